@@ -1,0 +1,97 @@
+// What every stage shares with the host: put in front of each stage's source.
+// src/gpu/layout.rs holds the twins; a test compares names, offsets and sizes.
+
+const MAX_LIGHTS: u32 = 16u;
+const WORKGROUP: u32 = 8u;
+
+struct Frame {
+    clip_from_world: mat4x4<f32>,
+    eye_world: vec3<f32>,
+    jitter_x: f32,
+    // Half the image plane at distance 1: right and up are scaled by the field of view.
+    right: vec3<f32>,
+    jitter_y: f32,
+    up: vec3<f32>,
+    sample_index: u32,
+    forward: vec3<f32>,
+    samples: u32,
+    zenith: vec3<f32>,
+    light_count: u32,
+    horizon: vec3<f32>,
+    p: f32,
+    ambient: vec3<f32>,
+    early_end: f32,
+    cells: vec3<i32>,
+    max_cells: u32,
+    image_width: f32,
+    image_height: f32,
+    // log₂e · α/65535 · (σ in 1/m, or τ): optical depth in bits per unit of ρ code (and metre).
+    extinction: f32,
+    texture_frame: u32,
+    exposure: f32,
+    filmic: u32,
+    // The part of the image in the targets: its first pixel and its size.
+    window_x: u32,
+    window_y: u32,
+    window_width: u32,
+    window_height: u32,
+    pad_0: u32,
+    pad_1: u32,
+}
+
+struct Light {
+    // Unit direction towards a directional light, or the position of a point light.
+    vector: vec3<f32>,
+    is_point: u32,
+    intensity: vec3<f32>,
+    pad: u32,
+}
+
+struct Lights {
+    list: array<Light, MAX_LIGHTS>,
+}
+
+struct Quad {
+    corners: array<vec4<f32>, 4>,
+    e1: vec3<f32>,
+    thickness: f32,
+    e2: vec3<f32>,
+    repeat_u: f32,
+    n: vec3<f32>,
+    repeat_v: f32,
+    // The eye relative to corner A, along e1, e2 and n.
+    eye_plane: vec3<f32>,
+    pad: u32,
+    e: vec2<f32>,
+    f: vec2<f32>,
+    g: vec2<f32>,
+    pad_g: vec2<f32>,
+}
+
+// The part of the window that one submission works on.
+struct Tile {
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+}
+
+fn cross2(a: vec2<f32>, b: vec2<f32>) -> f32 {
+    return a.x * b.y - a.y * b.x;
+}
+
+fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
+    return a.x * b.x + a.y * b.y;
+}
+
+// Camera::view_ray: unit direction through a pixel of the whole image.
+fn view_ray(frame: Frame, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
+    let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
+    let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;
+    let d = frame.forward + frame.right * x + frame.up * y;
+    return d / sqrt(dot3(d, d));
+}

@@ -1,0 +1,29 @@
+//! `taki devices`: the adapters.
+
+use super::terminal::say;
+use crate::error::Result;
+use crate::gpu::adapters;
+
+pub fn run() -> Result<()> {
+    let adapters = adapters();
+    if adapters.is_empty() {
+        say(
+            "no GPU adapter: rendering uses the CPU engine. A Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine.",
+        );
+    }
+    for adapter in adapters {
+        let (info, limits) = (adapter.get_info(), adapter.limits());
+        say(&format!(
+            "{} ({:?}, {:?}, driver {} {}): 3-D textures to {}, images to {}, timestamps {}",
+            info.name,
+            info.device_type,
+            info.backend,
+            info.driver,
+            info.driver_info,
+            limits.max_texture_dimension_3d,
+            limits.max_texture_dimension_2d,
+            if adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) { "yes" } else { "no" },
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,181 @@
+//! The command line: one file per subcommand.
+
+mod bench;
+mod compare;
+mod devices;
+mod render;
+mod scene;
+mod terminal;
+mod volume;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+use crate::error::{Error, Result};
+use crate::gpu::DeviceOptions;
+use crate::job::EngineChoice;
+use crate::scene::{DEFAULT_PRESET, Limits, Scene, presets};
+use terminal::{Terminal, say};
+
+const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \
+69 no adapter (only with --engine gpu) · 73 cannot create output · 74 I/O error · 75 device lost, try again · \
+124 the GPU did not answer · 130/143 interrupted · 101 a bug.";
+
+/// Renders matter too fine for geometry, gushing water first, as volume textures on the GPU.
+#[derive(Parser)]
+#[command(version, max_term_width = 100, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Renders one image.
+    Render(render::RenderArgs),
+    /// Checks a scene and prints it fully resolved.
+    Scene(scene::SceneArgs),
+    /// Builds a volume texture or prints its statistics.
+    Volume(volume::VolumeArgs),
+    /// Measures this machine: passes, engines, volumes, with the work each did.
+    Bench(bench::BenchArgs),
+    /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
+    Compare(compare::CompareArgs),
+    /// Lists the scenes that come with the program.
+    Presets,
+    /// Lists the GPU adapters of this machine.
+    Devices,
+    /// Prints completions for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// What every command that reads a scene takes.
+#[derive(Args, Clone)]
+struct SceneOptions {
+    /// A preset (see `taki presets`) or a scene file.
+    #[arg(default_value = DEFAULT_PRESET)]
+    scene: PathBuf,
+    /// Sets any parameter, such as `--set curves.h=1.4`; may be given often. The README's table lists
+    /// them all, and so does `taki scene`.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Seed of the volume's randomness: short for --set volume.seed=N.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Lets the scene refer to files in this folder too; may be given often.
+    #[arg(long = "allow-path", value_name = "DIR")]
+    allow_paths: Vec<PathBuf>,
+    /// Most memory the work may use, MiB. What needs more is refused before it starts.
+    #[arg(long, value_name = "MIB", default_value_t = 4096)]
+    memory: u64,
+}
+
+impl SceneOptions {
+    fn limits(&self) -> Limits {
+        Limits { allow_paths: self.allow_paths.clone(), memory: self.memory.saturating_mul(1 << 20) }
+    }
+
+    /// Loads the scene; `more` are settings of other options, which come last.
+    fn load(&self, more: &[String]) -> Result<Scene> {
+        let mut sets = self.sets.clone();
+        sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
+        sets.extend_from_slice(more);
+        Scene::load(&self.scene, &sets, &self.limits())
+    }
+}
+
+/// Which engine, on which device.
+#[derive(Args, Clone)]
+struct EngineOptions {
+    /// auto takes a GPU adapter if there is one, else the CPU.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineChoice,
+    /// Takes the adapter whose name contains this (see `taki devices`).
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Longest wait for one piece of GPU work, seconds; then the program ends with 124.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
+    watchdog: f64,
+}
+
+impl EngineOptions {
+    fn device(&self) -> DeviceOptions {
+        DeviceOptions { adapter: self.adapter.clone(), watchdog: Duration::from_secs_f64(self.watchdog) }
+    }
+}
+
+fn seconds(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
+        _ => Err("a number of seconds from 0 to 86400".into()),
+    }
+}
+
+/// `WIDTHxHEIGHT`.
+fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+    let parts = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    parts.ok_or_else(|| "WIDTHxHEIGHT in pixels, such as 1280x720".into())
+}
+
+/// Where a command writes when -o is not given: the scene's name in the current folder.
+fn default_output(scene: &Scene, extension: &str) -> PathBuf {
+    Path::new(&scene.name).with_extension(extension)
+}
+
+/// Runs the program; the exit code is the table's in the README.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Help and version go to stdout and are no error.
+            let text = e.render().to_string();
+            if e.use_stderr() {
+                terminal::complain_raw(&text)
+            } else {
+                say(text.trim_end())
+            }
+            return ExitCode::from(e.exit_code() as u8);
+        }
+    };
+    let terminal = Terminal::new();
+    let result = run(cli, &terminal);
+    terminal.close();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            terminal.error(&e);
+            if matches!(e, Error::Watchdog { .. }) {
+                // A hung driver would hang the device's destructor too.
+                std::process::exit(e.exit_code().into());
+            }
+            ExitCode::from(e.exit_code())
+        }
+    }
+}
+
+fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
+    match cli.command {
+        Command::Render(args) => render::run(&args, terminal),
+        Command::Scene(args) => scene::run(&args),
+        Command::Volume(args) => volume::run(&args, terminal),
+        Command::Bench(args) => bench::run(&args, terminal),
+        Command::Compare(args) => compare::run(&args),
+        Command::Devices => devices::run(),
+        Command::Presets => {
+            presets().for_each(|(name, what)| say(&format!("{name:<12} {what}")));
+            Ok(())
+        }
+        Command::Completions { shell } => {
+            let mut bytes = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "taki", &mut bytes);
+            say(String::from_utf8_lossy(&bytes).trim_end());
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! `taki volume`: the volume texture as NumPy arrays.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::terminal::{Terminal, say};
+use super::{SceneOptions, default_output};
+use crate::error::{Error, Result};
+use crate::frame::Output;
+use crate::job::Monitor;
+use crate::volume::{Statistics, read_npz, write_npz};
+
+#[derive(Args)]
+pub struct VolumeArgs {
+    #[command(subcommand)]
+    command: VolumeCommand,
+}
+
+#[derive(Subcommand)]
+enum VolumeCommand {
+    /// Builds a scene's volume texture and writes it as .npz: rho, v, k, alpha.
+    Build {
+        #[command(flatten)]
+        scene: SceneOptions,
+        /// The file. Default: the scene's name with .npz, in the current folder.
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+    /// Prints statistics of a volume file.
+    Info {
+        /// The .npz file.
+        file: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+        /// Most memory the volume may use, MiB.
+        #[arg(long, value_name = "MIB", default_value_t = 4096)]
+        memory: u64,
+    },
+}
+
+pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
+    match &args.command {
+        VolumeCommand::Build { scene: options, output } => {
+            let scene = options.load(&[])?;
+            let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
+            let mut out = Output::create(&path)?;
+            let volume = scene.volume(options.limits().memory, terminal)?;
+            terminal.progress("saving", 0, 1)?;
+            let writer = std::io::BufWriter::with_capacity(1 << 20, out.file());
+            write_npz(&volume, writer).map_err(|e| Error::write(&path, e))?;
+            out.finish()?;
+            terminal.close();
+            let [nx, ny, nz] = volume.size;
+            terminal.note(&format!("taki: wrote {} ({nx}×{ny}×{nz} cells)", path.display()));
+            Ok(())
+        }
+        VolumeCommand::Info { file, json, memory } => {
+            let statistics = read_npz(file, memory.saturating_mul(1 << 20))?.statistics();
+            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
+            Ok(())
+        }
+    }
+}
+
+fn in_words(s: &Statistics) -> String {
+    let [nx, ny, nz] = s.size;
+    let percent = |x: f64| format!("{:.2} %", 100.0 * x);
+    let share = |n: u64| percent(n as f64 / s.cells.max(1) as f64);
+    [
+        format!(
+            "size            {nx} × {ny} × {nz} cells, {} packed",
+            crate::error::human_bytes(s.bytes.into())
+        ),
+        format!("flow cells      {} ({} of all)", s.flow_cells, share(s.flow_cells)),
+        format!("occupied cells  {} ({} of all)", s.occupied_cells, share(s.occupied_cells)),
+        format!("alpha           {}", s.alpha),
+        "over the flow cells (theory for a built volume in brackets):".into(),
+        format!("  mean rho      {:.4} (alpha/2 = {:.4})", s.rho_mean, s.alpha / 2.0),
+        format!("  rho = 0       {} (30.85 %)", percent(s.rho_share_at_zero)),
+        format!("  rho = alpha   {} (30.85 %)", percent(s.rho_share_at_alpha)),
+        format!("  mean k_d, k_s {:.4}, {:.4}", s.k_d_mean, s.k_s_mean),
+        format!("  mean v        ({:.4}, {:.4}, {:.4})", s.v_mean[0], s.v_mean[1], s.v_mean[2]),
+    ]
+    .join("\n")
+}

@@ -1,0 +1,269 @@
+//! §3 The raster pass on the CPU. Twin: `shaders/gbuffer.wgsl`, with the fill rule of a GPU
+//! (corners snapped to 1/256 pixel, top-left rule), so that the two cover the same pixels.
+
+use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+use crate::camera::sample_offset;
+use crate::scene::{Light, Mesh, Quad, Scene};
+
+/// The targets of one sample.
+pub struct Gbuffer {
+    /// Radiance of the opaque scene or background, and metres from the eye (0: background).
+    pub opaque: Vec<[f32; 4]>,
+    /// Its normal.
+    pub normal: Vec<Vec3>,
+    /// u, v, metres from the eye.
+    pub surface: Vec<[f32; 3]>,
+    /// Quad number plus 1; 0: none.
+    pub quad_id: Vec<u32>,
+}
+
+/// A triangle in pixels, clipped at the near plane.
+struct ScreenTriangle {
+    x: [f64; 3],
+    y: [f64; 3],
+    inverse_w: [f64; 3],
+    /// Each corner as weights of the corners before clipping.
+    weights: [Vec3; 3],
+    id: u32,
+}
+
+/// What covers a pixel: depth (reversed, 0 is far), and the triangle's place in the list plus 1.
+type Covered = (f32, u32);
+
+/// Fills the targets with sample `sample`.
+pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
+    let image = &scene.image;
+    let (width, height) = (image.width as usize, image.height as usize);
+    let offset = sample_offset(sample, image.samples);
+    let clip_from_world = scene.camera.clip_from_world(image.width, image.height, offset);
+    let near = scene.camera.near as f64;
+    let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {
+        let clip = corners.map(|p| clip_from_world * p.extend(1.0));
+        clip_near(clip, scene.camera.near, |part| out.push(to_screen(part, width, height, id)));
+    };
+    let mut rock = Vec::new();
+    for (i, t) in mesh.indices.chunks_exact(3).enumerate() {
+        project(
+            [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position)),
+            i as u32,
+            &mut rock,
+        );
+    }
+    let mut water = Vec::new();
+    for (i, quad) in scene.quads.iter().enumerate() {
+        let [a, b, c, d] = quad.corners;
+        project([a, b, c], i as u32, &mut water);
+        project([a, c, d], i as u32, &mut water);
+    }
+
+    let eye_plane: Vec<Vec3> = scene.quads.iter().map(|q| eye_in_plane(q, scene.camera.eye)).collect();
+    let mut out = Gbuffer {
+        opaque: vec![[0.0; 4]; width * height],
+        normal: vec![Vec3::ZERO; width * height],
+        surface: vec![[0.0; 3]; width * height],
+        quad_id: vec![0; width * height],
+    };
+    let rows = 16.min(height);
+    let band = rows * width;
+    out.opaque
+        .par_chunks_mut(band)
+        .zip(out.normal.par_chunks_mut(band))
+        .zip(out.surface.par_chunks_mut(band))
+        .zip(out.quad_id.par_chunks_mut(band))
+        .enumerate()
+        .for_each(|(i, (((opaque, normal), surface), quad_id))| {
+            let first_row = i * rows;
+            let ray = |k: usize| {
+                let pixel = [(k % width) as u32, (first_row + k / width) as u32];
+                scene.camera.view_ray(image.width, image.height, pixel, offset)
+            };
+            let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
+            rasterise(&rock, near, width, first_row, &mut covered);
+            for (k, &(_, id)) in covered.iter().enumerate() {
+                if id == 0 {
+                    opaque[k] = scene.background.radiance(ray(k)).extend(0.0).to_array();
+                } else {
+                    let triangle = &rock[id as usize - 1];
+                    let pixel = [(k % width) as f64 + 0.5, (first_row + k / width) as f64 + 0.5];
+                    let corner = mesh.indices[3 * triangle.id as usize..][..3]
+                        .iter()
+                        .map(|&v| mesh.vertices[v as usize]);
+                    let corner: Vec<_> = corner.collect();
+                    let weights = triangle.weights_at(pixel).to_array();
+                    let mix = |get: fn(&crate::scene::Vertex) -> [f32; 3]| {
+                        (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
+                    };
+                    let (radiance, n) =
+                        shade_opaque(scene, mix(|v| v.position), mix(|v| v.normal), mix(|v| v.albedo));
+                    opaque[k] = radiance;
+                    normal[k] = n;
+                }
+            }
+            covered.iter_mut().for_each(|c| c.1 = 0);
+            rasterise(&water, near, width, first_row, &mut covered);
+            for (k, &(_, id)) in covered.iter().enumerate() {
+                if id != 0 {
+                    let quad = water[id as usize - 1].id;
+                    quad_id[k] = quad + 1;
+                    surface[k] = map_quad(&scene.quads[quad as usize], eye_plane[quad as usize], ray(k));
+                }
+            }
+        });
+    out
+}
+
+/// The eye relative to corner A along e1, e2 and n, subtracted in float64.
+pub fn eye_in_plane(quad: &Quad, eye: Vec3) -> Vec3 {
+    let away = eye.as_dvec3() - quad.map.a_world.as_dvec3();
+    Vec3::from_array(
+        [quad.map.e1_world, quad.map.e2_world, quad.map.n_world].map(|axis| away.dot(axis.as_dvec3()) as f32),
+    )
+}
+
+/// Where the ray `d` meets a quad: u, v and metres. Twin: `volume_fragment`.
+pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
+    let map = &quad.map;
+    let d_n = d.dot(map.n_world);
+    let d_n = if d_n.abs() < 1e-20 { 1e-20 } else { d_n };
+    let t = (-eye_plane.z / d_n).clamp(0.0, 1e9);
+    let hh = eye_plane.truncate() + Vec2::new(d.dot(map.e1_world), d.dot(map.e2_world)) * t;
+    let uv = map.uv(hh);
+    [uv.x, uv.y, t]
+}
+
+/// Lambert, two-sided: (radiance and metres from the eye, normal). Twin: `opaque_fragment`.
+fn shade_opaque(scene: &Scene, position: Vec3, normal: Vec3, albedo: Vec3) -> ([f32; 4], Vec3) {
+    let to_eye = scene.camera.eye - position;
+    let distance = to_eye.dot(to_eye).sqrt();
+    let mut n = normal / normal.dot(normal).max(1e-30).sqrt();
+    if n.dot(to_eye) < 0.0 {
+        n = -n;
+    }
+    let mut irradiance = scene.ambient;
+    for light in &scene.lights {
+        let (to_light, intensity) = light.at(position);
+        irradiance += intensity * n.dot(to_light).max(0.0);
+    }
+    ((albedo * irradiance).extend(distance).to_array(), n)
+}
+
+impl Light {
+    /// Unit direction from a point to the light, and I there.
+    pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {
+        match *self {
+            Light::Directional { to_light, intensity } => (to_light, intensity),
+            Light::Point { position, intensity } => {
+                let away = position - point;
+                let d2 = away.dot(away).max(1e-12);
+                (away / d2.sqrt(), intensity * (1.0 / d2))
+            }
+        }
+    }
+}
+
+/// Cuts a triangle at w = near and gives each part as corners with weights of the original three.
+fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3); 3])) {
+    let corners = [(clip[0], Vec3::X), (clip[1], Vec3::Y), (clip[2], Vec3::Z)];
+    let mut polygon: Vec<(Vec4, Vec3)> = Vec::with_capacity(4);
+    for i in 0..3 {
+        let (a, b) = (corners[i], corners[(i + 1) % 3]);
+        let (inside_a, inside_b) = (a.0.w >= near, b.0.w >= near);
+        if inside_a {
+            polygon.push(a);
+        }
+        if inside_a != inside_b {
+            let s = (near - a.0.w) / (b.0.w - a.0.w);
+            let mut cut = a.0.lerp(b.0, s);
+            cut.w = near;
+            polygon.push((cut, a.1.lerp(b.1, s)));
+        }
+    }
+    for i in 2..polygon.len() {
+        part([polygon[0], polygon[i - 1], polygon[i]]);
+    }
+}
+
+fn to_screen(part: [(Vec4, Vec3); 3], width: usize, height: usize, id: u32) -> ScreenTriangle {
+    // Far outside the image snapping has no meaning and would lose the fraction's bits.
+    let snap = |x: f64| (x.clamp(-1e9, 1e9) * 256.0).round() / 256.0;
+    let mut t = ScreenTriangle {
+        x: part.map(|(c, _)| snap((c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64)),
+        y: part.map(|(c, _)| snap((0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64)),
+        inverse_w: part.map(|(c, _)| 1.0 / c.w as f64),
+        weights: part.map(|(_, w)| w),
+        id,
+    };
+    if t.area() < 0.0 {
+        t.x.swap(1, 2);
+        t.y.swap(1, 2);
+        t.inverse_w.swap(1, 2);
+        t.weights.swap(1, 2);
+    }
+    t
+}
+
+impl ScreenTriangle {
+    fn edge(&self, i: usize, p: [f64; 2]) -> f64 {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        (self.x[b] - self.x[a]) * (p[1] - self.y[a]) - (self.y[b] - self.y[a]) * (p[0] - self.x[a])
+    }
+
+    fn area(&self) -> f64 {
+        self.edge(2, [self.x[2], self.y[2]])
+    }
+
+    /// Whether a point on edge i belongs to this triangle: it does on top and left edges.
+    fn owns_edge(&self, i: usize) -> bool {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        let (dx, dy) = (self.x[b] - self.x[a], self.y[b] - self.y[a]);
+        dy < 0.0 || (dy == 0.0 && dx > 0.0)
+    }
+
+    /// Perspective-correct weights of the original corners at a pixel position.
+    fn weights_at(&self, p: [f64; 2]) -> Vec3 {
+        let w = [0, 1, 2].map(|i| self.edge(i, p) * self.inverse_w[i]);
+        let sum: f64 = w.iter().sum();
+        (0..3).map(|i| self.weights[i] * (w[i] / sum) as f32).sum()
+    }
+}
+
+/// Draws triangles into the rows from `first_row` on that `covered` holds; nearer ones win, the first
+/// of equals stays.
+fn rasterise(
+    triangles: &[ScreenTriangle],
+    near: f64,
+    width: usize,
+    first_row: usize,
+    covered: &mut [Covered],
+) {
+    let rows = covered.len() / width;
+    for (number, t) in triangles.iter().enumerate() {
+        let area = t.area();
+        if !(area > 0.0) {
+            continue;
+        }
+        let low = |v: [f64; 3]| (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(0.0);
+        let high = |v: [f64; 3]| (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
+        let y0 = (low(t.y) as usize).max(first_row);
+        let y1 = (high(t.y).max(0.0) as usize).min(first_row + rows);
+        let x0 = low(t.x) as usize;
+        let x1 = (high(t.x).max(0.0) as usize).min(width);
+        let owns = [0, 1, 2].map(|i| t.owns_edge(i));
+        for y in y0..y1 {
+            for x in x0..x1 {
+                let p = [x as f64 + 0.5, y as f64 + 0.5];
+                let e = [0, 1, 2].map(|i| t.edge(i, p));
+                if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
+                    let inverse_w = (0..3).map(|i| e[i] * t.inverse_w[i]).sum::<f64>() / area;
+                    let depth = (near * inverse_w) as f32;
+                    let slot = &mut covered[(y - first_row) * width + x];
+                    if depth > slot.0 {
+                        *slot = (depth, number as u32 + 1);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! §4 and §5 on the CPU. Twin: `shaders/integrate.wgsl`, the same operations in the same order.
+
+use glam::{IVec3, Vec2, Vec3};
+
+use super::gbuffer::Gbuffer;
+use crate::camera::sample_offset;
+use crate::gpu::layout::extinction;
+use crate::mapping::CellFrame;
+use crate::scene::{AngleFrame, Attenuation, Scene, Visibility};
+use crate::shading::{Metric, fibre_angles, specular_power};
+use crate::volume::{Cell, VolumeTexture};
+use crate::walk::Walk;
+
+/// What all pixels of a frame share.
+pub struct Integrator<'a> {
+    scene: &'a Scene,
+    volume: &'a VolumeTexture,
+    size: IVec3,
+    extinction: f32,
+    per_cell: bool,
+}
+
+/// What one ray brings home.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Traced {
+    /// Radiance towards the eye, what is behind included.
+    pub radiance: Vec3,
+    /// T at the end of the walk.
+    pub transmittance: f32,
+    /// Cells of the view ray and of its light rays.
+    pub cells: [u32; 2],
+}
+
+/// One light as a ray sees it.
+#[derive(Clone, Copy)]
+struct RayLight {
+    /// Jᵀl, or J⁻¹l normalised.
+    l_v: Vec3,
+    /// J⁻¹l.
+    l_cell: Vec3,
+    intensity: Vec3,
+    sum: f32,
+}
+
+impl<'a> Integrator<'a> {
+    /// For a scene and its volume.
+    pub fn new(scene: &'a Scene, volume: &'a VolumeTexture) -> Self {
+        Integrator {
+            scene,
+            volume,
+            size: IVec3::from_array(volume.size.map(|n| n as i32)),
+            extinction: extinction(&scene.trace.attenuation, volume.alpha),
+            per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
+        }
+    }
+
+    /// One pixel (column, row) of sample `sample`.
+    pub fn pixel(&self, gbuffer: &Gbuffer, pixel: [u32; 2], sample: u32) -> Traced {
+        let image = &self.scene.image;
+        let i = pixel[1] as usize * image.width as usize + pixel[0] as usize;
+        let behind = Vec3::from_slice(&gbuffer.opaque[i]);
+        match gbuffer.quad_id[i] {
+            0 => Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] },
+            id => {
+                let d = self.scene.camera.view_ray(
+                    image.width,
+                    image.height,
+                    pixel,
+                    sample_offset(sample, image.samples),
+                );
+                self.trace(id as usize - 1, d, gbuffer.surface[i], behind)
+            }
+        }
+    }
+
+    /// Walks the volume of quad number `quad` from its point `hit` = (u, v, metres) along the world
+    /// direction `d_world`.
+    pub fn trace(&self, quad: usize, d_world: Vec3, hit: [f32; 3], behind: Vec3) -> Traced {
+        let scene = self.scene;
+        let quad = &scene.quads[quad];
+        let map = &quad.map;
+        let cells = self.size.as_vec3();
+        let frame = CellFrame::new(map, &quad.material, self.volume.size, Vec2::new(hit[0], hit[1]));
+
+        let d_n = d_world.dot(map.n_world);
+        let side = if d_n > 0.0 { -1.0 } else { 1.0 };
+        let plane = |w: Vec3, n: f32| Vec3::new(w.dot(map.e1_world), w.dot(map.e2_world), n);
+        let d = plane(d_world, (d_n * side).min(-1e-6));
+        let d_cell = frame.cell_from_plane(d);
+
+        let texture_frame = scene.frame == AngleFrame::Texture;
+        let mut metric = Metric {
+            m: [
+                frame.cx.dot(frame.cx),
+                2.0 * frame.cx.dot(frame.cy),
+                frame.cy.dot(frame.cy),
+                frame.depth * frame.depth,
+            ],
+        };
+        let mut e_v = -frame.transposed(d);
+        if texture_frame {
+            metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
+            e_v = -d_cell / d_cell.dot(d_cell).sqrt();
+        }
+        let point = scene.camera.eye + d_world * hit[2];
+        let mut lights: Vec<RayLight> = scene
+            .lights
+            .iter()
+            .map(|light| {
+                let (to_light, intensity) = light.at(point);
+                let l = plane(to_light, to_light.dot(map.n_world) * side);
+                let l_cell = frame.cell_from_plane(l);
+                let l_v =
+                    if texture_frame { l_cell / l_cell.dot(l_cell).sqrt() } else { frame.transposed(l) };
+                RayLight { l_v, l_cell, intensity, sum: 0.0 }
+            })
+            .collect();
+
+        let x = hit[0] * quad.material.repeat_u * cells.x;
+        let y = hit[1] * quad.material.repeat_v * cells.y;
+        let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
+        let mut transmittance = 1.0f32;
+        let mut walked = [0u32; 2];
+        for crossing in
+            Walk::new(self.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
+        {
+            if crossing.cell.z >= self.size.z || transmittance < scene.trace.early_end {
+                break;
+            }
+            walked[0] += 1;
+            let cell = self.cell(crossing.cell);
+            if cell.rho_code() == 0 {
+                continue;
+            }
+            let mut tau_bits = cell.rho_code() as f32 * self.extinction;
+            if !self.per_cell {
+                tau_bits *= crossing.t_exit - crossing.t_enter;
+            }
+            let passed = transmittance * (-tau_bits).exp2();
+            let weight = transmittance - passed;
+
+            let (k_d, k_s) = cell.k_codes();
+            let v = cell.v_code();
+            let inverse_q = 1.0 / metric.squared(v).max(1e-30);
+            let t_dot_e = v.dot(e_v);
+            for light in &mut lights {
+                let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
+                let psi = k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p);
+                let seen = match scene.visibility {
+                    Visibility::None => 1.0,
+                    Visibility::March => self.visibility(crossing.cell, light.l_cell, &mut walked[1]),
+                };
+                light.sum += weight * seen * psi;
+            }
+            transmittance = passed;
+        }
+
+        let mut radiance = scene.ambient * (1.0 - transmittance) + behind * transmittance;
+        for light in &lights {
+            radiance += light.intensity * (light.sum * (1.0 / 255.0));
+        }
+        Traced { radiance, transmittance, cells: walked }
+    }
+
+    /// V_i(k): from the middle of `start` to where the light ray leaves the slab. With per-cell
+    /// attenuation the cell itself does not hide its own light.
+    fn visibility(&self, start: IVec3, direction: Vec3, light_cells: &mut u32) -> f32 {
+        let mut depth = 0.0f32;
+        let walk = Walk::new(self.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
+        for (n, crossing) in walk.take(self.scene.trace.max_cells as usize).enumerate() {
+            if crossing.cell.z < 0 || crossing.cell.z >= self.size.z {
+                break;
+            }
+            *light_cells += 1;
+            let rho = self.cell(crossing.cell).rho_code() as f32;
+            if self.per_cell {
+                depth += if n == 0 { 0.0 } else { rho };
+            } else {
+                depth += rho * (crossing.t_exit - crossing.t_enter);
+            }
+        }
+        (-depth * self.extinction).exp2()
+    }
+
+    #[inline]
+    fn cell(&self, c: IVec3) -> Cell {
+        self.volume.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
+    }
+}

@@ -1,0 +1,144 @@
+//! One error type; every variant says what happened and what the user can do.
+
+use std::path::{Path, PathBuf};
+
+/// Everything that can end a command. The text is one line: what happened, then what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A comparison found more difference than its threshold allows.
+    #[error("{0}")]
+    Comparison(String),
+    /// The command line cannot be understood.
+    #[error("{0}")]
+    Usage(String),
+    /// The work would need more memory than its budget, or the device had none left.
+    #[error("{what} needs {need}, the budget is {budget}; {fix}")]
+    Memory {
+        /// What needs the memory, with the values that make its size.
+        what: String,
+        /// Bytes needed, for people.
+        need: String,
+        /// Bytes allowed, for people.
+        budget: String,
+        /// What to do.
+        fix: String,
+    },
+    /// A scene, parameter, volume or image is not valid.
+    #[error("{what}; {fix}")]
+    Input {
+        /// The fault with its file, line or byte, key and value.
+        what: String,
+        /// What to do.
+        fix: String,
+    },
+    /// `--engine gpu` was asked for and no adapter can do the work.
+    #[error("{0}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu")]
+    NoAdapter(String),
+    /// An output cannot be created. Known before any work is done.
+    #[error("cannot create {}: {why}; {fix}", path.display())]
+    CannotCreate {
+        /// The output.
+        path: PathBuf,
+        /// Why not.
+        why: String,
+        /// What to do.
+        fix: String,
+    },
+    /// Reading or writing failed half-way.
+    #[error("{what} {}: {why}; {fix}", path.display())]
+    Io {
+        /// `cannot write` or `cannot read`.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's word for it.
+        why: String,
+        /// What to do.
+        fix: &'static str,
+    },
+    /// The device was lost: trying again may help.
+    #[error("the GPU device was lost: {0}; run the command again, or use --engine cpu")]
+    DeviceLost(String),
+    /// A submission did not finish in time.
+    #[error(
+        "the GPU did not answer for {seconds} s; raise --watchdog, lower the image size, or use --engine cpu"
+    )]
+    Watchdog {
+        /// The time-out that passed.
+        seconds: f64,
+    },
+    /// The user or the system asked the program to end.
+    #[error("interrupted: no output was written; run the same command again to make it")]
+    Interrupted {
+        /// 130 after SIGINT, 143 after SIGTERM.
+        code: u8,
+    },
+}
+
+/// The crate's result.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A fault in what the user gave.
+    pub fn input(what: impl Into<String>, fix: impl Into<String>) -> Self {
+        Error::Input { what: what.into(), fix: fix.into() }
+    }
+
+    /// More memory than allowed. `need` and `budget` in bytes.
+    pub fn memory(what: impl Into<String>, need: u128, budget: u64, fix: impl Into<String>) -> Self {
+        Error::Memory {
+            what: what.into(),
+            need: human_bytes(need),
+            budget: human_bytes(budget as u128),
+            fix: fix.into(),
+        }
+    }
+
+    /// A failed read; exit code 74.
+    pub fn read(path: &Path, why: impl ToString) -> Self {
+        Error::Io {
+            what: "cannot read",
+            path: path.to_owned(),
+            why: why.to_string(),
+            fix: "check that the file exists and may be read",
+        }
+    }
+
+    /// A failed write; exit code 74.
+    pub fn write(path: &Path, why: impl ToString) -> Self {
+        Error::Io {
+            what: "cannot write",
+            path: path.to_owned(),
+            why: why.to_string(),
+            fix: "free some space or choose another place with -o",
+        }
+    }
+
+    /// The exit code of the process, as listed in the README.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Comparison(_) => 1,
+            Error::Usage(_) => 2,
+            Error::Memory { .. } => 33,
+            Error::Input { .. } => 65,
+            Error::NoAdapter(_) => 69,
+            Error::CannotCreate { .. } => 73,
+            Error::Io { .. } => 74,
+            Error::DeviceLost(_) => 75,
+            Error::Watchdog { .. } => 124,
+            Error::Interrupted { code } => *code,
+        }
+    }
+}
+
+/// Bytes in binary units with one decimal.
+pub fn human_bytes(bytes: u128) -> String {
+    const UNITS: [&str; 7] = ["B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
+    let mut value = bytes as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", UNITS[unit]) }
+}

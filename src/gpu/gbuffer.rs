@@ -1,0 +1,209 @@
+//! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
+
+use super::device::Gpu;
+use super::layout::{Frame, Window};
+use super::shader;
+use super::timing::Timer;
+use super::upload::Uploaded;
+use crate::error::Result;
+use crate::scene::{Scene, Vertex};
+
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// The targets of one window.
+pub struct Targets {
+    /// Radiance of the opaque scene or the background; metres from the eye (0: background).
+    pub opaque: wgpu::Texture,
+    /// Normal of the opaque scene (0: background).
+    pub normal: wgpu::Texture,
+    /// u, v and metres from the eye of the nearest volume quad.
+    pub surface: wgpu::Texture,
+    /// Its number plus 1; 0: none.
+    pub quad_id: wgpu::Texture,
+    depth: wgpu::TextureView,
+}
+
+/// Bytes of [`Targets`] a pixel.
+pub const TARGET_BYTES: u64 = 16 + 16 + 16 + 4 + 4;
+
+impl Targets {
+    /// Targets for a window of `width` × `height` pixels.
+    pub fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
+        let texture = |label, format, usage| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        Targets {
+            opaque: texture("opaque radiance", FLOATS, read),
+            normal: texture("opaque normal", FLOATS, wgpu::TextureUsages::COPY_SRC),
+            surface: texture("surface", FLOATS, read),
+            quad_id: texture("quad id", wgpu::TextureFormat::R32Uint, read),
+            depth: texture("depth", DEPTH, wgpu::TextureUsages::empty()).create_view(&Default::default()),
+        }
+    }
+}
+
+/// The pass: two pipelines.
+pub struct Gbuffer {
+    background: wgpu::RenderPipeline,
+    opaque: wgpu::RenderPipeline,
+    volume: wgpu::RenderPipeline,
+}
+
+impl Gbuffer {
+    /// Compiles the pipelines.
+    pub fn new(gpu: &Gpu) -> Self {
+        let module = shader(gpu, "gbuffer", include_str!("../../shaders/gbuffer.wgsl"));
+        let target =
+            |format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
+        let pipeline = |name: &str,
+                        buffers: &[Option<wgpu::VertexBufferLayout>],
+                        targets: &[Option<wgpu::ColorTargetState>],
+                        compare| {
+            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(name),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(&format!("{name}_vertex")),
+                    compilation_options: Default::default(),
+                    buffers,
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(compare),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(&format!("{name}_fragment")),
+                    compilation_options: Default::default(),
+                    targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
+        let vertices = wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &attributes,
+        };
+        let opaque_targets = [target(FLOATS), target(FLOATS)];
+        Gbuffer {
+            background: pipeline("background", &[], &opaque_targets, wgpu::CompareFunction::Always),
+            opaque: pipeline("opaque", &[Some(vertices)], &opaque_targets, wgpu::CompareFunction::Greater),
+            volume: pipeline(
+                "volume",
+                &[],
+                &[target(FLOATS), target(wgpu::TextureFormat::R32Uint)],
+                wgpu::CompareFunction::Greater,
+            ),
+        }
+    }
+
+    /// Fills `targets` with one sample of a window; seconds on the device.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        timer: &Timer,
+        scene: &Scene,
+        up: &Uploaded,
+        targets: &Targets,
+        window: Window,
+        frame: &Frame,
+    ) -> Result<f64> {
+        let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, &wgpu::Buffer)]| {
+            let entries: Vec<_> = entries
+                .iter()
+                .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: buffer.as_entire_binding(),
+                })
+                .collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("gbuffer"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            })
+        };
+        let sky = bind(&self.background, &[(0, &uniform)]);
+        let rock = bind(&self.opaque, &[(0, &uniform), (1, &up.lights)]);
+        let water = bind(&self.volume, &[(0, &uniform), (2, &up.quads)]);
+        let views = [&targets.opaque, &targets.normal, &targets.surface, &targets.quad_id]
+            .map(|t| t.create_view(&Default::default()));
+        let cleared = |view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                resolve_target: None,
+                depth_slice: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })
+        };
+        let depth = |load| wgpu::RenderPassDepthStencilAttachment {
+            view: &targets.depth,
+            depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        };
+        // The whole image is the viewport wherever the window lies, so that edges fall on the same
+        // pixels for every division into windows.
+        let image = &scene.image;
+        let place = |pass: &mut wgpu::RenderPass| {
+            let (x, y) = (-(window.x as f32), -(window.y as f32));
+            pass.set_viewport(x, y, image.width as f32, image.height as f32, 0.0, 1.0);
+        };
+        timer.run(gpu, "gbuffer", |encoder, span| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("gbuffer opaque"),
+                color_attachments: &[cleared(&views[0]), cleared(&views[1])],
+                depth_stencil_attachment: Some(depth(wgpu::LoadOp::Clear(0.0))),
+                timestamp_writes: span.render(true, false),
+                ..Default::default()
+            });
+            place(&mut pass);
+            pass.set_pipeline(&self.background);
+            pass.set_bind_group(0, &sky, &[]);
+            pass.draw(0..3, 0..1);
+            if up.index_count > 0 {
+                pass.set_pipeline(&self.opaque);
+                pass.set_bind_group(0, &rock, &[]);
+                pass.set_vertex_buffer(0, up.vertices.slice(..));
+                pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
+                pass.draw_indexed(0..up.index_count, 0, 0..1);
+            }
+            drop(pass);
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("gbuffer volume"),
+                color_attachments: &[cleared(&views[2]), cleared(&views[3])],
+                depth_stencil_attachment: Some(depth(wgpu::LoadOp::Load)),
+                timestamp_writes: span.render(false, true),
+                ..Default::default()
+            });
+            place(&mut pass);
+            if up.quad_count > 0 {
+                pass.set_pipeline(&self.volume);
+                pass.set_bind_group(0, &water, &[]);
+                pass.draw(0..6, 0..up.quad_count);
+            }
+        })
+    }
+}

@@ -1,0 +1,197 @@
+//! §4 and §5: the compute pass that walks the volume under each pixel.
+
+use super::device::Gpu;
+use super::gbuffer::Targets;
+use super::layout::{Frame, Tile, Window};
+use super::shader;
+use super::timing::Timer;
+use super::upload::Uploaded;
+use crate::error::Result;
+use crate::scene::{Attenuation, Scene, Visibility};
+use crate::shading::whole_exponent;
+
+/// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
+/// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
+const TILE_SECONDS: f64 = 0.03;
+/// Pixels of the first tile, when nothing is known about the scene's cost. With every pixel at the
+/// cap of 512 cells and a full light walk from each, software Vulkan takes about a second for it.
+const FIRST_TILE_PIXELS: u64 = 1024;
+/// A tile grows at most this much over the one before.
+const TILE_GROWTH: f64 = 4.0;
+
+/// What the pipeline is specialised to (`override` constants of the shader).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    lights: u32,
+    per_cell: bool,
+    march: bool,
+    exponent: u32,
+}
+
+impl Variant {
+    /// For a scene.
+    pub fn of(scene: &Scene) -> Self {
+        Variant {
+            lights: scene.lights.len() as u32,
+            per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
+            march: scene.visibility == Visibility::March,
+            exponent: whole_exponent(scene.p).unwrap_or(0),
+        }
+    }
+}
+
+/// Sums over samples, per pixel of a window.
+pub struct Sums {
+    /// Radiance rgb and transmittance, `vec4<f32>`.
+    pub radiance: wgpu::Buffer,
+    /// Cells of view rays and of light rays, `vec2<u32>`.
+    pub counts: wgpu::Buffer,
+}
+
+/// Bytes of [`Sums`] a pixel.
+pub const SUM_BYTES: u64 = 16 + 8;
+
+impl Sums {
+    /// Sums for `pixels` pixels.
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        Sums {
+            radiance: gpu.buffer("radiance", pixels * 16, usage),
+            counts: gpu.buffer("counts", pixels * 8, usage),
+        }
+    }
+}
+
+/// The pass: one specialised pipeline.
+pub struct Integrate {
+    pipeline: wgpu::ComputePipeline,
+    /// What it is specialised to.
+    pub variant: Variant,
+}
+
+/// Chooses tile sizes from the time the last one took. The picture does not depend on them.
+pub struct Tiler {
+    pixels: f64,
+    fixed: bool,
+}
+
+impl Tiler {
+    /// Learns the size; with `fixed` every tile has about that many pixels.
+    pub fn new(fixed: Option<u32>) -> Self {
+        Tiler { pixels: fixed.map_or(FIRST_TILE_PIXELS as f64, f64::from), fixed: fixed.is_some() }
+    }
+
+    /// Rows at full width when there are enough pixels for several, else a part of one band.
+    fn next(&self, window: Window, x: u32, y: u32) -> Tile {
+        let pixels = self.pixels.max(1.0) as u64;
+        let rows = (pixels / window.width as u64).min((window.height - y) as u64) as u32;
+        if x == 0 && rows >= super::layout::WORKGROUP {
+            let rows = rows - rows % super::layout::WORKGROUP;
+            return Tile { x: 0, y, width: window.width, height: rows };
+        }
+        let height = super::layout::WORKGROUP.min(window.height - y);
+        let width = (pixels / height as u64).clamp(1, (window.width - x) as u64) as u32;
+        Tile { x, y, width, height }
+    }
+
+    fn learn(&mut self, tile: Tile, seconds: f64) {
+        if !self.fixed {
+            let pixels = tile.width as f64 * tile.height as f64;
+            let wanted = pixels * TILE_SECONDS / seconds.max(1e-6);
+            self.pixels = wanted.clamp(64.0, pixels.max(self.pixels) * TILE_GROWTH);
+        }
+    }
+}
+
+impl Integrate {
+    /// Compiles the pipeline for one variant.
+    pub fn new(gpu: &Gpu, variant: Variant) -> Self {
+        let module = shader(gpu, "integrate", include_str!("../../shaders/integrate.wgsl"));
+        let constants = [
+            ("LIGHTS", variant.lights as f64),
+            ("PER_CELL", f64::from(u8::from(variant.per_cell))),
+            ("MARCH", f64::from(u8::from(variant.march))),
+            ("EXPONENT", variant.exponent as f64),
+        ];
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("integrate"),
+            layout: None,
+            module: &module,
+            entry_point: Some("integrate"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Integrate { pipeline, variant }
+    }
+
+    /// Adds one sample of a window to `sums`, tile by tile; seconds on the device. `between` is called
+    /// after each tile with the pixels done so far, and may stop the work.
+    #[allow(clippy::too_many_arguments)] // Each is one input of the stage; a struct would only rename them.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        timer: &Timer,
+        tiler: &mut Tiler,
+        up: &Uploaded,
+        targets: &Targets,
+        sums: &Sums,
+        window: Window,
+        frame: &Frame,
+        mut between: impl FnMut(u64) -> Result<()>,
+    ) -> Result<f64> {
+        let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let (surface, quad_id, opaque) =
+            (view(&targets.surface), view(&targets.quad_id), view(&targets.opaque));
+        let mut entries = vec![
+            entry(0, uniform.as_entire_binding()),
+            entry(2, up.quads.as_entire_binding()),
+            entry(3, tile_buffer.as_entire_binding()),
+            entry(4, wgpu::BindingResource::TextureView(&up.volume)),
+            entry(5, wgpu::BindingResource::TextureView(&surface)),
+            entry(6, wgpu::BindingResource::TextureView(&quad_id)),
+            entry(7, wgpu::BindingResource::TextureView(&opaque)),
+            entry(8, sums.radiance.as_entire_binding()),
+            entry(9, sums.counts.as_entire_binding()),
+        ];
+        entries.push(entry(1, up.lights.as_entire_binding()));
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("integrate"),
+            layout: &self.pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let (mut x, mut y, mut seconds, mut done) = (0, 0, 0.0, 0);
+        while y < window.height {
+            let tile = tiler.next(window, x, y);
+            gpu.queue.write_buffer(&tile_buffer, 0, bytemuck::bytes_of(&tile));
+            let took = timer.run(gpu, "integrate", |encoder, span| {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("integrate"),
+                    timestamp_writes: span.compute(),
+                });
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                let groups = |n: u32| n.div_ceil(super::layout::WORKGROUP);
+                pass.dispatch_workgroups(groups(tile.width), groups(tile.height), 1);
+            })?;
+            seconds += took;
+            tiler.learn(tile, took);
+            done += tile.width as u64 * tile.height as u64;
+            between(done)?;
+            x += tile.width;
+            if x >= window.width {
+                x = 0;
+                y += tile.height;
+            }
+        }
+        Ok(seconds)
+    }
+}
+
+fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {
+    wgpu::BindGroupEntry { binding, resource }
+}

@@ -1,0 +1,196 @@
+//! Structs the host shares with the shaders: twins of those in `shaders/frame.wgsl`, checked by a
+//! test through naga (names, offsets, sizes, constants).
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+
+use crate::camera::sample_offset;
+use crate::scene::{self, AngleFrame, Attenuation, MAX_LIGHTS, Scene, Tone};
+
+/// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
+pub const WORKGROUP: u32 = 8;
+
+/// A rectangle of the image, pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// Uniforms of one sample of one window.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)] // The fields are described where the shaders read them.
+pub struct Frame {
+    pub clip_from_world: [[f32; 4]; 4],
+    pub eye_world: [f32; 3],
+    pub jitter_x: f32,
+    pub right: [f32; 3],
+    pub jitter_y: f32,
+    pub up: [f32; 3],
+    pub sample_index: u32,
+    pub forward: [f32; 3],
+    pub samples: u32,
+    pub zenith: [f32; 3],
+    pub light_count: u32,
+    pub horizon: [f32; 3],
+    pub p: f32,
+    pub ambient: [f32; 3],
+    pub early_end: f32,
+    pub cells: [i32; 3],
+    pub max_cells: u32,
+    pub image_width: f32,
+    pub image_height: f32,
+    pub extinction: f32,
+    pub texture_frame: u32,
+    pub exposure: f32,
+    pub filmic: u32,
+    pub window_x: u32,
+    pub window_y: u32,
+    pub window_width: u32,
+    pub window_height: u32,
+    pub pad_0: u32,
+    pub pad_1: u32,
+}
+
+/// One light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Light {
+    pub vector: [f32; 3],
+    pub is_point: u32,
+    pub intensity: [f32; 3],
+    pub pad: u32,
+}
+
+/// One quad.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Quad {
+    pub corners: [[f32; 4]; 4],
+    pub e1: [f32; 3],
+    pub thickness: f32,
+    pub e2: [f32; 3],
+    pub repeat_u: f32,
+    pub n: [f32; 3],
+    pub repeat_v: f32,
+    pub eye_plane: [f32; 3],
+    pub pad: u32,
+    pub e: [f32; 2],
+    pub f: [f32; 2],
+    pub g: [f32; 2],
+    pub pad_g: [f32; 2],
+}
+
+/// The part of a window that one submission works on, pixels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Tile {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Frame {
+    /// Sample `sample` of `window`, with a volume of `size` cells and density scale `alpha`.
+    pub fn new(scene: &Scene, size: [u32; 3], alpha: f32, window: Window, sample: u32) -> Self {
+        let camera = &scene.camera;
+        let image = &scene.image;
+        let [jitter_x, jitter_y] = sample_offset(sample, image.samples);
+        let (right, up) = camera.image_plane(image.width, image.height);
+        Frame {
+            clip_from_world: camera
+                .clip_from_world(image.width, image.height, [jitter_x, jitter_y])
+                .to_cols_array_2d(),
+            eye_world: camera.eye.to_array(),
+            jitter_x,
+            right: right.to_array(),
+            jitter_y,
+            up: up.to_array(),
+            sample_index: sample,
+            forward: camera.forward.to_array(),
+            samples: image.samples,
+            zenith: scene.background.zenith.to_array(),
+            light_count: scene.lights.len() as u32,
+            horizon: scene.background.horizon.to_array(),
+            p: scene.p,
+            ambient: scene.ambient.to_array(),
+            early_end: scene.trace.early_end,
+            cells: size.map(|n| n as i32),
+            max_cells: scene.trace.max_cells,
+            image_width: image.width as f32,
+            image_height: image.height as f32,
+            extinction: extinction(&scene.trace.attenuation, alpha),
+            texture_frame: u32::from(scene.frame == AngleFrame::Texture),
+            exposure: image.exposure.exp2(),
+            filmic: u32::from(image.tone == Tone::Filmic),
+            window_x: window.x,
+            window_y: window.y,
+            window_width: window.width,
+            window_height: window.height,
+            pad_0: 0,
+            pad_1: 0,
+        }
+    }
+}
+
+/// Optical depth in bits (log₂ of the transmittance) per unit of a cell's ρ code, and per metre with
+/// path-length attenuation: the walk then needs one product and `exp2`.
+pub fn extinction(attenuation: &Attenuation, alpha: f32) -> f32 {
+    let per_rho = match *attenuation {
+        Attenuation::PathLength { sigma } => sigma,
+        Attenuation::PerCell { tau } => tau,
+    };
+    (per_rho as f64 * alpha as f64 / 65535.0 * std::f64::consts::LOG2_E) as f32
+}
+
+/// The scene's lights, padded to the buffer's length.
+pub fn lights(scene: &Scene) -> [Light; MAX_LIGHTS] {
+    let mut lights = [Light::default(); MAX_LIGHTS];
+    for (slot, light) in lights.iter_mut().zip(&scene.lights) {
+        *slot = match *light {
+            scene::Light::Directional { to_light, intensity } => {
+                Light { vector: to_light.to_array(), is_point: 0, intensity: intensity.to_array(), pad: 0 }
+            }
+            scene::Light::Point { position, intensity } => {
+                Light { vector: position.to_array(), is_point: 1, intensity: intensity.to_array(), pad: 0 }
+            }
+        };
+    }
+    lights
+}
+
+impl Quad {
+    /// A quad seen by an eye. The eye's place relative to the quad is taken in float64: far eyes
+    /// would lose the digits that texture coordinates need.
+    pub fn new(quad: &scene::Quad, eye: Vec3) -> Self {
+        let map = &quad.map;
+        let away: DVec3 = eye.as_dvec3() - map.a_world.as_dvec3();
+        let along = |axis: Vec3| away.dot(axis.as_dvec3()) as f32;
+        Quad {
+            corners: quad.corners.map(|c| c.extend(1.0).to_array()),
+            e1: map.e1_world.to_array(),
+            thickness: quad.material.thickness_m,
+            e2: map.e2_world.to_array(),
+            repeat_u: quad.material.repeat_u,
+            n: map.n_world.to_array(),
+            repeat_v: quad.material.repeat_v,
+            eye_plane: [along(map.e1_world), along(map.e2_world), along(map.n_world)],
+            pad: 0,
+            e: map.e.to_array(),
+            f: map.f.to_array(),
+            g: map.g.to_array(),
+            pad_g: [0.0; 2],
+        }
+    }
+}

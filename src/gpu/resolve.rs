@@ -1,0 +1,63 @@
+//! The picture from the linear sums.
+
+use super::device::Gpu;
+use super::integrate::Sums;
+use super::layout::{Frame, WORKGROUP, Window};
+use super::shader;
+use super::timing::Timer;
+use crate::error::Result;
+
+/// The pass.
+pub struct Resolve {
+    pipeline: wgpu::ComputePipeline,
+}
+
+impl Resolve {
+    /// Compiles the pipeline.
+    pub fn new(gpu: &Gpu) -> Self {
+        let module = shader(gpu, "resolve", include_str!("../../shaders/resolve.wgsl"));
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("resolve"),
+            layout: None,
+            module: &module,
+            entry_point: Some("resolve"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        Resolve { pipeline }
+    }
+
+    /// Bytes of the picture a pixel: RGBA.
+    pub const PICTURE_BYTES: u64 = 4;
+
+    /// Turns the sums of a window into `picture`; seconds on the device.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        timer: &Timer,
+        sums: &Sums,
+        picture: &wgpu::Buffer,
+        window: Window,
+        frame: &Frame,
+    ) -> Result<f64> {
+        let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("resolve"),
+            layout: &self.pipeline.get_bind_group_layout(0),
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: sums.radiance.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: picture.as_entire_binding() },
+            ],
+        });
+        timer.run(gpu, "resolve", |encoder, span| {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("resolve"),
+                timestamp_writes: span.compute(),
+            });
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(window.width.div_ceil(WORKGROUP), window.height.div_ceil(WORKGROUP), 1);
+        })
+    }
+}

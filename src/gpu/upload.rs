@@ -1,0 +1,114 @@
+//! The scene on the device: volume texture, quads, lights, mesh.
+
+use super::device::Gpu;
+use super::layout::{self, Quad};
+use crate::error::{Error, Result};
+use crate::scene::{Mesh, Scene};
+use crate::volume::{Cell, VolumeTexture};
+
+/// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
+const SLAB_BYTES: usize = 64 << 20;
+
+/// Everything of a scene that does not change from sample to sample.
+pub struct Uploaded {
+    /// The volume as a 3-D storage texture, `rg32uint`.
+    pub volume: wgpu::TextureView,
+    /// Its cells.
+    pub size: [u32; 3],
+    /// Its density scale.
+    pub alpha: f32,
+    /// `array<Quad>`.
+    pub quads: wgpu::Buffer,
+    /// Number of quads.
+    pub quad_count: u32,
+    /// `Lights`.
+    pub lights: wgpu::Buffer,
+    /// Vertices of the opaque mesh.
+    pub vertices: wgpu::Buffer,
+    /// Its indices.
+    pub indices: wgpu::Buffer,
+    /// Number of indices.
+    pub index_count: u32,
+}
+
+impl Uploaded {
+    /// Uploads a scene.
+    pub fn new(gpu: &Gpu, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh) -> Result<Self> {
+        let limits = gpu.device.limits();
+        let quads: Vec<Quad> = scene.quads.iter().map(|q| Quad::new(q, scene.camera.eye)).collect();
+        let quad_bytes: &[u8] = bytemuck::cast_slice(&quads);
+        let largest =
+            [quad_bytes.len(), size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
+        if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
+            return Err(Error::input(
+                format!("the scene's quads or rocks are too large for {}", gpu.name()),
+                "lower their number or use --engine cpu",
+            ));
+        }
+        Ok(Uploaded {
+            volume: upload_volume(gpu, volume)?,
+            size: volume.size,
+            alpha: volume.alpha,
+            quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
+            quad_count: quads.len() as u32,
+            lights: gpu.buffer_with(
+                "lights",
+                bytemuck::bytes_of(&layout::lights(scene)),
+                wgpu::BufferUsages::UNIFORM,
+            ),
+            vertices: gpu.buffer_with(
+                "vertices",
+                bytemuck::cast_slice(&mesh.vertices),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            indices: gpu.buffer_with(
+                "indices",
+                bytemuck::cast_slice(&mesh.indices),
+                wgpu::BufferUsages::INDEX,
+            ),
+            index_count: mesh.indices.len() as u32,
+        })
+    }
+}
+
+fn upload_volume(gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView> {
+    let [nx, ny, nz] = volume.size;
+    let most = gpu.device.limits().max_texture_dimension_3d;
+    if volume.size.iter().any(|&n| n > most) {
+        return Err(Error::input(
+            format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
+            format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
+        ));
+    }
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("volume"),
+        size: wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: nz },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::Rg32Uint,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let layer = nx as usize * ny as usize;
+    let layers = (SLAB_BYTES / (layer * size_of::<Cell>())).max(1);
+    for (slab, cells) in volume.cells.chunks(layers * layer).enumerate() {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: (slab * layers) as u32 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(cells),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(nx * size_of::<Cell>() as u32),
+                rows_per_image: Some(ny),
+            },
+            wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: (cells.len() / layer) as u32 },
+        );
+        gpu.run(gpu.encoder("upload volume"))?;
+    }
+    Ok(texture.create_view(&Default::default()))
+}

@@ -1,0 +1,104 @@
+//! Which engine renders, and what happens when a device is lost.
+
+use crate::cpu;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::{DeviceOptions, Gpu, GpuRenderer, RenderOptions};
+use crate::job::Monitor;
+use crate::scene::{Mesh, Scene};
+use crate::volume::VolumeTexture;
+
+/// The user's choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum EngineChoice {
+    /// A GPU adapter if there is one, else the CPU.
+    #[default]
+    Auto,
+    /// A GPU adapter, or exit 69.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+/// An engine ready to render.
+pub enum Engine {
+    /// On a device.
+    Gpu(Box<GpuRenderer>, DeviceOptions),
+    /// On all cores.
+    Cpu,
+}
+
+/// Pixels a submission after a device was lost: small enough for the shortest watchdog known.
+const CAREFUL_TILE_PIXELS: u32 = 4096;
+
+impl Engine {
+    /// Opens the engine; says in one line what was taken and why.
+    pub fn open(choice: EngineChoice, device: &DeviceOptions) -> Result<(Engine, String)> {
+        let cpu =
+            |why: &str| (Engine::Cpu, format!("engine cpu on {} threads{why}", rayon::current_num_threads()));
+        match choice {
+            EngineChoice::Cpu => Ok(cpu("")),
+            EngineChoice::Gpu => Engine::open_gpu(device),
+            EngineChoice::Auto => match Engine::open_gpu(device) {
+                Ok(opened) => Ok(opened),
+                // A named adapter that is not there is a mistake, not a reason to fall back.
+                Err(e) if device.adapter.is_some() => Err(e),
+                Err(Error::NoAdapter(why)) => Ok(cpu(&format!(
+                    ": {why}; a Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine"
+                ))),
+                Err(e) => Err(e),
+            },
+        }
+    }
+
+    fn open_gpu(device: &DeviceOptions) -> Result<(Engine, String)> {
+        let renderer = GpuRenderer::new(Gpu::open(device)?);
+        renderer.gpu.check()?;
+        let line = format!("engine gpu on {}", renderer.gpu.name());
+        Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
+    }
+
+    /// `gpu` or `cpu`.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Engine::Gpu(..) => "gpu",
+            Engine::Cpu => "cpu",
+        }
+    }
+
+    /// The adapter's name, on the GPU engine.
+    pub fn adapter(&self) -> Option<String> {
+        match self {
+            Engine::Gpu(renderer, _) => Some(renderer.gpu.name()),
+            Engine::Cpu => None,
+        }
+    }
+
+    /// Renders. After a lost device or exhausted device memory it tries once more on a new device
+    /// with smaller tiles.
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+        options: &RenderOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Frame> {
+        match self {
+            Engine::Cpu => cpu::render(scene, volume, mesh, options.surface, monitor),
+            Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
+                Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {
+                    monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
+                    **renderer = GpuRenderer::new(Gpu::open(device)?);
+                    let careful = RenderOptions {
+                        tile_pixels: Some(CAREFUL_TILE_PIXELS),
+                        window_pixels: Some(1 << 18),
+                        ..options.clone()
+                    };
+                    renderer.render(scene, volume, mesh, &careful, monitor)
+                }
+                other => other,
+            },
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! taki (滝, waterfall) renders matter that is too fine for geometry, gushing water first, as volume
+//! textures on the GPU. It implements Kimoto and Ohno, "Rendering Gushing Water Using Texture Mapping".
+//!
+//! The frame, stage by stage:
+//!
+//! 1. [`scene`] reads what is asked for, strictly, and checks it whole before any work.
+//! 2. [`curve`] makes spatial fractal curves (§1 of the method); [`walk`] finds the cells they pass.
+//! 3. [`volume`] gives each cell density ρ, flow direction v and reflection coefficients k (§2), packed
+//!    to 64 bits.
+//! 4. [`mapping`] is the one-to-one map between a quad and the volume's face (§3): the raster pass
+//!    (`gbuffer`) finds the quad and its texture coordinates under each pixel.
+//! 5. [`shading`] is the light of one cell (§5); the compute pass (`integrate`) walks the cells under
+//!    each pixel (§4) and adds them up.
+//! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR.
+//!
+//! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
+//! [`job`] chooses between them and watches over long work. The command line is a client of all this.
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod camera;
+pub mod cli;
+pub mod cpu;
+pub mod curve;
+pub mod error;
+pub mod frame;
+pub mod gpu;
+pub mod job;
+pub mod mapping;
+pub mod random;
+pub mod scene;
+pub mod shading;
+pub mod volume;
+pub mod walk;
+
+pub use error::{Error, Result};

@@ -1,0 +1,7 @@
+//! Parse, dispatch, one error line, exit code.
+
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    taki::cli::main()
+}

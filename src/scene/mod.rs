@@ -1,0 +1,505 @@
+//! What is asked for: the scene, read strictly, checked whole before any work.
+
+mod param;
+mod preset;
+mod print;
+mod read;
+mod rock;
+mod value;
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+pub use param::{Cost, Kind, PARAMS, Param};
+pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
+pub use read::Source;
+pub use rock::{Mesh, Rock, Vertex};
+pub use value::{Place, Raw, Value, Values};
+
+use crate::curve::{CurveShape, levels_for};
+use crate::error::{Error, Result};
+use crate::mapping::{Material, QuadMap};
+use crate::volume::{VolumeTexture, WaterSpec, read_npz};
+
+/// Most lights of a scene: the size of the light buffer in `shaders/frame.wgsl`.
+pub const MAX_LIGHTS: usize = 16;
+
+/// A whole scene, valid.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Its name: the preset's, or the file's stem.
+    pub name: String,
+    /// The values it was made from.
+    pub values: Values,
+    /// How the volume is built, unless it comes from `volume_file`.
+    pub water: WaterSpec,
+    /// The `.npz` to take the volume from, resolved and inside the allowed folders.
+    pub volume_file: Option<PathBuf>,
+    /// The volume's quads.
+    pub quads: Vec<Quad>,
+    /// The lights, those without intensity left out.
+    pub lights: Vec<Light>,
+    /// Light of the whole surroundings.
+    pub ambient: Vec3,
+    /// Opaque geometry.
+    pub rocks: Vec<Rock>,
+    /// The walk through the volume.
+    pub trace: Trace,
+    /// Where angles are measured.
+    pub frame: AngleFrame,
+    /// Attenuation between light and cell.
+    pub visibility: Visibility,
+    /// Exponent of the specular term.
+    pub p: f32,
+    /// The camera.
+    pub camera: Camera,
+    /// What is seen where nothing is.
+    pub background: Background,
+    /// Size, samples and tone.
+    pub image: Image,
+}
+
+/// A quad with its material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quad {
+    /// A, B, C, D in the world.
+    pub corners: [Vec3; 4],
+    /// The quad in its plane.
+    pub map: QuadMap,
+    /// How the volume lies on it.
+    pub material: Material,
+}
+
+/// A light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// From infinitely far: unit vector towards it, radiance factor I.
+    Directional {
+        /// Unit.
+        to_light: Vec3,
+        /// Colour × intensity.
+        intensity: Vec3,
+    },
+    /// From a point: I at 1 m, falling with the square of the distance.
+    Point {
+        /// Metres.
+        position: Vec3,
+        /// Colour × intensity, at 1 m.
+        intensity: Vec3,
+    },
+}
+
+/// How view rays go through the volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trace {
+    /// τ_k of a cell.
+    pub attenuation: Attenuation,
+    /// Most cells of one ray.
+    pub max_cells: u32,
+    /// A ray ends where T falls below this; 0: never.
+    pub early_end: f32,
+}
+
+/// τ_k of a cell with density ρ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Attenuation {
+    /// σ·ρ·Δs, σ in 1/m.
+    PathLength {
+        /// Extinction at ρ = 1, 1/m.
+        sigma: f32,
+    },
+    /// τ·ρ.
+    PerCell {
+        /// Optical depth at ρ = 1.
+        tau: f32,
+    },
+}
+
+/// Where the fibre model's angles are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleFrame {
+    /// t = normalize(J v) against world vectors.
+    World,
+    /// v against J⁻¹l and J⁻¹e, normalised: the paper's.
+    Texture,
+}
+
+/// V_i(k).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Visibility {
+    /// 1.
+    None,
+    /// Exact walk from the cell's centre to the light.
+    March,
+}
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Metres.
+    pub eye: Vec3,
+    /// Unit, to the right of the image.
+    pub right: Vec3,
+    /// Unit, up in the image.
+    pub up: Vec3,
+    /// Unit, into the image.
+    pub forward: Vec3,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_fov: f32,
+    /// Near plane, metres along `forward`.
+    pub near: f32,
+}
+
+/// Radiance where nothing is seen: horizon + (zenith − horizon)·max(0, d·y).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Background {
+    /// Straight up.
+    pub zenith: Vec3,
+    /// At and below the horizon.
+    pub horizon: Vec3,
+}
+
+/// The picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Image {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Stops.
+    pub exposure: f32,
+    /// Tone curve.
+    pub tone: Tone,
+}
+
+/// Tone curve of the PNG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Clamp only.
+    None,
+    /// Narkowicz 2015.
+    Filmic,
+}
+
+/// What the command line allows a scene.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Folders besides the scene's own that references may lead into.
+    pub allow_paths: Vec<PathBuf>,
+    /// Bytes the work may use.
+    pub memory: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { allow_paths: Vec::new(), memory: 4 << 30 }
+    }
+}
+
+impl Scene {
+    /// Reads a preset or file, applies `--set`s in order, and checks the whole.
+    pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
+        let source = Source::find(scene)?;
+        let mut values = source.values()?;
+        for setting in sets {
+            read::apply_set(&mut values, setting)?;
+        }
+        // A path on the command line is the user's own word: relative to the current folder.
+        let set_by_hand = sets.iter().any(|s| s.split('=').next().is_some_and(|k| k.trim() == "volume.file"));
+        let folder = if set_by_hand { None } else { Some(source.folder.as_path()) };
+        Scene::from_values(&source.name, values, folder, limits)
+    }
+
+    /// Checks values that passed the table against one another. References resolve inside `folder`;
+    /// without one they are trusted.
+    pub fn from_values(name: &str, values: Values, folder: Option<&Path>, limits: &Limits) -> Result<Scene> {
+        let v = &values;
+        let size = [v.count("volume.nx"), v.count("volume.ny"), v.count("volume.nz")];
+        let levels = match v.count("curves.levels") {
+            0 => levels_for(size[1]).min(16),
+            n => n,
+        };
+        let water = WaterSpec {
+            size,
+            across: v.count("curves.across"),
+            deep: v.count("curves.deep"),
+            shape: CurveShape {
+                h: v.float("curves.h"),
+                sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
+                levels,
+            },
+            seed: v.int("volume.seed") as u64,
+            alpha: v.float("volume.alpha"),
+            k_d: v.float("volume.k_d"),
+            k_s: v.float("volume.k_s"),
+            k_noise: v.float("volume.k_noise"),
+        };
+        let volume_file = match v.text("volume.file") {
+            file if file.is_empty() => None,
+            file => Some(confine(Path::new(&file), folder, &limits.allow_paths)?),
+        };
+        if volume_file.is_none() {
+            crate::volume::check_budget(size, limits.memory)?;
+            let curves = water.across as u128 * water.deep as u128;
+            let points = curves << levels;
+            if points > 1 << 36 {
+                return Err(Error::input(
+                    format!("curves.across × curves.deep × 2^levels makes {points} curve points"),
+                    "lower curves.across, curves.deep or curves.levels: at most 6.8e10",
+                ));
+            }
+        }
+        let image = Image {
+            width: v.count("image.width"),
+            height: v.count("image.height"),
+            samples: v.count("image.samples"),
+            exposure: v.float("image.exposure"),
+            tone: if v.text("image.tone") == "none" { Tone::None } else { Tone::Filmic },
+        };
+        image.check_budget(limits.memory)?;
+        let camera = camera(v)?;
+        let trace = Trace {
+            attenuation: match v.text("trace.attenuation").as_str() {
+                "per-cell" => Attenuation::PerCell { tau: v.float("trace.tau") },
+                _ => Attenuation::PathLength { sigma: v.float("trace.sigma") },
+            },
+            max_cells: v.count("trace.max_cells"),
+            early_end: v.float("trace.early_end"),
+        };
+        Ok(Scene {
+            name: name.into(),
+            water,
+            volume_file,
+            quads: quads(v)?,
+            lights: lights(v)?,
+            ambient: v.triple("light.ambient"),
+            rocks: rocks(v, limits.memory)?,
+            trace,
+            frame: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
+            visibility: if v.text("light.visibility") == "none" {
+                Visibility::None
+            } else {
+                Visibility::March
+            },
+            p: v.float("light.p"),
+            camera,
+            background: Background {
+                zenith: v.triple("background.zenith"),
+                horizon: v.triple("background.horizon"),
+            },
+            image,
+            values,
+        })
+    }
+
+    /// Builds the volume texture, or reads it from the scene's file.
+    pub fn volume(&self, memory: u64, monitor: &dyn crate::job::Monitor) -> Result<VolumeTexture> {
+        match &self.volume_file {
+            Some(path) => read_npz(path, memory),
+            None => crate::volume::build_water(&self.water, monitor),
+        }
+    }
+
+    /// All rocks as one mesh.
+    pub fn mesh(&self) -> Mesh {
+        let mut mesh = Mesh::default();
+        self.rocks.iter().for_each(|rock| rock.add_to(&mut mesh));
+        mesh
+    }
+
+    /// What is valid but surely not meant.
+    pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let lit = self.lights.is_empty() && self.ambient == Vec3::ZERO;
+        if self.quads.is_empty() && self.rocks.is_empty() {
+            warnings
+                .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
+        } else if lit {
+            warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
+        } else if !self.quads.is_empty() && !volume.cells.iter().any(|c| c.rho_code() > 0) {
+            warnings.push("the volume is empty: no cell has density".into());
+        }
+        warnings
+    }
+}
+
+impl Image {
+    /// The picture's own memory: radiance and transmittance in float32, 8-bit colour, counts.
+    fn check_budget(&self, memory: u64) -> Result<()> {
+        let need = self.width as u128 * self.height as u128 * 48;
+        if need > memory as u128 {
+            return Err(Error::memory(
+                format!("an image of {}×{} pixels (image.width, height)", self.width, self.height),
+                need,
+                memory,
+                "lower the size or raise --memory",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl Background {
+    /// Radiance along a unit direction.
+    pub fn radiance(&self, d: Vec3) -> Vec3 {
+        self.horizon + (self.zenith - self.horizon) * d.y.max(0.0)
+    }
+}
+
+fn quads(v: &Values) -> Result<Vec<Quad>> {
+    let mut quads = Vec::new();
+    for i in v.names("quads") {
+        let key = format!("quads.{i}.corners");
+        if !v.is_set(&key) {
+            return Err(Error::input(
+                format!("quad {i} has no corners"),
+                format!("give {key} four points A, B, C, D"),
+            ));
+        }
+        let corners = v.corners(&key);
+        let map = QuadMap::new(corners).map_err(|fault| {
+            Error::input(
+                format!("quad {i} ({key}) {}", fault.words()),
+                "a quad needs four corners A, B, C, D in one plane, convex, in order around it",
+            )
+        })?;
+        let name = v.text(&format!("quads.{i}.material"));
+        if name != "water" && !v.names("materials").contains(&name) {
+            let known = v.names("materials").join(", ");
+            return Err(Error::input(
+                format!("quad {i} (quads.{i}.material) has the unknown material {name:?}"),
+                format!("add [materials.{name}] or use one of: water {known}"),
+            ));
+        }
+        let material = |what: &str| v.float(&format!("materials.{name}.{what}"));
+        let material = Material {
+            thickness_m: material("thickness"),
+            repeat_u: material("repeat_u"),
+            repeat_v: material("repeat_v"),
+        };
+        quads.push(Quad { corners, map, material });
+    }
+    Ok(quads)
+}
+
+fn lights(v: &Values) -> Result<Vec<Light>> {
+    let mut lights = Vec::new();
+    for name in v.names("lights") {
+        let key = |what: &str| format!("lights.{name}.{what}");
+        let intensity = v.triple(&key("color")) * v.float(&key("intensity"));
+        if !intensity.is_finite() {
+            return Err(Error::input(
+                format!("light {name} is infinitely bright"),
+                "lower its color or intensity",
+            ));
+        }
+        let light = if v.text(&key("kind")) == "point" {
+            Light::Point { position: v.triple(&key("position")), intensity }
+        } else {
+            let direction = v.triple(&key("direction"));
+            let to_light = unit(direction).ok_or_else(|| {
+                Error::input(
+                    format!("{} = {direction} has no direction", key("direction")),
+                    "give a vector towards the light",
+                )
+            })?;
+            Light::Directional { to_light, intensity }
+        };
+        if intensity != Vec3::ZERO {
+            lights.push(light);
+        }
+    }
+    if lights.len() > MAX_LIGHTS {
+        return Err(Error::input(
+            format!("the scene has {} lights", lights.len()),
+            format!("at most {MAX_LIGHTS}"),
+        ));
+    }
+    Ok(lights)
+}
+
+fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
+    let mut rocks = Vec::new();
+    for name in v.names("rocks") {
+        let key = |what: &str| format!("rocks.{name}.{what}");
+        if !v.is_set(&key("corners")) {
+            return Err(Error::input(
+                format!("rock {name} has no corners"),
+                format!("give {} four points", key("corners")),
+            ));
+        }
+        rocks.push(Rock {
+            corners: v.corners(&key("corners")),
+            levels: v.count(&key("levels")),
+            h: v.float(&key("h")),
+            amplitude: v.float(&key("amplitude")),
+            bulge: v.float(&key("bulge")),
+            seed: v.int(&key("seed")) as u64,
+            color: v.triple(&key("color")),
+            color_noise: v.float(&key("color_noise")),
+            cavity: v.float(&key("cavity")),
+            name,
+        });
+    }
+    // Vertex and six indices, on the CPU and on the device.
+    let need: u128 =
+        rocks.iter().map(|r| r.vertex_count() as u128 * 2 * (size_of::<Vertex>() as u128 + 24)).sum();
+    if need > memory as u128 {
+        return Err(Error::memory(
+            format!("{} rocks", rocks.len()),
+            need,
+            memory,
+            "lower rocks.*.levels or raise --memory",
+        ));
+    }
+    Ok(rocks)
+}
+
+fn camera(v: &Values) -> Result<Camera> {
+    let (eye, target, up) = (v.triple("camera.eye"), v.triple("camera.target"), v.triple("camera.up"));
+    let forward = unit(target - eye)
+        .ok_or_else(|| Error::input("camera.eye and camera.target are the same point", "move one of them"))?;
+    let right = unit(forward.cross(unit(up).unwrap_or(Vec3::ZERO))).ok_or_else(|| {
+        Error::input("camera.up is zero or along the view", "turn it away from the view direction")
+    })?;
+    Ok(Camera {
+        eye,
+        right,
+        up: right.cross(forward),
+        forward,
+        tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
+        near: v.float("camera.near"),
+    })
+}
+
+/// Normalised in float64, so that neither tiny nor huge vectors lose their direction.
+fn unit(v: Vec3) -> Option<Vec3> {
+    let d = v.as_dvec3();
+    (d.length() > 1e-12).then(|| d.normalize().as_vec3())
+}
+
+/// Resolves a reference inside the scene's folder (or an allowed one), following links.
+fn confine(file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
+    let Some(folder) = folder else { return Ok(file.to_owned()) };
+    let joined = folder.join(file);
+    let real = joined.canonicalize().map_err(|e| {
+        Error::input(
+            format!("volume.file = {:?}: {} {e}", file.display().to_string(), joined.display()),
+            "check the path",
+        )
+    })?;
+    let inside = std::iter::once(folder)
+        .chain(allowed.iter().map(PathBuf::as_path))
+        .filter_map(|dir| dir.canonicalize().ok())
+        .any(|dir| real.starts_with(dir));
+    if !inside {
+        return Err(Error::input(
+            format!("volume.file = {:?} leads out of the scene's folder", file.display().to_string()),
+            format!("allow it with --allow-path {}", real.parent().unwrap_or(&real).display()),
+        ));
+    }
+    Ok(real)
+}

@@ -1,0 +1,435 @@
+//! The parameter table: every number, choice, colour and file a scene can set, once.
+//!
+//! It feeds the scene file, `--set`, the resolved print, the README's table and the viewer's sliders.
+//! A `*` in a key stands for a name the scene chooses, or for the number of a quad.
+
+use Cost::*;
+use Kind::*;
+
+/// What a change of a parameter costs an interactive renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// The volume texture is built again from its curves.
+    Volume,
+    /// Something already built is packed or uploaded again.
+    Upload,
+    /// A few bytes of uniforms.
+    Uniform,
+}
+
+impl Cost {
+    /// The word in tables and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Volume => "volume",
+            Upload => "upload",
+            Uniform => "uniform",
+        }
+    }
+}
+
+/// Type, range and default of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A float32: smallest, largest, default.
+    Float(f64, f64, f64),
+    /// A whole number: smallest, largest, default.
+    Int(i64, i64, i64),
+    /// One of the words; the first is the default.
+    Choice(&'static [&'static str]),
+    /// Linear RGB, each 0 to 10000.
+    Color([f64; 3]),
+    /// A point or direction, each component −1e7 to 1e7.
+    Point([f64; 3]),
+    /// A path or name; empty means none.
+    Text(&'static str),
+    /// Four points A, B, C, D; there is no default.
+    Corners,
+}
+
+/// One parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Param {
+    /// Dotted key in the scene file and for `--set`.
+    pub key: &'static str,
+    /// The paper's symbol, if it has one.
+    pub symbol: &'static str,
+    /// Unit, or empty.
+    pub unit: &'static str,
+    /// Type, range and default.
+    pub kind: Kind,
+    /// What a change costs.
+    pub cost: Cost,
+    /// What it is, in one sentence.
+    pub doc: &'static str,
+}
+
+/// Largest colour component.
+pub const COLOR_MAX: f64 = 1.0e4;
+/// Largest coordinate, metres.
+pub const POINT_MAX: f64 = 1.0e7;
+
+const fn p(
+    key: &'static str,
+    symbol: &'static str,
+    unit: &'static str,
+    kind: Kind,
+    cost: Cost,
+    doc: &'static str,
+) -> Param {
+    Param { key, symbol, unit, kind, cost, doc }
+}
+
+/// The table, in the order of the method.
+pub const PARAMS: &[Param] = &[
+    p(
+        "curves.across",
+        "",
+        "",
+        Int(1, 65536, 32),
+        Volume,
+        "Columns of the jitter grid of curve ends on the face y = 0, across the flow.",
+    ),
+    p("curves.deep", "", "", Int(1, 65536, 32), Volume, "Rows of the jitter grid, into the surface."),
+    p(
+        "curves.h",
+        "h",
+        "",
+        Float(0.0, 8.0, 0.9),
+        Volume,
+        "Complexity of the spatial fractal curves: small is rough, large is smooth.",
+    ),
+    p(
+        "curves.amplitude",
+        "",
+        "flow lengths",
+        Float(0.0, 1.0, 0.05),
+        Volume,
+        "Standard deviation of g as a fraction of the flow length ny.",
+    ),
+    p(
+        "curves.levels",
+        "",
+        "",
+        Int(0, 16, 0),
+        Volume,
+        "Depth of the recursion; 0: as deep as makes the leaf segments half a cell.",
+    ),
+    p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume, "Cells across the flow."),
+    p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume, "Cells along the flow."),
+    p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface."),
+    p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
+    p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform, "Scale of the density ρ."),
+    p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
+    p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload, "Base of the specular reflection coefficient."),
+    p(
+        "volume.k_noise",
+        "",
+        "",
+        Float(0.0, 1.0, 0.1),
+        Upload,
+        "Standard deviation of the normal noise added to k_d and k_s.",
+    ),
+    p(
+        "volume.file",
+        "",
+        "",
+        Text(""),
+        Volume,
+        "Takes the volume texture from this .npz file instead of building it.",
+    ),
+    p(
+        "materials.*.thickness",
+        "H",
+        "m",
+        Float(1e-4, 1e4, 0.4),
+        Uniform,
+        "Depth of one volume under the face of the quads.",
+    ),
+    p(
+        "materials.*.repeat_u",
+        "",
+        "",
+        Float(1e-3, 1e4, 1.0),
+        Uniform,
+        "Copies of the volume along u, across the flow.",
+    ),
+    p(
+        "materials.*.repeat_v",
+        "",
+        "",
+        Float(1e-3, 1e4, 1.0),
+        Uniform,
+        "Copies of the volume along v, along the flow.",
+    ),
+    p(
+        "quads.*.corners",
+        "A B C D",
+        "m",
+        Corners,
+        Upload,
+        "Corners at (u,v) = (0,0) (1,0) (1,1) (0,1): convex, planar; v runs down the flow.",
+    ),
+    p("quads.*.material", "", "", Text("water"), Upload, "Name of the quad's material."),
+    p(
+        "trace.attenuation",
+        "",
+        "",
+        Choice(&["path-length", "per-cell"]),
+        Uniform,
+        "How a cell attenuates: τ_k = σ·ρ·Δs over the metres inside it, or τ_k = τ·ρ however short the way.",
+    ),
+    p(
+        "trace.sigma",
+        "σ",
+        "1/m",
+        Float(0.0, 1e5, 10.0),
+        Uniform,
+        "Extinction at ρ = 1, for path-length attenuation.",
+    ),
+    p(
+        "trace.tau",
+        "τ",
+        "",
+        Float(0.0, 1e3, 0.1),
+        Uniform,
+        "Optical depth of one cell at ρ = 1, for per-cell attenuation.",
+    ),
+    p(
+        "trace.max_cells",
+        "",
+        "cells",
+        Int(1, 65536, 512),
+        Uniform,
+        "Most cells one view ray, and one light ray, may meet.",
+    ),
+    p(
+        "trace.early_end",
+        "",
+        "",
+        Float(0.0, 1.0, 1.0 / 1024.0),
+        Uniform,
+        "A view ray ends where its transmittance falls below this; 0: never.",
+    ),
+    p(
+        "light.frame",
+        "",
+        "",
+        Choice(&["world", "texture"]),
+        Uniform,
+        "Where angles are measured: in the world, or in the volume's own space as in the paper.",
+    ),
+    p(
+        "light.visibility",
+        "V",
+        "",
+        Choice(&["march", "none"]),
+        Uniform,
+        "Attenuation between light and cell: an exact walk from the cell's centre, or none.",
+    ),
+    p(
+        "light.p",
+        "p",
+        "",
+        Float(1.0, 1e4, 20.0),
+        Uniform,
+        "Exponent of the specular term; whole numbers up to 255 are fastest.",
+    ),
+    p(
+        "light.ambient",
+        "",
+        "",
+        Color([0.1, 0.1, 0.1]),
+        Uniform,
+        "Light from everywhere, added in every cell.",
+    ),
+    p("lights.*.kind", "", "", Choice(&["directional", "point"]), Uniform, "Kind of light."),
+    p(
+        "lights.*.direction",
+        "l",
+        "",
+        Point([0.5, 0.8, 0.6]),
+        Uniform,
+        "Direction towards a directional light, of any length but zero.",
+    ),
+    p("lights.*.position", "", "m", Point([0.0, 10.0, 10.0]), Uniform, "Where a point light is."),
+    p("lights.*.color", "", "", Color([1.0, 1.0, 1.0]), Uniform, "Colour of the light."),
+    p(
+        "lights.*.intensity",
+        "I",
+        "",
+        Float(0.0, 1e9, 1.0),
+        Uniform,
+        "Factor on the colour; of a point light at a distance of 1 m, falling with its square.",
+    ),
+    p(
+        "rocks.*.corners",
+        "",
+        "m",
+        Corners,
+        Upload,
+        "Corners of the patch that the fractal height field is raised on, counter-clockwise from the outside.",
+    ),
+    p("rocks.*.levels", "", "", Int(0, 10, 7), Upload, "Subdivisions: the mesh has 2^levels squares a side."),
+    p(
+        "rocks.*.h",
+        "",
+        "",
+        Float(0.0, 8.0, 0.9),
+        Upload,
+        "Roughness of the height field, as h of the curves.",
+    ),
+    p(
+        "rocks.*.amplitude",
+        "",
+        "m",
+        Float(0.0, 1e4, 0.5),
+        Upload,
+        "Standard deviation of the displacement at the first level.",
+    ),
+    p(
+        "rocks.*.bulge",
+        "",
+        "m",
+        Float(-1e4, 1e4, 0.0),
+        Upload,
+        "Height of the patch's middle over its border, before it is made rough.",
+    ),
+    p("rocks.*.seed", "", "", Int(0, i64::MAX, 1), Upload, "Seed of the rock."),
+    p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload, "Mean albedo."),
+    p(
+        "rocks.*.color_noise",
+        "",
+        "",
+        Float(0.0, 1.0, 0.3),
+        Upload,
+        "Relative fractal variation of the albedo.",
+    ),
+    p("rocks.*.cavity", "", "", Float(0.0, 1.0, 0.6), Upload, "How much hollows are darker than ridges."),
+    p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform, "Where the camera is."),
+    p("camera.target", "", "m", Point([0.0, 0.0, 0.0]), Uniform, "The point in the middle of the image."),
+    p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform, "Direction that is up in the image."),
+    p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform, "Vertical field of view."),
+    p(
+        "camera.near",
+        "",
+        "m",
+        Float(1e-4, 1e4, 0.01),
+        Uniform,
+        "Geometry nearer than this, along the view axis, is cut off.",
+    ),
+    p(
+        "background.zenith",
+        "",
+        "",
+        Color([0.0, 0.0, 0.0]),
+        Uniform,
+        "Radiance of the background straight up.",
+    ),
+    p(
+        "background.horizon",
+        "",
+        "",
+        Color([0.0, 0.0, 0.0]),
+        Uniform,
+        "Radiance of the background at and below the horizon.",
+    ),
+    p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform, "Width of the picture."),
+    p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform, "Height of the picture."),
+    p(
+        "image.samples",
+        "",
+        "",
+        Int(1, 4096, 1),
+        Uniform,
+        "Jittered samples a pixel; 1 is the pixel's centre.",
+    ),
+    p(
+        "image.exposure",
+        "",
+        "stops",
+        Float(-32.0, 32.0, 0.0),
+        Uniform,
+        "Factor 2^exposure on the radiance, in the PNG only.",
+    ),
+    p(
+        "image.tone",
+        "",
+        "",
+        Choice(&["filmic", "none"]),
+        Uniform,
+        "Tone curve of the PNG: Narkowicz's fit of ACES, or none.",
+    ),
+];
+
+/// The entry a concrete key such as `lights.sun.color` belongs to.
+pub fn find(key: &str) -> Option<&'static Param> {
+    PARAMS.iter().find(|param| matches(param.key, key))
+}
+
+fn matches(pattern: &str, key: &str) -> bool {
+    let mut parts = key.split('.');
+    pattern
+        .split('.')
+        .all(|want| parts.next().is_some_and(|got| if want == "*" { !got.is_empty() } else { want == got }))
+        && parts.next().is_none()
+}
+
+/// Known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
+pub fn nearest(key: &str) -> Option<String> {
+    let parts: Vec<&str> = key.split('.').collect();
+    PARAMS
+        .iter()
+        .map(|param| {
+            let named: Vec<&str> = param
+                .key
+                .split('.')
+                .enumerate()
+                .map(|(i, want)| if want == "*" { parts.get(i).copied().unwrap_or("NAME") } else { want })
+                .collect();
+            named.join(".")
+        })
+        .map(|candidate| {
+            // A bare last word (`sigma` for `trace.sigma`) is the commonest slip.
+            let last = candidate.rsplit('.').next().unwrap_or("").to_owned();
+            let score = strsim::jaro_winkler(key, &candidate).max(strsim::jaro_winkler(key, &last));
+            (score, candidate)
+        })
+        .filter(|(score, _)| *score > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+impl Param {
+    /// Range in words, for messages and tables.
+    pub fn range(&self) -> String {
+        match self.kind {
+            Float(min, max, _) => format!("{} to {}", number(min), number(max)),
+            Int(min, i64::MAX, _) => format!("{min} to 2^63−1"),
+            Int(min, max, _) => format!("{min} to {max}"),
+            Choice(words) => words.join(", "),
+            Color(_) => format!("three numbers, 0 to {}", number(COLOR_MAX)),
+            Point(_) => format!("three numbers, ±{}", number(POINT_MAX)),
+            Text(_) => "text".into(),
+            Corners => format!("four points of three numbers, ±{}", number(POINT_MAX)),
+        }
+    }
+
+    /// Default in words.
+    pub fn default_words(&self) -> String {
+        match self.kind {
+            Float(.., d) => number(d),
+            Int(.., d) => d.to_string(),
+            Choice(words) => words[0].into(),
+            Color(c) | Point(c) => format!("[{}, {}, {}]", number(c[0]), number(c[1]), number(c[2])),
+            Text("") => "none".into(),
+            Text(t) => t.into(),
+            Corners => "required".into(),
+        }
+    }
+}
+
+/// A number as people write it.
+fn number(x: f64) -> String {
+    if x != 0.0 && (x.abs() >= 1e5 || x.abs() < 1e-3) { format!("{x:e}") } else { format!("{x}") }
+}

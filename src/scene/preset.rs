@@ -1,0 +1,43 @@
+//! The scenes that come with the program: scene files in `assets/scenes/`.
+
+/// A preset: name, what it shows, its scene file.
+type Preset = (&'static str, &'static str, &'static str);
+
+/// In the order they are listed; the first is the default scene.
+const PRESETS: &[Preset] = &[
+    (
+        "waterfall",
+        "a fall over a rough cliff, by daylight",
+        include_str!("../../assets/scenes/waterfall.toml"),
+    ),
+    (
+        "fig5",
+        "the paper's figure 5: a 40×40×40 volume on 8 quads",
+        include_str!("../../assets/scenes/fig5.toml"),
+    ),
+    ("fig6", "figure 6: as 5, with larger density", include_str!("../../assets/scenes/fig6.toml")),
+    ("fig7", "figure 7: as 5, with less complex curves", include_str!("../../assets/scenes/fig7.toml")),
+    (
+        "front",
+        "the benchmark: one unit quad seen from the front",
+        include_str!("../../assets/scenes/front.toml"),
+    ),
+];
+
+/// The scene rendered when none is named.
+pub const DEFAULT: &str = PRESETS[0].0;
+
+/// The scene file of a preset.
+pub fn text(name: &str) -> Option<&'static str> {
+    PRESETS.iter().find(|p| p.0 == name).map(|p| p.2)
+}
+
+/// The presets' names.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|p| p.0)
+}
+
+/// The presets' names and what they show.
+pub fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
+    PRESETS.iter().map(|p| (p.0, p.1))
+}

@@ -1,0 +1,137 @@
+//! The scene fully resolved: as a scene file that gives the same picture, and as JSON with everything
+//! an independent program needs to compute the image.
+
+use std::fmt::Write;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::param::PARAMS;
+use super::read::VERSION;
+use super::{Light, Scene};
+
+impl Scene {
+    /// Every concrete key of this scene, in the table's order.
+    pub fn keys(&self) -> Vec<String> {
+        let mut keys = Vec::new();
+        for param in PARAMS {
+            match param.key.split_once(".*.") {
+                None => keys.push(param.key.to_owned()),
+                Some((section, rest)) => {
+                    let mut names = self.values.names(section);
+                    if section == "materials" && !names.iter().any(|n| n == "water") {
+                        names.push("water".into());
+                    }
+                    keys.extend(names.iter().map(|name| format!("{section}.{name}.{rest}")));
+                }
+            }
+        }
+        keys
+    }
+
+    /// The scene as a scene file with every default filled in.
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("version = {VERSION}\n");
+        let mut keys = self.keys();
+        // A stable sort by table: `a.b.c` belongs to table `a.b`.
+        let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(t, _)| t.to_owned());
+        let mut tables: Vec<String> = Vec::new();
+        for key in &keys {
+            if !tables.contains(&table(key)) {
+                tables.push(table(key));
+            }
+        }
+        keys.sort_by_key(|key| tables.iter().position(|t| *t == table(key)));
+        let mut open = String::new();
+        for key in &keys {
+            let this = table(key);
+            if this != open {
+                // Infallible: writing to a String.
+                let _ = match this.strip_prefix("quads.") {
+                    Some(_) => writeln!(text, "\n[[quads]]"),
+                    None => writeln!(text, "\n[{this}]"),
+                };
+                open = this;
+            }
+            let name = key.rsplit('.').next().unwrap_or(key);
+            let _ = writeln!(text, "{name} = {}", self.values.get(key).to_toml());
+        }
+        text
+    }
+
+    /// The scene as JSON: parameters as in the scene file, and under `derived` what follows from them
+    /// (camera basis, unit lights, the rock mesh with normals and albedo).
+    pub fn to_json(&self) -> Json {
+        let mut root = Map::new();
+        root.insert("taki".into(), json!(env!("CARGO_PKG_VERSION")));
+        root.insert("version".into(), json!(VERSION));
+        root.insert("name".into(), json!(self.name));
+        for key in self.keys() {
+            insert(&mut root, &key, self.values.get(&key).to_json());
+        }
+        // A list, as in the scene file.
+        if let Some(Json::Object(quads)) = root.remove("quads") {
+            let mut numbered: Vec<(u64, Json)> =
+                quads.into_iter().map(|(n, quad)| (n.parse().unwrap_or(u64::MAX), quad)).collect();
+            numbered.sort_by_key(|(n, _)| *n);
+            root.insert("quads".into(), numbered.into_iter().map(|(_, quad)| quad).collect());
+        }
+        let camera = &self.camera;
+        let lights: Vec<Json> = self
+            .lights
+            .iter()
+            .map(|light| match light {
+                Light::Directional { to_light, intensity } => {
+                    json!({"kind": "directional", "to_light": to_light.to_array(), "intensity": intensity.to_array()})
+                }
+                Light::Point { position, intensity } => {
+                    json!({"kind": "point", "position": position.to_array(), "intensity": intensity.to_array()})
+                }
+            })
+            .collect();
+        let mesh = self.mesh();
+        let column = |get: fn(&super::Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
+        root.insert(
+            "derived".into(),
+            json!({
+                "curves": {
+                    "levels": self.water.shape.levels,
+                    "sigma_g_cells": self.water.shape.sigma_g_cells,
+                },
+                "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
+                "camera": {
+                    "eye": camera.eye.to_array(),
+                    "right": camera.right.to_array(),
+                    "up": camera.up.to_array(),
+                    "forward": camera.forward.to_array(),
+                    "tan_half_fov": camera.tan_half_fov,
+                    "near": camera.near,
+                    "sample_offsets": (0..self.image.samples)
+                        .map(|s| crate::camera::sample_offset(s, self.image.samples))
+                        .collect::<Vec<_>>(),
+                },
+                "lights": lights,
+                "mesh": {
+                    "positions": column(|v| v.position),
+                    "normals": column(|v| v.normal),
+                    "albedos": column(|v| v.albedo),
+                    "triangles": mesh.indices.chunks_exact(3).collect::<Vec<_>>(),
+                },
+            }),
+        );
+        Json::Object(root)
+    }
+}
+
+fn insert(map: &mut Map<String, Json>, key: &str, value: Json) {
+    match key.split_once('.') {
+        None => {
+            map.insert(key.into(), value);
+        }
+        Some((first, rest)) => {
+            let slot = map.entry(first).or_insert_with(|| Json::Object(Map::new()));
+            if let Json::Object(inner) = slot {
+                insert(inner, rest, value);
+            }
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! Parameter values: checked against the table, merged, printed.
+
+use std::collections::BTreeMap;
+
+use super::param::{COLOR_MAX, Kind, POINT_MAX, Param, find, nearest};
+use crate::error::{Error, Result};
+
+/// A checked value. Numbers are the shortest decimal of the float32 that is rendered with.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number.
+    Float(f64),
+    /// A whole number.
+    Int(i64),
+    /// A word, path or name.
+    Text(String),
+    /// A colour, point or direction.
+    Triple([f64; 3]),
+    /// Four corners.
+    Corners([[f64; 3]; 4]),
+}
+
+/// A value as some syntax gave it, before it meets the table.
+#[derive(Clone, Debug)]
+pub enum Raw {
+    /// A float.
+    Float(f64),
+    /// A whole number.
+    Int(i64),
+    /// A string.
+    Text(String),
+    /// A list.
+    List(Vec<Raw>),
+    /// Anything else, by its name.
+    Other(&'static str),
+}
+
+/// Where a value comes from, for messages: `file:line` or `--set`.
+#[derive(Clone, Debug)]
+pub struct Place(pub String);
+
+/// Dotted concrete keys and their values; keys not in the map have their defaults.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Values(pub BTreeMap<Key, Value>);
+
+/// A dotted key that sorts numbers (of quads) by size and names by letters.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Key(Vec<Part>);
+
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    Number(u32),
+    Name(String),
+}
+
+impl Key {
+    /// From its dotted form.
+    pub fn new(dotted: &str) -> Self {
+        Key(dotted
+            .split('.')
+            .map(|part| match part.parse() {
+                Ok(n) => Part::Number(n),
+                Err(_) => Part::Name(part.into()),
+            })
+            .collect())
+    }
+}
+
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (i, part) in self.0.iter().enumerate() {
+            let dot = if i == 0 { "" } else { "." };
+            match part {
+                Part::Number(n) => write!(f, "{dot}{n}")?,
+                Part::Name(name) => write!(f, "{dot}{name}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Values {
+    /// Checks `raw` against the table and stores it.
+    pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
+        let Some(param) = find(key) else {
+            let fix = match nearest(key) {
+                Some(near) => format!("did you mean {near}?"),
+                None => "the README's parameter table lists every key".into(),
+            };
+            return Err(Error::input(format!("{}: unknown key {key}", place.0), fix));
+        };
+        let value = check(param, raw).map_err(|got| {
+            Error::input(format!("{}: {key} = {got}", place.0), format!("allowed: {}", param.range()))
+        })?;
+        self.0.insert(Key::new(key), value);
+        Ok(())
+    }
+
+    /// Removes every key under `prefix`.
+    pub fn clear_under(&mut self, prefix: &str) {
+        let prefix = Key::new(prefix);
+        self.0.retain(|key, _| !key.0.starts_with(&prefix.0));
+    }
+
+    /// The names (or numbers) below `section`, in order.
+    pub fn names(&self, section: &str) -> Vec<String> {
+        let section = Key::new(section);
+        let mut names: Vec<String> = Vec::new();
+        for key in self.0.keys() {
+            if let Some(rest) = key.0.strip_prefix(section.0.as_slice())
+                && let Some(first) = rest.first()
+            {
+                let name = Key(vec![first.clone()]).to_string();
+                if names.last() != Some(&name) {
+                    names.push(name);
+                }
+            }
+        }
+        names
+    }
+
+    /// The value of a concrete key: set, or the table's default.
+    ///
+    /// # Panics
+    /// If the table has no such key, or a required value was not given: callers check first.
+    pub fn get(&self, key: &str) -> Value {
+        if let Some(value) = self.0.get(&Key::new(key)) {
+            return value.clone();
+        }
+        let param = find(key).unwrap_or_else(|| panic!("no parameter {key}"));
+        match param.kind {
+            Kind::Float(.., d) => Value::Float(round_f32(d)),
+            Kind::Int(.., d) => Value::Int(d),
+            Kind::Choice(words) => Value::Text(words[0].into()),
+            Kind::Text(t) => Value::Text(t.into()),
+            Kind::Color(c) | Kind::Point(c) => Value::Triple(c),
+            Kind::Corners => panic!("{key} has no default"),
+        }
+    }
+
+    /// Whether the scene sets this key itself.
+    pub fn is_set(&self, key: &str) -> bool {
+        self.0.contains_key(&Key::new(key))
+    }
+
+    /// A float32 parameter.
+    pub fn float(&self, key: &str) -> f32 {
+        match self.get(key) {
+            Value::Float(x) => x as f32,
+            other => panic!("{key} is no number: {other:?}"),
+        }
+    }
+
+    /// A whole parameter.
+    pub fn int(&self, key: &str) -> i64 {
+        match self.get(key) {
+            Value::Int(x) => x,
+            other => panic!("{key} is no whole number: {other:?}"),
+        }
+    }
+
+    /// A whole parameter whose range fits 32 bits.
+    pub fn count(&self, key: &str) -> u32 {
+        u32::try_from(self.int(key)).unwrap_or_else(|_| panic!("{key} does not fit 32 bits"))
+    }
+
+    /// A word.
+    pub fn text(&self, key: &str) -> String {
+        match self.get(key) {
+            Value::Text(t) => t,
+            other => panic!("{key} is no text: {other:?}"),
+        }
+    }
+
+    /// A point, direction or colour.
+    pub fn triple(&self, key: &str) -> glam::Vec3 {
+        match self.get(key) {
+            Value::Triple(t) => glam::Vec3::from_array(t.map(|x| x as f32)),
+            other => panic!("{key} is no triple: {other:?}"),
+        }
+    }
+
+    /// Four corners.
+    pub fn corners(&self, key: &str) -> [glam::Vec3; 4] {
+        match self.get(key) {
+            Value::Corners(c) => c.map(|p| glam::Vec3::from_array(p.map(|x| x as f32))),
+            other => panic!("{key} is no quad: {other:?}"),
+        }
+    }
+}
+
+/// The value as the renderer's float32, in its shortest decimal.
+fn round_f32(x: f64) -> f64 {
+    (x as f32).to_string().parse().unwrap_or(f64::NAN)
+}
+
+/// Checks a raw value against a parameter's kind; the error is the value in words.
+fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
+    let words = || raw.words();
+    match param.kind {
+        Kind::Float(min, max, _) => Ok(Value::Float(float(raw, min, max).ok_or_else(words)?)),
+        Kind::Int(min, max, _) => match raw {
+            Raw::Int(x) if (min..=max).contains(x) => Ok(Value::Int(*x)),
+            _ => Err(words()),
+        },
+        Kind::Choice(options) => match raw {
+            Raw::Text(t) if options.contains(&t.as_str()) => Ok(Value::Text(t.clone())),
+            _ => Err(words()),
+        },
+        Kind::Text(_) => match raw {
+            Raw::Text(t) => Ok(Value::Text(t.clone())),
+            _ => Err(words()),
+        },
+        Kind::Color(_) => Ok(Value::Triple(triple(raw, 0.0, COLOR_MAX).ok_or_else(words)?)),
+        Kind::Point(_) => Ok(Value::Triple(triple(raw, -POINT_MAX, POINT_MAX).ok_or_else(words)?)),
+        Kind::Corners => {
+            let Raw::List(list) = raw else { return Err(words()) };
+            let points: Option<Vec<[f64; 3]>> =
+                list.iter().map(|p| triple(p, -POINT_MAX, POINT_MAX)).collect();
+            let corners = points.and_then(|p| <[[f64; 3]; 4]>::try_from(p).ok());
+            Ok(Value::Corners(corners.ok_or_else(words)?))
+        }
+    }
+}
+
+/// A number inside the range whose float32 is neither denormal nor infinite.
+fn float(raw: &Raw, min: f64, max: f64) -> Option<f64> {
+    let x = match *raw {
+        Raw::Float(x) => x,
+        Raw::Int(x) => x as f64,
+        _ => return None,
+    };
+    let single = x as f32;
+    let usable = single.is_normal() || x == 0.0;
+    // −0 would turn signs of derived values; it means 0.
+    ((min..=max).contains(&x) && usable).then(|| if x == 0.0 { 0.0 } else { round_f32(x) })
+}
+
+fn triple(raw: &Raw, min: f64, max: f64) -> Option<[f64; 3]> {
+    let Raw::List(list) = raw else { return None };
+    let numbers: Option<Vec<f64>> = list.iter().map(|x| float(x, min, max)).collect();
+    numbers.and_then(|n| n.try_into().ok())
+}
+
+impl Raw {
+    /// The value in words, cut to a length that fits a message.
+    fn words(&self) -> String {
+        let text = match self {
+            Raw::Float(x) => format!("{x:?}"),
+            Raw::Int(x) => x.to_string(),
+            Raw::Text(t) => format!("{t:?}"),
+            Raw::List(list) => {
+                format!("[{}]", list.iter().take(5).map(Raw::words).collect::<Vec<_>>().join(", "))
+            }
+            Raw::Other(name) => (*name).into(),
+        };
+        match text.char_indices().nth(60) {
+            Some((cut, _)) => format!("{}…", &text[..cut]),
+            None => text,
+        }
+    }
+}
+
+impl Value {
+    /// As TOML.
+    pub fn to_toml(&self) -> String {
+        match self {
+            Value::Float(x) => toml::Value::Float(*x).to_string(),
+            Value::Int(x) => x.to_string(),
+            Value::Text(t) => toml::Value::String(t.clone()).to_string(),
+            Value::Triple(t) => format!("[{}, {}, {}]", t[0], t[1], t[2]),
+            Value::Corners(c) => {
+                format!("[{}]", c.iter().map(|p| Value::Triple(*p).to_toml()).collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+
+    /// As JSON.
+    pub fn to_json(&self) -> serde_json::Value {
+        match self {
+            Value::Float(x) => serde_json::json!(x),
+            Value::Int(x) => serde_json::json!(x),
+            Value::Text(t) => serde_json::json!(t),
+            Value::Triple(t) => serde_json::json!(t),
+            Value::Corners(c) => serde_json::json!(c),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! One cell of the volume texture in 64 bits, as the shader reads it (`rg32uint`).
+//!
+//! | word | bits | what |
+//! |---|---|---|
+//! | x | 0–15 | ρ before α, unorm16 |
+//! | x | 16–23 | k_d, unorm8 |
+//! | x | 24–31 | k_s, unorm8 |
+//! | y | 0–9, 10–19, 20–29 | v as three signed 10-bit numbers, largest magnitude 511 |
+//! | y | 30–31 | zero |
+//!
+//! v is scaled by its largest component, not by its length: the direction is code/|code|. The largest
+//! angular error is 0.079° (a test states it), decoding needs shifts only, the length cancels in the
+//! fibre model, and packing what was unpacked gives the same code again.
+
+use glam::Vec3;
+
+/// Largest code of a component of v.
+pub const V_SCALE: f32 = 511.0;
+
+/// A packed cell.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Cell {
+    /// ρ, k_d and k_s.
+    pub x: u32,
+    /// v; 0 where the cell is empty.
+    pub y: u32,
+}
+
+impl Cell {
+    /// Packs v alone; a zero vector gives an empty cell.
+    pub fn from_direction(v: Vec3) -> Self {
+        let largest = v.abs().max_element();
+        // Below this the squares of a direction vanish in f32 and it has no direction.
+        if !(largest > 1e-18) {
+            return Cell::default();
+        }
+        let code = (v * (V_SCALE / largest)).round().as_ivec3();
+        let bits = |c: i32| (c as u32) & 0x3ff;
+        Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
+    }
+
+    /// The same cell with ρ before α, k_d and k_s, each in [0,1].
+    pub fn with_density(self, rho: f32, k_d: f32, k_s: f32) -> Self {
+        let unorm = |x: f32, scale: f32| (x.clamp(0.0, 1.0) * scale).round() as u32;
+        Cell { x: unorm(rho, 65535.0) | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }
+    }
+
+    /// Whether v is set.
+    pub fn has_direction(self) -> bool {
+        self.y != 0
+    }
+
+    /// ρ before α as stored, 0 to 65535.
+    #[inline]
+    pub fn rho_code(self) -> u32 {
+        self.x & 0xffff
+    }
+
+    /// k_d and k_s as stored, 0 to 255.
+    #[inline]
+    pub fn k_codes(self) -> (u32, u32) {
+        (self.x >> 16 & 0xff, self.x >> 24)
+    }
+
+    /// v as stored: parallel to v, each component −511 to 511.
+    #[inline]
+    pub fn v_code(self) -> Vec3 {
+        let signed = |shift: u32| ((self.y << shift) as i32 >> 22) as f32;
+        Vec3::new(signed(22), signed(12), signed(2))
+    }
+
+    /// ρ before α.
+    pub fn rho(self) -> f32 {
+        self.rho_code() as f32 / 65535.0
+    }
+
+    /// (k_d, k_s).
+    pub fn k(self) -> (f32, f32) {
+        let (d, s) = self.k_codes();
+        (d as f32 / 255.0, s as f32 / 255.0)
+    }
+
+    /// v, unit or zero.
+    pub fn v(self) -> Vec3 {
+        self.v_code().normalize_or_zero()
+    }
+}

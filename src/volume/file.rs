@@ -1,0 +1,217 @@
+//! Volume files: NumPy `.npz` with `rho` float32 [nz,ny,nx], `v` float32 [nz,ny,nx,3], `k` float32
+//! [nz,ny,nx,2] and the scalar `alpha`.
+//!
+//! The arrays hold what the renderer uses, after packing: `rho` includes α, `v` is unit or zero.
+//! `alpha` makes reading exact (the cells hold ρ/α); a file without it is read with α = 1.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, Write};
+use std::path::Path;
+
+use glam::Vec3;
+use npyz::WriterBuilder;
+use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
+
+use super::{Cell, VolumeTexture, check_budget};
+use crate::error::{Error, Result};
+
+/// NumPy pads its headers to 128 bytes; a longer one than this is not an array of numbers, and a
+/// bound keeps the header's parser (recursive) from a hostile file.
+const MAX_HEADER_BYTES: u64 = 512;
+
+/// Largest distance of |v| from 1 that counts as unit: float32 rounding, with room for files made
+/// by other programs in lower precision.
+const UNIT_TOLERANCE: f32 = 1e-3;
+
+/// Writes `volume` to `out` as `.npz`. The bytes depend on the volume alone.
+pub fn write_npz(volume: &VolumeTexture, out: impl Write + Seek) -> std::io::Result<()> {
+    let [nx, ny, nz] = volume.size.map(u64::from);
+    let mut zip = ZipWriter::new(out);
+    let cells = &volume.cells;
+    let rho = cells.iter().map(|c| c.rho() * volume.alpha);
+    write_array(&mut zip, "rho", &[nz, ny, nx], rho)?;
+    let v = cells.iter().flat_map(|c| c.v().to_array());
+    write_array(&mut zip, "v", &[nz, ny, nx, 3], v)?;
+    let k = cells.iter().flat_map(|c| <[f32; 2]>::from(c.k()));
+    write_array(&mut zip, "k", &[nz, ny, nx, 2], k)?;
+    write_array(&mut zip, "alpha", &[], std::iter::once(volume.alpha))?;
+    zip.finish()?.flush()
+}
+
+fn write_array<W: Write + Seek>(
+    zip: &mut ZipWriter<W>,
+    name: &str,
+    shape: &[u64],
+    values: impl Iterator<Item = f32>,
+) -> std::io::Result<()> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(1))
+        .large_file(true)
+        // A date would make equal volumes differ.
+        .last_modified_time(zip::DateTime::default());
+    zip.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+    let mut buffered = std::io::BufWriter::with_capacity(1 << 16, zip);
+    let mut writer =
+        npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut buffered).begin_nd()?;
+    writer.extend(values)?;
+    writer.finish()?;
+    buffered.flush()
+}
+
+/// Reads a volume of at most `budget` bytes. Every value is checked; nothing of the size the file
+/// claims is allocated before it was compared with the budget.
+pub fn read_npz(path: &Path, budget: u64) -> Result<VolumeTexture> {
+    let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
+    if !meta.is_file() {
+        return Err(Error::input(
+            format!("{} is not a regular file", path.display()),
+            "give an .npz file made by `taki volume build` or NumPy's savez",
+        ));
+    }
+    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let mut reader = Reader {
+        path,
+        budget,
+        zip: ZipArchive::new(BufReader::new(file)).map_err(|e| bad(path, e.to_string()))?,
+    };
+    reader.volume()
+}
+
+fn bad(path: &Path, what: String) -> Error {
+    Error::input(
+        format!("{}: {what}", path.display()),
+        "a volume file is an .npz with rho float32 [nz,ny,nx], v float32 [nz,ny,nx,3], k float32 [nz,ny,nx,2]",
+    )
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    budget: u64,
+    zip: ZipArchive<BufReader<File>>,
+}
+
+impl Reader<'_> {
+    fn volume(&mut self) -> Result<VolumeTexture> {
+        let alpha = self.alpha()?;
+        let shape = self.each("rho", None, |_, _: [f32; 1]| Ok(()))?;
+        let &[nz, ny, nx] = shape.as_slice() else {
+            return Err(bad(self.path, format!("rho has shape {shape:?}, not [nz,ny,nx]")));
+        };
+        let size = [nx, ny, nz].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        if size.contains(&0) {
+            return Err(bad(self.path, format!("rho has shape {shape:?}: a volume has at least one cell")));
+        }
+        check_budget(size, self.budget)?;
+        let mut cells = vec![Cell::default(); (nx * ny * nz) as usize];
+        self.each("v", Some(&[nz, ny, nx, 3]), |i, v: [f32; 3]| {
+            let v = Vec3::from_array(v);
+            let length = v.length();
+            if v == Vec3::ZERO || (length - 1.0).abs() <= UNIT_TOLERANCE {
+                cells[i] = Cell::from_direction(v);
+                Ok(())
+            } else {
+                Err(format!("{v:?} has length {length}: v is unit or zero"))
+            }
+        })?;
+        let mut rho = vec![0.0f32; cells.len()];
+        self.each("rho", Some(&[nz, ny, nx]), |i, [value]: [f32; 1]| {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(format!("{value} is outside 0..=1"));
+            }
+            if value > alpha * 1.000001 {
+                return Err(format!("{value} is more than the file's alpha {alpha}"));
+            }
+            if value > 0.0 && !cells[i].has_direction() {
+                return Err(format!("{value} where v is zero: a cell with density needs a direction"));
+            }
+            rho[i] = if alpha > 0.0 { value / alpha } else { 0.0 };
+            Ok(())
+        })?;
+        self.each("k", Some(&[nz, ny, nx, 2]), |i, [k_d, k_s]: [f32; 2]| {
+            if !(0.0..=1.0).contains(&k_d) || !(0.0..=1.0).contains(&k_s) {
+                return Err(format!("({k_d}, {k_s}) is outside 0..=1"));
+            }
+            if cells[i].has_direction() {
+                cells[i] = cells[i].with_density(rho[i], k_d, k_s);
+            }
+            Ok(())
+        })?;
+        Ok(VolumeTexture { size, alpha, cells })
+    }
+
+    fn alpha(&mut self) -> Result<f32> {
+        if self.zip.index_for_name("alpha.npy").is_none() {
+            return Ok(1.0);
+        }
+        let mut alpha = 1.0;
+        self.each("alpha", Some(&[]), |_, [value]: [f32; 1]| {
+            alpha = value;
+            if (0.0..=1.0).contains(&value) { Ok(()) } else { Err(format!("{value} is outside 0..=1")) }
+        })?;
+        Ok(alpha)
+    }
+
+    /// Reads array `name` as float32 in rows of N, giving each to `row` with its index; returns the
+    /// shape. Without an expected shape only the header is read.
+    fn each<const N: usize>(
+        &mut self,
+        name: &str,
+        expected: Option<&[u64]>,
+        mut row: impl FnMut(usize, [f32; N]) -> std::result::Result<(), String>,
+    ) -> Result<Vec<u64>> {
+        let path = self.path;
+        let fault = |what: String| bad(path, format!("{name}: {what}"));
+        let entry = self
+            .zip
+            .by_name(&npyz::npz::file_name_from_array_name(name))
+            .map_err(|e| fault(e.to_string()))?;
+        let (header, mut bytes) = open_array(entry).map_err(|e| fault(e.to_string()))?;
+        let shape = header.shape().to_vec();
+        let dtype = header.dtype().descr();
+        if dtype != "'<f4'" {
+            return Err(fault(format!("dtype is {dtype}, not '<f4' (float32)")));
+        }
+        if header.order() != npyz::Order::C {
+            return Err(fault("the array is in Fortran order; save it with numpy.ascontiguousarray".into()));
+        }
+        let Some(expected) = expected else { return Ok(shape) };
+        if shape != expected {
+            return Err(fault(format!("shape is {shape:?}, not {expected:?}")));
+        }
+        let npy = npyz::NpyFile::with_header(header, &mut bytes);
+        let mut values = npy.data::<f32>().map_err(|e| fault(e.to_string()))?;
+        let rows = expected.iter().product::<u64>() as usize / N;
+        for i in 0..rows {
+            let mut out = [0.0; N];
+            for slot in &mut out {
+                *slot = match values.next() {
+                    Some(Ok(x)) => x,
+                    Some(Err(e)) => return Err(fault(format!("row {i}: {e}"))),
+                    None => return Err(fault(format!("ends after {i} of {rows} rows"))),
+                };
+            }
+            row(i, out).map_err(|e| fault(format!("row {i}: {e}")))?;
+        }
+        // The archive's checksum is only compared when an entry is read to its end.
+        if bytes.read(&mut [0]).map_err(|e| fault(e.to_string()))? != 0 {
+            return Err(fault(format!("has more than {rows} rows")));
+        }
+        Ok(shape)
+    }
+}
+
+/// Opens an array after checking that its header is of a sane length.
+fn open_array<R: Read>(mut entry: R) -> std::io::Result<(npyz::NpyHeader, impl Read)> {
+    let mut prefix = [0u8; 12];
+    entry.read_exact(&mut prefix)?;
+    let header_bytes = match prefix[6] {
+        1 => u16::from_le_bytes([prefix[8], prefix[9]]) as u64,
+        _ => u32::from_le_bytes([prefix[8], prefix[9], prefix[10], prefix[11]]) as u64,
+    };
+    if &prefix[..6] != b"\x93NUMPY" || header_bytes > MAX_HEADER_BYTES {
+        return Err(std::io::Error::other("not a NumPy array"));
+    }
+    let mut bytes = BufReader::with_capacity(1 << 16, std::io::Cursor::new(prefix).chain(entry));
+    Ok((npyz::NpyHeader::from_reader(&mut bytes)?, bytes))
+}

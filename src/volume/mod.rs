@@ -1,0 +1,107 @@
+//! §2 The volume texture: density ρ, flow direction v and reflection coefficients k in every cell.
+
+mod cell;
+mod file;
+mod water;
+
+pub use cell::{Cell, V_SCALE};
+pub use file::{read_npz, write_npz};
+pub use water::{WaterSpec, build_water};
+
+use crate::error::{Error, Result};
+
+/// A volume texture: nx × ny × nz packed cells, x fastest, then y, then z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeTexture {
+    /// Cells along x (across the flow), y (along it) and z (into the surface).
+    pub size: [u32; 3],
+    /// Scale of ρ, 0 to 1: the cells hold ρ/α.
+    pub alpha: f32,
+    /// nx·ny·nz cells.
+    pub cells: Vec<Cell>,
+}
+
+impl VolumeTexture {
+    /// Linear index of a cell inside the tile.
+    #[inline]
+    pub fn index(&self, x: u32, y: u32, z: u32) -> usize {
+        (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
+    }
+
+    /// What `taki volume info` prints.
+    pub fn statistics(&self) -> Statistics {
+        let mut s = Statistics { size: self.size, alpha: self.alpha, ..Default::default() };
+        let (mut rho, mut k_d, mut k_s) = (0.0f64, 0.0f64, 0.0f64);
+        let (mut at_zero, mut at_alpha) = (0u64, 0u64);
+        let mut v = glam::DVec3::ZERO;
+        for cell in self.cells.iter().filter(|c| c.has_direction()) {
+            s.flow_cells += 1;
+            s.occupied_cells += u64::from(cell.rho_code() > 0);
+            at_zero += u64::from(cell.rho_code() == 0);
+            at_alpha += u64::from(cell.rho_code() == 0xffff);
+            rho += (cell.rho() * self.alpha) as f64;
+            let k = cell.k();
+            k_d += k.0 as f64;
+            k_s += k.1 as f64;
+            v += cell.v().as_dvec3();
+        }
+        s.cells = self.cells.len() as u64;
+        s.bytes = (self.cells.len() * size_of::<Cell>()) as u64;
+        if s.flow_cells > 0 {
+            let n = s.flow_cells as f64;
+            s.rho_mean = rho / n;
+            s.rho_share_at_zero = at_zero as f64 / n;
+            s.rho_share_at_alpha = at_alpha as f64 / n;
+            s.k_d_mean = k_d / n;
+            s.k_s_mean = k_s / n;
+            s.v_mean = (v / n).to_array();
+        }
+        s
+    }
+}
+
+/// Figures of a volume texture. Means and shares are over the flow cells (those with v set).
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Statistics {
+    /// nx, ny, nz.
+    pub size: [u32; 3],
+    /// Scale of ρ.
+    pub alpha: f32,
+    /// nx·ny·nz.
+    pub cells: u64,
+    /// Cells with a direction.
+    pub flow_cells: u64,
+    /// Cells with ρ > 0.
+    pub occupied_cells: u64,
+    /// Mean ρ; α/2 in theory.
+    pub rho_mean: f64,
+    /// Share with ρ = 0; 0.3085 in theory.
+    pub rho_share_at_zero: f64,
+    /// Share with ρ = α; 0.3085 in theory.
+    pub rho_share_at_alpha: f64,
+    /// Mean k_d.
+    pub k_d_mean: f64,
+    /// Mean k_s.
+    pub k_s_mean: f64,
+    /// Mean v (not a unit vector).
+    pub v_mean: [f64; 3],
+    /// Size of the packed cells.
+    pub bytes: u64,
+}
+
+/// Checks, before anything is allocated, that a volume of `size` cells fits into `budget` bytes.
+/// Building needs the packed cells and one vector per cell.
+pub fn check_budget(size: [u32; 3], budget: u64) -> Result<()> {
+    let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>()) as u128;
+    let need = size.iter().map(|&n| n as u128).product::<u128>() * per_cell;
+    if need > budget as u128 {
+        let [nx, ny, nz] = size;
+        return Err(Error::memory(
+            format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)"),
+            need,
+            budget,
+            "lower volume.nx, volume.ny or volume.nz, or raise --memory",
+        ));
+    }
+    Ok(())
+}

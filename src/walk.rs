@@ -1,0 +1,137 @@
+//! The exact 3-D DDA walk through a grid of unit cells: geometry only.
+//!
+//! Used by the curves (method §2) to find every cell a segment passes, and by the trace (§4) along
+//! view and light rays. Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing",
+//! Eurographics 1987, in the spirit of the paper's [Snyder and Barr 87].
+//!
+//! Copies of the grid lie side by side in x and y, so the cell's x and y wrap; z does not, and the
+//! consumer ends the walk when z leaves the slab. The walk itself ends at `t_end`.
+//!
+//! Edge cases:
+//! - A zero (or −0) component never steps: its next boundary lies at [`NEVER`].
+//! - A start on a face belongs to the cell the ray goes into.
+//! - Through an edge or corner exactly one axis steps at a time, x before y before z, so the cells
+//!   always form a 6-connected chain; the cell between has length 0.
+//! - Boundaries are whole numbers and each parameter is computed from its boundary afresh, so no
+//!   error adds up along the ray, and parameters never decrease.
+//!
+//! `shaders/integrate.wgsl` is this file's twin: the same operations in the same order.
+
+use glam::{IVec3, Vec3};
+
+/// The parameter of a boundary that is never met. Larger than any path, small enough that
+/// differences of parameters stay finite.
+pub const NEVER: f32 = 1.0e30;
+
+/// Direction components smaller than this (in cells per unit of t) count as zero: such a ray would
+/// need more than 10^20 units of t to cross one cell.
+pub const PARALLEL: f32 = 1.0e-20;
+
+/// One cell on the way of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// The cell; x and y wrapped into the tile, z as it is (may lie outside the slab).
+    pub cell: IVec3,
+    /// Parameter where the ray enters the cell.
+    pub t_enter: f32,
+    /// Parameter where the ray leaves the cell; never less than `t_enter`.
+    pub t_exit: f32,
+}
+
+/// Iterator over the cells of a ray `origin + t·direction`, t from 0 to `t_end`.
+#[derive(Clone, Debug)]
+pub struct Walk {
+    size: IVec3,
+    cell: IVec3,
+    step: IVec3,
+    origin: Vec3,
+    inverse: Vec3,
+    boundary: Vec3,
+    t_next: Vec3,
+    t: f32,
+    t_end: f32,
+}
+
+/// The cell coordinate a ray starts in: on a face it is the side the ray goes to.
+fn start_cell(x: f32, direction: f32) -> f32 {
+    if direction < 0.0 { x.ceil() - 1.0 } else { x.floor() }
+}
+
+impl Walk {
+    /// A ray from `origin_cell` (cells, finite, |x| < 2^23) along `direction_cell` (cells per unit
+    /// of t) through tiles of `size` cells.
+    pub fn new(size: IVec3, origin_cell: Vec3, direction_cell: Vec3, t_end: f32) -> Self {
+        let start = Vec3::new(
+            start_cell(origin_cell.x, direction_cell.x),
+            start_cell(origin_cell.y, direction_cell.y),
+            start_cell(origin_cell.z, direction_cell.z),
+        );
+        let mut step = IVec3::ZERO;
+        let mut inverse = Vec3::ZERO;
+        let mut boundary = Vec3::ZERO;
+        let mut t_next = Vec3::splat(NEVER);
+        for axis in 0..3 {
+            let d = direction_cell[axis];
+            if d.abs() < PARALLEL {
+                continue;
+            }
+            step[axis] = if d > 0.0 { 1 } else { -1 };
+            inverse[axis] = 1.0 / d;
+            boundary[axis] = start[axis] + if d > 0.0 { 1.0 } else { 0.0 };
+            t_next[axis] = (boundary[axis] - origin_cell[axis]) * inverse[axis];
+        }
+        let cell = start.as_ivec3();
+        Walk {
+            size,
+            cell: IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z),
+            step,
+            origin: origin_cell,
+            inverse,
+            boundary,
+            t_next,
+            t: 0.0,
+            t_end,
+        }
+    }
+}
+
+impl Iterator for Walk {
+    type Item = Crossing;
+
+    #[inline]
+    fn next(&mut self) -> Option<Crossing> {
+        if self.t >= self.t_end {
+            return None;
+        }
+        let t_exit = self.t_next.x.min(self.t_next.y).min(self.t_next.z);
+        let crossing = Crossing { cell: self.cell, t_enter: self.t, t_exit: t_exit.min(self.t_end) };
+        // One axis steps: x before y before z where several boundaries coincide.
+        if self.t_next.x <= t_exit {
+            self.boundary.x += self.step.x as f32;
+            self.t_next.x = (self.boundary.x - self.origin.x) * self.inverse.x;
+            self.cell.x = wrap(self.cell.x + self.step.x, self.size.x);
+        } else if self.t_next.y <= t_exit {
+            self.boundary.y += self.step.y as f32;
+            self.t_next.y = (self.boundary.y - self.origin.y) * self.inverse.y;
+            self.cell.y = wrap(self.cell.y + self.step.y, self.size.y);
+        } else {
+            self.boundary.z += self.step.z as f32;
+            self.t_next.z = (self.boundary.z - self.origin.z) * self.inverse.z;
+            self.cell.z += self.step.z;
+        }
+        self.t = t_exit;
+        Some(crossing)
+    }
+}
+
+/// One step past either end of 0..n comes in at the other.
+#[inline]
+fn wrap(x: i32, n: i32) -> i32 {
+    if x < 0 {
+        n - 1
+    } else if x >= n {
+        0
+    } else {
+        x
+    }
+}
