@@ -15,7 +15,7 @@
 //! - Boundaries are whole numbers and each parameter is computed from its boundary afresh, so no
 //!   error adds up along the ray, and parameters never decrease.
 //!
-//! `shaders/integrate.wgsl` is this file's twin: the same operations in the same order.
+//! `shaders/walk.wgsl` is this file's twin: the same operations in the same order.
 
 use glam::{IVec3, Vec3};
 
@@ -66,29 +66,30 @@ impl Walk {
             start_cell(origin_cell.y, direction_cell.y),
             start_cell(origin_cell.z, direction_cell.z),
         );
+        // A parallel axis stays at boundary 1 of origin 0: its parameter is always NEVER.
         let mut step = IVec3::ZERO;
-        let mut inverse = Vec3::ZERO;
-        let mut boundary = Vec3::ZERO;
-        let mut t_next = Vec3::splat(NEVER);
+        let mut origin = Vec3::ZERO;
+        let mut inverse = Vec3::splat(NEVER);
+        let mut boundary = Vec3::ONE;
         for axis in 0..3 {
             let d = direction_cell[axis];
             if d.abs() < PARALLEL {
                 continue;
             }
             step[axis] = if d > 0.0 { 1 } else { -1 };
+            origin[axis] = origin_cell[axis];
             inverse[axis] = 1.0 / d;
             boundary[axis] = start[axis] + if d > 0.0 { 1.0 } else { 0.0 };
-            t_next[axis] = (boundary[axis] - origin_cell[axis]) * inverse[axis];
         }
         let cell = start.as_ivec3();
         Walk {
             size,
             cell: IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z),
             step,
-            origin: origin_cell,
+            origin,
             inverse,
             boundary,
-            t_next,
+            t_next: (boundary - origin) * inverse,
             t: 0.0,
             t_end,
         }
@@ -106,11 +107,12 @@ impl Iterator for Walk {
         let t_exit = self.t_next.x.min(self.t_next.y).min(self.t_next.z);
         let crossing = Crossing { cell: self.cell, t_enter: self.t, t_exit: t_exit.min(self.t_end) };
         // One axis steps: x before y before z where several boundaries coincide.
-        if self.t_next.x <= t_exit {
+        let t_next = self.t_next;
+        if t_next.x <= t_next.y && t_next.x <= t_next.z {
             self.boundary.x += self.step.x as f32;
             self.t_next.x = (self.boundary.x - self.origin.x) * self.inverse.x;
             self.cell.x = wrap(self.cell.x + self.step.x, self.size.x);
-        } else if self.t_next.y <= t_exit {
+        } else if t_next.y <= t_next.z {
             self.boundary.y += self.step.y as f32;
             self.t_next.y = (self.boundary.y - self.origin.y) * self.inverse.y;
             self.cell.y = wrap(self.cell.y + self.step.y, self.size.y);

@@ -1,7 +1,231 @@
-use super::terminal::Terminal;
-use crate::error::Result;
-#[derive(clap::Args)]
-pub struct BenchArgs {}
-pub fn run(_: &BenchArgs, _: &Terminal) -> Result<()> {
+//! `taki bench`: what the passes cost on this machine, with the work they did.
+//!
+//! Times are medians of runs in turn in one process: other programs on the machine disturb all rows
+//! alike, so ratios between rows hold where single times do not.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::terminal::{Terminal, say};
+use super::{EngineOptions, size};
+use crate::cpu;
+use crate::error::{Error, Result};
+use crate::gpu::{BenchPass, GpuBench};
+use crate::job::{Engine, EngineChoice, Monitor, Unwatched};
+use crate::scene::{Limits, Scene};
+use crate::volume::VolumeTexture;
+
+#[derive(Args)]
+pub struct BenchArgs {
+    /// Measures the `front` scene with this volume file only.
+    #[arg(long, value_name = "V.npz")]
+    volume: Option<PathBuf>,
+    /// Measures this image size only.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Runs of each row, of which the median counts.
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    runs: u32,
+    #[command(flatten)]
+    engine: EngineOptions,
+    /// Prints one JSON object with all rows.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One measured pass.
+#[derive(Serialize)]
+struct Row {
+    scene: &'static str,
+    volume: String,
+    size: String,
+    engine: &'static str,
+    pass: &'static str,
+    /// Median.
+    seconds: f64,
+    /// Fastest run.
+    fastest: f64,
+    /// Cells walked in one run, by view and light rays.
+    cells: u64,
+    /// Core-nanoseconds per cell: wall seconds × cores / cells.
+    ns_per_cell: f64,
+}
+
+const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
+
+pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
+    let sizes = args.size.map_or(SIZES.to_vec(), |s| vec![s]);
+    let mut rows = Vec::new();
+    let (engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
+    terminal.note(&format!("taki: {line}"));
+    let mut gpu = match engine {
+        Engine::Gpu(renderer, _) => Some(GpuBench::new(*renderer)),
+        Engine::Cpu => None,
+    };
+    let volumes: Vec<Vec<String>> = match &args.volume {
+        Some(file) => {
+            let file = file.to_str().ok_or_else(|| Error::Usage("--volume: the path is not UTF-8".into()))?;
+            vec![vec![format!("volume.file={file:?}")]]
+        }
+        None => [40, 256].map(cube).to_vec(),
+    };
+    for sets in &volumes {
+        for &size in &sizes {
+            let mut sets = sets.clone();
+            sets.extend(front(size));
+            let direct = load("front", &sets)?;
+            sets.push("light.visibility=march".into());
+            let marched = load("front", &sets)?;
+            let volume = direct.volume(direct_limits().memory, terminal)?;
+            passes(args, terminal, &mut gpu, [&direct, &marched], &volume, &mut rows)?;
+        }
+    }
+    if args.volume.is_none() {
+        builds(args, terminal, &mut rows)?;
+    }
+    terminal.close();
+    print(args.json, &line, &rows);
     Ok(())
+}
+
+fn direct_limits() -> Limits {
+    Limits::default()
+}
+
+fn load(preset: &'static str, sets: &[String]) -> Result<Scene> {
+    Scene::load(preset.as_ref(), sets, &direct_limits())
+}
+
+/// A cubic volume with as many strands per face area as 32 × 32 at 40³.
+fn cube(n: u32) -> Vec<String> {
+    let strands = (32.0 * n as f64 / 40.0).round();
+    let mut sets: Vec<String> = ["nx", "ny", "nz"].map(|axis| format!("volume.{axis}={n}")).to_vec();
+    sets.extend(["across", "deep"].map(|axis| format!("curves.{axis}={strands}")));
+    sets
+}
+
+/// The front scene at a size: the quad spans 0.98 of the smaller side of the image.
+fn front([width, height]: [u32; 2]) -> Vec<String> {
+    let half_height = 0.5 / 0.98 * height as f64 / width.min(height) as f64;
+    let fov = 2.0 * (half_height / 3.0).atan().to_degrees();
+    vec![format!("image.width={width}"), format!("image.height={height}"), format!("camera.fov={fov}")]
+}
+
+/// Median and fastest.
+fn summary(mut times: Vec<f64>) -> [f64; 2] {
+    times.sort_by(f64::total_cmp);
+    [times[times.len() / 2], times[0]]
+}
+
+/// Rows of one scene and size: all passes in turn, `runs` times.
+fn passes(
+    args: &BenchArgs,
+    terminal: &Terminal,
+    gpu: &mut Option<GpuBench>,
+    [direct, marched]: [&Scene; 2],
+    volume: &VolumeTexture,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let mesh = direct.mesh();
+    let mut measured: Vec<(&'static str, &'static str, Vec<f64>, u64)> = Vec::new();
+    let mut add =
+        |engine, pass, seconds, cells| match measured.iter_mut().find(|m| m.0 == engine && m.1 == pass) {
+            Some(m) => m.2.push(seconds),
+            None => measured.push((engine, pass, vec![seconds], cells)),
+        };
+    if let Some(gpu) = gpu {
+        gpu.prepare(direct, marched, volume, &mesh)?;
+    }
+    // The first round warms caches and tile sizes and is not counted.
+    for round in 0..=args.runs {
+        terminal.progress("rounds", round as u64, args.runs as u64)?;
+        let counted = round > 0;
+        if let Some(gpu) = gpu {
+            for pass in BenchPass::ALL {
+                let (seconds, cells) = gpu.run(pass)?;
+                if counted {
+                    add("gpu", pass.name(), seconds, cells);
+                }
+            }
+        }
+        // `--engine gpu` asks for the device's rows alone.
+        let on_cpu = if args.engine.engine == EngineChoice::Gpu { 0 } else { 2 };
+        for (pass, scene) in [("integrate", direct), ("integrate march", marched)].into_iter().take(on_cpu) {
+            let frame = cpu::render(scene, volume, &mesh, false, &Unwatched)?;
+            if counted {
+                add("cpu", pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
+                if pass == "integrate" {
+                    add("cpu", "gbuffer", frame.seconds.gbuffer, 0);
+                }
+            }
+        }
+    }
+    let [nx, ny, nz] = volume.size;
+    for (engine, pass, times, cells) in measured {
+        rows.push(row("front", format!("{nx}×{ny}×{nz}"), direct, engine, pass, summary(times), cells));
+    }
+    Ok(())
+}
+
+fn row(
+    scene: &'static str,
+    volume: String,
+    of: &Scene,
+    engine: &'static str,
+    pass: &'static str,
+    [seconds, fastest]: [f64; 2],
+    cells: u64,
+) -> Row {
+    let cores = rayon::current_num_threads() as f64;
+    let ns_per_cell = if cells == 0 { 0.0 } else { seconds * cores / cells as f64 * 1e9 };
+    let size = format!("{}×{}", of.image.width, of.image.height);
+    Row { scene, volume, size, engine, pass, seconds, fastest, cells, ns_per_cell }
+}
+
+/// Rows for building volumes; cells are those of the volume.
+fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
+    for n in [40, 256] {
+        let scene = load("front", &cube(n))?;
+        let mut times = Vec::new();
+        for round in 0..args.runs.min(5) {
+            terminal.progress("builds", round as u64, args.runs as u64)?;
+            let clock = Instant::now();
+            let volume = scene.volume(direct_limits().memory, &Unwatched)?;
+            times.push(clock.elapsed().as_secs_f64());
+            drop(volume);
+        }
+        let cells = (n as u64).pow(3);
+        rows.push(Row {
+            size: "–".into(),
+            ..row("front", format!("{n}×{n}×{n}"), &scene, "cpu", "volume build", summary(times), cells)
+        });
+    }
+    Ok(())
+}
+
+fn print(json: bool, line: &str, rows: &[Row]) {
+    if json {
+        say(&serde_json::json!({"engine": line, "cores": rayon::current_num_threads(), "rows": rows})
+            .to_string());
+        return;
+    }
+    say("| scene | volume | size | engine | pass | ms | fastest | cells | core-ns per cell |");
+    say("|---|---|---|---|---|--:|--:|--:|--:|");
+    for r in rows {
+        let cells = if r.cells == 0 { "–".into() } else { r.cells.to_string() };
+        let ns = if r.cells == 0 { "–".into() } else { format!("{:.2}", r.ns_per_cell) };
+        say(&format!(
+            "| {} | {} | {} | {} | {} | {:.2} | {:.2} | {cells} | {ns} |",
+            r.scene,
+            r.volume,
+            r.size,
+            r.engine,
+            r.pass,
+            r.seconds * 1e3,
+            r.fastest * 1e3
+        ));
+    }
 }

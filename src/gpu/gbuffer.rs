@@ -24,9 +24,6 @@ pub struct Targets {
     depth: wgpu::TextureView,
 }
 
-/// Bytes of [`Targets`] a pixel.
-pub const TARGET_BYTES: u64 = 16 + 16 + 16 + 4 + 4;
-
 impl Targets {
     /// Targets for a window of `width` × `height` pixels.
     pub fn new(gpu: &Gpu, width: u32, height: u32) -> Self {

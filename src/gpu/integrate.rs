@@ -48,9 +48,6 @@ pub struct Sums {
     pub counts: wgpu::Buffer,
 }
 
-/// Bytes of [`Sums`] a pixel.
-pub const SUM_BYTES: u64 = 16 + 8;
-
 impl Sums {
     /// Sums for `pixels` pixels.
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
@@ -65,6 +62,7 @@ impl Sums {
 /// The pass: one specialised pipeline.
 pub struct Integrate {
     pipeline: wgpu::ComputePipeline,
+    group_layout: wgpu::BindGroupLayout,
     /// What it is specialised to.
     pub variant: Variant,
 }
@@ -106,25 +104,40 @@ impl Tiler {
 impl Integrate {
     /// Compiles the pipeline for one variant.
     pub fn new(gpu: &Gpu, variant: Variant) -> Self {
-        let module = shader(gpu, "integrate", include_str!("../../shaders/integrate.wgsl"));
         let constants = [
             ("LIGHTS", variant.lights as f64),
             ("PER_CELL", f64::from(u8::from(variant.per_cell))),
             ("MARCH", f64::from(u8::from(variant.march))),
             ("EXPONENT", variant.exponent as f64),
         ];
+        Self::compile(gpu, variant, include_str!("../../shaders/integrate.wgsl"), &constants)
+    }
+
+    /// The bench's bare walk: the same bindings, no light.
+    pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
+        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &[])
+    }
+
+    fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)]) -> Self {
+        let module = shader(gpu, "integrate", source);
+        let group_layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("integrate"),
+            entries: &bindings(),
+        });
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("integrate"),
+            bind_group_layouts: &[Some(&group_layout)],
+            immediate_size: 0,
+        });
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("integrate"),
-            layout: None,
+            layout: Some(&layout),
             module: &module,
             entry_point: Some("integrate"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                ..Default::default()
-            },
+            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
             cache: None,
         });
-        Integrate { pipeline, variant }
+        Integrate { pipeline, group_layout, variant }
     }
 
     /// Adds one sample of a window to `sums`, tile by tile; seconds on the device. `between` is called
@@ -147,8 +160,9 @@ impl Integrate {
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let (surface, quad_id, opaque) =
             (view(&targets.surface), view(&targets.quad_id), view(&targets.opaque));
-        let mut entries = vec![
+        let entries = [
             entry(0, uniform.as_entire_binding()),
+            entry(1, up.lights.as_entire_binding()),
             entry(2, up.quads.as_entire_binding()),
             entry(3, tile_buffer.as_entire_binding()),
             entry(4, wgpu::BindingResource::TextureView(&up.volume)),
@@ -158,10 +172,9 @@ impl Integrate {
             entry(8, sums.radiance.as_entire_binding()),
             entry(9, sums.counts.as_entire_binding()),
         ];
-        entries.push(entry(1, up.lights.as_entire_binding()));
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
-            layout: &self.pipeline.get_bind_group_layout(0),
+            layout: &self.group_layout,
             entries: &entries,
         });
         let (mut x, mut y, mut seconds, mut done) = (0, 0, 0.0, 0);
@@ -190,6 +203,41 @@ impl Integrate {
         }
         Ok(seconds)
     }
+}
+
+/// The bindings of `shaders/integrate.wgsl`, in order.
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 10] {
+    use wgpu::{
+        BindingType, BufferBindingType, StorageTextureAccess, TextureFormat, TextureSampleType,
+        TextureViewDimension,
+    };
+    let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let uniform = buffer(BufferBindingType::Uniform);
+    let texture = |sample_type| BindingType::Texture {
+        sample_type,
+        view_dimension: TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let floats = texture(TextureSampleType::Float { filterable: false });
+    let sums = buffer(BufferBindingType::Storage { read_only: false });
+    let volume = BindingType::StorageTexture {
+        access: StorageTextureAccess::ReadOnly,
+        format: TextureFormat::Rg32Uint,
+        view_dimension: TextureViewDimension::D3,
+    };
+    let quads = buffer(BufferBindingType::Storage { read_only: true });
+    let ids = texture(TextureSampleType::Uint);
+    let types = [uniform, uniform, quads, uniform, volume, floats, ids, floats, sums, sums];
+    let mut binding = 0;
+    types.map(|ty| {
+        binding += 1;
+        wgpu::BindGroupLayoutEntry {
+            binding: binding - 1,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty,
+            count: None,
+        }
+    })
 }
 
 fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {

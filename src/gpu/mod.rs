@@ -1,5 +1,6 @@
 //! The frame on the GPU: upload, gbuffer, integrate, resolve, read back.
 
+mod bench;
 mod device;
 mod gbuffer;
 mod integrate;
@@ -9,6 +10,7 @@ mod resolve;
 mod timing;
 mod upload;
 
+pub use bench::{BenchPass, GpuBench};
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use integrate::{Integrate, Sums, Tiler, Variant};
@@ -42,7 +44,7 @@ pub struct RenderOptions {
 
 /// The text of a stage's shader: what all stages share, then its own.
 pub fn shader_source(stage: &str) -> String {
-    format!("{}\n{stage}", include_str!("../../shaders/frame.wgsl"))
+    [include_str!("../../shaders/frame.wgsl"), include_str!("../../shaders/walk.wgsl"), stage].join("\n")
 }
 
 fn shader(gpu: &Gpu, name: &str, stage: &str) -> wgpu::ShaderModule {

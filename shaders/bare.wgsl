@@ -1,0 +1,69 @@
+// The bare walk, for `taki bench` only: the rays and cells of `integrate`, one fetch and one addition a
+// cell, no light. The floor under the integrate pass.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(2) var<storage, read> quads: array<Quad>;
+@group(0) @binding(3) var<uniform> tile: Tile;
+@group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
+@group(0) @binding(5) var surface: texture_2d<f32>;
+@group(0) @binding(6) var quad_id: texture_2d<u32>;
+@group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
+@group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
+
+@compute @workgroup_size(WORKGROUP, WORKGROUP)
+fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= tile.width || id.y >= tile.height {
+        return;
+    }
+    let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
+    let quad_number = textureLoad(quad_id, pixel, 0).x;
+    if quad_number == 0u {
+        return;
+    }
+    let quad = quads[quad_number - 1u];
+    let hit = textureLoad(surface, pixel, 0);
+    let cells = vec3<f32>(frame.cells);
+    let cx = (quad.e + quad.g * hit.y) / (quad.repeat_u * cells.x);
+    let cy = (quad.f + quad.g * hit.x) / (quad.repeat_v * cells.y);
+    let depth = quad.thickness / cells.z;
+    let det = cross2(cx, cy);
+    let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let d_n = dot3(d_world, quad.n);
+    let side = select(1.0, -1.0, d_n > 0.0);
+    let d = vec3<f32>(dot3(d_world, quad.e1), dot3(d_world, quad.e2), min(d_n * side, -1e-6));
+    let d_cell = vec3<f32>(cross2(d.xy, cy) / det, cross2(cx, d.xy) / det, -d.z / depth);
+    let x = hit.x * quad.repeat_u * cells.x;
+    let y = hit.y * quad.repeat_v * cells.y;
+    let origin = vec3<f32>(x - cells.x * floor(x / cells.x), y - cells.y * floor(y / cells.y), 0.0);
+    var walk = walk_new(frame.cells, origin, d_cell);
+    var sum = 0u;
+    var n = 0u;
+    var done = false;
+    // Uniforms read inside the loop would be gathered lane by lane on software Vulkan.
+    let layers = frame.cells.z;
+    let max_cells = frame.max_cells;
+    while !done {
+        visit(&walk, &sum, &n, &done, layers, max_cells);
+        visit(&walk, &sum, &n, &done, layers, max_cells);
+        visit(&walk, &sum, &n, &done, layers, max_cells);
+        visit(&walk, &sum, &n, &done, layers, max_cells);
+    }
+    let index = pixel.y * frame.window_width + pixel.x;
+    radiance[index] = vec4<f32>(f32(sum), 0.0, 0.0, 1.0);
+    counts[index] = vec2<u32>(n, 0u);
+}
+
+fn visit(
+    walk: ptr<function, Walk>,
+    sum: ptr<function, u32>,
+    n: ptr<function, u32>,
+    done: ptr<function, bool>,
+    layers: i32,
+    max_cells: u32,
+) {
+    let texel = textureLoad(volume, (*walk).cell);
+    *sum += select(texel.x + texel.y, 0u, *done);
+    *n += select(1u, 0u, *done);
+    walk_step(walk);
+    *done |= ((*walk).cell.z >= layers) | (*n >= max_cells);
+}
