@@ -1,0 +1,18 @@
+//! Every test of the project, as one binary: linking one is quicker than linking twelve.
+//!
+//! Reference truth (float64, closed form) and parity of the engines (float32, same order) are two kinds
+//! of test; each module says which it holds. Tolerances stand in `tolerance`.
+
+mod closed_forms;
+mod compare;
+mod curve;
+mod faults;
+mod gpu;
+mod mapping;
+mod presets;
+mod scene;
+mod shaders;
+mod shading;
+mod tolerance;
+mod volume;
+mod walk;
