@@ -64,6 +64,6 @@ fn visit(
     let texel = textureLoad(volume, (*walk).cell);
     *sum += select(texel.x + texel.y, 0u, *done);
     *n += select(1u, 0u, *done);
-    walk_step(walk);
+    walk_step(walk, true);
     *done |= ((*walk).cell.z >= layers) | (*n >= max_cells);
 }

@@ -83,7 +83,7 @@ fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: V
     }
     (*ray).cells += select(1u, 0u, (*ray).done);
     (*ray).t = t_exit;
-    walk_step(walk);
+    walk_step(walk, true);
     let z = (*walk).cell.z;
     (*ray).done |= (z < 0) | (z >= view.layers) | ((*ray).cells >= view.max_cells);
 }
@@ -191,10 +191,23 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
     ray.transmittance = 1.0;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
-        visit(&walk, &ray, view);
-        visit(&walk, &ray, view);
-        visit(&walk, &ray, view);
-        visit(&walk, &ray, view);
+        if MARCH {
+            // Rays of one SIMD group meet occupied cells at different steps; those that found one wait
+            // for the others, so that all walk to the light at once.
+            var seeking = true;
+            while seeking {
+                seek(&walk, &ray, &seeking, view);
+                seek(&walk, &ray, &seeking, view);
+                seek(&walk, &ray, &seeking, view);
+                seek(&walk, &ray, &seeking, view);
+            }
+            visit(&walk, &ray, view);
+        } else {
+            visit(&walk, &ray, view);
+            visit(&walk, &ray, view);
+            visit(&walk, &ray, view);
+            visit(&walk, &ray, view);
+        }
     }
 
     // Σ_k T_k (1 − e^(−τ_k)) = 1 − T_end carries the ambient light.
@@ -207,6 +220,17 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
     }
     *count = vec2<u32>(ray.cells, ray.light_cells);
     return vec4<f32>(color, ray.transmittance);
+}
+
+// Goes on by one cell if the one it is in is empty; ends the seeking if not.
+fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
+    let empty = (textureLoad(volume, (*walk).cell).x & 0xffffu) == 0u;
+    let on = *seeking & empty & !(*ray).done;
+    (*ray).cells += select(0u, 1u, on);
+    (*ray).t = select((*ray).t, walk_exit(*walk), on);
+    walk_step(walk, on);
+    (*ray).done |= ((*walk).cell.z >= view.layers) | ((*ray).cells >= view.max_cells);
+    *seeking = on & !(*ray).done;
 }
 
 // The light of one cell, and the step to the next. Past the end of the walk nothing changes.
@@ -251,7 +275,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     (*ray).cells += select(1u, 0u, (*ray).done);
     (*ray).transmittance = passed;
     (*ray).t = t_exit;
-    walk_step(walk);
+    walk_step(walk, true);
     (*ray).done |= ((*walk).cell.z >= view.layers) | (passed < view.early_end)
         | ((*ray).cells >= view.max_cells);
 }

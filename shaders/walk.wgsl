@@ -47,12 +47,12 @@ fn walk_exit(walk: Walk) -> f32 {
     return select(select(t_next.z, t_next.y, y), t_next.x, x);
 }
 
-// Goes to the next cell: one axis steps, x before y before z where several boundaries coincide.
-fn walk_step(walk: ptr<function, Walk>) {
+// Goes to the next cell if `on`: one axis steps, x before y before z where several boundaries coincide.
+fn walk_step(walk: ptr<function, Walk>, on: bool) {
     let t_next = (*walk).t_next;
     let x = (t_next.x <= t_next.y) & (t_next.x <= t_next.z);
     let y = !x & (t_next.y <= t_next.z);
-    let moved = vec3<bool>(x, y, !(x | y));
+    let moved = vec3<bool>(x & on, y & on, !(x | y) & on);
     (*walk).boundary += select(vec3<f32>(0.0), (*walk).step_f32, moved);
     (*walk).t_next = ((*walk).boundary - (*walk).origin) * (*walk).inverse;
     let cell = (*walk).cell + select(vec3<i32>(0), (*walk).step, moved);

@@ -41,22 +41,37 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
     let near = scene.camera.near as f64;
     let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {
         let clip = corners.map(|p| clip_from_world * p.extend(1.0));
-        clip_near(clip, scene.camera.near, |part| out.push(to_screen(part, width, height, id)));
+        clip_near(clip, scene.camera.near, |part| {
+            let triangle = to_screen(part, width, height, id);
+            // Most triangles of a fine mesh lie between the pixels' centres.
+            if triangle.covers_centres(width, height) {
+                out.push(triangle);
+            }
+        });
     };
-    let mut rock = Vec::new();
-    for (i, t) in mesh.indices.chunks_exact(3).enumerate() {
-        project(
-            [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position)),
-            i as u32,
-            &mut rock,
-        );
-    }
+    const CHUNK: usize = 4096;
+    let rock: Vec<ScreenTriangle> = mesh
+        .indices
+        .par_chunks(3 * CHUNK)
+        .enumerate()
+        .flat_map_iter(|(chunk, indices)| {
+            let mut out = Vec::new();
+            for (i, t) in indices.chunks_exact(3).enumerate() {
+                let corners = [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position));
+                project(corners, (chunk * CHUNK + i) as u32, &mut out);
+            }
+            out
+        })
+        .collect();
     let mut water = Vec::new();
     for (i, quad) in scene.quads.iter().enumerate() {
         let [a, b, c, d] = quad.corners;
         project([a, b, c], i as u32, &mut water);
         project([a, c, d], i as u32, &mut water);
     }
+    let rows = 16.min(height);
+    let rock_bins = bins(&rock, height, rows);
+    let water_bins = bins(&water, height, rows);
 
     let eye_plane: Vec<Vec3> = scene.quads.iter().map(|q| eye_in_plane(q, scene.camera.eye)).collect();
     let mut out = Gbuffer {
@@ -65,7 +80,6 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
         surface: vec![[0.0; 3]; width * height],
         quad_id: vec![0; width * height],
     };
-    let rows = 16.min(height);
     let band = rows * width;
     out.opaque
         .par_chunks_mut(band)
@@ -80,7 +94,7 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
                 scene.camera.view_ray(image.width, image.height, pixel, offset)
             };
             let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
-            rasterise(&rock, near, width, first_row, &mut covered);
+            rasterise(&rock, &rock_bins[i], near, width, first_row, &mut covered);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id == 0 {
                     opaque[k] = scene.background.radiance(ray(k)).extend(0.0).to_array();
@@ -102,7 +116,7 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
                 }
             }
             covered.iter_mut().for_each(|c| c.1 = 0);
-            rasterise(&water, near, width, first_row, &mut covered);
+            rasterise(&water, &water_bins[i], near, width, first_row, &mut covered);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id != 0 {
                     let quad = water[id as usize - 1].id;
@@ -214,6 +228,12 @@ impl ScreenTriangle {
         self.edge(2, [self.x[2], self.y[2]])
     }
 
+    /// Whether it has an area and its bounding box holds a pixel's centre of the image.
+    fn covers_centres(&self, width: usize, height: usize) -> bool {
+        let ((x0, x1), (y0, y1)) = (centres(self.x, width), centres(self.y, height));
+        self.area() > 0.0 && x0 < x1 && y0 < y1
+    }
+
     /// Whether a point on edge i belongs to this triangle: it does on top and left edges.
     fn owns_edge(&self, i: usize) -> bool {
         let (a, b) = ((i + 1) % 3, (i + 2) % 3);
@@ -229,29 +249,43 @@ impl ScreenTriangle {
     }
 }
 
+/// For each band of `rows` rows the numbers of the triangles that reach into it, in order.
+fn bins(triangles: &[ScreenTriangle], height: usize, rows: usize) -> Vec<Vec<u32>> {
+    let mut bins = vec![Vec::new(); height.div_ceil(rows)];
+    for (number, t) in triangles.iter().enumerate() {
+        let (y0, y1) = centres(t.y, height);
+        for bin in &mut bins[y0 / rows..=(y1 - 1) / rows] {
+            bin.push(number as u32);
+        }
+    }
+    bins
+}
+
+/// The half-open range of pixel centres between the least and the largest of `v`, inside 0..n.
+fn centres(v: [f64; 3], n: usize) -> (usize, usize) {
+    let low = (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(0.0);
+    let high = (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
+    (low as usize, (high.max(0.0) as usize).min(n))
+}
+
 /// Draws triangles into the rows from `first_row` on that `covered` holds; nearer ones win, the first
 /// of equals stays.
 fn rasterise(
     triangles: &[ScreenTriangle],
+    numbers: &[u32],
     near: f64,
     width: usize,
     first_row: usize,
     covered: &mut [Covered],
 ) {
     let rows = covered.len() / width;
-    for (number, t) in triangles.iter().enumerate() {
+    for &number in numbers {
+        let t = &triangles[number as usize];
         let area = t.area();
-        if !(area > 0.0) {
-            continue;
-        }
-        let low = |v: [f64; 3]| (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(0.0);
-        let high = |v: [f64; 3]| (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
-        let y0 = (low(t.y) as usize).max(first_row);
-        let y1 = (high(t.y).max(0.0) as usize).min(first_row + rows);
-        let x0 = low(t.x) as usize;
-        let x1 = (high(t.x).max(0.0) as usize).min(width);
+        let (y0, y1) = centres(t.y, first_row + rows);
+        let (x0, x1) = centres(t.x, width);
         let owns = [0, 1, 2].map(|i| t.owns_edge(i));
-        for y in y0..y1 {
+        for y in y0.max(first_row)..y1 {
             for x in x0..x1 {
                 let p = [x as f64 + 0.5, y as f64 + 0.5];
                 let e = [0, 1, 2].map(|i| t.edge(i, p));
@@ -260,7 +294,7 @@ fn rasterise(
                     let depth = (near * inverse_w) as f32;
                     let slot = &mut covered[(y - first_row) * width + x];
                     if depth > slot.0 {
-                        *slot = (depth, number as u32 + 1);
+                        *slot = (depth, number + 1);
                     }
                 }
             }

@@ -1,9 +1,11 @@
 //! The linear frame with named layers, and the files it becomes.
 
+mod difference;
 mod exr_file;
 mod output;
 mod png_file;
 
+pub use difference::{Difference, Tolerance};
 pub use exr_file::{read_exr, write_exr};
 pub use output::Output;
 pub use png_file::{encode_png, read_png};

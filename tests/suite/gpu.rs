@@ -1,1 +1,206 @@
-//! gpu
+//! Parity: the GPU engine against the CPU engine, stage by stage, in linear radiance.
+
+use std::path::Path;
+
+use taki::cpu;
+use taki::error::Error;
+use taki::frame::{Difference, Frame, Tolerance};
+use taki::gpu::{DeviceOptions, Gpu, GpuRenderer, RenderOptions, adapters};
+use taki::job::Unwatched;
+use taki::scene::{Limits, Scene};
+
+use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};
+
+/// A renderer, or none on a machine without an adapter: then a GPU test says so and ends. In
+/// continuous integration (CI=true) that is a failure.
+pub fn renderer(test: &str) -> Option<GpuRenderer> {
+    match Gpu::open(&DeviceOptions::default()) {
+        Ok(gpu) => Some(GpuRenderer::new(gpu)),
+        Err(e) => {
+            assert!(std::env::var("CI").is_err(), "continuous integration needs an adapter: {e}");
+            eprintln!("{test}: not run: {e}");
+            None
+        }
+    }
+}
+
+pub fn scene(preset: &str, sets: &[&str]) -> Scene {
+    let sets: Vec<String> = sets.iter().map(|s| s.to_string()).collect();
+    Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a valid scene")
+}
+
+const SURFACE: RenderOptions = RenderOptions { surface: true, tile_pixels: None, window_pixels: None };
+
+fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mesh = scene.mesh();
+    let on_gpu = renderer.render(scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
+    let on_cpu = cpu::render(scene, &volume, &mesh, true, &Unwatched).expect("a frame");
+    [on_gpu, on_cpu]
+}
+
+fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
+    frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect()
+}
+
+/// Parity of final radiance and transmittance, and of the raster pass's layers.
+fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
+    let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
+    let least = |what: &str, a: &[[f32; 3]], b: &[[f32; 3]]| {
+        let d = Difference::new(gpu.width, a, b, tolerance);
+        assert!(1.0 - d.share_outside() >= PARITY_SHARE, "{what}: {d:?}");
+    };
+    least(what, &rgb(gpu), &rgb(cpu));
+    let layer = |frame: &Frame, get: fn(&Frame, usize) -> [f32; 3]| {
+        (0..frame.radiance.len()).map(|i| get(frame, i)).collect::<Vec<_>>()
+    };
+    let surfaces: [(&str, fn(&Frame, usize) -> [f32; 3]); 3] = [
+        ("transmittance, cells", |f, i| [f.radiance[i][3], f.counts[i][0] as f32, 0.0]),
+        ("uv, depth", |f, i| {
+            let s = f.surface.as_ref().expect("asked for");
+            [s.uv[i][0], s.uv[i][1], s.depth[i]]
+        }),
+        ("quad", |f, i| [f.surface.as_ref().expect("asked for").quad[i] as f32, 0.0, 0.0]),
+    ];
+    for (name, get) in surfaces {
+        least(&format!("{what}, {name}"), &layer(gpu, get), &layer(cpu, get));
+    }
+    assert_eq!((gpu.non_finite_pixels(), cpu.non_finite_pixels()), (0, 0), "{what}");
+}
+
+#[test]
+fn continuous_integration_runs_on_software_vulkan() {
+    if std::env::var("CI").is_ok() {
+        let names: Vec<String> = adapters().iter().map(|a| a.get_info().name).collect();
+        assert!(names.iter().any(|n| n.contains("llvmpipe")), "adapters: {names:?}");
+        let renderer = renderer("software Vulkan").expect("an adapter");
+        assert!(renderer.gpu.timestamps, "lavapipe times its passes");
+    }
+}
+
+#[test]
+fn the_engines_agree_on_the_papers_figures() {
+    let Some(mut renderer) = renderer("figures") else { return };
+    for figure in ["fig5", "fig6", "fig7"] {
+        let scene = scene(figure, &["image.samples=1"]);
+        assert_parity(figure, &both(&mut renderer, &scene));
+    }
+}
+
+#[test]
+fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
+    let Some(mut renderer) = renderer("variants") else { return };
+    let small = ["image.width=96", "image.height=80", "curves.across=12", "curves.deep=12"];
+    let variants: [&[&str]; 8] = [
+        &["light.visibility=march"],
+        &["trace.attenuation=per-cell", "trace.tau=0.3"],
+        &["trace.attenuation=per-cell", "light.visibility=march", "light.frame=texture"],
+        &["light.frame=texture", "light.p=7.5"],
+        &["light.p=255", "trace.max_cells=9"],
+        &["lights.key.kind=point", "lights.key.position=[0.4,0.5,1.5]", "light.visibility=march"],
+        &["lights.key.intensity=0", "trace.early_end=0.2"],
+        &["materials.water.repeat_u=2.5", "materials.water.repeat_v=0.6", "camera.eye=[1.5,-1.0,1.2]"],
+    ];
+    for variant in variants {
+        let sets: Vec<&str> = small.iter().chain(variant).copied().collect();
+        assert_parity(&variant.join(" "), &both(&mut renderer, &scene("front", &sets)));
+    }
+}
+
+#[test]
+fn the_engines_agree_with_many_lights_and_a_volume_of_unequal_sides() {
+    let Some(mut renderer) = renderer("lights") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("lights.toml");
+    let lights: String = (0..15)
+        .map(|i| format!("[lights.l{i}]\ndirection = [{}, 0.5, {}]\nintensity = 0.2\n", i as f32 / 8.0 - 1.0, i % 3))
+        .collect();
+    let text = format!(
+        "version = 1\nbase = \"front\"\n{lights}[volume]\nnx = 17\nny = 40\nnz = 5\n[image]\nwidth = 64\nheight = 64\n"
+    );
+    std::fs::write(&file, text).expect("written");
+    let scene = Scene::load(&file, &[], &Limits::default()).expect("valid");
+    assert_eq!(scene.lights.len(), 16);
+    assert_parity("16 lights", &both(&mut renderer, &scene));
+}
+
+#[test]
+fn the_engines_agree_at_odd_sizes_and_with_several_samples() {
+    let Some(mut renderer) = renderer("odd sizes") else { return };
+    for (width, height) in [(1, 1), (1, 70), (63, 5), (65, 33), (257, 3)] {
+        let (w, h) = (format!("image.width={width}"), format!("image.height={height}"));
+        let frames = both(&mut renderer, &scene("front", &[&w, &h, "image.samples=3", "light.visibility=march"]));
+        let [gpu, cpu] = &frames;
+        assert_eq!((gpu.radiance.len(), cpu.radiance.len()), ((width * height) as usize, (width * height) as usize));
+        // Of so few pixels one on an edge would break the share: the mean tells a shifted row.
+        let mean = |f: &Frame| rgb(f).iter().flatten().map(|&x| x as f64).sum::<f64>() / (width * height) as f64;
+        assert!((mean(gpu) - mean(cpu)).abs() <= 0.02 * mean(cpu).abs() + 1e-4, "{width}×{height}");
+        let d = Difference::new(width, &rgb(gpu), &rgb(cpu), Tolerance { relative: 1e-3, absolute: 1e-4 });
+        assert!(d.outside <= 2, "{width}×{height}: {d:?}");
+    }
+}
+
+#[test]
+fn the_picture_is_the_tone_curve_of_the_radiance_on_both_engines() {
+    let Some(mut renderer) = renderer("resolve") else { return };
+    for sets in [["image.tone=filmic", "image.exposure=1.5"], ["image.tone=none", "image.exposure=-2"]] {
+        let scene = scene("front", &["image.width=64", "image.height=64", sets[0], sets[1]]);
+        for frame in both(&mut renderer, &scene) {
+            for (linear, picture) in frame.radiance.iter().zip(&frame.picture) {
+                let want = cpu::resolve::resolve(&scene.image, *linear);
+                let near = (0..4).all(|c| picture[c].abs_diff(want[c]) <= 1);
+                assert!(near, "{linear:?} became {picture:?}, not {want:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tiles_and_windows_do_not_change_a_single_bit() {
+    let Some(mut renderer) = renderer("tiles") else { return };
+    let scene = scene("fig5", &["image.width=101", "image.height=67", "image.samples=2", "rocks.foot.levels=5"]);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mesh = scene.mesh();
+    let mut render = |tile_pixels, window_pixels| {
+        let options = RenderOptions { surface: true, tile_pixels, window_pixels };
+        renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
+    };
+    let whole = render(None, None);
+    for (tile, window) in [(Some(64), None), (Some(5000), None), (None, Some(101 * 7)), (Some(900), Some(101 * 32))] {
+        let other = render(tile, window);
+        assert!(whole.radiance == other.radiance && whole.counts == other.counts, "tile {tile:?}, window {window:?}");
+        assert!(whole.picture == other.picture && whole.surface == other.surface, "tile {tile:?}, window {window:?}");
+    }
+}
+
+#[test]
+fn parity_fails_when_sigma_or_a_quad_changes() {
+    let Some(mut renderer) = renderer("harness") else { return };
+    let base = ["image.width=64", "image.height=64"];
+    let frame = |renderer: &mut GpuRenderer, more: &str| {
+        let [gpu, _] = both(renderer, &scene("front", &[base[0], base[1], more]));
+        gpu
+    };
+    let reference = frame(&mut renderer, "trace.sigma=10");
+    for change in ["trace.sigma=10.2", "materials.water.thickness=1.02", "light.p=21", "volume.seed=2"] {
+        let other = frame(&mut renderer, change);
+        let failed = std::panic::catch_unwind(|| assert_parity(change, &[reference.clone(), other.clone()]));
+        assert!(failed.is_err(), "{change} went unseen");
+    }
+}
+
+#[test]
+fn a_destroyed_device_is_an_error_and_the_engine_recovers_on_a_new_one() {
+    let Some(renderer) = renderer("device lost") else { return };
+    renderer.gpu.device.destroy();
+    let scene = scene("front", &["image.width=32", "image.height=32"]);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mesh = scene.mesh();
+    let mut engine = taki::job::Engine::Gpu(Box::new(renderer), DeviceOptions::default());
+    if let taki::job::Engine::Gpu(renderer, _) = &mut engine {
+        let lost = renderer.render(&scene, &volume, &mesh, &SURFACE, &Unwatched);
+        assert!(matches!(lost, Err(Error::DeviceLost(_))), "{lost:?}");
+    }
+    let frame = engine.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame on the new device");
+    assert!(frame.covered_pixels() > 0);
+}

@@ -1,1 +1,101 @@
-//! shaders
+//! The shaders against the host: every file is valid, and every struct and constant both sides share is
+//! the same on both.
+
+use std::mem::offset_of;
+
+use taki::gpu::layout::{Frame, Light, Quad, Tile, WORKGROUP};
+use taki::gpu::shader_source;
+use taki::scene::MAX_LIGHTS;
+use wgpu::naga;
+
+/// Files that are put in front of every stage.
+const SHARED: [&str; 2] = ["frame.wgsl", "walk.wgsl"];
+/// The stages.
+const STAGES: [&str; 4] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl"];
+
+fn file(name: &str) -> String {
+    let path = format!("{}/shaders/{name}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+fn validate(source: &str) -> Result<naga::Module, String> {
+    let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string(source))?;
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
+        .validate(&module)
+        .map_err(|e| e.emit_to_string(source))?;
+    Ok(module)
+}
+
+#[test]
+fn every_file_in_shaders_is_a_known_stage_or_shared_and_none_is_missing() {
+    let folder = format!("{}/shaders", env!("CARGO_MANIFEST_DIR"));
+    let mut found: Vec<String> = std::fs::read_dir(folder)
+        .expect("the folder of shaders")
+        .map(|entry| entry.expect("an entry").file_name().into_string().expect("UTF-8"))
+        .collect();
+    let mut known: Vec<&str> = SHARED.iter().chain(&STAGES).copied().collect();
+    found.sort_unstable();
+    known.sort_unstable();
+    assert_eq!(found, known);
+}
+
+#[test]
+fn every_stage_is_valid_wgsl() {
+    for stage in STAGES {
+        if let Err(e) = validate(&shader_source(&file(stage))) {
+            panic!("{stage}:\n{e}");
+        }
+    }
+}
+
+#[test]
+fn the_validation_can_fail() {
+    assert!(validate(&shader_source("fn broken() -> f32 { return 1u; }")).is_err());
+}
+
+/// (name, offset) of each member, and the size, of a struct of a module.
+fn members(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+        panic!("no struct {name}");
+    };
+    let named = |m: &naga::StructMember| (m.name.clone().expect("a name"), m.offset);
+    (members.iter().map(named).collect(), *span)
+}
+
+macro_rules! fields {
+    ($ty:ty: $($field:ident)*) => {
+        (vec![$((stringify!($field).to_owned(), offset_of!($ty, $field) as u32)),*], size_of::<$ty>() as u32)
+    };
+}
+
+#[test]
+fn host_structs_have_the_layout_the_shaders_read() {
+    let module = validate(&shader_source(&file("integrate.wgsl"))).expect("valid");
+    let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
+        zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
+        texture_frame exposure filmic window_x window_y window_width window_height pad_0 pad_1);
+    assert_eq!(members(&module, "Frame"), frame);
+    assert_eq!(members(&module, "Light"), fields!(Light: vector is_point intensity pad));
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane pad e f g pad_g);
+    assert_eq!(members(&module, "Quad"), quad);
+    assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
+}
+
+#[test]
+fn constants_are_the_same_on_both_sides() {
+    let module = validate(&shader_source(&file("integrate.wgsl"))).expect("valid");
+    let constant = |name: &str| {
+        let found = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name));
+        let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(x)) => x as f64,
+            naga::Expression::Literal(naga::Literal::F32(x)) => x as f64,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    assert_eq!(constant("MAX_LIGHTS"), MAX_LIGHTS as f64);
+    assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
+    assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
+}

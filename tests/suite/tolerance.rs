@@ -1,1 +1,35 @@
-//! tolerance
+//! The project's only tolerances. Everything else is compared exactly, or with a bound that its test
+//! derives from float32 rounding or from the size of its sample.
+
+/// GPU against CPU, linear radiance: relative difference of a pixel that counts as the same. The two run
+/// the same float32 operations in the same order; what is left is `exp2`, `sqrt`, division and fused
+/// products, some ulp each, over a few hundred cells.
+pub const PARITY_RELATIVE: f32 = 1e-3;
+
+/// GPU against CPU: absolute difference that counts as the same in dark pixels.
+pub const PARITY_ABSOLUTE: f32 = 1e-4;
+
+/// GPU against CPU: share of pixels that must be the same. The rest may lie on an edge between two quads
+/// or on a ray through a cell's corner, where one ulp chooses another cell.
+pub const PARITY_SHARE: f64 = 0.999;
+
+/// One ray in float32 against a closed form in float64. The transmittance is a product over up to some
+/// 500 cells, each factor good to about 2^-24 of itself and of its exponent: 500 · 6e-8 = 3e-5 if all
+/// rounded the same way, a tenth of it as they do. Doubling it would hide a lost cell of 1e-5.
+pub const CLOSED_FORM_RELATIVE: f64 = 1e-5;
+
+/// Whether `a` is `b` but for a share `relative` of the larger one or a difference `absolute`. Never
+/// true of NaN.
+pub fn close(a: f64, b: f64, relative: f64, absolute: f64) -> bool {
+    a == b || (a - b).abs() <= absolute.max(relative * a.abs().max(b.abs()))
+}
+
+#[test]
+fn close_tells_near_from_far_and_never_accepts_nan() {
+    assert!(close(1.0, 1.0 + 0.9e-5, 1e-5, 0.0));
+    assert!(!close(1.0, 1.0 + 1.1e-5, 1e-5, 0.0));
+    assert!(close(0.0, 1e-7, 1e-5, 1e-6) && !close(0.0, 2e-6, 1e-5, 1e-6));
+    assert!(!close(1.0, -1.0, 1e-5, 1e-6));
+    assert!(!close(f64::NAN, f64::NAN, 1.0, 1.0) && !close(0.0, f64::NAN, 1.0, 1.0));
+    assert!(!close(f64::INFINITY, 1.0, 0.0, 1e-6));
+}
