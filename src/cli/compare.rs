@@ -65,7 +65,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         say(&format!("{} of {} pixels outside the tolerance ({:.4} %)", d.outside, d.pixels, share * 100.0));
     }
     if share > args.share {
-        return Err(Error::Comparison(format!("{share:.6} of the pixels are outside; --share allows {}", args.share)));
+        return Err(Error::Comparison(format!(
+            "{share:.6} of the pixels are outside; --share allows {}",
+            args.share
+        )));
     }
     match args.rmse {
         Some(most) if !(d.rmse <= most) => {

@@ -57,7 +57,8 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
         .flat_map_iter(|(chunk, indices)| {
             let mut out = Vec::new();
             for (i, t) in indices.chunks_exact(3).enumerate() {
-                let corners = [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position));
+                let corners =
+                    [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position));
                 project(corners, (chunk * CHUNK + i) as u32, &mut out);
             }
             out

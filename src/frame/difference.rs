@@ -41,8 +41,8 @@ impl Difference {
             let mut same = true;
             for (&x, &y) in p.iter().zip(q) {
                 let d = (x - y).abs();
-                // Written so that a NaN on either side is outside.
-                same &= d <= tolerance.absolute + tolerance.relative * x.abs().max(y.abs());
+                // NaN and infinity are outside even beside themselves.
+                same &= d.is_finite() && d <= tolerance.absolute + tolerance.relative * x.abs().max(y.abs());
                 let d = if d.is_finite() { d as f64 } else { f64::from(f32::MAX) };
                 squares += d * d;
                 sum += d;

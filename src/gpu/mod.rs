@@ -38,7 +38,8 @@ pub struct RenderOptions {
     pub surface: bool,
     /// About this many pixels a submission, instead of what the clock suggests.
     pub tile_pixels: Option<u32>,
-    /// Pixels rendered at once, instead of 2²¹.
+    /// Pixels rendered at once, instead of 2²¹. Rasterisers interpolate the rock from the window's corner,
+    /// so other windows round its radiance otherwise.
     pub window_pixels: Option<u64>,
 }
 

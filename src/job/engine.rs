@@ -90,11 +90,7 @@ impl Engine {
                 Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {
                     monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
                     **renderer = GpuRenderer::new(Gpu::open(device)?);
-                    let careful = RenderOptions {
-                        tile_pixels: Some(CAREFUL_TILE_PIXELS),
-                        window_pixels: Some(1 << 18),
-                        ..options.clone()
-                    };
+                    let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
                     renderer.render(scene, volume, mesh, &careful, monitor)
                 }
                 other => other,

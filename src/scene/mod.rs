@@ -351,6 +351,7 @@ impl Background {
 
 fn quads(v: &Values) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
+    let materials = v.names("materials");
     for i in v.names("quads") {
         let key = format!("quads.{i}.corners");
         if !v.is_set(&key) {
@@ -367,8 +368,8 @@ fn quads(v: &Values) -> Result<Vec<Quad>> {
             )
         })?;
         let name = v.text(&format!("quads.{i}.material"));
-        if name != "water" && !v.names("materials").contains(&name) {
-            let known = v.names("materials").join(", ");
+        if name != "water" && !materials.contains(&name) {
+            let known = materials.join(", ");
             return Err(Error::input(
                 format!("quad {i} (quads.{i}.material) has the unknown material {name:?}"),
                 format!("add [materials.{name}] or use one of: water {known}"),

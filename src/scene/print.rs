@@ -1,6 +1,7 @@
 //! The scene fully resolved: as a scene file that gives the same picture, and as JSON with everything
 //! an independent program needs to compute the image.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use serde_json::{Map, Value as Json, json};
@@ -34,20 +35,20 @@ impl Scene {
         let mut keys = self.keys();
         // A stable sort by table: `a.b.c` belongs to table `a.b`.
         let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(t, _)| t.to_owned());
-        let mut tables: Vec<String> = Vec::new();
+        let mut tables: HashMap<String, usize> = HashMap::new();
         for key in &keys {
-            if !tables.contains(&table(key)) {
-                tables.push(table(key));
-            }
+            let next = tables.len();
+            tables.entry(table(key)).or_insert(next);
         }
-        keys.sort_by_key(|key| tables.iter().position(|t| *t == table(key)));
+        keys.sort_by_cached_key(|key| tables.get(&table(key)).copied());
         let mut open = String::new();
         for key in &keys {
             let this = table(key);
             if this != open {
                 // Infallible: writing to a String.
-                let _ = match this.strip_prefix("quads.") {
-                    Some(_) => writeln!(text, "\n[[quads]]"),
+                let _ = match this.split_once('.') {
+                    Some(("quads", _)) => writeln!(text, "\n[[quads]]"),
+                    Some((section, name)) => writeln!(text, "\n[{section}.{}]", quoted(name)),
                     None => writeln!(text, "\n[{this}]"),
                 };
                 open = this;
@@ -119,6 +120,16 @@ impl Scene {
             }),
         );
         Json::Object(root)
+    }
+}
+
+/// A name as a TOML key: bare where it may be, else a string with JSON's escapes, which TOML shares but
+/// for U+007F.
+fn quoted(name: &str) -> String {
+    if name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
+        name.into()
+    } else {
+        json!(name).to_string().replace('\u{7f}', "\\u007f")
     }
 }
 

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::param::{Kind, PARAMS, find};
 use super::preset;
-use super::value::{Place, Raw, Values};
+use super::value::{Key, Place, Raw, Values};
 use crate::error::{Error, Result};
 
 /// Scene files larger than this are refused: four million numbers are no scene, but a mistake.
@@ -94,7 +95,7 @@ impl Source {
     }
 
     fn values_at_depth(&self, depth: u32) -> Result<Values> {
-        let file = File { source: self };
+        let file = File { source: self, newlines: self.text.match_indices('\n').map(|(i, _)| i).collect() };
         let root = DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let message = e.message().lines().collect::<Vec<_>>().join(", ");
@@ -137,12 +138,13 @@ impl Source {
 
 struct File<'a> {
     source: &'a Source,
+    /// Where the lines end: every value has its place, so finding one must not read the text again.
+    newlines: Vec<usize>,
 }
 
 impl File<'_> {
     fn place(&self, byte: usize) -> Place {
-        let before = self.source.text.as_bytes().iter().take(byte);
-        let line = 1 + before.filter(|&&b| b == b'\n').count();
+        let line = 1 + self.newlines.partition_point(|&end| end < byte);
         Place(format!("{}:{line}", self.source.origin))
     }
 
@@ -186,6 +188,10 @@ impl File<'_> {
                     .enumerate()
                     .try_for_each(|(i, quad)| self.keys(&format!("quads.{i}"), quad, values))
             }
+            _ if name == "quads" => Err(Error::input(
+                format!("{}: quads is a list", self.place(value.span().start).0),
+                "write [[quads]] before each",
+            )),
             _ => self.keys(name, value, values),
         }
     }
@@ -193,16 +199,39 @@ impl File<'_> {
     fn keys(&self, path: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
         match value.get_ref() {
             DeValue::Table(table) => {
-                // An empty [lights.NAME] is a light with every default.
-                if table.is_empty() && path.starts_with("lights.") {
-                    let place = self.place(value.span().start);
-                    return values.set(&format!("{path}.kind"), &Raw::Text("directional".into()), &place);
+                if table.is_empty() {
+                    return self.empty(path, value, values);
                 }
                 table.iter().try_for_each(|(key, value)| {
                     self.keys(&format!("{path}.{}", key.get_ref()), value, values)
                 })
             }
             leaf => values.set(path, &raw(leaf), &self.place(value.span().start)),
+        }
+    }
+
+    /// A table without keys: a light or material with every default, or a mistake.
+    fn empty(&self, path: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
+        let section = path.split('.').next().unwrap_or(path);
+        let key = match section {
+            "lights" => format!("{path}.kind"),
+            "materials" => format!("{path}.thickness"),
+            _ => format!("{path}.corners"),
+        };
+        let place = self.place(value.span().start);
+        match find(&key).map(|param| param.kind) {
+            Some(_) if values.is_set(&key) => Ok(()),
+            Some(Kind::Corners) => Err(Error::input(
+                format!("{}: {path} has no corners", place.0),
+                format!("give {key} four points A, B, C, D"),
+            )),
+            Some(_) => {
+                let default = values.get(&key);
+                values.0.insert(Key::new(&key), default);
+                Ok(())
+            }
+            None if PARAMS.iter().any(|param| param.key.split('.').next() == Some(path)) => Ok(()),
+            None => values.set(path, &Raw::Other("a table"), &place),
         }
     }
 }

@@ -6,6 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::random::{Family, Stream};
 
+/// Most subdivisions of a rock: a mesh of a million points.
+pub const MAX_LEVELS: u32 = 10;
+
 /// What a rock is made from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rock {
@@ -110,7 +113,12 @@ fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
     let n = 1usize << levels;
     let side = n + 1;
     let family = Family::new(seed, Stream::Rock);
-    let g = |i: usize| -> f32 { StandardNormal.sample(&mut family.member(2 * i as u64 + channel)) };
+    // A point keeps its number, and so its g, when finer levels are added: the shape stays.
+    let finest = |c: usize| (c as u64) << (MAX_LEVELS - levels);
+    let g = |x: usize, y: usize| -> f32 {
+        let number = finest(y) * ((1 << MAX_LEVELS) + 1) + finest(x);
+        StandardNormal.sample(&mut family.member(2 * number + channel))
+    };
     let mut field = vec![0.0f32; side * side];
     let mut stride = n;
     for level in 0..levels {
@@ -121,7 +129,7 @@ fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
                 let at = |dx: usize, dy: usize| field[(y - half + dy) * side + x - half + dx];
                 let mean = (at(0, 0) + at(stride, 0) + at(0, stride) + at(stride, stride)) * 0.25;
                 let i = y * side + x;
-                field[i] = mean + g(i) * scale;
+                field[i] = mean + g(x, y) * scale;
             }
         }
         for y in (0..side).step_by(half) {
@@ -146,7 +154,7 @@ fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
                 }
                 let i = y * side + x;
                 // √½: an edge's middle comes half a level after its square's.
-                field[i] = sum / count + g(i) * scale * (-0.5 * h).exp2();
+                field[i] = sum / count + g(x, y) * scale * (-0.5 * h).exp2();
             }
         }
         stride = half;

@@ -58,9 +58,10 @@ impl Key {
     pub fn new(dotted: &str) -> Self {
         Key(dotted
             .split('.')
-            .map(|part| match part.parse() {
-                Ok(n) => Part::Number(n),
-                Err(_) => Part::Name(part.into()),
+            .map(|part| match part.parse::<u32>() {
+                // A light named 007 keeps its name.
+                Ok(n) if n.to_string() == part => Part::Number(n),
+                _ => Part::Name(part.into()),
             })
             .collect())
     }

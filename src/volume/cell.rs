@@ -9,7 +9,7 @@
 //! | y | 30–31 | zero |
 //!
 //! v is scaled by its largest component, not by its length: the direction is code/|code|. The largest
-//! angular error is 0.079° (a test states it), decoding needs shifts only, the length cancels in the
+//! angular error is 0.0793° (a test states it), decoding needs shifts only, the length cancels in the
 //! fibre model, and packing what was unpacked gives the same code again.
 
 use glam::Vec3;

@@ -50,7 +50,9 @@ fn stepped_axis(a: IVec3, b: IVec3, step: IVec3, size: IVec3) -> Result<usize, T
         next[axis] += step[axis];
         step[axis] != 0 && wrapped(next, size) == b
     };
-    (0..3).find(|&axis| fits(axis)).ok_or_else(|| TestCaseError::fail(format!("{a} to {b} is no single step")))
+    (0..3)
+        .find(|&axis| fits(axis))
+        .ok_or_else(|| TestCaseError::fail(format!("{a} to {b} is no single step")))
 }
 
 /// Compares a walk with the truth: the cells may differ only where crossings coincide within rounding.
@@ -245,12 +247,7 @@ fn a_start_on_a_face_belongs_to_the_cell_the_ray_goes_into() {
 #[test]
 fn through_a_corner_one_axis_steps_at_a_time_x_before_y_before_z() {
     let met = cells([0.5, 0.5, 0.5], [1.0, 1.0, 1.0], 1.0);
-    let want = [
-        ([0, 0, 0], 0.0, 0.5),
-        ([1, 0, 0], 0.5, 0.5),
-        ([1, 1, 0], 0.5, 0.5),
-        ([1, 1, 1], 0.5, 1.0),
-    ];
+    let want = [([0, 0, 0], 0.0, 0.5), ([1, 0, 0], 0.5, 0.5), ([1, 1, 0], 0.5, 0.5), ([1, 1, 1], 0.5, 1.0)];
     assert_eq!(met, want);
     let back = cells([1.5, 1.5, 1.5], [-1.0, -1.0, -1.0], 1.0);
     assert_eq!(back.iter().map(|c| c.0).collect::<Vec<_>>(), [[1, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, 0]]);
