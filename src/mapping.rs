@@ -61,7 +61,7 @@ impl QuadMap {
         let size = ac.length().max(bd.length());
         // The cross product of the diagonals is twice the vector area.
         let normal = ac.cross(bd);
-        if !(normal.length() > 1e-9 * size * size) {
+        if !normal.is_finite() || normal.length() <= 1e-9 * size * size {
             return Err(QuadFault::Degenerate);
         }
         let n = normal.normalize();
@@ -85,7 +85,7 @@ impl QuadMap {
         let pa = glam::DVec2::ZERO;
         for [p, q, r] in [[pa, pb, pc], [pb, pc, pd], [pc, pd, pa], [pd, pa, pb]] {
             // A corner of 180° is as bad as a reflex one: the map is singular there.
-            if !((q - p).perp_dot(r - q) > 1e-7 * size * size) {
+            if (q - p).perp_dot(r - q) <= 1e-7 * size * size {
                 return Err(QuadFault::NotConvex);
             }
         }

@@ -71,7 +71,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         )));
     }
     match args.rmse {
-        Some(most) if !(d.rmse <= most) => {
+        Some(most) if d.rmse > most || most.is_nan() => {
             Err(Error::Comparison(format!("the rmse is {:.6}; --rmse allows {most}", d.rmse)))
         }
         _ => Ok(()),

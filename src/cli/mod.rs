@@ -8,7 +8,7 @@ mod scene;
 mod terminal;
 mod volume;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -125,7 +125,8 @@ fn size(text: &str) -> std::result::Result<[u32; 2], String> {
 
 /// Where a command writes when -o is not given: the scene's name in the current folder.
 fn default_output(scene: &Scene, extension: &str) -> PathBuf {
-    Path::new(&scene.name).with_extension(extension)
+    // Not `with_extension`: the scene v1.2 would become v1.png.
+    PathBuf::from(format!("{}.{extension}", scene.name))
 }
 
 /// Runs the program; the exit code is the table's in the README.

@@ -50,8 +50,7 @@ impl Terminal {
 
     /// The error line.
     pub fn error(&self, e: &Error) {
-        let text = e.to_string().replace(['\n', '\r'], " ");
-        self.print(&format!("taki: error: {text}"));
+        self.print(&format!("taki: error: {e}"));
     }
 
     /// Removes the progress bar.
@@ -61,7 +60,9 @@ impl Terminal {
         }
     }
 
+    /// Prints one line. Names of files and keys of scenes may hold what would end it or steer the terminal.
     fn print(&self, line: &str) {
+        let line = line.replace(char::is_control, " ");
         let write = || complain_raw(&format!("{line}\n"));
         match &*self.lock() {
             Some((_, bar)) => bar.suspend(write),
@@ -82,7 +83,7 @@ impl Monitor for Terminal {
         }
         if std::io::stderr().is_terminal() {
             let mut slot = self.lock();
-            if !slot.as_ref().is_some_and(|(name, _)| *name == stage) {
+            if slot.as_ref().is_none_or(|(name, _)| *name != stage) {
                 if let Some((_, old)) = slot.take() {
                     old.finish_and_clear();
                 }

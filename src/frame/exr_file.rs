@@ -5,13 +5,13 @@ use std::path::Path;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, ImageAttributes, LayerAttributes,
-    ReadChannels, ReadLayers, Text, WritableImage,
+    LineOrder, ReadChannels, ReadLayers, Text, WritableImage,
 };
 
 use super::{Frame, Layer};
 use crate::error::{Error, Result};
 
-/// Writes `layers` of a frame.
+/// Writes `layers` of a frame. The bytes depend on the arguments alone.
 pub fn write_exr(
     frame: &Frame,
     layers: &[Layer],
@@ -29,9 +29,16 @@ pub fn write_exr(
     let channels = AnyChannels::sort(channels.collect());
     let mut attributes = LayerAttributes::default();
     for (key, text) in texts {
-        attributes.other.insert(Text::from(*key), AttributeValue::Text(Text::from(*text)));
+        if *key == "Software" {
+            attributes.software_name = Some(Text::from(*text));
+        } else {
+            // A hash map: a second text of this kind would come in an order of its own each time.
+            attributes.other.insert(Text::from(*key), AttributeValue::Text(Text::from(*text)));
+        }
     }
-    let layer = exr::prelude::Layer::new(size, attributes, Encoding::FAST_LOSSLESS, channels);
+    // Without an order, chunks are written as the threads finish them.
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
+    let layer = exr::prelude::Layer::new(size, attributes, encoding, channels);
     let image = Image { attributes: ImageAttributes::with_size(size), layer_data: smallvec_of(layer) };
     image.write().to_buffered(out)
 }

@@ -3,7 +3,7 @@
 use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Window};
-use super::{GpuRenderer, Uploaded, readback};
+use super::{GpuRenderer, Inputs, Uploaded, readback};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
@@ -44,7 +44,6 @@ pub struct GpuBench {
 }
 
 struct Prepared {
-    scene: Scene,
     up: Uploaded,
     targets: Targets,
     sums: Sums,
@@ -72,7 +71,6 @@ impl GpuBench {
         let frame = layout::Frame::new(direct, volume.size, volume.alpha, window, 0);
         let pass = |pass| (pass, Tiler::new(None), None);
         self.prepared = Some(Prepared {
-            scene: direct.clone(),
             up: Uploaded::new(gpu, direct, volume, mesh)?,
             targets: Targets::new(gpu, window.width, window.height),
             sums: Sums::new(gpu, window.width as u64 * window.height as u64),
@@ -94,17 +92,15 @@ impl GpuBench {
     pub fn run(&mut self, pass: BenchPass) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
+        let inputs = Inputs { gpu, timer, up: &p.up, targets: &p.targets, window: p.window, frame: &p.frame };
         let number = match pass {
-            BenchPass::Gbuffer => {
-                return Ok((gbuffer.run(gpu, timer, &p.scene, &p.up, &p.targets, p.window, &p.frame)?, 0));
-            }
+            BenchPass::Gbuffer => return Ok((gbuffer.run(&inputs)?, 0)),
             BenchPass::BareWalk => 0,
             BenchPass::Integrate => 1,
             BenchPass::IntegrateMarch => 2,
         };
         let (integrate, tiler, cells) = &mut p.passes[number];
-        let seconds =
-            integrate.run(gpu, timer, tiler, &p.up, &p.targets, &p.sums, p.window, &p.frame, |_| Ok(()))?;
+        let seconds = integrate.run(&inputs, &p.sums, tiler, |_| Ok(()))?;
         let cells = match cells {
             Some(cells) => *cells,
             None => {

@@ -1,12 +1,9 @@
 //! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
 
 use super::device::Gpu;
-use super::layout::{Frame, Window};
-use super::shader;
-use super::timing::Timer;
-use super::upload::Uploaded;
+use super::{Inputs, shader};
 use crate::error::Result;
-use crate::scene::{Scene, Vertex};
+use crate::scene::Vertex;
 
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
@@ -114,17 +111,9 @@ impl Gbuffer {
         }
     }
 
-    /// Fills `targets` with one sample of a window; seconds on the device.
-    pub fn run(
-        &self,
-        gpu: &Gpu,
-        timer: &Timer,
-        scene: &Scene,
-        up: &Uploaded,
-        targets: &Targets,
-        window: Window,
-        frame: &Frame,
-    ) -> Result<f64> {
+    /// Fills the targets with one sample of a window; seconds on the device.
+    pub fn run(&self, inputs: &Inputs) -> Result<f64> {
+        let Inputs { gpu, timer, up, targets, window, frame } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, &wgpu::Buffer)]| {
             let entries: Vec<_> = entries
@@ -163,10 +152,9 @@ impl Gbuffer {
         };
         // The whole image is the viewport wherever the window lies, so that edges fall on the same
         // pixels for every division into windows.
-        let image = &scene.image;
         let place = |pass: &mut wgpu::RenderPass| {
             let (x, y) = (-(window.x as f32), -(window.y as f32));
-            pass.set_viewport(x, y, image.width as f32, image.height as f32, 0.0, 1.0);
+            pass.set_viewport(x, y, frame.image_width, frame.image_height, 0.0, 1.0);
         };
         timer.run(gpu, "gbuffer", |encoder, span| {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {

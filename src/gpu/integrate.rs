@@ -1,11 +1,8 @@
 //! §4 and §5: the compute pass that walks the volume under each pixel.
 
 use super::device::Gpu;
-use super::gbuffer::Targets;
-use super::layout::{Frame, Tile, Window};
-use super::shader;
-use super::timing::Timer;
-use super::upload::Uploaded;
+use super::layout::{Tile, Window};
+use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::{Attenuation, Scene, Visibility};
 use crate::shading::whole_exponent;
@@ -142,19 +139,14 @@ impl Integrate {
 
     /// Adds one sample of a window to `sums`, tile by tile; seconds on the device. `between` is called
     /// after each tile with the pixels done so far, and may stop the work.
-    #[allow(clippy::too_many_arguments)] // Each is one input of the stage; a struct would only rename them.
     pub fn run(
         &self,
-        gpu: &Gpu,
-        timer: &Timer,
-        tiler: &mut Tiler,
-        up: &Uploaded,
-        targets: &Targets,
+        inputs: &Inputs,
         sums: &Sums,
-        window: Window,
-        frame: &Frame,
+        tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
+        let Inputs { gpu, timer, up, targets, window, frame } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());

@@ -55,6 +55,23 @@ fn shader(gpu: &Gpu, name: &str, stage: &str) -> wgpu::ShaderModule {
     })
 }
 
+/// What the passes of one sample of one window work on.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// Its clock.
+    pub timer: &'a Timer,
+    /// The scene on the device.
+    pub up: &'a Uploaded,
+    /// The raster pass's results.
+    pub targets: &'a Targets,
+    /// The part of the image.
+    pub window: Window,
+    /// Its uniforms.
+    pub frame: &'a layout::Frame,
+}
+
 /// The renderer: a device and its compiled passes.
 pub struct GpuRenderer {
     /// The device.
@@ -127,24 +144,23 @@ impl GpuRenderer {
             let uniforms = |sample| layout::Frame::new(scene, volume.size, volume.alpha, window, sample);
             for sample in 0..image.samples {
                 let frame_uniforms = uniforms(sample);
-                seconds.gbuffer +=
-                    self.gbuffer.run(gpu, &self.timer, scene, &up, &targets, window, &frame_uniforms)?;
+                let inputs = Inputs {
+                    gpu,
+                    timer: &self.timer,
+                    up: &up,
+                    targets: &targets,
+                    window,
+                    frame: &frame_uniforms,
+                };
+                seconds.gbuffer += self.gbuffer.run(&inputs)?;
                 if sample == 0
                     && let Some(surface) = &mut frame.surface
                 {
                     read_surface(gpu, scene, &targets, window, surface)?;
                 }
-                seconds.integrate += integrate.run(
-                    gpu,
-                    &self.timer,
-                    &mut tiler,
-                    &up,
-                    &targets,
-                    &sums,
-                    window,
-                    &frame_uniforms,
-                    |pixels| monitor.progress("pixels", done + pixels, total),
-                )?;
+                seconds.integrate += integrate.run(&inputs, &sums, &mut tiler, |pixels| {
+                    monitor.progress("pixels", done + pixels, total)
+                })?;
                 done += window_pixels;
             }
             seconds.resolve += self.resolve.run(gpu, &self.timer, &sums, &picture, window, &uniforms(0))?;

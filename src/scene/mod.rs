@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-pub use param::{Cost, Kind, PARAMS, Param};
+pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::Source;
 pub use rock::{Mesh, Rock, Vertex};
@@ -313,13 +313,15 @@ impl Scene {
     /// What is valid but surely not meant.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = Vec::new();
-        let lit = self.lights.is_empty() && self.ambient == Vec3::ZERO;
+        let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO;
         if self.quads.is_empty() && self.rocks.is_empty() {
             warnings
                 .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
-        } else if lit {
+        } else if unlit {
             warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
-        } else if !self.quads.is_empty() && !volume.cells.iter().any(|c| c.rho_code() > 0) {
+        } else if !self.quads.is_empty()
+            && (volume.alpha == 0.0 || !volume.cells.iter().any(|c| c.rho_code() > 0))
+        {
             warnings.push("the volume is empty: no cell has density".into());
         }
         warnings

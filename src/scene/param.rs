@@ -433,3 +433,23 @@ impl Param {
 fn number(x: f64) -> String {
     if x != 0.0 && (x.abs() >= 1e5 || x.abs() < 1e-3) { format!("{x:e}") } else { format!("{x}") }
 }
+
+/// The table as Markdown, for the README.
+pub fn markdown_table() -> String {
+    let mut text = String::from(
+        "| key | symbol | unit | default | allowed | a change costs | what |\n|---|---|---|---|---|---|---|\n",
+    );
+    for param in PARAMS {
+        text += &format!(
+            "| `{}` | {} | {} | {} | {} | {} | {} |\n",
+            param.key,
+            param.symbol,
+            param.unit,
+            param.default_words(),
+            param.range(),
+            param.cost.word(),
+            param.doc
+        );
+    }
+    text
+}

@@ -133,7 +133,7 @@ fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
             }
         }
         for y in (0..side).step_by(half) {
-            let first = if (y / half) % 2 == 0 { half } else { 0 };
+            let first = if (y / half).is_multiple_of(2) { half } else { 0 };
             for x in (first..side).step_by(stride) {
                 let (mut sum, mut count) = (0.0, 0.0);
                 let mut add = |x: usize, y: usize| {

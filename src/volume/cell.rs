@@ -32,7 +32,7 @@ impl Cell {
     pub fn from_direction(v: Vec3) -> Self {
         let largest = v.abs().max_element();
         // Below this the squares of a direction vanish in f32 and it has no direction.
-        if !(largest > 1e-18) {
+        if largest.is_nan() || largest <= 1e-18 {
             return Cell::default();
         }
         let code = (v * (V_SCALE / largest)).round().as_ivec3();
@@ -40,7 +40,7 @@ impl Cell {
         Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
     }
 
-    /// The same cell with ρ before α, k_d and k_s, each in [0,1].
+    /// The same cell with ρ before α, k_d and k_s, each from 0 to 1.
     pub fn with_density(self, rho: f32, k_d: f32, k_s: f32) -> Self {
         let unorm = |x: f32, scale: f32| (x.clamp(0.0, 1.0) * scale).round() as u32;
         Cell { x: unorm(rho, 65535.0) | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }

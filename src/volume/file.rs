@@ -5,7 +5,7 @@
 //! `alpha` makes reading exact (the cells hold ρ/α); a file without it is read with α = 1.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use glam::Vec3;
@@ -26,7 +26,7 @@ const UNIT_TOLERANCE: f32 = 1e-3;
 /// Writes `volume` to `out` as `.npz`. The bytes depend on the volume alone.
 pub fn write_npz(volume: &VolumeTexture, out: impl Write + Seek) -> std::io::Result<()> {
     let [nx, ny, nz] = volume.size.map(u64::from);
-    let mut zip = ZipWriter::new(out);
+    let mut zip = ZipWriter::new(UntilError { out, position: 0, failed: false });
     let cells = &volume.cells;
     let rho = cells.iter().map(|c| c.rho() * volume.alpha);
     write_array(&mut zip, "rho", &[nz, ny, nx], rho)?;
@@ -36,6 +36,46 @@ pub fn write_npz(volume: &VolumeTexture, out: impl Write + Seek) -> std::io::Res
     write_array(&mut zip, "k", &[nz, ny, nx, 2], k)?;
     write_array(&mut zip, "alpha", &[], std::iter::once(volume.alpha))?;
     zip.finish()?.flush()
+}
+
+/// Passes on what is written until the first error, and takes everything after it as if it were:
+/// [`ZipWriter`] goes on writing when it is dropped, and complains on stderr when it cannot.
+struct UntilError<W> {
+    out: W,
+    position: u64,
+    failed: bool,
+}
+
+impl<W> UntilError<W> {
+    fn note<T>(&mut self, done: std::io::Result<T>) -> std::io::Result<T> {
+        self.failed |= done.as_ref().is_err_and(|e| e.kind() != ErrorKind::Interrupted);
+        done
+    }
+}
+
+impl<W: Write> Write for UntilError<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = if self.failed { Ok(bytes.len()) } else { self.out.write(bytes) };
+        self.position += *written.as_ref().unwrap_or(&0) as u64;
+        self.note(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let flushed = if self.failed { Ok(()) } else { self.out.flush() };
+        self.note(flushed)
+    }
+}
+
+impl<W: Seek> Seek for UntilError<W> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        let moved = match (self.failed, to) {
+            (false, to) => self.out.seek(to),
+            (true, SeekFrom::Start(position)) => Ok(position),
+            (true, SeekFrom::Current(by) | SeekFrom::End(by)) => Ok(self.position.saturating_add_signed(by)),
+        };
+        self.position = *moved.as_ref().unwrap_or(&self.position);
+        self.note(moved)
+    }
 }
 
 fn write_array<W: Write + Seek>(

@@ -54,7 +54,8 @@ fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
     let layer = |frame: &Frame, get: fn(&Frame, usize) -> [f32; 3]| {
         (0..frame.radiance.len()).map(|i| get(frame, i)).collect::<Vec<_>>()
     };
-    let surfaces: [(&str, fn(&Frame, usize) -> [f32; 3]); 3] = [
+    type Get = fn(&Frame, usize) -> [f32; 3];
+    let surfaces: [(&str, Get); 3] = [
         ("transmittance, cells", |f, i| [f.radiance[i][3], f.counts[i][0] as f32, 0.0]),
         ("uv, depth", |f, i| {
             let s = f.surface.as_ref().expect("asked for");

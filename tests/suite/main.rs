@@ -10,6 +10,7 @@ mod faults;
 mod gpu;
 mod mapping;
 mod presets;
+mod readme;
 mod scene;
 mod shaders;
 mod shading;

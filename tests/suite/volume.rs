@@ -112,7 +112,9 @@ fn curves_wrap_in_x_and_y_and_are_dropped_in_z() {
     for seed in 0..60 {
         let mut spec = spec(size, 1);
         spec.seed = seed;
-        spec.shape.sigma_g_cells = 6.0;
+        // Rough and wide: only tilted segments are displaced along y.
+        spec.shape.sigma_g_cells = 12.0;
+        spec.shape.h = 0.3;
         let volume = build(&spec);
         // The same curve from the public parts, in unwrapped space, looked at point by point.
         let mut rng = Family::new(seed, Stream::Curve).member(0);

@@ -101,11 +101,11 @@ fn with_shape(array: &[u8], len: usize, shape: &[u64]) -> Vec<u8> {
     let header_len = 10 + u16::from_le_bytes([array[8], array[9]]) as usize;
     let header = String::from_utf8(array[10..header_len].to_vec()).unwrap();
     let claimed = match shape {
-        [one] => format!("({one},)"),
+        [one] => format!("({one}, )"),
         _ => format!("({})", shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
     };
-    assert!(header.contains(&format!("({len},)")), "{header}");
-    let header = header.replace(&format!("({len},)"), &claimed);
+    assert!(header.contains(&format!("({len}, )")), "{header}");
+    let header = header.replace(&format!("({len}, )"), &claimed);
     let header = format!("{:<width$}\n", header.trim_end(), width = header_len - 11);
     assert_eq!(header.len(), header_len - 10, "the padding is used up");
     [&array[..10], header.as_bytes(), &array[header_len..]].concat()
