@@ -22,20 +22,10 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let quad = quads[quad_number - 1u];
     let hit = textureLoad(surface, pixel, 0);
-    let cells = vec3<f32>(frame.cells);
-    let cx = (quad.e + quad.g * hit.y) / (quad.repeat_u * cells.x);
-    let cy = (quad.f + quad.g * hit.x) / (quad.repeat_v * cells.y);
-    let depth = quad.thickness / cells.z;
-    let det = cross2(cx, cy);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-    let d_n = dot3(d_world, quad.n);
-    let side = select(1.0, -1.0, d_n > 0.0);
-    let d = vec3<f32>(dot3(d_world, quad.e1), dot3(d_world, quad.e2), min(d_n * side, -1e-6));
-    let d_cell = vec3<f32>(cross2(d.xy, cy) / det, cross2(cx, d.xy) / det, -d.z / depth);
-    let x = hit.x * quad.repeat_u * cells.x;
-    let y = hit.y * quad.repeat_v * cells.y;
-    let origin = vec3<f32>(x - cells.x * floor(x / cells.x), y - cells.y * floor(y / cells.y), 0.0);
-    var walk = walk_new(frame.cells, origin, d_cell);
+    let d = view_in_plane(quad, seen_side(quad, d_world), d_world);
+    let d_cell = cell_from_plane(cell_frame(quad, hit.xy, frame.cells), d);
+    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells), d_cell);
     var sum = 0u;
     var n = 0u;
     var done = false;

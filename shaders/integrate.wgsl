@@ -1,13 +1,11 @@
 // §4 and §5: the walk through the volume's cells under each pixel, and the light they send to the eye.
 //
-// One invocation a pixel. Twins: src/cpu/integrate.rs (same order of operations), src/mapping.rs (CellFrame), src/shading.rs (fibre model: Kajiya and Kay 1989).
-// The reasoning stands there.
+// One invocation a pixel. Twin: src/cpu/integrate.rs, the same operations in the same order; the reasoning
+// stands there.
 
 override LIGHTS: u32 = 1u;
 override PER_CELL: bool = false;
 override MARCH: bool = false;
-// The specular exponent where it is a whole number up to 255, else 0: `pow` costs three times as much.
-override EXPONENT: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> lights: Lights;
@@ -21,35 +19,6 @@ override EXPONENT: u32 = 0u;
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
 // Sum over samples of cells walked by view rays, and by light rays.
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
-
-fn v_code(word: u32) -> vec3<f32> {
-    let bits = vec3<u32>(word << 22u, word << 12u, word << 2u);
-    return vec3<f32>(bitcast<vec3<i32>>(bits) >> vec3<u32>(22u));
-}
-
-fn specular_power(x: f32, p: f32) -> f32 {
-    if EXPONENT == 0u {
-        return pow(x, p);
-    }
-    var power = x;
-    var result = 1.0;
-    if (EXPONENT & 1u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 2u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 4u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 8u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 16u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 32u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 64u) != 0u { result *= power; }
-    power *= power;
-    if (EXPONENT & 128u) != 0u { result *= power; }
-    return result;
-}
 
 // V_i(k): from the middle of `cell` to where the light ray leaves the slab.
 struct LightWalk {
@@ -146,18 +115,10 @@ var<private> others: array<RayLight, MAX_LIGHTS>;
 var<private> sums: array<f32, MAX_LIGHTS>;
 
 fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
-    // CellFrame::new: world_from_cell at (u, v), in the axes e1, e2, n of the quad's plane.
-    let cells = vec3<f32>(frame.cells);
-    var jacobian: CellFrame;
-    jacobian.cx = (quad.e + quad.g * hit.y) / (quad.repeat_u * cells.x);
-    jacobian.cy = (quad.f + quad.g * hit.x) / (quad.repeat_v * cells.y);
-    jacobian.depth = quad.thickness / cells.z;
-    jacobian.det = cross2(jacobian.cx, jacobian.cy);
-
+    let jacobian = cell_frame(quad, hit.xy, frame.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-    let d_n = dot3(d_world, quad.n);
-    let side = select(1.0, -1.0, d_n > 0.0);
-    let d = vec3<f32>(dot3(d_world, quad.e1), dot3(d_world, quad.e2), min(d_n * side, -1e-6));
+    let side = seen_side(quad, d_world);
+    let d = view_in_plane(quad, side, d_world);
     let d_cell = cell_from_plane(jacobian, d);
 
     var view: View;
@@ -183,11 +144,8 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
         sums[i] = 0.0;
     }
 
-    let x = hit.x * quad.repeat_u * cells.x;
-    let y = hit.y * quad.repeat_v * cells.y;
-    let origin = vec3<f32>(x - cells.x * floor(x / cells.x), y - cells.y * floor(y / cells.y), 0.0);
     var ray: Ray;
-    var walk = walk_new(frame.cells, origin, d_cell);
+    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells), d_cell);
     ray.transmittance = 1.0;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
@@ -280,33 +238,9 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         | ((*ray).cells >= view.max_cells);
 }
 
-// Ψ = k_d·sin(t,l) + k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p, with t = v/√q in the view's metric.
-fn psi(p: f32, k_d: f32, k_s: f32, v: vec3<f32>, l_v: vec3<f32>, t_dot_e: f32, sin2_e: f32, inverse_q: f32) -> f32 {
-    let t_dot_l = dot3(v, l_v);
-    let sin2_l = max(1.0 - t_dot_l * t_dot_l * inverse_q, 0.0);
-    let base = sqrt(sin2_l * sin2_e) - t_dot_l * t_dot_e * inverse_q;
-    return k_d * sqrt(sin2_l) + k_s * specular_power(max(base, 0.0), p);
-}
-
-// CellFrame: world_from_cell at one point, in the plane's axes: columns (cx, 0), (cy, 0), (0, 0, −depth).
-struct CellFrame {
-    cx: vec2<f32>,
-    cy: vec2<f32>,
-    depth: f32,
-    det: f32,
-}
-
-fn cell_from_plane(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
-    return vec3<f32>(cross2(d.xy, j.cy) / j.det, cross2(j.cx, d.xy) / j.det, -d.z / j.depth);
-}
-
-fn transposed(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
-    return vec3<f32>(dot2(j.cx, d.xy), dot2(j.cy, d.xy), -j.depth * d.z);
-}
-
 fn ray_light(i: u32, quad: Quad, jacobian: CellFrame, side: f32, d_world: vec3<f32>, t_hit: f32) -> RayLight {
     let to_light = light_at(i, d_world, t_hit).xyz;
-    let l = vec3<f32>(dot3(to_light, quad.e1), dot3(to_light, quad.e2), dot3(to_light, quad.n) * side);
+    let l = plane_from_world(quad, side, to_light);
     var out: RayLight;
     out.l_cell = cell_from_plane(jacobian, l);
     out.l_v = transposed(jacobian, l);

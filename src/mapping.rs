@@ -2,7 +2,7 @@
 //!
 //! A quad A(0,0) B(1,0) C(1,1) D(0,1) is handled in its own plane: axes e1 (along AB), e2 (so that
 //! A, B, C, D run counter-clockwise) and n = e1 × e2. Lengths are metres.
-//! `shaders/gbuffer.wgsl` and `shaders/integrate.wgsl` hold the twins of [`QuadMap::uv`] and
+//! `shaders/gbuffer.wgsl` and `shaders/mapping.wgsl` hold the twins of [`QuadMap::uv`] and
 //! [`CellFrame`].
 
 use glam::{Vec2, Vec3};

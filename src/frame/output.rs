@@ -31,7 +31,9 @@ impl Output {
         prefix.push(name);
         prefix.push(".taki-");
         remove_stale(folder, &prefix);
-        let temp = tempfile::Builder::new()
+        let mut builder = tempfile::Builder::new();
+        readable(&mut builder);
+        let temp = builder
             .prefix(&prefix)
             .suffix(&format!(".{}.tmp", std::process::id()))
             .tempfile_in(folder)
@@ -66,7 +68,6 @@ impl Output {
         let Output { path, temp } = self;
         let done = (|| {
             temp.as_file().sync_all()?;
-            share(temp.as_file())?;
             temp.persist(&path).map_err(|e| e.error)?;
             // The name itself is only safe once the folder is on disk; not every file system can.
             let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -77,17 +78,15 @@ impl Output {
     }
 }
 
-/// Temporary files are private; a finished picture is readable as any other new file.
+/// Temporary files are private; this one becomes a picture, readable as the umask lets any new file be.
 #[cfg(unix)]
-fn share(file: &File) -> std::io::Result<()> {
+fn readable(builder: &mut tempfile::Builder) {
     use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
 }
 
 #[cfg(not(unix))]
-fn share(_: &File) -> std::io::Result<()> {
-    Ok(())
-}
+fn readable(_: &mut tempfile::Builder) {}
 
 /// Removes `PREFIX….PID.tmp` in `folder` where no process PID lives. Best effort: a file that cannot
 /// be removed harms nobody.

@@ -149,7 +149,12 @@ impl Gpu {
         self.check()?;
         match waited {
             Ok(_) => Ok(()),
-            Err(wgpu::PollError::Timeout) => Err(Error::Watchdog { seconds: self.watchdog.as_secs_f64() }),
+            Err(wgpu::PollError::Timeout) => {
+                // Dropping a queue waits until it is idle, which after a hang may be never: a handle that
+                // is never dropped keeps the device until the process ends.
+                std::mem::forget((self.device.clone(), self.queue.clone()));
+                Err(Error::Watchdog { seconds: self.watchdog.as_secs_f64() })
+            }
             Err(e) => Err(Error::DeviceLost(e.to_string())),
         }
     }

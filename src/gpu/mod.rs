@@ -45,7 +45,14 @@ pub struct RenderOptions {
 
 /// The text of a stage's shader: what all stages share, then its own.
 pub fn shader_source(stage: &str) -> String {
-    [include_str!("../../shaders/frame.wgsl"), include_str!("../../shaders/walk.wgsl"), stage].join("\n")
+    [
+        include_str!("../../shaders/frame.wgsl"),
+        include_str!("../../shaders/mapping.wgsl"),
+        include_str!("../../shaders/walk.wgsl"),
+        include_str!("../../shaders/shading.wgsl"),
+        stage,
+    ]
+    .join("\n")
 }
 
 fn shader(gpu: &Gpu, name: &str, stage: &str) -> wgpu::ShaderModule {

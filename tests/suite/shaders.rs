@@ -9,7 +9,7 @@ use taki::scene::MAX_LIGHTS;
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
-const SHARED: [&str; 2] = ["frame.wgsl", "walk.wgsl"];
+const SHARED: [&str; 4] = ["frame.wgsl", "mapping.wgsl", "shading.wgsl", "walk.wgsl"];
 /// The stages.
 const STAGES: [&str; 4] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl"];
 

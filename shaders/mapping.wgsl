@@ -1,0 +1,51 @@
+// §3 The Jacobian of the map between a quad and the volume's face. Twin: src/mapping.rs, CellFrame.
+
+// world_from_cell at one point, in the axes e1, e2 and seen normal of the quad's plane: columns (cx, 0),
+// (cy, 0) and (0, 0, −depth).
+struct CellFrame {
+    cx: vec2<f32>,
+    cy: vec2<f32>,
+    depth: f32,
+    det: f32,
+}
+
+fn cell_from_plane(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(cross2(d.xy, j.cy) / j.det, cross2(j.cx, d.xy) / j.det, -d.z / j.depth);
+}
+
+fn transposed(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(dot2(j.cx, d.xy), dot2(j.cy, d.xy), -j.depth * d.z);
+}
+
+fn cell_frame(quad: Quad, uv: vec2<f32>, size: vec3<i32>) -> CellFrame {
+    let cells = vec3<f32>(size);
+    var j: CellFrame;
+    j.cx = (quad.e + quad.g * uv.y) / (quad.repeat_u * cells.x);
+    j.cy = (quad.f + quad.g * uv.x) / (quad.repeat_v * cells.y);
+    j.depth = quad.thickness / cells.z;
+    j.det = cross2(j.cx, j.cy);
+    return j;
+}
+
+// A world vector in the plane's axes; `side` is −1 where the quad is seen from behind.
+fn plane_from_world(quad: Quad, side: f32, d: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(dot3(d, quad.e1), dot3(d, quad.e2), dot3(d, quad.n) * side);
+}
+
+// −1 where the direction `d_world` meets the quad from behind.
+fn seen_side(quad: Quad, d_world: vec3<f32>) -> f32 {
+    return select(1.0, -1.0, dot3(d_world, quad.n) > 0.0);
+}
+
+// A view direction in the plane's axes; one in the plane is tilted into it, so that it comes to an end.
+fn view_in_plane(quad: Quad, side: f32, d_world: vec3<f32>) -> vec3<f32> {
+    let d = plane_from_world(quad, side, d_world);
+    return vec3<f32>(d.xy, min(d.z, -1e-6));
+}
+
+// Where on the face z = 0 the walk begins, inside the tile.
+fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>) -> vec3<f32> {
+    let cells = vec2<f32>(size.xy);
+    let xy = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) * cells;
+    return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
+}

@@ -1,0 +1,165 @@
+//! The parts of a scene, made from values that passed the table and checked against one another.
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+use super::{Camera, Light, MAX_LIGHTS, Quad, Rock, Values, Vertex};
+use crate::error::{Error, Result};
+use crate::mapping::{Material, QuadMap};
+
+pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
+    let mut quads = Vec::new();
+    let materials = v.names("materials");
+    for i in v.names("quads") {
+        let key = format!("quads.{i}.corners");
+        if !v.is_set(&key) {
+            return Err(Error::input(
+                format!("quad {i} has no corners"),
+                format!("give {key} four points A, B, C, D"),
+            ));
+        }
+        let corners = v.corners(&key);
+        let map = QuadMap::new(corners).map_err(|fault| {
+            Error::input(
+                format!("quad {i} ({key}) {}", fault.words()),
+                "a quad needs four corners A, B, C, D in one plane, convex, in order around it",
+            )
+        })?;
+        let name = v.text(&format!("quads.{i}.material"));
+        if name != "water" && !materials.contains(&name) {
+            let known = materials.join(", ");
+            return Err(Error::input(
+                format!("quad {i} (quads.{i}.material) has the unknown material {name:?}"),
+                format!("add [materials.{name}] or use one of: water {known}"),
+            ));
+        }
+        let material = |what: &str| v.float(&format!("materials.{name}.{what}"));
+        let material = Material {
+            thickness_m: material("thickness"),
+            repeat_u: material("repeat_u"),
+            repeat_v: material("repeat_v"),
+        };
+        quads.push(Quad { corners, map, material });
+    }
+    Ok(quads)
+}
+
+pub(super) fn lights(v: &Values) -> Result<Vec<Light>> {
+    let mut lights = Vec::new();
+    for name in v.names("lights") {
+        let key = |what: &str| format!("lights.{name}.{what}");
+        let intensity = v.triple(&key("color")) * v.float(&key("intensity"));
+        if !intensity.is_finite() {
+            return Err(Error::input(
+                format!("light {name} is infinitely bright"),
+                "lower its color or intensity",
+            ));
+        }
+        let light = if v.text(&key("kind")) == "point" {
+            Light::Point { position: v.triple(&key("position")), intensity }
+        } else {
+            let direction = v.triple(&key("direction"));
+            let to_light = unit(direction).ok_or_else(|| {
+                Error::input(
+                    format!("{} = {direction} has no direction", key("direction")),
+                    "give a vector towards the light",
+                )
+            })?;
+            Light::Directional { to_light, intensity }
+        };
+        if intensity != Vec3::ZERO {
+            lights.push(light);
+        }
+    }
+    if lights.len() > MAX_LIGHTS {
+        return Err(Error::input(
+            format!("the scene has {} lights", lights.len()),
+            format!("at most {MAX_LIGHTS}"),
+        ));
+    }
+    Ok(lights)
+}
+
+pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
+    let mut rocks = Vec::new();
+    for name in v.names("rocks") {
+        let key = |what: &str| format!("rocks.{name}.{what}");
+        if !v.is_set(&key("corners")) {
+            return Err(Error::input(
+                format!("rock {name} has no corners"),
+                format!("give {} four points", key("corners")),
+            ));
+        }
+        rocks.push(Rock {
+            corners: v.corners(&key("corners")),
+            levels: v.count(&key("levels")),
+            h: v.float(&key("h")),
+            amplitude: v.float(&key("amplitude")),
+            bulge: v.float(&key("bulge")),
+            seed: v.int(&key("seed")) as u64,
+            color: v.triple(&key("color")),
+            color_noise: v.float(&key("color_noise")),
+            cavity: v.float(&key("cavity")),
+            name,
+        });
+    }
+    // Vertex and six indices, on the CPU and on the device.
+    let need: u128 =
+        rocks.iter().map(|r| r.vertex_count() as u128 * 2 * (size_of::<Vertex>() as u128 + 24)).sum();
+    if need > memory as u128 {
+        return Err(Error::memory(
+            format!("{} rocks", rocks.len()),
+            need,
+            memory,
+            "lower rocks.*.levels or raise --memory",
+        ));
+    }
+    Ok(rocks)
+}
+
+pub(super) fn camera(v: &Values) -> Result<Camera> {
+    let (eye, target, up) = (v.triple("camera.eye"), v.triple("camera.target"), v.triple("camera.up"));
+    let forward = unit(target - eye)
+        .ok_or_else(|| Error::input("camera.eye and camera.target are the same point", "move one of them"))?;
+    let right = unit(forward.cross(unit(up).unwrap_or(Vec3::ZERO))).ok_or_else(|| {
+        Error::input("camera.up is zero or along the view", "turn it away from the view direction")
+    })?;
+    Ok(Camera {
+        eye,
+        right,
+        up: right.cross(forward),
+        forward,
+        tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
+        near: v.float("camera.near"),
+    })
+}
+
+/// Normalised in float64, so that neither tiny nor huge vectors lose their direction.
+fn unit(v: Vec3) -> Option<Vec3> {
+    let d = v.as_dvec3();
+    (d.length() > 1e-12).then(|| d.normalize().as_vec3())
+}
+
+/// Resolves a reference inside the scene's folder (or an allowed one), following links.
+pub(super) fn confine(file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
+    let Some(folder) = folder else { return Ok(file.to_owned()) };
+    let joined = folder.join(file);
+    let real = joined.canonicalize().map_err(|e| {
+        Error::input(
+            format!("volume.file = {:?}: {} {e}", file.display().to_string(), joined.display()),
+            "check the path",
+        )
+    })?;
+    let inside = std::iter::once(folder)
+        .chain(allowed.iter().map(PathBuf::as_path))
+        .filter_map(|dir| dir.canonicalize().ok())
+        .any(|dir| real.starts_with(dir));
+    if !inside {
+        return Err(Error::input(
+            format!("volume.file = {:?} leads out of the scene's folder", file.display().to_string()),
+            format!("allow it with --allow-path {}", real.parent().unwrap_or(&real).display()),
+        ));
+    }
+    Ok(real)
+}
