@@ -79,6 +79,10 @@ struct Row {
     ns_per_cell: f64,
 }
 
+/// Deepest volume that rows with a light walk from every cell are measured on: their cost grows with the
+/// square of the depth, and 256 layers take minutes a frame.
+const MARCH_LAYERS: u32 = 64;
+
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -162,6 +166,7 @@ fn passes(
             Some(m) => m.2.push(seconds),
             None => measured.push((engine, pass, vec![seconds], cells)),
         };
+    let march = volume.size[2] <= MARCH_LAYERS;
     if let Some(gpu) = gpu {
         gpu.prepare(direct, marched, volume, &mesh)?;
     }
@@ -170,7 +175,7 @@ fn passes(
         terminal.progress("rounds", round as u64, args.runs as u64)?;
         let counted = round > 0;
         if let Some(gpu) = gpu {
-            for pass in BenchPass::ALL {
+            for pass in BenchPass::ALL.into_iter().filter(|&p| march || p != BenchPass::IntegrateMarch) {
                 let (seconds, cells) = gpu.run(pass)?;
                 if counted {
                     add("gpu", pass.name(), seconds, cells);
@@ -178,7 +183,10 @@ fn passes(
             }
         }
         // `--engine gpu` asks for the device's rows alone.
-        let on_cpu = if args.engine.engine == EngineChoice::Gpu { 0 } else { 2 };
+        let on_cpu = match args.engine.engine {
+            EngineChoice::Gpu => 0,
+            _ => 1 + usize::from(march),
+        };
         for (pass, scene) in [("integrate", direct), ("integrate march", marched)].into_iter().take(on_cpu) {
             let frame = cpu::render(scene, volume, &mesh, false, &Unwatched)?;
             if counted {

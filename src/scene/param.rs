@@ -270,7 +270,14 @@ pub const PARAMS: &[Param] = &[
         Upload,
         "Corners of the patch that the fractal height field is raised on, counter-clockwise from the outside.",
     ),
-    p("rocks.*.levels", "", "", Int(0, super::rock::MAX_LEVELS as i64, 7), Upload, "Subdivisions: the mesh has 2^levels squares a side."),
+    p(
+        "rocks.*.levels",
+        "",
+        "",
+        Int(0, super::rock::MAX_LEVELS as i64, 7),
+        Upload,
+        "Subdivisions: the mesh has 2^levels squares a side.",
+    ),
     p(
         "rocks.*.h",
         "",

@@ -35,14 +35,16 @@ impl Cell {
         if largest.is_nan() || largest <= 1e-18 {
             return Cell::default();
         }
-        let code = (v * (V_SCALE / largest)).round().as_ivec3();
+        // Rounded by truncation: `f32::round` is a call into the C library.
+        let code = v * (V_SCALE / largest);
+        let code = (code + Vec3::splat(0.5).copysign(code)).as_ivec3();
         let bits = |c: i32| (c as u32) & 0x3ff;
         Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
     }
 
     /// The same cell with ρ before α, k_d and k_s, each from 0 to 1.
     pub fn with_density(self, rho: f32, k_d: f32, k_s: f32) -> Self {
-        let unorm = |x: f32, scale: f32| (x.clamp(0.0, 1.0) * scale).round() as u32;
+        let unorm = |x: f32, scale: f32| (x.clamp(0.0, 1.0) * scale + 0.5) as u32;
         Cell { x: unorm(rho, 65535.0) | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }
     }
 

@@ -12,7 +12,7 @@ use crate::curve::{CurveShape, spatial_fractal_curve};
 use crate::error::Result;
 use crate::job::Monitor;
 use crate::random::{Family, Stream};
-use crate::walk::Walk;
+use crate::walk::{Walk, floor_cell};
 
 /// Everything the water builder needs; equal specs give equal bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,20 +106,26 @@ fn walk_curve(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>, report: &m
     let p2 = Vec3::new(x, size.y as f32, z);
     spatial_fractal_curve(&spec.shape, p1, p2, &mut rng, points);
     let mut open: Option<(IVec3, Vec3)> = None;
+    let mut add = |cell: IVec3, part: Vec3| match &mut open {
+        Some((last, sum)) if *last == cell => *sum += part,
+        _ => {
+            if let Some((last, sum)) = open.replace((cell, part))
+                && (0..size.z).contains(&last.z)
+            {
+                report(last, sum);
+            }
+        }
+    };
     for ends in points.windows(2) {
         let d = ends[1] - ends[0];
+        let cell = cell_of(ends[0]);
+        if cell == cell_of(ends[1]) {
+            // Half of all segments lie in one cell: the walk would find just that.
+            add(IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z), d);
+            continue;
+        }
         for crossing in Walk::new(size, ends[0], d, 1.0) {
-            let part = d * (crossing.t_exit - crossing.t_enter);
-            match &mut open {
-                Some((cell, sum)) if *cell == crossing.cell => *sum += part,
-                _ => {
-                    if let Some((cell, sum)) = open.replace((crossing.cell, part))
-                        && (0..size.z).contains(&cell.z)
-                    {
-                        report(cell, sum);
-                    }
-                }
-            }
+            add(crossing.cell, d * (crossing.t_exit - crossing.t_enter));
         }
     }
     if let Some((cell, sum)) = open
@@ -127,6 +133,11 @@ fn walk_curve(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>, report: &m
     {
         report(cell, sum);
     }
+}
+
+#[inline]
+fn cell_of(p: Vec3) -> IVec3 {
+    IVec3::new(floor_cell(p.x), floor_cell(p.y), floor_cell(p.z))
 }
 
 /// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
