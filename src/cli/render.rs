@@ -13,6 +13,7 @@ use crate::frame::{Frame, Layer, Output, encode_png, write_exr};
 use crate::gpu::RenderOptions;
 use crate::job::{Engine, Monitor};
 use crate::scene::Scene;
+use crate::volume::VolumeTexture;
 
 #[derive(Args)]
 pub struct RenderArgs {
@@ -85,7 +86,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
 
     let clock = Instant::now();
     terminal.progress("saving", 0, 1)?;
-    let resolved = scene.to_toml();
+    let resolved = metadata(&scene, &volume);
     let texts =
         [("Software", concat!("taki ", env!("CARGO_PKG_VERSION"))), ("taki.scene", resolved.as_str())];
     for sink in sinks {
@@ -101,6 +102,14 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         terminal.note(&format!("taki: wrote {} in {total:.2} s", names.join(", ")));
     }
     Ok(())
+}
+
+/// The scene that made a picture, as a scene file. A volume file stands in it by its contents, not by its
+/// path: equal pictures are equal files, and nobody's folders are published.
+fn metadata(scene: &Scene, volume: &VolumeTexture) -> String {
+    let mut scene = scene.clone();
+    scene.values.clear_under("volume.file");
+    format!("# volume texture: crc32 {:08x}\n{}", volume.checksum(), scene.to_toml())
 }
 
 fn open(path: &std::path::Path) -> Result<Sink> {

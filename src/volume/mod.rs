@@ -28,6 +28,15 @@ impl VolumeTexture {
         (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
     }
 
+    /// CRC-32 of size, α and cells: equal volumes have equal ones, built or read.
+    pub fn checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(bytemuck::bytes_of(&self.size));
+        hasher.update(bytemuck::bytes_of(&self.alpha));
+        hasher.update(bytemuck::cast_slice(&self.cells));
+        hasher.finalize()
+    }
+
     /// What `taki volume info` prints.
     pub fn statistics(&self) -> Statistics {
         let mut s = Statistics { size: self.size, alpha: self.alpha, ..Default::default() };

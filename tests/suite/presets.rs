@@ -101,3 +101,26 @@ fn figure_six_is_denser_and_figure_seven_smoother_than_figure_five() {
     let along = |s: &Scene| s.volume(1 << 30, &Unwatched).expect("a volume").statistics().v_mean[1];
     assert!(along(&seven) > along(&five) + 0.02, "{} against {}", along(&seven), along(&five));
 }
+
+#[test]
+fn a_scene_that_takes_its_volume_from_a_file_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let taki = |args: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_taki"));
+        let out = command.current_dir(folder.path()).args(args).output().expect("it runs");
+        assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    };
+    taki(&["volume", "build", "fig5", "-o", "v.npz"]);
+    let text = "version = 1\nbase = \"fig5\"\n[volume]\nfile = \"v.npz\"\n";
+    std::fs::write(folder.path().join("mine.toml"), text).expect("written");
+    let picture = |scene: &str, engine: &str, file: &str| {
+        taki(&["render", scene, "--engine", engine, "--size", "80x128", "--samples", "1", "-o", file]);
+        std::fs::read(folder.path().join(file)).expect("a picture")
+    };
+    for file in ["a.png", "b.exr"] {
+        assert!(picture("fig5", "cpu", file) == picture("mine.toml", "cpu", file), "cpu {file}");
+        if renderer("bytes").is_some() {
+            assert!(picture("fig5", "gpu", file) == picture("mine.toml", "gpu", file), "gpu {file}");
+        }
+    }
+}
