@@ -25,10 +25,11 @@
 //! the exit (it minds NaN: three instructions to `select`'s two); leaving out any one of `exp2`, the power, the
 //! roots or the division gains 6 % each, so none of them is the bottleneck.
 //!
-//! The limit: 222 instructions a step, of which 60 fetch and 55 step, at the rate this device reaches (about
-//! 1.1 a cycle beside a busy sibling, 1.6 alone) make 7 to 12 core-nanoseconds a cell. A scalar kernel compiled
-//! by Numba needs 13 to 17 per cell. Time per frame is therefore alike, for the reason below; half as much
-//! again would take 150 instructions a step, less than fetch, step and `exp2` leave for a fibre model.
+//! The limit: 222 instructions a step, of which 60 fetch and 55 step. One thread alone (`LP_NUM_THREADS=1`)
+//! needs 6.8 ns a cell, two threads 7.1 (fastest run) to 12.8 (median) core-nanoseconds: what is lost when
+//! both cores of the shared machine work was not found out. A scalar kernel compiled by Numba needs 13 to 17 per
+//! cell. Time per frame is therefore alike, for the reason below; half as much again would take about 150
+//! instructions a step, less than fetch, step and `exp2` leave for a fibre model.
 //!
 //! The walk goes on through the tiled copies where other programs' rays leave the box: 46.7 cells a ray in
 //! `front` at 40³ against their 34.5. Compare nanoseconds per cell as well as times.
