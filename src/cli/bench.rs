@@ -9,23 +9,23 @@
 //! compiled shader, since counts have no noise. The least a step needs there is the fetch: bounds, address,
 //! eight 64-bit loads and their transposition, about 60. The bare walk (fetch, step, one addition) needs 120.
 //!
-//! | change | integrate, instructions a step |
+//! | integrate, direct light | instructions a step |
 //! |---|--:|
-//! | as first written, one cell a loop turn | 326 |
-//! | uniforms read before the loop: inside it each is gathered lane by lane, 25 instructions apiece | 250 |
-//! | four cells a loop turn: mask blends and loop bounds are paid once | 222 |
+//! | one cell a loop turn, uniforms read in the loop (each is gathered lane by lane, about 25 instructions) | 326 |
+//! | two cells a turn: mask blends and loop bounds are paid once | 290 |
+//! | four cells a turn, uniforms read before the loop | 222 |
 //!
-//! The rest is 60 of fetch, 55 of step, 25 of `exp2` and 80 of fibre model. Two lights' worth of arrays kept in
-//! registers (the first light apart from the others) was worth 7 %. With `march`, rays of a SIMD group that
-//! found an occupied cell wait for the others before all walk to the light: 2.4 times faster at 8 % occupied
-//! cells.
+//! Of the 222 about 60 are fetch, 55 step and 25 `exp2`, read off the listing; the fibre model and spilled
+//! registers are the rest. Keeping the first light out of indexed arrays was worth 7 %. With `march`, rays of a SIMD
+//! group that found an occupied cell wait for the others before all walk to the light: 2.4 times faster at 8 %
+//! occupied cells.
 //!
 //! What did not help: seeking the next occupied cell before shading it *without* `march` (1.7 times slower:
-//! an inner loop costs more than shading an empty cell); more than four cells a turn (registers spill); `min` for
+//! an inner loop costs more than shading an empty cell); eight cells a turn (no better than four in the bare walk); `min` for
 //! the exit (it minds NaN: three instructions to `select`'s two); leaving out any one of `exp2`, the power, the
 //! roots or the division gains 6 % each, so none of them is the bottleneck.
 //!
-//! The limit: 222 instructions a step, of which 60 fetch and 55 step. One thread alone (`LP_NUM_THREADS=1`)
+//! The limit, 222 instructions a step: one thread alone (`LP_NUM_THREADS=1`)
 //! needs 6.8 ns a cell, two threads 7.1 (fastest run) to 12.8 (median) core-nanoseconds: what is lost when
 //! both cores of the shared machine work was not found out. A scalar kernel compiled by Numba needs 13 to 17 per
 //! cell. Time per frame is therefore alike, for the reason below; half as much again would take about 150

@@ -120,7 +120,7 @@ fn walk_curve(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>, report: &m
         let d = ends[1] - ends[0];
         let cell = cell_of(ends[0]);
         if cell == cell_of(ends[1]) {
-            // Half of all segments lie in one cell: the walk would find just that.
+            // Many segments lie in one cell: the walk would find just that.
             add(IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z), d);
             continue;
         }
