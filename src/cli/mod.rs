@@ -151,6 +151,11 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             terminal.error(&e);
+            if matches!(e, Error::Watchdog { .. }) {
+                // The driver's threads are still at work: exit handlers would take their memory away under
+                // them, and the process end by a fault. Outputs and temporary files are settled by now.
+                signal_hook::low_level::exit(e.exit_code().into());
+            }
             ExitCode::from(e.exit_code())
         }
     }

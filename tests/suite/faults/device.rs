@@ -171,3 +171,26 @@ fn the_gpu_gives_the_same_bytes_each_time() {
     };
     assert!(bytes() == bytes());
 }
+
+#[test]
+fn a_watchdog_that_ends_work_in_flight_ends_the_process_with_its_own_code() {
+    if !has_gpu() {
+        return;
+    }
+    let dir = tempdir().unwrap();
+    // Deep and marched: a first tile takes software Vulkan far longer than the watchdog's time, and its
+    // threads are still at work when the process ends.
+    let sets = ["volume.nz=200", "volume.nx=100", "volume.ny=100", "trace.max_cells=5000"];
+    // Whether they are caught at work is chance: several tries.
+    for _ in 0..12 {
+        let mut command =
+            taki(["render", "front", "--engine=gpu", "--watchdog=0.01", "--size=1500x1500", "-o"]);
+        command.arg(dir.path().join("x.png")).arg("--set=light.visibility=march");
+        let run = run(command.args(sets.map(|s| format!("--set={s}"))));
+        // A fast GPU may be done in time; a signal is never right.
+        assert!(matches!(run.code, Some(0 | 124)), "{:?}: {}", run.code, run.err);
+        if run.code == Some(124) {
+            has_only(dir.path(), &[]);
+        }
+    }
+}
