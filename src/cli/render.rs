@@ -9,11 +9,10 @@ use serde_json::json;
 use super::terminal::{Terminal, say};
 use super::{EngineOptions, SceneOptions, default_output, size};
 use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer, Output, encode_png, write_exr};
+use crate::frame::{Frame, Layer};
 use crate::gpu::RenderOptions;
-use crate::job::{Engine, Monitor};
+use crate::job::{Engine, Monitor, Still};
 use crate::scene::Scene;
-use crate::volume::VolumeTexture;
 
 #[derive(Args)]
 pub struct RenderArgs {
@@ -39,12 +38,6 @@ pub struct RenderArgs {
     json: bool,
 }
 
-/// An output and how to write it.
-enum Sink {
-    Png(Output),
-    Exr(Output),
-}
-
 pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let start = Instant::now();
     let mut more = Vec::new();
@@ -57,9 +50,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         [] => vec![default_output(&scene, "png")],
         given => given.to_vec(),
     };
-    // Every output is opened before any work: a folder that is not there is known at once.
-    let sinks = outputs.iter().map(|path| open(path)).collect::<Result<Vec<Sink>>>()?;
-    let has_exr = sinks.iter().any(|s| matches!(s, Sink::Exr(_)));
+    let still = Still::create(&outputs)?;
+    let has_exr = still.has_exr();
     if args.layers.is_some() && !has_exr {
         return Err(Error::Usage("--layers is for EXR files; add -o FILE.exr".into()));
     }
@@ -86,12 +78,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
 
     let clock = Instant::now();
     terminal.progress("saving", 0, 1)?;
-    let resolved = metadata(&scene, &volume);
-    let texts =
-        [("Software", concat!("taki ", env!("CARGO_PKG_VERSION"))), ("taki.scene", resolved.as_str())];
-    for sink in sinks {
-        save(sink, &frame, &layers, &texts)?;
-    }
+    still.save(&frame, &layers, &scene, &volume)?;
     frame.seconds.output = clock.elapsed().as_secs_f64();
     terminal.close();
     let total = start.elapsed().as_secs_f64();
@@ -102,38 +89,6 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         terminal.note(&format!("taki: wrote {} in {total:.2} s", names.join(", ")));
     }
     Ok(())
-}
-
-/// The scene that made a picture, as a scene file. A volume file stands in it by its contents, not by its
-/// path: equal pictures are equal files, and nobody's folders are published.
-fn metadata(scene: &Scene, volume: &VolumeTexture) -> String {
-    let mut scene = scene.clone();
-    scene.values.clear_under("volume.file");
-    format!("# volume texture: crc32 {:08x}\n{}", volume.checksum(), scene.to_toml())
-}
-
-fn open(path: &std::path::Path) -> Result<Sink> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        Some("png") => Ok(Sink::Png(Output::create(path)?)),
-        Some("exr") => Ok(Sink::Exr(Output::create(path)?)),
-        _ => Err(Error::Usage(format!("-o {}: unknown kind of picture; use .png or .exr", path.display()))),
-    }
-}
-
-fn save(sink: Sink, frame: &Frame, layers: &[Layer], texts: &[(&str, &str)]) -> Result<()> {
-    match sink {
-        Sink::Png(output) => {
-            let bytes = encode_png(frame, texts).map_err(|e| Error::write(output.path(), e))?;
-            output.finish_with(&bytes)
-        }
-        Sink::Exr(mut output) => {
-            let path = output.path().to_owned();
-            let writer = std::io::BufWriter::with_capacity(1 << 20, output.file());
-            write_exr(frame, layers, texts, writer).map_err(|e| Error::write(&path, e))?;
-            output.finish()
-        }
-    }
 }
 
 fn report(

@@ -15,6 +15,7 @@ use crate::walk::Walk;
 pub struct Integrator<'a> {
     scene: &'a Scene,
     volume: &'a VolumeTexture,
+    cells: &'a [Cell],
     size: IVec3,
     extinction: f32,
     per_cell: bool,
@@ -48,6 +49,7 @@ impl<'a> Integrator<'a> {
         Integrator {
             scene,
             volume,
+            cells: &volume.cells,
             size: IVec3::from_array(volume.size.map(|n| n as i32)),
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
@@ -184,6 +186,6 @@ impl<'a> Integrator<'a> {
 
     #[inline]
     fn cell(&self, c: IVec3) -> Cell {
-        self.volume.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
+        self.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
     }
 }

@@ -5,6 +5,7 @@ pub mod gbuffer;
 pub mod integrate;
 pub mod resolve;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -24,18 +25,30 @@ pub fn render(
     surface: bool,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
+    render_samples(scene, volume, mesh, 0..scene.image.samples, surface, monitor)
+}
+
+/// Renders only some of a scene's samples; the radiance is their mean.
+pub fn render_samples(
+    scene: &Scene,
+    volume: &VolumeTexture,
+    mesh: &Mesh,
+    samples: Range<u32>,
+    surface: bool,
+    monitor: &dyn Monitor,
+) -> Result<Frame> {
     let image = &scene.image;
     let width = image.width as usize;
     let mut frame = Frame::new(image.width, image.height, surface);
     let mut seconds = Seconds::default();
     let integrator = integrate::Integrator::new(scene, volume);
-    let total = image.width as u64 * image.height as u64 * image.samples as u64;
+    let total = image.width as u64 * image.height as u64 * samples.len() as u64;
     let done = AtomicU64::new(0);
-    for sample in 0..image.samples {
+    for sample in samples.clone() {
         let clock = Instant::now();
         let gbuffer = gbuffer::run(scene, mesh, sample);
         seconds.gbuffer += clock.elapsed().as_secs_f64();
-        if sample == 0
+        if sample == samples.start
             && let Some(surface) = &mut frame.surface
         {
             for i in 0..gbuffer.quad_id.len() {
@@ -63,7 +76,7 @@ pub fn render(
         seconds.integrate += clock.elapsed().as_secs_f64();
     }
     let clock = Instant::now();
-    let inverse = 1.0 / image.samples as f32;
+    let inverse = 1.0 / samples.len() as f32;
     frame.radiance.par_iter_mut().zip(frame.picture.par_iter_mut()).for_each(|(sum, picture)| {
         *sum = sum.map(|x| x * inverse);
         *picture = resolve::resolve(image, *sum);

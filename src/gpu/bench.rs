@@ -3,7 +3,7 @@
 use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Window};
-use super::{GpuRenderer, Inputs, Uploaded, readback};
+use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
@@ -68,10 +68,10 @@ impl GpuBench {
     ) -> Result<()> {
         let gpu = &self.renderer.gpu;
         let window = Window { x: 0, y: 0, width: direct.image.width, height: direct.image.height };
-        let frame = layout::Frame::new(direct, volume.size, volume.alpha, window, 0);
+        let frame = layout::Frame::new(direct, volume, window, &(0..1), 0);
         let pass = |pass| (pass, Tiler::new(None), None);
         self.prepared = Some(Prepared {
-            up: Uploaded::new(gpu, direct, volume, mesh)?,
+            up: Uploaded::new(gpu, &mut Resident::default(), direct, volume, mesh)?,
             targets: Targets::new(gpu, window.width, window.height),
             sums: Sums::new(gpu, window.width as u64 * window.height as u64),
             window,

@@ -1,11 +1,14 @@
 //! Structs the host shares with the shaders: twins of those in `shaders/frame.wgsl`, checked by a
 //! test through naga (names, offsets, sizes, constants).
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use crate::camera::sample_offset;
 use crate::scene::{self, AngleFrame, Attenuation, MAX_LIGHTS, Scene, Tone};
+use crate::volume::VolumeTexture;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
 pub const WORKGROUP: u32 = 8;
@@ -102,8 +105,14 @@ pub struct Tile {
 }
 
 impl Frame {
-    /// Sample `sample` of `window`, with a volume of `size` cells and density scale `alpha`.
-    pub fn new(scene: &Scene, size: [u32; 3], alpha: f32, window: Window, sample: u32) -> Self {
+    /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with.
+    pub fn new(
+        scene: &Scene,
+        volume: &VolumeTexture,
+        window: Window,
+        samples: &Range<u32>,
+        sample: u32,
+    ) -> Self {
         let camera = &scene.camera;
         let image = &scene.image;
         let [jitter_x, jitter_y] = sample_offset(sample, image.samples);
@@ -117,20 +126,20 @@ impl Frame {
             right: right.to_array(),
             jitter_y,
             up: up.to_array(),
-            sample_index: sample,
+            sample_index: sample - samples.start,
             forward: camera.forward.to_array(),
-            samples: image.samples,
+            samples: samples.len() as u32,
             zenith: scene.background.zenith.to_array(),
             light_count: scene.lights.len() as u32,
             horizon: scene.background.horizon.to_array(),
             p: scene.p,
             ambient: scene.ambient.to_array(),
             early_end: scene.trace.early_end,
-            cells: size.map(|n| n as i32),
+            cells: volume.size.map(|n| n as i32),
             max_cells: scene.trace.max_cells,
             image_width: image.width as f32,
             image_height: image.height as f32,
-            extinction: extinction(&scene.trace.attenuation, alpha),
+            extinction: extinction(&scene.trace.attenuation, volume.alpha),
             texture_frame: u32::from(scene.frame == AngleFrame::Texture),
             exposure: image.exposure.exp2(),
             filmic: u32::from(image.tone == Tone::Filmic),

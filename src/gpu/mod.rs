@@ -16,8 +16,9 @@ pub use gbuffer::{Gbuffer, Targets};
 pub use integrate::{Integrate, Sums, Tiler, Variant};
 pub use resolve::Resolve;
 pub use timing::Timer;
-pub use upload::Uploaded;
+pub use upload::{Resident, Uploaded};
 
+use std::ops::Range;
 use std::time::Instant;
 
 use crate::error::{Error, Result};
@@ -36,6 +37,8 @@ const WINDOW_PIXELS: u64 = 1 << 21;
 pub struct RenderOptions {
     /// Whether to bring back depth, texture coordinates, quads and normals too.
     pub surface: bool,
+    /// Only these of the scene's samples; the radiance is their mean.
+    pub samples: Option<Range<u32>>,
     /// About this many pixels a submission, instead of what the clock suggests.
     pub tile_pixels: Option<u32>,
     /// Pixels rendered at once, instead of 2²¹. Rasterisers interpolate the rock from the window's corner,
@@ -86,14 +89,66 @@ pub struct GpuRenderer {
     timer: Timer,
     gbuffer: Gbuffer,
     resolve: Resolve,
-    integrate: Option<Integrate>,
+    /// The latest first.
+    integrate: Vec<Integrate>,
+    resident: Resident,
+    /// The latest first.
+    canvases: Vec<Canvas>,
+}
+
+/// Specialised pipelines that are kept: a slider that goes to and fro finds them again.
+const KEPT_PIPELINES: usize = 16;
+/// Canvases that are kept: an interactive renderer changes between its preview sizes.
+const KEPT_CANVASES: usize = 5;
+
+/// Targets and sums of one size.
+struct Canvas {
+    size: [u32; 2],
+    targets: Targets,
+    sums: Sums,
+    picture: wgpu::Buffer,
+}
+
+impl Canvas {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
+        let pixels = width as u64 * height as u64;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        Canvas {
+            size: [width, height],
+            targets: Targets::new(gpu, width, height),
+            sums: Sums::new(gpu, pixels),
+            picture: gpu.buffer("picture", pixels * Resolve::PICTURE_BYTES, usage),
+        }
+    }
+}
+
+/// The first item that `is` it, moved to the front; a new one if there is none. The last of more than
+/// `most` goes, before the new one is made.
+fn recent<T>(items: &mut Vec<T>, most: usize, is: impl Fn(&T) -> bool, new: impl FnOnce() -> T) -> &T {
+    let item = match items.iter().position(is) {
+        Some(i) => items.remove(i),
+        None => {
+            items.truncate(most - 1);
+            new()
+        }
+    };
+    items.insert(0, item);
+    &items[0]
 }
 
 impl GpuRenderer {
     /// Compiles the passes that do not depend on the scene.
     pub fn new(gpu: Gpu) -> Self {
         let (timer, gbuffer, resolve) = (Timer::new(&gpu), Gbuffer::new(&gpu), Resolve::new(&gpu));
-        GpuRenderer { gpu, timer, gbuffer, resolve, integrate: None }
+        GpuRenderer {
+            gpu,
+            timer,
+            gbuffer,
+            resolve,
+            integrate: Vec::new(),
+            resident: Resident::default(),
+            canvases: Vec::new(),
+        }
     }
 
     /// Renders a scene.
@@ -122,60 +177,55 @@ impl GpuRenderer {
         let mut seconds = Seconds::default();
         let clock = Instant::now();
         let variant = Variant::of(scene);
-        let integrate = match self.integrate.take() {
-            Some(pass) if pass.variant == variant => pass,
-            _ => Integrate::new(gpu, variant),
-        };
-        let integrate = &*self.integrate.insert(integrate);
+        let integrate = recent(
+            &mut self.integrate,
+            KEPT_PIPELINES,
+            |pass| pass.variant == variant,
+            || Integrate::new(gpu, variant),
+        );
         seconds.pipelines = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let up = Uploaded::new(gpu, scene, volume, mesh)?;
+        let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
         seconds.upload = clock.elapsed().as_secs_f64();
 
         let mut frame = Frame::new(image.width, image.height, options.surface);
         let rows = options.window_pixels.unwrap_or(WINDOW_PIXELS) / image.width as u64;
         let rows = (rows as u32).clamp(1, image.height);
-        let targets = Targets::new(gpu, image.width, rows);
-        let pixels = image.width as u64 * rows as u64;
-        let sums = Sums::new(gpu, pixels);
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let picture = gpu.buffer("picture", pixels * Resolve::PICTURE_BYTES, usage);
+        let size = [image.width, rows];
+        let canvas = recent(&mut self.canvases, KEPT_CANVASES, |c| c.size == size, || Canvas::new(gpu, size));
+        let Canvas { targets, sums, picture, .. } = canvas;
         gpu.check()?;
 
-        let total = image.width as u64 * image.height as u64 * image.samples as u64;
+        let samples = options.samples.clone().unwrap_or(0..image.samples);
+        let total = image.width as u64 * image.height as u64 * samples.len() as u64;
         let mut done = 0;
         let mut tiler = Tiler::new(options.tile_pixels);
         for y in (0..image.height).step_by(rows as usize) {
             let window = Window { x: 0, y, width: image.width, height: rows.min(image.height - y) };
             let window_pixels = window.width as u64 * window.height as u64;
-            let uniforms = |sample| layout::Frame::new(scene, volume.size, volume.alpha, window, sample);
-            for sample in 0..image.samples {
+            let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample);
+            for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);
-                let inputs = Inputs {
-                    gpu,
-                    timer: &self.timer,
-                    up: &up,
-                    targets: &targets,
-                    window,
-                    frame: &frame_uniforms,
-                };
+                let inputs =
+                    Inputs { gpu, timer: &self.timer, up: &up, targets, window, frame: &frame_uniforms };
                 seconds.gbuffer += self.gbuffer.run(&inputs)?;
-                if sample == 0
+                if sample == samples.start
                     && let Some(surface) = &mut frame.surface
                 {
-                    read_surface(gpu, scene, &targets, window, surface)?;
+                    read_surface(gpu, scene, targets, window, surface)?;
                 }
-                seconds.integrate += integrate.run(&inputs, &sums, &mut tiler, |pixels| {
+                seconds.integrate += integrate.run(&inputs, sums, &mut tiler, |pixels| {
                     monitor.progress("pixels", done + pixels, total)
                 })?;
                 done += window_pixels;
             }
-            seconds.resolve += self.resolve.run(gpu, &self.timer, &sums, &picture, window, &uniforms(0))?;
+            seconds.resolve +=
+                self.resolve.run(gpu, &self.timer, sums, picture, window, &uniforms(samples.start))?;
             let clock = Instant::now();
             let first = y as usize * image.width as usize;
             let range = first..first + window_pixels as usize;
             let bytes = readback::read_buffer(gpu, &sums.radiance, window_pixels * 16)?;
-            let inverse = 1.0 / image.samples as f32;
+            let inverse = 1.0 / samples.len() as f32;
             let mean = |sum: [f32; 4]| sum.map(|x| x * inverse);
             frame.radiance[range.clone()]
                 .iter_mut()
@@ -186,7 +236,7 @@ impl GpuRenderer {
                 .iter_mut()
                 .zip(bytes.chunks_exact(8))
                 .for_each(|(out, count)| *out = bytemuck::pod_read_unaligned(count));
-            let bytes = readback::read_buffer(gpu, &picture, window_pixels * 4)?;
+            let bytes = readback::read_buffer(gpu, picture, window_pixels * 4)?;
             frame.picture[range].copy_from_slice(bytemuck::cast_slice(&bytes));
             seconds.readback += clock.elapsed().as_secs_f64();
         }

@@ -1,5 +1,7 @@
 //! The scene on the device: volume texture, quads, lights, mesh.
 
+use std::sync::Arc;
+
 use super::device::Gpu;
 use super::layout::{self, Quad};
 use crate::error::{Error, Result};
@@ -9,14 +11,18 @@ use crate::volume::{Cell, VolumeTexture};
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
 const SLAB_BYTES: usize = 64 << 20;
 
+/// What stays on the device from frame to frame: the volume's cells and the mesh, known again by the
+/// memory they came from.
+#[derive(Default)]
+pub struct Resident {
+    volume: Option<(Arc<Vec<Cell>>, [u32; 3], wgpu::TextureView)>,
+    mesh: Option<(Mesh, wgpu::Buffer, wgpu::Buffer)>,
+}
+
 /// Everything of a scene that does not change from sample to sample.
 pub struct Uploaded {
     /// The volume as a 3-D storage texture, `rg32uint`.
     pub volume: wgpu::TextureView,
-    /// Its cells.
-    pub size: [u32; 3],
-    /// Its density scale.
-    pub alpha: f32,
     /// `array<Quad>`.
     pub quads: wgpu::Buffer,
     /// Number of quads.
@@ -32,8 +38,14 @@ pub struct Uploaded {
 }
 
 impl Uploaded {
-    /// Uploads a scene.
-    pub fn new(gpu: &Gpu, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh) -> Result<Self> {
+    /// Uploads what of a scene is not resident yet.
+    pub fn new(
+        gpu: &Gpu,
+        resident: &mut Resident,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+    ) -> Result<Self> {
         let limits = gpu.device.limits();
         let quads: Vec<Quad> = scene.quads.iter().map(|q| Quad::new(q, scene.camera.eye)).collect();
         let quad_bytes: &[u8] = bytemuck::cast_slice(&quads);
@@ -45,10 +57,9 @@ impl Uploaded {
                 "lower their number or use --engine cpu",
             ));
         }
+        let (vertices, indices) = resident.mesh(gpu, mesh);
         Ok(Uploaded {
-            volume: upload_volume(gpu, volume)?,
-            size: volume.size,
-            alpha: volume.alpha,
+            volume: resident.volume(gpu, volume)?,
             quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
             quad_count: quads.len() as u32,
             lights: gpu.buffer_with(
@@ -56,18 +67,42 @@ impl Uploaded {
                 bytemuck::bytes_of(&layout::lights(scene)),
                 wgpu::BufferUsages::UNIFORM,
             ),
-            vertices: gpu.buffer_with(
-                "vertices",
-                bytemuck::cast_slice(&mesh.vertices),
-                wgpu::BufferUsages::VERTEX,
-            ),
-            indices: gpu.buffer_with(
-                "indices",
-                bytemuck::cast_slice(&mesh.indices),
-                wgpu::BufferUsages::INDEX,
-            ),
+            vertices,
+            indices,
             index_count: mesh.indices.len() as u32,
         })
+    }
+}
+
+impl Resident {
+    fn volume(&mut self, gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView> {
+        if let Some((cells, size, view)) = &self.volume
+            && Arc::ptr_eq(cells, &volume.cells)
+            && *size == volume.size
+        {
+            return Ok(view.clone());
+        }
+        // The old volume goes first: two large ones might not fit.
+        self.volume = None;
+        let view = upload_volume(gpu, volume)?;
+        self.volume = Some((volume.cells.clone(), volume.size, view.clone()));
+        Ok(view)
+    }
+
+    /// Vertices and indices.
+    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> (wgpu::Buffer, wgpu::Buffer) {
+        if let Some((old, vertices, indices)) = &self.mesh
+            && Arc::ptr_eq(&old.vertices, &mesh.vertices)
+            && Arc::ptr_eq(&old.indices, &mesh.indices)
+        {
+            return (vertices.clone(), indices.clone());
+        }
+        let (of_vertices, of_indices) =
+            (bytemuck::cast_slice(&mesh.vertices), bytemuck::cast_slice(&mesh.indices));
+        let vertices = gpu.buffer_with("vertices", of_vertices, wgpu::BufferUsages::VERTEX);
+        let indices = gpu.buffer_with("indices", of_indices, wgpu::BufferUsages::INDEX);
+        self.mesh = Some((mesh.clone(), vertices.clone(), indices.clone()));
+        (vertices, indices)
     }
 }
 

@@ -85,7 +85,10 @@ impl Engine {
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
         match self {
-            Engine::Cpu => cpu::render(scene, volume, mesh, options.surface, monitor),
+            Engine::Cpu => {
+                let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
+                cpu::render_samples(scene, volume, mesh, samples, options.surface, monitor)
+            }
             Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
                 Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {
                     monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));

@@ -1,8 +1,10 @@
 //! How long work is run, watched and stopped.
 
 mod engine;
+mod still;
 
 pub use engine::{Engine, EngineChoice};
+pub use still::Still;
 
 use crate::error::Result;
 

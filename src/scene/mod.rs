@@ -16,7 +16,7 @@ pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::Source;
 pub use rock::{Mesh, Rock, Vertex};
-pub use value::{Place, Raw, Value, Values};
+pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::curve::{CurveShape, levels_for};
 use crate::error::{Error, Result};

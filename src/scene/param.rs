@@ -369,11 +369,6 @@ pub const PARAMS: &[Param] = &[
     ),
 ];
 
-/// The entry a concrete key such as `lights.sun.color` belongs to.
-pub fn find(key: &str) -> Option<&'static Param> {
-    PARAMS.iter().find(|param| matches(param.key, key))
-}
-
 fn matches(pattern: &str, key: &str) -> bool {
     let mut parts = key.split('.');
     pattern
@@ -408,6 +403,11 @@ pub fn nearest(key: &str) -> Option<String> {
 }
 
 impl Param {
+    /// The entry a concrete key such as `lights.sun.color` belongs to.
+    pub fn find(key: &str) -> Option<&'static Param> {
+        PARAMS.iter().find(|param| matches(param.key, key))
+    }
+
     /// Range in words, for messages and tables.
     pub fn range(&self) -> String {
         match self.kind {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::param::{Kind, PARAMS, find};
+use super::param::{Kind, PARAMS, Param};
 use super::preset;
 use super::value::{Key, Place, Raw, Values};
 use crate::error::{Error, Result};
@@ -219,7 +219,7 @@ impl File<'_> {
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
-        match find(&key).map(|param| param.kind) {
+        match Param::find(&key).map(|param| param.kind) {
             Some(_) if values.is_set(&key) => Ok(()),
             Some(Kind::Corners) => Err(Error::input(
                 format!("{}: {path} has no corners", place.0),

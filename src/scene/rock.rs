@@ -1,6 +1,8 @@
 //! Fractal rock: a height field by midpoint displacement (Fournier, Fussell and Carpenter 1982),
 //! raised on a four-cornered patch as a real mesh.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -49,10 +51,10 @@ pub struct Vertex {
 /// Triangles of opaque geometry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertices.
-    pub vertices: Vec<Vertex>,
+    /// Vertices, shared: who keeps them on a device knows them again.
+    pub vertices: Arc<Vec<Vertex>>,
     /// Three indices a triangle.
-    pub indices: Vec<u32>,
+    pub indices: Arc<Vec<u32>>,
 }
 
 impl Rock {
@@ -83,23 +85,25 @@ impl Rock {
         };
         let positions: Vec<Vec3> = (0..side * side).map(position).collect();
         let hollow = hollows(&height, side);
-        let first = mesh.vertices.len() as u32;
+        let vertices = Arc::make_mut(&mut mesh.vertices);
+        let first = vertices.len() as u32;
         for i in 0..side * side {
             let (x, y) = (i % side, i / side);
             let du = positions[y * side + (x + 1).min(n)] - positions[y * side + x.saturating_sub(1)];
             let dv = positions[(y + 1).min(n) * side + x] - positions[y.saturating_sub(1) * side + x];
             let shade = (1.0 + self.color_noise * tint[i]).max(0.1) * (1.0 - self.cavity * hollow[i]);
-            mesh.vertices.push(Vertex {
+            vertices.push(Vertex {
                 position: positions[i].to_array(),
                 normal: du.cross(dv).normalize_or(out).to_array(),
                 albedo: (self.color * shade).to_array(),
             });
         }
+        let indices = Arc::make_mut(&mut mesh.indices);
         for y in 0..n as u32 {
             for x in 0..n as u32 {
                 let i = first + y * side as u32 + x;
                 let up = i + side as u32;
-                mesh.indices.extend([i, i + 1, up + 1, i, up + 1, up]);
+                indices.extend([i, i + 1, up + 1, i, up + 1, up]);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::param::{COLOR_MAX, Kind, POINT_MAX, Param, find, nearest};
+use super::param::{COLOR_MAX, Kind, POINT_MAX, Param, nearest};
 use crate::error::{Error, Result};
 
 /// A checked value. Numbers are the shortest decimal of the float32 that is rendered with.
@@ -83,7 +83,7 @@ impl std::fmt::Display for Key {
 impl Values {
     /// Checks `raw` against the table and stores it.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
-        let Some(param) = find(key) else {
+        let Some(param) = Param::find(key) else {
             let fix = match nearest(key) {
                 Some(near) => format!("did you mean {near}?"),
                 None => "the README's parameter table lists every key".into(),
@@ -101,6 +101,15 @@ impl Values {
     pub fn clear_under(&mut self, prefix: &str) {
         let prefix = Key::new(prefix);
         self.0.retain(|key, _| !key.0.starts_with(&prefix.0));
+    }
+
+    /// Gives `key` the value it has in `other`, or none if it has none there.
+    pub fn copy_from(&mut self, other: &Values, key: &str) {
+        let key = Key::new(key);
+        match other.0.get(&key) {
+            Some(value) => self.0.insert(key, value.clone()),
+            None => self.0.remove(&key),
+        };
     }
 
     /// The names (or numbers) below `section`, in order.
@@ -128,7 +137,7 @@ impl Values {
         if let Some(value) = self.0.get(&Key::new(key)) {
             return value.clone();
         }
-        let param = find(key).unwrap_or_else(|| panic!("no parameter {key}"));
+        let param = Param::find(key).unwrap_or_else(|| panic!("no parameter {key}"));
         match param.kind {
             Kind::Float(.., d) => Value::Float(round_f32(d)),
             Kind::Int(.., d) => Value::Int(d),

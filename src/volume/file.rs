@@ -177,7 +177,7 @@ impl Reader<'_> {
             }
             Ok(())
         })?;
-        Ok(VolumeTexture { size, alpha, cells })
+        Ok(VolumeTexture { size, alpha, cells: cells.into() })
     }
 
     fn alpha(&mut self) -> Result<f32> {

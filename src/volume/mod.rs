@@ -8,6 +8,8 @@ pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
 pub use water::{WaterSpec, build_water};
 
+use std::sync::Arc;
+
 use crate::error::{Error, Result};
 
 /// A volume texture: nx × ny × nz packed cells, x fastest, then y, then z.
@@ -17,8 +19,9 @@ pub struct VolumeTexture {
     pub size: [u32; 3],
     /// Scale of ρ, 0 to 1: the cells hold ρ/α.
     pub alpha: f32,
-    /// nx·ny·nz cells.
-    pub cells: Vec<Cell>,
+    /// nx·ny·nz cells, shared: a copy with another α costs nothing, and who keeps cells on a device
+    /// knows them again.
+    pub cells: Arc<Vec<Cell>>,
 }
 
 impl VolumeTexture {

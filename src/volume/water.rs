@@ -50,7 +50,7 @@ pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeText
     let directions = flow_directions(spec, monitor)?;
     let mut cells: Vec<Cell> = directions.into_par_iter().map(Cell::from_direction).collect();
     set_density_and_reflection(spec, &mut cells);
-    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
+    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
 
 /// Element 2: per cell the sum of (length inside the cell × direction) over all curves.

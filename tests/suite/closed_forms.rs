@@ -37,7 +37,7 @@ fn material(thickness_m: f32, repeat_u: f32, repeat_v: f32) -> Material {
 /// A volume of one cell over and over.
 fn uniform(size: [u32; 3], v: Vec3, rho: f32, k_d: f32, k_s: f32) -> VolumeTexture {
     let cell = Cell::from_direction(v).with_density(rho, k_d, k_s);
-    VolumeTexture { size, alpha: 1.0, cells: vec![cell; size.iter().product::<u32>() as usize] }
+    VolumeTexture { size, alpha: 1.0, cells: vec![cell; size.iter().product::<u32>() as usize].into() }
 }
 
 /// Cells with and without flow, of every density and direction.
@@ -53,7 +53,7 @@ fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
         }
     };
     let cells = (0..size.iter().product::<u32>()).map(|_| cell()).collect();
-    VolumeTexture { size, alpha: 0.8, cells }
+    VolumeTexture { size, alpha: 0.8, cells: std::sync::Arc::new(cells) }
 }
 
 /// The direction at `degrees` from the normal of `rectangle`, turned by `around` about it.
@@ -149,7 +149,7 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
             // Fibres along the flow, light across them: Ψ is k_d = 1 in every cell, so that the light
             // adds the bare weights up one by one.
             let mut volume = noise([5, 7, 9], seed);
-            for cell in &mut volume.cells {
+            for cell in std::sync::Arc::make_mut(&mut volume.cells) {
                 *cell = match cell.has_direction() {
                     true => Cell::from_direction(Vec3::Y).with_density(cell.rho(), 1.0, 0.0),
                     false => Cell::default(),

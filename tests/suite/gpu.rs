@@ -29,7 +29,8 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
     Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a valid scene")
 }
 
-const SURFACE: RenderOptions = RenderOptions { surface: true, tile_pixels: None, window_pixels: None };
+const SURFACE: RenderOptions =
+    RenderOptions { surface: true, samples: None, tile_pixels: None, window_pixels: None };
 
 fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
@@ -175,7 +176,7 @@ fn tiles_do_not_change_a_single_bit_and_windows_no_more_than_rounding() {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
     let mut render = |tile_pixels, window_pixels| {
-        let options = RenderOptions { surface: true, tile_pixels, window_pixels };
+        let options = RenderOptions { surface: true, tile_pixels, window_pixels, samples: None };
         renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
     };
     let whole = render(None, None);
@@ -224,4 +225,64 @@ fn a_destroyed_device_is_an_error_and_the_engine_recovers_on_a_new_one() {
     let frame =
         engine.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame on the new device");
     assert!(frame.covered_pixels() > 0);
+}
+
+#[test]
+fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
+    let scene = scene("fig5", &["image.width=65", "image.height=63", "image.samples=4"]);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mesh = scene.mesh();
+    let mut engines = vec![taki::job::Engine::Cpu];
+    engines.extend(renderer("parts").map(|r| taki::job::Engine::Gpu(Box::new(r), DeviceOptions::default())));
+    for engine in &mut engines {
+        let mut part = |samples| {
+            let options = RenderOptions { samples, ..Default::default() };
+            engine.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
+        };
+        let whole = part(None);
+        let parts = [part(Some(0..1)), part(Some(1..4))];
+        for i in 0..whole.radiance.len() {
+            let counts = [0, 1].map(|c| parts[0].counts[i][c] + parts[1].counts[i][c]);
+            assert_eq!(whole.counts[i], counts, "pixel {i}");
+            for c in 0..4 {
+                let mean = (parts[0].radiance[i][c] + 3.0 * parts[1].radiance[i][c]) / 4.0;
+                let want = whole.radiance[i][c];
+                assert!((mean - want).abs() <= 1e-5 * want.abs() + 1e-6, "pixel {i}: {mean} for {want}");
+            }
+        }
+        assert_ne!(parts[0].radiance, whole.radiance);
+    }
+}
+
+#[test]
+fn what_stays_on_the_device_is_never_stale() {
+    let Some(mut kept) = renderer("resident") else { return };
+    let size = ["image.width=64", "image.height=48"];
+    // Each differs from the one before in what a renderer keeps: cells, α, mesh, size, lights, exponent.
+    let changes: [&[&str]; 8] = [
+        &[],
+        &["volume.seed=9"],
+        &["volume.seed=9", "volume.alpha=0.4"],
+        &["rocks.foot.seed=5"],
+        &["image.width=32", "image.height=32"],
+        &["light.p=7", "light.visibility=march"],
+        &["camera.fov=30", "lights.sun.direction=[1, 0.2, 0.1]"],
+        &[],
+    ];
+    for change in changes {
+        let sets = [&size[..], &["rocks.foot.levels=4"], change].concat();
+        let scene = scene("fig5", &sets);
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let mesh = scene.mesh();
+        let frame = |renderer: &mut GpuRenderer| {
+            renderer.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame")
+        };
+        // Twice: the second finds everything on the device.
+        let [first, again] = [frame(&mut kept), frame(&mut kept)];
+        let fresh = frame(&mut renderer("resident").expect("an adapter"));
+        for (name, other) in [("first", &first), ("again", &again)] {
+            assert!(fresh.radiance == other.radiance && fresh.picture == other.picture, "{change:?} {name}");
+            assert!(fresh.surface == other.surface && fresh.counts == other.counts, "{change:?} {name}");
+        }
+    }
 }

@@ -75,7 +75,7 @@ fn density_over_the_flow_cells_is_a_clamped_normal() {
 fn directions_are_unit_in_flow_cells_and_the_rest_is_empty() {
     let volume = build(&spec([30, 40, 20], 8));
     let mut empty = 0;
-    for cell in &volume.cells {
+    for cell in volume.cells.iter() {
         if cell.has_direction() {
             assert!((cell.v().length() - 1.0).abs() < 1e-6);
         } else {
@@ -235,7 +235,7 @@ fn another_base_of_k_d_changes_the_bits_of_k_d_only() {
     let b = build(&WaterSpec { k_d: 0.7, ..base });
     let k_d_bits = 0x00ff_0000;
     let mut changed = 0;
-    for (a, b) in a.cells.iter().zip(&b.cells) {
+    for (a, b) in a.cells.iter().zip(b.cells.iter()) {
         assert_eq!((a.x & !k_d_bits, a.y), (b.x & !k_d_bits, b.y));
         changed += usize::from(a != b);
     }
@@ -249,7 +249,7 @@ fn another_h_keeps_the_density_of_cells_that_stay_occupied() {
     rough.shape.h = 0.4;
     let (a, b) = (build(&base), build(&rough));
     let (mut both, mut moved) = (0, 0);
-    for (a, b) in a.cells.iter().zip(&b.cells) {
+    for (a, b) in a.cells.iter().zip(b.cells.iter()) {
         if a.has_direction() && b.has_direction() {
             assert_eq!(a.x, b.x, "ρ and k belong to the cell, not to its curves");
             both += 1;
