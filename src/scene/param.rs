@@ -62,6 +62,8 @@ pub struct Param {
     pub cost: Cost,
     /// What it is, in one sentence.
     pub doc: &'static str,
+    /// Where a slider runs, if that is not the whole of the allowed range.
+    pub slider: Option<(f64, f64)>,
 }
 
 /// Largest colour component.
@@ -77,7 +79,7 @@ const fn p(
     cost: Cost,
     doc: &'static str,
 ) -> Param {
-    Param { key, symbol, unit, kind, cost, doc }
+    Param { key, symbol, unit, kind, cost, doc, slider: None }
 }
 
 /// The table, in the order of the method.
@@ -89,8 +91,10 @@ pub const PARAMS: &[Param] = &[
         Int(1, 65536, 32),
         Volume,
         "Columns of the jitter grid of curve ends on the face y = 0, across the flow.",
-    ),
-    p("curves.deep", "", "", Int(1, 65536, 32), Volume, "Rows of the jitter grid, into the surface."),
+    )
+    .slider(1.0, 128.0),
+    p("curves.deep", "", "", Int(1, 65536, 32), Volume, "Rows of the jitter grid, into the surface.")
+        .slider(1.0, 128.0),
     p(
         "curves.h",
         "h",
@@ -98,7 +102,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 8.0, 0.9),
         Volume,
         "Complexity of the spatial fractal curves: small is rough, large is smooth.",
-    ),
+    )
+    .slider(0.0, 3.0),
     p(
         "curves.amplitude",
         "",
@@ -106,7 +111,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 1.0, 0.05),
         Volume,
         "Standard deviation of g as a fraction of the flow length ny.",
-    ),
+    )
+    .slider(0.0, 0.3),
     p(
         "curves.levels",
         "",
@@ -115,9 +121,10 @@ pub const PARAMS: &[Param] = &[
         Volume,
         "Depth of the recursion; 0: as deep as makes the leaf segments half a cell.",
     ),
-    p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume, "Cells across the flow."),
-    p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume, "Cells along the flow."),
-    p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface."),
+    p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume, "Cells across the flow.").slider(1.0, 256.0),
+    p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume, "Cells along the flow.").slider(1.0, 256.0),
+    p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface.")
+        .slider(1.0, 256.0),
     p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
     p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform, "Scale of the density ρ."),
     p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
@@ -145,7 +152,8 @@ pub const PARAMS: &[Param] = &[
         Float(1e-4, 1e4, 0.4),
         Uniform,
         "Depth of one volume under the face of the quads.",
-    ),
+    )
+    .slider(0.01, 10.0),
     p(
         "materials.*.repeat_u",
         "",
@@ -153,7 +161,8 @@ pub const PARAMS: &[Param] = &[
         Float(1e-3, 1e4, 1.0),
         Uniform,
         "Copies of the volume along u, across the flow.",
-    ),
+    )
+    .slider(0.1, 20.0),
     p(
         "materials.*.repeat_v",
         "",
@@ -161,7 +170,8 @@ pub const PARAMS: &[Param] = &[
         Float(1e-3, 1e4, 1.0),
         Uniform,
         "Copies of the volume along v, along the flow.",
-    ),
+    )
+    .slider(0.1, 20.0),
     p(
         "quads.*.corners",
         "A B C D",
@@ -186,7 +196,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 1e5, 10.0),
         Uniform,
         "Extinction at ρ = 1, for path-length attenuation.",
-    ),
+    )
+    .slider(0.0, 200.0),
     p(
         "trace.tau",
         "τ",
@@ -194,7 +205,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 1e3, 0.1),
         Uniform,
         "Optical depth of one cell at ρ = 1, for per-cell attenuation.",
-    ),
+    )
+    .slider(0.0, 2.0),
     p(
         "trace.max_cells",
         "",
@@ -202,7 +214,8 @@ pub const PARAMS: &[Param] = &[
         Int(1, 65536, 512),
         Uniform,
         "Most cells one view ray, and one light ray, may meet.",
-    ),
+    )
+    .slider(1.0, 2048.0),
     p(
         "trace.early_end",
         "",
@@ -234,7 +247,8 @@ pub const PARAMS: &[Param] = &[
         Float(1.0, 1e4, 20.0),
         Uniform,
         "Exponent of the specular term; whole numbers up to 255 are fastest.",
-    ),
+    )
+    .slider(1.0, 200.0),
     p(
         "light.ambient",
         "",
@@ -261,7 +275,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 1e9, 1.0),
         Uniform,
         "Factor on the colour; of a point light at a distance of 1 m, falling with its square.",
-    ),
+    )
+    .slider(0.0, 100.0),
     p(
         "rocks.*.corners",
         "",
@@ -277,7 +292,8 @@ pub const PARAMS: &[Param] = &[
         Int(0, super::rock::MAX_LEVELS as i64, 7),
         Upload,
         "Subdivisions: the mesh has 2^levels squares a side.",
-    ),
+    )
+    .slider(0.0, 9.0),
     p(
         "rocks.*.h",
         "",
@@ -285,7 +301,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 8.0, 0.9),
         Upload,
         "Roughness of the height field, as h of the curves.",
-    ),
+    )
+    .slider(0.0, 2.0),
     p(
         "rocks.*.amplitude",
         "",
@@ -293,7 +310,8 @@ pub const PARAMS: &[Param] = &[
         Float(0.0, 1e4, 0.5),
         Upload,
         "Standard deviation of the displacement at the first level.",
-    ),
+    )
+    .slider(0.0, 5.0),
     p(
         "rocks.*.bulge",
         "",
@@ -301,7 +319,8 @@ pub const PARAMS: &[Param] = &[
         Float(-1e4, 1e4, 0.0),
         Upload,
         "Height of the patch's middle over its border, before it is made rough.",
-    ),
+    )
+    .slider(-5.0, 5.0),
     p("rocks.*.seed", "", "", Int(0, i64::MAX, 1), Upload, "Seed of the rock."),
     p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload, "Mean albedo."),
     p(
@@ -316,7 +335,7 @@ pub const PARAMS: &[Param] = &[
     p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform, "Where the camera is."),
     p("camera.target", "", "m", Point([0.0, 0.0, 0.0]), Uniform, "The point in the middle of the image."),
     p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform, "Direction that is up in the image."),
-    p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform, "Vertical field of view."),
+    p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform, "Vertical field of view.").slider(5.0, 120.0),
     p(
         "camera.near",
         "",
@@ -324,7 +343,8 @@ pub const PARAMS: &[Param] = &[
         Float(1e-4, 1e4, 0.01),
         Uniform,
         "Geometry nearer than this, along the view axis, is cut off.",
-    ),
+    )
+    .slider(0.001, 10.0),
     p(
         "background.zenith",
         "",
@@ -341,8 +361,10 @@ pub const PARAMS: &[Param] = &[
         Uniform,
         "Radiance of the background at and below the horizon.",
     ),
-    p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform, "Width of the picture."),
-    p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform, "Height of the picture."),
+    p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform, "Width of the picture.")
+        .slider(16.0, 8192.0),
+    p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform, "Height of the picture.")
+        .slider(16.0, 8192.0),
     p(
         "image.samples",
         "",
@@ -350,7 +372,8 @@ pub const PARAMS: &[Param] = &[
         Int(1, 4096, 1),
         Uniform,
         "Jittered samples a pixel; 1 is the pixel's centre.",
-    ),
+    )
+    .slider(1.0, 256.0),
     p(
         "image.exposure",
         "",
@@ -358,7 +381,8 @@ pub const PARAMS: &[Param] = &[
         Float(-32.0, 32.0, 0.0),
         Uniform,
         "Factor 2^exposure on the radiance, in the PNG only.",
-    ),
+    )
+    .slider(-8.0, 8.0),
     p(
         "image.tone",
         "",
@@ -403,6 +427,10 @@ pub fn nearest(key: &str) -> Option<String> {
 }
 
 impl Param {
+    const fn slider(self, low: f64, high: f64) -> Self {
+        Param { slider: Some((low, high)), ..self }
+    }
+
     /// The entry a concrete key such as `lights.sun.color` belongs to.
     pub fn find(key: &str) -> Option<&'static Param> {
         PARAMS.iter().find(|param| matches(param.key, key))

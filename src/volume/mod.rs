@@ -6,7 +6,7 @@ mod water;
 
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
-pub use water::{WaterSpec, build_water};
+pub use water::{WaterSpec, build_water, set_density_and_reflection};
 
 use std::sync::Arc;
 
