@@ -6,7 +6,7 @@ mod water;
 
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
-pub use water::{WaterSpec, build_water, set_density_and_reflection};
+pub use water::{WaterSpec, build_water, curve_points, set_density_and_reflection};
 
 use std::sync::Arc;
 
@@ -40,6 +40,21 @@ impl VolumeTexture {
         hasher.finalize()
     }
 
+    /// How ρ is spread over the flow cells, with `bins` equal steps between 0 and α. At least one step
+    /// is made.
+    pub fn rho_histogram(&self, bins: usize) -> RhoHistogram {
+        let bins = bins.max(1);
+        let mut h = RhoHistogram { at_zero: 0, between: vec![0; bins], at_alpha: 0 };
+        for cell in self.cells.iter().filter(|c| c.has_direction()) {
+            match cell.rho_code() as usize {
+                0 => h.at_zero += 1,
+                0xffff => h.at_alpha += 1,
+                code => h.between[(code - 1) * bins / 0xfffe] += 1,
+            }
+        }
+        h
+    }
+
     /// What `taki volume info` prints.
     pub fn statistics(&self) -> Statistics {
         let mut s = Statistics { size: self.size, alpha: self.alpha, ..Default::default() };
@@ -69,6 +84,24 @@ impl VolumeTexture {
             s.v_mean = (v / n).to_array();
         }
         s
+    }
+}
+
+/// Flow cells counted by their ρ. A built volume clamps ρ, so its two ends are values of their own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RhoHistogram {
+    /// Cells with ρ = 0.
+    pub at_zero: u64,
+    /// Cells with 0 < ρ < α, in equal steps of ρ.
+    pub between: Vec<u64>,
+    /// Cells with ρ = α.
+    pub at_alpha: u64,
+}
+
+impl RhoHistogram {
+    /// All flow cells.
+    pub fn total(&self) -> u64 {
+        self.at_zero + self.between.iter().sum::<u64>() + self.at_alpha
     }
 }
 

@@ -93,18 +93,28 @@ fn flow_directions(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Vec<Vec3>>
     Ok(directions)
 }
 
+/// Writes the points of curve number `curve` of the jitter grid (column + row·across) into `points`, in
+/// cells, unwrapped: just the curve the volume is built from.
+///
+/// The curve is drawn level by level, so a spec with fewer `shape.levels` gives every
+/// 2^(difference)-th point of the same curve.
+pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
+    let [nx, ny, nz] = spec.size.map(|n| n as f32);
+    let mut rng = Family::new(spec.seed, Stream::Curve).member(curve as u64);
+    let column = (curve % spec.across as usize) as f32;
+    let row = (curve / spec.across as usize) as f32;
+    let x = (column + rng.random::<f32>()) / spec.across as f32 * nx;
+    let z = (row + rng.random::<f32>()) / spec.deep as f32 * nz;
+    let p1 = Vec3::new(x, 0.0, z);
+    let p2 = Vec3::new(x, ny, z);
+    spatial_fractal_curve(&spec.shape, p1, p2, &mut rng, points);
+}
+
 /// Builds curve number `curve` of the jitter grid and reports each cell it passes; parts of
 /// neighbouring segments inside one cell come as one. x and y wrap; what leaves in z is dropped.
 fn walk_curve(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>, report: &mut impl FnMut(IVec3, Vec3)) {
     let size = IVec3::from_array(spec.size.map(|n| n as i32));
-    let mut rng = Family::new(spec.seed, Stream::Curve).member(curve as u64);
-    let column = (curve % spec.across as usize) as f32;
-    let row = (curve / spec.across as usize) as f32;
-    let x = (column + rng.random::<f32>()) / spec.across as f32 * size.x as f32;
-    let z = (row + rng.random::<f32>()) / spec.deep as f32 * size.z as f32;
-    let p1 = Vec3::new(x, 0.0, z);
-    let p2 = Vec3::new(x, size.y as f32, z);
-    spatial_fractal_curve(&spec.shape, p1, p2, &mut rng, points);
+    curve_points(spec, curve, points);
     let mut open: Option<(IVec3, Vec3)> = None;
     let mut add = |cell: IVec3, part: Vec3| match &mut open {
         Some((last, sum)) if *last == cell => *sum += part,

@@ -8,6 +8,7 @@ mod compare;
 mod curve;
 mod faults;
 mod gpu;
+mod looking;
 mod mapping;
 mod presets;
 mod readme;

@@ -1,0 +1,285 @@
+//! The spatial fractal curves the volume is built from, as lines in the volume's box: what h, amplitude
+//! and levels do to them.
+
+mod view;
+
+use std::ops::Range;
+
+use eframe::egui::{self, Color32, Pos2, Sense, Stroke, Vec2};
+use glam::Vec3;
+
+use super::layer_image::heat;
+use super::volume_panel::axis_colour;
+use crate::volume::{WaterSpec, curve_points};
+use view::{View, Window};
+
+/// Segments of all curves together: some milliseconds of tessellation.
+const MAX_SEGMENTS: usize = 20_000;
+/// Segments drawn as one polyline, in one shade.
+const RUN: usize = 8;
+const MAX_CURVES: usize = 200;
+/// Curves whose levels are shown: more would hide one another.
+const MAX_LEVEL_CURVES: usize = 4;
+
+/// The curves' panel: the view, what is shown, and the points of the curves shown.
+pub struct CurvesPanel {
+    view: View,
+    count: usize,
+    show_levels: bool,
+    level: u32,
+    points: Option<Points>,
+}
+
+/// Points of some curves, in cells, each with 2^levels segments.
+struct Points {
+    spec: WaterSpec,
+    count: usize,
+    levels: u32,
+    curves: Vec<Vec<Vec3>>,
+}
+
+impl Default for CurvesPanel {
+    fn default() -> Self {
+        CurvesPanel { view: View::default(), count: 24, show_levels: false, level: 2, points: None }
+    }
+}
+
+impl CurvesPanel {
+    /// Shows the curves of `spec`.
+    pub fn show(&mut self, ui: &mut egui::Ui, spec: &WaterSpec) {
+        self.take(spec);
+        self.canvas(ui, spec);
+        ui.add_space(4.0);
+        self.controls(ui, spec);
+        if self.show_levels {
+            self.level_words(ui, spec);
+        }
+        let scales: Vec<String> =
+            (1..=spec.shape.levels.min(5)).map(|n| format!("{:.2}", spec.shape.scale(n))).collect();
+        let more = if spec.shape.levels > 5 { ", …" } else { "" };
+        ui.label(format!("S(n) = 2^(−n·h), h = {:.2}:  {}{more}", spec.shape.h, scales.join(", ")))
+            .on_hover_text(
+                "The scale of the displacement at levels 1, 2, 3, …: small h is rough, large h is smooth",
+            );
+    }
+
+    fn take(&mut self, spec: &WaterSpec) {
+        let all = spec.across as usize * spec.deep as usize;
+        let count = self.count.min(all).max(1);
+        let known = |p: &Points| p.spec == *spec && p.count == count;
+        if !self.points.as_ref().is_some_and(known) {
+            self.points = Some(Points::new(spec, count));
+        }
+    }
+
+    fn canvas(&mut self, ui: &mut egui::Ui, spec: &WaterSpec) {
+        let width = ui.available_width();
+        let size = Vec2::new(width, (0.95 * width).clamp(200.0, 460.0));
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Spatial fractal curves"));
+        self.view.steer(ui, &response);
+        if !ui.is_rect_visible(rect) {
+            return;
+        }
+        let visuals = ui.visuals();
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 4.0, visuals.extreme_bg_color);
+        let window = Window::new(&self.view, rect, Vec3::from_array(spec.size.map(|n| n as f32)));
+        let ink =
+            Ink { dark: visuals.dark_mode, text: visuals.text_color(), weak: visuals.weak_text_color() };
+        let edge = Stroke::new(1.0, ink.weak.gamma_multiply(0.7));
+        let (behind, before) = window.edges();
+        for ends in behind {
+            painter.line_segment(ends, Stroke::new(1.0, ink.weak.gamma_multiply(0.4)));
+        }
+        if let Some(points) = &self.points {
+            let faint = if self.show_levels { 0.3 } else { 1.0 };
+            draw_curves(&painter, &window, points, &ink, faint);
+            if self.show_levels {
+                draw_levels(&painter, &window, points, &ink, self.level.min(points.levels));
+            }
+        }
+        for ends in before {
+            painter.line_segment(ends, edge);
+        }
+        draw_axes(&painter, &window, spec, &ink);
+        let hint = "drag turns · scroll zooms · double click resets";
+        let at = rect.center_bottom() - Vec2::new(0.0, 6.0);
+        painter.text(at, egui::Align2::CENTER_BOTTOM, hint, egui::FontId::proportional(11.0), ink.weak);
+        response.on_hover_cursor(egui::CursorIcon::Grab);
+    }
+
+    fn controls(&mut self, ui: &mut egui::Ui, spec: &WaterSpec) {
+        let all = spec.across as usize * spec.deep as usize;
+        ui.spacing_mut().slider_width = (ui.available_width() - 170.0).clamp(60.0, 300.0);
+        let range = 1..=all.clamp(1, MAX_CURVES);
+        ui.add(egui::Slider::new(&mut self.count, range).text("Curves shown"))
+            .on_hover_text(format!("Of {all} in the volume, spread evenly over their grid"));
+        let levels = self.points.as_ref().map_or(0, |p| p.levels);
+        ui.checkbox(&mut self.show_levels, "Show levels")
+            .on_hover_text("The recursion: every level displaces the midpoints of the level before");
+        if self.show_levels {
+            let slider = egui::Slider::new(&mut self.level, 0..=levels).text("Level");
+            ui.add(slider);
+        }
+    }
+
+    fn level_words(&self, ui: &mut egui::Ui, spec: &WaterSpec) {
+        let n = self.level.min(spec.shape.levels);
+        let segments = 1u32 << n.min(31);
+        let text = if n == 0 {
+            "Level 0: the straight line from y = 0 to its twin".into()
+        } else {
+            let sigma = spec.shape.sigma_g_cells * spec.shape.scale(n);
+            format!("Level {n}: {segments} segments, midpoints moved by {sigma:.2} cells (σ)")
+        };
+        ui.label(text);
+    }
+}
+
+impl Points {
+    fn new(spec: &WaterSpec, count: usize) -> Self {
+        let most = (MAX_SEGMENTS / count.max(1)).max(1).ilog2();
+        let levels = spec.shape.levels.min(most);
+        // Fewer levels give points of the same curves.
+        let mut coarse = *spec;
+        coarse.shape.levels = levels;
+        let curve = |curve: usize| {
+            let mut points = Vec::new();
+            curve_points(&coarse, curve, &mut points);
+            points
+        };
+        let curves = spread(spec.across, spec.deep, count).into_iter().map(curve).collect();
+        Points { spec: *spec, count, levels, curves }
+    }
+}
+
+/// Numbers of `count` curves spread evenly over the jitter grid.
+fn spread(across: u32, deep: u32, count: usize) -> Vec<usize> {
+    let all = across as usize * deep as usize;
+    if count >= all {
+        return (0..all).collect();
+    }
+    let mut chosen = std::collections::BTreeSet::new();
+    // Roberts' R2 sequence: its points keep their distance from one another for any count.
+    let mut i = 0u32;
+    while chosen.len() < count && i < 64 * MAX_CURVES as u32 {
+        let place = |step: f64, n: u32| ((0.5 + step * i as f64).fract() * n as f64) as usize % n as usize;
+        let (column, row) = (place(0.754_877_666_25, across), place(0.569_840_290_998, deep));
+        chosen.insert(row * across as usize + column);
+        i += 1;
+    }
+    chosen.into_iter().collect()
+}
+
+/// Colours of the theme.
+struct Ink {
+    dark: bool,
+    text: Color32,
+    weak: Color32,
+}
+
+impl Ink {
+    /// Shade of a line at `depth`, 0 far to 1 near.
+    fn shade(&self, depth: f32) -> Color32 {
+        let (far, near) = if self.dark {
+            (Color32::from_rgb(38, 66, 92), Color32::from_rgb(168, 226, 255))
+        } else {
+            (Color32::from_rgb(176, 203, 224), Color32::from_rgb(6, 58, 112))
+        };
+        far.lerp_to_gamma(near, depth.clamp(0.0, 1.0))
+    }
+
+    /// Level `n` of `levels`: other hues than the curves'.
+    fn level(&self, n: u32, levels: u32) -> Color32 {
+        let t = n as f32 / levels.max(1) as f32;
+        // Light levels on dark, dark on light.
+        let [r, g, b] = heat(if self.dark { 0.45 + 0.5 * t } else { 0.25 + 0.4 * t });
+        Color32::from_rgb(r, g, b)
+    }
+}
+
+/// The curves, far ones first. What lies beyond the volume in z is dropped there, and faint here.
+fn draw_curves(painter: &egui::Painter, window: &Window, points: &Points, ink: &Ink, faint: f32) {
+    let nz = points.spec.size[2] as f32;
+    let outside = |p: Vec3| p.z < 0.0 || p.z > nz;
+    let mut runs: Vec<(f32, Vec<Pos2>, Color32)> = Vec::new();
+    for curve in &points.curves {
+        let mut start = 0;
+        while start + 1 < curve.len() {
+            let run = run_from(curve, start, outside);
+            let seen: Vec<(Pos2, f32)> = curve[run.start..=run.end].iter().map(|&p| window.see(p)).collect();
+            let depth = seen.iter().map(|s| s.1).sum::<f32>() / seen.len() as f32;
+            let fade = if outside(curve[start]) { 0.3 } else { 1.0 };
+            let colour = ink.shade(depth).gamma_multiply(faint * fade);
+            start = run.end;
+            runs.push((depth, seen.into_iter().map(|s| s.0).collect(), colour));
+        }
+    }
+    runs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    for (depth, line, colour) in runs {
+        painter.line(line, Stroke::new(0.8 + 0.7 * depth.clamp(0.0, 1.0), colour));
+    }
+}
+
+/// The segments from point `start` that are drawn in one: at most [`RUN`], all inside or all outside.
+fn run_from(curve: &[Vec3], start: usize, outside: impl Fn(Vec3) -> bool) -> Range<usize> {
+    let last = (start + RUN).min(curve.len() - 1);
+    let is_outside = outside(curve[start]);
+    let end = (start + 1..=last).find(|&i| outside(curve[i]) != is_outside).unwrap_or(last);
+    start..end
+}
+
+/// Levels 0 to `level` of a few curves, the coarser the fainter, with the midpoints `level` displaced.
+fn draw_levels(painter: &egui::Painter, window: &Window, points: &Points, ink: &Ink, level: u32) {
+    let shown = points.curves.len().min(MAX_LEVEL_CURVES);
+    for i in 0..shown {
+        let curve = &points.curves[(2 * i + 1) * points.curves.len() / (2 * shown)];
+        for n in 0..=level {
+            let stride = 1usize << (points.levels - n);
+            let line: Vec<Pos2> = curve.iter().step_by(stride).map(|&p| window.see(p).0).collect();
+            let age = (level - n) as f32;
+            let colour = ink.level(n, points.levels).gamma_multiply(0.75f32.powf(age).max(0.25));
+            let width = if n == level { 2.2 } else { 1.3 };
+            // Dots as dense as the line say nothing.
+            if n == level && line.len() <= 65 {
+                let moved = if n == 0 { 0 } else { 1 };
+                for at in line.iter().skip(moved).step_by(1 + moved) {
+                    painter.circle_filled(*at, 3.2, colour);
+                }
+            }
+            painter.line(line, Stroke::new(width, colour));
+        }
+    }
+}
+
+/// The axes from the corner where x, y and z are 0, each with its cells, and the flow's direction.
+fn draw_axes(painter: &egui::Painter, window: &Window, spec: &WaterSpec, ink: &Ink) {
+    let size = Vec3::from_array(spec.size.map(|n| n as f32));
+    let font = egui::FontId::proportional(13.0);
+    let write = |at: Pos2, text: String, colour: Color32| {
+        painter.text(at, egui::Align2::CENTER_CENTER, text, font.clone(), colour);
+    };
+    let origin = window.see(Vec3::ZERO).0;
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let mut end = Vec3::ZERO;
+        end[axis] = size[axis];
+        let tip = window.see(end).0;
+        let colour = axis_colour(axis, ink.dark);
+        painter.line_segment([origin, tip], Stroke::new(2.0, colour));
+        let along = (tip - origin).normalized();
+        write(tip + along * 20.0, format!("{name} {}", spec.size[axis]), colour);
+    }
+    // Beside the y axis, away from the box's middle.
+    let middle = window.see(size * 0.5).0;
+    let start = window.see(Vec3::new(0.0, size.y * 0.3, 0.0)).0;
+    let end = window.see(Vec3::new(0.0, size.y * 0.7, 0.0)).0;
+    let along = (end - start).normalized();
+    let mut aside = along.rot90();
+    if aside.dot(start - middle) < 0.0 {
+        aside = -aside;
+    }
+    let (start, end) = (start + aside * 16.0, end + aside * 16.0);
+    painter.arrow(start, end - start, Stroke::new(2.0, ink.text));
+    write(start + (end - start) * 0.5 + aside * 20.0, "flow".into(), ink.text);
+}

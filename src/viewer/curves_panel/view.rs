@@ -1,0 +1,100 @@
+//! Looking at the volume's box from a circle around it.
+
+use eframe::egui::{self, Pos2, Rect};
+use glam::Vec3;
+
+/// Distance of the eye from the box's middle, in radii of the sphere around the box: near enough to tell
+/// near from far.
+const DISTANCE: f32 = 3.2;
+/// How much of the canvas that sphere fills; labels need the rest.
+const FILL: f32 = 0.92;
+
+/// Where the box is seen from: x to the right, y (the flow) down and z away when all is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct View {
+    /// Radians about the vertical.
+    yaw: f32,
+    /// Radians, positive from above.
+    pitch: f32,
+    zoom: f32,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        View { yaw: 0.55, pitch: 0.32, zoom: 1.0 }
+    }
+}
+
+impl View {
+    /// Drag turns, scroll and pinch zoom, a double click resets.
+    pub(super) fn steer(&mut self, ui: &egui::Ui, response: &egui::Response) {
+        if response.dragged() {
+            let by = response.drag_delta();
+            self.yaw += by.x * 0.01;
+            self.pitch = (self.pitch + by.y * 0.01).clamp(-1.5, 1.5);
+        }
+        if response.hovered() {
+            let pinch = ui.input(|i| i.zoom_delta());
+            // Taken, or a panel around the canvas would scroll as well.
+            let scroll = ui.input_mut(|i| std::mem::take(&mut i.smooth_scroll_delta));
+            self.zoom = (self.zoom * pinch * (scroll.y * 0.004).exp()).clamp(0.4, 12.0);
+        }
+        if response.double_clicked() {
+            *self = View::default();
+        }
+    }
+}
+
+/// A view of a box of cells in a rectangle of the screen.
+pub(super) struct Window {
+    centre: Pos2,
+    points: f32,
+    size: Vec3,
+    right: Vec3,
+    up: Vec3,
+    to_eye: Vec3,
+}
+
+impl Window {
+    /// `size` in cells.
+    pub(super) fn new(view: &View, rect: Rect, size: Vec3) -> Self {
+        let (sin_yaw, cos_yaw) = view.yaw.sin_cos();
+        let (sin_pitch, cos_pitch) = view.pitch.sin_cos();
+        // In cells: y points down, z away.
+        let right = Vec3::new(cos_yaw, 0.0, -sin_yaw);
+        let to_eye = Vec3::new(-sin_yaw * cos_pitch, -sin_pitch, -cos_yaw * cos_pitch);
+        let up = Vec3::new(sin_yaw * sin_pitch, -cos_pitch, cos_yaw * sin_pitch);
+        // The sphere's outline seen in perspective has radius 1/√(DISTANCE² − 1).
+        let fit = (DISTANCE * DISTANCE - 1.0).sqrt();
+        let points = 0.5 * rect.width().min(rect.height()) * FILL * fit * view.zoom;
+        Window { centre: rect.center(), points, size, right, up, to_eye }
+    }
+
+    /// Where a point in cells is on the screen, and how near: 0 at the back of the box, 1 at the front.
+    pub(super) fn see(&self, p_cell: Vec3) -> (Pos2, f32) {
+        let q = (p_cell - self.size * 0.5) / (0.5 * self.size.length());
+        let near = q.dot(self.to_eye);
+        // A curve far outside the box must not come behind the eye.
+        let scale = self.points / (DISTANCE - near).max(0.3);
+        let at = egui::vec2(q.dot(self.right), -q.dot(self.up)) * scale;
+        (self.centre + at, 0.5 + 0.62 * near)
+    }
+
+    /// The box's twelve edges on the screen: those that meet in its farthest corner, and the others.
+    pub(super) fn edges(&self) -> (Vec<[Pos2; 2]>, Vec<[Pos2; 2]>) {
+        let far = Vec3::select(self.to_eye.cmplt(Vec3::ZERO), self.size, Vec3::ZERO);
+        let (mut behind, mut before) = (Vec::new(), Vec::new());
+        for axis in 0..3 {
+            for corner in 0..4 {
+                let mut a = Vec3::ZERO;
+                a[(axis + 1) % 3] = (corner % 2) as f32 * self.size[(axis + 1) % 3];
+                a[(axis + 2) % 3] = (corner / 2) as f32 * self.size[(axis + 2) % 3];
+                let mut b = a;
+                b[axis] = self.size[axis];
+                let ends = [a, b].map(|p| self.see(p).0);
+                if a == far || b == far { behind.push(ends) } else { before.push(ends) }
+            }
+        }
+        (behind, before)
+    }
+}
