@@ -120,6 +120,14 @@ pub const PARAMS: &[Param] = &[
     p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface."),
     p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
     p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform, "Scale of the density ρ."),
+    p(
+        "volume.flow",
+        "",
+        "lengths",
+        Float(-1e6, 1e6, 0.0),
+        Uniform,
+        "Moves the volume down the flow by this many of its lengths; every whole number gives the same picture.",
+    ),
     p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
     p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload, "Base of the specular reflection coefficient."),
     p(
