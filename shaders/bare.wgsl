@@ -25,7 +25,7 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let d = view_in_plane(quad, seen_side(quad, d_world), d_world);
     let d_cell = cell_from_plane(cell_frame(quad, hit.xy, frame.cells), d);
-    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells), d_cell);
+    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
     var sum = 0u;
     var n = 0u;
     var done = false;

@@ -35,8 +35,9 @@ struct Frame {
     window_y: u32,
     window_width: u32,
     window_height: u32,
-    pad_0: u32,
-    pad_1: u32,
+    // How far the volume has moved down the flow, in cells: 0 to ny.
+    flow_cells: f32,
+    pad: u32,
 }
 
 struct Light {

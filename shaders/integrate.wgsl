@@ -145,7 +145,7 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
     }
 
     var ray: Ray;
-    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells), d_cell);
+    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
     ray.transmittance = 1.0;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {

@@ -43,9 +43,9 @@ fn view_in_plane(quad: Quad, side: f32, d_world: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(d.xy, min(d.z, -1e-6));
 }
 
-// Where on the face z = 0 the walk begins, inside the tile.
-fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>) -> vec3<f32> {
+// Where on the face z = 0 the walk begins, inside the tile: the volume has moved by `flow_cells` along y.
+fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> vec3<f32> {
     let cells = vec2<f32>(size.xy);
-    let xy = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) * cells;
+    let xy = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) * cells - vec2<f32>(0.0, flow_cells);
     return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
 }

@@ -4,7 +4,7 @@ use glam::{IVec3, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
 use crate::camera::sample_offset;
-use crate::gpu::layout::extinction;
+use crate::gpu::layout::{extinction, flow_cells};
 use crate::mapping::CellFrame;
 use crate::scene::{AngleFrame, Attenuation, Scene, Visibility};
 use crate::shading::{Metric, fibre_angles, specular_power};
@@ -18,6 +18,7 @@ pub struct Integrator<'a> {
     cells: &'a [Cell],
     size: IVec3,
     extinction: f32,
+    flow_cells: f32,
     per_cell: bool,
 }
 
@@ -52,6 +53,7 @@ impl<'a> Integrator<'a> {
             cells: &volume.cells,
             size: IVec3::from_array(volume.size.map(|n| n as i32)),
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
+            flow_cells: flow_cells(scene.flow, volume.size[1]),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
         }
     }
@@ -119,7 +121,8 @@ impl<'a> Integrator<'a> {
             .collect();
 
         let x = hit[0] * quad.material.repeat_u * cells.x;
-        let y = hit[1] * quad.material.repeat_v * cells.y;
+        // Where the volume has moved down, what is met lies further up in it.
+        let y = hit[1] * quad.material.repeat_v * cells.y - self.flow_cells;
         let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
         let mut transmittance = 1.0f32;
         let mut walked = [0u32; 2];

@@ -58,8 +58,8 @@ pub struct Frame {
     pub window_y: u32,
     pub window_width: u32,
     pub window_height: u32,
-    pub pad_0: u32,
-    pub pad_1: u32,
+    pub flow_cells: f32,
+    pub pad: u32,
 }
 
 /// One light.
@@ -147,8 +147,8 @@ impl Frame {
             window_y: window.y,
             window_width: window.width,
             window_height: window.height,
-            pad_0: 0,
-            pad_1: 0,
+            flow_cells: flow_cells(scene.flow, size[1]),
+            pad: 0,
         }
     }
 }
@@ -161,6 +161,12 @@ pub fn extinction(attenuation: &Attenuation, alpha: f32) -> f32 {
         Attenuation::PerCell { tau } => tau,
     };
     (per_rho as f64 * alpha as f64 / 65535.0 * std::f64::consts::LOG2_E) as f32
+}
+
+/// How far `flow` lengths of the volume move its `ny` cells, without the whole lengths: they change
+/// nothing, for copies of the volume join along y. In float64, so that whole numbers give exactly 0.
+pub fn flow_cells(flow: f32, ny: u32) -> f32 {
+    ((flow as f64).rem_euclid(1.0) * ny as f64) as f32
 }
 
 /// The scene's lights, padded to the buffer's length.

@@ -37,6 +37,8 @@ pub struct Scene {
     pub water: WaterSpec,
     /// The `.npz` to take the volume from, resolved and inside the allowed folders.
     pub volume_file: Option<PathBuf>,
+    /// How far the volume has moved down the flow, in lengths of the volume.
+    pub flow: f32,
     /// The volume's quads.
     pub quads: Vec<Quad>,
     /// The lights, those without intensity left out.
@@ -274,6 +276,7 @@ impl Scene {
             name: name.into(),
             water,
             volume_file,
+            flow: v.float("volume.flow"),
             quads: parts::quads(v)?,
             lights: parts::lights(v)?,
             ambient: v.triple("light.ambient"),

@@ -127,6 +127,14 @@ pub const PARAMS: &[Param] = &[
         .slider(1.0, 256.0),
     p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
     p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform, "Scale of the density ρ."),
+    p(
+        "volume.flow",
+        "",
+        "lengths",
+        Float(-1e6, 1e6, 0.0),
+        Uniform,
+        "Moves the volume down the flow by this many of its lengths; every whole number gives the same picture.",
+    ),
     p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
     p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload, "Base of the specular reflection coefficient."),
     p(

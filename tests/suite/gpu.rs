@@ -93,7 +93,7 @@ fn the_engines_agree_on_the_papers_figures() {
 fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
     let Some(mut renderer) = renderer("variants") else { return };
     let small = ["image.width=96", "image.height=80", "curves.across=12", "curves.deep=12"];
-    let variants: [&[&str]; 8] = [
+    let variants: [&[&str]; 9] = [
         &["light.visibility=march"],
         &["trace.attenuation=per-cell", "trace.tau=0.3"],
         &["trace.attenuation=per-cell", "light.visibility=march", "light.frame=texture"],
@@ -102,6 +102,7 @@ fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
         &["lights.key.kind=point", "lights.key.position=[0.4,0.5,1.5]", "light.visibility=march"],
         &["lights.key.intensity=0", "trace.early_end=0.2"],
         &["materials.water.repeat_u=2.5", "materials.water.repeat_v=0.6", "camera.eye=[1.5,-1.0,1.2]"],
+        &["volume.flow=0.3", "materials.water.repeat_v=0.6", "light.visibility=march"],
     ];
     for variant in variants {
         let sets: Vec<&str> = small.iter().chain(variant).copied().collect();

@@ -7,6 +7,7 @@ mod closed_forms;
 mod compare;
 mod curve;
 mod faults;
+mod flow;
 mod gpu;
 mod looking;
 mod mapping;
