@@ -6,6 +6,8 @@ mod devices;
 mod render;
 mod scene;
 mod terminal;
+#[cfg(feature = "viewer")]
+mod view;
 mod volume;
 
 use std::path::PathBuf;
@@ -36,6 +38,9 @@ struct Cli {
 enum Command {
     /// Renders one image.
     Render(render::RenderArgs),
+    /// Opens the viewer: turn the parameters and see the picture change.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArgs),
     /// Checks a scene and prints it fully resolved.
     Scene(scene::SceneArgs),
     /// Builds a volume texture or prints its statistics.
@@ -164,6 +169,8 @@ pub fn main() -> ExitCode {
 fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
     match cli.command {
         Command::Render(args) => render::run(&args, terminal),
+        #[cfg(feature = "viewer")]
+        Command::View(args) => view::run(&args),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Bench(args) => bench::run(&args, terminal),

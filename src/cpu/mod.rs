@@ -3,6 +3,7 @@
 
 pub mod gbuffer;
 pub mod integrate;
+pub mod ray;
 pub mod resolve;
 
 use std::ops::Range;

@@ -147,7 +147,7 @@ impl Frame {
             window_y: window.y,
             window_width: window.width,
             window_height: window.height,
-            flow_cells: flow_cells(scene.flow, size[1]),
+            flow_cells: flow_cells(scene.flow, volume.size[1]),
             pad: 0,
         }
     }

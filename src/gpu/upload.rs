@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::device::Gpu;
 use super::layout::{self, Quad};
 use crate::error::{Error, Result};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, Vertex};
 use crate::volume::{Cell, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
@@ -16,7 +16,9 @@ const SLAB_BYTES: usize = 64 << 20;
 #[derive(Default)]
 pub struct Resident {
     volume: Option<(Arc<Vec<Cell>>, [u32; 3], wgpu::TextureView)>,
-    mesh: Option<(Mesh, wgpu::Buffer, wgpu::Buffer)>,
+    vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
+    /// Of these vertices; previews have fewer triangles than pictures.
+    indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer)>,
 }
 
 /// Everything of a scene that does not change from sample to sample.
@@ -91,17 +93,27 @@ impl Resident {
 
     /// Vertices and indices.
     fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> (wgpu::Buffer, wgpu::Buffer) {
-        if let Some((old, vertices, indices)) = &self.mesh
-            && Arc::ptr_eq(&old.vertices, &mesh.vertices)
-            && Arc::ptr_eq(&old.indices, &mesh.indices)
-        {
-            return (vertices.clone(), indices.clone());
-        }
-        let (of_vertices, of_indices) =
-            (bytemuck::cast_slice(&mesh.vertices), bytemuck::cast_slice(&mesh.indices));
-        let vertices = gpu.buffer_with("vertices", of_vertices, wgpu::BufferUsages::VERTEX);
-        let indices = gpu.buffer_with("indices", of_indices, wgpu::BufferUsages::INDEX);
-        self.mesh = Some((mesh.clone(), vertices.clone(), indices.clone()));
+        let vertices = match &self.vertices {
+            Some((old, buffer)) if Arc::ptr_eq(old, &mesh.vertices) => buffer.clone(),
+            _ => {
+                self.indices.clear();
+                let bytes = bytemuck::cast_slice(&mesh.vertices);
+                let buffer = gpu.buffer_with("vertices", bytes, wgpu::BufferUsages::VERTEX);
+                self.vertices = Some((mesh.vertices.clone(), buffer.clone()));
+                buffer
+            }
+        };
+        let known = self.indices.iter().find(|(old, _)| Arc::ptr_eq(old, &mesh.indices));
+        let indices = match known {
+            Some((_, buffer)) => buffer.clone(),
+            None => {
+                let bytes = bytemuck::cast_slice(&mesh.indices);
+                let buffer = gpu.buffer_with("indices", bytes, wgpu::BufferUsages::INDEX);
+                self.indices.truncate(1);
+                self.indices.push((mesh.indices.clone(), buffer.clone()));
+                buffer
+            }
+        };
         (vertices, indices)
     }
 }

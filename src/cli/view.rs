@@ -1,0 +1,47 @@
+//! `taki view`: the viewer.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::terminal::say;
+use super::{EngineOptions, SceneOptions, seconds};
+use crate::error::Result;
+use crate::viewer::{self, Options, settings::Settings};
+
+#[derive(Args)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    engine: EngineOptions,
+    /// Closes the window after this many seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    exit_after: Option<f64>,
+    /// Writes the window's picture to this PNG before --exit-after closes it.
+    #[arg(long, value_name = "FILE", requires = "exit_after")]
+    screenshot: Option<PathBuf>,
+    /// At the end prints how quickly the viewer answered, as one JSON object on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &ViewArgs) -> Result<()> {
+    let mut sets = args.scene.sets.clone();
+    sets.extend(args.scene.seed.map(|n| format!("volume.seed={n}")));
+    let report = viewer::run(Options {
+        scene: args.scene.scene.clone(),
+        sets,
+        limits: args.scene.limits(),
+        engine: args.engine.engine,
+        device: args.engine.device(),
+        settings: Settings::place(),
+        exit_after: args.exit_after.map(Duration::from_secs_f64),
+        screenshot: args.screenshot.clone(),
+    })?;
+    if args.json {
+        say(&serde_json::json!(report).to_string());
+    }
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! The presets as small pictures, rendered when the gallery is first opened.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, channel};
+
+use eframe::egui;
+
+use super::parameters::name;
+use crate::cpu;
+use crate::job::Unwatched;
+use crate::scene::{Limits, Scene, presets};
+
+const WIDTH: u32 = 192;
+const HEIGHT: u32 = 108;
+
+/// The gallery window.
+#[derive(Default)]
+pub struct Gallery {
+    /// Whether it is shown.
+    pub open: bool,
+    pictures: HashMap<&'static str, egui::TextureHandle>,
+    coming: Option<Receiver<(&'static str, egui::ColorImage)>>,
+}
+
+impl Gallery {
+    /// Shows the window; the preset that was chosen.
+    pub fn show(&mut self, ctx: &egui::Context) -> Option<&'static str> {
+        if !self.open {
+            return None;
+        }
+        self.receive(ctx);
+        let mut chosen = None;
+        let mut open = self.open;
+        egui::Window::new("Scenes").open(&mut open).resizable(false).collapsible(false).show(ctx, |ui| {
+            egui::Grid::new("gallery").num_columns(2).spacing([12.0, 12.0]).show(ui, |ui| {
+                for (i, (preset, what)) in presets().enumerate() {
+                    ui.vertical(|ui| {
+                        ui.set_width(WIDTH as f32);
+                        let size = egui::vec2(WIDTH as f32, HEIGHT as f32);
+                        let response = match self.pictures.get(preset) {
+                            Some(texture) => {
+                                ui.add_sized(size, egui::Button::image((texture.id(), size)).frame(false))
+                            }
+                            None => ui.add_sized(size, egui::Button::new("…")),
+                        };
+                        name(&response, &format!("Open {preset}"));
+                        let response = response.on_hover_cursor(egui::CursorIcon::PointingHand);
+                        if response.on_hover_text(format!("Open {preset}")).clicked() {
+                            chosen = Some(preset);
+                        }
+                        ui.strong(preset);
+                        ui.weak(what);
+                    });
+                    if i % 2 == 1 {
+                        ui.end_row();
+                    }
+                }
+            });
+        });
+        self.open = open && chosen.is_none();
+        chosen
+    }
+
+    fn receive(&mut self, ctx: &egui::Context) {
+        let coming = self.coming.get_or_insert_with(|| {
+            let (send, receive) = channel();
+            let wake = ctx.clone();
+            // A thread that cannot start, or a window closed meanwhile, leaves grey boxes.
+            let _ = std::thread::Builder::new().name("thumbnails".into()).spawn(move || {
+                for (preset, _) in presets() {
+                    let Some(image) = thumbnail(preset) else { continue };
+                    if send.send((preset, image)).is_err() {
+                        return;
+                    }
+                    wake.request_repaint();
+                }
+            });
+            receive
+        });
+        while let Ok((preset, image)) = coming.try_recv() {
+            self.pictures.insert(preset, ctx.load_texture(preset, image, egui::TextureOptions::LINEAR));
+        }
+    }
+}
+
+/// The middle of a preset's picture in the gallery's aspect, rendered on the CPU: small, and beside the
+/// renderer's own work.
+fn thumbnail(preset: &str) -> Option<egui::ColorImage> {
+    let size = [format!("image.width={WIDTH}"), format!("image.height={HEIGHT}"), "image.samples=4".into()];
+    let limits = Limits::default();
+    let scene = Scene::load(Path::new(preset), &size, &limits).ok()?;
+    let volume = scene.volume(limits.memory, &Unwatched).ok()?;
+    let frame = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).ok()?;
+    Some(egui::ColorImage::from_rgba_unmultiplied(
+        [frame.width as usize, frame.height as usize],
+        bytemuck::cast_slice(&frame.picture),
+    ))
+}

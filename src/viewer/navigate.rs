@@ -1,0 +1,134 @@
+//! Camera and light moved by hand: from drags in the picture to parameters of the scene.
+
+use glam::{DQuat, DVec3};
+
+use crate::scene::{Raw, Scene, Values};
+
+/// The steepest look up or down, radians from the horizon: straight up has no right and left.
+const STEEPEST: f64 = 1.553;
+
+/// The camera as its parameters give it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Metres.
+    pub eye: DVec3,
+    /// The point in the middle of the image, metres.
+    pub target: DVec3,
+    /// Unit, up in the world.
+    pub up: DVec3,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_fov: f64,
+}
+
+impl Pose {
+    /// From a scene's parameters.
+    pub fn of(values: &Values) -> Pose {
+        let point = |key| values.triple(key).as_dvec3();
+        Pose {
+            eye: point("camera.eye"),
+            target: point("camera.target"),
+            up: point("camera.up").normalize_or(DVec3::Y),
+            tan_half_fov: (f64::from(values.float("camera.fov")).to_radians() * 0.5).tan(),
+        }
+    }
+
+    /// The parameters it sets.
+    pub fn edits(&self) -> [(&'static str, Raw); 2] {
+        [("camera.eye", raw(self.eye)), ("camera.target", raw(self.target))]
+    }
+
+    fn right(&self) -> DVec3 {
+        (self.target - self.eye).cross(self.up).normalize_or(DVec3::X)
+    }
+
+    /// Turns the eye around the target: `yaw` to the left, `pitch` upwards, radians.
+    pub fn orbit(mut self, yaw: f64, pitch: f64) -> Pose {
+        let away = self.eye - self.target;
+        let height = away.normalize_or(DVec3::Z).dot(self.up).clamp(-1.0, 1.0).asin();
+        let pitch = (height + pitch).clamp(-STEEPEST, STEEPEST) - height;
+        // A camera already past the steepest look only comes back.
+        let tilt = DQuat::from_axis_angle(self.right(), -pitch);
+        let turn = DQuat::from_axis_angle(self.up, yaw);
+        self.eye = self.target + turn * (tilt * away);
+        self
+    }
+
+    /// Moves eye and target along the image plane by fractions of the image's height.
+    pub fn pan(mut self, right: f64, up: f64) -> Pose {
+        let away = self.target - self.eye;
+        let height = 2.0 * self.tan_half_fov * away.length();
+        let image_right = self.right();
+        let image_up = image_right.cross(away).normalize_or(self.up);
+        let by = (image_right * right + image_up * up) * height;
+        self.eye += by;
+        self.target += by;
+        self
+    }
+
+    /// Brings the eye to `factor` of its distance from the target.
+    pub fn zoom(mut self, factor: f64) -> Pose {
+        let away = self.eye - self.target;
+        let length = (away.length() * factor).clamp(1e-2, 1e6);
+        self.eye = self.target + away.normalize_or(DVec3::Z) * length;
+        self
+    }
+
+    /// Looks at `point` from the same direction, without coming nearer than it was.
+    pub fn focus(mut self, point: DVec3) -> Pose {
+        let by = point - self.target;
+        self.target = point;
+        self.eye += by;
+        self
+    }
+
+    /// Looks from the same direction, so that everything of the scene is in a picture of this aspect.
+    pub fn frame_all(mut self, scene: &Scene, aspect: f64) -> Pose {
+        let corners =
+            scene.quads.iter().flat_map(|q| q.corners).chain(scene.rocks.iter().flat_map(|r| r.corners));
+        let corners: Vec<DVec3> = corners.map(|c| c.as_dvec3()).collect();
+        let (Some(low), Some(high)) =
+            (corners.iter().copied().reduce(DVec3::min), corners.iter().copied().reduce(DVec3::max))
+        else {
+            return self;
+        };
+        let centre = (low + high) * 0.5;
+        let away = (self.eye - self.target).normalize_or(DVec3::Z);
+        let forward = -away;
+        let right = forward.cross(self.up).normalize_or(DVec3::X);
+        let up = right.cross(forward);
+        // The distance at which the outermost corner touches the image's edge.
+        let distance = corners.iter().map(|corner| {
+            let d = *corner - centre;
+            let wide = (d.dot(right).abs() / aspect.max(1e-3)).max(d.dot(up).abs());
+            wide / self.tan_half_fov - d.dot(forward)
+        });
+        let distance = distance.fold(0.1, f64::max) * 1.05;
+        self.target = centre;
+        self.eye = centre + away * distance;
+        self
+    }
+}
+
+/// Turns a direction with the view: `right` and `up` in radians, as seen by the camera.
+pub fn turn_light(direction: DVec3, pose: &Pose, right: f64, up: f64) -> DVec3 {
+    let turn = DQuat::from_axis_angle(pose.up, right);
+    let tilt = DQuat::from_axis_angle(pose.right(), -up);
+    (turn * (tilt * direction)).normalize_or(DVec3::Y)
+}
+
+/// Azimuth (from +z towards +x) and elevation of a direction, degrees.
+pub fn angles(direction: DVec3) -> [f64; 2] {
+    let d = direction.normalize_or(DVec3::Y);
+    [d.x.atan2(d.z).to_degrees(), d.y.clamp(-1.0, 1.0).asin().to_degrees()]
+}
+
+/// The unit direction at these angles, degrees.
+pub fn direction([azimuth, elevation]: [f64; 2]) -> DVec3 {
+    let (a, e) = (azimuth.to_radians(), elevation.to_radians());
+    DVec3::new(a.sin() * e.cos(), e.sin(), a.cos() * e.cos())
+}
+
+/// A vector as a scene file's value, with the digits a float32 has.
+pub fn raw(v: DVec3) -> Raw {
+    Raw::List(v.to_array().into_iter().map(|x| Raw::Float(f64::from(x as f32))).collect())
+}

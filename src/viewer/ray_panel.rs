@@ -1,0 +1,4 @@
+//! x
+use eframe::egui;
+/// x
+pub fn show(_: &mut egui::Ui, _: &crate::cpu::ray::RayReport) {}

@@ -1,0 +1,196 @@
+//! The picture in the window: camera and light moved by hand in it, pixels picked from it.
+
+use eframe::egui;
+use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2, pos2, vec2};
+
+use super::navigate::{self, Pose};
+use super::parameters::name;
+use crate::scene::{Light, Scene, Values};
+
+/// What dragging in the picture does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tool {
+    /// Turns the camera around its target.
+    #[default]
+    Orbit,
+    /// Moves the camera along the image.
+    Pan,
+    /// Turns the first directional light.
+    Light,
+    /// Shows the ray under the pointer.
+    Inspect,
+}
+
+impl Tool {
+    /// All, in the order of the toolbar, with their keys.
+    pub const ALL: [(Tool, &'static str, egui::Key, &'static str); 4] = [
+        (Tool::Orbit, "Orbit", egui::Key::O, "Drag to turn the camera; Shift or the right button pans"),
+        (Tool::Pan, "Pan", egui::Key::P, "Drag to move the camera along the image"),
+        (Tool::Light, "Light", egui::Key::L, "Drag to turn the first directional light (or Ctrl and drag)"),
+        (Tool::Inspect, "Inspect", egui::Key::I, "Click or drag to see the ray of a pixel, cell by cell"),
+    ];
+}
+
+/// What was done in the picture.
+#[derive(Debug, Default)]
+pub struct Actions {
+    /// The camera was moved to here.
+    pub pose: Option<Pose>,
+    /// The light of this key was turned to here.
+    pub light: Option<(String, glam::DVec3)>,
+    /// Where in the image (0 to 1) a ray is asked for.
+    pub inspect: Option<[f32; 2]>,
+    /// Where in the image the camera is to focus.
+    pub focus: Option<[f32; 2]>,
+}
+
+/// What is drawn.
+pub struct Shown<'a> {
+    /// The picture, if there is one.
+    pub texture: Option<&'a egui::TextureHandle>,
+    /// Its aspect, and that of the scene's image.
+    pub aspect: f32,
+    /// The pixel that is inspected, 0 to 1.
+    pub marked: Option<[f32; 2]>,
+    /// The tool in hand.
+    pub tool: Tool,
+}
+
+/// The largest rectangle of an aspect inside another, on whole pixels.
+pub fn fit(outer: Rect, aspect: f32, pixels_per_point: f32) -> Rect {
+    let (w, h) = (outer.width().max(0.0), outer.height().max(0.0));
+    let size = if w / h.max(1e-6) > aspect { vec2(h * aspect, h) } else { vec2(w, w / aspect) };
+    let whole = |x: f32| (x * pixels_per_point).round() / pixels_per_point;
+    let size = vec2(whole(size.x), whole(size.y));
+    let corner = outer.center() - size * 0.5;
+    Rect::from_min_size(pos2(whole(corner.x), whole(corner.y)), size)
+}
+
+/// The key of the first directional light that shines.
+pub fn first_directional(values: &Values) -> Option<String> {
+    values.names("lights").into_iter().find(|light| {
+        let key = |what: &str| format!("lights.{light}.{what}");
+        values.text(&key("kind")) == "directional" && values.float(&key("intensity")) > 0.0
+    })
+}
+
+/// Shows the picture; what was done in it.
+pub fn show(ui: &mut Ui, shown: &Shown, values: &Values) -> (Rect, Actions) {
+    let outer = ui.available_rect_before_wrap();
+    let image = fit(outer, shown.aspect, ui.ctx().pixels_per_point());
+    let response = ui.allocate_rect(outer, Sense::click_and_drag());
+    name(&response, "Picture");
+    let painter = ui.painter_at(outer);
+    painter.rect_filled(outer, 0.0, ui.visuals().extreme_bg_color);
+    match shown.texture {
+        Some(texture) => {
+            let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+            painter.image(texture.id(), image, uv, Color32::WHITE);
+        }
+        None => {
+            let text = "The first picture is coming …";
+            let font = FontId::proportional(16.0);
+            painter.text(outer.center(), Align2::CENTER_CENTER, text, font, ui.visuals().weak_text_color());
+        }
+    }
+    if let Some([x, y]) = shown.marked {
+        mark(&painter, image, image.min + image.size() * vec2(x, y));
+    }
+
+    let mut actions = Actions::default();
+    let place = |at: Pos2| {
+        let p = (at - image.min) / image.size().max(Vec2::splat(1.0));
+        ((0.0..1.0).contains(&p.x) && (0.0..1.0).contains(&p.y)).then_some([p.x, p.y])
+    };
+    let (modifiers, scroll, pinch) = ui.input(|i| (i.modifiers, i.smooth_scroll_delta().y, i.zoom_delta()));
+    let pose = Pose::of(values);
+    let height = f64::from(image.height().max(1.0));
+    let drag = response.drag_delta();
+    if response.dragged() && drag != Vec2::ZERO {
+        let (dx, dy) = (f64::from(drag.x), f64::from(drag.y));
+        let primary = response.dragged_by(egui::PointerButton::Primary);
+        let tool = match () {
+            _ if !primary || modifiers.shift => Tool::Pan,
+            _ if modifiers.command => Tool::Light,
+            _ => shown.tool,
+        };
+        // A drag over the image's height turns half way round.
+        let turn = std::f64::consts::PI / height;
+        match tool {
+            Tool::Orbit => actions.pose = Some(pose.orbit(-dx * turn, dy * turn)),
+            Tool::Pan => actions.pose = Some(pose.pan(-dx / height, dy / height)),
+            Tool::Light => {
+                actions.light = first_directional(values).map(|light| {
+                    let key = format!("lights.{light}.direction");
+                    let direction = values.triple(&key).as_dvec3();
+                    (key, navigate::turn_light(direction, &pose, dx * turn, -dy * turn))
+                });
+            }
+            Tool::Inspect => {
+                actions.inspect = response.interact_pointer_pos().and_then(place);
+            }
+        }
+    }
+    if response.hovered() {
+        let factor = f64::from(scroll * -0.002).exp() / f64::from(pinch);
+        if (factor - 1.0).abs() > 1e-6 {
+            actions.pose = Some(actions.pose.unwrap_or(pose).zoom(factor));
+        }
+        let cursor = match shown.tool {
+            Tool::Inspect => egui::CursorIcon::Crosshair,
+            _ if response.dragged() => egui::CursorIcon::Grabbing,
+            _ => egui::CursorIcon::Grab,
+        };
+        ui.ctx().set_cursor_icon(cursor);
+    }
+    if let Some(at) = response.interact_pointer_pos().and_then(place) {
+        if response.double_clicked() {
+            actions.focus = Some(at);
+        } else if response.clicked() {
+            actions.inspect = Some(at);
+        }
+    }
+    if shown.tool == Tool::Light || (modifiers.command && response.dragged()) {
+        show_light(&painter, image, values, &pose);
+    }
+    (image, actions)
+}
+
+/// A cross that is seen on bright water and on dark rock.
+fn mark(painter: &egui::Painter, image: Rect, at: Pos2) {
+    let painter = painter.with_clip_rect(image);
+    for (width, color) in [(3.0, Color32::from_black_alpha(160)), (1.0, Color32::WHITE)] {
+        let stroke = Stroke::new(width, color);
+        for d in [vec2(1.0, 0.0), vec2(-1.0, 0.0), vec2(0.0, 1.0), vec2(0.0, -1.0)] {
+            painter.line_segment([at + d * 4.0, at + d * 12.0], stroke);
+        }
+        painter.circle_stroke(at, 4.0, stroke);
+    }
+}
+
+/// Where the light comes from, as a small sphere seen by the camera.
+fn show_light(painter: &egui::Painter, image: Rect, values: &Values, pose: &Pose) {
+    let Some(light) = first_directional(values) else { return };
+    let direction =
+        values.triple(&format!("lights.{light}.direction")).as_dvec3().normalize_or(glam::DVec3::Y);
+    let forward = (pose.target - pose.eye).normalize_or(-glam::DVec3::Z);
+    let right = forward.cross(pose.up).normalize_or(glam::DVec3::X);
+    let up = right.cross(forward);
+    let radius = 34.0;
+    let centre = image.left_bottom() + vec2(radius + 14.0, -radius - 30.0);
+    painter.circle(centre, radius, Color32::from_black_alpha(140), Stroke::new(1.0, Color32::from_gray(170)));
+    let tip = centre + vec2(direction.dot(right) as f32, -direction.dot(up) as f32) * radius;
+    let front = direction.dot(forward) < 0.0;
+    let color = if front { Color32::from_rgb(255, 214, 110) } else { Color32::from_rgb(130, 110, 70) };
+    painter.line_segment([centre, tip], Stroke::new(1.5, color));
+    painter.circle_filled(tip, 5.0, color);
+    let [azimuth, elevation] = navigate::angles(direction);
+    let text = format!("{light}: {azimuth:.0}°, {elevation:.0}° up");
+    let at = centre + vec2(-radius, radius + 4.0);
+    painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.0), Color32::WHITE);
+}
+
+/// Whether a light can be turned at all.
+pub fn has_directional(scene: &Scene) -> bool {
+    scene.lights.iter().any(|light| matches!(light, Light::Directional { .. }))
+}
