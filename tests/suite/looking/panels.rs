@@ -14,7 +14,7 @@ use taki::viewer::volume_panel::VolumePanel;
 use taki::volume::{VolumeTexture, WaterSpec, build_water};
 
 use super::spec;
-use crate::gpu::scene;
+use crate::gpu::{renderer, scene};
 
 fn volume(size: [u32; 3]) -> Arc<VolumeTexture> {
     Arc::new(build_water(&spec(size, size[0] / 2, size[2] / 2), &Unwatched).expect("a volume"))
@@ -44,6 +44,38 @@ fn scrubbers_move_the_planes() {
     harness.get_by_role_and_label(Role::Slider, "y").set_value_accesskit(1e9);
     harness.run();
     assert_eq!(harness.state().panel.cell(), [3, 29, 5]);
+}
+
+#[test]
+fn a_moved_plane_shows_its_own_flow_cells() {
+    if renderer("planes").is_none() {
+        return;
+    }
+    let volume = volume([20, 30, 12]);
+    let state = Inspected { panel: VolumePanel::default(), volume: volume.clone() };
+    let mut harness = Harness::builder()
+        .with_size([420.0, 900.0])
+        .wgpu()
+        .build_ui_state(|ui, state: &mut Inspected| state.panel.show(ui, &state.volume.clone()), state);
+    for z in [9, 2] {
+        harness.get_by_role_and_label(Role::Slider, "z").set_value_accesskit(z as f64);
+        harness.run();
+        let rect = harness.get_by_label("Slice across z").rect();
+        let scale = rect.width() / 20.0;
+        let image = harness.render().expect("a picture");
+        let mut colours = [Vec::new(), Vec::new()];
+        for y in (0..30u32).filter(|y| y.abs_diff(15) > 1) {
+            for x in (0..20u32).filter(|x| x.abs_diff(10) > 1) {
+                let at = rect.min + egui::vec2((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale);
+                let cell = volume.cells[volume.index(x, y, z)];
+                colours[usize::from(cell.has_direction())].push(image.get_pixel(at.x as u32, at.y as u32).0);
+            }
+        }
+        let [empty, flow] = colours;
+        assert!(empty.len() > 20 && flow.len() > 20);
+        assert!(empty.iter().all(|c| *c == empty[0]), "plane {z}: empty cells look alike");
+        assert!(flow.iter().all(|c| *c != empty[0]), "plane {z}: no flow cell looks empty");
+    }
 }
 
 #[test]
@@ -350,11 +382,13 @@ fn a_layer_of_a_large_frame_is_drawn_in_a_few_milliseconds() {
     for (i, depth) in frame.surface.as_mut().expect("layers").depth.iter_mut().enumerate() {
         *depth = 1.0 + (i % 977) as f32;
     }
-    let clock = std::time::Instant::now();
-    let image = layer_image(&frame, Layer::Depth, 1);
-    let seconds = clock.elapsed().as_secs_f64();
+    let seconds = (0..5).map(|_| {
+        let clock = std::time::Instant::now();
+        assert_eq!(layer_image(&frame, Layer::Depth, 1).pixels.len(), 1280 * 720);
+        clock.elapsed().as_secs_f64()
+    });
+    let seconds = seconds.fold(f64::INFINITY, f64::min);
     eprintln!("depth at 1280×720: {:.1} ms", seconds * 1e3);
-    assert_eq!(image.pixels.len(), 1280 * 720);
     // A few milliseconds on idle cores; this is for a busy machine and an accident of another order.
     assert!(seconds < 1.0, "{seconds} s");
 }
