@@ -85,18 +85,25 @@ impl CurvesPanel {
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 4.0, visuals.extreme_bg_color);
         let window = Window::new(&self.view, rect, Vec3::from_array(spec.size.map(|n| n as f32)));
-        let ink =
-            Ink { dark: visuals.dark_mode, text: visuals.text_color(), weak: visuals.weak_text_color() };
+        let ink = Ink {
+            dark: visuals.dark_mode,
+            paper: visuals.extreme_bg_color,
+            text: visuals.text_color(),
+            weak: visuals.weak_text_color(),
+        };
         let edge = Stroke::new(1.0, ink.weak.gamma_multiply(0.7));
         let (behind, before) = window.edges();
         for ends in behind {
             painter.line_segment(ends, Stroke::new(1.0, ink.weak.gamma_multiply(0.4)));
         }
         if let Some(points) = &self.points {
-            let faint = if self.show_levels { 0.3 } else { 1.0 };
-            draw_curves(&painter, &window, points, &ink, faint);
             if self.show_levels {
-                draw_levels(&painter, &window, points, &ink, self.level.min(points.levels));
+                let (explained, rest) = points.explained();
+                draw_curves(&painter, &window, points, rest, &ink, 0.25);
+                draw_curves(&painter, &window, points, explained.clone(), &ink, 1.0);
+                draw_levels(&painter, &window, points, explained, &ink, self.level.min(points.levels));
+            } else {
+                draw_curves(&painter, &window, points, points.curves.iter().collect(), &ink, 1.0);
             }
         }
         for ends in before {
@@ -104,8 +111,10 @@ impl CurvesPanel {
         }
         draw_axes(&painter, &window, spec, &ink);
         let hint = "drag turns · scroll zooms · double click resets";
-        let at = rect.center_bottom() - Vec2::new(0.0, 6.0);
-        painter.text(at, egui::Align2::CENTER_BOTTOM, hint, egui::FontId::proportional(11.0), ink.weak);
+        if rect.width() >= 280.0 {
+            let at = rect.min + Vec2::new(9.0, 6.0);
+            painter.text(at, egui::Align2::LEFT_TOP, hint, egui::FontId::proportional(11.0), ink.weak);
+        }
         response.on_hover_cursor(egui::CursorIcon::Grab);
     }
 
@@ -152,6 +161,18 @@ impl Points {
         let curves = spread(spec.across, spec.deep, count).into_iter().map(curve).collect();
         Points { spec: *spec, count, levels, curves }
     }
+
+    /// The few curves whose levels are shown, and the others.
+    fn explained(&self) -> (Vec<&Vec<Vec3>>, Vec<&Vec<Vec3>>) {
+        let all = self.curves.len();
+        let few = all.min(MAX_LEVEL_CURVES);
+        let numbers: Vec<usize> = (0..few).map(|i| (2 * i + 1) * all / (2 * few)).collect();
+        let of = |explained: bool| {
+            let chosen = (0..all).filter(|i| numbers.contains(i) == explained);
+            chosen.map(|i| &self.curves[i]).collect()
+        };
+        (of(true), of(false))
+    }
 }
 
 /// Numbers of `count` curves spread evenly over the jitter grid.
@@ -175,6 +196,7 @@ fn spread(across: u32, deep: u32, count: usize) -> Vec<usize> {
 /// Colours of the theme.
 struct Ink {
     dark: bool,
+    paper: Color32,
     text: Color32,
     weak: Color32,
 }
@@ -183,9 +205,9 @@ impl Ink {
     /// Shade of a line at `depth`, 0 far to 1 near.
     fn shade(&self, depth: f32) -> Color32 {
         let (far, near) = if self.dark {
-            (Color32::from_rgb(38, 66, 92), Color32::from_rgb(168, 226, 255))
+            (Color32::from_rgb(58, 94, 126), Color32::from_rgb(168, 226, 255))
         } else {
-            (Color32::from_rgb(176, 203, 224), Color32::from_rgb(6, 58, 112))
+            (Color32::from_rgb(160, 190, 214), Color32::from_rgb(6, 58, 112))
         };
         far.lerp_to_gamma(near, depth.clamp(0.0, 1.0))
     }
@@ -194,17 +216,24 @@ impl Ink {
     fn level(&self, n: u32, levels: u32) -> Color32 {
         let t = n as f32 / levels.max(1) as f32;
         // Light levels on dark, dark on light.
-        let [r, g, b] = heat(if self.dark { 0.45 + 0.5 * t } else { 0.25 + 0.4 * t });
+        let [r, g, b] = heat(if self.dark { 0.6 + 0.38 * t } else { 0.25 + 0.4 * t });
         Color32::from_rgb(r, g, b)
     }
 }
 
 /// The curves, far ones first. What lies beyond the volume in z is dropped there, and faint here.
-fn draw_curves(painter: &egui::Painter, window: &Window, points: &Points, ink: &Ink, faint: f32) {
+fn draw_curves(
+    painter: &egui::Painter,
+    window: &Window,
+    points: &Points,
+    curves: Vec<&Vec<Vec3>>,
+    ink: &Ink,
+    faint: f32,
+) {
     let nz = points.spec.size[2] as f32;
     let outside = |p: Vec3| p.z < 0.0 || p.z > nz;
     let mut runs: Vec<(f32, Vec<Pos2>, Color32)> = Vec::new();
-    for curve in &points.curves {
+    for curve in curves {
         let mut start = 0;
         while start + 1 < curve.len() {
             let run = run_from(curve, start, outside);
@@ -231,10 +260,15 @@ fn run_from(curve: &[Vec3], start: usize, outside: impl Fn(Vec3) -> bool) -> Ran
 }
 
 /// Levels 0 to `level` of a few curves, the coarser the fainter, with the midpoints `level` displaced.
-fn draw_levels(painter: &egui::Painter, window: &Window, points: &Points, ink: &Ink, level: u32) {
-    let shown = points.curves.len().min(MAX_LEVEL_CURVES);
-    for i in 0..shown {
-        let curve = &points.curves[(2 * i + 1) * points.curves.len() / (2 * shown)];
+fn draw_levels(
+    painter: &egui::Painter,
+    window: &Window,
+    points: &Points,
+    curves: Vec<&Vec<Vec3>>,
+    ink: &Ink,
+    level: u32,
+) {
+    for curve in curves {
         for n in 0..=level {
             let stride = 1usize << (points.levels - n);
             let line: Vec<Pos2> = curve.iter().step_by(stride).map(|&p| window.see(p).0).collect();
@@ -258,7 +292,13 @@ fn draw_axes(painter: &egui::Painter, window: &Window, spec: &WaterSpec, ink: &I
     let size = Vec3::from_array(spec.size.map(|n| n as f32));
     let font = egui::FontId::proportional(13.0);
     let write = |at: Pos2, text: String, colour: Color32| {
-        painter.text(at, egui::Align2::CENTER_CENTER, text, font.clone(), colour);
+        // A label of an axis that leaves the canvas stays at its edge.
+        let room = painter.clip_rect().shrink2(Vec2::new(22.0, 10.0));
+        let at = if room.is_positive() { room.clamp(at) } else { at };
+        let galley = painter.layout_no_wrap(text, font.clone(), colour);
+        let rect = egui::Align2::CENTER_CENTER.anchor_size(at, galley.size());
+        painter.rect_filled(rect.expand(2.0), 3.0, ink.paper.gamma_multiply(0.75));
+        painter.galley(rect.min, galley, colour);
     };
     let origin = window.see(Vec3::ZERO).0;
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {

@@ -226,7 +226,7 @@ pub fn quad_colour(quad: u32) -> [u8; 3] {
 const INK: Color32 = Color32::from_gray(235);
 const FAINT_INK: Color32 = Color32::from_gray(175);
 const BAR: Vec2 = Vec2::new(150.0, 12.0);
-const SQUARE: f32 = 44.0;
+const SQUARE: f32 = 36.0;
 /// Quads shown with a swatch each.
 const MAX_SWATCHES: u32 = 12;
 
@@ -241,8 +241,13 @@ pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
         .corner_radius(5)
         .inner_margin(egui::Margin::symmetric(9, 6));
     frame.show(ui, |ui| {
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 7.0;
+        let height = match legend {
+            Legend::Uv | Legend::Normal => SQUARE,
+            Legend::None | Legend::Scale { .. } | Legend::Quads(_) => BAR.y + 6.0,
+        };
+        let row = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(Vec2::new(ui.available_width(), height), row, |ui| {
+            ui.spacing_mut().item_spacing = Vec2::new(7.0, 0.0);
             ui.label(RichText::new(layer.name()).color(INK).strong());
             match *legend {
                 Legend::None => {}
@@ -310,8 +315,8 @@ fn uv_square(ui: &mut egui::Ui) {
     ui.painter().add(mesh);
     outline(ui, rect);
     ui.vertical(|ui| {
-        ui.label(RichText::new("u → 0…1 red").color(INK));
-        ui.label(RichText::new("v ↓ 0…1 green").color(INK));
+        ui.label(RichText::new("u to the right: red").color(INK));
+        ui.label(RichText::new("v down: green").color(INK));
     });
 }
 
@@ -340,8 +345,8 @@ fn normal_ball(ui: &mut egui::Ui) {
     let stroke = Stroke::new(1.0, Color32::from_white_alpha(60));
     ui.painter().circle_stroke(rect.center(), rect.width() * 0.5, stroke);
     ui.vertical(|ui| {
-        ui.label(RichText::new("world x → red, y ↑ green,").color(INK));
-        ui.label(RichText::new("z to you blue; middle = 0").color(INK));
+        ui.label(RichText::new("world x right: red, y up: green,").color(INK));
+        ui.label(RichText::new("z towards you: blue").color(INK));
     });
 }
 

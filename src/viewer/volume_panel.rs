@@ -19,6 +19,12 @@ const BINS: usize = 10;
 const COUNT_AT_ONCE: usize = 1 << 18;
 /// Narrowest panel with the three slices in one row, points.
 const ROW_WIDTH: f32 = 620.0;
+/// Narrowest panel with a title and its key in one line, points.
+const ONE_LINE_WIDTH: f32 = 350.0;
+/// Narrowest slice with its directions named, points.
+const FULL_CAPTION_WIDTH: f32 = 115.0;
+/// Least width and height of the scrubbers beside slices, points.
+const SCRUBBERS_BESIDE: f32 = 150.0;
 /// Largest height of all slices together, points.
 const MAX_HEIGHT: f32 = 430.0;
 /// Between slices, points.
@@ -122,31 +128,43 @@ impl VolumePanel {
     }
 
     fn selector(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
+        let one_line = ui.available_width() >= ONE_LINE_WIDTH;
         ui.horizontal(|ui| {
             for (shown, name) in Shown::ALL {
                 ui.selectable_value(&mut self.shown, shown, name);
             }
-            ui.add_space(6.0);
-            match self.shown {
-                Shown::V => {
-                    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                        let mut n = [0.0; 3];
-                        n[axis] = 1.0;
-                        swatch(ui, super::layer_image::direction_colour(n));
-                        ui.label(format!("+{name}"));
-                    }
-                }
-                Shown::Rho | Shown::KD | Shown::KS => {
-                    ui.label("0");
-                    let bar = egui::vec2(70.0, 11.0);
-                    super::layer_image::colour_bar(ui, bar, super::layer_image::sequential);
-                    let high = if self.shown == Shown::Rho { volume.alpha } else { 1.0 };
-                    ui.label(short(high as f64));
+            if one_line {
+                ui.add_space(6.0);
+                self.key(ui, volume);
+            }
+        });
+        if !one_line {
+            ui.horizontal(|ui| self.key(ui, volume));
+        }
+    }
+
+    /// What the slices' colours mean.
+    fn key(&self, ui: &mut egui::Ui, volume: &VolumeTexture) {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        match self.shown {
+            Shown::V => {
+                for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                    let mut n = [0.0; 3];
+                    n[axis] = 1.0;
+                    swatch(ui, super::layer_image::direction_colour(n));
+                    ui.label(format!("+{name}"));
                 }
             }
-            swatch(ui, slice::empty_colour(ui.visuals().dark_mode));
-            ui.label("no flow").on_hover_text("Cells no curve passes: ρ, v and k are 0");
-        });
+            Shown::Rho | Shown::KD | Shown::KS => {
+                ui.label("0");
+                let bar = egui::vec2(60.0, 11.0);
+                super::layer_image::colour_bar(ui, bar, super::layer_image::sequential);
+                let high = if self.shown == Shown::Rho { volume.alpha } else { 1.0 };
+                ui.label(short(high as f64));
+            }
+        }
+        swatch(ui, slice::empty_colour(ui.visuals().dark_mode));
+        ui.label("no flow").on_hover_text("Cells no curve passes: ρ, v and k are 0");
     }
 
     /// Side by side, each with its scrubber below.
@@ -157,7 +175,7 @@ impl VolumePanel {
             ui.set_max_width(columns);
             ui.spacing_mut().item_spacing.x = GAP;
             for axis in 0..3 {
-                ui.vertical(|ui| self.slice(ui, volume, axis, scale));
+                self.slice(ui, volume, axis, scale);
             }
         });
         self.scrubbers(ui, volume);
@@ -168,35 +186,55 @@ impl VolumePanel {
     fn three_views(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture, [nx, ny, nz]: [f32; 3], width: f32) {
         let scale = ((width - GAP) / (nx + nz)).min((MAX_HEIGHT - GAP) / (ny + nz));
         ui.spacing_mut().item_spacing = egui::Vec2::splat(GAP);
+        // The scrubbers go where there is room: beside a long volume, under the side view of a square
+        // one, below all in a narrow panel.
+        let right_of_all = width - (nx + nz) * scale - 2.0 * GAP;
+        let under_side = if nz * scale >= SCRUBBERS_BESIDE { width - nx * scale - GAP } else { 0.0 };
+        let beside = |panel: &mut Self, ui: &mut egui::Ui, room: f32| {
+            if room >= SCRUBBERS_BESIDE {
+                ui.vertical(|ui| {
+                    ui.set_max_width(room);
+                    ui.spacing_mut().item_spacing.y = 4.0;
+                    panel.scrubbers(ui, volume);
+                    ui.label(slice::in_words(volume, panel.cell));
+                });
+            }
+        };
         ui.horizontal_top(|ui| {
             self.slice(ui, volume, 2, scale);
             self.slice(ui, volume, 0, scale);
+            beside(self, ui, right_of_all);
         });
         ui.horizontal_top(|ui| {
             self.slice(ui, volume, 1, scale);
-            let [x, y, z] = self.cell;
-            let words = slice::in_words(volume, [x, y, z]);
-            // A narrow volume leaves no room for words under its side view.
-            if width - nx * scale - GAP > 150.0 {
-                ui.vertical(|ui| {
-                    ui.spacing_mut().item_spacing.y = 3.0;
-                    ui.label(RichText::new("Where the planes meet").strong());
-                    ui.label(words);
-                });
+            if right_of_all < SCRUBBERS_BESIDE {
+                beside(self, ui, under_side);
             }
         });
-        self.scrubbers(ui, volume);
+        if right_of_all.max(under_side) < SCRUBBERS_BESIDE {
+            self.scrubbers(ui, volume);
+        }
     }
 
     fn slice(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture, axis: usize, scale: f32) {
-        self.slices[axis].show(ui, volume, axis, self.shown, &mut self.cell, scale);
+        let right = volume.size[slice::PLANES[axis][0]] as f32 * scale;
+        ui.vertical(|ui| {
+            ui.set_max_width(right);
+            ui.spacing_mut().item_spacing.y = 2.0;
+            let words =
+                ["across x: z right, y down", "across y: x right, z down", "across z: x right, y down"];
+            let words =
+                if right >= FULL_CAPTION_WIDTH { words[axis] } else { &words[axis][.."across x".len()] };
+            ui.add(egui::Label::new(RichText::new(words).small()).truncate());
+            self.slices[axis].show(ui, volume, axis, self.shown, &mut self.cell, scale);
+        });
     }
 
     fn scrubbers(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         ui.spacing_mut().item_spacing.y = 4.0;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             ui.scope(|ui| {
-                ui.spacing_mut().slider_width = (ui.available_width() - 90.0).clamp(60.0, 420.0);
+                ui.spacing_mut().slider_width = (ui.available_width() - 78.0).clamp(60.0, 420.0);
                 let text = RichText::new(name).strong().color(axis_colour(axis, ui.visuals().dark_mode));
                 let range = 0..=volume.size[axis] - 1;
                 ui.add(egui::Slider::new(&mut self.cell[axis], range).text(text));

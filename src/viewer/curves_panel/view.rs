@@ -5,9 +5,12 @@ use glam::Vec3;
 
 /// Distance of the eye from the box's middle, in radii of the sphere around the box: near enough to tell
 /// near from far.
-const DISTANCE: f32 = 3.2;
-/// How much of the canvas that sphere fills; labels need the rest.
-const FILL: f32 = 0.92;
+const DISTANCE: f32 = 4.0;
+/// Diameter of that sphere's outline in shares of the canvas without its labels; a little more than all,
+/// for two corners seldom lie on the outline.
+const FILL: f32 = 1.05;
+/// Room for labels on both sides together, points.
+const LABELS: egui::Vec2 = egui::vec2(64.0, 40.0);
 
 /// Where the box is seen from: x to the right, y (the flow) down and z away when all is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +69,8 @@ impl Window {
         let up = Vec3::new(sin_yaw * sin_pitch, -cos_pitch, cos_yaw * sin_pitch);
         // The sphere's outline seen in perspective has radius 1/√(DISTANCE² − 1).
         let fit = (DISTANCE * DISTANCE - 1.0).sqrt();
-        let points = 0.5 * rect.width().min(rect.height()) * FILL * fit * view.zoom;
+        let room = (rect.size() - LABELS).max(egui::Vec2::splat(40.0));
+        let points = 0.5 * room.min_elem() * FILL * fit * view.zoom;
         Window { centre: rect.center(), points, size, right, up, to_eye }
     }
 

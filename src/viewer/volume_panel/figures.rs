@@ -11,7 +11,7 @@ pub(super) fn show(ui: &mut egui::Ui, s: &Statistics) {
     let of_all = |n: u64| format!("{} ({:.1} %)", thousands(n), 100.0 * n as f64 / s.cells.max(1) as f64);
     let percent = |x: f64| format!("{:.2} %", 100.0 * x);
     let [vx, vy, vz] = s.v_mean;
-    let half = format!("α/2 = {:.4}", s.alpha / 2.0);
+    let half = format!("{:.4} (α/2)", s.alpha / 2.0);
     let rows = [
         ("size", format!("{nx} × {ny} × {nz}"), ""),
         ("cells", format!("{}, {}", thousands(s.cells), human_bytes(s.bytes.into())), ""),
@@ -23,15 +23,25 @@ pub(super) fn show(ui: &mut egui::Ui, s: &Statistics) {
         ("mean k_d, k_s", format!("{:.3}, {:.3}", s.k_d_mean, s.k_s_mean), ""),
         ("mean v", format!("({vx:.3}, {vy:.3}, {vz:.3})"), ""),
     ];
-    egui::Grid::new("volume figures").num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
-        for title in ["", "this volume", "theory"] {
-            ui.label(RichText::new(title).weak());
+    // Side by side, or theory's figure below in a narrow panel.
+    let beside = ui.available_width() >= super::ONE_LINE_WIDTH;
+    egui::Grid::new("volume figures").spacing([10.0, 3.0]).striped(true).min_row_height(0.0).show(ui, |ui| {
+        if beside {
+            for title in ["", "this volume", "theory"] {
+                ui.label(RichText::new(title).weak());
+            }
+            ui.end_row();
         }
-        ui.end_row();
         for (name, value, theory) in rows {
             ui.label(name);
             ui.label(RichText::new(value).strong());
-            ui.label(theory);
+            if beside {
+                ui.label(theory);
+            } else if !theory.is_empty() {
+                ui.end_row();
+                ui.label("    in theory");
+                ui.label(theory);
+            }
             ui.end_row();
         }
     });

@@ -1,7 +1,7 @@
 //! How ρ is spread over the flow cells, beside ρ = clamp(N(0,1) + ½, 0, 1)·α.
 
 use eframe::egui;
-use egui_plot::{Bar, BarChart, Corner, Legend, Line, MarkerShape, Plot, PlotPoints, Points};
+use egui_plot::{Bar, BarChart, Line, MarkerShape, Plot, PlotPoints, Points};
 
 use super::{BINS, Counts, short};
 
@@ -58,17 +58,35 @@ pub(super) fn show(ui: &mut egui::Ui, counts: &Counts) {
             .radius(5.0)
             .allow_hover(false),
     );
-    ui.label(egui::RichText::new("Flow cells by ρ").strong());
+    let keys = [(ends_colour, "ρ = 0, ρ = α"), (between_colour, "between"), (theory_colour, "theory")];
+    let key = |ui: &mut egui::Ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        for (colour, name) in keys {
+            let [r, g, b, _] = colour.to_array();
+            super::swatch(ui, [r, g, b]);
+            ui.label(name);
+        }
+    };
+    let one_line = ui.available_width() >= super::ONE_LINE_WIDTH;
+    ui.horizontal(|ui| {
+        ui.label(egui::RichText::new("Flow cells by ρ").strong());
+        if one_line {
+            ui.add_space(6.0);
+            key(ui);
+        }
+    });
+    if !one_line {
+        ui.horizontal(key);
+    }
     Plot::new("rho histogram")
-        .height(170.0)
+        .height(160.0)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
         .include_y(0.0)
-        .include_y(40.0)
-        .legend(Legend::default().position(Corner::LeftTop))
+        .include_y(35.0)
         .x_axis_label("ρ, from 0 to α")
         .x_grid_spacer(move |_| {
             (0..=4)

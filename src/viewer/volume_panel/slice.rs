@@ -10,11 +10,11 @@ use crate::volume::{Cell, VolumeTexture};
 
 /// Cells across (right, down) of the plane across each axis: y goes down as water does; z, into the
 /// surface, to the right of the side view and down in the top view.
-const PLANES: [[usize; 2]; 3] = [[2, 1], [0, 2], [0, 1]];
+pub(super) const PLANES: [[usize; 2]; 3] = [[2, 1], [0, 2], [0, 1]];
 
 /// A cell no curve passes.
 pub(super) fn empty_colour(dark_mode: bool) -> [u8; 3] {
-    if dark_mode { [46, 47, 51] } else { [222, 223, 227] }
+    if dark_mode { [46, 47, 51] } else { [178, 180, 186] }
 }
 
 /// One plane's picture, made anew when what it shows changes.
