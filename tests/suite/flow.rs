@@ -46,7 +46,7 @@ fn rolled(volume: &VolumeTexture, by: u32) -> VolumeTexture {
             }
         }
     }
-    VolumeTexture { size: volume.size, alpha: volume.alpha, cells }
+    VolumeTexture { size: volume.size, alpha: volume.alpha, cells: cells.into() }
 }
 
 fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
@@ -102,9 +102,11 @@ fn water_flows_down_the_quad_by_that_share_of_its_length() {
     };
     let still = sets("volume.flow=0");
     let [nx, ny, nz] = [4, 40, 2];
-    let mut layer = VolumeTexture { size: [nx, ny, nz], alpha: 1.0, cells: vec![] };
+    let mut layer = VolumeTexture { size: [nx, ny, nz], alpha: 1.0, cells: Default::default() };
     let cell = Cell::from_direction(glam::Vec3::Y).with_density(1.0, 0.5, 0.5);
-    layer.cells = (0..nx * ny * nz).map(|i| if i / nx % ny == 10 { cell } else { Cell::default() }).collect();
+    let cells: Vec<Cell> =
+        (0..nx * ny * nz).map(|i| if i / nx % ny == 10 { cell } else { Cell::default() }).collect();
+    layer.cells = cells.into();
     // Mean row of what hides the background.
     let row = |frame: &Frame| {
         let (mut sum, mut weight) = (0.0, 0.0);
