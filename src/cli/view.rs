@@ -22,6 +22,10 @@ pub struct ViewArgs {
     /// Writes the window's picture to this PNG before --exit-after closes it.
     #[arg(long, value_name = "FILE", requires = "exit_after")]
     screenshot: Option<PathBuf>,
+    /// Measures: changes parameters by itself, draws while it renders, then closes and prints how quickly
+    /// the viewer answered.
+    #[arg(long, conflicts_with = "exit_after")]
+    measure: bool,
     /// At the end prints how quickly the viewer answered, as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -39,8 +43,9 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         settings: Settings::place(),
         exit_after: args.exit_after.map(Duration::from_secs_f64),
         screenshot: args.screenshot.clone(),
+        measure: args.measure,
     })?;
-    if args.json {
+    if args.json || args.measure {
         say(&serde_json::json!(report).to_string());
     }
     Ok(())

@@ -9,6 +9,7 @@ use egui::{Key, KeyboardShortcut, Modifiers, RichText, Ui};
 
 use super::curves_panel::CurvesPanel;
 use super::document::Document;
+use super::drive::Drive;
 use super::gallery::Gallery;
 use super::layer_image::show_legend;
 use super::metrics;
@@ -91,7 +92,7 @@ pub struct Viewer {
     fault: Option<String>,
     engine: String,
     last_frame: Option<Instant>,
-    drew_continuously: bool,
+    drive: Option<Drive>,
     opened: Instant,
     shot: Shot,
     title: String,
@@ -124,6 +125,7 @@ impl Viewer {
         ctx.set_zoom_factor(settings.zoom);
         let first_pose = Pose::of(document.values());
         let mut viewer = Viewer {
+            drive: options.measure.then(Drive::new),
             options,
             document,
             worker,
@@ -157,7 +159,6 @@ impl Viewer {
             fault: None,
             engine: String::new(),
             last_frame: None,
-            drew_continuously: false,
             opened: Instant::now(),
             shot: Shot::NotYet,
             title: String::new(),
@@ -193,6 +194,13 @@ impl Viewer {
         let settled = self.worker.state().settled;
         let shown = self.picture.as_ref().is_some_and(|p| p.serial == self.serial);
         self.asked.is_some() && settled >= self.serial && (shown || self.fault.is_some())
+    }
+
+    /// Whether the picture in the window is of the latest change.
+    pub fn shows_latest(&self) -> bool {
+        self.picture
+            .as_ref()
+            .is_some_and(|p| p.serial == self.serial && Arc::ptr_eq(&p.of, self.document.scene()))
     }
 
     /// The ray that is inspected.
@@ -245,6 +253,10 @@ impl Viewer {
         match &mut self.texture {
             Some(texture) => texture.set(image, smooth),
             None => self.texture = Some(ctx.load_texture("picture", image, smooth)),
+        }
+        if picture.first {
+            // The next frame knows that this one was drawn.
+            ctx.request_repaint();
         }
         self.measured.picture(picture.first.then_some(picture.asked), picture.cost);
         self.picture = Some(picture);
@@ -1013,14 +1025,12 @@ impl eframe::App for Viewer {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         let now = Instant::now();
-        let rendering = self.busy.is_some() && !self.is_settled();
-        let interval = self.last_frame.filter(|_| self.drew_continuously && rendering);
-        let interval = interval.map(|last| (now - last).as_secs_f64());
+        let continuous = self.drive.as_ref().is_some_and(Drive::draws_continuously);
+        let interval = self.last_frame.take().map(|last| (now - last).as_secs_f64());
         self.measured.frame(frame.info().cpu_usage, interval);
-        self.last_frame = Some(now);
+        self.last_frame = (continuous && !self.is_settled()).then_some(now);
         self.show(ui);
-        // Whether the next frame follows at once, so that its delay says something.
-        self.drew_continuously = ctx.has_requested_repaint();
+        self.measure(&ctx);
     }
 }
 
@@ -1057,6 +1067,22 @@ impl Viewer {
         self.life(&ctx);
         if !ctx.input(|i| i.pointer.any_down()) {
             self.document.end_gesture();
+        }
+    }
+
+    /// Goes on with measuring, and closes the window at its end.
+    fn measure(&mut self, ctx: &egui::Context) {
+        let Some(mut drive) = self.drive.take() else { return };
+        match drive.step(self, ctx) {
+            Ok(false) => self.drive = Some(drive),
+            Ok(true) => self.closing = true,
+            Err(e) => {
+                eprintln!("taki: error: {e}");
+                self.closing = true;
+            }
+        }
+        if self.closing {
+            ctx.request_repaint();
         }
     }
 

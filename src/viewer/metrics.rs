@@ -23,8 +23,9 @@ pub struct Report {
     pub volume_preview: Latency,
     /// The window's own frame: its thread's work from the start of one to its hand-over, in all states.
     pub own_frame: Latency,
-    /// From frame to frame while the renderer was at work and the window drew continuously.
-    pub frame_interval_rendering: Latency,
+    /// From frame to frame while the window drew without pause beside the renderer at work: work,
+    /// hand-over and waiting for the screen.
+    pub frame_while_rendering: Latency,
     /// Frames drawn.
     pub frames: u64,
     /// Pictures shown.
@@ -53,6 +54,8 @@ struct Samples {
     intervals: Vec<f64>,
     frames: u64,
     pictures: u64,
+    /// Of a picture that the frame in hand draws.
+    drawn: Option<(Instant, Cost)>,
 }
 
 /// Shared between the window, which measures, and its caller, who reports.
@@ -76,6 +79,9 @@ impl Shared {
         let mut s = self.lock();
         s.start.get_or_insert_with(Instant::now);
         s.frames += 1;
+        if let Some((asked, cost)) = s.drawn.take() {
+            push(&mut s.previews[cost as usize], asked.elapsed().as_secs_f64() * 1e3);
+        }
         if let Some(own) = own {
             push(&mut s.own, f64::from(own) * 1e3);
         }
@@ -84,14 +90,15 @@ impl Shared {
         }
     }
 
-    /// A picture is on its way to the window. `asked`: when its request was made, if it is the first for it.
+    /// A picture is drawn in this frame; it counts as shown when the next one begins. `asked`: when its
+    /// request was made, if it is the first for it.
     pub fn picture(&self, asked: Option<Instant>, cost: Cost) {
         let mut s = self.lock();
         s.pictures += 1;
         if s.first_picture.is_none() {
             s.first_picture = s.start.map(|start| start.elapsed().as_secs_f64() * 1e3);
         } else if let Some(asked) = asked {
-            push(&mut s.previews[cost as usize], asked.elapsed().as_secs_f64() * 1e3);
+            s.drawn = Some((asked, cost));
         }
     }
 
@@ -116,7 +123,7 @@ impl Shared {
             upload_preview: latency(&s.previews[Cost::Upload as usize]),
             volume_preview: latency(&s.previews[Cost::Volume as usize]),
             own_frame: latency(&s.own),
-            frame_interval_rendering: latency(&s.intervals),
+            frame_while_rendering: latency(&s.intervals),
             frames: s.frames,
             pictures: s.pictures,
         }

@@ -6,9 +6,10 @@
 mod app;
 pub mod curves_panel;
 pub mod document;
+mod drive;
 mod gallery;
 pub mod layer_image;
-mod metrics;
+pub mod metrics;
 mod navigate;
 pub mod parameters;
 pub mod ray_panel;
@@ -24,7 +25,6 @@ use std::time::Duration;
 use eframe::{NativeOptions, Renderer, egui};
 
 pub use app::Viewer;
-pub use metrics::Report;
 
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceOptions, adapters};
@@ -50,13 +50,15 @@ pub struct Options {
     pub exit_after: Option<Duration>,
     /// Where the window's picture is written before it closes.
     pub screenshot: Option<PathBuf>,
+    /// Drives itself through changes, measures how quickly the window answers, and closes it.
+    pub measure: bool,
 }
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
 /// If the scene is not valid, or there is no display or nothing that can draw on it.
-pub fn run(options: Options) -> Result<Report> {
+pub fn run(options: Options) -> Result<metrics::Report> {
     // A wrong scene is told on the terminal, before any window.
     document::Document::open(&options.scene, &options.sets, &options.limits)?;
     let (settings, _) = settings::Settings::load(options.settings.as_deref());

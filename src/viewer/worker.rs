@@ -74,7 +74,9 @@ pub struct Picture {
     pub serial: u64,
     /// When that was asked for.
     pub asked: Instant,
-    /// The scene, with the picture's size.
+    /// The scene that was asked for.
+    pub of: Arc<Scene>,
+    /// The same with the picture's size.
     pub scene: Arc<Scene>,
     /// Its volume.
     pub volume: Arc<VolumeTexture>,
@@ -608,6 +610,7 @@ impl Renderer {
         let picture = Picture {
             serial: job.request.serial,
             asked: job.request.asked,
+            of: job.request.scene.clone(),
             scene: Arc::new(scene),
             volume: job.volume.clone(),
             mesh: job.meshes.full.clone(),
