@@ -3,7 +3,6 @@
 
 pub mod gbuffer;
 pub mod integrate;
-pub mod ray;
 pub mod resolve;
 
 use std::ops::Range;
