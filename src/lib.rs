@@ -31,6 +31,8 @@ pub mod mapping;
 pub mod random;
 pub mod scene;
 pub mod shading;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 pub mod volume;
 pub mod walk;
 

@@ -11,6 +11,7 @@ mod flow;
 mod gpu;
 mod mapping;
 mod presets;
+mod ray;
 mod readme;
 mod scene;
 mod shaders;
