@@ -5,10 +5,13 @@ use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::camera::sample_offset;
-use crate::scene::{Light, Mesh, Quad, Scene};
+use crate::gpu::layout::Window;
+use crate::scene::{Image, Light, Mesh, Quad, Scene};
 
-/// The targets of one sample.
+/// The targets of one sample of a part of the image, row by row.
 pub struct Gbuffer {
+    /// The part.
+    pub window: Window,
     /// Radiance of the opaque scene or background, and metres from the eye (0: background).
     pub opaque: Vec<[f32; 4]>,
     /// Its normal.
@@ -32,19 +35,26 @@ struct ScreenTriangle {
 /// What covers a pixel: depth (reversed, 0 is far), and the triangle's place in the list plus 1.
 type Covered = (f32, u32);
 
-/// Fills the targets with sample `sample`.
+/// Fills the targets of the whole image with sample `sample`.
 pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
+    let Image { width, height, .. } = scene.image;
+    run_window(scene, mesh, Window { x: 0, y: 0, width, height }, sample)
+}
+
+/// Fills the targets of a window inside the image with sample `sample`, with the same bits as those of
+/// the whole image.
+pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gbuffer {
     let image = &scene.image;
-    let (width, height) = (image.width as usize, image.height as usize);
+    let (width, height) = (window.width as usize, window.height as usize);
     let offset = sample_offset(sample, image.samples);
     let clip_from_world = scene.camera.clip_from_world(image.width, image.height, offset);
     let near = scene.camera.near as f64;
     let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {
         let clip = corners.map(|p| clip_from_world * p.extend(1.0));
         clip_near(clip, scene.camera.near, |part| {
-            let triangle = to_screen(part, width, height, id);
+            let triangle = to_screen(part, image.width as usize, image.height as usize, id);
             // Most triangles of a fine mesh lie between the pixels' centres.
-            if triangle.covers_centres(width, height) {
+            if triangle.covers_centres(window) {
                 out.push(triangle);
             }
         });
@@ -71,11 +81,12 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
         project([a, c, d], i as u32, &mut water);
     }
     let rows = 16.min(height);
-    let rock_bins = bins(&rock, height, rows);
-    let water_bins = bins(&water, height, rows);
+    let rock_bins = bins(&rock, window, rows);
+    let water_bins = bins(&water, window, rows);
 
     let eye_plane: Vec<Vec3> = scene.quads.iter().map(|q| eye_in_plane(q, scene.camera.eye)).collect();
     let mut out = Gbuffer {
+        window,
         opaque: vec![[0.0; 4]; width * height],
         normal: vec![Vec3::ZERO; width * height],
         surface: vec![[0.0; 3]; width * height],
@@ -89,24 +100,23 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
         .zip(out.quad_id.par_chunks_mut(band))
         .enumerate()
         .for_each(|(i, (((opaque, normal), surface), quad_id))| {
-            let first_row = i * rows;
-            let ray = |k: usize| {
-                let pixel = [(k % width) as u32, (first_row + k / width) as u32];
-                scene.camera.view_ray(image.width, image.height, pixel, offset)
-            };
+            let band =
+                Window { y: window.y + (i * rows) as u32, height: (opaque.len() / width) as u32, ..window };
+            let pixel = |k: usize| [band.x + (k % width) as u32, band.y + (k / width) as u32];
+            let ray = |k: usize| scene.camera.view_ray(image.width, image.height, pixel(k), offset);
             let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
-            rasterise(&rock, &rock_bins[i], near, width, first_row, &mut covered);
+            rasterise(&rock, &rock_bins[i], near, band, &mut covered);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id == 0 {
                     opaque[k] = scene.background.radiance(ray(k)).extend(0.0).to_array();
                 } else {
                     let triangle = &rock[id as usize - 1];
-                    let pixel = [(k % width) as f64 + 0.5, (first_row + k / width) as f64 + 0.5];
+                    let centre = pixel(k).map(|p| p as f64 + 0.5);
                     let corner = mesh.indices[3 * triangle.id as usize..][..3]
                         .iter()
                         .map(|&v| mesh.vertices[v as usize]);
                     let corner: Vec<_> = corner.collect();
-                    let weights = triangle.weights_at(pixel).to_array();
+                    let weights = triangle.weights_at(centre).to_array();
                     let mix = |get: fn(&crate::scene::Vertex) -> [f32; 3]| {
                         (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
                     };
@@ -117,7 +127,7 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
                 }
             }
             covered.iter_mut().for_each(|c| c.1 = 0);
-            rasterise(&water, &water_bins[i], near, width, first_row, &mut covered);
+            rasterise(&water, &water_bins[i], near, band, &mut covered);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id != 0 {
                     let quad = water[id as usize - 1].id;
@@ -229,10 +239,20 @@ impl ScreenTriangle {
         self.edge(2, [self.x[2], self.y[2]])
     }
 
-    /// Whether it has an area and its bounding box holds a pixel's centre of the image.
-    fn covers_centres(&self, width: usize, height: usize) -> bool {
-        let ((x0, x1), (y0, y1)) = (centres(self.x, width), centres(self.y, height));
+    /// Whether it has an area and its bounding box holds a pixel's centre of the window.
+    fn covers_centres(&self, window: Window) -> bool {
+        let ((x0, x1), (y0, y1)) = self.centres(window);
         self.area() > 0.0 && x0 < x1 && y0 < y1
+    }
+
+    /// The half-open ranges of the columns and rows of the window whose centres its bounding box holds.
+    fn centres(&self, window: Window) -> ((usize, usize), (usize, usize)) {
+        let range = |v: [f64; 3], first: u32, count: u32| {
+            let low = (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(first as f64);
+            let high = (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
+            (low as usize, (high.max(0.0) as usize).min((first + count) as usize))
+        };
+        (range(self.x, window.x, window.width), range(self.y, window.y, window.height))
     }
 
     /// Whether a point on edge i belongs to this triangle: it does on top and left edges.
@@ -250,50 +270,42 @@ impl ScreenTriangle {
     }
 }
 
-/// For each band of `rows` rows the numbers of the triangles that reach into it, in order.
-fn bins(triangles: &[ScreenTriangle], height: usize, rows: usize) -> Vec<Vec<u32>> {
-    let mut bins = vec![Vec::new(); height.div_ceil(rows)];
+/// For each band of `rows` rows of the window the numbers of the triangles that reach into it, in order.
+fn bins(triangles: &[ScreenTriangle], window: Window, rows: usize) -> Vec<Vec<u32>> {
+    let mut bins = vec![Vec::new(); (window.height as usize).div_ceil(rows)];
     for (number, t) in triangles.iter().enumerate() {
-        let (y0, y1) = centres(t.y, height);
-        for bin in &mut bins[y0 / rows..=(y1 - 1) / rows] {
+        let (_, rows_met) = t.centres(window);
+        let [first, last] = [rows_met.0, rows_met.1 - 1].map(|y| (y - window.y as usize) / rows);
+        for bin in &mut bins[first..=last] {
             bin.push(number as u32);
         }
     }
     bins
 }
 
-/// The half-open range of pixel centres between the least and the largest of `v`, inside 0..n.
-fn centres(v: [f64; 3], n: usize) -> (usize, usize) {
-    let low = (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(0.0);
-    let high = (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
-    (low as usize, (high.max(0.0) as usize).min(n))
-}
-
-/// Draws triangles into the rows from `first_row` on that `covered` holds; nearer ones win, the first
-/// of equals stays.
+/// Draws triangles into the band of rows that `covered` holds; nearer ones win, the first of equals
+/// stays.
 fn rasterise(
     triangles: &[ScreenTriangle],
     numbers: &[u32],
     near: f64,
-    width: usize,
-    first_row: usize,
+    band: Window,
     covered: &mut [Covered],
 ) {
-    let rows = covered.len() / width;
+    let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
     for &number in numbers {
         let t = &triangles[number as usize];
         let area = t.area();
-        let (y0, y1) = centres(t.y, first_row + rows);
-        let (x0, x1) = centres(t.x, width);
+        let ((x0, x1), (y0, y1)) = t.centres(band);
         let owns = [0, 1, 2].map(|i| t.owns_edge(i));
-        for y in y0.max(first_row)..y1 {
+        for y in y0..y1 {
             for x in x0..x1 {
                 let p = [x as f64 + 0.5, y as f64 + 0.5];
                 let e = [0, 1, 2].map(|i| t.edge(i, p));
                 if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
                     let inverse_w = (0..3).map(|i| e[i] * t.inverse_w[i]).sum::<f64>() / area;
                     let depth = (near * inverse_w) as f32;
-                    let slot = &mut covered[(y - first_row) * width + x];
+                    let slot = &mut covered[(y - top) * width + x - left];
                     if depth > slot.0 {
                         *slot = (depth, number + 1);
                     }

@@ -9,7 +9,7 @@ use crate::mapping::CellFrame;
 use crate::scene::{AngleFrame, Attenuation, Scene, Visibility};
 use crate::shading::{Metric, fibre_angles, specular_power};
 use crate::volume::{Cell, VolumeTexture};
-use crate::walk::Walk;
+use crate::walk::{Crossing, Walk};
 
 /// What all pixels of a frame share.
 pub struct Integrator<'a> {
@@ -32,6 +32,19 @@ pub struct Traced {
     /// Cells of the view ray and of its light rays.
     pub cells: [u32; 2],
 }
+
+/// Watches a ray on its way, cell by cell. With the empty one, `()`, nothing is left of it.
+pub trait Observer {
+    /// The ray is in a cell, empty or not, and has `transmittance` left.
+    fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _transmittance: f32) {}
+    /// The cell sends this much of the ambient light to the eye.
+    fn ambient(&mut self, _radiance: Vec3) {}
+    /// The cell sees the next of the scene's lights by `_visibility` (V), and sends this much of it to
+    /// the eye.
+    fn light(&mut self, _visibility: f32, _radiance: Vec3) {}
+}
+
+impl Observer for () {}
 
 /// One light as a ray sees it.
 #[derive(Clone, Copy)]
@@ -58,10 +71,16 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// One pixel (column, row) of sample `sample`.
-    pub fn pixel(&self, gbuffer: &Gbuffer, pixel: [u32; 2], sample: u32) -> Traced {
+    /// One pixel (column, row of the whole image, inside the window of `gbuffer`) of sample `sample`.
+    pub fn pixel<O: Observer>(
+        &self,
+        gbuffer: &Gbuffer,
+        pixel: [u32; 2],
+        sample: u32,
+        observer: &mut O,
+    ) -> Traced {
         let image = &self.scene.image;
-        let i = pixel[1] as usize * image.width as usize + pixel[0] as usize;
+        let i = gbuffer.window.index(pixel);
         let behind = Vec3::from_slice(&gbuffer.opaque[i]);
         match gbuffer.quad_id[i] {
             0 => Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] },
@@ -72,14 +91,21 @@ impl<'a> Integrator<'a> {
                     pixel,
                     sample_offset(sample, image.samples),
                 );
-                self.trace(id as usize - 1, d, gbuffer.surface[i], behind)
+                self.trace(id as usize - 1, d, gbuffer.surface[i], behind, observer)
             }
         }
     }
 
     /// Walks the volume of quad number `quad` from its point `hit` = (u, v, metres) along the world
     /// direction `d_world`.
-    pub fn trace(&self, quad: usize, d_world: Vec3, hit: [f32; 3], behind: Vec3) -> Traced {
+    pub fn trace<O: Observer>(
+        &self,
+        quad: usize,
+        d_world: Vec3,
+        hit: [f32; 3],
+        behind: Vec3,
+        observer: &mut O,
+    ) -> Traced {
         let scene = self.scene;
         let quad = &scene.quads[quad];
         let map = &quad.map;
@@ -134,6 +160,7 @@ impl<'a> Integrator<'a> {
             }
             walked[0] += 1;
             let cell = self.cell(crossing.cell);
+            observer.enter(&crossing, cell, transmittance);
             if cell.rho_code() == 0 {
                 continue;
             }
@@ -143,6 +170,7 @@ impl<'a> Integrator<'a> {
             }
             let passed = transmittance * (-tau_bits).exp2();
             let weight = transmittance - passed;
+            observer.ambient(scene.ambient * weight);
 
             let (k_d, k_s) = cell.k_codes();
             let v = cell.v_code();
@@ -155,7 +183,9 @@ impl<'a> Integrator<'a> {
                     Visibility::None => 1.0,
                     Visibility::March => self.visibility(crossing.cell, light.l_cell, &mut walked[1]),
                 };
-                light.sum += weight * seen * psi;
+                let lit = weight * seen * psi;
+                light.sum += lit;
+                observer.light(seen, light.intensity * (lit * (1.0 / 255.0)));
             }
             transmittance = passed;
         }

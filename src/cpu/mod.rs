@@ -3,6 +3,7 @@
 
 pub mod gbuffer;
 pub mod integrate;
+pub mod ray;
 pub mod resolve;
 
 use std::ops::Range;
@@ -65,7 +66,7 @@ pub fn render_samples(
             .enumerate()
             .try_for_each(|(y, (radiance, counts))| {
                 for x in 0..width {
-                    let traced = integrator.pixel(&gbuffer, [x as u32, y as u32], sample);
+                    let traced = integrator.pixel(&gbuffer, [x as u32, y as u32], sample, &mut ());
                     let new = traced.radiance.extend(traced.transmittance).to_array();
                     radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
                     counts[x] = [0, 1].map(|c| counts[x][c] + traced.cells[c]);

@@ -26,6 +26,13 @@ pub struct Window {
     pub height: u32,
 }
 
+impl Window {
+    /// The place of a pixel of the image, which lies inside, among those of the window, row by row.
+    pub fn index(&self, pixel: [u32; 2]) -> usize {
+        (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
+    }
+}
+
 /// Uniforms of one sample of one window.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

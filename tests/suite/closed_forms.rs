@@ -63,7 +63,7 @@ fn slanted(degrees: f64, around: f64) -> Vec3 {
 }
 
 fn trace(scene: &Scene, volume: &VolumeTexture, d: Vec3, uv: [f32; 2], behind: Vec3) -> Traced {
-    Integrator::new(scene, volume).trace(0, d, [uv[0], uv[1], 3.0], behind)
+    Integrator::new(scene, volume).trace(0, d, [uv[0], uv[1], 3.0], behind, &mut ())
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod gpu;
 mod looking;
 mod mapping;
 mod presets;
+mod ray;
 mod readme;
 mod scene;
 mod shaders;

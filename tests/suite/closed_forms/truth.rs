@@ -158,7 +158,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
                 Light::Point { position, intensity: Vec3::new(0.2, 0.9, 1.4) },
             ];
             let behind = Vec3::new(0.3, 0.0, 2.0);
-            let own = Integrator::new(&scene, &volume).trace(0, d, [uv[0], uv[1], distance], behind);
+            let own = Integrator::new(&scene, &volume).trace(0, d, [uv[0], uv[1], distance], behind, &mut ());
             let x = x.as_dvec3();
             let truth = trace(&scene, &volume, d.as_dvec3(), uv.map(f64::from), x, behind.as_dvec3());
             // A cell met for no length has no weight but with per-cell attenuation.

@@ -1,0 +1,268 @@
+//! The inspector of one pixel: what its ray meets behind the face, as curves over the depth and as a
+//! table of cells.
+
+use eframe::egui::{
+    Align, Color32, Grid, Label, Layout, Rangef, RichText, ScrollArea, TextStyle, TextWrapMode, Ui, Vec2b,
+    vec2,
+};
+use egui_extras::{Column, TableBuilder};
+use egui_plot::{AxisHints, HoverPosition, Line, Plot, PlotPoints, Span, VLine};
+use glam::Vec3;
+
+use crate::cpu::ray::{RayReport, RayStep};
+
+/// Rec. 709 weights of linear RGB.
+const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+/// Height of a plot without its axis, points: three of them and some rows fit a laptop's screen.
+const PLOT_HEIGHT: f32 = 76.0;
+/// Room for the depth axis: its figures and its label.
+const AXIS_HEIGHT: f32 = 34.0;
+/// Room for a plot's own figures: the same for all, so that their depths lie under one another.
+const FIGURES_WIDTH: f32 = 48.0;
+/// Size of the table's figures and of the plots' titles, points: a row of the table is wide.
+const SMALL: f32 = 11.0;
+/// Heads, widths in points and meanings of the table's columns.
+const COLUMNS: [(&str, f32, &str); 10] = [
+    ("#", 22.0, "Place of the cell on the ray, from 0"),
+    ("x  y  z", 58.0, "The cell in the volume"),
+    ("from – to m", 96.0, "Where the ray enters and leaves the cell, metres behind the face"),
+    ("ρ", 36.0, "Density, α·ρ"),
+    ("T", 36.0, "Transmittance before the cell"),
+    ("radiance", 134.0, "Linear RGB the cell adds towards the eye, ambient light included"),
+    ("V", 36.0, "Attenuation towards each light"),
+    ("v", 112.0, "Direction of the flow in the volume"),
+    ("k_d", 30.0, "Diffuse reflection coefficient"),
+    ("k_s", 30.0, "Specular reflection coefficient"),
+];
+
+/// Shows a pixel's report in the space there is.
+pub fn show(ui: &mut Ui, report: &RayReport) {
+    headline(ui, report);
+    if report.steps.is_empty() {
+        ui.add_space(8.0);
+        ui.label("No water covers this pixel: its ray goes straight to the rock or the background.");
+        return;
+    }
+    // What the pointer is on: a row marks its cell in the plots, a depth in a plot its row.
+    let pointed_row = ui.scope_id().with("pointed row");
+    let row: Option<usize> = ui.data(|data| data.get_temp(pointed_row)).flatten();
+    let marked = row.and_then(|row| report.steps.get(row));
+    let depth = plots(ui, report, marked);
+    let selected =
+        depth.and_then(|m| report.steps.iter().position(|s| (s.enter_m..s.exit_m).contains(&(m as f32))));
+    ui.add_space(4.0);
+    let rows = rows(ui, report);
+    let hovered = table(ui, report, &rows, selected);
+    if hovered != row {
+        ui.data_mut(|data| data.insert_temp(pointed_row, hovered));
+        ui.request_repaint();
+    }
+}
+
+/// The cells that the table lists: those with water, or all if a box above it says so.
+fn rows(ui: &mut Ui, report: &RayReport) -> Vec<usize> {
+    let key = ui.scope_id().with("empty too");
+    let mut all: bool = ui.data(|data| data.get_temp(key)).unwrap_or(false);
+    let wet: Vec<usize> = (0..report.steps.len()).filter(|&i| report.steps[i].rho > 0.0).collect();
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(format!("{} cells, {} with water", report.steps.len(), wet.len())).strong());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.checkbox(&mut all, "list empty cells").changed() {
+                ui.data_mut(|data| data.insert_temp(key, all));
+            }
+        });
+    });
+    if all { (0..report.steps.len()).collect() } else { wet }
+}
+
+/// The pixel in a few figures.
+fn headline(ui: &mut Ui, report: &RayReport) {
+    let [x, y] = report.pixel;
+    ui.heading(format!("Pixel {x}, {y}"));
+    ui.add_space(2.0);
+    let pair = |ui: &mut Ui, name: &str, value: String| {
+        ui.label(RichText::new(name).weak());
+        ui.add(Label::new(value).wrap_mode(TextWrapMode::Extend));
+    };
+    Grid::new("headline").num_columns(4).spacing([12.0, 4.0]).show(ui, |ui| {
+        pair(ui, "radiance", triple(report.radiance));
+        pair(ui, "transmittance", figure(report.transmittance));
+        ui.end_row();
+        pair(ui, "behind", triple(report.behind));
+        pair(ui, "depth", report.face.map_or("–".into(), |f| format!("{:.3} m", f.depth_m)));
+        ui.end_row();
+        if let Some(face) = &report.face {
+            let [u, v] = face.uv;
+            pair(ui, "quad", format!("{}   u {u:.4}   v {v:.4}", face.quad));
+            pair(ui, "cells", format!("{}, {} on the way to lights", report.cells[0], report.cells[1]));
+            ui.end_row();
+        }
+    });
+}
+
+/// Density, transmittance and radiance over the depth; the depth under the pointer.
+fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f64> {
+    let dark = ui.visuals().dark_mode;
+    let color = |on_dark: [u8; 3], on_light: [u8; 3]| {
+        let [r, g, b] = if dark { on_dark } else { on_light };
+        Color32::from_rgb(r, g, b)
+    };
+    let density = steps(&report.steps, |s| s.rho);
+    let radiance = steps(&report.steps, |s| s.radiance.dot(LUMINANCE));
+    let mut transmittance: Vec<[f64; 2]> =
+        report.steps.iter().map(|s| [s.enter_m as f64, s.transmittance as f64]).collect();
+    if let Some(last) = report.steps.last() {
+        transmittance.push([last.exit_m as f64, report.transmittance as f64]);
+    }
+    let group = ui.scope_id().with("depth");
+    let plots = [
+        ("density α·ρ", density, color([110, 180, 255], [20, 100, 190]), None),
+        ("transmittance T", transmittance, color([255, 170, 90], [190, 90, 0]), Some(1.0)),
+        ("radiance added (luminance)", radiance, color([150, 220, 130], [40, 130, 30]), None),
+    ];
+    let mut depth = None;
+    let last = plots.len() - 1;
+    for (i, (name, points, color, top)) in plots.into_iter().enumerate() {
+        ui.add_space(4.0);
+        let peak = points.iter().map(|p| p[1] as f32).fold(0.0, f32::max);
+        ui.label(RichText::new(format!("{name}, up to {}", figure(peak))).size(SMALL).color(color));
+        let plot = Plot::new(name)
+            .height(if i == last { PLOT_HEIGHT + AXIS_HEIGHT } else { PLOT_HEIGHT })
+            // The last figure of the axis stands half beyond it.
+            .width(ui.available_width() - 10.0)
+            .link_axis(group, Vec2b::new(true, false))
+            .link_cursor(group, Vec2b::new(true, false))
+            .show_axes(Vec2b::new(i == last, true))
+            .custom_x_axes(vec![
+                AxisHints::new_x().label("metres behind the face").label_spacing(Rangef::new(24.0, 32.0)),
+            ])
+            .custom_y_axes(vec![
+                AxisHints::new_y().min_thickness(FIGURES_WIDTH).label_spacing(Rangef::new(12.0, 18.0)),
+            ])
+            // The wheel is the panel's.
+            .allow_scroll(false)
+            .allow_boxed_zoom(false)
+            .allow_axis_zoom_drag(false)
+            .allow_drag(Vec2b::new(true, false))
+            .allow_zoom(Vec2b::new(true, false))
+            .set_margin_fraction(vec2(0.0, 0.08))
+            .include_y(0.0)
+            .label_formatter(move |at| {
+                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) =
+                    at;
+                Some(format!("{:.4} m\n{}", position.x, figure(position.y as f32)))
+            });
+        let plot = match top {
+            Some(top) => plot.include_y(top),
+            None => plot,
+        };
+        let mark = marked.map(|step| (step.enter_m as f64, step.exit_m as f64));
+        let weak = ui.visuals().weak_text_color();
+        let shown = plot.show(ui, |plot| {
+            if let Some((enter, exit)) = mark {
+                plot.span(Span::new("", enter..=exit).fill(weak.gamma_multiply(0.25)).border_width(0.0));
+                plot.vline(VLine::new("", enter).color(weak).allow_hover(false));
+            }
+            let line = Line::new(name, PlotPoints::new(points)).color(color);
+            // A band would round the steps off.
+            plot.line(line.allow_band(false).fill(0.0).fill_alpha(0.15));
+            plot.pointer_coordinate().filter(|_| plot.response().hovered())
+        });
+        depth = depth.or(shown.inner.map(|p| p.x));
+    }
+    depth
+}
+
+/// A value of each cell from where the ray enters it to where it leaves it.
+fn steps(steps: &[RayStep], value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
+    steps.iter().flat_map(|s| [s.enter_m, s.exit_m].map(|metres| [metres as f64, value(s) as f64])).collect()
+}
+
+/// The cells `rows`, of which `selected` is shown as such; the one under the pointer.
+fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize>) -> Option<usize> {
+    let mut hovered = None;
+    let row_height = ui.text_style_height(&TextStyle::Monospace) + 2.0;
+    ScrollArea::horizontal().id_salt("cells").show(ui, |ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        let height = ui.available_height();
+        let mut table = TableBuilder::new(ui)
+            .id_salt("cells")
+            .striped(true)
+            .resizable(true)
+            .auto_shrink(false)
+            .min_scrolled_height(3.0 * row_height)
+            .max_scroll_height(height)
+            .cell_layout(Layout::right_to_left(Align::Center));
+        for (_, width, _) in COLUMNS {
+            table = table.column(Column::initial(width).at_least(width.min(36.0)).clip(true));
+        }
+        if let Some(row) = selected.and_then(|number| rows.iter().position(|&row| row == number)) {
+            table = table.scroll_to_row(row, None);
+        }
+        table
+            .header(row_height + 2.0, |mut header| {
+                for (name, _, tip) in COLUMNS {
+                    header.col(|ui| {
+                        ui.add(
+                            Label::new(RichText::new(name).size(SMALL + 1.0).strong())
+                                .wrap_mode(TextWrapMode::Extend),
+                        )
+                        .on_hover_text(tip);
+                    });
+                }
+            })
+            .body(|body| {
+                body.rows(row_height, rows.len(), |mut row| {
+                    let number = rows[row.index()];
+                    let step = &report.steps[number];
+                    row.set_selected(selected == Some(number));
+                    for text in cells(number, step) {
+                        row.col(|ui| {
+                            // What is empty steps back.
+                            let text = RichText::new(text).monospace().size(SMALL);
+                            let text = if step.rho > 0.0 { text } else { text.weak() };
+                            ui.add(Label::new(text).wrap_mode(TextWrapMode::Extend).selectable(false));
+                        });
+                    }
+                    if row.response().hovered() {
+                        hovered = Some(number);
+                    }
+                });
+            });
+    });
+    hovered
+}
+
+/// A row of the table, in the order of [`COLUMNS`].
+fn cells(number: usize, step: &RayStep) -> [String; 10] {
+    let [x, y, z] = step.cell;
+    let occupied = step.rho > 0.0;
+    let only = |text: String| if occupied { text } else { String::new() };
+    [
+        number.to_string(),
+        format!("{x:>2} {y:>2} {z:>2}"),
+        format!("{:.4}–{:.4}", step.enter_m, step.exit_m),
+        only(format!("{:.3}", step.rho)),
+        format!("{:.3}", step.transmittance),
+        only(triple(step.radiance)),
+        step.visibility.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(" "),
+        only(format!("{:>5.2} {:>5.2} {:>5.2}", step.v.x, step.v.y, step.v.z)),
+        only(format!("{:.2}", step.k_d)),
+        only(format!("{:.2}", step.k_s)),
+    ]
+}
+
+fn triple(x: Vec3) -> String {
+    format!("{} {} {}", figure(x.x), figure(x.y), figure(x.z))
+}
+
+/// Three or four digits of a number of any size.
+fn figure(x: f32) -> String {
+    match x.abs() {
+        0.0 => "0".into(),
+        a if !(1e-3..1e4).contains(&a) => format!("{x:.1e}"),
+        a if a < 10.0 => format!("{x:.4}"),
+        a if a < 100.0 => format!("{x:.3}"),
+        _ => format!("{x:.1}"),
+    }
+}
