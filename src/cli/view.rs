@@ -26,6 +26,9 @@ pub struct ViewArgs {
     /// the viewer answered.
     #[arg(long, conflicts_with = "exit_after")]
     measure: bool,
+    /// Takes the window's GPU device away after this many seconds, as a driver's reset does.
+    #[arg(long, hide = true, value_name = "SECONDS", value_parser = seconds)]
+    lose_window_after: Option<f64>,
     /// At the end prints how quickly the viewer answered, as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -44,6 +47,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         exit_after: args.exit_after.map(Duration::from_secs_f64),
         screenshot: args.screenshot.clone(),
         measure: args.measure,
+        lose_window_after: args.lose_window_after.map(Duration::from_secs_f64),
     })?;
     if args.json || args.measure {
         say(&serde_json::json!(report).to_string());

@@ -14,14 +14,15 @@ use super::gallery::Gallery;
 use super::layer_image::show_legend;
 use super::metrics;
 use super::navigate::Pose;
-use super::parameters::{Costs, ParameterPanel, name};
+use super::parameters::{Costs, ParameterPanel, cost_color, name};
+use super::probe::{Aim, Probe};
 use super::settings::{Settings, Theme};
 use super::transfer::{ExportAnswer, ExportDialog, PathDialog, Purpose, UnsavedAnswer, ask_unsaved};
 use super::viewport::{self, Shown, Tool};
 use super::volume_panel::VolumePanel;
 use super::worker::{Busy, Export, Message, MessageKind, Picture, Request, Worker};
-use super::{Options, ray_panel};
-use crate::cpu::ray::{RayReport, inspect};
+use super::{Kept, Loss, Options, ray_panel};
+use crate::cpu::ray::RayReport;
 use crate::error::{Error, Result, human_bytes};
 use crate::frame::Layer;
 use crate::scene::{Raw, Scene};
@@ -57,6 +58,7 @@ pub struct Viewer {
     worker: Worker,
     settings: Settings,
     measured: metrics::Shared,
+    loss: Loss,
 
     parameters: ParameterPanel,
     volume_panel: VolumePanel,
@@ -78,6 +80,7 @@ pub struct Viewer {
     /// The inspected place in the image, and its ray.
     marked: Option<[f32; 2]>,
     ray: Option<RayReport>,
+    probe: Probe,
     playing: bool,
     /// The camera as the scene was opened.
     first_pose: Pose,
@@ -107,13 +110,26 @@ enum Shot {
 }
 
 impl Viewer {
-    /// A viewer in a window's context.
+    /// A viewer in a window's context; `kept`: what an earlier window left.
     ///
     /// # Errors
     /// If the scene cannot be opened.
-    pub fn new(ctx: &egui::Context, options: Options, measured: metrics::Shared) -> Result<Viewer> {
+    pub fn new(
+        ctx: &egui::Context,
+        mut options: Options,
+        measured: metrics::Shared,
+        loss: Loss,
+        kept: Option<Kept>,
+    ) -> Result<Viewer> {
         let (mut settings, note) = Settings::load(options.settings.as_deref());
-        let document = Document::open(&options.scene, &options.sets, &options.limits)?;
+        let again = kept.is_some();
+        if again {
+            options.lose_window_after = None;
+        }
+        let document = match kept {
+            Some(kept) => kept.document,
+            None => Document::open(&options.scene, &options.sets, &options.limits)?,
+        };
         if let Some(path) = &document.path {
             settings.remember(path);
         }
@@ -131,6 +147,7 @@ impl Viewer {
             worker,
             settings,
             measured,
+            loss,
             parameters: ParameterPanel::default(),
             volume_panel: VolumePanel::default(),
             curves_panel: CurvesPanel::default(),
@@ -148,6 +165,7 @@ impl Viewer {
             inspector: Inspector::default(),
             marked: None,
             ray: None,
+            probe: Probe::default(),
             playing: false,
             first_pose,
             serial: 0,
@@ -165,6 +183,12 @@ impl Viewer {
         };
         if let Some(note) = note {
             viewer.say(MessageKind::Warning, note);
+        }
+        if again {
+            viewer.say(
+                MessageKind::Warning,
+                "the window's GPU device was lost; the window was opened anew with all of the scene",
+            );
         }
         Ok(viewer)
     }
@@ -191,6 +215,9 @@ impl Viewer {
 
     /// Whether everything that was asked for is shown.
     pub fn is_settled(&self) -> bool {
+        if self.probe.is_busy() {
+            return false;
+        }
         let settled = self.worker.state().settled;
         let shown = self.picture.as_ref().is_some_and(|p| p.serial == self.serial);
         self.asked.is_some() && settled >= self.serial && (shown || self.fault.is_some())
@@ -293,19 +320,28 @@ impl Viewer {
             && self.settings.inspectors
             && self.inspector == Inspector::Pixel
         {
-            self.ray = self.ray_at(place);
+            self.ask(Aim::Inspect, place);
         }
     }
 
-    /// The ray through a place in the image, at full resolution.
-    fn ray_at(&self, [x, y]: [f32; 2]) -> Option<RayReport> {
-        let picture = self.picture.as_ref()?;
-        let size = self.asked.as_ref().map(|asked| asked.1)?;
-        let mut scene = (*picture.scene).clone();
-        [scene.image.width, scene.image.height] = size;
-        let pixel = [(x * size[0] as f32) as u32, (y * size[1] as f32) as u32];
-        let pixel = [pixel[0].min(size[0] - 1), pixel[1].min(size[1] - 1)];
-        Some(inspect(&scene, &picture.volume, &picture.mesh, pixel))
+    /// Asks for the ray through a place in the image, at full resolution.
+    fn ask(&mut self, aim: Aim, place: [f32; 2]) {
+        if let (Some(picture), Some((_, size, ..))) = (&self.picture, &self.asked) {
+            self.probe.ask(aim, picture, *size, place);
+        }
+    }
+
+    fn receive_rays(&mut self, ctx: &egui::Context) {
+        match self.probe.answer(ctx) {
+            Some((Aim::Inspect, ray)) => self.ray = Some(ray),
+            Some((Aim::Focus, ray)) => {
+                if let Some(point) = ray.surface_point() {
+                    let pose = Pose::of(self.document.values()).focus(point.as_dvec3());
+                    self.move_camera(pose, None);
+                }
+            }
+            None => {}
+        }
     }
 
     // ---- Scenes ---------------------------------------------------------------------------------------
@@ -611,7 +647,7 @@ impl Viewer {
     }
 
     fn toolbar(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             for (tool, text, key, what) in Tool::ALL {
                 let able = tool != Tool::Light || viewport::has_directional(self.document.scene());
                 let button = ui.add_enabled(able, egui::Button::selectable(self.tool == tool, text));
@@ -657,13 +693,17 @@ impl Viewer {
                     }
                 });
             name(&combo.response, "Refine to");
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let inspectors = ui.selectable_label(self.settings.inspectors, "Inspectors");
-                if inspectors.on_hover_text("Show or hide the inspectors (V)").clicked() {
-                    self.settings.inspectors = !self.settings.inspectors;
+            ui.separator();
+            for (on, text, what) in [
+                (&mut self.settings.parameters, "Parameters", "Show or hide the parameters (Tab)"),
+                (&mut self.settings.inspectors, "Inspectors", "Show or hide the inspectors (V)"),
+            ] {
+                if ui.selectable_label(*on, text).on_hover_text(what).clicked() {
+                    *on = !*on;
                 }
-                self.progress(ui);
-            });
+            }
+            ui.separator();
+            self.progress(ui);
         });
     }
 
@@ -673,6 +713,8 @@ impl Viewer {
         if let Some(busy) = self.busy
             && (working || self.exporting)
         {
+            let text = RichText::new(busy.what).small();
+            ui.add(egui::ProgressBar::new(busy.share).desired_width(110.0).text(text));
             let stop = ui.button("Stop").on_hover_text("Stop the work in hand (Esc)");
             if stop.clicked() {
                 if self.exporting {
@@ -681,8 +723,6 @@ impl Viewer {
                     self.worker.stop();
                 }
             }
-            let text = RichText::new(busy.what).small();
-            ui.add(egui::ProgressBar::new(busy.share).desired_width(110.0).text(text));
         } else if let Some(picture) = &self.picture {
             let samples = picture.samples;
             let text = if samples == 1 { "1 sample".into() } else { format!("{samples} samples") };
@@ -760,9 +800,11 @@ impl Viewer {
                 "The window's own work a frame: median {:.1} ms, 95 in 100 below {:.1} ms",
                 frames.median, frames.p95
             ));
-            if let Some(ms) = self.measured.last_preview() {
-                ui.label(format!("preview {ms:.0} ms"))
-                    .on_hover_text("From the last change of a uniform to its first picture");
+            if let (Some(ms), Some(picture)) = (self.measured.last_preview(), &self.picture) {
+                let color = cost_color(ui, picture.cost);
+                let text = format!("{}: preview in {ms:.0} ms", picture.cost.word());
+                ui.label(RichText::new(text).color(color))
+                    .on_hover_text("What the last change cost, and the time to its first picture");
             }
         });
     }
@@ -770,7 +812,7 @@ impl Viewer {
     fn show_banners(&mut self, ctx: &egui::Context, at: egui::Rect) {
         self.banners.retain(|(m, since)| m.kind != MessageKind::Note || since.elapsed() < NOTE_TIME);
         let mut lines: Vec<(MessageKind, String, Option<usize>)> = Vec::new();
-        let faults = self.document.fault().map(ToString::to_string).into_iter().chain(self.fault.clone());
+        let faults = self.document.fault().map(str::to_owned).into_iter().chain(self.fault.clone());
         lines.extend(faults.map(|fault| (MessageKind::Error, fault, None)));
         let first = self.banners.len().saturating_sub(MAX_BANNERS);
         let newest = self.banners.iter().enumerate().skip(first);
@@ -890,6 +932,10 @@ impl Viewer {
     // ---- The window's life ----------------------------------------------------------------------------
 
     fn life(&mut self, ctx: &egui::Context) {
+        if self.loss.happened() && !self.closing {
+            self.loss.keep(Kept { document: self.document.clone() });
+            self.closing = true;
+        }
         let title =
             format!("{}{} — taki", if self.document.is_changed() { "• " } else { "" }, self.document.name);
         if title != self.title {
@@ -1031,6 +1077,12 @@ impl eframe::App for Viewer {
         self.last_frame = (continuous && !self.is_settled()).then_some(now);
         self.show(ui);
         self.measure(&ctx);
+        if self.options.lose_window_after.is_some_and(|after| self.opened.elapsed() > after)
+            && let Some(state) = frame.wgpu_render_state()
+        {
+            self.options.lose_window_after = None;
+            state.device.destroy();
+        }
     }
 }
 
@@ -1046,6 +1098,7 @@ impl Viewer {
         self.flow(&ctx);
 
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui));
+        egui::Panel::top("toolbar").show(ui, |ui| self.toolbar(ui));
         egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
         if self.settings.parameters {
             let costs = Costs { volume_seconds: self.worker.state().volume_seconds };
@@ -1060,7 +1113,6 @@ impl Viewer {
                 self.inspectors(ui);
             });
         }
-        egui::Panel::top("toolbar").show(ui, |ui| self.toolbar(ui));
         let central = egui::CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.show_banners(&ctx, central.response.rect);
         self.windows(&ctx);
@@ -1121,12 +1173,11 @@ impl Viewer {
             self.marked = Some(place);
             self.inspect_again();
         }
-        if let Some(place) = actions.focus
-            && let Some(point) = self.ray_at(place).and_then(|ray| ray.surface_point())
-        {
-            let pose = Pose::of(self.document.values()).focus(point.as_dvec3());
-            self.move_camera(pose, None);
+        if let Some(place) = actions.focus {
+            self.ask(Aim::Focus, place);
         }
+        // After the clicks of this frame: an answer is on its way before the next.
+        self.receive_rays(ui.ctx());
         let pixels = rect.size() * ui.ctx().pixels_per_point();
         self.request([pixels.x.round() as u32, pixels.y.round() as u32]);
     }

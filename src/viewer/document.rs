@@ -11,6 +11,7 @@ use crate::scene::{Cost, Key, Kind, Limits, Param, Place, Raw, Scene, Source, Va
 const MAX_UNDO: usize = 500;
 
 /// A scene under edit.
+#[derive(Clone)]
 pub struct Document {
     /// Its name: the preset's, or the file's stem.
     pub name: String,
@@ -29,7 +30,7 @@ pub struct Document {
     /// The last valid scene of the values.
     scene: Arc<Scene>,
     /// Why the values make no scene.
-    fault: Option<Error>,
+    fault: Option<String>,
 }
 
 impl Document {
@@ -71,8 +72,8 @@ impl Document {
     }
 
     /// Why the values make no scene, if they do not; [`Document::scene`] is then an older one.
-    pub fn fault(&self) -> Option<&Error> {
-        self.fault.as_ref()
+    pub fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
     }
 
     /// Whether there is anything to save.
@@ -171,7 +172,7 @@ impl Document {
                 self.scene = Arc::new(scene);
                 self.fault = None;
             }
-            Err(e) => self.fault = Some(e),
+            Err(e) => self.fault = Some(e.to_string()),
         }
     }
 

@@ -56,6 +56,7 @@ struct Samples {
     pictures: u64,
     /// Of a picture that the frame in hand draws.
     drawn: Option<(Instant, Cost)>,
+    last_preview: Option<f64>,
 }
 
 /// Shared between the window, which measures, and its caller, who reports.
@@ -80,7 +81,9 @@ impl Shared {
         s.start.get_or_insert_with(Instant::now);
         s.frames += 1;
         if let Some((asked, cost)) = s.drawn.take() {
-            push(&mut s.previews[cost as usize], asked.elapsed().as_secs_f64() * 1e3);
+            let ms = asked.elapsed().as_secs_f64() * 1e3;
+            s.last_preview = Some(ms);
+            push(&mut s.previews[cost as usize], ms);
         }
         if let Some(own) = own {
             push(&mut s.own, f64::from(own) * 1e3);
@@ -108,10 +111,9 @@ impl Shared {
         latency(&s.own[s.own.len().saturating_sub(300)..])
     }
 
-    /// Latency of the last previews of all costs.
+    /// Milliseconds from the last change to its first picture.
     pub fn last_preview(&self) -> Option<f64> {
-        let s = self.lock();
-        s.previews[Cost::Uniform as usize].last().copied()
+        self.lock().last_preview
     }
 
     /// Everything.

@@ -12,6 +12,7 @@ pub mod layer_image;
 pub mod metrics;
 mod navigate;
 pub mod parameters;
+mod probe;
 pub mod ray_panel;
 pub mod settings;
 mod transfer;
@@ -20,6 +21,8 @@ pub mod volume_panel;
 pub mod worker;
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use eframe::{NativeOptions, Renderer, egui};
@@ -52,7 +55,13 @@ pub struct Options {
     pub screenshot: Option<PathBuf>,
     /// Drives itself through changes, measures how quickly the window answers, and closes it.
     pub measure: bool,
+    /// Takes the window's own device away after this time, as a driver's reset does. For tests.
+    #[doc(hidden)]
+    pub lose_window_after: Option<Duration>,
 }
+
+/// The window is opened anew after its own GPU device was lost, but not for ever.
+const MAX_WINDOWS: usize = 4;
 
 /// Opens the window and returns when it is closed.
 ///
@@ -61,6 +70,19 @@ pub struct Options {
 pub fn run(options: Options) -> Result<metrics::Report> {
     // A wrong scene is told on the terminal, before any window.
     document::Document::open(&options.scene, &options.sets, &options.limits)?;
+    let measured = metrics::Shared::default();
+    let mut kept = None;
+    for _ in 0..MAX_WINDOWS {
+        kept = open_window(&options, &measured, kept)?;
+        if kept.is_none() {
+            break;
+        }
+    }
+    Ok(measured.report())
+}
+
+/// One window, until it is closed or its device is lost; then what is to be kept.
+fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>) -> Result<Option<Kept>> {
     let (settings, _) = settings::Settings::load(options.settings.as_deref());
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("taki")
@@ -76,16 +98,59 @@ pub fn run(options: Options) -> Result<metrics::Report> {
     let renderer = if adapters().is_empty() { Renderer::Glow } else { Renderer::Wgpu };
     let native =
         NativeOptions { viewport, renderer, persist_window: false, dithering: false, ..Default::default() };
-    let report = metrics::Shared::default();
-    let handed = report.clone();
+    let loss = Loss::default();
+    let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
     let opened = eframe::run_native(
         "taki",
         native,
         Box::new(move |context| {
-            let viewer = Viewer::new(&context.egui_ctx, options, handed)?;
-            Ok(Box::new(viewer))
+            if let Some(state) = &context.wgpu_render_state {
+                seen.watch(&state.device, &context.egui_ctx);
+            }
+            Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen, kept)?))
         }),
     );
     opened.map_err(|e| Error::NoAdapter(format!("no window could be opened ({e})")))?;
-    Ok(report.report())
+    Ok(loss.take())
+}
+
+/// What outlives a window whose device was lost.
+#[derive(Clone)]
+pub struct Kept {
+    document: document::Document,
+}
+
+/// The loss of the window's own device, and what was kept.
+#[derive(Clone, Default)]
+pub struct Loss {
+    lost: Arc<AtomicBool>,
+    kept: Arc<Mutex<Option<Kept>>>,
+}
+
+impl Loss {
+    /// Notes when `device` is lost, in place of wgpu's own way of ending the process.
+    fn watch(&self, device: &wgpu::Device, ctx: &egui::Context) {
+        let note = |lost: &Arc<AtomicBool>| {
+            let (lost, ctx) = (lost.clone(), ctx.clone());
+            move || {
+                lost.store(true, Ordering::Relaxed);
+                ctx.request_repaint();
+            }
+        };
+        let (on_loss, on_error) = (note(&self.lost), note(&self.lost));
+        device.set_device_lost_callback(move |_, _| on_loss());
+        device.on_uncaptured_error(Arc::new(move |_| on_error()));
+    }
+
+    fn happened(&self) -> bool {
+        self.lost.load(Ordering::Relaxed)
+    }
+
+    fn keep(&self, kept: Kept) {
+        *self.kept.lock().unwrap_or_else(|e| e.into_inner()) = Some(kept);
+    }
+
+    fn take(&self) -> Option<Kept> {
+        self.kept.lock().unwrap_or_else(|e| e.into_inner()).take()
+    }
 }

@@ -81,7 +81,9 @@ pub fn show(ui: &mut Ui, shown: &Shown, values: &Values) -> (Rect, Actions) {
     let response = ui.allocate_rect(outer, Sense::click_and_drag());
     name(&response, "Picture");
     let painter = ui.painter_at(outer);
-    painter.rect_filled(outer, 0.0, ui.visuals().extreme_bg_color);
+    // Neutral and of middling brightness: a bright surround makes the picture look dark.
+    let ground = if ui.visuals().dark_mode { Color32::from_gray(22) } else { Color32::from_gray(176) };
+    painter.rect_filled(outer, 0.0, ground);
     match shown.texture {
         Some(texture) => {
             let uv = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
