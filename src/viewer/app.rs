@@ -110,7 +110,7 @@ enum Shot {
 }
 
 impl Viewer {
-    /// A viewer in a window's context; `kept`: what an earlier window left.
+    /// A viewer in a window's context, with what an earlier window left in `loss`.
     ///
     /// # Errors
     /// If the scene cannot be opened.
@@ -119,11 +119,11 @@ impl Viewer {
         mut options: Options,
         measured: metrics::Shared,
         loss: Loss,
-        kept: Option<Kept>,
     ) -> Result<Viewer> {
         let (mut settings, note) = Settings::load(options.settings.as_deref());
-        let again = kept.is_some();
-        if again {
+        let kept = loss.take();
+        let again = kept.as_ref().map(|kept| kept.device_lost);
+        if again.is_some() {
             options.lose_window_after = None;
         }
         let document = match kept {
@@ -184,11 +184,10 @@ impl Viewer {
         if let Some(note) = note {
             viewer.say(MessageKind::Warning, note);
         }
-        if again {
-            viewer.say(
-                MessageKind::Warning,
-                "the window's GPU device was lost; the window was opened anew with all of the scene",
-            );
+        if let Some(device_lost) = again {
+            let why = if device_lost { "the window's GPU device was lost" } else { "a bug ended the window" };
+            let text = format!("{why}; it was opened anew with all of the scene");
+            viewer.say(MessageKind::Warning, text);
         }
         Ok(viewer)
     }
@@ -933,7 +932,7 @@ impl Viewer {
 
     fn life(&mut self, ctx: &egui::Context) {
         if self.loss.happened() && !self.closing {
-            self.loss.keep(Kept { document: self.document.clone() });
+            self.loss.keep(Kept { document: self.document.clone(), device_lost: true });
             self.closing = true;
         }
         let title =
@@ -1185,6 +1184,10 @@ impl Viewer {
 
 impl Drop for Viewer {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            let device_lost = self.loss.happened();
+            self.loss.keep(Kept { document: self.document.clone(), device_lost });
+        }
         if let Some(path) = &self.options.settings
             && let Err(e) = self.settings.save(path)
         {

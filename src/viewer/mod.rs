@@ -20,6 +20,7 @@ mod viewport;
 pub mod volume_panel;
 pub mod worker;
 
+use std::panic::AssertUnwindSafe;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -60,8 +61,8 @@ pub struct Options {
     pub lose_window_after: Option<Duration>,
 }
 
-/// The window is opened anew after its own GPU device was lost, but not for ever.
-const MAX_WINDOWS: usize = 4;
+/// The window is opened anew after its own GPU device was lost, but not for ever. A loss takes two tries.
+const MAX_WINDOWS: usize = 8;
 
 /// Opens the window and returns when it is closed.
 ///
@@ -75,10 +76,14 @@ pub fn run(options: Options) -> Result<metrics::Report> {
     for _ in 0..MAX_WINDOWS {
         kept = open_window(&options, &measured, kept)?;
         if kept.is_none() {
-            break;
+            return Ok(measured.report());
         }
     }
-    Ok(measured.report())
+    Err(Error::DeviceLost(match kept.map(rescue) {
+        Some(Ok(path)) => format!("the window was lost again and again; its scene is in {}", path.display()),
+        Some(Err(e)) => format!("the window was lost again and again, and its scene was not kept: {e}"),
+        None => "the window was lost again and again".into(),
+    }))
 }
 
 /// One window, until it is closed or its device is lost; then what is to be kept.
@@ -99,31 +104,50 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
     let native =
         NativeOptions { viewport, renderer, persist_window: false, dithering: false, ..Default::default() };
     let loss = Loss::default();
+    if let Some(kept) = kept {
+        loss.keep(kept);
+    }
     let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
-    let opened = eframe::run_native(
-        "taki",
-        native,
-        Box::new(move |context| {
-            if let Some(state) = &context.wgpu_render_state {
-                seen.watch(&state.device, &context.egui_ctx);
-            }
-            Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen, kept)?))
-        }),
-    );
-    opened.map_err(|e| Error::NoAdapter(format!("no window could be opened ({e})")))?;
-    Ok(loss.take())
+    let create: eframe::AppCreator = Box::new(move |context| {
+        if let Some(state) = &context.wgpu_render_state {
+            seen.watch(&state.device, &context.egui_ctx);
+        }
+        Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen)?))
+    });
+    // Drawing with a lost device ends in a panic inside egui's renderer. The event loop that it went through
+    // takes the next window for one that is open already and ends at once; the one after that opens. What
+    // is kept waits meanwhile.
+    let opened = std::panic::catch_unwind(AssertUnwindSafe(|| eframe::run_native("taki", native, create)));
+    match opened {
+        Ok(Ok(())) => Ok(loss.take()),
+        Ok(Err(e)) => Err(Error::NoAdapter(format!("no window could be opened ({e})"))),
+        Err(panic) => match loss.take() {
+            Some(kept) => Ok(Some(kept)),
+            None => std::panic::resume_unwind(panic),
+        },
+    }
 }
 
-/// What outlives a window whose device was lost.
+/// Saves what no window could show any more.
+fn rescue(mut kept: Kept) -> Result<PathBuf> {
+    let path = std::env::temp_dir().join(format!("{}-rescued.toml", kept.document.name));
+    kept.document.save(&path)?;
+    Ok(path)
+}
+
+/// What outlives a window that was lost.
 #[derive(Clone)]
 pub struct Kept {
     document: document::Document,
+    /// Whether its device was lost; else a bug ended it.
+    device_lost: bool,
 }
 
 /// The loss of the window's own device, and what was kept.
 #[derive(Clone, Default)]
 pub struct Loss {
     lost: Arc<AtomicBool>,
+    /// Until the next window takes it.
     kept: Arc<Mutex<Option<Kept>>>,
 }
 
