@@ -741,22 +741,28 @@ impl Viewer {
             }
         });
         ui.separator();
-        match (self.inspector, &self.picture) {
-            (Inspector::Pixel, _) => match &self.ray {
+        if self.inspector == Inspector::Pixel {
+            // Its table scrolls by itself.
+            match &self.ray {
                 Some(ray) => ray_panel::show(ui, ray),
                 None => {
                     ui.label("Click in the picture to see the ray of a pixel, cell by cell.");
                 }
-            },
-            (Inspector::Volume, Some(picture)) => self.volume_panel.show(ui, &picture.volume),
-            (Inspector::Volume, None) => {
-                ui.label("The volume is being built.");
             }
-            (Inspector::Curves, _) if self.document.scene().volume_file.is_some() => {
-                ui.label("This volume comes from a file, not from curves.");
-            }
-            (Inspector::Curves, _) => self.curves_panel.show(ui, &self.document.scene().water),
+            return;
         }
+        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            match (self.inspector, &self.picture) {
+                (Inspector::Volume, Some(picture)) => self.volume_panel.show(ui, &picture.volume),
+                (Inspector::Volume, None) => {
+                    ui.label("The volume is being built.");
+                }
+                _ if self.document.scene().volume_file.is_some() => {
+                    ui.label("This volume comes from a file, not from curves.");
+                }
+                _ => self.curves_panel.show(ui, &self.document.scene().water),
+            }
+        });
     }
 
     fn status(&mut self, ui: &mut Ui) {
@@ -775,7 +781,7 @@ impl Viewer {
                 ));
                 let passes = format!("gbuffer {} · integrate {} ms", ms(s.gbuffer), ms(s.integrate));
                 let all = format!(
-                    "Of the last part: gbuffer {}, integrate {}, resolve {} ms on the device; pipelines {}, \
+                    "Of one sample: gbuffer {}, integrate {}, resolve {} ms on the device; pipelines {}, \
                      upload {}, read-back {} ms on the host.\nLast volume {} ms.",
                     ms(s.gbuffer),
                     ms(s.integrate),
@@ -866,18 +872,17 @@ impl Viewer {
 
     fn help_window(&mut self, ctx: &egui::Context) {
         let mut open = self.help;
-        egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false).show(
-            ctx,
-            |ui| {
-                egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
-                    for (keys, what) in HELP {
-                        ui.monospace(*keys);
-                        ui.label(*what);
-                        ui.end_row();
-                    }
-                });
-            },
-        );
+        let window = egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false);
+        let middle = ctx.content_rect().center();
+        window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
+            egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
+                for (keys, what) in HELP {
+                    ui.monospace(*keys);
+                    ui.label(*what);
+                    ui.end_row();
+                }
+            });
+        });
         self.help = open;
     }
 

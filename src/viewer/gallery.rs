@@ -32,7 +32,9 @@ impl Gallery {
         self.receive(ctx);
         let mut chosen = None;
         let mut open = self.open;
-        egui::Window::new("Scenes").open(&mut open).resizable(false).collapsible(false).show(ctx, |ui| {
+        let window = egui::Window::new("Scenes").open(&mut open).resizable(false).collapsible(false);
+        let middle = ctx.content_rect().center();
+        window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
             egui::Grid::new("gallery").num_columns(2).spacing([12.0, 12.0]).show(ui, |ui| {
                 for (i, (preset, what)) in presets().enumerate() {
                     ui.vertical(|ui| {

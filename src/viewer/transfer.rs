@@ -180,7 +180,9 @@ impl ExportDialog {
     pub fn show(&mut self, ctx: &egui::Context, aspect: f64, exporting: Option<f32>) -> ExportAnswer {
         let mut answer = ExportAnswer::Nothing;
         let mut open = self.open;
-        egui::Window::new("Export").open(&mut open).resizable(false).collapsible(false).show(ctx, |ui| {
+        let window = egui::Window::new("Export").open(&mut open).resizable(false).collapsible(false);
+        let middle = ctx.content_rect().center();
+        window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
             ui.set_width(380.0);
             egui::Grid::new("export").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
                 ui.label("File");

@@ -649,13 +649,15 @@ impl Renderer {
         let clock = Instant::now();
         let coarse = scale >= COARSE_SCALE;
         let mesh = if coarse { &job.meshes.coarse } else { &job.meshes.full };
-        let frame = self.run_engine(&scene, &job.volume, mesh, &options, &watch)?;
-        let s = &frame.seconds;
+        let mut frame = self.run_engine(&scene, &job.volume, mesh, &options, &watch)?;
+        let s = &mut frame.seconds;
         let of_pixels = s.integrate + s.resolve + s.readback;
         let once = clock.elapsed().as_secs_f64() - of_pixels - s.pipelines - s.upload;
         let samples = samples.len() as f64;
         self.speed.per_pixel = Some(of_pixels / samples / (width as f64 * height as f64));
         self.speed.once[usize::from(coarse)] = once.max(0.0) / samples;
+        // People compare passes, not parts of a refinement.
+        (s.gbuffer, s.integrate) = (s.gbuffer / samples, s.integrate / samples);
         Ok(frame)
     }
 
