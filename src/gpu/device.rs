@@ -122,7 +122,12 @@ impl Gpu {
 
     /// The first fault the device reported, if any.
     pub fn check(&self) -> Result<()> {
-        match self.fault.lock().unwrap_or_else(|e| e.into_inner()).clone() {
+        let fault = || self.fault.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        if matches!(fault(), Some(Fault::Bug(_))) {
+            // A lost device refuses commands before it tells of its loss.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
+        match fault() {
             None => Ok(()),
             Some(Fault::Lost(why)) => Err(Error::DeviceLost(why)),
             Some(Fault::OutOfMemory(why)) => Err(Error::Memory {

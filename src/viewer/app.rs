@@ -918,6 +918,10 @@ impl Viewer {
             Some((Purpose::Save, path)) => self.save_to(&path),
             None => {}
         }
+        // A save that was given up takes what was to follow it along.
+        if !self.paths.is_open() {
+            self.leave_after_save = None;
+        }
         if let Some(leaving) = self.leaving.clone()
             && let Some(answer) = ask_unsaved(ctx, &self.document.name)
         {
@@ -1121,7 +1125,9 @@ impl Viewer {
         self.show_banners(&ctx, central.response.rect);
         self.windows(&ctx);
         self.life(&ctx);
-        if !ctx.input(|i| i.pointer.any_down()) {
+        // A step of the wheel is spread over some frames.
+        let moving = |i: &egui::InputState| i.pointer.any_down() || i.smooth_scroll_delta() != egui::Vec2::ZERO;
+        if !ctx.input(moving) {
             self.document.end_gesture();
         }
     }
