@@ -353,7 +353,7 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
             };
             name(&response, key);
             if key.ends_with(".seed") {
-                let dice = ui.small_button("dice").on_hover_text("Another random seed");
+                let dice = ui.button("🎲").on_hover_text("Another random seed");
                 name(&dice, &format!("Dice {key}"));
                 if dice.clicked() {
                     new = i64::from(rand::rng().random::<u32>() >> 4);
