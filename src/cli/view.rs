@@ -8,7 +8,7 @@ use clap::Args;
 use super::terminal::say;
 use super::{EngineOptions, SceneOptions, seconds};
 use crate::error::Result;
-use crate::viewer::{self, Options, settings::Settings};
+use crate::viewer::{self, Options, WindowChoice, settings::Settings};
 
 #[derive(Args)]
 pub struct ViewArgs {
@@ -16,6 +16,9 @@ pub struct ViewArgs {
     scene: SceneOptions,
     #[command(flatten)]
     engine: EngineOptions,
+    /// What draws the window: auto takes Vulkan, Metal or Direct3D on a GPU, else OpenGL.
+    #[arg(long, value_enum, default_value_t)]
+    window: WindowChoice,
     /// Closes the window after this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     exit_after: Option<f64>,
@@ -41,6 +44,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         scene: args.scene.scene.clone(),
         sets,
         limits: args.scene.limits(),
+        window: args.window,
         engine: args.engine.engine,
         device: args.engine.device(),
         settings: Settings::place(),

@@ -44,6 +44,8 @@ pub struct Options {
     pub sets: Vec<String>,
     /// Memory budget and allowed folders.
     pub limits: Limits,
+    /// What draws the window.
+    pub window: WindowChoice,
     /// Which engine renders.
     pub engine: EngineChoice,
     /// On which device.
@@ -63,6 +65,40 @@ pub struct Options {
 
 /// The window is opened anew after its own GPU device was lost, but not for ever. A loss takes two tries.
 const MAX_WINDOWS: usize = 8;
+
+/// What draws the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum WindowChoice {
+    /// Vulkan, Metal or Direct3D on a GPU; OpenGL where they would be software.
+    #[default]
+    Auto,
+    /// Vulkan, Metal or Direct3D.
+    Wgpu,
+    /// OpenGL.
+    Opengl,
+}
+
+impl WindowChoice {
+    /// In the order to try them.
+    fn renderers(self) -> Vec<Renderer> {
+        match self {
+            WindowChoice::Wgpu => vec![Renderer::Wgpu],
+            WindowChoice::Opengl => vec![Renderer::Glow],
+            WindowChoice::Auto => {
+                let software = |a: &wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
+                let adapters = adapters();
+                if adapters.is_empty() {
+                    vec![Renderer::Glow]
+                } else if adapters.iter().all(software) {
+                    // egui's shader takes software Vulkan four times as long as the one for OpenGL.
+                    vec![Renderer::Glow, Renderer::Wgpu]
+                } else {
+                    vec![Renderer::Wgpu, Renderer::Glow]
+                }
+            }
+        }
+    }
+}
 
 /// Opens the window and returns when it is closed.
 ///
@@ -98,26 +134,35 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
     if let Some(position) = settings.position {
         viewport = viewport.with_position(position);
     }
-    // The window needs something to draw with even where the CPU renders: Vulkan, Metal or Direct3D, else
-    // OpenGL.
-    let renderer = if adapters().is_empty() { Renderer::Glow } else { Renderer::Wgpu };
-    let native =
-        NativeOptions { viewport, renderer, persist_window: false, dithering: false, ..Default::default() };
     let loss = Loss::default();
     if let Some(kept) = kept {
         loss.keep(kept);
     }
-    let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
-    let create: eframe::AppCreator = Box::new(move |context| {
-        if let Some(state) = &context.wgpu_render_state {
-            seen.watch(&state.device, &context.egui_ctx);
+    let mut opened = Ok(Ok(()));
+    for renderer in options.window.renderers() {
+        let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
+        let create: eframe::AppCreator = Box::new(move |context| {
+            if let Some(state) = &context.wgpu_render_state {
+                seen.watch(&state.device, &context.egui_ctx);
+            }
+            Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen)?))
+        });
+        let viewport = viewport.clone();
+        let native = NativeOptions {
+            viewport,
+            renderer,
+            persist_window: false,
+            dithering: false,
+            ..Default::default()
+        };
+        // Drawing with a lost device ends in a panic inside egui's renderer. The event loop that it went
+        // through takes the next window for one that is open already and ends at once; the one after that
+        // opens. What is kept waits meanwhile.
+        opened = std::panic::catch_unwind(AssertUnwindSafe(|| eframe::run_native("taki", native, create)));
+        if !matches!(opened, Ok(Err(_))) {
+            break;
         }
-        Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen)?))
-    });
-    // Drawing with a lost device ends in a panic inside egui's renderer. The event loop that it went through
-    // takes the next window for one that is open already and ends at once; the one after that opens. What
-    // is kept waits meanwhile.
-    let opened = std::panic::catch_unwind(AssertUnwindSafe(|| eframe::run_native("taki", native, create)));
+    }
     match opened {
         Ok(Ok(())) => Ok(loss.take()),
         Ok(Err(e)) => Err(Error::NoAdapter(format!("no window could be opened ({e})"))),
