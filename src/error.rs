@@ -34,6 +34,12 @@ pub enum Error {
     /// `--engine gpu` was asked for and no adapter can do the work.
     #[error("{0}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu")]
     NoAdapter(String),
+    /// The viewer's window cannot be opened.
+    #[error(
+        "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) with Vulkan or \
+         OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
+    )]
+    NoWindow(String),
     /// An output cannot be created. Known before any work is done.
     #[error("cannot create {}: {why}; {fix}", path.display())]
     CannotCreate {
@@ -121,7 +127,7 @@ impl Error {
             Error::Usage(_) => 2,
             Error::Memory { .. } => 33,
             Error::Input { .. } => 65,
-            Error::NoAdapter(_) => 69,
+            Error::NoAdapter(_) | Error::NoWindow(_) => 69,
             Error::CannotCreate { .. } => 73,
             Error::Io { .. } => 74,
             Error::DeviceLost(_) => 75,

@@ -139,6 +139,7 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         loss.keep(kept);
     }
     let mut opened = Ok(Ok(()));
+    let mut first_fault = None;
     for renderer in options.window.renderers() {
         let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
         let create: eframe::AppCreator = Box::new(move |context| {
@@ -159,18 +160,26 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         // through takes the next window for one that is open already and ends at once; the one after that
         // opens. What is kept waits meanwhile.
         opened = std::panic::catch_unwind(AssertUnwindSafe(|| eframe::run_native("taki", native, create)));
-        if !matches!(opened, Ok(Err(_))) {
-            break;
+        match &opened {
+            // The next way to draw may do; what keeps all of them from it is told by the first.
+            Ok(Err(e)) => first_fault = first_fault.or_else(|| Some(cause(e))),
+            _ => break,
         }
     }
     match opened {
         Ok(Ok(())) => Ok(loss.take()),
-        Ok(Err(e)) => Err(Error::NoAdapter(format!("no window could be opened ({e})"))),
+        Ok(Err(e)) => Err(Error::NoWindow(first_fault.unwrap_or_else(|| cause(&e)))),
         Err(panic) => match loss.take() {
             Some(kept) => Ok(Some(kept)),
             None => std::panic::resume_unwind(panic),
         },
     }
+}
+
+/// The last part of an error: before it stand the places in libraries that it came through.
+fn cause(e: &eframe::Error) -> String {
+    let text = e.to_string();
+    text.rsplit(": ").next().unwrap_or(&text).trim_end_matches('.').to_owned()
 }
 
 /// Saves what no window could show any more.
