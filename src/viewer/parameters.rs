@@ -422,7 +422,9 @@ fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let mut scale = factor;
     let button = ui.color_edit_button_rgb(&mut rgb);
     name(&button, key);
-    let picked = button.changed();
+    // The open picker turns the colour into hue and back: what that rounds is no change.
+    let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
+    let picked = button.changed() && rgb.iter().zip(&t).any(moved);
     if factor > 1.0 {
         let drag = DragValue::new(&mut scale).range(1.0..=1e4).speed(0.02).prefix("× ").max_decimals(3);
         name(&ui.add(drag), &format!("{key} factor"));
