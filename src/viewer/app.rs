@@ -851,7 +851,7 @@ impl Viewer {
                             });
                             match index {
                                 Some(i) => {
-                                    if ui.small_button("✕").on_hover_text("Close").clicked() {
+                                    if ui.small_button("✖").on_hover_text("Close").clicked() {
                                         closed = Some(*i);
                                     }
                                 }
@@ -1126,7 +1126,8 @@ impl Viewer {
         self.windows(&ctx);
         self.life(&ctx);
         // A step of the wheel is spread over some frames.
-        let moving = |i: &egui::InputState| i.pointer.any_down() || i.smooth_scroll_delta() != egui::Vec2::ZERO;
+        let moving =
+            |i: &egui::InputState| i.pointer.any_down() || i.smooth_scroll_delta() != egui::Vec2::ZERO;
         if !ctx.input(moving) {
             self.document.end_gesture();
         }
