@@ -851,7 +851,7 @@ impl Viewer {
                             });
                             match index {
                                 Some(i) => {
-                                    if ui.small_button("✕").on_hover_text("Close").clicked() {
+                                    if ui.small_button("✖").on_hover_text("Close").clicked() {
                                         closed = Some(*i);
                                     }
                                 }

@@ -78,7 +78,8 @@ impl Document {
 
     /// Whether there is anything to save.
     pub fn is_changed(&self) -> bool {
-        self.values != self.saved
+        // Set to its default or left out is the same.
+        self.values != self.saved && !changed_keys(&self.saved, &self.values).is_empty()
     }
 
     /// The value a key had when the scene was opened or saved.

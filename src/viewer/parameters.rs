@@ -47,7 +47,7 @@ impl ParameterPanel {
             let hint = egui::TextEdit::singleline(&mut self.search).hint_text("Search parameters");
             let field = ui.add(hint.desired_width(ui.available_width() - 44.0));
             name(&field, "Search parameters");
-            let clear = ui.add_enabled(!self.search.is_empty(), egui::Button::new("✕"));
+            let clear = ui.add_enabled(!self.search.is_empty(), egui::Button::new("✖"));
             if clear.on_hover_text("Show all").clicked() {
                 self.search.clear();
             }
@@ -155,7 +155,7 @@ impl ParameterPanel {
             });
             edit = widget(ui, document, key, param, &value);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let mark = ui.label(RichText::new("●").color(cost_color(ui, param.cost)).small());
+                let mark = ui.label(RichText::new("⏺").color(cost_color(ui, param.cost)).small());
                 mark.on_hover_text(cost_words(param.cost, costs));
                 if document.differs(key) {
                     let was = document.saved_value(key).to_toml();
@@ -422,7 +422,9 @@ fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let mut scale = factor;
     let button = ui.color_edit_button_rgb(&mut rgb);
     name(&button, key);
-    let picked = button.changed();
+    // The open picker turns the colour into hue and back: what that rounds is no change.
+    let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
+    let picked = button.changed() && rgb.iter().zip(&t).any(moved);
     if factor > 1.0 {
         let drag = DragValue::new(&mut scale).range(1.0..=1e4).speed(0.02).prefix("× ").max_decimals(3);
         name(&ui.add(drag), &format!("{key} factor"));

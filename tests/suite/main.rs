@@ -18,5 +18,7 @@ mod scene;
 mod shaders;
 mod shading;
 mod tolerance;
+#[cfg(feature = "viewer")]
+mod viewer;
 mod volume;
 mod walk;
