@@ -114,6 +114,7 @@ fn options(scene: &Path, settings: &Path) -> Options {
         scene: scene.to_owned(),
         sets: Vec::new(),
         limits: Limits::default(),
+        window: Default::default(),
         engine: EngineChoice::Cpu,
         device: DeviceOptions::default(),
         settings: Some(settings.to_owned()),
@@ -140,7 +141,7 @@ impl Window {
         let builder = Harness::builder().with_size(size).with_pixels_per_point(1.0).allow_missing_glyphs();
         let harness = more(builder).build_eframe(|context| {
             let measured = metrics::Shared::default();
-            Viewer::new(&context.egui_ctx, options, measured, Loss::default(), None).expect("a valid scene")
+            Viewer::new(&context.egui_ctx, options, measured, Loss::default()).expect("a valid scene")
         });
         let mut window = Window { harness, folder };
         window.settle();
