@@ -1116,7 +1116,9 @@ impl Viewer {
             });
         }
         if self.settings.inspectors {
-            egui::Panel::right("inspectors").default_size(430.0).size_range(320.0..=760.0).show(ui, |ui| {
+            // A small window keeps room for the picture.
+            let most = (ui.available_width() * 0.55).max(200.0);
+            egui::Panel::right("inspectors").default_size(430.0).size_range(200.0..=most).show(ui, |ui| {
                 ui.add_space(4.0);
                 self.inspectors(ui);
             });

@@ -22,8 +22,8 @@ const GROUPS: [(&str, &str, &[&str]); 7] = [
 /// Width of the names.
 const NAME_WIDTH: f32 = 104.0;
 /// Room for the number beside a slider, and for the marks at the end of a row.
-const VALUE_WIDTH: f32 = 76.0;
-const MARKS_WIDTH: f32 = 44.0;
+const VALUE_WIDTH: f32 = 64.0;
+const MARKS_WIDTH: f32 = 60.0;
 
 /// The panel's own state.
 #[derive(Default)]
@@ -59,6 +59,8 @@ impl ParameterPanel {
         let search = self.search.trim().to_lowercase();
         let mut shown = 0;
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            // The scroll bar lies over the contents: it is not to hide the marks.
+            ui.set_max_width(ui.available_width() - 8.0);
             for (title, about, sections) in GROUPS {
                 let of_group = |key: &&String| sections.contains(&key.split('.').next().unwrap_or(""));
                 let found: Vec<&String> =
@@ -269,7 +271,7 @@ fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bool {
     let mut changed = false;
     let width = ((ui.available_width() - MARKS_WIDTH) / 3.0 - ui.spacing().item_spacing.x).max(36.0);
     for (x, axis) in t.iter_mut().zip(["x", "y", "z"]) {
-        let drag = DragValue::new(x).speed(speed).max_decimals(4).update_while_editing(false).clip_text(true);
+        let drag = DragValue::new(x).speed(speed).max_decimals(3).update_while_editing(false).clip_text(true);
         let response = ui.add_sized([width, ui.spacing().interact_size.y], drag);
         name(&response, &format!("{key} {axis}"));
         changed |= response.changed();

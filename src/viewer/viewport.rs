@@ -179,7 +179,7 @@ fn show_light(painter: &egui::Painter, image: Rect, values: &Values, pose: &Pose
     let right = forward.cross(pose.up).normalize_or(glam::DVec3::X);
     let up = right.cross(forward);
     let radius = 34.0;
-    let centre = image.left_bottom() + vec2(radius + 14.0, -radius - 30.0);
+    let centre = image.right_bottom() + vec2(-radius - 50.0, -radius - 30.0);
     painter.circle(centre, radius, Color32::from_black_alpha(140), Stroke::new(1.0, Color32::from_gray(170)));
     let tip = centre + vec2(direction.dot(right) as f32, -direction.dot(up) as f32) * radius;
     let front = direction.dot(forward) < 0.0;
@@ -188,8 +188,8 @@ fn show_light(painter: &egui::Painter, image: Rect, values: &Values, pose: &Pose
     painter.circle_filled(tip, 5.0, color);
     let [azimuth, elevation] = navigate::angles(direction);
     let text = format!("{light}: {azimuth:.0}°, {elevation:.0}° up");
-    let at = centre + vec2(-radius, radius + 4.0);
-    painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.0), Color32::WHITE);
+    let at = centre + vec2(0.0, radius + 4.0);
+    painter.text(at, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
 }
 
 /// Whether a light can be turned at all.
