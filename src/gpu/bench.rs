@@ -94,7 +94,7 @@ impl GpuBench {
         let p = self.prepared.as_mut().expect("prepare comes first");
         let inputs = Inputs { gpu, timer, up: &p.up, targets: &p.targets, window: p.window, frame: &p.frame };
         let number = match pass {
-            BenchPass::Gbuffer => return Ok((gbuffer.run(&inputs)?, 0)),
+            BenchPass::Gbuffer => return Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
             BenchPass::BareWalk => 0,
             BenchPass::Integrate => 1,
             BenchPass::IntegrateMarch => 2,

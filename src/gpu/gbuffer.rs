@@ -8,6 +8,9 @@ use crate::scene::Vertex;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
+/// Indices drawn in one submission: 65,536 triangles take software Vulkan about 20 ms.
+const PART_INDICES: u32 = 3 << 16;
+
 /// The targets of one window.
 pub struct Targets {
     /// Radiance of the opaque scene or the background; metres from the eye (0: background).
@@ -111,8 +114,9 @@ impl Gbuffer {
         }
     }
 
-    /// Fills the targets with one sample of a window; seconds on the device.
-    pub fn run(&self, inputs: &Inputs) -> Result<f64> {
+    /// Fills the targets with one sample of a window; seconds on the device. A large mesh is drawn in
+    /// parts; `between` is called before each but the first, and may stop the work.
+    pub fn run(&self, inputs: &Inputs, mut between: impl FnMut() -> Result<()>) -> Result<f64> {
         let Inputs { gpu, timer, up, targets, window, frame } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, &wgpu::Buffer)]| {
@@ -134,17 +138,11 @@ impl Gbuffer {
         let water = bind(&self.volume, &[(0, &uniform), (2, &up.quads)]);
         let views = [&targets.opaque, &targets.normal, &targets.surface, &targets.quad_id]
             .map(|t| t.create_view(&Default::default()));
-        let cleared = |view| {
-            Some(wgpu::RenderPassColorAttachment {
-                view,
-                resolve_target: None,
-                depth_slice: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })
+        let colour = |view, load| {
+            let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+            Some(wgpu::RenderPassColorAttachment { view, resolve_target: None, depth_slice: None, ops })
         };
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         let depth = |load| wgpu::RenderPassDepthStencilAttachment {
             view: &targets.depth,
             depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
@@ -156,39 +154,58 @@ impl Gbuffer {
             let (x, y) = (-(window.x as f32), -(window.y as f32));
             pass.set_viewport(x, y, frame.image_width, frame.image_height, 0.0, 1.0);
         };
-        timer.run(gpu, "gbuffer", |encoder, span| {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("gbuffer opaque"),
-                color_attachments: &[cleared(&views[0]), cleared(&views[1])],
-                depth_stencil_attachment: Some(depth(wgpu::LoadOp::Clear(0.0))),
-                timestamp_writes: span.render(true, false),
-                ..Default::default()
-            });
-            place(&mut pass);
-            pass.set_pipeline(&self.background);
-            pass.set_bind_group(0, &sky, &[]);
-            pass.draw(0..3, 0..1);
-            if up.index_count > 0 {
-                pass.set_pipeline(&self.opaque);
-                pass.set_bind_group(0, &rock, &[]);
-                pass.set_vertex_buffer(0, up.vertices.slice(..));
-                pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed(0..up.index_count, 0, 0..1);
+        let parts = up.index_count.div_ceil(PART_INDICES).max(1);
+        let mut seconds = 0.0;
+        for part in 0..parts {
+            let last = part + 1 == parts;
+            if part > 0 {
+                between()?;
             }
-            drop(pass);
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("gbuffer volume"),
-                color_attachments: &[cleared(&views[2]), cleared(&views[3])],
-                depth_stencil_attachment: Some(depth(wgpu::LoadOp::Load)),
-                timestamp_writes: span.render(false, true),
-                ..Default::default()
-            });
-            place(&mut pass);
-            if up.quad_count > 0 {
-                pass.set_pipeline(&self.volume);
-                pass.set_bind_group(0, &water, &[]);
-                pass.draw(0..6, 0..up.quad_count);
-            }
-        })
+            seconds += timer.run(gpu, "gbuffer", |encoder, span| {
+                let (load, load_depth) = match part {
+                    0 => (clear, wgpu::LoadOp::Clear(0.0)),
+                    _ => (wgpu::LoadOp::Load, wgpu::LoadOp::Load),
+                };
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("gbuffer opaque"),
+                    color_attachments: &[colour(&views[0], load), colour(&views[1], load)],
+                    depth_stencil_attachment: Some(depth(load_depth)),
+                    timestamp_writes: span.render(true, !last),
+                    ..Default::default()
+                });
+                place(&mut pass);
+                if part == 0 {
+                    pass.set_pipeline(&self.background);
+                    pass.set_bind_group(0, &sky, &[]);
+                    pass.draw(0..3, 0..1);
+                }
+                if up.index_count > 0 {
+                    let first = part * PART_INDICES;
+                    pass.set_pipeline(&self.opaque);
+                    pass.set_bind_group(0, &rock, &[]);
+                    pass.set_vertex_buffer(0, up.vertices.slice(..));
+                    pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
+                    pass.draw_indexed(first..up.index_count.min(first + PART_INDICES), 0, 0..1);
+                }
+                drop(pass);
+                if !last {
+                    return;
+                }
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("gbuffer volume"),
+                    color_attachments: &[colour(&views[2], clear), colour(&views[3], clear)],
+                    depth_stencil_attachment: Some(depth(wgpu::LoadOp::Load)),
+                    timestamp_writes: span.render(false, true),
+                    ..Default::default()
+                });
+                place(&mut pass);
+                if up.quad_count > 0 {
+                    pass.set_pipeline(&self.volume);
+                    pass.set_bind_group(0, &water, &[]);
+                    pass.draw(0..6, 0..up.quad_count);
+                }
+            })?;
+        }
+        Ok(seconds)
     }
 }

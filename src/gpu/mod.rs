@@ -208,7 +208,7 @@ impl GpuRenderer {
                 let frame_uniforms = uniforms(sample);
                 let inputs =
                     Inputs { gpu, timer: &self.timer, up: &up, targets, window, frame: &frame_uniforms };
-                seconds.gbuffer += self.gbuffer.run(&inputs)?;
+                seconds.gbuffer += self.gbuffer.run(&inputs, || monitor.progress("pixels", done, total))?;
                 if sample == samples.start
                     && let Some(surface) = &mut frame.surface
                 {
