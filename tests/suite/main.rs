@@ -22,3 +22,5 @@ mod tolerance;
 mod viewer;
 mod volume;
 mod walk;
+#[cfg(all(feature = "viewer", target_os = "linux"))]
+mod window;

@@ -6,6 +6,7 @@ mod files;
 mod hand;
 mod look;
 mod picture;
+mod soak;
 mod widgets;
 
 use std::path::{Path, PathBuf};
@@ -138,7 +139,7 @@ impl Window {
         size: [f32; 2],
         more: impl FnOnce(HarnessBuilder<Viewer>) -> HarnessBuilder<Viewer>,
     ) -> Window {
-        let builder = Harness::builder().with_size(size).with_pixels_per_point(1.0).allow_missing_glyphs();
+        let builder = Harness::builder().with_size(size).with_pixels_per_point(1.0);
         let harness = more(builder).build_eframe(|context| {
             let measured = metrics::Shared::default();
             Viewer::new(&context.egui_ctx, options, measured, Loss::default()).expect("a valid scene")

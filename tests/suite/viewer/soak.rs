@@ -1,0 +1,107 @@
+//! Hours of use in seconds: many changes without waiting, and memory that does not grow with them.
+
+use std::process::Command;
+
+use rand::{RngExt, SeedableRng};
+use taki::frame::Layer;
+use taki::scene::{Kind, Param};
+
+use super::*;
+
+const CHANGES: usize = 2_000;
+/// From here on everything that is kept has its size: buffers, textures, most of the steps of undo.
+const WARM: usize = 500;
+/// Steps of undo still grow, and the allocator keeps what it likes; a leaked picture or volume a change
+/// would be ten times this.
+const MAX_GROWTH_MIB: f64 = 60.0;
+const ALONE: &str = "TAKI_TEST_SOAK_ALONE";
+
+fn resident_mib() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find(|line| line.starts_with("VmRSS:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+}
+
+/// A value for a key that is quick to render.
+fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
+    Some(match param.kind {
+        Kind::Float(min, max, _) => {
+            let (low, high) = param.slider.unwrap_or((min, max));
+            Raw::Float(rng.random_range(low.max(-1e3)..=high.min(1e3)))
+        }
+        Kind::Int(_, i64::MAX, _) => Raw::Int(rng.random_range(0..1_000_000)),
+        Kind::Int(min, max, _) => Raw::Int(rng.random_range(min..=max.min(12))),
+        Kind::Choice(words) => Raw::Text(words[rng.random_range(0..words.len())].into()),
+        Kind::Color(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(0.0..2.0))).collect()),
+        Kind::Point(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(-8.0..8.0))).collect()),
+        Kind::Text(_) | Kind::Corners => return None,
+    })
+}
+
+fn soak() {
+    let mut window = Setup { size: [260.0, 220.0], ..Setup::bare() }.open();
+    let keys = window.viewer().document().scene().keys();
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(3);
+    let mut warm = None;
+    for i in 0..CHANGES {
+        match rng.random_range(0..20) {
+            0 => window.undo(),
+            1 => window.redo(),
+            2 => {
+                let key = keys[rng.random_range(0..keys.len())].clone();
+                window.harness.state_mut().document_mut().reset(&[key]);
+            }
+            3 => {
+                let keys = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
+                window.key(keys[rng.random_range(0..Layer::ALL.len())]);
+            }
+            4 => {
+                let size = [rng.random_range(60.0..300.0), rng.random_range(80.0..260.0)];
+                window.harness.set_size(size.into());
+            }
+            5 => window.key([Key::V, Key::Space, Key::F, Key::Home, Key::T][rng.random_range(0..5)]),
+            _ => {
+                let key = &keys[rng.random_range(0..keys.len())];
+                let param = Param::find(key).expect("a parameter");
+                if let Some(raw) = some(&mut rng, param) {
+                    window.set(key, raw);
+                }
+            }
+        }
+        window.harness.step();
+        if i == WARM {
+            warm = resident_mib();
+        }
+    }
+    if let (Some(warm), Some(now)) = (warm, resident_mib()) {
+        eprintln!("resident after {WARM} changes {warm:.0} MiB, after {CHANGES} {now:.0} MiB");
+        assert!(now - warm <= MAX_GROWTH_MIB, "{warm:.0} MiB became {now:.0} MiB");
+    }
+    window.harness.state_mut().document_mut().reset(&keys);
+    window.harness.set_size([300.0, 300.0].into());
+    window.harness.run_steps(2);
+    let playing = window.harness.query_by_label("Pause the water").is_some();
+    if playing {
+        window.key(Key::Space);
+    }
+    window.harness.state_mut().document_mut().reset(&keys);
+    window.settle();
+    assert!(window.viewer().document().fault().is_none() && !window.viewer().document().is_changed());
+    assert_eq!(window.picture().scale, 1);
+    assert!(!window.reads("bug"), "nothing went wrong under the renderer");
+}
+
+#[test]
+fn thousands_of_changes_neither_panic_nor_fill_the_memory() {
+    if std::env::var_os(ALONE).is_some() {
+        return soak();
+    }
+    // In a process of its own: the other tests' memory is not the viewer's.
+    let mut alone = Command::new(std::env::current_exe().expect("this program"));
+    alone.args(["--exact", "--nocapture", "--test-threads=1"]);
+    alone.arg("viewer::soak::thousands_of_changes_neither_panic_nor_fill_the_memory").env(ALONE, "1");
+    let out = alone.output().expect("it runs");
+    let said = String::from_utf8_lossy(&out.stderr);
+    eprintln!("{said}");
+    assert!(out.status.success() && !said.contains("panicked"), "{said}");
+}
