@@ -458,6 +458,10 @@ impl Viewer {
     // ---- Input ----------------------------------------------------------------------------------------
 
     fn shortcuts(&mut self, ctx: &egui::Context) {
+        // The question about unsaved changes comes first, and Esc is an answer to it.
+        if self.leaving.is_some() {
+            return;
+        }
         let hit =
             |key, modifiers| ctx.input_mut(|i| i.consume_shortcut(&KeyboardShortcut::new(modifiers, key)));
         const CTRL: Modifiers = Modifiers::COMMAND;
