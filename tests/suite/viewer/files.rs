@@ -161,6 +161,22 @@ fn changes_are_asked_about_before_another_scene_is_opened() {
 }
 
 #[test]
+fn escape_goes_back_from_the_question_about_changes() {
+    let mut window = wide().open();
+    window.set("curves.h", Raw::Float(0.1));
+    window.harness.state_mut().open(Path::new("front"));
+    window.harness.run_steps(4);
+    assert!(window.reads("Save the changes?"));
+    // No other key does anything under it.
+    window.chord(Modifiers::COMMAND, Key::Z);
+    assert!(is_changed(&window));
+    window.key(Key::Escape);
+    window.harness.run_steps(2);
+    assert!(!window.reads("Save the changes?") && is_changed(&window));
+    assert_eq!(window.viewer().document().name, "small");
+}
+
+#[test]
 fn a_save_that_was_cancelled_leaves_nothing_for_the_next_one_to_do() {
     let mut window = wide().open();
     window.harness.state_mut().open(Path::new("front"));
