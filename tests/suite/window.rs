@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SIZE: [u32; 2] = [900, 560];
 /// A window opens within seconds, on software Vulkan too.
 const LONGEST: Duration = Duration::from_secs(60);
-/// The middle of the picture, right of the parameters; a slider of the first group.
+/// The middle of the picture, right of the parameters.
 const PICTURE: [u32; 2] = [620, 320];
 
 /// A process that does not outlive its test.
@@ -51,7 +51,8 @@ fn has(program: &str) -> bool {
 /// Starts a server on a free display; its name.
 fn server() -> (Owned, String) {
     let mut server = Command::new("Xvfb")
-        .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+        // Without -noreset the server starts anew when xdotool leaves, and refuses the viewer meanwhile.
+        .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
