@@ -2,7 +2,7 @@
 //!
 //! Needs Xvfb and xdotool, which `tests/run` installs.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -101,11 +101,13 @@ impl Desk {
                 panic!("the viewer ended with {status}: {}", desk.end().1);
             }
             std::thread::sleep(Duration::from_millis(100));
-            desk.window =
-                desk.xdotool(&["search", "--name", "taki"]).lines().next().unwrap_or_default().into();
+            desk.window = desk
+                .xdotool(&["search", "--onlyvisible", "--name", "taki"])
+                .lines()
+                .next()
+                .unwrap_or_default()
+                .into();
         }
-        // There is no window manager that would give it the keyboard.
-        desk.xdotool(&["windowfocus", "--sync", &desk.window]);
         Some(desk)
     }
 
@@ -128,7 +130,8 @@ impl Desk {
     }
 
     fn key(&self, key: &str) {
-        self.xdotool(&["key", key]);
+        // There is no window manager that would give the window the keyboard once it is there.
+        self.xdotool(&["windowfocus", &self.window, "key", key]);
         std::thread::sleep(Duration::from_millis(150));
     }
 
@@ -156,13 +159,11 @@ impl Desk {
             std::thread::sleep(Duration::from_millis(50));
         };
         let mut said = String::new();
-        for pipe in [
-            self.viewer.0.stdout.take().map(|p| Box::new(p) as Box<dyn std::io::Read>),
-            self.viewer.0.stderr.take().map(|p| Box::new(p) as Box<dyn std::io::Read>),
-        ] {
-            if let Some(mut pipe) = pipe {
-                pipe.read_to_string(&mut said).expect("text");
-            }
+        if let Some(mut out) = self.viewer.0.stdout.take() {
+            out.read_to_string(&mut said).expect("text");
+        }
+        if let Some(mut err) = self.viewer.0.stderr.take() {
+            err.read_to_string(&mut said).expect("text");
         }
         assert!(!said.contains("panicked"), "{said}");
         (code, said)
@@ -229,12 +230,12 @@ fn a_window_without_changes_closes_when_asked_and_one_with_changes_asks_first() 
     desk.key("ctrl+q");
     std::thread::sleep(Duration::from_millis(1000));
     assert!(desk.viewer.0.try_wait().expect("a process").is_none(), "unsaved changes are asked about");
-    desk.key("Escape");
     // Saved under the name it proposes, nothing is left to ask about.
     let start = Instant::now();
     while desk.title().starts_with('•') {
         assert!(start.elapsed() < LONGEST, "not saved: the title is {:?}", desk.title());
         // A frame of a software GPU on a busy machine takes its time: the dialog may not be there yet.
+        desk.key("Escape");
         desk.key("ctrl+s");
         std::thread::sleep(Duration::from_millis(800));
         desk.key("Return");
