@@ -252,7 +252,10 @@ fn raw(value: &DeValue) -> Raw {
 
 /// Applies one `--set key=value`. The value is TOML; what is not TOML is taken as a word.
 pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
-    let Some((key, text)) = setting.split_once('=') else {
+    // A name in a key may hold an = of its own: the first one that ends a known key is meant.
+    let splits = || setting.match_indices('=').map(|(at, _)| (&setting[..at], &setting[at + 1..]));
+    let known = splits().find(|(key, _)| Param::find(key.trim()).is_some());
+    let Some((key, text)) = known.or(splits().next()) else {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
     let (key, text) = (key.trim(), text.trim());

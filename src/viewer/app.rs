@@ -139,6 +139,8 @@ impl Viewer {
         });
         ctx.set_theme(preference(settings.theme));
         ctx.set_zoom_factor(settings.zoom);
+        // Weak text is to be read too.
+        ctx.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.8);
         let first_pose = Pose::of(document.values());
         let mut viewer = Viewer {
             drive: options.measure.then(Drive::new),
@@ -685,14 +687,10 @@ impl Viewer {
             ui.separator();
             ui.label("Refine to");
             let combo = egui::ComboBox::from_id_salt("refine")
-                .selected_text(format!("{} samples", self.settings.refine_to))
+                .selected_text(samples_text(self.settings.refine_to))
                 .show_ui(ui, |ui| {
                     for samples in [1, 4, 16, 64, 256] {
-                        ui.selectable_value(
-                            &mut self.settings.refine_to,
-                            samples,
-                            format!("{samples} samples"),
-                        );
+                        ui.selectable_value(&mut self.settings.refine_to, samples, samples_text(samples));
                     }
                 });
             name(&combo.response, "Refine to");
@@ -727,9 +725,7 @@ impl Viewer {
                 }
             }
         } else if let Some(picture) = &self.picture {
-            let samples = picture.samples;
-            let text = if samples == 1 { "1 sample".into() } else { format!("{samples} samples") };
-            ui.weak(text);
+            ui.weak(samples_text(picture.samples));
         }
     }
 
@@ -853,14 +849,11 @@ impl Viewer {
                                 ui.set_max_width(width);
                                 ui.add(egui::Label::new(text).wrap());
                             });
-                            match index {
-                                Some(i) => {
-                                    if ui.small_button("✖").on_hover_text("Close").clicked() {
-                                        closed = Some(*i);
-                                    }
-                                }
-                                None if self.document.can_undo() => undo |= ui.button("Undo").clicked(),
-                                None => {}
+                            if let Some(i) = index {
+                                let close = ui.small_button("✖").on_hover_text("Close");
+                                closed = close.clicked().then_some(*i).or(closed);
+                            } else if self.document.can_undo() {
+                                undo |= ui.button("Undo").clicked();
                             }
                         });
                     });
@@ -879,12 +872,15 @@ impl Viewer {
         let window = egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false);
         let middle = ctx.content_rect().center();
         window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
-            egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
-                for (keys, what) in HELP {
-                    ui.monospace(*keys);
-                    ui.label(*what);
-                    ui.end_row();
-                }
+            let height = (ctx.content_rect().height() - 90.0).max(120.0);
+            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
+                    for (keys, what) in HELP {
+                        ui.monospace(*keys);
+                        ui.label(*what);
+                        ui.end_row();
+                    }
+                });
             });
         });
         self.help = open;
@@ -1040,9 +1036,14 @@ fn item(ui: &mut Ui, text: &str, keys: &str) -> bool {
 fn counted(n: u64) -> String {
     match n {
         0..=9_999 => n.to_string(),
-        10_000..=9_999_999 => format!("{:.0} thousand", n as f64 / 1e3),
+        10_000..=999_999 => format!("{:.0} thousand", n as f64 / 1e3),
+        1_000_000..=99_999_999 => format!("{:.1} million", n as f64 / 1e6),
         _ => format!("{:.0} million", n as f64 / 1e6),
     }
+}
+
+fn samples_text(samples: u32) -> String {
+    if samples == 1 { "1 sample".into() } else { format!("{samples} samples") }
 }
 
 /// Bytes of this process in memory, where the system tells.
@@ -1122,7 +1123,7 @@ impl Viewer {
         if self.settings.inspectors {
             // A small window keeps room for the picture.
             let most = (ui.available_width() * 0.55).max(200.0);
-            egui::Panel::right("inspectors").default_size(430.0).size_range(200.0..=most).show(ui, |ui| {
+            egui::Panel::right("inspectors").default_size(480.0).size_range(200.0..=most).show(ui, |ui| {
                 ui.add_space(4.0);
                 self.inspectors(ui);
             });

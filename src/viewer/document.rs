@@ -27,6 +27,8 @@ pub struct Document {
     redo: Vec<Values>,
     /// The gesture whose edits are one step.
     gesture: Option<String>,
+    /// Keys that changed by themselves.
+    quiet: BTreeSet<String>,
     /// The last valid scene of the values.
     scene: Arc<Scene>,
     /// Why the values make no scene.
@@ -51,6 +53,7 @@ impl Document {
             undo: Vec::new(),
             redo: Vec::new(),
             gesture: None,
+            quiet: BTreeSet::new(),
             scene: Arc::new(scene),
             fault: None,
         })
@@ -76,10 +79,11 @@ impl Document {
         self.fault.as_deref()
     }
 
-    /// Whether there is anything to save.
+    /// Whether there is anything to save; what changed by itself is not.
     pub fn is_changed(&self) -> bool {
         // Set to its default or left out is the same.
-        self.values != self.saved && !changed_keys(&self.saved, &self.values).is_empty()
+        self.values != self.saved
+            && changed_keys(&self.saved, &self.values).iter().any(|key| !self.quiet.contains(key))
     }
 
     /// The value a key had when the scene was opened or saved.
@@ -102,6 +106,7 @@ impl Document {
         let mut values = self.values.clone();
         for (key, raw) in edits {
             values.set(key, raw, &Place("viewer".into()))?;
+            self.quiet.remove(*key);
         }
         self.replace(values, gesture);
         Ok(())
@@ -110,6 +115,7 @@ impl Document {
     /// Sets a value that changes by itself, without a step of undo.
     pub fn set_quietly(&mut self, key: &str, raw: &Raw) -> Result<()> {
         self.values.set(key, raw, &Place("viewer".into()))?;
+        self.quiet.insert(key.to_owned());
         self.check();
         Ok(())
     }

@@ -20,7 +20,7 @@ mod viewport;
 pub mod volume_panel;
 pub mod worker;
 
-use std::panic::AssertUnwindSafe;
+use std::panic::{AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -129,7 +129,7 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         .with_title("taki")
         .with_app_id("taki")
         .with_inner_size(settings.window.unwrap_or([1660.0, 900.0]))
-        .with_min_inner_size([480.0, 320.0])
+        .with_min_inner_size([760.0, 480.0])
         .with_drag_and_drop(true);
     if let Some(position) = settings.position {
         viewport = viewport.with_position(position);
@@ -159,7 +159,8 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         // Drawing with a lost device ends in a panic inside egui's renderer. The event loop that it went
         // through takes the next window for one that is open already and ends at once; the one after that
         // opens. What is kept waits meanwhile.
-        opened = std::panic::catch_unwind(AssertUnwindSafe(|| eframe::run_native("taki", native, create)));
+        let run = AssertUnwindSafe(|| eframe::run_native("taki", native, create));
+        opened = loss.without_noise(|| std::panic::catch_unwind(run));
         match &opened {
             // The next way to draw may do; what keeps all of them from it is told by the first.
             Ok(Err(e)) => first_fault = first_fault.or_else(|| Some(cause(e))),
@@ -170,7 +171,12 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         Ok(Ok(())) => Ok(loss.take()),
         Ok(Err(e)) => Err(Error::NoWindow(first_fault.unwrap_or_else(|| cause(&e)))),
         Err(panic) => match loss.take() {
-            Some(kept) => Ok(Some(kept)),
+            Some(kept) => {
+                if kept.device_lost {
+                    eprintln!("taki: warning: the window's GPU device was lost; the window is opened anew");
+                }
+                Ok(Some(kept))
+            }
             None => std::panic::resume_unwind(panic),
         },
     }
@@ -201,6 +207,7 @@ pub struct Kept {
 #[derive(Clone, Default)]
 pub struct Loss {
     lost: Arc<AtomicBool>,
+    device: Arc<Mutex<Option<wgpu::Device>>>,
     /// Until the next window takes it.
     kept: Arc<Mutex<Option<Kept>>>,
 }
@@ -216,8 +223,32 @@ impl Loss {
             }
         };
         let (on_loss, on_error) = (note(&self.lost), note(&self.lost));
+        *self.device.lock().unwrap_or_else(|e| e.into_inner()) = Some(device.clone());
         device.set_device_lost_callback(move |_, _| on_loss());
         device.on_uncaptured_error(Arc::new(move |_| on_error()));
+    }
+
+    /// Runs something whose panics are expected, and not printed, once the device is lost.
+    fn without_noise<T>(&self, run: impl FnOnce() -> T) -> T {
+        let usual: Arc<dyn Fn(&PanicHookInfo) + Send + Sync> = std::panic::take_hook().into();
+        let (loss, inner) = (self.clone(), usual.clone());
+        std::panic::set_hook(Box::new(move |info| {
+            loss.ask_device();
+            if !loss.happened() {
+                inner(info);
+            }
+        }));
+        let result = run();
+        std::panic::set_hook(Box::new(move |info| usual(info)));
+        result
+    }
+
+    /// Lets a lost device tell of its loss: it does so when it is polled, but refuses work before.
+    fn ask_device(&self) {
+        if let Some(device) = &*self.device.lock().unwrap_or_else(|e| e.into_inner()) {
+            // Its own answer is what the callback says.
+            let _ = device.poll(wgpu::PollType::Poll);
+        }
     }
 
     fn happened(&self) -> bool {

@@ -112,7 +112,7 @@ impl ParameterPanel {
                 let place = key.rsplit_once('.').map_or("", |(place, _)| place);
                 if place != open && place.contains('.') {
                     ui.add_space(4.0);
-                    ui.label(RichText::new(place.replace('.', " · ")).weak().small());
+                    ui.label(RichText::new(place.replace('.', " · ")).italics());
                 }
                 open = place.into();
                 self.row(ui, document, costs, key);
@@ -288,7 +288,7 @@ fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
         ui.horizontal(|ui| {
             ui.add_space(10.0);
             ui.allocate_ui_with_layout(
-                egui::vec2(NAME_WIDTH - 10.0 - ui.spacing().item_spacing.x, ui.spacing().interact_size.y),
+                egui::vec2(NAME_WIDTH - 10.0, ui.spacing().interact_size.y),
                 Layout::left_to_right(Align::Center),
                 |ui| {
                     ui.set_min_width(ui.available_width());

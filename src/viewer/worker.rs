@@ -324,8 +324,8 @@ struct Renderer {
 }
 
 enum Task {
-    View(Request),
-    Export(Export),
+    View(Box<Request>),
+    Export(Box<Export>),
     LoseDevice,
     Quit,
 }
@@ -343,10 +343,9 @@ impl Renderer {
                 }
                 Task::View(request) => {
                     let serial = request.serial;
-                    let again = request.clone();
-                    let done = self.guarded(|renderer| renderer.view(request));
-                    if self.settle(done) {
-                        // On the new device; nothing is asked for twice more than MAX_REBUILDS allows.
+                    let again = (*request).clone();
+                    if self.attempt(|renderer| renderer.view(*request)) {
+                        // On the new device, or on the CPU, which is tried once only.
                         let mut queue = lock(&self.shared.queue);
                         queue.view.get_or_insert(again);
                         continue;
@@ -356,9 +355,8 @@ impl Renderer {
                     state.busy = None;
                 }
                 Task::Export(export) => {
-                    let done = self.guarded(|renderer| renderer.export(&export));
-                    if self.settle(done) {
-                        lock(&self.shared.queue).exports.push_front(export);
+                    if self.attempt(|renderer| renderer.export(&export)) {
+                        lock(&self.shared.queue).exports.push_front(*export);
                         continue;
                     }
                     let mut state = lock(&self.shared.state);
@@ -380,45 +378,37 @@ impl Renderer {
                 return Task::LoseDevice;
             }
             if let Some(export) = queue.exports.pop_front() {
-                return Task::Export(export);
+                return Task::Export(Box::new(export));
             }
             if let Some(request) = queue.view.take() {
-                return Task::View(request);
+                return Task::View(Box::new(request));
             }
             queue = self.shared.news.wait(queue).unwrap_or_else(|e| e.into_inner());
         }
     }
 
-    /// A panic under the renderer is a bug of this program, but no reason to lose the user's work.
-    fn guarded(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+    /// Works and deals with how it ends; true: try it again.
+    fn attempt(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> bool {
+        // A panic under the renderer is a bug of this program, but no reason to lose the user's work.
         match std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(self))) {
-            Ok(result) => result,
-            Err(panic) => {
-                let why = panic
-                    .downcast_ref::<String>()
-                    .cloned()
-                    .or_else(|| panic.downcast_ref::<&str>().map(|s| s.to_string()))
-                    .unwrap_or_default();
-                self.say(
-                    MessageKind::Error,
-                    format!("a bug ended the renderer ({why}); it goes on on the CPU. Please report this"),
-                );
-                self.to_cpu();
-                Ok(())
-            }
-        }
-    }
-
-    /// Deals with the end of a task; true: try it again.
-    fn settle(&mut self, done: Result<()>) -> bool {
-        match done {
-            Ok(()) => lock(&self.shared.state).fault = None,
-            Err(Error::Interrupted { .. }) => {}
-            Err(e @ (Error::DeviceLost(_) | Error::Watchdog { .. })) => {
+            Ok(Ok(())) => lock(&self.shared.state).fault = None,
+            Ok(Err(Error::Interrupted { .. })) => {}
+            Ok(Err(e @ (Error::DeviceLost(_) | Error::Watchdog { .. }))) => {
                 self.lost(&e);
                 return true;
             }
-            Err(e) => lock(&self.shared.state).fault = Some(e.to_string()),
+            Ok(Err(e)) => lock(&self.shared.state).fault = Some(e.to_string()),
+            Err(panic) => {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let why = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no word why");
+                let bug = format!("a bug ended the renderer ({why}); please report this");
+                if matches!(self.engine, Some(Engine::Gpu(..))) {
+                    self.say(MessageKind::Error, format!("{bug}. The CPU engine goes on"));
+                    self.take_cpu();
+                    return true;
+                }
+                lock(&self.shared.state).fault = Some(bug);
+            }
         }
         false
     }
@@ -431,7 +421,7 @@ impl Renderer {
         lock(&self.shared.state).devices_lost += 1;
         if self.losses.len() > MAX_REBUILDS || matches!(e, Error::Watchdog { .. }) {
             self.say(MessageKind::Error, format!("{e}. The CPU engine goes on; save your work"));
-            self.to_cpu();
+            self.take_cpu();
         } else {
             self.say(
                 MessageKind::Warning,
@@ -442,7 +432,7 @@ impl Renderer {
         }
     }
 
-    fn to_cpu(&mut self) {
+    fn take_cpu(&mut self) {
         self.choice = EngineChoice::Cpu;
         self.engine = None;
         self.speed = Speed::default();

@@ -246,3 +246,26 @@ fn a_window_without_changes_closes_when_asked_and_one_with_changes_asks_first() 
     let (code, said) = desk.end();
     assert_eq!(code, Some(0), "{said}");
 }
+
+#[test]
+fn a_window_whose_device_is_lost_is_opened_anew_with_its_scene() {
+    if crate::gpu::renderer("a lost window").is_none() {
+        return;
+    }
+    let arguments = [
+        ["--window", "wgpu"],
+        ["--lose-window-after", "2"],
+        ["--exit-after", "5"],
+        ["--screenshot", "shot.png"],
+    ];
+    let Some(mut desk) = Desk::open(arguments.as_flattened()) else { return };
+    let (code, said) = desk.end();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("opened anew"), "{said}");
+    // The second window's picture: the scene still has the changes of the command line.
+    let shot = desk.folder.path().join("shot.png");
+    let (width, height, pixels) = taki::frame::read_png(&shot).expect("a screenshot");
+    assert_eq!([width, height], SIZE);
+    let [low, high] = [[PICTURE[0] - 100, PICTURE[1] - 60], [PICTURE[0] + 100, PICTURE[1] + 60]];
+    assert!(colours(width, &pixels, low, high) > 12, "a picture is in its place");
+}
