@@ -105,8 +105,9 @@ impl GpuBench {
             Some(cells) => *cells,
             None => {
                 let size = p.window.width as u64 * p.window.height as u64 * 8;
-                let bytes = readback::read_buffer(gpu, &p.sums.counts, size)?;
-                let sum = bytes.chunks_exact(4).map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64).sum();
+                let sum = readback::read_buffer(gpu, &p.sums.counts, size, |bytes| {
+                    bytes.chunks_exact(4).map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64).sum()
+                })?;
                 *cells.insert(sum)
             }
         };

@@ -224,20 +224,21 @@ impl GpuRenderer {
             let clock = Instant::now();
             let first = y as usize * image.width as usize;
             let range = first..first + window_pixels as usize;
-            let bytes = readback::read_buffer(gpu, &sums.radiance, window_pixels * 16)?;
             let inverse = 1.0 / samples.len() as f32;
-            let mean = |sum: [f32; 4]| sum.map(|x| x * inverse);
-            frame.radiance[range.clone()]
-                .iter_mut()
-                .zip(bytes.chunks_exact(16))
-                .for_each(|(out, sum)| *out = mean(bytemuck::pod_read_unaligned(sum)));
-            let bytes = readback::read_buffer(gpu, &sums.counts, window_pixels * 8)?;
-            frame.counts[range.clone()]
-                .iter_mut()
-                .zip(bytes.chunks_exact(8))
-                .for_each(|(out, count)| *out = bytemuck::pod_read_unaligned(count));
-            let bytes = readback::read_buffer(gpu, picture, window_pixels * 4)?;
-            frame.picture[range].copy_from_slice(bytemuck::cast_slice(&bytes));
+            readback::read_buffer(gpu, &sums.radiance, window_pixels * 16, |bytes| {
+                let mean = |sum: [f32; 4]| sum.map(|x| x * inverse);
+                frame.radiance[range.clone()]
+                    .iter_mut()
+                    .zip(bytes.chunks_exact(16))
+                    .for_each(|(out, sum)| *out = mean(bytemuck::pod_read_unaligned(sum)));
+            })?;
+            monitor.progress("pixels", done, total)?;
+            readback::read_buffer(gpu, &sums.counts, window_pixels * 8, |bytes| {
+                bytemuck::cast_slice_mut(&mut frame.counts[range.clone()]).copy_from_slice(bytes);
+            })?;
+            readback::read_buffer(gpu, picture, window_pixels * 4, |bytes| {
+                bytemuck::cast_slice_mut(&mut frame.picture[range]).copy_from_slice(bytes);
+            })?;
             seconds.readback += clock.elapsed().as_secs_f64();
         }
         frame.seconds = seconds;

@@ -3,8 +3,8 @@
 use super::device::Gpu;
 use crate::error::{Error, Result};
 
-/// Maps a finished `MAP_READ` buffer and copies it out.
-pub fn map(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
+/// Maps a finished `MAP_READ` buffer and hands its bytes to `read`.
+pub fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, read: impl FnOnce(&[u8]) -> T) -> Result<T> {
     let (send, receive) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
         // The receiver is gone only if waiting failed, and that is reported.
@@ -16,19 +16,24 @@ pub fn map(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
         other => return Err(Error::DeviceLost(format!("a buffer could not be read ({other:?})"))),
     }
     let view = buffer.get_mapped_range(..).map_err(|e| Error::DeviceLost(e.to_string()))?;
-    let bytes = view.to_vec();
+    let result = read(&view);
     drop(view);
     buffer.unmap();
-    Ok(bytes)
+    Ok(result)
 }
 
-/// Reads a whole storage buffer.
-pub fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>> {
+/// Hands the first `size` bytes of a storage buffer to `read`.
+pub fn read_buffer<T>(
+    gpu: &Gpu,
+    buffer: &wgpu::Buffer,
+    size: u64,
+    read: impl FnOnce(&[u8]) -> T,
+) -> Result<T> {
     let staging = gpu.buffer("read-back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
     let mut encoder = gpu.encoder("read-back");
     encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
     gpu.run(encoder)?;
-    map(gpu, &staging)
+    map(gpu, &staging, read)
 }
 
 /// Reads a 2-D texture, tightly packed: copies pad every row to 256 bytes.
@@ -56,6 +61,8 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
         texture.size(),
     );
     gpu.run(encoder)?;
-    let bytes = map(gpu, &staging)?;
-    Ok(bytes.chunks(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect())
+    map(gpu, &staging, |bytes| {
+        let rows = bytes.chunks(padded as usize).map(|line| &line[..row as usize]);
+        rows.collect::<Vec<_>>().concat()
+    })
 }

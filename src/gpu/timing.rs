@@ -84,8 +84,7 @@ impl Timer {
         encoder.resolve_query_set(&q.set, 0..2, &q.resolved, 0);
         encoder.copy_buffer_to_buffer(&q.resolved, 0, &q.readable, 0, 16);
         gpu.run(encoder)?;
-        let bytes = super::readback::map(gpu, &q.readable)?;
-        let ticks: [u64; 2] = bytemuck::pod_read_unaligned(&bytes);
+        let ticks: [u64; 2] = super::readback::map(gpu, &q.readable, bytemuck::pod_read_unaligned)?;
         Ok(ticks[1].saturating_sub(ticks[0]) as f64 * q.seconds_per_tick)
     }
 }
