@@ -74,7 +74,7 @@ pub enum Error {
         seconds: f64,
     },
     /// The user or the system asked the program to end.
-    #[error("interrupted: no output was written; run the same command again to make it")]
+    #[error("interrupted: nothing unfinished was kept; run the same command again")]
     Interrupted {
         /// 130 after SIGINT, 143 after SIGTERM.
         code: u8,

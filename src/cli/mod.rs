@@ -170,7 +170,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
     match cli.command {
         Command::Render(args) => render::run(&args, terminal),
         #[cfg(feature = "viewer")]
-        Command::View(args) => view::run(&args),
+        Command::View(args) => view::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Bench(args) => bench::run(&args, terminal),

@@ -43,6 +43,12 @@ impl Terminal {
         Terminal { bar: Mutex::new(None), signal }
     }
 
+    /// 0, or the exit code of the signal that came.
+    #[cfg(feature = "viewer")]
+    pub fn signal(&self) -> Arc<AtomicUsize> {
+        self.signal.clone()
+    }
+
     /// One line that tells what is being done, on a terminal only.
     pub fn note(&self, line: &str) {
         self.print(line);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::terminal::say;
+use super::terminal::{Terminal, say};
 use super::{EngineOptions, SceneOptions, seconds};
 use crate::error::Result;
 use crate::viewer::{self, Options, WindowChoice, settings::Settings};
@@ -37,7 +37,7 @@ pub struct ViewArgs {
     json: bool,
 }
 
-pub fn run(args: &ViewArgs) -> Result<()> {
+pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
     let mut sets = args.scene.sets.clone();
     sets.extend(args.scene.seed.map(|n| format!("volume.seed={n}")));
     let report = viewer::run(Options {
@@ -48,6 +48,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
         engine: args.engine.engine,
         device: args.engine.device(),
         settings: Settings::place(),
+        signal: terminal.signal(),
         exit_after: args.exit_after.map(Duration::from_secs_f64),
         screenshot: args.screenshot.clone(),
         measure: args.measure,

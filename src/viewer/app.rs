@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use eframe::egui;
@@ -940,6 +941,9 @@ impl Viewer {
     // ---- The window's life ----------------------------------------------------------------------------
 
     fn life(&mut self, ctx: &egui::Context) {
+        if self.options.signal.load(Ordering::Relaxed) != 0 {
+            self.closing = true;
+        }
         if self.loss.happened() && !self.closing {
             self.loss.keep(Kept { document: self.document.clone(), device_lost: true });
             self.closing = true;

@@ -22,7 +22,7 @@ pub mod worker;
 
 use std::panic::{AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -52,6 +52,8 @@ pub struct Options {
     pub device: DeviceOptions,
     /// The settings file; none keeps nothing.
     pub settings: Option<PathBuf>,
+    /// Closes the window once this is not 0: the exit code of a signal that came.
+    pub signal: Arc<AtomicUsize>,
     /// Closes the window after this time.
     pub exit_after: Option<Duration>,
     /// Where the window's picture is written before it closes.
@@ -111,6 +113,10 @@ pub fn run(options: Options) -> Result<metrics::Report> {
     let mut kept = None;
     for _ in 0..MAX_WINDOWS {
         kept = open_window(&options, &measured, kept)?;
+        let code = options.signal.load(Ordering::Relaxed);
+        if code != 0 {
+            return Err(Error::Interrupted { code: code as u8 });
+        }
         if kept.is_none() {
             return Ok(measured.report());
         }
@@ -143,6 +149,7 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
     for renderer in options.window.renderers() {
         let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
         let create: eframe::AppCreator = Box::new(move |context| {
+            wake_on_signal(&options.signal, &context.egui_ctx);
             if let Some(state) = &context.wgpu_render_state {
                 seen.watch(&state.device, &context.egui_ctx);
             }
@@ -180,6 +187,19 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
             None => std::panic::resume_unwind(panic),
         },
     }
+}
+
+/// A window at rest draws nothing and notices nothing: a signal wakes it.
+fn wake_on_signal(signal: &Arc<AtomicUsize>, ctx: &egui::Context) {
+    let (signal, ctx) = (signal.clone(), ctx.clone());
+    let watch = move || {
+        while signal.load(Ordering::Relaxed) == 0 {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        ctx.request_repaint();
+    };
+    // Without the thread a signal is noticed when the mouse moves.
+    let _ = std::thread::Builder::new().name("signals".into()).spawn(watch);
 }
 
 /// The last part of an error: before it stand the places in libraries that it came through.

@@ -119,6 +119,7 @@ fn options(scene: &Path, settings: &Path) -> Options {
         engine: EngineChoice::Cpu,
         device: DeviceOptions::default(),
         settings: Some(settings.to_owned()),
+        signal: Default::default(),
         exit_after: None,
         screenshot: None,
         measure: false,

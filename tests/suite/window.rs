@@ -269,3 +269,16 @@ fn a_window_whose_device_is_lost_is_opened_anew_with_its_scene() {
     let [low, high] = [[PICTURE[0] - 100, PICTURE[1] - 60], [PICTURE[0] + 100, PICTURE[1] + 60]];
     assert!(colours(width, &pixels, low, high) > 12, "a picture is in its place");
 }
+
+#[test]
+fn an_interrupted_window_closes_with_the_signals_own_code() {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let Some(mut desk) = Desk::open(&[]) else { return };
+        desk.until_changed("the sets are changes");
+        let pid = desk.viewer.0.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().expect("kill runs").success());
+        let (ended, said) = desk.end();
+        assert_eq!(ended, Some(code), "{said}");
+        assert!(said.contains("interrupted"), "{said}");
+    }
+}
