@@ -405,3 +405,70 @@ fn recent_files_are_offered() {
     window.settle();
     assert_eq!(window.viewer().document().name, "small");
 }
+
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
+fn drop_on(window: &mut Window, path: &Path) {
+    window.harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(path.to_owned())));
+    window.harness.run_steps(2);
+}
+
+#[test]
+fn a_scene_or_a_volume_is_opened_by_dropping_it_on_the_window() {
+    let mut window = wide().open();
+    let scene = window.path("dropped.toml");
+    std::fs::write(&scene, window.viewer().document().scene().to_toml()).expect("written");
+    drop_on(&mut window, &scene);
+    window.settle();
+    assert_eq!(window.viewer().document().name, "dropped");
+
+    // Another seed than the scene's, so that the picture tells where the volume comes from.
+    let volume = window.path("v.npz");
+    let output = ["volume", "build", &text(&scene), "--seed", "99", "-o", &text(&volume)];
+    taki(&output);
+    let before = window.picture().frame.radiance.clone();
+    drop_on(&mut window, &volume);
+    window.settle();
+    assert!(window.viewer().document().scene().volume_file.is_some());
+    let by_file = window.picture().frame.radiance.clone();
+    assert_ne!(by_file, before);
+    window.undo();
+    window.set("volume.seed", Raw::Int(99));
+    window.settle();
+    assert_eq!(window.picture().frame.radiance, by_file, "the file holds the volume of this seed");
+
+    let other = window.path("notes.txt");
+    std::fs::write(&other, "x").expect("written");
+    drop_on(&mut window, &other);
+    assert!(window.reads("neither a scene"));
+}
+
+#[test]
+fn the_command_line_is_copied_to_the_clipboard() {
+    let mut window = wide().open();
+    window.set("trace.sigma", Raw::Float(3.5));
+    window.harness.run_steps(1);
+    // One event, one frame: the harness keeps the last frame's output only.
+    let (key, modifiers) = (Key::C, Modifiers::COMMAND | Modifiers::SHIFT);
+    let event = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+    window.harness.input_mut().events.push(event);
+    window.harness.step();
+    let commands = &window.harness.output().platform_output.commands;
+    let copied = commands.iter().find_map(|command| match command {
+        egui::OutputCommand::CopyText(text) => Some(text.clone()),
+        _ => None,
+    });
+    let copied = copied.expect("something was copied");
+    assert_eq!(copied, window.viewer().document().command_line());
+    assert!(copied.starts_with("taki render ") && copied.contains("trace.sigma=3.5"), "{copied}");
+}
