@@ -1,5 +1,7 @@
 //! The parameter panel: every entry of the parameter table as a widget.
 
+use std::collections::HashMap;
+
 use eframe::egui;
 use egui::{Align, Color32, ComboBox, DragValue, Layout, Response, RichText, Slider, SliderClamping, Ui};
 use rand::RngExt;
@@ -63,8 +65,9 @@ impl ParameterPanel {
             ui.set_max_width(ui.available_width() - 8.0);
             for (title, about, sections) in GROUPS {
                 let of_group = |key: &&String| sections.contains(&key.split('.').next().unwrap_or(""));
-                let found: Vec<&String> =
+                let mut found: Vec<&String> =
                     keys.iter().filter(of_group).filter(|key| matches(key, &search)).collect();
+                together(&mut found);
                 shown += found.len();
                 if !found.is_empty() {
                     self.group(ui, document, costs, (title, about), &found, !search.is_empty());
@@ -109,7 +112,7 @@ impl ParameterPanel {
         header.body_unindented(|ui| {
             let mut open = String::new();
             for key in keys {
-                let place = key.rsplit_once('.').map_or("", |(place, _)| place);
+                let place = place(key);
                 if place != open && place.contains('.') {
                     ui.add_space(4.0);
                     ui.label(RichText::new(place.replace('.', " · ")).italics());
@@ -205,6 +208,21 @@ impl ParameterPanel {
             self.apply(document, key, Some(raw));
         }
     }
+}
+
+/// The part of a key before its last: `lights.sun` of `lights.sun.color`.
+fn place(key: &str) -> &str {
+    key.rsplit_once('.').map_or("", |(place, _)| place)
+}
+
+/// Brings what belongs to one light, quad or rock together, in the order in which they first appear: the
+/// table goes parameter by parameter.
+fn together(keys: &mut [&String]) {
+    let mut first = HashMap::new();
+    for (i, key) in keys.iter().enumerate() {
+        first.entry(place(key)).or_insert(i);
+    }
+    keys.sort_by_key(|key| first.get(place(key)).copied());
 }
 
 fn matches(key: &str, search: &str) -> bool {

@@ -274,6 +274,25 @@ fn what_is_changed_is_marked_and_goes_back_one_by_one_or_by_groups() {
 }
 
 #[test]
+fn what_belongs_to_one_light_or_rock_stands_together() {
+    let mut setup = Setup::default();
+    setup.scene += "\n[lights.moon]\ncolor = [0.2, 0.3, 0.6]\n";
+    let mut window = setup.open();
+    for section in ["lights", "rocks"] {
+        window.enter("Search parameters", section);
+        let all = window.names(Role::Slider);
+        let owners =
+            all.iter().filter(|name| name.starts_with(section)).filter_map(|name| name.split('.').nth(1));
+        let mut runs: Vec<&str> = owners.collect();
+        runs.dedup();
+        let mut once = runs.clone();
+        once.sort_unstable();
+        once.dedup();
+        assert!(runs.len() > 1 && runs.len() == once.len(), "{section}: {runs:?}");
+    }
+}
+
+#[test]
 fn the_search_shows_matches_only() {
     let mut window = open_groups();
     let shown = |window: &Window| window.names(Role::Slider);
