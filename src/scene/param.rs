@@ -134,7 +134,8 @@ pub const PARAMS: &[Param] = &[
         Float(-1e6, 1e6, 0.0),
         Uniform,
         "Moves the volume down the flow by this many of its lengths; every whole number gives the same picture.",
-    ),
+    )
+    .slider(0.0, 1.0),
     p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
     p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload, "Base of the specular reflection coefficient."),
     p(

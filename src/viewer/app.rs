@@ -83,6 +83,8 @@ pub struct Viewer {
     ray: Option<RayReport>,
     probe: Probe,
     playing: bool,
+    /// When the water was moved last.
+    flowed: Option<Instant>,
     /// The camera as the scene was opened.
     first_pose: Pose,
 
@@ -170,6 +172,7 @@ impl Viewer {
             ray: None,
             probe: Probe::default(),
             playing: false,
+            flowed: None,
             first_pose,
             serial: 0,
             asked: None,
@@ -555,15 +558,19 @@ impl Viewer {
 
     fn flow(&mut self, ctx: &egui::Context) {
         if !self.playing {
+            self.flowed = None;
             return;
         }
-        let seconds = f64::from(ctx.input(|i| i.stable_dt)).min(0.1);
+        let now = Instant::now();
+        let seconds = self.flowed.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
         let flow = f64::from(self.document.values().float("volume.flow"));
-        // Whole lengths give the same picture: the loop has no seam.
-        let next = (flow + seconds * self.settings.flow_speed).rem_euclid(1.0);
+        // Whole lengths give the same picture: the loop has no seam. After a pause of the whole window the
+        // water goes on from where it was.
+        let next = (flow + seconds.min(0.5) * self.settings.flow_speed).rem_euclid(1.0);
         let set = self.document.set_quietly("volume.flow", &Raw::Float(f64::from(next as f32)));
         self.tell(set);
-        ctx.request_repaint();
+        // Oftener than a screen shows would only take time from the renderer.
+        ctx.request_repaint_after(Duration::from_millis(16));
     }
 
     // ---- Panels ---------------------------------------------------------------------------------------

@@ -340,12 +340,12 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
     };
     ui.spacing_mut().slider_width = slider_width(ui);
     match (param.kind, value) {
-        (Kind::Float(min, max, _), Value::Float(x)) => {
+        (Kind::Float(min, max, default), Value::Float(x)) => {
             let mut new = *x;
             let (low, high) = param.slider.unwrap_or((min, max));
             let slider = Slider::new(&mut new, low..=high)
-                .logarithmic(is_logarithmic(low, high))
-                .smallest_positive((high * 1e-4).max(1e-6))
+                .logarithmic(is_logarithmic(low, high, default))
+                .smallest_positive((high * 1e-4).min(default.abs() * 0.1).max(1e-6))
                 .clamping(SliderClamping::Never)
                 .max_decimals(4)
                 .update_while_editing(false)
@@ -355,12 +355,12 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
             // Typed numbers may lie beyond the slider, but not beyond what is allowed.
             (response.changed() && new != *x).then(|| Raw::Float(new.clamp(min, max)))
         }
-        (Kind::Int(min, max, _), Value::Int(x)) => {
+        (Kind::Int(min, max, default), Value::Int(x)) => {
             let mut new = *x;
             let response = match param.slider {
                 Some((low, high)) => ui.add(
                     Slider::new(&mut new, low as i64..=high as i64)
-                        .logarithmic(is_logarithmic(low, high))
+                        .logarithmic(is_logarithmic(low, high, default as f64))
                         .clamping(SliderClamping::Never)
                         .update_while_editing(false)
                         .suffix(if param.unit == "cells" { "" } else { &suffix }),
@@ -431,8 +431,10 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
 }
 
 /// Whether a slider over this range is easier with equal ratios than with equal steps.
-fn is_logarithmic(low: f64, high: f64) -> bool {
-    low >= 0.0 && high / low.max(1.0) >= 64.0
+fn is_logarithmic(low: f64, high: f64, default: f64) -> bool {
+    let wide = high / low.max(1.0) >= 64.0;
+    let small = default > 0.0 && default < 0.02 * high;
+    low >= 0.0 && (wide || small)
 }
 
 /// A linear colour: the button holds its hue, the factor its brightness past 1.
