@@ -1,0 +1,637 @@
+//! The thread itself: what it does with a request, and how it goes on after a fault.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant, SystemTime};
+
+use eframe::egui;
+use rayon::prelude::*;
+
+use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
+use crate::cpu::resolve::resolve;
+use crate::error::{Error, Result};
+use crate::frame::{Frame, Layer};
+use crate::gpu::{DeviceOptions, RenderOptions};
+use crate::job::{Engine, EngineChoice, Monitor, Still};
+use crate::scene::{Cost, Image, Mesh, Rock, Scene};
+use crate::viewer::document::changed_keys;
+use crate::viewer::layer_image::layer_image;
+use crate::volume::{VolumeTexture, WaterSpec, set_density_and_reflection};
+
+/// A preview aims at this: with the window's own frame and the volume's upload it stays under 150 ms.
+const PREVIEW_SECONDS: f64 = 0.06;
+/// Pixels of the first preview of all, when nothing is known about the scene's cost.
+const FIRST_PREVIEW_PIXELS: f64 = 15_000.0;
+/// A full picture that takes longer than this is reached over pictures of half the size.
+const STEP_SECONDS: f64 = 0.4;
+/// After a preview the renderer waits this long for the next change before it starts to refine.
+const SETTLE: Duration = Duration::from_millis(60);
+/// A preview is finished even if something newer waits, so that a moving slider shows pictures at all;
+/// one that takes longer than this is given up.
+const PATIENCE: Duration = Duration::from_millis(250);
+/// So is the building of a volume, but it is worth a longer wait.
+const BUILD_PATIENCE: Duration = Duration::from_secs(2);
+/// More than this many lost devices a minute, and the CPU takes over.
+const MAX_REBUILDS: usize = 3;
+/// Preview pixels per side of a full pixel that are tried.
+/// From this scale on the rocks are drawn coarsely.
+const COARSE_SCALE: u32 = 3;
+const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
+
+/// The volume of the last request, and what it was made from.
+struct MadeVolume {
+    source: VolumeSource,
+    volume: Arc<VolumeTexture>,
+}
+
+#[derive(PartialEq)]
+enum VolumeSource {
+    Water(WaterSpec),
+    /// Path, and what tells one version of the file from the next.
+    File(PathBuf, Option<SystemTime>, u64),
+}
+
+/// The picture that refinement goes on from.
+struct Rendered {
+    scene: Arc<Scene>,
+    size: [u32; 2],
+    frame: Arc<Frame>,
+    samples: u32,
+    volume: Arc<VolumeTexture>,
+}
+
+/// The opaque geometry for pictures and for previews.
+#[derive(Clone)]
+struct Meshes {
+    full: Mesh,
+    coarse: Mesh,
+}
+
+/// What the last pictures took, seconds a sample.
+#[derive(Default)]
+struct Speed {
+    /// Of walk, tone and read-back.
+    per_pixel: Option<f64>,
+    /// Of the rest, mostly the raster pass: with the full mesh, and with the coarse one.
+    once: [f64; 2],
+}
+
+/// What the thread holds.
+pub struct Renderer {
+    shared: Arc<Shared>,
+    choice: EngineChoice,
+    device: DeviceOptions,
+    memory: u64,
+    engine: Option<Engine>,
+    volume: Option<MadeVolume>,
+    mesh: Option<(Vec<Rock>, Meshes)>,
+    rendered: Option<Rendered>,
+    speed: Speed,
+    /// When devices were lost.
+    losses: VecDeque<Instant>,
+}
+
+enum Task {
+    View(Box<Request>),
+    Export(Box<Export>),
+    LoseDevice,
+    Quit,
+}
+
+impl Renderer {
+    /// Opens nothing yet.
+    pub fn new(shared: Arc<Shared>, choice: EngineChoice, device: DeviceOptions, memory: u64) -> Self {
+        Renderer {
+            shared,
+            choice,
+            device,
+            memory,
+            engine: None,
+            volume: None,
+            mesh: None,
+            rendered: None,
+            speed: Speed::default(),
+            losses: VecDeque::new(),
+        }
+    }
+
+    /// Works until the window's side is dropped.
+    pub fn run(mut self) {
+        self.open_engine();
+        loop {
+            match self.next() {
+                Task::Quit => return,
+                Task::LoseDevice => {
+                    if let Some(Engine::Gpu(renderer, _)) = &self.engine {
+                        renderer.gpu.device.destroy();
+                    }
+                }
+                Task::View(request) => {
+                    let serial = request.serial;
+                    let again = (*request).clone();
+                    if self.attempt(|renderer| renderer.view(*request)) {
+                        // On the new device, or on the CPU, which is tried once only.
+                        let mut queue = lock(&self.shared.queue);
+                        queue.view.get_or_insert(again);
+                        continue;
+                    }
+                    let mut state = lock(&self.shared.state);
+                    state.settled = state.settled.max(serial);
+                    state.busy = None;
+                }
+                Task::Export(export) => {
+                    if self.attempt(|renderer| renderer.export(&export)) {
+                        lock(&self.shared.queue).exports.push_front(*export);
+                        continue;
+                    }
+                    let mut state = lock(&self.shared.state);
+                    state.exports_done += 1;
+                    state.busy = None;
+                }
+            }
+            (self.shared.wake)();
+        }
+    }
+
+    fn next(&self) -> Task {
+        let mut queue = lock(&self.shared.queue);
+        loop {
+            if queue.quit {
+                return Task::Quit;
+            }
+            if std::mem::take(&mut queue.lose_device) {
+                return Task::LoseDevice;
+            }
+            if let Some(export) = queue.exports.pop_front() {
+                return Task::Export(Box::new(export));
+            }
+            if let Some(request) = queue.view.take() {
+                return Task::View(Box::new(request));
+            }
+            queue = self.shared.news.wait(queue).unwrap_or_else(|e| e.into_inner());
+        }
+    }
+
+    /// Works and deals with how it ends; true: try it again.
+    fn attempt(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> bool {
+        // A panic under the renderer is a bug of this program, but no reason to lose the user's work.
+        match std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(self))) {
+            Ok(Ok(())) => lock(&self.shared.state).fault = None,
+            Ok(Err(Error::Interrupted { .. })) => {}
+            Ok(Err(e @ (Error::DeviceLost(_) | Error::Watchdog { .. }))) => {
+                self.lost(&e);
+                return true;
+            }
+            Ok(Err(e)) => lock(&self.shared.state).fault = Some(e.to_string()),
+            Err(panic) => {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let why = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no word why");
+                let bug = format!("a bug ended the renderer ({why}); please report this");
+                if matches!(self.engine, Some(Engine::Gpu(..))) {
+                    self.say(MessageKind::Error, format!("{bug}. The CPU engine goes on"));
+                    self.take_cpu();
+                    return true;
+                }
+                lock(&self.shared.state).fault = Some(bug);
+            }
+        }
+        false
+    }
+
+    /// Opens a new device after one was lost; past a few a minute the CPU takes over.
+    fn lost(&mut self, e: &Error) {
+        let now = Instant::now();
+        self.losses.retain(|at| now - *at < Duration::from_secs(60));
+        self.losses.push_back(now);
+        lock(&self.shared.state).devices_lost += 1;
+        if self.losses.len() > MAX_REBUILDS || matches!(e, Error::Watchdog { .. }) {
+            self.say(MessageKind::Error, format!("{e}. The CPU engine goes on; save your work"));
+            self.take_cpu();
+        } else {
+            self.say(
+                MessageKind::Warning,
+                format!("the GPU device was lost ({e}); a new one was opened, nothing of the scene is lost"),
+            );
+            self.engine = None;
+            self.open_engine();
+        }
+    }
+
+    fn take_cpu(&mut self) {
+        self.choice = EngineChoice::Cpu;
+        self.engine = None;
+        self.speed = Speed::default();
+        self.open_engine();
+    }
+
+    fn open_engine(&mut self) {
+        let opened = Engine::open(self.choice, &self.device);
+        let (engine, line) = match opened {
+            Ok(opened) => opened,
+            Err(e) => {
+                self.say(MessageKind::Error, format!("{e}. The CPU engine goes on"));
+                (Engine::Cpu, "engine cpu".into())
+            }
+        };
+        if matches!(engine, Engine::Cpu) && self.choice != EngineChoice::Cpu {
+            self.say(MessageKind::Warning, line.clone());
+        }
+        self.engine = Some(engine);
+        lock(&self.shared.state).engine = line;
+        (self.shared.wake)();
+    }
+
+    fn say(&self, kind: MessageKind, text: String) {
+        let mut state = lock(&self.shared.state);
+        let message = Message { kind, text };
+        if state.messages.last() != Some(&message) {
+            state.messages.push(message);
+        }
+        drop(state);
+        (self.shared.wake)();
+    }
+
+    /// Whether there is something newer to do than `serial`; waits for it up to `time`.
+    fn superseded(&self, serial: u64, time: Duration) -> bool {
+        let until = Instant::now() + time;
+        let mut queue = lock(&self.shared.queue);
+        loop {
+            let newer = self.shared.newest.load(Ordering::Relaxed) > serial;
+            if newer || queue.quit || queue.lose_device || !queue.exports.is_empty() {
+                return true;
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            queue =
+                self.shared.news.wait_timeout(queue, left).map_or_else(|e| e.into_inner().0, |woken| woken.0);
+        }
+    }
+
+    fn watch(&self, what: &'static str, serial: u64, patience: Duration) -> Watch {
+        Watch {
+            shared: self.shared.clone(),
+            what,
+            serial,
+            patience,
+            start: Instant::now(),
+            shown: Mutex::new(None),
+        }
+    }
+
+    fn view(&mut self, request: Request) -> Result<()> {
+        let (volume, made) = self.volume(&request)?;
+        let (meshes, mesh_made) = self.meshes(&request.scene);
+        let cost = match made {
+            Some(cost) => cost,
+            None if mesh_made => Cost::Upload,
+            None => Cost::Uniform,
+        };
+        let job = Job { request: &request, volume, meshes, cost };
+        let mut first = true;
+        if let Some(rendered) = self.goes_on(&request, &job.volume) {
+            let samples = rendered.samples;
+            self.keep(&job, rendered, first);
+            if samples >= request.samples {
+                return Ok(());
+            }
+            first = false;
+        } else {
+            self.rendered = None;
+            let mut scale = self.preview_scale(request.size);
+            self.picture(&job, scale, first)?;
+            first = false;
+            if self.superseded(request.serial, SETTLE) {
+                return Ok(());
+            }
+            while scale > 1 {
+                scale = match self.seconds_for(request.size, 1) {
+                    // Half a picture's time is well spent on showing what the next one will be.
+                    full if full > STEP_SECONDS && scale > 2 => scale.div_ceil(2).max(2),
+                    _ => 1,
+                };
+                self.picture(&job, scale, first)?;
+            }
+        }
+        // As many samples again as there are: half the time goes into the last step.
+        while let Some(samples) = self.rendered.as_ref().map(|r| r.samples)
+            && samples < request.samples
+        {
+            let more = samples.min(request.samples - samples);
+            let part = self.render(&job, 1, samples..samples + more, "refining")?;
+            if let Some(rendered) = self.rendered.take() {
+                let mut frame = rendered.frame;
+                add(Arc::make_mut(&mut frame), samples, &part, more, &request.scene.image);
+                self.keep(&job, Rendered { frame, samples: samples + more, ..rendered }, first);
+            }
+        }
+        Ok(())
+    }
+
+    /// The finished part of the same picture, if that is what is asked for again.
+    fn goes_on(&mut self, request: &Request, volume: &Arc<VolumeTexture>) -> Option<Rendered> {
+        let old = self.rendered.take()?;
+        let same = old.size == request.size
+            && Arc::ptr_eq(&old.volume, volume)
+            && (!request.layer.of_surface() || old.frame.surface.is_some())
+            && old.samples <= request.samples.max(1)
+            && changed_keys(&old.scene.values, &request.scene.values)
+                .iter()
+                .all(|key| key.starts_with("image."))
+            && old.scene.name == request.scene.name;
+        if !same {
+            return None;
+        }
+        let mut frame = old.frame;
+        let image = &request.scene.image;
+        if (old.scene.image.exposure, old.scene.image.tone) != (image.exposure, image.tone) {
+            develop(Arc::make_mut(&mut frame), image);
+        }
+        Some(Rendered { scene: request.scene.clone(), frame, ..old })
+    }
+
+    /// Renders and shows sample 0 at 1/scale of the size.
+    fn picture(&mut self, job: &Job, scale: u32, first: bool) -> Result<()> {
+        let frame = self.render(job, scale, 0..1, if first { "preview" } else { "refining" })?;
+        let frame = Arc::new(frame);
+        if scale == 1 {
+            let rendered = Rendered {
+                scene: job.request.scene.clone(),
+                size: job.request.size,
+                frame,
+                samples: 1,
+                volume: job.volume.clone(),
+            };
+            self.keep(job, rendered, first);
+        } else {
+            self.show(job, frame, scale, 1, first);
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, job: &Job, rendered: Rendered, first: bool) {
+        self.show(job, rendered.frame.clone(), 1, rendered.samples, first);
+        self.rendered = Some(rendered);
+    }
+
+    fn show(&self, job: &Job, frame: Arc<Frame>, scale: u32, samples: u32, first: bool) {
+        let mut scene = (*job.request.scene).clone();
+        (scene.image.width, scene.image.height) = (frame.width, frame.height);
+        let layer = job.request.layer;
+        let drawn = layer_image(&frame, layer, samples);
+        let size = [frame.width as usize, frame.height as usize];
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, bytemuck::cast_slice(&drawn.pixels));
+        let picture = Picture {
+            serial: job.request.serial,
+            asked: job.request.asked,
+            of: job.request.scene.clone(),
+            scene: Arc::new(scene),
+            volume: job.volume.clone(),
+            mesh: job.meshes.full.clone(),
+            frame,
+            image: Arc::new(image),
+            layer,
+            legend: drawn.legend,
+            scale,
+            samples,
+            first,
+            cost: job.cost,
+        };
+        lock(&self.shared.state).picture = Some(Arc::new(picture));
+        (self.shared.wake)();
+    }
+
+    fn render(
+        &mut self,
+        job: &Job,
+        scale: u32,
+        samples: std::ops::Range<u32>,
+        what: &'static str,
+    ) -> Result<Frame> {
+        let [width, height] = job.request.size.map(|n| n.div_ceil(scale).max(1));
+        let mut scene = (*job.request.scene).clone();
+        scene.image.width = width;
+        scene.image.height = height;
+        scene.image.samples = job.request.samples.max(1);
+        let patience = if what == "preview" { PATIENCE } else { Duration::ZERO };
+        let watch = self.watch(what, job.request.serial, patience);
+        let options = RenderOptions {
+            surface: job.request.layer.of_surface() && samples.start == 0,
+            samples: Some(samples.clone()),
+            ..Default::default()
+        };
+        let clock = Instant::now();
+        let coarse = scale >= COARSE_SCALE;
+        let mesh = if coarse { &job.meshes.coarse } else { &job.meshes.full };
+        let mut frame = self.run_engine(&scene, &job.volume, mesh, &options, &watch)?;
+        let s = &mut frame.seconds;
+        let of_pixels = s.integrate + s.resolve + s.readback;
+        let once = clock.elapsed().as_secs_f64() - of_pixels - s.pipelines - s.upload;
+        let samples = samples.len() as f64;
+        self.speed.per_pixel = Some(of_pixels / samples / (width as f64 * height as f64));
+        self.speed.once[usize::from(coarse)] = once.max(0.0) / samples;
+        // People compare passes, not parts of a refinement.
+        (s.gbuffer, s.integrate) = (s.gbuffer / samples, s.integrate / samples);
+        Ok(frame)
+    }
+
+    /// Renders without [`Engine::render`]'s own second try: lost devices are counted here.
+    fn run_engine(
+        &mut self,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+        options: &RenderOptions,
+        watch: &Watch,
+    ) -> Result<Frame> {
+        match self.engine.get_or_insert(Engine::Cpu) {
+            Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
+            cpu => cpu.render(scene, volume, mesh, options, watch),
+        }
+    }
+
+    /// Expected seconds of one sample at 1/scale of the size.
+    fn seconds_for(&self, size: [u32; 2], scale: u32) -> f64 {
+        let pixels = size.map(|n| n.div_ceil(scale) as f64).iter().product::<f64>();
+        let per_pixel = self.speed.per_pixel.unwrap_or(PREVIEW_SECONDS / FIRST_PREVIEW_PIXELS);
+        pixels * per_pixel + self.speed.once[usize::from(scale >= COARSE_SCALE)]
+    }
+
+    fn preview_scale(&self, size: [u32; 2]) -> u32 {
+        let fits = |scale: &u32| self.seconds_for(size, *scale) <= PREVIEW_SECONDS;
+        SCALES.into_iter().find(fits).unwrap_or(SCALES[SCALES.len() - 1])
+    }
+
+    /// The request's volume, and what making it cost.
+    fn volume(&mut self, request: &Request) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
+        let scene = &request.scene;
+        let source = match &scene.volume_file {
+            None => VolumeSource::Water(scene.water),
+            Some(path) => {
+                let meta = std::fs::metadata(path).ok();
+                let changed = meta.as_ref().and_then(|m| m.modified().ok());
+                VolumeSource::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
+            }
+        };
+        let clock = Instant::now();
+        let (volume, cost) = match (self.volume.take(), &source) {
+            (Some(made), _) if made.source == source => {
+                let volume = made.volume.clone();
+                self.volume = Some(made);
+                return Ok((volume, None));
+            }
+            (Some(MadeVolume { source: VolumeSource::Water(old), volume }), VolumeSource::Water(new))
+                if same_curves(&old, new) =>
+            {
+                let mut changed = VolumeTexture { alpha: new.alpha, ..(*volume).clone() };
+                if (WaterSpec { alpha: new.alpha, ..old }) == *new {
+                    (changed, Cost::Uniform)
+                } else {
+                    let cells: &mut Vec<_> = Arc::make_mut(&mut changed.cells);
+                    set_density_and_reflection(new, cells);
+                    (changed, Cost::Upload)
+                }
+            }
+            (old, _) => {
+                // The old one serves while the new one is made, and after it if that is given up.
+                self.volume = old;
+                let watch = self.watch("curves", request.serial, BUILD_PATIENCE);
+                (scene.volume(self.memory, &watch)?, Cost::Volume)
+            }
+        };
+        let volume = Arc::new(volume);
+        if cost == Cost::Volume {
+            lock(&self.shared.state).volume_seconds = clock.elapsed().as_secs_f64();
+            scene.warnings(&volume).into_iter().for_each(|w| self.say(MessageKind::Warning, w));
+        }
+        self.volume = Some(MadeVolume { source, volume: volume.clone() });
+        Ok((volume, Some(cost)))
+    }
+
+    /// The request's geometry, and whether it was made anew.
+    fn meshes(&mut self, scene: &Scene) -> (Meshes, bool) {
+        if let Some((rocks, meshes)) = &self.mesh
+            && *rocks == scene.rocks
+        {
+            return (meshes.clone(), false);
+        }
+        let full = scene.mesh();
+        let meshes = Meshes { coarse: full.coarse(&scene.rocks), full };
+        self.mesh = Some((scene.rocks.clone(), meshes.clone()));
+        (meshes, true)
+    }
+
+    fn export(&mut self, export: &Export) -> Result<()> {
+        let clock = Instant::now();
+        let result = self.export_files(export);
+        let names: Vec<String> = export.paths.iter().map(|p| p.display().to_string()).collect();
+        let names = names.join(", ");
+        match &result {
+            Ok(()) => {
+                let seconds = clock.elapsed().as_secs_f64();
+                self.say(MessageKind::Note, format!("wrote {names} in {seconds:.1} s"));
+            }
+            Err(Error::Interrupted { .. }) => {
+                self.say(MessageKind::Note, format!("export cancelled; {names} was not written"));
+            }
+            Err(Error::DeviceLost(_) | Error::Watchdog { .. }) => return result,
+            Err(e) => self.say(MessageKind::Error, format!("export failed: {e}")),
+        }
+        Ok(())
+    }
+
+    fn export_files(&mut self, export: &Export) -> Result<()> {
+        let still = Still::create(&export.paths)?;
+        let request = Request {
+            // No view request is ever older: a volume that is being built for the export is not given up.
+            serial: u64::MAX,
+            asked: Instant::now(),
+            scene: Arc::new(export.scene.clone()),
+            size: [export.scene.image.width, export.scene.image.height],
+            samples: export.scene.image.samples,
+            layer: Layer::Rgb,
+        };
+        let (volume, _) = self.volume(&request)?;
+        let (meshes, _) = self.meshes(&export.scene);
+        let watch = self.watch("export", u64::MAX, Duration::MAX);
+        let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
+        let frame = self.run_engine(&export.scene, &volume, &meshes.full, &options, &watch)?;
+        watch.progress("saving", 1, 1)?;
+        still.save(&frame, &Layer::ALL, &export.scene, &volume)
+    }
+}
+
+/// What all pictures of a request share.
+struct Job<'a> {
+    request: &'a Request,
+    volume: Arc<VolumeTexture>,
+    meshes: Meshes,
+    cost: Cost,
+}
+
+fn same_curves(a: &WaterSpec, b: &WaterSpec) -> bool {
+    WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, ..*a } == *b
+}
+
+/// Adds the mean of `more` samples to the mean of `samples`.
+fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, image: &Image) {
+    let share = more as f32 / (samples + more) as f32;
+    sum.radiance
+        .par_iter_mut()
+        .zip(&part.radiance)
+        .for_each(|(a, b)| *a = [0, 1, 2, 3].map(|c| a[c] + (b[c] - a[c]) * share));
+    sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
+    sum.seconds = part.seconds;
+    develop(sum, image);
+}
+
+/// Makes the picture from the radiance.
+fn develop(frame: &mut Frame, image: &Image) {
+    frame
+        .picture
+        .par_iter_mut()
+        .zip(&frame.radiance)
+        .for_each(|(picture, linear)| *picture = resolve(image, *linear));
+}
+
+/// Watches one piece of work for the render thread: ends it when something newer is wanted.
+struct Watch {
+    shared: Arc<Shared>,
+    what: &'static str,
+    serial: u64,
+    /// How long the work goes on though something newer is wanted.
+    patience: Duration,
+    start: Instant,
+    /// When the window was last told.
+    shown: Mutex<Option<Instant>>,
+}
+
+impl Monitor for Watch {
+    fn progress(&self, _: &'static str, done: u64, total: u64) -> Result<()> {
+        let export = self.serial == u64::MAX;
+        let newer = self.shared.newest.load(Ordering::Relaxed) > self.serial;
+        let stopped = !export && self.shared.stopped.load(Ordering::Relaxed) >= self.serial;
+        let cancelled = export && self.shared.cancel_export.load(Ordering::Relaxed);
+        let quit = self.shared.quit.load(Ordering::Relaxed);
+        if quit || stopped || cancelled || (newer && self.start.elapsed() >= self.patience) {
+            return Err(Error::Interrupted { code: 130 });
+        }
+        let mut shown = lock(&self.shown);
+        if shown.is_none_or(|at| at.elapsed() > Duration::from_millis(100)) {
+            *shown = Some(Instant::now());
+            let share = done as f32 / total.max(1) as f32;
+            lock(&self.shared.state).busy = Some(Busy { what: self.what, share });
+            (self.shared.wake)();
+        }
+        Ok(())
+    }
+
+    fn warn(&self, text: &str) {
+        let message = Message { kind: MessageKind::Warning, text: text.into() };
+        lock(&self.shared.state).messages.push(message);
+        (self.shared.wake)();
+    }
+}
