@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand.
 
+mod batch;
 mod bench;
 mod compare;
 mod devices;
@@ -19,7 +20,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::error::{Error, Result};
 use crate::gpu::DeviceOptions;
 use crate::job::EngineChoice;
-use crate::scene::{DEFAULT_PRESET, Limits, Scene, presets};
+use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \
@@ -38,6 +39,8 @@ struct Cli {
 enum Command {
     /// Renders one image.
     Render(render::RenderArgs),
+    /// Renders many images: the frames of an animation, the grid of a sweep.
+    Batch(batch::BatchArgs),
     /// Opens the viewer: turn the parameters and see the picture change.
     #[cfg(feature = "viewer")]
     View(view::ViewArgs),
@@ -88,10 +91,19 @@ impl SceneOptions {
 
     /// Loads the scene; `more` are settings of other options, which come last.
     fn load(&self, more: &[String]) -> Result<Scene> {
+        Scene::load(&self.scene, &self.all_sets(more), &self.limits())
+    }
+
+    /// Loads the scene as it moves.
+    fn animation(&self, more: &[String]) -> Result<Animation> {
+        Animation::load(&self.scene, &self.all_sets(more), &self.limits())
+    }
+
+    fn all_sets(&self, more: &[String]) -> Vec<String> {
         let mut sets = self.sets.clone();
         sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
         sets.extend_from_slice(more);
-        Scene::load(&self.scene, &sets, &self.limits())
+        sets
     }
 }
 
@@ -169,6 +181,7 @@ pub fn main() -> ExitCode {
 fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
     match cli.command {
         Command::Render(args) => render::run(&args, terminal),
+        Command::Batch(args) => batch::run(&args, terminal),
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),

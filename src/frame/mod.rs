@@ -3,11 +3,13 @@
 mod difference;
 mod exr_file;
 mod output;
+mod owner;
 mod png_file;
 
 pub use difference::{Difference, Tolerance};
 pub use exr_file::{read_exr, write_exr};
-pub use output::Output;
+pub use output::{Output, folder_of, remove_left_by, remove_stale};
+pub use owner::{Life, Owner};
 pub use png_file::{encode_png, read_png};
 
 use glam::Vec3;

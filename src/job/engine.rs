@@ -58,6 +58,14 @@ impl Engine {
         Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
     }
 
+    /// Opens the device anew, after it was lost.
+    pub fn renew(&mut self) -> Result<()> {
+        if let Engine::Gpu(renderer, device) = self {
+            **renderer = GpuRenderer::new(Gpu::open(device)?);
+        }
+        Ok(())
+    }
+
     /// `gpu` or `cpu`.
     pub fn word(&self) -> &'static str {
         match self {

@@ -1,10 +1,15 @@
 //! How long work is run, watched and stopped.
 
+pub mod batch;
+mod claim;
 mod engine;
 mod still;
+mod stock;
 
+pub use claim::{Asked, Claim, Claims};
 pub use engine::{Engine, EngineChoice};
 pub use still::Still;
+pub use stock::VolumeStock;
 
 use crate::error::Result;
 
