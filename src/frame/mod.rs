@@ -4,11 +4,13 @@ mod difference;
 mod exr_file;
 mod output;
 mod png_file;
+mod window;
 
 pub use difference::{Difference, Tolerance};
 pub use exr_file::{read_exr, write_exr};
 pub use output::Output;
 pub use png_file::{encode_png, read_png};
+pub use window::Window;
 
 use glam::Vec3;
 
