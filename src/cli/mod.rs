@@ -5,6 +5,7 @@ mod compare;
 mod devices;
 mod render;
 mod scene;
+mod stitch;
 mod terminal;
 #[cfg(feature = "viewer")]
 mod view;
@@ -47,6 +48,8 @@ enum Command {
     Volume(volume::VolumeArgs),
     /// Measures this machine: passes, engines, volumes, with the work each did.
     Bench(bench::BenchArgs),
+    /// Joins crops of one picture to the file of the whole.
+    Stitch(stitch::StitchArgs),
     /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
     Compare(compare::CompareArgs),
     /// Lists the scenes that come with the program.
@@ -174,6 +177,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Bench(args) => bench::run(&args, terminal),
+        Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::run(),
         Command::Presets => {

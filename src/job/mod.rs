@@ -2,9 +2,14 @@
 
 mod engine;
 mod still;
+mod stitch;
+mod strips;
 
 pub use engine::{Engine, EngineChoice};
-pub use still::Still;
+pub(crate) use still::{About, Sink};
+pub use still::{Still, StillWriter};
+pub use stitch::stitch;
+pub use strips::{check_image, strips};
 
 use crate::error::Result;
 
