@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, seconds, size};
-use crate::error::{Error, Result};
-use crate::frame::{Layer, Window};
+use super::{EngineOptions, SceneOptions, crop, seconds, size, window};
+use crate::error::Result;
+use crate::frame::Layer;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::job::{Engine, Monitor};
+use crate::scene::Animation;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -74,7 +75,7 @@ pub struct BatchArgs {
     samples: Option<u32>,
     /// Renders this part of every picture only: column and row of its top left pixel, width, height.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
-    crop: Option<Window>,
+    crop: Option<[u32; 4]>,
     #[command(flatten)]
     engine: EngineOptions,
     /// Layers of EXR files.
@@ -150,11 +151,13 @@ impl BatchArgs {
         more
     }
 
-    fn request(&self, scene: &str) -> Result<Request> {
+    fn request(&self, animation: &Animation) -> Result<Request> {
         let outputs = match self.outputs.as_slice() {
-            [] => vec![default_pattern(scene, &self.sweeps)],
+            [] => vec![default_pattern(animation.name(), &self.sweeps)],
             given => given.to_vec(),
         };
+        let size = ["image.width", "image.height"].map(|side| animation.values().count(side));
+        let crop = self.crop.map(|crop| window(Some(crop), size)).transpose()?;
         Ok(Request {
             frames: self.frames.clone().map(|f| f.0),
             sweeps: self.sweeps.clone(),
@@ -163,7 +166,7 @@ impl BatchArgs {
             overwrite: self.overwrite,
             keep_going: self.keep_going,
             retries: self.retries,
-            crop: self.crop,
+            crop,
             layers: self.layers.clone().unwrap_or(Layer::ALL.to_vec()),
             stale: Duration::from_secs_f64(self.stale),
         })
@@ -182,7 +185,7 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     let animation = args.scene.animation(&args.settings())?;
-    let request = args.request(animation.name())?;
+    let request = args.request(&animation)?;
     let batch = Batch::plan(animation, request, terminal)?;
     terminal.close();
     if args.dry_run {

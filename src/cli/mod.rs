@@ -6,6 +6,7 @@ mod compare;
 mod devices;
 mod render;
 mod scene;
+mod stitch;
 mod terminal;
 #[cfg(feature = "viewer")]
 mod view;
@@ -18,6 +19,7 @@ use std::time::Duration;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::error::{Error, Result};
+use crate::frame::Window;
 use crate::gpu::DeviceOptions;
 use crate::job::EngineChoice;
 use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
@@ -50,6 +52,8 @@ enum Command {
     Volume(volume::VolumeArgs),
     /// Measures this machine: passes, engines, volumes, with the work each did.
     Bench(bench::BenchArgs),
+    /// Joins crops of one picture to the file of the whole.
+    Stitch(stitch::StitchArgs),
     /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
     Compare(compare::CompareArgs),
     /// Lists the scenes that come with the program.
@@ -140,6 +144,29 @@ fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     parts.ok_or_else(|| "WIDTHxHEIGHT in pixels, such as 1280x720".into())
 }
 
+/// `X,Y,W,H`.
+fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
+    let numbers = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<Vec<u32>>>();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "column, row, width and height in pixels, such as 0,0,640,360".into())
+}
+
+/// The part of the image that is asked for.
+fn window(crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
+    let Some(crop) = crop else { return Ok(Window::whole(size)) };
+    let [x, y, width, height] = crop;
+    if !Window::fits(size, crop) {
+        return Err(Error::Usage(format!(
+            "--crop {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, rows 0 to {}, and \
+             at least one of each",
+            size[0] - 1,
+            size[1] - 1
+        )));
+    }
+    Ok(Window { x, y, width, height })
+}
+
 /// Where a command writes when -o is not given: the scene's name in the current folder.
 fn default_output(scene: &Scene, extension: &str) -> PathBuf {
     // Not `with_extension`: the scene v1.2 would become v1.png.
@@ -187,6 +214,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Bench(args) => bench::run(&args, terminal),
+        Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::run(),
         Command::Presets => {

@@ -2,7 +2,7 @@
 
 use crate::cpu;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
+use crate::frame::{Frame, Window};
 use crate::gpu::{DeviceOptions, Gpu, GpuRenderer, RenderOptions};
 use crate::job::Monitor;
 use crate::scene::{Mesh, Scene};
@@ -95,7 +95,8 @@ impl Engine {
         match self {
             Engine::Cpu => {
                 let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
-                cpu::render_samples(scene, volume, mesh, samples, options.surface, monitor)
+                let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
+                cpu::render_samples(scene, volume, mesh, window, samples, options.surface, monitor)
             }
             Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
                 Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {

@@ -331,18 +331,9 @@ impl Scene {
 }
 
 impl Image {
-    /// The picture's own memory: radiance and transmittance in float32, 8-bit colour, counts.
+    /// Pictures are made in parts: refused are those of which no part fits.
     fn check_budget(&self, memory: u64) -> Result<()> {
-        let need = self.width as u128 * self.height as u128 * 48;
-        if need > memory as u128 {
-            return Err(Error::memory(
-                format!("an image of {}×{} pixels (image.width, height)", self.width, self.height),
-                need,
-                memory,
-                "lower the size or raise --memory",
-            ));
-        }
-        Ok(())
+        crate::job::check_image(self, memory)
     }
 }
 

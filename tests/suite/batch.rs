@@ -93,7 +93,11 @@ fn order_threads_and_engine_reuse_change_no_byte() {
 #[test]
 fn a_loop_closes_frame_n_is_frame_0() {
     let dir = folder();
-    run(&mut batch(dir.path(), ["--loop", "6", "--set", "animate.turn=6", "--frames", "0-7", "-o", "f.#.png"])).done();
+    run(&mut batch(
+        dir.path(),
+        ["--loop", "6", "--set", "animate.turn=6", "--frames", "0-7", "-o", "f.#.png"],
+    ))
+    .done();
     let made = files(dir.path());
     assert!(made["f.0.png"] == made["f.6.png"] && made["f.1.png"] == made["f.7.png"]);
     let pictures: std::collections::BTreeSet<&Vec<u8>> = made.values().collect();
@@ -132,8 +136,11 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
     let after = files(dir.path());
     assert!(after.len() == 3 && after.iter().all(|(name, bytes)| before[name] != *bytes));
     // Any foreign picture, and another part of the same one.
-    run(&mut batch(dir.path(), ["--frames", "0-2", "-o", "f.####.png", "--set", "trace.sigma=3", "--crop", "0,0,4,4"]))
-        .refused(73, &["another part"]);
+    run(&mut batch(
+        dir.path(),
+        ["--frames", "0-2", "-o", "f.####.png", "--set", "trace.sigma=3", "--crop", "0,0,4,4"],
+    ))
+    .refused(73, &["another part"]);
     let mut plain = taki(["render"]);
     run(plain.args(TINY).args(["-o", "f.0001.exr", "--layers", "rgb"]).current_dir(dir.path())).done();
     run(&mut batch(dir.path(), ["--frames", "0-2", "-o", "f.####.exr"])).refused(73, &["f.0001.exr"]);
@@ -164,7 +171,8 @@ fn faults_are_known_before_any_picture() {
         words.iter().for_each(|word| assert!(refused.stderr().contains(word), "no {word:?} in {refused:?}"));
     }
     // The camera passes its own target half-way.
-    let mut command = taki(["batch", "bad.toml", "--size", "8x8", "--engine", "cpu", "--frames", "0-8", "-o", "g.#.png"]);
+    let mut command =
+        taki(["batch", "bad.toml", "--size", "8x8", "--engine", "cpu", "--frames", "0-8", "-o", "g.#.png"]);
     run(command.current_dir(dir.path())).refused(65, &["frame 4", "same point"]);
     assert_eq!(files_but(dir.path(), &["f.0002.png", "bad.toml"]), Vec::<String>::new());
 }
@@ -183,7 +191,8 @@ fn a_dry_run_tells_what_would_be_made_and_makes_nothing() {
         assert!(told.done().contains(word), "no {word:?} in {}", told.done());
     }
     assert!(files(dir.path()).is_empty());
-    let json: serde_json::Value = serde_json::from_str(run(batch(dir.path(), arguments).arg("--json")).done()).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(run(batch(dir.path(), arguments).arg("--json")).done()).unwrap();
     assert_eq!((json["pictures"].as_u64(), json["to_render"].as_u64()), (Some(10), Some(10)));
     // Thirteen channels and a PNG of 16×12 pixels.
     assert_eq!(json["disk_bytes"].as_u64(), Some(10 * 16 * 12 * (13 * 4 + 3)));

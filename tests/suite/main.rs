@@ -5,6 +5,7 @@
 
 mod animation;
 mod batch;
+mod big;
 mod closed_forms;
 mod compare;
 mod curve;

@@ -6,26 +6,10 @@ use rayon::prelude::*;
 
 use super::{Batch, stamp};
 use crate::error::{Error, Result};
-use crate::frame::{Verified, verify};
+use crate::frame::{Kind, Verified, verify};
 use crate::job::still::{scene_text, volume_line};
 use crate::job::{Claims, Monitor, VolumeStock};
 use crate::scene::Scene;
-
-/// A kind of picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    Png,
-    Exr,
-}
-
-/// The kind that a file's extension tells.
-pub fn kind_of(path: &Path) -> Result<Kind> {
-    match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
-        Some("png") => Ok(Kind::Png),
-        Some("exr") => Ok(Kind::Exr),
-        _ => Err(Error::Usage(format!("-o {}: unknown kind of picture; use .png or .exr", path.display()))),
-    }
-}
 
 /// What a file's name holds.
 #[derive(Debug, PartialEq)]
@@ -43,8 +27,11 @@ impl Batch {
     /// Decodes what is there. Files of other scenes are refused unless they may be replaced.
     pub(super) fn look(&mut self, monitor: &dyn Monitor) -> Result<()> {
         let own: Vec<usize> = self.own().collect();
-        let there: Vec<usize> =
-            own.par_iter().copied().filter(|&n| self.files(n).iter().any(|f| f.symlink_metadata().is_ok())).collect();
+        let there: Vec<usize> = own
+            .par_iter()
+            .copied()
+            .filter(|&n| self.files(n).iter().any(|f| f.symlink_metadata().is_ok()))
+            .collect();
         for (part, numbers) in there.chunks(16).enumerate() {
             monitor.progress("verifying", part as u64 * 16, there.len() as u64)?;
             let found: Vec<Result<Vec<Found>>> = if self.request.overwrite {
@@ -95,7 +82,8 @@ impl Batch {
     /// Whether another process has made the picture since this one has looked.
     pub(super) fn made_meanwhile(&self, number: usize) -> Result<bool> {
         let files = self.files(number);
-        let new = |file: &std::path::PathBuf| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
+        let new =
+            |file: &std::path::PathBuf| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
         Ok(files.iter().all(new) && self.found(number)?.iter().all(|f| *f == Found::Whole))
     }
 
@@ -122,7 +110,9 @@ impl Batch {
 
     /// What tells the picture in a file from the one of `scene`.
     fn difference(&self, file: &Path, verified: &Verified, scene: &Scene) -> Result<Option<String>> {
-        let Some(text) = &verified.scene else { return Ok(Some("it does not say what scene it shows".into())) };
+        let Some(text) = &verified.scene else {
+            return Ok(Some("it does not say what scene it shows".into()));
+        };
         let (line, text) = text.split_once('\n').unwrap_or((text, ""));
         let wanted = scene_text(scene);
         if text != wanted {
@@ -144,8 +134,9 @@ impl Batch {
         if verified.window != self.window(scene) {
             return Ok(Some("it is another part of the picture".into()));
         }
-        if kind_of(file)? == Kind::Exr {
-            let mut wanted: Vec<&str> = self.request.layers.iter().flat_map(|l| l.channels()).copied().collect();
+        if Kind::of(file)? == Kind::Exr {
+            let mut wanted: Vec<&str> =
+                self.request.layers.iter().flat_map(|l| l.channels()).copied().collect();
             let mut have: Vec<&str> = verified.channels.iter().map(String::as_str).collect();
             wanted.sort_unstable();
             have.sort_unstable();

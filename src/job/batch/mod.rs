@@ -9,12 +9,14 @@
 //! A picture's bytes depend on the scene and the frame's number alone.
 
 mod existing;
+mod needs;
 mod pattern;
 mod report;
 mod run;
 mod sweep;
 mod writer;
 
+pub use needs::Needs;
 pub use pattern::Pattern;
 pub use report::{Event, Name, Summary, Watcher};
 pub use sweep::Sweep;
@@ -26,8 +28,8 @@ use std::time::{Duration, SystemTime};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::frame::{Layer, Output, Window, folder_of, remove_stale};
-use crate::job::Monitor;
+use crate::frame::{Layer, Window, folder_of, remove_stale};
+use crate::job::{Monitor, Still};
 use crate::scene::{Animation, Place, Scene};
 
 /// Most pictures of one batch.
@@ -94,7 +96,10 @@ impl Batch {
             .collect::<Result<Vec<Sweep>>>()?;
         for (i, sweep) in sweeps.iter().enumerate() {
             if sweeps[..i].iter().any(|other| other.key == sweep.key) {
-                return Err(Error::Usage(format!("--sweep {} is given twice; list all values in one", sweep.key)));
+                return Err(Error::Usage(format!(
+                    "--sweep {} is given twice; list all values in one",
+                    sweep.key
+                )));
             }
         }
         let frames = match &request.frames {
@@ -110,8 +115,11 @@ impl Batch {
             )));
         };
         let names: Vec<Vec<String>> = sweeps.iter().map(Sweep::names).collect();
-        let pictures =
-            request.outputs.iter().map(|path| Pattern::new(path, &names)).collect::<Result<Vec<Pattern>>>()?;
+        let pictures = request
+            .outputs
+            .iter()
+            .map(|path| Pattern::new(path, &names))
+            .collect::<Result<Vec<Pattern>>>()?;
         for (i, pattern) in pictures.iter().enumerate() {
             check_pattern(pattern, &sweeps, frames.len())?;
             if pictures[..i].iter().any(|other| other.given() == pattern.given()) {
@@ -174,7 +182,8 @@ impl Batch {
 
     /// What a picture is called in messages.
     pub fn name(&self, number: usize) -> Name {
-        let sweep = self.words(number).iter().zip(&self.sweeps).map(|(v, s)| format!("{}={v}", s.key)).collect();
+        let sweep =
+            self.words(number).iter().zip(&self.sweeps).map(|(v, s)| format!("{}={v}", s.key)).collect();
         Name { frame: self.frame(number), sweep }
     }
 
@@ -218,14 +227,13 @@ impl Batch {
 
     /// Every folder is there and can be written; what dead processes left in it goes.
     fn check_folders(&self) -> Result<()> {
-        let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
-        for file in self.own().take(1).flat_map(|n| self.files(n)) {
-            existing::kind_of(&file)?;
-            if seen.insert(folder_of(&file).to_owned()) {
-                drop(Output::open(&file)?);
-                remove_stale(folder_of(&file), |_| true);
-            }
+        let files: Vec<PathBuf> = self.own().take(1).flat_map(|n| self.files(n)).collect();
+        let still = Still::open(&files)?;
+        if self.request.layers != Layer::ALL && !still.has_exr() {
+            return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
         }
+        let folders: BTreeSet<&Path> = files.iter().map(|file| folder_of(file)).collect();
+        folders.iter().for_each(|folder| remove_stale(folder, |_| true));
         Ok(())
     }
 }

@@ -45,6 +45,11 @@ impl Pattern {
         &self.given
     }
 
+    /// Whether its files hold layers.
+    pub fn is_exr(&self) -> bool {
+        self.given.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+    }
+
     /// Whether frames have names of their own.
     pub fn has_frame(&self) -> bool {
         self.parts.iter().any(|part| matches!(part, Part::Frame(_)))

@@ -143,17 +143,3 @@ pub fn words(files: &[PathBuf]) -> Vec<String> {
 pub fn word(file: &Path) -> String {
     file.display().to_string()
 }
-
-impl std::ops::AddAssign for Seconds {
-    fn add_assign(&mut self, other: Self) {
-        self.volume += other.volume;
-        self.device += other.device;
-        self.pipelines += other.pipelines;
-        self.upload += other.upload;
-        self.gbuffer += other.gbuffer;
-        self.integrate += other.integrate;
-        self.resolve += other.resolve;
-        self.readback += other.readback;
-        self.output += other.output;
-    }
-}

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use super::Batch;
 use super::report::{Event, Name, Summary, Watcher};
 use super::writer::{Outcomes, Start, Writer};
-use super::Batch;
 use crate::error::{Error, Result};
-use crate::frame::{Owner, Window, remove_left_by};
+use crate::frame::{Window, remove_left_by};
 use crate::gpu::RenderOptions;
 use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, strips};
 use crate::scene::{Mesh, Rock, Scene};
@@ -186,6 +186,7 @@ impl Work<'_> {
             layers: layers.clone(),
             began,
         });
+        let several = parts.len() > 1;
         for part in parts {
             let options = RenderOptions { surface, window: Some(part), ..Default::default() };
             let rows = [part.y - window.y, part.height, window.height];
@@ -201,12 +202,17 @@ impl Work<'_> {
             };
             if frame.non_finite_pixels() > 0 {
                 let count = frame.non_finite_pixels();
-                self.watcher.warn(&format!("{name}: {count} pixels are not finite: please report this scene"));
+                self.watcher
+                    .warn(&format!("{name}: {count} pixels are not finite: please report this scene"));
             }
             if let Some(start) = start.take() {
                 writer.begin(start);
             }
             writer.strip(frame);
+            if several {
+                // Strips take what memory there is: the next one only when this one is written.
+                writer.settle();
+            }
         }
         writer.end();
         Ok(())

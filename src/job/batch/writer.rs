@@ -33,6 +33,8 @@ enum Message {
     Start(Box<Start>),
     Strip(Box<Frame>),
     End,
+    /// Nothing: it is taken when all before it is written.
+    Settle,
     /// What has been started is not wanted any more.
     Drop,
 }
@@ -48,7 +50,10 @@ pub struct Writer {
 
 impl Writer {
     /// Starts the thread in `scope`. It ends when the writer is dropped and all is written.
-    pub fn start<'scope>(scope: &'scope std::thread::Scope<'scope, '_>, watcher: &'scope dyn Watcher) -> Writer {
+    pub fn start<'scope>(
+        scope: &'scope std::thread::Scope<'scope, '_>,
+        watcher: &'scope dyn Watcher,
+    ) -> Writer {
         // No queue: while one strip is encoded the next is rendered, and no third takes memory.
         let (send, receive) = sync_channel(0);
         let outcomes: Arc<Mutex<Outcomes>> = Arc::default();
@@ -65,6 +70,11 @@ impl Writer {
     /// The next rows of the picture.
     pub fn strip(&self, frame: Frame) {
         self.tell(Message::Strip(Box::new(frame)));
+    }
+
+    /// Waits until all strips are written.
+    pub fn settle(&self) {
+        self.tell(Message::Settle);
     }
 
     /// The picture is complete.
@@ -112,6 +122,7 @@ fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn 
                     push(open, &strip);
                 }
             }
+            Message::Settle => {}
             Message::Drop => open = None,
             Message::End => {
                 if let Some(open) = open.take() {

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
 use crate::cpu::resolve::resolve;
 use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer};
+use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
-use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock};
+use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, strips};
 use crate::scene::{Cost, Image, Mesh, Rock, Scene};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
@@ -431,7 +431,7 @@ impl Renderer {
         volume: &VolumeTexture,
         mesh: &Mesh,
         options: &RenderOptions,
-        watch: &Watch,
+        watch: &dyn Monitor,
     ) -> Result<Frame> {
         match self.engine.get_or_insert(Engine::Cpu) {
             Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
@@ -511,9 +511,15 @@ impl Renderer {
         let (meshes, _) = self.meshes(&export.scene);
         let watch = self.watch("export", u64::MAX, Duration::MAX);
         let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let frame = self.run_engine(&export.scene, &volume, &meshes.full, &options, &watch)?;
+        let (scene, image) = (&export.scene, &export.scene.image);
+        let window = Window::whole([image.width, image.height]);
+        let strips = strips(scene, window, options.surface, self.memory)?;
+        let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
+        writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
+            self.run_engine(scene, &volume, &meshes.full, options, watch)
+        })?;
         watch.progress("saving", 1, 1)?;
-        still.save(&frame, &Layer::ALL, &export.scene, &volume)
+        writer.finish().map(drop)
     }
 }
 
