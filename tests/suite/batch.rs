@@ -1,6 +1,7 @@
 //! Many pictures: each depends on its scene and number alone, and none is lost, whatever ends the work.
 
 mod crash;
+mod moving;
 mod sweep;
 
 use std::collections::BTreeMap;
@@ -156,7 +157,7 @@ fn faults_are_known_before_any_picture() {
     let cases: [(&[&str], i32, &[&str]); 12] = [
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),
-        (&["--frames", "0-3", "-o", "f.png"], 2, &["4 frames would have one name", "fall.####.png"]),
+        (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would have one name", "fall.####.png"]),
         (&["--frames", "0-3", "-o", "f.####.jpg"], 2, &["unknown kind"]),
         (&["--frames", "3-0", "-o", "f.####.png"], 2, &["ends before it begins"]),
         (&["--frames", "x", "-o", "f.####.png"], 2, &["0-239"]),
