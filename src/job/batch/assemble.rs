@@ -256,9 +256,9 @@ impl Batch {
             let float = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
             let count = |x: Option<u64>| x.map_or(String::new(), |x| x.to_string());
             let mut record = vec![row.number.to_string(), row.frame.to_string()];
-            record.extend(
-                row.parameters.values().map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned)),
-            );
+            // In the order of the head, which the map does not keep.
+            let parameters = self.sweeps.iter().map(|s| &row.parameters[&s.key]);
+            record.extend(parameters.map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned)));
             record.extend(row.files.iter().cloned());
             record.extend((0..3).map(|c| float(row.mean_radiance.map(|m| m[c]))));
             record.push(float(row.mean_transmittance));
