@@ -23,6 +23,8 @@ use crate::error::{Error, Result};
 
 /// Bytes compressed at a time, on all cores.
 const BATCH_BYTES: usize = 8 << 20;
+/// Most bytes of one line of a file that is read: those of the widest picture with all layers are 48 MB.
+const LINE_BYTES: u64 = 64 << 20;
 /// Most bytes of the header of a file that is read.
 const HEADER_BYTES: u64 = 64 << 20;
 
@@ -177,6 +179,14 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::input(format!("{}: {why}", path.display()), "give an EXR image")
 }
 
+/// A file that ends too early is damaged; others that cannot be read are a fault of the disk.
+fn unreadable(path: &Path, e: std::io::Error) -> Error {
+    match e.kind() {
+        std::io::ErrorKind::UnexpectedEof => bad(path, "it ends too early"),
+        _ => Error::read(path, e),
+    }
+}
+
 /// A picture of this program read line by line.
 pub struct ExrLines {
     path: PathBuf,
@@ -204,7 +214,7 @@ impl ExrLines {
         let foreign = || bad(path, "not a picture of taki (one part of float32 scan lines, run lengths)");
         // Version 2, nothing but perhaps long names: other kinds are not even parsed.
         let mut start = [0; 8];
-        file.read_exact(&mut start).map_err(|e| bad(path, e))?;
+        file.read_exact(&mut start).map_err(|e| unreadable(path, e))?;
         if start[..5] != [0x76, 0x2f, 0x31, 0x01, 2] || start[5] & !4 != 0 || start[6..] != [0, 0] {
             return Err(foreign());
         }
@@ -237,6 +247,9 @@ impl ExrLines {
         // Run lengths make at most 64 bytes of one.
         let pixels = u64::from(window[2]) * u64::from(window[3]);
         let values = pixels.saturating_mul(4 * header.channels.list.len() as u64);
+        if values / u64::from(window[3]) > LINE_BYTES {
+            return Err(foreign());
+        }
         if values / 64 > bytes || 8 * u64::from(window[3]) > bytes {
             return Err(bad(path, format!("{bytes} bytes cannot hold {}×{} pixels", window[2], window[3])));
         }
@@ -244,7 +257,7 @@ impl ExrLines {
             let mut offset = [0; 8];
             file.read_exact(&mut offset).map(|()| u64::from_le_bytes(offset))
         });
-        let offsets = offsets.collect::<std::io::Result<Vec<u64>>>().map_err(|e| bad(path, e))?;
+        let offsets = offsets.collect::<std::io::Result<Vec<u64>>>().map_err(|e| unreadable(path, e))?;
         let position = file.stream_position().map_err(|e| Error::read(path, e))?;
         let [x, y, width, height] = window;
         let channels = header.channels.list.iter().map(|c| c.name.to_string()).collect();
@@ -280,7 +293,7 @@ impl ExrLines {
             return Err(fail("the table of lines is wrong"));
         }
         let mut head = [0; 8];
-        self.file.read_exact(&mut head).map_err(|e| fail(&e.to_string()))?;
+        self.file.read_exact(&mut head).map_err(|e| unreadable(&self.path, e))?;
         let [y, size] = [0, 4].map(|i| i32::from_le_bytes([head[i], head[i + 1], head[i + 2], head[i + 3]]));
         let size = u32::try_from(size).unwrap_or(0) as usize;
         self.position += 8 + size as u64;
@@ -291,7 +304,7 @@ impl ExrLines {
             return Err(fail("it has a wrong length"));
         }
         let mut packed = vec![0; size];
-        self.file.read_exact(&mut packed).map_err(|e| fail(&e.to_string()))?;
+        self.file.read_exact(&mut packed).map_err(|e| unreadable(&self.path, e))?;
         if size < expected && unpacked_length(&packed) != Some(expected) {
             return Err(fail("its run lengths are wrong"));
         }

@@ -173,6 +173,14 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::input(format!("{}: {why}", path.display()), "give a PNG image")
 }
 
+/// Damage is the file's fault, all else the disk's.
+fn decoding(path: &Path, e: png::DecodingError) -> Error {
+    match e {
+        png::DecodingError::IoError(e) if e.kind() != io::ErrorKind::UnexpectedEof => Error::read(path, e),
+        other => bad(path, other),
+    }
+}
+
 /// A file that tells how far it was read.
 struct Counted {
     inner: BufReader<File>,
@@ -231,7 +239,7 @@ impl PngRows {
         options.set_skip_ancillary_crc_failures(false);
         let mut decoder = png::Decoder::new_with_options(counted, options);
         decoder.set_limits(png::Limits { bytes: READ_BYTES });
-        let info = decoder.read_header_info().map_err(|e| bad(path, e))?;
+        let info = decoder.read_header_info().map_err(|e| decoding(path, e))?;
         let [width, height] = [info.width, info.height];
         if info.color_type != png::ColorType::Rgb
             || info.bit_depth != png::BitDepth::Eight
@@ -244,7 +252,7 @@ impl PngRows {
         if (u64::from(width) * 3 + 1) * u64::from(height) > bytes.saturating_mul(1032) {
             return Err(bad(path, format!("{bytes} bytes cannot hold {width}×{height} pixels")));
         }
-        let reader = decoder.read_info().map_err(|e| bad(path, e))?;
+        let reader = decoder.read_info().map_err(|e| decoding(path, e))?;
         if reader.info().animation_control.is_some() {
             return Err(bad(path, "not a picture of taki (animated)"));
         }
@@ -280,7 +288,7 @@ impl PngRows {
                 Ok(())
             }
             Ok(None) => Err(bad(&self.path, "the pixels end too early")),
-            Err(e) => Err(bad(&self.path, e)),
+            Err(e) => Err(decoding(&self.path, e)),
         }
     }
 
@@ -292,7 +300,7 @@ impl PngRows {
 
     /// Reads what comes after the pixels, to the file's last byte; the figures, if it has some.
     pub fn finish(mut self) -> Result<Option<Figures>> {
-        self.reader.finish().map_err(|e| bad(&self.path, e))?;
+        self.reader.finish().map_err(|e| decoding(&self.path, e))?;
         if self.read.load(Ordering::Relaxed) != self.bytes {
             return Err(bad(&self.path, "bytes follow its end"));
         }

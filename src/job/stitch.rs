@@ -151,8 +151,7 @@ pub fn stitch(parts: &[PathBuf], output: &Path, monitor: &dyn Monitor) -> Result
             open.push(Open { number, rows, row: Vec::new() });
         }
         canvas.clear();
-        for i in 0..open.len() {
-            let Open { number, rows, row } = &mut open[i];
+        for Open { number, rows, row } in &mut open {
             match rows {
                 Rows::Png(rows) => {
                     row.resize(3 * windows[*number].width as usize, 0);

@@ -441,3 +441,17 @@ fn the_command_line_crops_and_stitches() {
     }
     assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 4);
 }
+
+#[test]
+fn a_disk_that_fills_up_in_the_middle_of_a_picture_leaves_no_file() {
+    let dir = tempdir().expect("a folder");
+    for name in ["x.png", "x.exr"] {
+        let render = taki(["render", "fig5", "--engine=cpu", "--size=300x300", "--samples=1", "-o"]);
+        // 64 KiB fit, and then no more.
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash"]).arg(render.get_program());
+        shell.args(render.get_args()).arg(dir.path().join(name));
+        run(&mut shell).refused(74, &["cannot write", name, "free some space"]);
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 0, "{name}");
+    }
+}
