@@ -14,8 +14,8 @@
 //! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR.
 //!
 //! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
-//! [`job`] chooses between them and watches over long work. The command line and the viewer are clients
-//! of all this.
+//! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
+//! machines. The command line and the viewer are clients of all this.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -25,6 +25,7 @@ pub mod cli;
 pub mod cpu;
 pub mod curve;
 pub mod error;
+pub mod farm;
 pub mod frame;
 pub mod gpu;
 pub mod job;

@@ -3,6 +3,7 @@
 mod bench;
 mod compare;
 mod devices;
+mod farm;
 mod render;
 mod scene;
 mod terminal;
@@ -45,6 +46,8 @@ enum Command {
     Scene(scene::SceneArgs),
     /// Builds a volume texture or prints its statistics.
     Volume(volume::VolumeArgs),
+    /// Writes a job file that splits a batch over the machines of a farm.
+    Farm(farm::FarmArgs),
     /// Measures this machine: passes, engines, volumes, with the work each did.
     Bench(bench::BenchArgs),
     /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
@@ -173,6 +176,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::View(args) => view::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
+        Command::Farm(args) => farm::run(&args),
         Command::Bench(args) => bench::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::run(),
