@@ -6,6 +6,7 @@
 mod closed_forms;
 mod compare;
 mod curve;
+mod farm;
 mod faults;
 mod flow;
 mod gpu;
