@@ -4,8 +4,9 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Subcommand};
+use clap::{Args, CommandFactory, Subcommand};
 
+use super::Cli;
 use crate::error::{Error, Result};
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::frame::Output;
@@ -111,7 +112,7 @@ struct JobArgs {
 
 impl JobArgs {
     fn job(&self) -> Result<Job> {
-        Ok(Job {
+        let job = Job {
             name: self.name.clone(),
             taki: self.taki.clone(),
             shards: self.shards,
@@ -121,12 +122,44 @@ impl JobArgs {
             memory: self.memory,
             gpus: self.gpus,
             batch: self.batch.clone(),
-        })
+        };
+        job.check()?;
+        check_batch(&job)?;
+        Ok(job)
     }
 }
 
 fn name(text: &str) -> std::result::Result<String, String> {
     check_name(text).map(|()| text.to_string())
+}
+
+/// Reads the arguments as `taki batch` will: a slip of the pen is found here, not on every node. Scenes are
+/// not read; they may be elsewhere.
+fn check_batch(job: &Job) -> Result<()> {
+    let shard = format!("0/{}", job.shards);
+    let start = ["taki", "batch", "--shard", &shard].map(OsString::from);
+    let matches = Cli::command().try_get_matches_from(start.iter().chain(&job.batch)).map_err(|e| {
+        let text = e.render().to_string();
+        let line = match e.use_stderr() {
+            true => text.lines().next().unwrap_or("").trim_start_matches("error: "),
+            false => "they ask for help",
+        };
+        Error::Usage(format!(
+            "taki batch would not take the arguments after --: {line}; see taki batch --help"
+        ))
+    })?;
+    let outputs = matches.subcommand().and_then(|(_, batch)| batch.get_many::<PathBuf>("outputs"));
+    let whole = |path: &&PathBuf| {
+        !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr"))
+    };
+    match outputs.into_iter().flatten().find(whole) {
+        None => Ok(()),
+        Some(path) => Err(Error::Usage(format!(
+            "-o {}: a shard has only its own pictures; leave this out, and when the job is done run the whole \
+             taki batch without --shard: it keeps the pictures and makes the rest of them",
+            path.display()
+        ))),
+    }
 }
 
 pub fn run(args: &FarmArgs) -> Result<()> {

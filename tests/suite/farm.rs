@@ -183,7 +183,17 @@ fn a_job_file_goes_to_stdout_or_replaces_a_file() {
     assert_eq!(run(slurm().arg("-o").arg(&file).args(batch)).done(), "");
     assert_eq!(fs::read_to_string(&file).unwrap(), text);
     run(slurm().arg("-o").arg(folder.path().join("none/x")).args(batch)).refused(73, &["none/x"]);
-    run(slurm().args(batch).args(["--shard", "0/2"])).refused(2, &["--shard"]);
+}
+
+#[test]
+fn arguments_that_batch_would_not_take_are_refused_before_the_nodes_do() {
+    let slurm = |batch: &[&str]| run(taki(["farm", "slurm", "--"]).args(batch));
+    slurm(&["front", "--shard", "0/2"]).refused(2, &["--shard"]);
+    slurm(&["front", "--fram", "0-9"]).refused(2, &["taki batch", "--fram"]);
+    slurm(&["front", "--frames", "9-0"]).refused(2, &["9-0"]);
+    slurm(&["--help"]).refused(2, &["help"]);
+    slurm(&["front", "-o", "fall.####.exr", "-o", "fall.mp4"]).refused(2, &["fall.mp4", "without --shard"]);
+    slurm(&["front", "-o", "fall.####.exr", "-o", "fall.####.PNG"]).done();
 }
 
 /// Whether the tools that a test needs are there. In continuous integration (CI=true) they must be.
