@@ -5,6 +5,7 @@
 @group(0) @binding(1) var<storage, read> radiance: array<vec4<f32>>;
 // One pixel a word: red in the lowest byte, alpha 255 in the highest.
 @group(0) @binding(2) var<storage, read_write> picture: array<u32>;
+@group(0) @binding(3) var<uniform> tile: Tile;
 
 // Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
 fn filmic(x: f32) -> f32 {
@@ -27,10 +28,10 @@ fn channel(linear: f32) -> u32 {
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= frame.window_width || id.y >= frame.window_height {
+    if id.x >= tile.width || id.y >= tile.height {
         return;
     }
-    let index = id.y * frame.window_width + id.x;
+    let index = (tile.y + id.y) * frame.window_width + tile.x + id.x;
     let linear = radiance[index].rgb / f32(frame.samples);
     picture[index] = channel(linear.r) | (channel(linear.g) << 8u) | (channel(linear.b) << 16u) | 0xff000000u;
 }

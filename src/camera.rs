@@ -1,7 +1,8 @@
 //! The pinhole camera: rays through pixels, and the matrix that puts geometry under them.
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{DMat4, DVec4, Mat4, Vec3, Vec4};
 
+use crate::frame::Window;
 use crate::scene::Camera;
 
 impl Camera {
@@ -37,6 +38,20 @@ impl Camera {
         let d = self.forward + right * x + up * y;
         d / d.dot(d).sqrt()
     }
+}
+
+/// The clip space of a window from that of the whole image, in float64; the same bits where the window is
+/// the whole image.
+pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: Window) -> Mat4 {
+    let [w, h] = [width, height].map(f64::from);
+    let [x, y, window_w, window_h] = [window.x, window.y, window.width, window.height].map(f64::from);
+    let window_from_clip = DMat4::from_cols(
+        DVec4::new(w / window_w, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, h / window_h, 0.0, 0.0),
+        DVec4::Z,
+        DVec4::new((w - 2.0 * x) / window_w - 1.0, 1.0 - (h - 2.0 * y) / window_h, 0.0, 1.0),
+    );
+    (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
 }
 
 /// Where sample `sample` of `samples` lies inside a pixel: the centre for one sample, else the R2

@@ -1,11 +1,13 @@
 //! The command line: one file per subcommand.
 
+mod batch;
 mod bench;
 mod compare;
 mod devices;
 mod farm;
 mod render;
 mod scene;
+mod stitch;
 mod terminal;
 #[cfg(feature = "viewer")]
 mod view;
@@ -18,9 +20,10 @@ use std::time::Duration;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::error::{Error, Result};
+use crate::frame::Window;
 use crate::gpu::DeviceOptions;
 use crate::job::EngineChoice;
-use crate::scene::{DEFAULT_PRESET, Limits, Scene, presets};
+use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \
@@ -39,6 +42,8 @@ struct Cli {
 enum Command {
     /// Renders one image.
     Render(render::RenderArgs),
+    /// Renders many images: the frames of an animation, the grid of a sweep.
+    Batch(batch::BatchArgs),
     /// Opens the viewer: turn the parameters and see the picture change.
     #[cfg(feature = "viewer")]
     View(view::ViewArgs),
@@ -50,6 +55,8 @@ enum Command {
     Farm(farm::FarmArgs),
     /// Measures this machine: passes, engines, volumes, with the work each did.
     Bench(bench::BenchArgs),
+    /// Joins crops of one picture to the file of the whole.
+    Stitch(stitch::StitchArgs),
     /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
     Compare(compare::CompareArgs),
     /// Lists the scenes that come with the program.
@@ -91,10 +98,19 @@ impl SceneOptions {
 
     /// Loads the scene; `more` are settings of other options, which come last.
     fn load(&self, more: &[String]) -> Result<Scene> {
+        Scene::load(&self.scene, &self.all_sets(more), &self.limits())
+    }
+
+    /// Loads the scene as it moves.
+    fn animation(&self, more: &[String]) -> Result<Animation> {
+        Animation::load(&self.scene, &self.all_sets(more), &self.limits())
+    }
+
+    fn all_sets(&self, more: &[String]) -> Vec<String> {
         let mut sets = self.sets.clone();
         sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
         sets.extend_from_slice(more);
-        Scene::load(&self.scene, &sets, &self.limits())
+        sets
     }
 }
 
@@ -129,6 +145,29 @@ fn seconds(text: &str) -> std::result::Result<f64, String> {
 fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parts = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     parts.ok_or_else(|| "WIDTHxHEIGHT in pixels, such as 1280x720".into())
+}
+
+/// `X,Y,W,H`.
+fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
+    let numbers = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<Vec<u32>>>();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "column, row, width and height in pixels, such as 0,0,640,360".into())
+}
+
+/// The part of the image that is asked for.
+fn window(crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
+    let Some(crop) = crop else { return Ok(Window::whole(size)) };
+    let [x, y, width, height] = crop;
+    if !Window::fits(size, crop) {
+        return Err(Error::Usage(format!(
+            "--crop {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, rows 0 to {}, and \
+             at least one of each",
+            size[0] - 1,
+            size[1] - 1
+        )));
+    }
+    Ok(Window { x, y, width, height })
 }
 
 /// Where a command writes when -o is not given: the scene's name in the current folder.
@@ -172,12 +211,14 @@ pub fn main() -> ExitCode {
 fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
     match cli.command {
         Command::Render(args) => render::run(&args, terminal),
+        Command::Batch(args) => batch::run(&args, terminal),
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Farm(args) => farm::run(&args),
         Command::Bench(args) => bench::run(&args, terminal),
+        Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::run(),
         Command::Presets => {

@@ -7,11 +7,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, default_output, size};
+use super::{EngineOptions, SceneOptions, crop, default_output, size, window};
 use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer};
+use crate::frame::{Figures, Layer, Window};
 use crate::gpu::RenderOptions;
-use crate::job::{Engine, Monitor, Still};
+use crate::job::{Engine, Monitor, Still, strips};
 use crate::scene::Scene;
 
 #[derive(Args)]
@@ -25,9 +25,16 @@ pub struct RenderArgs {
     /// Size of the picture in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
+    /// Renders only these columns and rows of the picture: the same pixels, bit for bit. `taki stitch`
+    /// joins such parts.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
+    crop: Option<[u32; 4]>,
     /// Jittered samples a pixel.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
+    /// This frame of the scene's animation.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=999_999_999))]
+    frame: u32,
     #[command(flatten)]
     engine: EngineOptions,
     /// Layers of the EXR file.
@@ -45,7 +52,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
-    let scene = args.scene.load(&more)?;
+    let scene = args.scene.animation(&more)?.at(args.frame)?;
+    let window = window(args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {
         [] => vec![default_output(&scene, "png")],
         given => given.to_vec(),
@@ -68,22 +76,29 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let device_seconds = clock.elapsed().as_secs_f64();
     let mesh = scene.mesh();
     let options = RenderOptions { surface, ..Default::default() };
-    let mut frame = engine.render(&scene, &volume, &mesh, &options, terminal)?;
-    frame.seconds.volume = volume_seconds;
-    frame.seconds.device = device_seconds;
-    if frame.non_finite_pixels() > 0 {
-        terminal
-            .warn(&format!("{} pixels are not finite: please report this scene", frame.non_finite_pixels()));
+    let strips = strips(&scene, window, surface, args.scene.limits().memory)?;
+    let mut writer = still.begin(&scene, &volume, window, &layers)?;
+    let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
+        engine.render(&scene, &volume, &mesh, options, monitor)
+    })?;
+    let not_finite = writer.figures().non_finite_pixels;
+    if not_finite > 0 {
+        terminal.warn(&format!("{not_finite} pixels are not finite: please report this scene"));
     }
 
     let clock = Instant::now();
     terminal.progress("saving", 0, 1)?;
-    still.save(&frame, &layers, &scene, &volume)?;
-    frame.seconds.output = clock.elapsed().as_secs_f64();
+    let figures = writer.finish()?;
+    seconds.output += clock.elapsed().as_secs_f64();
+    (seconds.volume, seconds.device) = (volume_seconds, device_seconds);
     terminal.close();
     let total = start.elapsed().as_secs_f64();
     if args.json {
-        say(&report(&scene, &engine, &frame, has_exr.then_some(&layers), &outputs, total).to_string());
+        let layers = if has_exr { layers.as_slice() } else { &[] };
+        let mut report = report(&scene, &engine, window, &figures, layers, &outputs);
+        report["seconds"] = json!(seconds);
+        report["seconds_total"] = json!(total);
+        say(&report.to_string());
     } else {
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         terminal.note(&format!("taki: wrote {} in {total:.2} s", names.join(", ")));
@@ -94,27 +109,28 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
 fn report(
     scene: &Scene,
     engine: &Engine,
-    frame: &Frame,
-    layers: Option<&Vec<Layer>>,
+    window: Window,
+    figures: &Figures,
+    layers: &[Layer],
     outputs: &[PathBuf],
-    total: f64,
 ) -> serde_json::Value {
-    let [view, light] = frame.cells_walked();
+    let image = &scene.image;
+    let crop = (window != Window::whole([image.width, image.height]))
+        .then(|| json!({"x": window.x, "y": window.y, "of": {"width": image.width, "height": image.height}}));
     json!({
         "scene": scene.name,
         "engine": engine.word(),
         "adapter": engine.adapter(),
-        "width": frame.width,
-        "height": frame.height,
-        "samples": scene.image.samples,
-        "seconds": frame.seconds,
-        "seconds_total": total,
-        "rays": frame.width as u64 * frame.height as u64 * scene.image.samples as u64,
-        "covered_pixels": frame.covered_pixels(),
-        "cells_walked": view,
-        "light_cells_walked": light,
-        "non_finite_pixels": frame.non_finite_pixels(),
-        "layers": layers.map(|l| l.iter().map(|l| l.name()).collect::<Vec<_>>()).unwrap_or_default(),
+        "width": window.width,
+        "height": window.height,
+        "crop": crop,
+        "samples": image.samples,
+        "rays": figures.pixels * u64::from(image.samples),
+        "covered_pixels": figures.covered_pixels,
+        "cells_walked": figures.cells_walked,
+        "light_cells_walked": figures.light_cells_walked,
+        "non_finite_pixels": figures.non_finite_pixels,
+        "layers": layers.iter().map(|l| l.name()).collect::<Vec<_>>(),
         "outputs": outputs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
     })
 }

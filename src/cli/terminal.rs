@@ -81,13 +81,52 @@ impl Terminal {
     }
 }
 
+impl Terminal {
+    /// Whether someone may look at it: progress is then drawn, and not told line by line.
+    pub fn is_interactive(&self) -> bool {
+        std::io::stderr().is_terminal()
+    }
+
+    /// An error once a signal has come.
+    pub fn check(&self) -> Result<()> {
+        match self.signal.load(Ordering::Relaxed) {
+            0 => Ok(()),
+            code => Err(Error::Interrupted { code: code as u8 }),
+        }
+    }
+
+    /// Draws the bar of many pictures, `done` of `total`, and what `pace` says of them.
+    pub fn bar(&self, done: f64, total: f64, pace: &str) {
+        if !self.is_interactive() {
+            return;
+        }
+        let mut slot = self.lock();
+        if slot.as_ref().is_none_or(|(name, _)| *name != PICTURES) {
+            if let Some((_, old)) = slot.take() {
+                old.finish_and_clear();
+            }
+            let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("{prefix:>8} {wide_bar} {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_prefix(PICTURES);
+            *slot = Some((PICTURES, bar));
+        }
+        if let Some((_, bar)) = &*slot {
+            // In thousandths of a picture.
+            bar.set_length((total * 1e3) as u64);
+            bar.set_position((done * 1e3) as u64);
+            bar.set_message(pace.to_owned());
+        }
+    }
+}
+
+/// The bar of many pictures.
+const PICTURES: &str = "pictures";
+
 impl Monitor for Terminal {
     fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()> {
-        let code = self.signal.load(Ordering::Relaxed);
-        if code != 0 {
-            return Err(Error::Interrupted { code: code as u8 });
-        }
-        if std::io::stderr().is_terminal() {
+        self.check()?;
+        if self.is_interactive() {
             let mut slot = self.lock();
             if slot.as_ref().is_none_or(|(name, _)| *name != stage) {
                 if let Some((_, old)) = slot.take() {

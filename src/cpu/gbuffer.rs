@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::camera::sample_offset;
-use crate::gpu::layout::Window;
+use crate::frame::Window;
 use crate::scene::{Image, Light, Mesh, Quad, Scene};
 
 /// The targets of one sample of a part of the image, row by row.

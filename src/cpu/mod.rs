@@ -13,7 +13,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::frame::{Frame, Seconds};
+use crate::frame::{Frame, Seconds, Window};
 use crate::job::Monitor;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
@@ -26,55 +26,67 @@ pub fn render(
     surface: bool,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
-    render_samples(scene, volume, mesh, 0..scene.image.samples, surface, monitor)
+    let window = Window::whole([scene.image.width, scene.image.height]);
+    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, monitor)
 }
 
-/// Renders only some of a scene's samples; the radiance is their mean.
+/// Pixels rendered at once: 44 bytes each, besides the frame.
+const BAND_PIXELS: u64 = 1 << 21;
+
+/// Renders a part of the image with only some of a scene's samples; the radiance is their mean. The pixels
+/// have the same bits whatever the part is.
 pub fn render_samples(
     scene: &Scene,
     volume: &VolumeTexture,
     mesh: &Mesh,
+    window: Window,
     samples: Range<u32>,
     surface: bool,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;
-    let width = image.width as usize;
-    let mut frame = Frame::new(image.width, image.height, surface);
+    let width = window.width as usize;
+    let mut frame = Frame::new(window.width, window.height, surface);
     let mut seconds = Seconds::default();
     let integrator = integrate::Integrator::new(scene, volume);
-    let total = image.width as u64 * image.height as u64 * samples.len() as u64;
+    let total = window.pixels() * samples.len() as u64;
     let done = AtomicU64::new(0);
-    for sample in samples.clone() {
-        let clock = Instant::now();
-        let gbuffer = gbuffer::run(scene, mesh, sample);
-        seconds.gbuffer += clock.elapsed().as_secs_f64();
-        if sample == samples.start
-            && let Some(surface) = &mut frame.surface
-        {
-            for i in 0..gbuffer.quad_id.len() {
-                let [u, v, t] = gbuffer.surface[i];
-                let behind = (gbuffer.opaque[i][3], gbuffer.normal[i]);
-                surface.set(i, scene, gbuffer.quad_id[i], [u, v, t, 0.0], behind);
-            }
-        }
-        let clock = Instant::now();
-        frame
-            .radiance
-            .par_chunks_mut(width)
-            .zip(frame.counts.par_chunks_mut(width))
-            .enumerate()
-            .try_for_each(|(y, (radiance, counts))| {
-                for x in 0..width {
-                    let traced = integrator.pixel(&gbuffer, [x as u32, y as u32], sample, &mut ());
-                    let new = traced.radiance.extend(traced.transmittance).to_array();
-                    radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
-                    counts[x] = [0, 1].map(|c| counts[x][c] + traced.cells[c]);
+    let rows = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);
+    for y in (0..window.height).step_by(rows as usize) {
+        let band = Window { y: window.y + y, height: rows.min(window.height - y), ..window };
+        let first = y as usize * width;
+        let pixels = first..first + band.pixels() as usize;
+        for sample in samples.clone() {
+            let clock = Instant::now();
+            let gbuffer = gbuffer::run_window(scene, mesh, band, sample);
+            seconds.gbuffer += clock.elapsed().as_secs_f64();
+            if sample == samples.start
+                && let Some(surface) = &mut frame.surface
+            {
+                for i in 0..gbuffer.quad_id.len() {
+                    let [u, v, t] = gbuffer.surface[i];
+                    let behind = (gbuffer.opaque[i][3], gbuffer.normal[i]);
+                    surface.set(first + i, scene, gbuffer.quad_id[i], [u, v, t, 0.0], behind);
                 }
-                let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
-                monitor.progress("pixels", pixels, total)
-            })?;
-        seconds.integrate += clock.elapsed().as_secs_f64();
+            }
+            let clock = Instant::now();
+            frame.radiance[pixels.clone()]
+                .par_chunks_mut(width)
+                .zip(frame.counts[pixels.clone()].par_chunks_mut(width))
+                .zip(band.y..band.bottom())
+                .try_for_each(|((radiance, counts), y)| {
+                    for x in 0..width {
+                        let pixel = [band.x + x as u32, y];
+                        let traced = integrator.pixel(&gbuffer, pixel, sample, &mut ());
+                        let new = traced.radiance.extend(traced.transmittance).to_array();
+                        radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
+                        counts[x] = [0, 1].map(|c| counts[x][c] + traced.cells[c]);
+                    }
+                    let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
+                    monitor.progress("pixels", pixels, total)
+                })?;
+            seconds.integrate += clock.elapsed().as_secs_f64();
+        }
     }
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;

@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::gbuffer;
 use super::integrate::{Integrator, Observer};
 use crate::camera::sample_offset;
-use crate::gpu::layout::Window;
+use crate::frame::Window;
 use crate::scene::{Mesh, Scene};
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::Crossing;

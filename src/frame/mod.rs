@@ -2,17 +2,35 @@
 
 mod difference;
 mod exr_file;
+mod figures;
 mod output;
+mod owner;
 mod png_file;
+mod verify;
+mod window;
 
 pub use difference::{Difference, Tolerance};
-pub use exr_file::{read_exr, write_exr};
-pub use output::Output;
-pub use png_file::{encode_png, read_png};
+pub use exr_file::{ExrLines, ExrWriter, channel_names, lines_of, read_exr};
+pub use figures::{Figures, KnownFigures, figures_of};
+pub use output::{Output, folder_of, remove_left_by, remove_stale};
+pub use owner::{Life, Owner};
+pub use png_file::{PngRows, PngWriter, crop_text, encode_png, read_png, rgb_rows};
+pub use verify::{Kind, Verified, verify};
+pub use window::Window;
 
 use glam::Vec3;
 
 use crate::scene::Scene;
+
+/// Key of the text that holds the scene, as a scene file.
+pub const SCENE_TEXT: &str = "taki.scene";
+/// Key of the text that tells which part of the image a PNG is.
+pub const CROP_TEXT: &str = "taki.crop";
+/// Key of the text that holds the figures of a PNG, as JSON.
+pub const FIGURES_TEXT: &str = "taki.figures";
+
+/// Largest side of an image: the limit of the parameter table.
+const MAX_SIDE: u32 = 1_000_000;
 
 /// Seconds per stage. On the GPU engine gbuffer, integrate and resolve are the device's own time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -35,6 +53,20 @@ pub struct Seconds {
     pub readback: f64,
     /// Encoding and writing the outputs (host).
     pub output: f64,
+}
+
+impl std::ops::AddAssign for Seconds {
+    fn add_assign(&mut self, other: Seconds) {
+        self.volume += other.volume;
+        self.device += other.device;
+        self.pipelines += other.pipelines;
+        self.upload += other.upload;
+        self.gbuffer += other.gbuffer;
+        self.integrate += other.integrate;
+        self.resolve += other.resolve;
+        self.readback += other.readback;
+        self.output += other.output;
+    }
 }
 
 /// What the raster pass saw at the first sample of each pixel.

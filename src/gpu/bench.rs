@@ -2,9 +2,10 @@
 
 use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
-use super::layout::{self, Window};
+use super::layout::{self, Tile};
 use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
 use crate::error::Result;
+use crate::frame::Window;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
 
@@ -67,13 +68,13 @@ impl GpuBench {
         mesh: &Mesh,
     ) -> Result<()> {
         let gpu = &self.renderer.gpu;
-        let window = Window { x: 0, y: 0, width: direct.image.width, height: direct.image.height };
+        let window = Window::whole([direct.image.width, direct.image.height]);
         let frame = layout::Frame::new(direct, volume, window, &(0..1), 0);
         let pass = |pass| (pass, Tiler::new(None), None);
         self.prepared = Some(Prepared {
             up: Uploaded::new(gpu, &mut Resident::default(), direct, volume, mesh)?,
             targets: Targets::new(gpu, window.width, window.height),
-            sums: Sums::new(gpu, window.width as u64 * window.height as u64),
+            sums: Sums::new(gpu, window.pixels()),
             window,
             frame,
             passes: [
@@ -92,7 +93,8 @@ impl GpuBench {
     pub fn run(&mut self, pass: BenchPass) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
-        let inputs = Inputs { gpu, timer, up: &p.up, targets: &p.targets, window: p.window, frame: &p.frame };
+        let (window, area) = (p.window, Tile::whole(p.window));
+        let inputs = Inputs { gpu, timer, up: &p.up, targets: &p.targets, window, area, frame: &p.frame };
         let number = match pass {
             BenchPass::Gbuffer => return Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
             BenchPass::BareWalk => 0,
@@ -104,9 +106,12 @@ impl GpuBench {
         let cells = match cells {
             Some(cells) => *cells,
             None => {
-                let size = p.window.width as u64 * p.window.height as u64 * 8;
-                let sum = readback::read_buffer(gpu, &p.sums.counts, size, |bytes| {
-                    bytes.chunks_exact(4).map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64).sum()
+                let mut sum = 0;
+                readback::read_rows(gpu, &p.sums.counts, 8, window.width, area, |_, bytes| {
+                    sum += bytes
+                        .chunks_exact(4)
+                        .map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64)
+                        .sum::<u64>();
                 })?;
                 *cells.insert(sum)
             }

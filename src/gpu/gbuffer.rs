@@ -25,6 +25,9 @@ pub struct Targets {
 }
 
 impl Targets {
+    /// Bytes a pixel: three of four floats, the quad's number, depth.
+    pub const BYTES: u64 = 3 * 16 + 4 + 4;
+
     /// Targets for a window of `width` × `height` pixels.
     pub fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
         let texture = |label, format, usage| {
@@ -117,7 +120,7 @@ impl Gbuffer {
     /// Fills the targets with one sample of a window; seconds on the device. A large mesh is drawn in
     /// parts; `between` is called before each but the first, and may stop the work.
     pub fn run(&self, inputs: &Inputs, mut between: impl FnMut() -> Result<()>) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, window, frame } = *inputs;
+        let Inputs { gpu, timer, up, targets, window, frame, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, &wgpu::Buffer)]| {
             let entries: Vec<_> = entries
@@ -148,11 +151,9 @@ impl Gbuffer {
             depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
             stencil_ops: None,
         };
-        // The whole image is the viewport wherever the window lies, so that edges fall on the same
-        // pixels for every division into windows.
+        // The targets may be larger than a window at the image's edge.
         let place = |pass: &mut wgpu::RenderPass| {
-            let (x, y) = (-(window.x as f32), -(window.y as f32));
-            pass.set_viewport(x, y, frame.image_width, frame.image_height, 0.0, 1.0);
+            pass.set_viewport(0.0, 0.0, window.width as f32, window.height as f32, 0.0, 1.0);
         };
         let parts = up.index_count.div_ceil(PART_INDICES).max(1);
         let mut seconds = 0.0;

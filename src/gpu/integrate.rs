@@ -1,7 +1,7 @@
 //! §4 and §5: the compute pass that walks the volume under each pixel.
 
 use super::device::Gpu;
-use super::layout::{Tile, Window};
+use super::layout::Tile;
 use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::{Attenuation, Scene, Visibility};
@@ -46,6 +46,9 @@ pub struct Sums {
 }
 
 impl Sums {
+    /// Bytes a pixel.
+    pub const BYTES: u64 = 16 + 8;
+
     /// Sums for `pixels` pixels.
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
@@ -76,17 +79,18 @@ impl Tiler {
         Tiler { pixels: fixed.map_or(FIRST_TILE_PIXELS as f64, f64::from), fixed: fixed.is_some() }
     }
 
-    /// Rows at full width when there are enough pixels for several, else a part of one band.
-    fn next(&self, window: Window, x: u32, y: u32) -> Tile {
+    /// Rows at full width when there are enough pixels for several, else a part of one band; `x` and `y`
+    /// count from the corner of `area`.
+    fn next(&self, area: Tile, x: u32, y: u32) -> Tile {
         let pixels = self.pixels.max(1.0) as u64;
-        let rows = (pixels / window.width as u64).min((window.height - y) as u64) as u32;
+        let rows = (pixels / area.width as u64).min((area.height - y) as u64) as u32;
         if x == 0 && rows >= super::layout::WORKGROUP {
             let rows = rows - rows % super::layout::WORKGROUP;
-            return Tile { x: 0, y, width: window.width, height: rows };
+            return Tile { x: area.x, y: area.y + y, width: area.width, height: rows };
         }
-        let height = super::layout::WORKGROUP.min(window.height - y);
-        let width = (pixels / height as u64).clamp(1, (window.width - x) as u64) as u32;
-        Tile { x, y, width, height }
+        let height = super::layout::WORKGROUP.min(area.height - y);
+        let width = (pixels / height as u64).clamp(1, (area.width - x) as u64) as u32;
+        Tile { x: area.x + x, y: area.y + y, width, height }
     }
 
     fn learn(&mut self, tile: Tile, seconds: f64) {
@@ -137,7 +141,7 @@ impl Integrate {
         Integrate { pipeline, group_layout, variant }
     }
 
-    /// Adds one sample of a window to `sums`, tile by tile; seconds on the device. `between` is called
+    /// Adds one sample of a window's area to `sums`, tile by tile; seconds on the device. `between` is called
     /// after each tile with the pixels done so far, and may stop the work.
     pub fn run(
         &self,
@@ -146,7 +150,7 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, window, frame } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
@@ -170,8 +174,8 @@ impl Integrate {
             entries: &entries,
         });
         let (mut x, mut y, mut seconds, mut done) = (0, 0, 0.0, 0);
-        while y < window.height {
-            let tile = tiler.next(window, x, y);
+        while y < area.height {
+            let tile = tiler.next(area, x, y);
             gpu.queue.write_buffer(&tile_buffer, 0, bytemuck::bytes_of(&tile));
             let took = timer.run(gpu, "integrate", |encoder, span| {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
@@ -188,7 +192,7 @@ impl Integrate {
             done += tile.width as u64 * tile.height as u64;
             between(done)?;
             x += tile.width;
-            if x >= window.width {
+            if x >= area.width {
                 x = 0;
                 y += tile.height;
             }

@@ -6,32 +6,13 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-use crate::camera::sample_offset;
+use crate::camera::{clip_to_window, sample_offset};
+use crate::frame::Window;
 use crate::scene::{self, AngleFrame, Attenuation, MAX_LIGHTS, Scene, Tone};
 use crate::volume::VolumeTexture;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
 pub const WORKGROUP: u32 = 8;
-
-/// A rectangle of the image, pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// First column.
-    pub x: u32,
-    /// First row.
-    pub y: u32,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-}
-
-impl Window {
-    /// The place of a pixel of the image, which lies inside, among those of the window, row by row.
-    pub fn index(&self, pixel: [u32; 2]) -> usize {
-        (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
-    }
-}
 
 /// Uniforms of one sample of one window.
 #[repr(C)]
@@ -111,6 +92,13 @@ pub struct Tile {
     pub height: u32,
 }
 
+impl Tile {
+    /// All of a window.
+    pub fn whole(window: Window) -> Tile {
+        Tile { x: 0, y: 0, width: window.width, height: window.height }
+    }
+}
+
 impl Frame {
     /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with.
     pub fn new(
@@ -124,10 +112,9 @@ impl Frame {
         let image = &scene.image;
         let [jitter_x, jitter_y] = sample_offset(sample, image.samples);
         let (right, up) = camera.image_plane(image.width, image.height);
+        let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
         Frame {
-            clip_from_world: camera
-                .clip_from_world(image.width, image.height, [jitter_x, jitter_y])
-                .to_cols_array_2d(),
+            clip_from_world: clip_to_window(clip, [image.width, image.height], window).to_cols_array_2d(),
             eye_world: camera.eye.to_array(),
             jitter_x,
             right: right.to_array(),

@@ -3,6 +3,7 @@
 mod bench;
 mod device;
 mod gbuffer;
+mod grid;
 mod integrate;
 pub mod layout;
 mod readback;
@@ -13,6 +14,7 @@ mod upload;
 pub use bench::{BenchPass, GpuBench};
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
+pub use grid::Grid;
 pub use integrate::{Integrate, Sums, Tiler, Variant};
 pub use resolve::Resolve;
 pub use timing::Timer;
@@ -21,18 +23,20 @@ pub use upload::{Resident, Uploaded};
 use std::ops::Range;
 use std::time::Instant;
 
-use crate::error::{Error, Result};
-use crate::frame::{Frame, Seconds, Surface};
+use crate::error::Result;
+use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
-use layout::Window;
+use layout::Tile;
 
-/// Pixels rendered at once. Larger images are made of several windows, so that no target passes a
-/// device's limits: 2²¹ pixels are 33 MB of the 128 MiB a storage buffer may have.
-const WINDOW_PIXELS: u64 = 1 << 21;
+/// Bytes on the device for a pixel of a window: targets, sums and picture.
+pub const CANVAS_BYTES: u64 = Targets::BYTES + Sums::BYTES + Resolve::PICTURE_BYTES;
 
-/// How to render on the GPU.
+/// Pixels of the raster pass's layers brought back at once: 52 bytes each, twice.
+const SURFACE_PIXELS: u32 = 1 << 17;
+
+/// How to render.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
     /// Whether to bring back depth, texture coordinates, quads and normals too.
@@ -41,9 +45,11 @@ pub struct RenderOptions {
     pub samples: Option<Range<u32>>,
     /// About this many pixels a submission, instead of what the clock suggests.
     pub tile_pixels: Option<u32>,
-    /// Pixels rendered at once, instead of 2²¹. Rasterisers interpolate the rock from the window's corner,
-    /// so other windows round its radiance otherwise.
-    pub window_pixels: Option<u64>,
+    /// Only this part of the image, which it must lie in: the frame has its size, and the same bits as this
+    /// part of the whole image's frame.
+    pub window: Option<Window>,
+    /// How the GPU engine cuts the image; another grid rounds the rock's radiance otherwise.
+    pub grid: Grid,
 }
 
 /// The text of a stage's shader: what all stages share, then its own.
@@ -76,9 +82,11 @@ pub struct Inputs<'a> {
     pub up: &'a Uploaded,
     /// The raster pass's results.
     pub targets: &'a Targets,
-    /// The part of the image.
+    /// The part of the image that is drawn.
     pub window: Window,
-    /// Its uniforms.
+    /// What of it is looked at.
+    pub area: Tile,
+    /// The window's uniforms.
     pub frame: &'a layout::Frame,
 }
 
@@ -151,7 +159,7 @@ impl GpuRenderer {
         }
     }
 
-    /// Renders a scene.
+    /// Renders a scene, or the part of it that `options.window` names.
     pub fn render(
         &mut self,
         scene: &Scene,
@@ -162,18 +170,6 @@ impl GpuRenderer {
     ) -> Result<Frame> {
         let image = &scene.image;
         let gpu = &self.gpu;
-        let side = gpu.device.limits().max_texture_dimension_2d;
-        if image.width.max(image.height) > side {
-            return Err(Error::input(
-                format!(
-                    "an image of {}×{} pixels is too large for {}",
-                    image.width,
-                    image.height,
-                    gpu.name()
-                ),
-                format!("a side is at most {side} pixels there; use --engine cpu for more"),
-            ));
-        }
         let mut seconds = Seconds::default();
         let clock = Instant::now();
         let variant = Variant::of(scene);
@@ -188,56 +184,72 @@ impl GpuRenderer {
         let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
         seconds.upload = clock.elapsed().as_secs_f64();
 
-        let mut frame = Frame::new(image.width, image.height, options.surface);
-        let rows = options.window_pixels.unwrap_or(WINDOW_PIXELS) / image.width as u64;
-        let rows = (rows as u32).clamp(1, image.height);
-        let size = [image.width, rows];
+        let whole = [image.width, image.height];
+        let part = options.window.unwrap_or(Window::whole(whole));
+        let mut frame = Frame::new(part.width, part.height, options.surface);
+        let size = options.grid.size(whole);
         let canvas = recent(&mut self.canvases, KEPT_CANVASES, |c| c.size == size, || Canvas::new(gpu, size));
         let Canvas { targets, sums, picture, .. } = canvas;
         gpu.check()?;
 
         let samples = options.samples.clone().unwrap_or(0..image.samples);
-        let total = image.width as u64 * image.height as u64 * samples.len() as u64;
+        let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
         let mut tiler = Tiler::new(options.tile_pixels);
-        for y in (0..image.height).step_by(rows as usize) {
-            let window = Window { x: 0, y, width: image.width, height: rows.min(image.height - y) };
-            let window_pixels = window.width as u64 * window.height as u64;
+        for window in options.grid.windows(whole, part) {
+            // They meet, by the way windows are chosen.
+            let Some(wanted) = window.meet(&part) else { continue };
+            let area = Tile {
+                x: wanted.x - window.x,
+                y: wanted.y - window.y,
+                width: wanted.width,
+                height: wanted.height,
+            };
             let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample);
             for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);
-                let inputs =
-                    Inputs { gpu, timer: &self.timer, up: &up, targets, window, frame: &frame_uniforms };
+                let inputs = Inputs {
+                    gpu,
+                    timer: &self.timer,
+                    up: &up,
+                    targets,
+                    window,
+                    area,
+                    frame: &frame_uniforms,
+                };
                 seconds.gbuffer += self.gbuffer.run(&inputs, || monitor.progress("pixels", done, total))?;
                 if sample == samples.start
                     && let Some(surface) = &mut frame.surface
                 {
-                    read_surface(gpu, scene, targets, window, surface)?;
+                    let first = part.index([wanted.x, wanted.y]);
+                    read_surface(gpu, scene, targets, area, surface, first, part.width as usize)?;
                 }
                 seconds.integrate += integrate.run(&inputs, sums, &mut tiler, |pixels| {
                     monitor.progress("pixels", done + pixels, total)
                 })?;
-                done += window_pixels;
+                done += wanted.pixels();
             }
             seconds.resolve +=
-                self.resolve.run(gpu, &self.timer, sums, picture, window, &uniforms(samples.start))?;
+                self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms(samples.start))?;
             let clock = Instant::now();
-            let first = y as usize * image.width as usize;
-            let range = first..first + window_pixels as usize;
             let inverse = 1.0 / samples.len() as f32;
-            readback::read_buffer(gpu, &sums.radiance, window_pixels * 16, |bytes| {
+            let range = |row: u32| {
+                let first = part.index([wanted.x, wanted.y + row]);
+                first..first + wanted.width as usize
+            };
+            readback::read_rows(gpu, &sums.radiance, 16, window.width, area, |row, bytes| {
                 let mean = |sum: [f32; 4]| sum.map(|x| x * inverse);
-                frame.radiance[range.clone()]
+                frame.radiance[range(row)]
                     .iter_mut()
                     .zip(bytes.chunks_exact(16))
                     .for_each(|(out, sum)| *out = mean(bytemuck::pod_read_unaligned(sum)));
             })?;
             monitor.progress("pixels", done, total)?;
-            readback::read_buffer(gpu, &sums.counts, window_pixels * 8, |bytes| {
-                bytemuck::cast_slice_mut(&mut frame.counts[range.clone()]).copy_from_slice(bytes);
+            readback::read_rows(gpu, &sums.counts, 8, window.width, area, |row, bytes| {
+                bytemuck::cast_slice_mut(&mut frame.counts[range(row)]).copy_from_slice(bytes);
             })?;
-            readback::read_buffer(gpu, picture, window_pixels * 4, |bytes| {
-                bytemuck::cast_slice_mut(&mut frame.picture[range]).copy_from_slice(bytes);
+            readback::read_rows(gpu, picture, 4, window.width, area, |row, bytes| {
+                bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);
             })?;
             seconds.readback += clock.elapsed().as_secs_f64();
         }
@@ -246,24 +258,31 @@ impl GpuRenderer {
     }
 }
 
+/// Brings the layers of `area` back into `surface`, whose rows of `width` pixels they begin in at `first`.
 fn read_surface(
     gpu: &Gpu,
     scene: &Scene,
     targets: &Targets,
-    window: Window,
+    area: Tile,
     surface: &mut Surface,
+    first: usize,
+    width: usize,
 ) -> Result<()> {
-    let floats = |texture| -> Result<Vec<[f32; 4]>> {
-        Ok(readback::read_texture(gpu, texture)?.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
-    };
-    let (opaque, normal, hit) =
-        (floats(&targets.opaque)?, floats(&targets.normal)?, floats(&targets.surface)?);
-    let quads = readback::read_texture(gpu, &targets.quad_id)?;
-    let first = window.y as usize * window.width as usize;
-    for i in 0..window.width as usize * window.height as usize {
-        let quad: u32 = bytemuck::pod_read_unaligned(&quads[4 * i..4 * i + 4]);
-        let behind = (opaque[i][3], glam::Vec3::from_slice(&normal[i]));
-        surface.set(first + i, scene, quad, hit[i], behind);
+    let rows = (SURFACE_PIXELS / area.width).max(1);
+    for y in (0..area.height).step_by(rows as usize) {
+        let band = Tile { y: area.y + y, height: rows.min(area.height - y), ..area };
+        let read = |texture| readback::read_texture(gpu, texture, band);
+        let (opaque, normal, hit) = (read(&targets.opaque)?, read(&targets.normal)?, read(&targets.surface)?);
+        let quads = read(&targets.quad_id)?;
+        let floats = |bytes: &[u8], i: usize| -> [f32; 4] {
+            bytemuck::pod_read_unaligned(&bytes[16 * i..16 * i + 16])
+        };
+        for i in 0..band.width as usize * band.height as usize {
+            let quad: u32 = bytemuck::pod_read_unaligned(&quads[4 * i..4 * i + 4]);
+            let behind = (floats(&opaque, i)[3], glam::Vec3::from_slice(&floats(&normal, i)));
+            let (row, column) = (y as usize + i / band.width as usize, i % band.width as usize);
+            surface.set(first + row * width + column, scene, quad, floats(&hit, i), behind);
+        }
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! From the device to the host.
 
 use super::device::Gpu;
+use super::layout::Tile;
 use crate::error::{Error, Result};
 
 /// Maps a finished `MAP_READ` buffer and hands its bytes to `read`.
@@ -22,34 +23,56 @@ pub fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, read: impl FnOnce(&[u8]) -> T) -
     Ok(result)
 }
 
-/// Hands the first `size` bytes of a storage buffer to `read`.
-pub fn read_buffer<T>(
+/// Bytes brought back at once: the staging buffer of a whole window would be a good part of its targets.
+const STAGING_BYTES: u64 = 16 << 20;
+
+/// Hands the rows of `area` in a storage buffer, which has `width` items of `item` bytes a row, to `read`
+/// with their numbers in the area.
+pub fn read_rows(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
-    size: u64,
-    read: impl FnOnce(&[u8]) -> T,
-) -> Result<T> {
-    let staging = gpu.buffer("read-back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-    let mut encoder = gpu.encoder("read-back");
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
-    gpu.run(encoder)?;
-    map(gpu, &staging, read)
+    item: u64,
+    width: u32,
+    area: Tile,
+    mut read: impl FnMut(u32, &[u8]),
+) -> Result<()> {
+    let (stride, row) = (item * u64::from(width), item * u64::from(area.width));
+    let most = ((STAGING_BYTES / stride) as u32).clamp(1, area.height);
+    let staging = gpu.buffer(
+        "read-back",
+        stride * u64::from(most - 1) + row,
+        wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+    );
+    for first in (0..area.height).step_by(most as usize) {
+        let rows = most.min(area.height - first);
+        let offset = stride * u64::from(area.y + first) + item * u64::from(area.x);
+        let mut encoder = gpu.encoder("read-back");
+        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, stride * u64::from(rows - 1) + row);
+        gpu.run(encoder)?;
+        map(gpu, &staging, |bytes| {
+            let lines = bytes.chunks(stride as usize).take(rows as usize);
+            lines.zip(first..).for_each(|(line, number)| read(number, &line[..row as usize]));
+        })?;
+    }
+    Ok(())
 }
 
-/// Reads a 2-D texture, tightly packed: copies pad every row to 256 bytes.
-pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
-    let (width, height) = (texture.width(), texture.height());
+/// Reads an area of a 2-D texture, tightly packed: copies pad every row to 256 bytes.
+pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, area: Tile) -> Result<Vec<u8>> {
     let texel = texture.format().block_copy_size(None).unwrap_or(4);
-    let row = width * texel;
+    let row = area.width * texel;
     let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let staging = gpu.buffer(
         "read-back",
-        padded as u64 * height as u64,
+        padded as u64 * area.height as u64,
         wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
     );
     let mut encoder = gpu.encoder("read-back");
     encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
+        wgpu::TexelCopyTextureInfo {
+            origin: wgpu::Origin3d { x: area.x, y: area.y, z: 0 },
+            ..texture.as_image_copy()
+        },
         wgpu::TexelCopyBufferInfo {
             buffer: &staging,
             layout: wgpu::TexelCopyBufferLayout {
@@ -58,7 +81,7 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
                 rows_per_image: None,
             },
         },
-        texture.size(),
+        wgpu::Extent3d { width: area.width, height: area.height, depth_or_array_layers: 1 },
     );
     gpu.run(encoder)?;
     map(gpu, &staging, |bytes| {

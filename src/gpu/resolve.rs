@@ -2,7 +2,7 @@
 
 use super::device::Gpu;
 use super::integrate::Sums;
-use super::layout::{Frame, WORKGROUP, Window};
+use super::layout::{Frame, Tile, WORKGROUP};
 use super::shader;
 use super::timing::Timer;
 use crate::error::Result;
@@ -30,17 +30,18 @@ impl Resolve {
     /// Bytes of the picture a pixel: RGBA.
     pub const PICTURE_BYTES: u64 = 4;
 
-    /// Turns the sums of a window into `picture`; seconds on the device.
+    /// Turns the sums of an area of a window into `picture`; seconds on the device.
     pub fn run(
         &self,
         gpu: &Gpu,
         timer: &Timer,
         sums: &Sums,
         picture: &wgpu::Buffer,
-        window: Window,
+        area: Tile,
         frame: &Frame,
     ) -> Result<f64> {
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let tile = gpu.buffer_with("tile", bytemuck::bytes_of(&area), wgpu::BufferUsages::UNIFORM);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("resolve"),
             layout: &self.pipeline.get_bind_group_layout(0),
@@ -48,6 +49,7 @@ impl Resolve {
                 wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: sums.radiance.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 2, resource: picture.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 3, resource: tile.as_entire_binding() },
             ],
         });
         timer.run(gpu, "resolve", |encoder, span| {
@@ -57,7 +59,7 @@ impl Resolve {
             });
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(window.width.div_ceil(WORKGROUP), window.height.div_ceil(WORKGROUP), 1);
+            pass.dispatch_workgroups(area.width.div_ceil(WORKGROUP), area.height.div_ceil(WORKGROUP), 1);
         })
     }
 }

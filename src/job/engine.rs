@@ -2,7 +2,7 @@
 
 use crate::cpu;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
+use crate::frame::{Frame, Window};
 use crate::gpu::{DeviceOptions, Gpu, GpuRenderer, RenderOptions};
 use crate::job::Monitor;
 use crate::scene::{Mesh, Scene};
@@ -58,6 +58,14 @@ impl Engine {
         Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
     }
 
+    /// Opens the device anew, after it was lost.
+    pub fn renew(&mut self) -> Result<()> {
+        if let Engine::Gpu(renderer, device) = self {
+            **renderer = GpuRenderer::new(Gpu::open(device)?);
+        }
+        Ok(())
+    }
+
     /// `gpu` or `cpu`.
     pub fn word(&self) -> &'static str {
         match self {
@@ -87,7 +95,8 @@ impl Engine {
         match self {
             Engine::Cpu => {
                 let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
-                cpu::render_samples(scene, volume, mesh, samples, options.surface, monitor)
+                let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
+                cpu::render_samples(scene, volume, mesh, window, samples, options.surface, monitor)
             }
             Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
                 Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {

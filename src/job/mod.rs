@@ -1,10 +1,20 @@
 //! How long work is run, watched and stopped.
 
+pub mod batch;
+mod claim;
 mod engine;
 mod still;
+mod stitch;
+mod stock;
+mod strips;
 
+pub use claim::{Asked, Claim, Claims};
 pub use engine::{Engine, EngineChoice};
-pub use still::Still;
+pub(crate) use still::{About, Sink};
+pub use still::{Still, StillWriter};
+pub use stitch::stitch;
+pub use stock::VolumeStock;
+pub use strips::{check_image, memory_of, strips};
 
 use crate::error::Result;
 

@@ -1,5 +1,7 @@
 //! What is asked for: the scene, read strictly, checked whole before any work.
 
+mod animation;
+mod keyframes;
 mod param;
 mod parts;
 mod preset;
@@ -12,9 +14,10 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+pub use animation::Animation;
 pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::Source;
+pub use read::{Source, parse_value};
 pub use rock::{Mesh, Rock, Vertex};
 pub use value::{Key, Place, Raw, Value, Values};
 
@@ -207,13 +210,8 @@ impl Scene {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
-        for setting in sets {
-            read::apply_set(&mut values, setting)?;
-        }
-        // A path on the command line is the user's own word: relative to the current folder.
-        let set_by_hand = sets.iter().any(|s| s.split('=').next().is_some_and(|k| k.trim() == "volume.file"));
-        let folder = if set_by_hand { None } else { Some(source.folder.as_path()) };
-        Scene::from_values(&source.name, values, folder, limits)
+        let folder = read::apply_sets(&mut values, sets, &source)?;
+        Scene::from_values(&source.name, values, folder.as_deref(), limits)
     }
 
     /// Checks values that passed the table against one another. References resolve inside `folder`;
@@ -333,18 +331,9 @@ impl Scene {
 }
 
 impl Image {
-    /// The picture's own memory: radiance and transmittance in float32, 8-bit colour, counts.
+    /// Pictures are made in parts: refused are those of which no part fits.
     fn check_budget(&self, memory: u64) -> Result<()> {
-        let need = self.width as u128 * self.height as u128 * 48;
-        if need > memory as u128 {
-            return Err(Error::memory(
-                format!("an image of {}×{} pixels (image.width, height)", self.width, self.height),
-                need,
-                memory,
-                "lower the size or raise --memory",
-            ));
-        }
-        Ok(())
+        crate::job::check_image(self, memory)
     }
 }
 

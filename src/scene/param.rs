@@ -45,6 +45,10 @@ pub enum Kind {
     Text(&'static str),
     /// Four points A, B, C, D; there is no default.
     Corners,
+    /// Numbers of frames, each larger than the one before; empty by default.
+    Frames,
+    /// A list of numbers, of triples or of four corners, all alike; empty by default.
+    Series,
 }
 
 /// One parameter.
@@ -70,6 +74,10 @@ pub struct Param {
 pub const COLOR_MAX: f64 = 1.0e4;
 /// Largest coordinate, metres.
 pub const POINT_MAX: f64 = 1.0e7;
+/// Most keyframes of a track.
+pub const MAX_KEYFRAMES: usize = 10_000;
+/// Largest number of a frame.
+pub const MAX_FRAME: i64 = 999_999_999;
 
 const fn p(
     key: &'static str,
@@ -400,6 +408,57 @@ pub const PARAMS: &[Param] = &[
         Uniform,
         "Tone curve of the PNG: Narkowicz's fit of ACES, or none.",
     ),
+    p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform, "Frames of the animation; --frames chooses others.")
+        .slider(1.0, 1000.0),
+    p("animate.fps", "", "1/s", Float(0.01, 1000.0, 24.0), Uniform, "Frames a second.").slider(1.0, 120.0),
+    p(
+        "animate.loop",
+        "",
+        "frames",
+        Int(0, 1_000_000, 0),
+        Uniform,
+        "The animation comes round exactly after so many frames, which then are its length; 0: it does not.",
+    )
+    .slider(0.0, 1000.0),
+    p(
+        "animate.speed",
+        "",
+        "lengths/s",
+        Float(-1000.0, 1000.0, 0.5),
+        Uniform,
+        "How fast the volume moves down the flow; in a loop rounded to whole lengths, but not to none.",
+    )
+    .slider(0.0, 4.0),
+    p(
+        "animate.turn",
+        "",
+        "frames",
+        Int(-1_000_000, 1_000_000, 0),
+        Uniform,
+        "Turntable: the camera goes once round its target, about camera.up, in so many frames; 0: it does not.",
+    )
+    .slider(-1000.0, 1000.0),
+    p("animate.path.frames", "", "frames", Frames, Uniform, "When the camera is at the points of its path."),
+    p("animate.path.eyes", "", "m", Series, Uniform, "Points of the camera's path: a smooth curve goes through them."),
+    p(
+        "animate.path.targets",
+        "",
+        "m",
+        Series,
+        Uniform,
+        "What the camera looks at there; without them camera.target all the way.",
+    ),
+    p("animate.tracks.*.key", "", "", Text(""), Uniform, "The parameter that a track moves, any with a numeric value."),
+    p("animate.tracks.*.frames", "", "frames", Frames, Uniform, "Frames of its keyframes."),
+    p("animate.tracks.*.values", "", "", Series, Uniform, "Values at its keyframes."),
+    p(
+        "animate.tracks.*.interpolation",
+        "",
+        "",
+        Choice(&["linear", "smooth", "hold"]),
+        Uniform,
+        "Between keyframes: straight lines, a smooth curve that never overshoots, or steps.",
+    ),
 ];
 
 fn matches(pattern: &str, key: &str) -> bool {
@@ -440,6 +499,11 @@ impl Param {
         Param { slider: Some((low, high)), ..self }
     }
 
+    /// Whether it holds a list, which only a scene file or `--set` can give.
+    pub fn is_list(&self) -> bool {
+        matches!(self.kind, Frames | Series)
+    }
+
     /// The entry a concrete key such as `lights.sun.color` belongs to.
     pub fn find(key: &str) -> Option<&'static Param> {
         PARAMS.iter().find(|param| matches(param.key, key))
@@ -456,6 +520,10 @@ impl Param {
             Point(_) => format!("three numbers, ±{}", number(POINT_MAX)),
             Text(_) => "text".into(),
             Corners => format!("four points of three numbers, ±{}", number(POINT_MAX)),
+            Frames => format!(
+                "at most {MAX_KEYFRAMES} whole numbers, 0 to {MAX_FRAME}, each larger than the one before"
+            ),
+            Series => format!("at most {MAX_KEYFRAMES} values of one kind: numbers, triples or corners"),
         }
     }
 
@@ -469,6 +537,7 @@ impl Param {
             Text("") => "none".into(),
             Text(t) => t.into(),
             Corners => "required".into(),
+            Frames | Series => "none".into(),
         }
     }
 }

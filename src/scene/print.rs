@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value as Json, json};
 
-use super::param::PARAMS;
+use super::param::{PARAMS, Param};
 use super::read::VERSION;
 use super::{Light, Scene};
 
@@ -26,6 +26,8 @@ impl Scene {
                 }
             }
         }
+        // A list that is not given has nothing to say.
+        keys.retain(|key| self.values.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
         keys
     }
 
@@ -48,6 +50,9 @@ impl Scene {
                 // Infallible: writing to a String.
                 let _ = match this.split_once('.') {
                     Some(("quads", _)) => writeln!(text, "\n[[quads]]"),
+                    Some(("animate", track)) if track.starts_with("tracks.") => {
+                        writeln!(text, "\n[[animate.tracks]]")
+                    }
                     Some((section, name)) => writeln!(text, "\n[{section}.{}]", quoted(name)),
                     None => writeln!(text, "\n[{this}]"),
                 };

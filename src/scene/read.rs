@@ -17,6 +17,9 @@ pub const MAX_QUADS: usize = 65_536;
 /// The version of the scene format this program writes and reads.
 pub const VERSION: i64 = 1;
 
+/// The list of keyframed parameters.
+const TRACKS: &str = "animate.tracks";
+
 /// The sections whose second key part is a name the scene chooses.
 const NAMED: [&str; 3] = ["lights", "materials", "rocks"];
 
@@ -206,6 +209,14 @@ impl File<'_> {
                     self.keys(&format!("{path}.{}", key.get_ref()), value, values)
                 })
             }
+            // A scene's own tracks replace its base's, as its quads do.
+            DeValue::Array(tracks) if path == TRACKS => {
+                values.clear_under(TRACKS);
+                tracks
+                    .iter()
+                    .enumerate()
+                    .try_for_each(|(i, track)| self.keys(&format!("{TRACKS}.{i}"), track, values))
+            }
             leaf => values.set(path, &raw(leaf), &self.place(value.span().start)),
         }
     }
@@ -250,6 +261,14 @@ fn raw(value: &DeValue) -> Raw {
     }
 }
 
+/// Applies `--set`s in order; the folder in which references of the scene resolve.
+pub fn apply_sets(values: &mut Values, sets: &[String], source: &Source) -> Result<Option<PathBuf>> {
+    sets.iter().try_for_each(|setting| apply_set(values, setting))?;
+    // A path on the command line is the user's own word: relative to the current folder.
+    let set_by_hand = sets.iter().any(|s| s.split('=').next().is_some_and(|k| k.trim() == "volume.file"));
+    Ok((!set_by_hand).then(|| source.folder.clone()))
+}
+
 /// Applies one `--set key=value`. The value is TOML; what is not TOML is taken as a word.
 pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     // A name in a key may hold an = of its own: the first one that ends a known key is meant.
@@ -259,28 +278,34 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
     let (key, text) = (key.trim(), text.trim());
-    let parsed = DeValue::parse(text).map_or_else(|_| Raw::Text(text.into()), |v| raw(v.get_ref()));
-    // Names come from the scene: a misspelt one must not make a second light.
-    let mut parts = key.split('.');
-    if let (Some(section), Some(name)) = (parts.next(), parts.next())
-        && (NAMED.contains(&section) || section == "quads")
-    {
-        let mut names = values.names(section);
-        if section == "materials" {
-            names.extend(values.names("quads").iter().map(|q| values.text(&format!("quads.{q}.material"))));
-        }
-        if !names.iter().any(|n| n == name) {
-            names.sort_unstable();
-            names.dedup();
-            return Err(Error::input(
-                format!("--set {key}: the scene has no {name} in {section}"),
-                if names.is_empty() {
-                    "there are none".into()
-                } else {
-                    format!("there are: {}", names.join(", "))
-                },
-            ));
-        }
-    }
+    let parsed = parse_value(text);
+    check_names(values, key).map_err(|(what, fix)| Error::input(format!("--set {key}: {what}"), fix))?;
     values.set(key, &parsed, &Place("--set".into()))
+}
+
+/// A value as `--set` takes it: TOML, else a word.
+pub fn parse_value(text: &str) -> Raw {
+    DeValue::parse(text).map_or_else(|_| Raw::Text(text.into()), |v| raw(v.get_ref()))
+}
+
+/// Names come from the scene: a misspelt one must not make a second light. The error is what is wrong and
+/// what there is.
+pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (String, String)> {
+    let mut parts = key.split('.');
+    let (Some(section), Some(name)) = (parts.next(), parts.next()) else { return Ok(()) };
+    if !NAMED.contains(&section) && section != "quads" {
+        return Ok(());
+    }
+    let mut names = values.names(section);
+    if section == "materials" {
+        names.extend(values.names("quads").iter().map(|q| values.text(&format!("quads.{q}.material"))));
+    }
+    if names.iter().any(|n| n == name) {
+        return Ok(());
+    }
+    names.sort_unstable();
+    names.dedup();
+    let known =
+        if names.is_empty() { "there are none".into() } else { format!("there are: {}", names.join(", ")) };
+    Err((format!("the scene has no {name} in {section}"), known))
 }

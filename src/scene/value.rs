@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::param::{COLOR_MAX, Kind, POINT_MAX, Param, nearest};
+use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param, nearest};
 use crate::error::{Error, Result};
 
 /// A checked value. Numbers are the shortest decimal of the float32 that is rendered with.
@@ -18,6 +18,10 @@ pub enum Value {
     Triple([f64; 3]),
     /// Four corners.
     Corners([[f64; 3]; 4]),
+    /// Numbers of frames.
+    Frames(Vec<i64>),
+    /// Values of one kind, by their components: 1, 3 or 12.
+    Series(Vec<Vec<f64>>),
 }
 
 /// A value as some syntax gave it, before it meets the table.
@@ -144,6 +148,8 @@ impl Values {
             Kind::Choice(words) => Value::Text(words[0].into()),
             Kind::Text(t) => Value::Text(t.into()),
             Kind::Color(c) | Kind::Point(c) => Value::Triple(c),
+            Kind::Frames => Value::Frames(Vec::new()),
+            Kind::Series => Value::Series(Vec::new()),
             Kind::Corners => panic!("{key} has no default"),
         }
     }
@@ -190,6 +196,22 @@ impl Values {
         }
     }
 
+    /// Numbers of frames.
+    pub fn frames(&self, key: &str) -> Vec<i64> {
+        match self.get(key) {
+            Value::Frames(frames) => frames,
+            other => panic!("{key} is no list of frames: {other:?}"),
+        }
+    }
+
+    /// Values by their components.
+    pub fn series(&self, key: &str) -> Vec<Vec<f64>> {
+        match self.get(key) {
+            Value::Series(values) => values,
+            other => panic!("{key} is no list of values: {other:?}"),
+        }
+    }
+
     /// Four corners.
     pub fn corners(&self, key: &str) -> [glam::Vec3; 4] {
         match self.get(key) {
@@ -230,7 +252,43 @@ fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
             let corners = points.and_then(|p| <[[f64; 3]; 4]>::try_from(p).ok());
             Ok(Value::Corners(corners.ok_or_else(words)?))
         }
+        Kind::Frames => Ok(Value::Frames(frames(raw).ok_or_else(words)?)),
+        Kind::Series => Ok(Value::Series(series(raw).ok_or_else(words)?)),
     }
+}
+
+fn frames(raw: &Raw) -> Option<Vec<i64>> {
+    let Raw::List(list) = raw else { return None };
+    let numbers = list.iter().map(|x| match x {
+        Raw::Int(n) if (0..=MAX_FRAME).contains(n) => Some(*n),
+        _ => None,
+    });
+    let numbers: Vec<i64> = numbers.collect::<Option<_>>()?;
+    (numbers.len() <= MAX_KEYFRAMES && numbers.is_sorted_by(|a, b| a < b)).then_some(numbers)
+}
+
+/// The numbers of each value in one row; whether they are allowed is for the key they are meant for.
+fn series(raw: &Raw) -> Option<Vec<Vec<f64>>> {
+    let Raw::List(list) = raw else { return None };
+    let number = |raw: &Raw| match *raw {
+        Raw::Float(x) if x.is_finite() => Some(x),
+        Raw::Int(x) => Some(x as f64),
+        _ => None,
+    };
+    let triple = |raw: &Raw| match raw {
+        Raw::List(parts) if parts.len() == 3 => parts.iter().map(number).collect::<Option<Vec<f64>>>(),
+        _ => None,
+    };
+    let value = |raw: &Raw| match raw {
+        Raw::List(points) if points.len() == 4 => {
+            Some(points.iter().map(triple).collect::<Option<Vec<_>>>()?.concat())
+        }
+        Raw::List(_) => triple(raw),
+        _ => Some(vec![number(raw)?]),
+    };
+    let values: Vec<Vec<f64>> = list.iter().map(value).collect::<Option<_>>()?;
+    let alike = values.iter().all(|v| v.len() == values[0].len());
+    (values.len() <= MAX_KEYFRAMES && alike).then_some(values)
 }
 
 /// A number inside the range whose float32 is neither denormal nor infinite.
@@ -274,7 +332,24 @@ impl Raw {
 impl Value {
     /// As TOML.
     pub fn to_toml(&self) -> String {
+        let list = |items: Vec<String>| format!("[{}]", items.join(", "));
         match self {
+            Value::Frames(frames) => list(frames.iter().map(i64::to_string).collect()),
+            Value::Series(values) => list(
+                values
+                    .iter()
+                    .map(|value| match value.as_slice() {
+                        [x] => Value::Float(*x).to_toml(),
+                        [x, y, z] => Value::Triple([*x, *y, *z]).to_toml(),
+                        corners => list(
+                            corners
+                                .chunks_exact(3)
+                                .map(|p| Value::Triple([p[0], p[1], p[2]]).to_toml())
+                                .collect(),
+                        ),
+                    })
+                    .collect(),
+            ),
             Value::Float(x) => toml::Value::Float(*x).to_string(),
             Value::Int(x) => x.to_string(),
             Value::Text(t) => toml::Value::String(t.clone()).to_string(),
@@ -293,6 +368,15 @@ impl Value {
             Value::Text(t) => serde_json::json!(t),
             Value::Triple(t) => serde_json::json!(t),
             Value::Corners(c) => serde_json::json!(c),
+            Value::Frames(frames) => serde_json::json!(frames),
+            Value::Series(values) => values
+                .iter()
+                .map(|value| match value.as_slice() {
+                    [x] => serde_json::json!(x),
+                    [_, _, _] => serde_json::json!(value),
+                    corners => corners.chunks_exact(3).map(|p| serde_json::json!(p)).collect(),
+                })
+                .collect(),
         }
     }
 }

@@ -416,7 +416,9 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
             let id = ui.make_persistent_id(("text", key));
             let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| text.clone());
             let width = ui.available_width() - MARKS_WIDTH;
-            let field = egui::TextEdit::singleline(&mut typed).hint_text("built").desired_width(width);
+            let field = egui::TextEdit::singleline(&mut typed)
+                .hint_text(if key == "volume.file" { "built" } else { "" })
+                .desired_width(width);
             let response = ui.add(field);
             name(&response, key);
             if response.has_focus() {
@@ -425,6 +427,12 @@ fn widget(ui: &mut Ui, document: &Document, key: &str, param: &Param, value: &Va
             }
             let entered = ui.data_mut(|d| d.remove_temp::<String>(id));
             entered.filter(|new| new != text).map(Raw::Text)
+        }
+        (Kind::Frames | Kind::Series, list) => {
+            // Keyframes are written in the scene file.
+            let label = egui::Label::new(egui::RichText::new(list.to_toml()).weak()).truncate();
+            name(&ui.add(label), key);
+            None
         }
         _ => None,
     }

@@ -21,6 +21,7 @@ const TINY: [&str; 6] = ["--engine", "cpu", "--size", "16x16", "--samples", "1"]
 const ENDLESS: [&str; 7] = ["render", "fig5", "--engine", "cpu", "--samples", "4096", "-o"];
 
 /// What a run of the program left.
+#[derive(Debug)]
 pub struct Run {
     code: Option<i32>,
     out: String,
@@ -43,7 +44,23 @@ impl Run {
         &self.out
     }
 
-    fn lines(&self, start: &str) -> Vec<&str> {
+    /// How it ended; none after a signal.
+    pub fn exit_code(&self) -> Option<i32> {
+        self.code
+    }
+
+    /// What it printed.
+    pub fn stdout(&self) -> &str {
+        &self.out
+    }
+
+    /// What it said.
+    pub fn stderr(&self) -> &str {
+        &self.err
+    }
+
+    /// The lines it said that start so.
+    pub fn lines(&self, start: &str) -> Vec<&str> {
         self.err.lines().filter(|line| line.starts_with(start)).collect()
     }
 }
@@ -65,7 +82,8 @@ pub fn run(command: &mut Command) -> Run {
     run
 }
 
-fn wait(child: &mut Child) -> Option<i32> {
+/// Waits for the end; how it ended.
+pub fn wait(child: &mut Child) -> Option<i32> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait().unwrap() {
@@ -207,14 +225,20 @@ fn temporary_files_of_the_dead_are_removed_and_those_of_the_living_kept() {
     let dir = tempdir().unwrap();
     let mut dead = Command::new("true").spawn().unwrap();
     dead.wait().unwrap();
-    let name = |target: &str, pid: u32| format!(".{target}.taki-abc.{pid}.tmp");
+    let machine = &taki::frame::Owner::me().machine;
+    let name = |target: &str, pid: u32| format!(".{target}.taki-abc.{machine}-{pid}.tmp");
     let (stale, living) = (name("x.png", dead.id()), name("x.png", std::process::id()));
     let (other, foreign) = (name("y.png", dead.id()), ".x.png.taki-notes".to_owned());
-    for file in [&stale, &living, &other, &foreign] {
+    // Another machine's processes cannot be asked: its files are stale after a day without a write.
+    let elsewhere = |n: &str| format!(".x.png.taki-{n}.00000000-{}.tmp", dead.id());
+    let (recent, ancient) = (elsewhere("a"), elsewhere("b"));
+    for file in [&stale, &living, &other, &foreign, &recent, &ancient] {
         fs::write(dir.path().join(file), "").unwrap();
     }
+    let day_before = std::time::SystemTime::now() - Duration::from_secs(25 * 3600);
+    File::options().write(true).open(dir.path().join(&ancient)).unwrap().set_modified(day_before).unwrap();
     run(&mut render("front", dir.path().join("x.png"))).done();
-    has_only(dir.path(), &[&living, &other, &foreign, "x.png"]);
+    has_only(dir.path(), &[&living, &other, &foreign, &recent, "x.png"]);
 }
 
 /// Starts endless work and waits until it has its temporary file.

@@ -3,6 +3,9 @@
 //! Reference truth (float64, closed form) and parity of the engines (float32, same order) are two kinds
 //! of test; each module says which it holds. Tolerances stand in `tolerance`.
 
+mod animation;
+mod batch;
+mod big;
 mod closed_forms;
 mod compare;
 mod curve;

@@ -4,7 +4,7 @@ use glam::Vec3;
 use taki::camera::sample_offset;
 use taki::cpu::gbuffer;
 use taki::cpu::ray::{RayReport, inspect};
-use taki::gpu::layout::Window;
+use taki::frame::Window;
 use taki::job::Unwatched;
 use taki::scene::{Light, Scene};
 

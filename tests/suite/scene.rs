@@ -24,6 +24,10 @@ repeat_u = 2.0
 [[quads]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 material = \"a\"
+[[animate.tracks]]
+key = \"trace.sigma\"
+frames = [0]
+values = [1.5]
 ";
 
 fn source(text: &str) -> Source {
@@ -57,7 +61,10 @@ fn refused<T>(result: Result<T, String>, words: &[&str]) {
 
 /// A parameter's key in `ONE_OF_EACH`.
 fn concrete(param: &Param) -> String {
-    param.key.replace('*', if param.key.starts_with("quads") { "0" } else { "a" })
+    param.key.replace(
+        '*',
+        if param.key.starts_with("quads") || param.key.starts_with("animate") { "0" } else { "a" },
+    )
 }
 
 /// A valid value that is not the default, as TOML.
@@ -71,6 +78,8 @@ fn another(param: &Param) -> String {
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),
         Kind::Text(_) => "some file.npz".into(),
         Kind::Corners => "[[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]".into(),
+        Kind::Frames => "[0, 7, 999999999]".into(),
+        Kind::Series => "[[0.25, -3.0, 10000.0], [1.0, 2.0, 3.0]]".into(),
     }
 }
 
@@ -125,6 +134,41 @@ fn ranges_include_their_ends_and_nothing_outside() {
                 let corners = |n: usize| Raw::List((0..n).map(|_| p()).collect());
                 let long = Raw::List(vec![p(), p(), p(), Raw::List(vec![Raw::Int(1); 4])]);
                 (vec![corners(4)], vec![corners(3), corners(5), corners(0), p(), long])
+            }
+            Kind::Frames => {
+                let list = |n: &[i64]| Raw::List(n.iter().copied().map(Raw::Int).collect());
+                let many = |n: i64| list(&(0..n).collect::<Vec<_>>());
+                (
+                    vec![list(&[]), list(&[0]), list(&[3, 999_999_999]), many(10_000)],
+                    vec![
+                        list(&[-1]),
+                        list(&[1_000_000_000]),
+                        list(&[2, 2]),
+                        list(&[2, 1]),
+                        many(10_001),
+                        Raw::Int(1),
+                    ],
+                )
+            }
+            Kind::Series => {
+                let numbers = |n: usize| Raw::List(vec![Raw::Float(0.5); n]);
+                let corners = || Raw::List(vec![list([0.0, 1.0, 2.0]); 4]);
+                (
+                    vec![
+                        numbers(0),
+                        numbers(10_000),
+                        Raw::List(vec![list([1.0; 3]); 2]),
+                        Raw::List(vec![corners(); 2]),
+                    ],
+                    vec![
+                        numbers(10_001),
+                        Raw::List(vec![Raw::Float(f64::NAN)]),
+                        Raw::List(vec![numbers(2); 2]),
+                        Raw::List(vec![list([1.0; 3]), Raw::Int(1)]),
+                        Raw::List(vec![Raw::List(vec![numbers(2); 4])]),
+                        Raw::Float(1.0),
+                    ],
+                )
             }
         };
         for raw in inside {

@@ -1,10 +1,9 @@
 //! The thread itself: what it does with a request, and how it goes on after a fault.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use eframe::egui;
 use rayon::prelude::*;
@@ -12,13 +11,13 @@ use rayon::prelude::*;
 use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
 use crate::cpu::resolve::resolve;
 use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer};
+use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
-use crate::job::{Engine, EngineChoice, Monitor, Still};
+use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, strips};
 use crate::scene::{Cost, Image, Mesh, Rock, Scene};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
-use crate::volume::{VolumeTexture, WaterSpec, set_density_and_reflection};
+use crate::volume::VolumeTexture;
 
 /// A preview aims at this: with the window's own frame and the volume's upload it stays under 150 ms.
 const PREVIEW_SECONDS: f64 = 0.06;
@@ -39,19 +38,6 @@ const MAX_REBUILDS: usize = 3;
 /// From this scale on the rocks are drawn coarsely.
 const COARSE_SCALE: u32 = 3;
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
-
-/// The volume of the last request, and what it was made from.
-struct MadeVolume {
-    source: VolumeSource,
-    volume: Arc<VolumeTexture>,
-}
-
-#[derive(PartialEq)]
-enum VolumeSource {
-    Water(WaterSpec),
-    /// Path, and what tells one version of the file from the next.
-    File(PathBuf, Option<SystemTime>, u64),
-}
 
 /// The picture that refinement goes on from.
 struct Rendered {
@@ -85,7 +71,7 @@ pub struct Renderer {
     device: DeviceOptions,
     memory: u64,
     engine: Option<Engine>,
-    volume: Option<MadeVolume>,
+    volume: VolumeStock,
     mesh: Option<(Vec<Rock>, Meshes)>,
     rendered: Option<Rendered>,
     speed: Speed,
@@ -109,7 +95,7 @@ impl Renderer {
             device,
             memory,
             engine: None,
-            volume: None,
+            volume: VolumeStock::default(),
             mesh: None,
             rendered: None,
             speed: Speed::default(),
@@ -445,7 +431,7 @@ impl Renderer {
         volume: &VolumeTexture,
         mesh: &Mesh,
         options: &RenderOptions,
-        watch: &Watch,
+        watch: &dyn Monitor,
     ) -> Result<Frame> {
         match self.engine.get_or_insert(Engine::Cpu) {
             Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
@@ -468,47 +454,14 @@ impl Renderer {
     /// The request's volume, and what making it cost.
     fn volume(&mut self, request: &Request) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
         let scene = &request.scene;
-        let source = match &scene.volume_file {
-            None => VolumeSource::Water(scene.water),
-            Some(path) => {
-                let meta = std::fs::metadata(path).ok();
-                let changed = meta.as_ref().and_then(|m| m.modified().ok());
-                VolumeSource::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
-            }
-        };
         let clock = Instant::now();
-        let (volume, cost) = match (self.volume.take(), &source) {
-            (Some(made), _) if made.source == source => {
-                let volume = made.volume.clone();
-                self.volume = Some(made);
-                return Ok((volume, None));
-            }
-            (Some(MadeVolume { source: VolumeSource::Water(old), volume }), VolumeSource::Water(new))
-                if same_curves(&old, new) =>
-            {
-                let mut changed = VolumeTexture { alpha: new.alpha, ..(*volume).clone() };
-                if (WaterSpec { alpha: new.alpha, ..old }) == *new {
-                    (changed, Cost::Uniform)
-                } else {
-                    let cells: &mut Vec<_> = Arc::make_mut(&mut changed.cells);
-                    set_density_and_reflection(new, cells);
-                    (changed, Cost::Upload)
-                }
-            }
-            (old, _) => {
-                // The old one serves while the new one is made, and after it if that is given up.
-                self.volume = old;
-                let watch = self.watch("curves", request.serial, BUILD_PATIENCE);
-                (scene.volume(self.memory, &watch)?, Cost::Volume)
-            }
-        };
-        let volume = Arc::new(volume);
-        if cost == Cost::Volume {
+        let watch = self.watch("curves", request.serial, BUILD_PATIENCE);
+        let (volume, cost) = self.volume.volume(scene, self.memory, &watch)?;
+        if cost == Some(Cost::Volume) {
             lock(&self.shared.state).volume_seconds = clock.elapsed().as_secs_f64();
             scene.warnings(&volume).into_iter().for_each(|w| self.say(MessageKind::Warning, w));
         }
-        self.volume = Some(MadeVolume { source, volume: volume.clone() });
-        Ok((volume, Some(cost)))
+        Ok((volume, cost))
     }
 
     /// The request's geometry, and whether it was made anew.
@@ -558,9 +511,15 @@ impl Renderer {
         let (meshes, _) = self.meshes(&export.scene);
         let watch = self.watch("export", u64::MAX, Duration::MAX);
         let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let frame = self.run_engine(&export.scene, &volume, &meshes.full, &options, &watch)?;
+        let (scene, image) = (&export.scene, &export.scene.image);
+        let window = Window::whole([image.width, image.height]);
+        let strips = strips(scene, window, options.surface, self.memory)?;
+        let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
+        writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
+            self.run_engine(scene, &volume, &meshes.full, options, watch)
+        })?;
         watch.progress("saving", 1, 1)?;
-        still.save(&frame, &Layer::ALL, &export.scene, &volume)
+        writer.finish().map(drop)
     }
 }
 
@@ -570,10 +529,6 @@ struct Job<'a> {
     volume: Arc<VolumeTexture>,
     meshes: Meshes,
     cost: Cost,
-}
-
-fn same_curves(a: &WaterSpec, b: &WaterSpec) -> bool {
-    WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, ..*a } == *b
 }
 
 /// Adds the mean of `more` samples to the mean of `samples`.

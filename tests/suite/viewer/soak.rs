@@ -34,7 +34,7 @@ fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
         Kind::Choice(words) => Raw::Text(words[rng.random_range(0..words.len())].into()),
         Kind::Color(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(0.0..2.0))).collect()),
         Kind::Point(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(-8.0..8.0))).collect()),
-        Kind::Text(_) | Kind::Corners => return None,
+        Kind::Text(_) | Kind::Corners | Kind::Frames | Kind::Series => return None,
     })
 }
 

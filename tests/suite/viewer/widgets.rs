@@ -52,6 +52,8 @@ fn every_parameter_has_a_widget_of_its_name() {
             Kind::Text(_) => vec![(Role::TextInput, key.clone())],
             Kind::Color(_) => vec![(Role::ColorWell, key.clone())],
             Kind::Point(_) => axes.map(|axis| (Role::SpinButton, format!("{key} {axis}"))).into(),
+            // Of keyframes, which no preset has.
+            Kind::Frames | Kind::Series => Vec::new(),
             Kind::Corners => {
                 let names = ["A", "B", "C", "D"].into_iter();
                 let names = names.flat_map(|c| axes.map(|axis| format!("{key} {c} {axis}")));

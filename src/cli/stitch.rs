@@ -1,0 +1,29 @@
+//! `taki stitch`: crops joined to the whole picture.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::terminal::Terminal;
+use crate::error::Result;
+use crate::job::stitch;
+
+#[derive(Args)]
+pub struct StitchArgs {
+    /// Files that `taki render --crop` wrote: all PNG or all EXR, of one scene at one size.
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    /// The whole picture: of the parts' kind.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+pub fn run(args: &StitchArgs, terminal: &Terminal) -> Result<()> {
+    let start = Instant::now();
+    stitch(&args.parts, &args.output, terminal)?;
+    terminal.close();
+    let (parts, seconds) = (args.parts.len(), start.elapsed().as_secs_f64());
+    terminal.note(&format!("taki: wrote {} of {parts} parts in {seconds:.2} s", args.output.display()));
+    Ok(())
+}

@@ -1,0 +1,149 @@
+//! What is there already: whole, broken, or another's.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::{Batch, stamp};
+use crate::error::{Error, Result};
+use crate::frame::{Kind, Verified, verify};
+use crate::job::still::{scene_text, volume_line};
+use crate::job::{Claims, Monitor, VolumeStock};
+use crate::scene::Scene;
+
+/// What a file's name holds.
+#[derive(Debug, PartialEq)]
+pub enum Found {
+    Nothing,
+    /// Just this picture, every byte of it decoded.
+    Whole,
+    /// No picture: what is wrong with it.
+    Broken(String),
+    /// Another picture: what tells it from this one.
+    Other(String),
+}
+
+impl Batch {
+    /// Decodes what is there. Files of other scenes are refused unless they may be replaced.
+    pub(super) fn look(&mut self, monitor: &dyn Monitor) -> Result<()> {
+        let own: Vec<usize> = self.own().collect();
+        let there: Vec<usize> = own
+            .par_iter()
+            .copied()
+            .filter(|&n| self.files(n).iter().any(|f| f.symlink_metadata().is_ok()))
+            .collect();
+        for (part, numbers) in there.chunks(16).enumerate() {
+            monitor.progress("verifying", part as u64 * 16, there.len() as u64)?;
+            let found: Vec<Result<Vec<Found>>> = if self.request.overwrite {
+                numbers.iter().map(|_| Ok(Vec::new())).collect()
+            } else {
+                numbers.par_iter().map(|&n| self.found(n)).collect()
+            };
+            for (&number, found) in numbers.iter().zip(found) {
+                let files = self.files(number);
+                let found = found?;
+                for (file, found) in files.iter().zip(&found) {
+                    match found {
+                        Found::Other(what) => {
+                            return Err(Error::CannotCreate {
+                                path: file.clone(),
+                                why: format!("another picture has this name: {what}"),
+                                fix: "choose other names with -o, or replace it with --overwrite".into(),
+                            });
+                        }
+                        Found::Broken(why) => {
+                            monitor.warn(&format!("{}: {why}; it is rendered again", file.display()));
+                        }
+                        Found::Whole | Found::Nothing => {}
+                    }
+                }
+                if !found.is_empty() && found.iter().all(|f| *f == Found::Whole) {
+                    self.whole[number] = true;
+                    files.iter().take(1).for_each(|file| Claims::clear_dead(file));
+                    continue;
+                }
+                for file in files {
+                    if file.is_dir() {
+                        return Err(Error::CannotCreate {
+                            path: file,
+                            why: "a folder has this name".into(),
+                            fix: "choose another name with -o".into(),
+                        });
+                    }
+                    if let Some(stamp) = stamp(&file) {
+                        self.replaced.insert(file, stamp);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether another process has made the picture since this one has looked.
+    pub(super) fn made_meanwhile(&self, number: usize) -> Result<bool> {
+        let files = self.files(number);
+        let new =
+            |file: &std::path::PathBuf| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
+        Ok(files.iter().all(new) && self.found(number)?.iter().all(|f| *f == Found::Whole))
+    }
+
+    /// What the names of a picture's files hold.
+    fn found(&self, number: usize) -> Result<Vec<Found>> {
+        let scene = self.scene(number)?;
+        self.files(number).iter().map(|file| self.found_in(file, &scene)).collect()
+    }
+
+    fn found_in(&self, file: &Path, scene: &Scene) -> Result<Found> {
+        if file.symlink_metadata().is_err() {
+            return Ok(Found::Nothing);
+        }
+        let verified = match verify(file) {
+            Ok(verified) => verified,
+            Err(Error::Input { what, .. }) => return Ok(Found::Broken(what)),
+            Err(e) => return Err(e),
+        };
+        Ok(match self.difference(file, &verified, scene)? {
+            None => Found::Whole,
+            Some(what) => Found::Other(what),
+        })
+    }
+
+    /// What tells the picture in a file from the one of `scene`.
+    fn difference(&self, file: &Path, verified: &Verified, scene: &Scene) -> Result<Option<String>> {
+        let Some(text) = &verified.scene else {
+            return Ok(Some("it does not say what scene it shows".into()));
+        };
+        let (line, text) = text.split_once('\n').unwrap_or((text, ""));
+        let wanted = scene_text(scene);
+        if text != wanted {
+            let lines = text.lines().map(Some).chain(std::iter::repeat(None));
+            let differ = wanted.lines().zip(lines).find(|(want, have)| *have != Some(want));
+            return Ok(Some(match differ {
+                Some((want, have)) => format!("it has {:?}, this has {want:?}", have.unwrap_or("")),
+                None => "its scene has more parameters".into(),
+            }));
+        }
+        if scene.volume_file.is_some() {
+            // A built volume follows from its parameters; one from a file may have changed since.
+            let memory = self.base.limits().memory;
+            let (volume, _) = VolumeStock::default().volume(scene, memory, &crate::job::Unwatched)?;
+            if line != volume_line(&volume) {
+                return Ok(Some("it was made with other contents of volume.file".into()));
+            }
+        }
+        if verified.window != self.window(scene) {
+            return Ok(Some("it is another part of the picture".into()));
+        }
+        if Kind::of(file)? == Kind::Exr {
+            let mut wanted: Vec<&str> =
+                self.request.layers.iter().flat_map(|l| l.channels()).copied().collect();
+            let mut have: Vec<&str> = verified.channels.iter().map(String::as_str).collect();
+            wanted.sort_unstable();
+            have.sort_unstable();
+            if wanted != have {
+                return Ok(Some(format!("it has the channels {}", have.join(", "))));
+            }
+        }
+        Ok(None)
+    }
+}

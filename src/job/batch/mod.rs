@@ -1,0 +1,258 @@
+//! Many pictures from one scene: the frames of an animation, the grid of a sweep, or both.
+//!
+//! 1. [`Batch::plan`] checks everything before any work: the scene of every frame, every output's folder
+//!    and name, and what is there already, by decoding it.
+//! 2. [`Batch::run`] renders what is missing. It claims each picture, so that any number of processes may
+//!    share a folder, and hands finished strips to a thread that encodes while the next are rendered.
+//! 3. What is made of all pictures (movies, a sheet, manifests) is made at the end, from the files.
+//!
+//! A picture's bytes depend on the scene and the frame's number alone.
+
+mod existing;
+mod needs;
+mod pattern;
+mod report;
+mod run;
+mod sweep;
+mod writer;
+
+pub use needs::Needs;
+pub use pattern::Pattern;
+pub use report::{Event, Name, Summary, Watcher};
+pub use sweep::Sweep;
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::frame::{Layer, Window, folder_of, remove_stale};
+use crate::job::{Monitor, Still};
+use crate::scene::{Animation, Place, Scene};
+
+/// Most pictures of one batch.
+const MAX_PICTURES: usize = 1_000_000;
+/// The scenes of so many frames, evenly chosen, are checked before the work; of more it would take longer
+/// than people wait for a first picture.
+const CHECKED_FRAMES: usize = 2000;
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Numbers of frames; none: the animation's, or with a sweep frame 0.
+    pub frames: Option<Vec<u32>>,
+    /// `KEY=VALUES`.
+    pub sweeps: Vec<String>,
+    /// Patterns of the pictures' files.
+    pub outputs: Vec<PathBuf>,
+    /// (i, n): of the pictures, numbered from 0, those whose number leaves i when divided by n.
+    pub shard: Option<(u32, u32)>,
+    /// Whether files that are there are replaced.
+    pub overwrite: bool,
+    /// Whether the others go on when one picture fails.
+    pub keep_going: bool,
+    /// How often a picture is tried again after a lost device.
+    pub retries: u32,
+    /// Only this part of every picture.
+    pub crop: Option<Window>,
+    /// Layers of EXR files.
+    pub layers: Vec<Layer>,
+    /// Claims of other machines not touched for so long are taken over.
+    pub stale: Duration,
+}
+
+/// A batch that has been checked.
+pub struct Batch {
+    base: Animation,
+    request: Request,
+    sweeps: Vec<Sweep>,
+    frames: Vec<u32>,
+    pictures: Vec<Pattern>,
+    /// By number of the picture, whether it is there whole.
+    whole: Vec<bool>,
+    /// Files that were there before and are to be replaced.
+    replaced: HashMap<PathBuf, Stamp>,
+}
+
+/// Tells one version of a file from the next.
+type Stamp = (Option<SystemTime>, u64);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    let meta = std::fs::metadata(path).ok()?;
+    Some((meta.modified().ok(), meta.len()))
+}
+
+impl Batch {
+    /// Checks what is asked for and what is there.
+    pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
+        let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
+        let keys = first.keys();
+        let sweeps = request
+            .sweeps
+            .iter()
+            .map(|text| Sweep::parse(text, &keys, base.values()))
+            .collect::<Result<Vec<Sweep>>>()?;
+        for (i, sweep) in sweeps.iter().enumerate() {
+            if sweeps[..i].iter().any(|other| other.key == sweep.key) {
+                return Err(Error::Usage(format!(
+                    "--sweep {} is given twice; list all values in one",
+                    sweep.key
+                )));
+            }
+        }
+        let frames = match &request.frames {
+            Some(frames) => frames.clone(),
+            None if !sweeps.is_empty() => vec![0],
+            None => (0..base.frames).collect(),
+        };
+        let points = sweeps.iter().try_fold(1usize, |n, s| n.checked_mul(s.values.len()));
+        let count = points.and_then(|n| n.checked_mul(frames.len())).filter(|&n| n <= MAX_PICTURES);
+        let Some(count) = count else {
+            return Err(Error::Usage(format!(
+                "the sweep's grid times the frames is more than {MAX_PICTURES} pictures; split it"
+            )));
+        };
+        let names: Vec<Vec<String>> = sweeps.iter().map(Sweep::names).collect();
+        let pictures = request
+            .outputs
+            .iter()
+            .map(|path| Pattern::new(path, &names))
+            .collect::<Result<Vec<Pattern>>>()?;
+        for (i, pattern) in pictures.iter().enumerate() {
+            check_pattern(pattern, &sweeps, frames.len())?;
+            if pictures[..i].iter().any(|other| other.given() == pattern.given()) {
+                return Err(Error::Usage(format!("-o {} is given twice", pattern.given().display())));
+            }
+        }
+        let mut batch = Batch {
+            base,
+            request,
+            sweeps,
+            frames,
+            pictures,
+            whole: vec![false; count],
+            replaced: HashMap::new(),
+        };
+        batch.check_scenes(monitor)?;
+        batch.check_folders()?;
+        batch.look(monitor)?;
+        Ok(batch)
+    }
+
+    /// How many pictures there are, of all shards.
+    pub fn count(&self) -> usize {
+        self.whole.len()
+    }
+
+    /// The numbers of this run's pictures.
+    fn own(&self) -> impl Iterator<Item = usize> + use<> {
+        let (shard, of) = self.request.shard.unwrap_or((0, 1));
+        (shard as usize..self.count()).step_by(of as usize)
+    }
+
+    /// The values of the sweeps, by number, at a picture: the last sweep changes fastest, and within each
+    /// point of the grid the frames.
+    fn choice(&self, number: usize) -> Vec<usize> {
+        let mut point = number / self.frames.len();
+        let mut choice: Vec<usize> = self
+            .sweeps
+            .iter()
+            .rev()
+            .map(|sweep| {
+                let n = sweep.values.len();
+                let value = point % n;
+                point /= n;
+                value
+            })
+            .collect();
+        choice.reverse();
+        choice
+    }
+
+    fn words(&self, number: usize) -> Vec<String> {
+        self.choice(number).iter().zip(&self.sweeps).map(|(&v, sweep)| sweep.values[v].1.clone()).collect()
+    }
+
+    /// The frame's number of a picture.
+    pub fn frame(&self, number: usize) -> u32 {
+        self.frames[number % self.frames.len()]
+    }
+
+    /// What a picture is called in messages.
+    pub fn name(&self, number: usize) -> Name {
+        let sweep =
+            self.words(number).iter().zip(&self.sweeps).map(|(v, s)| format!("{}={v}", s.key)).collect();
+        Name { frame: self.frame(number), sweep }
+    }
+
+    /// The files of a picture.
+    pub fn files(&self, number: usize) -> Vec<PathBuf> {
+        let words = self.words(number);
+        self.pictures.iter().map(|p| p.at(self.frame(number), &words)).collect()
+    }
+
+    /// The scene of a picture.
+    pub fn scene(&self, number: usize) -> Result<Scene> {
+        if self.sweeps.is_empty() {
+            return self.base.at(self.frame(number));
+        }
+        let choice = self.choice(number);
+        let changes: Vec<_> = choice
+            .iter()
+            .zip(&self.sweeps)
+            .map(|(&v, sweep)| (sweep.key.clone(), sweep.values[v].0.clone(), Place("--sweep".into())))
+            .collect();
+        self.base.with(&changes)?.at(self.frame(number))
+    }
+
+    /// Every frame's scene is valid, or the first that is not says so.
+    fn check_scenes(&self, monitor: &dyn Monitor) -> Result<()> {
+        let own: Vec<usize> = self.own().collect();
+        let step = own.len().div_ceil(CHECKED_FRAMES).max(1);
+        let mut some: Vec<usize> = own.iter().copied().step_by(step).collect();
+        some.extend(own.last());
+        let total = some.len() as u64;
+        // In parts, each on all cores: a signal is heard between them, and the first fault is always the same.
+        for (part, numbers) in some.chunks(256).enumerate() {
+            monitor.progress("checking", part as u64 * 256, total)?;
+            let faults: Vec<Error> = numbers.par_iter().filter_map(|&n| self.scene(n).err()).collect();
+            if let Some(first) = faults.into_iter().next() {
+                return Err(first);
+            }
+        }
+        Ok(())
+    }
+
+    /// Every folder is there and can be written; what dead processes left in it goes.
+    fn check_folders(&self) -> Result<()> {
+        let files: Vec<PathBuf> = self.own().take(1).flat_map(|n| self.files(n)).collect();
+        let still = Still::open(&files)?;
+        if self.request.layers != Layer::ALL && !still.has_exr() {
+            return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
+        }
+        let folders: BTreeSet<&Path> = files.iter().map(|file| folder_of(file)).collect();
+        folders.iter().for_each(|folder| remove_stale(folder, |_| true));
+        Ok(())
+    }
+}
+
+/// Different pictures have different names.
+fn check_pattern(pattern: &Pattern, sweeps: &[Sweep], frames: usize) -> Result<()> {
+    let given = pattern.given().display();
+    if frames > 1 && !pattern.has_frame() {
+        return Err(Error::Usage(format!(
+            "-o {given}: {frames} frames would have one name; put #### where the frame's number goes, such as fall.####.png"
+        )));
+    }
+    for (i, sweep) in sweeps.iter().enumerate() {
+        if sweep.values.len() > 1 && !pattern.has_sweep(i) {
+            return Err(Error::Usage(format!(
+                "-o {given}: all values of {name} would have one name; put {{{name}}} where the value goes",
+                name = sweep.name
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,85 @@
+//! What a batch would do and what it takes, without doing it.
+
+use serde::Serialize;
+
+use super::Batch;
+use super::report::word;
+use crate::error::{Result, human_bytes};
+use crate::job::memory_of;
+
+/// What a run would render, and what it needs for it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Needs {
+    /// Pictures of the run.
+    pub pictures: u64,
+    /// Those that are not there whole.
+    pub to_render: u64,
+    /// Files of the first and of the last picture.
+    pub first: Vec<String>,
+    /// Files of the last picture.
+    pub last: Vec<String>,
+    /// Pixels of each, and samples a pixel.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Parts that a picture is rendered in.
+    pub strips: u64,
+    /// Memory of the work on host and device, bytes, beside the program's own.
+    pub memory_bytes: u64,
+    /// The most that what is missing may take on the disk, bytes: PNG and EXR before compression.
+    pub disk_bytes: u64,
+}
+
+impl Batch {
+    /// What [`Batch::run`] would do and needs.
+    pub fn needs(&self) -> Result<Needs> {
+        let own: Vec<usize> = self.own().collect();
+        let to_render = own.iter().filter(|&&n| !self.whole[n]).count() as u64;
+        let files = |number: Option<&usize>| {
+            number.map_or(Vec::new(), |&n| self.files(n).iter().map(|f| word(f)).collect())
+        };
+        let scene = self.scene(own.first().copied().unwrap_or(0))?;
+        let window = self.window(&scene);
+        let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
+        let (memory_bytes, strips) = memory_of(&scene, window, surface, self.base.limits().memory)?;
+        let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
+        let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
+        let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();
+        Ok(Needs {
+            pictures: own.len() as u64,
+            to_render,
+            first: files(own.first()),
+            last: files(own.last()),
+            size: [window.width, window.height],
+            samples: scene.image.samples,
+            strips: strips.len() as u64,
+            memory_bytes,
+            disk_bytes: window.pixels() * pixel * to_render,
+        })
+    }
+
+    /// Whether pictures are written with layers.
+    pub(super) fn has_exr(&self) -> bool {
+        self.pictures.iter().any(super::Pattern::is_exr)
+    }
+}
+
+impl std::fmt::Display for Needs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [width, height] = self.size;
+        let samples = if self.samples == 1 { "1 sample".into() } else { format!("{} samples", self.samples) };
+        writeln!(
+            f,
+            "{} pictures of {width}×{height} pixels, {samples} each: {} to render, {} there and whole",
+            self.pictures,
+            self.to_render,
+            self.pictures - self.to_render
+        )?;
+        writeln!(f, "first   {}", self.first.join(", "))?;
+        writeln!(f, "last    {}", self.last.join(", "))?;
+        let parts =
+            if self.strips > 1 { format!(", each picture in {} strips", self.strips) } else { String::new() };
+        writeln!(f, "memory  {} on host and device{parts}", human_bytes(self.memory_bytes.into()))?;
+        write!(f, "disk    at most {}", human_bytes(self.disk_bytes.into()))
+    }
+}

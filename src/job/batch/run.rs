@@ -1,0 +1,282 @@
+//! The work: claim, render, hand over, until nothing is left.
+
+use std::time::{Duration, Instant};
+
+use super::Batch;
+use super::report::{Event, Name, Summary, Watcher};
+use super::writer::{Outcomes, Start, Writer};
+use crate::error::{Error, Result};
+use crate::frame::{Window, remove_left_by};
+use crate::gpu::RenderOptions;
+use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, strips};
+use crate::scene::{Mesh, Rock, Scene};
+
+/// Between two looks at what others have claimed.
+const WAIT: Duration = Duration::from_millis(200);
+
+/// What the pictures of a run share.
+struct Work<'a> {
+    batch: &'a Batch,
+    engine: &'a mut Engine,
+    claims: Claims,
+    volumes: VolumeStock,
+    mesh: Option<(Vec<Rock>, Mesh)>,
+    watcher: &'a dyn Watcher,
+    /// Whether the scene's warnings were told.
+    warned: bool,
+    summary: Summary,
+    /// The first error of a picture.
+    failure: Option<Error>,
+}
+
+/// What came of trying a picture.
+enum Tried {
+    /// Its strips are with the writer.
+    Handed,
+    /// Another process has made it.
+    Elsewhere,
+    /// Another process is making it.
+    Theirs(String),
+}
+
+impl Batch {
+    /// Renders what is missing of this run's pictures, and waits for what others have claimed. The summary
+    /// is told in any case; the error is the one that ended the run, or with `keep_going` the first of those
+    /// that did not.
+    pub fn run(&self, engine: &mut Engine, watcher: &dyn Watcher) -> Result<Summary> {
+        let clock = Instant::now();
+        let numbers: Vec<usize> = self.own().filter(|&n| !self.whole[n]).collect();
+        let pictures = self.own().count() as u64;
+        let kept = pictures - numbers.len() as u64;
+        let adapter = engine.adapter().unwrap_or_else(|| engine.word().into());
+        watcher.event(&Event::Started { pictures, kept, engine: &adapter });
+        let mut work = Work {
+            batch: self,
+            engine,
+            claims: Claims::new(self.request.stale),
+            volumes: VolumeStock::default(),
+            mesh: None,
+            watcher,
+            warned: false,
+            summary: Summary { pictures, kept, ..Default::default() },
+            failure: None,
+        };
+        let ended = std::thread::scope(|scope| {
+            let writer = Writer::start(scope, watcher);
+            let ended = work.all(numbers, &writer);
+            (ended, writer.finish())
+        });
+        // The scope has ended, and with it the thread: all outcomes are there.
+        let (ended, outcomes) = ended;
+        let last = std::mem::take(&mut *outcomes.lock().unwrap_or_else(|e| e.into_inner()));
+        let ended = ended.and(work.note(last));
+        let Work { mut summary, failure, .. } = work;
+        let result = match (ended, failure) {
+            (Err(e), _) | (Ok(()), Some(e)) => Err(e),
+            (Ok(()), None) => Ok(()),
+        };
+        summary.left = pictures - kept - summary.rendered - summary.elsewhere - summary.failed;
+        summary.elapsed = clock.elapsed().as_secs_f64();
+        summary.exit_code = result.as_ref().map_or_else(Error::exit_code, |()| 0);
+        watcher.event(&Event::Done(&summary));
+        result.map(|()| summary)
+    }
+
+    /// The part of the image that is rendered.
+    pub(super) fn window(&self, scene: &Scene) -> Window {
+        self.request.crop.unwrap_or(Window::whole([scene.image.width, scene.image.height]))
+    }
+}
+
+impl Work<'_> {
+    /// Every picture of the list, in order; then, again and again, those that others had claimed.
+    fn all(&mut self, mut numbers: Vec<usize>, writer: &Writer) -> Result<()> {
+        let mut round = 0;
+        while !numbers.is_empty() {
+            let mut theirs = Vec::new();
+            let mut who = String::new();
+            for number in numbers {
+                // Signals are heard even where every picture is another's.
+                self.watcher.progress("pictures", 0, 1)?;
+                match self.attempts(number, writer) {
+                    Ok(Tried::Handed) => {}
+                    Ok(Tried::Elsewhere) => {
+                        self.summary.elsewhere += 1;
+                        self.watcher.event(&Event::Elsewhere { picture: &self.batch.name(number) });
+                    }
+                    Ok(Tried::Theirs(other)) => {
+                        theirs.push(number);
+                        who = other;
+                    }
+                    Err(e) => self.note(vec![(number, self.batch.name(number), Err(e))])?,
+                }
+                self.note(writer.outcomes())?;
+            }
+            numbers = theirs;
+            if !numbers.is_empty() {
+                if round == 0 {
+                    self.watcher.event(&Event::Waiting { pictures: numbers.len() as u64, on: &who });
+                }
+                round += 1;
+                std::thread::sleep(WAIT);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries a picture until it is handed over; a lost device is replaced.
+    fn attempts(&mut self, number: usize, writer: &Writer) -> Result<Tried> {
+        let mut retries = self.batch.request.retries;
+        loop {
+            match self.attempt(number, writer) {
+                Err(e @ Error::DeviceLost(_)) if retries > 0 => {
+                    retries -= 1;
+                    let picture = self.batch.name(number);
+                    self.watcher.event(&Event::Retry { picture: &picture, error: e.to_string() });
+                    self.engine.renew()?;
+                }
+                other => return other,
+            }
+        }
+    }
+
+    fn attempt(&mut self, number: usize, writer: &Writer) -> Result<Tried> {
+        let files = self.batch.files(number);
+        let claim = match self.claims.ask(&files[0])? {
+            Asked::Theirs(who) => return Ok(Tried::Theirs(who)),
+            Asked::Ours(claim) => claim,
+        };
+        if self.batch.made_meanwhile(number)? {
+            claim.done();
+            return Ok(Tried::Elsewhere);
+        }
+        for owner in &claim.taken_from {
+            files.iter().for_each(|file| remove_left_by(owner, file));
+        }
+        self.render(number, claim, writer)?;
+        Ok(Tried::Handed)
+    }
+
+    fn render(&mut self, number: usize, claim: Claim, writer: &Writer) -> Result<()> {
+        let began = Instant::now();
+        let name = self.batch.name(number);
+        self.watcher.event(&Event::Rendering { picture: &name });
+        let files = self.batch.files(number);
+        let scene = self.batch.scene(number)?;
+        let memory = self.batch.base.limits().memory;
+        let still = Still::open(&files)?;
+        let layers = &self.batch.request.layers;
+        let surface = still.has_exr() && layers.iter().any(|l| l.of_surface());
+        let window = self.batch.window(&scene);
+        let (volume, _) = self.volumes.volume(&scene, memory, self.watcher)?;
+        if !std::mem::replace(&mut self.warned, true) {
+            scene.warnings(&volume).iter().for_each(|w| self.watcher.warn(w));
+        }
+        let mesh = self.mesh(&scene);
+        let parts = strips(&scene, window, surface, memory)?;
+        let mut start = Some(Start {
+            number,
+            name: name.clone(),
+            files,
+            still: Some(still),
+            claim,
+            scene: scene.clone(),
+            volume: volume.clone(),
+            window,
+            layers: layers.clone(),
+            began,
+        });
+        let several = parts.len() > 1;
+        for part in parts {
+            let options = RenderOptions { surface, window: Some(part), ..Default::default() };
+            let rows = [part.y - window.y, part.height, window.height];
+            let watch = Share { watcher: self.watcher, name: &name, rows };
+            let frame = match self.engine.render(&scene, &volume, &mesh, &options, &watch) {
+                Ok(frame) => frame,
+                Err(e) => {
+                    if start.is_none() {
+                        writer.drop_picture();
+                    }
+                    return Err(e);
+                }
+            };
+            if frame.non_finite_pixels() > 0 {
+                let count = frame.non_finite_pixels();
+                self.watcher
+                    .warn(&format!("{name}: {count} pixels are not finite: please report this scene"));
+            }
+            if let Some(start) = start.take() {
+                writer.begin(start);
+            }
+            writer.strip(frame);
+            if several {
+                // Strips take what memory there is: the next one only when this one is written.
+                writer.settle();
+            }
+        }
+        writer.end();
+        Ok(())
+    }
+
+    fn mesh(&mut self, scene: &Scene) -> Mesh {
+        match &self.mesh {
+            Some((rocks, mesh)) if *rocks == scene.rocks => mesh.clone(),
+            _ => {
+                let mesh = scene.mesh();
+                self.mesh = Some((scene.rocks.clone(), mesh.clone()));
+                mesh
+            }
+        }
+    }
+
+    /// Counts what has become of pictures; the error that ends the run.
+    fn note(&mut self, outcomes: Outcomes) -> Result<()> {
+        let mut end = Ok(());
+        for (_, name, outcome) in outcomes {
+            match outcome {
+                Ok(seconds) => {
+                    self.summary.rendered += 1;
+                    self.summary.seconds += seconds;
+                }
+                Err(e @ Error::Interrupted { .. }) => end = Err(e),
+                Err(e) => {
+                    self.summary.failed += 1;
+                    let (error, exit_code) = (e.to_string(), e.exit_code());
+                    self.watcher.event(&Event::Failed { picture: &name, error, exit_code });
+                    // A hung device hangs every picture after this one too.
+                    let hopeless = matches!(e, Error::Watchdog { .. });
+                    if hopeless || !self.batch.request.keep_going {
+                        end = end.and(Err(e));
+                    } else {
+                        self.failure.get_or_insert(e);
+                    }
+                }
+            }
+        }
+        end
+    }
+}
+
+/// Tells how far one picture is, while one of its strips is rendered.
+struct Share<'a> {
+    watcher: &'a dyn Watcher,
+    name: &'a Name,
+    /// Rows of the picture before the strip, of the strip, and of all.
+    rows: [u32; 3],
+}
+
+impl Monitor for Share<'_> {
+    fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()> {
+        self.watcher.progress(stage, done, total)?;
+        if stage == "pixels" {
+            let [before, strip, all] = self.rows.map(f64::from);
+            let share = (before + strip * done as f64 / total.max(1) as f64) / all;
+            self.watcher.event(&Event::Progress { picture: self.name, share });
+        }
+        Ok(())
+    }
+
+    fn warn(&self, text: &str) {
+        self.watcher.warn(&format!("{}: {text}", self.name));
+    }
+}

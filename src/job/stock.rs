@@ -1,0 +1,70 @@
+//! The volume of the last scene, so that the next one makes anew only what it does not share with it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use crate::error::Result;
+use crate::job::Monitor;
+use crate::scene::{Cost, Scene};
+use crate::volume::{VolumeTexture, WaterSpec, set_density_and_reflection};
+
+/// Keeps one volume texture.
+#[derive(Default)]
+pub struct VolumeStock(Option<(Source, Arc<VolumeTexture>)>);
+
+/// What a volume was made from.
+#[derive(Clone, PartialEq)]
+enum Source {
+    Water(WaterSpec),
+    /// Path, and what tells one version of the file from the next.
+    File(PathBuf, Option<SystemTime>, u64),
+}
+
+impl VolumeStock {
+    /// The scene's volume, and what making it cost; no cost where it is the one in stock. If making it
+    /// fails or is given up, the old one stays.
+    pub fn volume(
+        &mut self,
+        scene: &Scene,
+        memory: u64,
+        monitor: &dyn Monitor,
+    ) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
+        let source = match &scene.volume_file {
+            None => Source::Water(scene.water),
+            Some(path) => {
+                let meta = std::fs::metadata(path).ok();
+                let changed = meta.as_ref().and_then(|m| m.modified().ok());
+                Source::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
+            }
+        };
+        let (volume, cost) = match (self.0.take(), &source) {
+            (Some((old, volume)), new) if old == *new => {
+                self.0 = Some((old, volume.clone()));
+                return Ok((volume, None));
+            }
+            (Some((Source::Water(old), volume)), Source::Water(new)) if same_curves(&old, new) => {
+                let mut changed = VolumeTexture { alpha: new.alpha, ..(*volume).clone() };
+                if (WaterSpec { alpha: new.alpha, ..old }) == *new {
+                    (changed, Cost::Uniform)
+                } else {
+                    let cells: &mut Vec<_> = Arc::make_mut(&mut changed.cells);
+                    set_density_and_reflection(new, cells);
+                    (changed, Cost::Upload)
+                }
+            }
+            (old, _) => {
+                self.0 = old;
+                (scene.volume(memory, monitor)?, Cost::Volume)
+            }
+        };
+        let volume = Arc::new(volume);
+        self.0 = Some((source, volume.clone()));
+        Ok((volume, Some(cost)))
+    }
+}
+
+/// Whether the two only differ in what [`set_density_and_reflection`] does, or in α.
+fn same_curves(a: &WaterSpec, b: &WaterSpec) -> bool {
+    WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, ..*a } == *b
+}

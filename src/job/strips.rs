@@ -1,0 +1,111 @@
+//! How a large picture is rendered in parts that fit the memory.
+
+use crate::error::{Error, Result};
+use crate::frame::Window;
+use crate::gpu::{CANVAS_BYTES, Grid};
+use crate::scene::{Image, Scene, Vertex};
+use crate::volume::Cell;
+
+/// Bytes of a strip's pixel on the host: radiance 16, counts 8, picture 4; and as R, G, B bytes 3 for the
+/// strip that is being encoded and 3 for the one that waits.
+const PIXEL_BYTES: u64 = 28 + 6;
+/// More with the raster pass's layers: depth 4, uv 8, quad 4, normal 12.
+const SURFACE_BYTES: u64 = 28;
+/// What both engines and the encoders need besides, whatever the size: staging for read-back (at most 2 × 16
+/// MiB), lines of an EXR before and after compression (3 × 8 MiB), and small buffers.
+const WORK_BYTES: u64 = 64 << 20;
+/// What the program and the driver themselves take: libraries, compiled shaders. Lavapipe and its compiler
+/// take some 150 MiB. Of a small budget at most a quarter is set aside for it.
+const PROGRAM_BYTES: u64 = 256 << 20;
+/// Strips are not larger than this without need: more memory would gain no time.
+const STRIP_PIXELS: u64 = 1 << 23;
+/// Most pixels of an image.
+const MAX_PIXELS: u64 = 1 << 36;
+
+/// Bytes for the window that is drawn: [`CANVAS_BYTES`] a pixel on the device. The CPU engine's targets have
+/// as many pixels, at most, and 44 bytes for each.
+fn canvas(image: &Image) -> u64 {
+    let [columns, rows] = Grid::default().size([image.width, image.height]);
+    u64::from(columns) * u64::from(rows) * CANVAS_BYTES
+}
+
+/// Refuses an image that cannot be rendered in any strips within `memory` bytes: one window and one row of
+/// pixels must fit.
+pub fn check_image(image: &Image, memory: u64) -> Result<()> {
+    let [width, height] = [image.width, image.height].map(u64::from);
+    let what = format!("an image of {width}×{height} pixels (image.width, height)");
+    if width * height > MAX_PIXELS {
+        // What one that is held whole would take.
+        let need = u128::from(width) * u128::from(height) * 48;
+        let fix = "a picture has at most 6.8e10 pixels, however large --memory is: lower the size";
+        return Err(Error::memory(what, need, memory, fix));
+    }
+    let need = canvas(image) + width * (PIXEL_BYTES + SURFACE_BYTES);
+    if need > memory {
+        return Err(Error::memory(what, need.into(), memory, "lower the size or raise --memory"));
+    }
+    Ok(())
+}
+
+/// Cuts a part of a scene's image into strips of its full width, from the top, that can be rendered within
+/// `memory` bytes together with the device's targets, the scene's volume and its rocks: whole rows of the
+/// windows that are drawn (see [`Grid`]) where they fit, else even parts of one.
+///
+/// A pixel of a strip takes 34 bytes, with `surface_layers` 62; a pixel of the window that is drawn 84, and
+/// there are at most 2²¹ of those. 64 MiB more are for read-back and encoders, and a quarter of `memory`,
+/// at most 256 MiB, for the program and the driver. These make strips smaller, down to an eighth of
+/// `memory`; only a single row and window that do not fit are an [`Error::Memory`].
+pub fn strips(scene: &Scene, window: Window, surface_layers: bool, memory: u64) -> Result<Vec<Window>> {
+    memory_of(scene, window, surface_layers, memory).map(|(_, strips)| strips)
+}
+
+/// The bytes that [`strips`] counts with for the work on host and device, the program itself left out; and
+/// the strips.
+pub fn memory_of(
+    scene: &Scene,
+    window: Window,
+    surface_layers: bool,
+    memory: u64,
+) -> Result<(u64, Vec<Window>)> {
+    let image = &scene.image;
+    check_image(image, memory)?;
+    let cells = match scene.volume_file {
+        // Read by now, and checked against the whole budget.
+        Some(_) => 0,
+        None => scene.water.size.iter().map(|&n| u64::from(n)).product(),
+    };
+    // On the host and on the device.
+    let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64);
+    let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
+    let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
+    let parts = canvas(image).saturating_add(volume).saturating_add(rocks);
+    let left = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
+    let row = u64::from(window.width) * (PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 });
+    let [_, drawn] = Grid::default().size([image.width, image.height]);
+    let wanted = (STRIP_PIXELS / u64::from(window.width)).max(u64::from(drawn));
+    let most = (left / row).clamp(1, wanted).min(u64::from(u32::MAX)) as u32;
+    let strips = cut(window, drawn, most);
+    let tallest = strips.iter().map(|s| u64::from(s.height)).max().unwrap_or(0);
+    Ok((parts.saturating_add(WORK_BYTES + tallest * row), strips))
+}
+
+/// Strips of at most `most` rows; those that can end between windows of `drawn` rows.
+fn cut(window: Window, drawn: u32, most: u32) -> Vec<Window> {
+    let mut strips = Vec::new();
+    let mut y = window.y;
+    while y < window.bottom() {
+        let left = window.bottom() - y;
+        // Rows to the end of the window that is drawn here.
+        let here = (drawn - y % drawn).min(left);
+        let height = if most >= left {
+            left
+        } else if most >= here {
+            here + (most - here) / drawn * drawn
+        } else {
+            here.div_ceil(here.div_ceil(most))
+        };
+        strips.push(Window { y, height, ..window });
+        y += height;
+    }
+    strips
+}

@@ -1,0 +1,285 @@
+//! A scene in time: what of it changes from frame to frame.
+//!
+//! A frame's scene depends on the animation and the frame's number alone. In a loop of N frames, frame f is
+//! frame f mod N, so that frame N is frame 0 to the last bit.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DQuat, DVec3};
+
+use super::keyframes::{CameraPath, Interpolation, Keyframes};
+use super::param::{Kind, Param};
+use super::read::{Source, apply_sets, check_names};
+use super::value::{Place, Raw, Values};
+use super::{Limits, Scene};
+use crate::error::{Error, Result};
+
+/// A scene, and how it moves.
+#[derive(Clone, Debug)]
+pub struct Animation {
+    name: String,
+    /// As read, with all of `animate`.
+    values: Values,
+    /// Where references resolve; trusted without one.
+    folder: Option<PathBuf>,
+    limits: Limits,
+    /// Frames a second.
+    pub fps: f64,
+    /// Its length in frames.
+    pub frames: u32,
+    /// After so many frames it comes round.
+    pub period: Option<u32>,
+    /// Lengths of the volume a frame: (whole lengths, frames), so that a loop closes exactly.
+    flow: (f64, f64),
+    /// Frames of one turn of the camera; 0: none.
+    turn: i64,
+    tracks: Vec<(String, Keyframes)>,
+    path: Option<CameraPath>,
+}
+
+impl Animation {
+    /// Reads a preset or file, applies `--set`s in order, and checks what moves.
+    pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
+        let source = Source::find(scene)?;
+        let mut values = source.values()?;
+        let folder = apply_sets(&mut values, sets, &source)?;
+        Animation::new(&source.name, values, folder, limits)
+    }
+
+    /// The animation of values that passed the table.
+    pub fn new(name: &str, values: Values, folder: Option<PathBuf>, limits: &Limits) -> Result<Animation> {
+        let period = Some(values.count("animate.loop")).filter(|&n| n > 0);
+        let frames = period.unwrap_or(values.count("animate.frames"));
+        let fps = f64::from(values.float("animate.fps"));
+        let speed = f64::from(values.float("animate.speed"));
+        let turn = values.int("animate.turn");
+        if let Some(n) = period
+            && turn != 0
+            && i64::from(n) % turn != 0
+        {
+            return Err(Error::input(
+                format!("animate.loop = {n} does not hold whole turns of animate.turn = {turn} frames"),
+                "make the loop a multiple of the turn",
+            ));
+        }
+        let flow = match period {
+            None => (speed, fps),
+            Some(n) => {
+                let lengths = speed * f64::from(n) / fps;
+                let whole = if speed == 0.0 { 0.0 } else { lengths.abs().round().max(1.0).copysign(lengths) };
+                (whole, f64::from(n))
+            }
+        };
+        let mut tracks: Vec<(String, Keyframes)> = Vec::new();
+        for i in values.names("animate.tracks") {
+            let (key, track) = track(&values, &format!("animate.tracks.{i}"), period)?;
+            if tracks.iter().any(|(other, _)| *other == key) {
+                return Err(Error::input(
+                    format!("animate.tracks.{i}: another track moves {key} too"),
+                    "put the keyframes of both into one",
+                ));
+            }
+            tracks.push((key, track));
+        }
+        let path = path(&values, frames, period)?;
+        if path.is_some() && turn != 0 {
+            return Err(Error::input(
+                "animate.path and animate.turn both move the camera",
+                "remove one, or set animate.turn = 0",
+            ));
+        }
+        for (key, _) in &tracks {
+            let taken = match key.as_str() {
+                "camera.eye" => path.is_some() || turn != 0,
+                "camera.target" => path.as_ref().is_some_and(CameraPath::has_targets),
+                _ => false,
+            };
+            if taken {
+                return Err(Error::input(
+                    format!("a track of {key} and animate.path or animate.turn both move the camera"),
+                    "remove one",
+                ));
+            }
+        }
+        Ok(Animation {
+            name: name.into(),
+            values,
+            folder,
+            limits: limits.clone(),
+            fps,
+            frames,
+            period,
+            flow,
+            turn,
+            tracks,
+            path,
+        })
+    }
+
+    /// The scene's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the command line allows.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Its values as read, those of frame 0 where nothing moves.
+    pub fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// The same animation with other values for some keys.
+    pub fn with(&self, changes: &[(String, Raw, Place)]) -> Result<Animation> {
+        let mut values = self.values.clone();
+        changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
+        Animation::new(&self.name, values, self.folder.clone(), &self.limits)
+    }
+
+    /// The scene of a frame. It holds no trace of the animation: as a scene file of its own it gives the
+    /// same picture.
+    pub fn at(&self, frame: u32) -> Result<Scene> {
+        let mut values = self.values.clone();
+        values.clear_under("animate");
+        let place = |key: &str| Place(format!("frame {frame}, animation of {key}"));
+        let number = self.period.map_or(frame, |n| frame % n);
+        let time = f64::from(number);
+        let moves_flow = self.tracks.iter().any(|(key, _)| key == "volume.flow");
+        if self.flow.0 != 0.0 && number != 0 && !moves_flow {
+            let flow = f64::from(values.float("volume.flow")) + self.flow.0 * time / self.flow.1;
+            values.set("volume.flow", &Raw::Float(flow), &place("volume.flow"))?;
+        }
+        for (key, track) in &self.tracks {
+            values.set(key, &raw(key, &track.at(time)), &place(key))?;
+        }
+        if let Some(path) = &self.path {
+            let (eye, target) = path.at(time);
+            values.set("camera.eye", &list(&eye.to_array()), &place("camera.eye"))?;
+            if let Some(target) = target {
+                values.set("camera.target", &list(&target), &place("camera.target"))?;
+            }
+        }
+        if self.turn != 0 && i64::from(number) % self.turn != 0 {
+            let [eye, target, up] =
+                ["eye", "target", "up"].map(|what| values.triple(&format!("camera.{what}")).as_dvec3());
+            let share = (i64::from(number) % self.turn) as f64 / self.turn as f64;
+            let axis = up.try_normalize().unwrap_or(DVec3::Y);
+            let turned =
+                target + DQuat::from_axis_angle(axis, share * std::f64::consts::TAU) * (eye - target);
+            values.set("camera.eye", &list(&turned.to_array()), &place("camera.eye"))?;
+        }
+        Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
+            .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })
+    }
+}
+
+/// An error of one frame's scene tells the frame.
+fn at_frame(error: Error, frame: u32) -> Error {
+    match error {
+        Error::Input { what, fix } => Error::Input { what: format!("frame {frame}: {what}"), fix },
+        other => other,
+    }
+}
+
+/// The keyframes of a track, and the key they move.
+fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String, Keyframes)> {
+    let bad = |what: String, fix: String| Err(Error::input(format!("{section}: {what}"), fix));
+    let key = values.text(&format!("{section}.key"));
+    if key.is_empty() {
+        return bad(
+            "the track has no key".into(),
+            "name the parameter it moves, such as key = \"curves.h\"".into(),
+        );
+    }
+    let (frames, series) =
+        (values.frames(&format!("{section}.frames")), values.series(&format!("{section}.values")));
+    let place = Place(format!("{section}.key"));
+    let Some(param) = Param::find(&key) else {
+        // It finds nothing to set, and says so with the nearest key.
+        return Err(match values.clone().set(&key, &Raw::Int(0), &place) {
+            Err(e) => e,
+            Ok(()) => Error::input(format!("{section}: {key} cannot move"), "name another parameter"),
+        });
+    };
+    if key.starts_with("animate.") || key == "image.width" || key == "image.height" {
+        return bad(
+            format!("{key} cannot move"),
+            "all frames share the picture's size and the animation's own parameters".into(),
+        );
+    }
+    if matches!(param.kind, Kind::Text(_) | Kind::Choice(_)) || param.is_list() {
+        return bad(
+            format!("{key} is no number"),
+            "only numbers, colours, points and corners can move".into(),
+        );
+    }
+    if let Err((what, fix)) = check_names(values, &key) {
+        return bad(what, fix);
+    }
+    if frames.is_empty() || frames.len() != series.len() {
+        let (f, v) = (frames.len(), series.len());
+        return bad(format!("{f} frames and {v} values"), "give each keyframe a frame and a value".into());
+    }
+    let mut scratch = values.clone();
+    for (frame, value) in frames.iter().zip(&series) {
+        scratch.set(&key, &raw(&key, value), &Place(format!("{section}.values at frame {frame}")))?;
+    }
+    let interpolation = Interpolation::of(&values.text(&format!("{section}.interpolation")));
+    match Keyframes::new(&frames, series, interpolation, period) {
+        Ok(track) => Ok((key, track)),
+        Err(why) => bad(format!("the keyframes of {key} {why}"), "see animate.loop in the README".into()),
+    }
+}
+
+fn path(values: &Values, frames: u32, period: Option<u32>) -> Result<Option<CameraPath>> {
+    let [eyes, targets] = ["eyes", "targets"].map(|what| values.series(&format!("animate.path.{what}")));
+    let at = values.frames("animate.path.frames");
+    if eyes.is_empty() {
+        return match targets.is_empty() && at.is_empty() {
+            true => Ok(None),
+            false => Err(Error::input("animate.path has no eyes", "give the points the camera goes through")),
+        };
+    }
+    let mut scratch = values.clone();
+    for (key, points) in [("camera.eye", &eyes), ("camera.target", &targets)] {
+        for point in points {
+            scratch.set(key, &raw(key, point), &Place("animate.path".into()))?;
+        }
+    }
+    let counts = [
+        eyes.len(),
+        if targets.is_empty() { eyes.len() } else { targets.len() },
+        if at.is_empty() { eyes.len() } else { at.len() },
+    ];
+    if eyes.len() < 2 || counts.iter().any(|&n| n != eyes.len()) {
+        return Err(Error::input(
+            format!(
+                "animate.path has {} eyes, {} targets and {} frames",
+                eyes.len(),
+                targets.len(),
+                at.len()
+            ),
+            "give at least two eyes, and as many targets and frames or none",
+        ));
+    }
+    CameraPath::new(&at, eyes, targets, frames, period)
+        .map(Some)
+        .map_err(|why| Error::input(format!("animate.path.frames {why}"), "see animate.loop in the README"))
+}
+
+/// Components as the parameter's kind wants them.
+fn raw(key: &str, components: &[f64]) -> Raw {
+    let whole = Param::find(key).is_some_and(|p| matches!(p.kind, Kind::Int(..)));
+    match components {
+        [x] if whole => Raw::Int(x.round() as i64),
+        [x] => Raw::Float(*x),
+        [_, _, _] => list(components),
+        corners => Raw::List(corners.chunks_exact(3).map(list).collect()),
+    }
+}
+
+fn list(components: &[f64]) -> Raw {
+    Raw::List(components.iter().map(|&x| Raw::Float(x)).collect())
+}
