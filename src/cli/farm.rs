@@ -1,6 +1,6 @@
 //! `taki farm`: job files.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -150,12 +150,14 @@ fn check_batch(job: &Job) -> Result<()> {
     })?;
     let outputs = matches.subcommand().and_then(|(_, batch)| batch.get_many::<PathBuf>("outputs"));
     let whole = |path: &&PathBuf| {
-        !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr"))
+        let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        !path.extension().is_some_and(picture) || !name.contains(['#', '{'])
     };
     match outputs.into_iter().flatten().find(whole) {
         None => Ok(()),
         Some(path) => Err(Error::Usage(format!(
-            "-o {}: a shard has only its own pictures; leave this out, and when the job is done run the whole \
+            "-o {}: this is one file of all pictures, and a shard has only its own; leave it out, and when the job is done run the whole \
              taki batch without --shard: it keeps the pictures and makes the rest of them",
             path.display()
         ))),

@@ -122,7 +122,7 @@ set -u
 folder=$1 program=$2 retries=$3 shard=$4
 cd -- "$folder" || exit 73
 signals=0 taki=
-trap 'signals=$((signals + 1)); [ -z "$taki" ] || kill -TERM "$taki"' TERM
+trap 'signals=$((signals + 1)); [ -z "$taki" ] || kill -TERM "$taki" 2>/dev/null' TERM
 
 run() {{
     "$program" batch --shard "$shard/{shards}"{arguments} &

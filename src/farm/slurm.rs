@@ -52,7 +52,7 @@ export RAYON_NUM_THREADS="${{SLURM_CPUS_PER_TASK:-0}}"
 taki=$!
 # Slurm signals this shell {GRACE_SECONDS} s before the time limit. The signal ends wait before taki has ended.
 signals=0
-trap 'signals=$((signals + 1)); kill -TERM "$taki"' TERM
+trap 'signals=$((signals + 1)); kill -TERM "$taki" 2>/dev/null' TERM
 seen=-1
 while [ "$seen" != "$signals" ]; do
     seen=$signals
@@ -65,8 +65,10 @@ case $code in
 {retried})
     # Not SLURM_JOB_ID: of the last task it names the whole array.
     task="${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
-    # A cancelled task would come back if it were requeued.
-    if [ "${{SLURM_RESTART_COUNT:-0}}" -lt {retries} ] && [ "$(squeue --noheader --jobs="$task" --format=%T)" = RUNNING ]; then
+    # A cancelled task would come back if it were requeued. While the signal of the time limit is under way,
+    # running is called signaling.
+    state=$(squeue --noheader --jobs="$task" --format=%T)
+    if [ "${{SLURM_RESTART_COUNT:-0}}" -lt {retries} ] && [[ $state == RUNNING || $state == SIGNALING ]]; then
         echo "taki ended with $code: task $task is requeued" >&2
         scontrol requeue "$task"
     fi

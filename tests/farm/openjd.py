@@ -33,11 +33,13 @@ exec TAKI "$@"
 ECHO = """#!/bin/bash
 printf '%s\\0' "$@" >words
 """
-WORDS = [
+HARD = [
     b"", b" ", b"a b", b"it's", b'"', b"$HOME", b"$(id)", b"`id`", b"\\", b"a\\nb", b"a\nb", b"a\r\nb", b"\t",
-    b"{{Param.Folder}}", b"}}", b"{", b"!", b"*", b"~", b"#x", b"- a", b"a: b", b"no", b"\x1b[2J", b"\xff\xfe",
-    "滝".encode(), "\u2028\u0085\ufeff\uffff".encode(), b"-x", b"&", b";", b"|", b">f", b"%s", b"'\"'\"'",
+    b"{{Param.Folder}}", b"}}", b"{", b"!", b"*", b"~", b"#x", b"a: b", b"no", b"\x1b[2J", "滝".encode(),
+    "\u2028\u0085\ufeff\uffff".encode(), b"&", b";", b"|", b">f", b"%s", b"'\"'\"'",
 ]
+# taki reads its own words; what they say is the scene's business.
+WORDS = [word for hard in HARD for word in (b"--set", hard)] + [b"--set=- a", b"-o", b"\xff\xfe {{#}}.png", b"front"]
 
 
 def run(*command, code=0):

@@ -105,15 +105,16 @@ CONF
 export SLURM_CONF=$work/slurm.conf
 daemon slurmctld.log slurmctld -D
 await 20 "slurmctld answers" scontrol ping
+idle() { [ "$(sinfo --noheader --format=%T)" = idle ]; }
+dead() { ! kill -0 "${daemons[-1]}"; }
 daemon slurmd.log slurmd -D
-sleep 1
-if ! kill -0 "${daemons[-1]}" 2>/dev/null; then
-    # Newer ones want cgroups unless told.
+await 30 "slurmd is ready or has given up" eval 'idle || dead'
+if dead 2>/dev/null; then
+    # Newer ones want to hear that they should do without cgroups; older ones do not know the word.
     echo "CgroupPlugin=disabled" >"$work/cgroup.conf"
     daemon slurmd.log slurmd -D
+    await 30 "slurmd is ready" idle
 fi
-idle() { [ "$(sinfo --noheader --format=%T)" = idle ]; }
-await 30 "the node is ready" idle
 
 # A program on the nodes that counts its runs and fails as the folder's file `fault` says:
 # SHARD CODE TIMES. The code 143 waits for SIGTERM.
@@ -152,11 +153,10 @@ submit() {
 }
 # One field of a task, as scontrol shows it: CASE SHARD FIELD.
 field() { scontrol show job --oneliner "$(cat "$work/$1/job")_$2" | grep -o "\b$3=[^ ]*" | cut -d= -f2; }
-is() { [ "$(field "$1" "$2" "$3")" = "$4" ]; }
 ended() {
     local states
-    states=$(scontrol show job --oneliner "$(cat "$work/$1/job")") || return 1
-    ! grep -qE 'JobState=(PENDING|RUNNING|COMPLETING|CONFIGURING|SUSPENDED)' <<<"$states"
+    states=$(scontrol show job --oneliner "$(cat "$work/$1/job")" | grep -o '\bJobState=[A-Z_]*') || return 1
+    ! grep -vqE '=(COMPLETED|FAILED|CANCELLED|TIMEOUT|NODE_FAIL|OUT_OF_MEMORY)$' <<<"$states"
 }
 runs() { grep -c run "$work/$1/runs.$2" 2>/dev/null || true; }
 expect() { [ "$2" = "$3" ] || fail "$1: $2, expected $3"; }
