@@ -40,6 +40,9 @@ pub enum Error {
          OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
     )]
     NoWindow(String),
+    /// A video was asked for and the program that encodes it is not there, or cannot.
+    #[error("{0}; install ffmpeg (Debian: ffmpeg) or write .gif or .apng, which need none")]
+    NoFfmpeg(String),
     /// An output cannot be created. Known before any work is done.
     #[error("cannot create {}: {why}; {fix}", path.display())]
     CannotCreate {
@@ -127,7 +130,7 @@ impl Error {
             Error::Usage(_) => 2,
             Error::Memory { .. } => 33,
             Error::Input { .. } => 65,
-            Error::NoAdapter(_) | Error::NoWindow(_) => 69,
+            Error::NoAdapter(_) | Error::NoWindow(_) | Error::NoFfmpeg(_) => 69,
             Error::CannotCreate { .. } => 73,
             Error::Io { .. } => 74,
             Error::DeviceLost(_) => 75,

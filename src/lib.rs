@@ -11,7 +11,8 @@
 //!    (`gbuffer`) finds the quad and its texture coordinates under each pixel.
 //! 5. [`shading`] is the light of one cell (§5); the compute pass (`integrate`) walks the cells under
 //!    each pixel (§4) and adds them up.
-//! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR.
+//! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR; many frames become
+//!    a [`movie`] or a labelled [`sheet`].
 //!
 //! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
 //! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
@@ -30,9 +31,11 @@ pub mod frame;
 pub mod gpu;
 pub mod job;
 pub mod mapping;
+pub mod movie;
 pub mod random;
 pub mod scene;
 pub mod shading;
+pub mod sheet;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod volume;

@@ -33,8 +33,9 @@ Run the same command again to go on: pictures that are there are decoded, and ke
 pub struct BatchArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// Pattern of the pictures' names, .png or .exr: #### is the frame's number, {NAME} a sweep's value.
-    /// May be given twice. Default: the scene's name in the current folder.
+    /// Pattern of the pictures' names, .png or .exr: #### is the frame's number, {NAME} a sweep's value; or a
+    /// movie, .gif, .apng (or .png without ####), .mp4 or .webm. May be given often. Default: PNG files with
+    /// the scene's name in the current folder.
     #[arg(short, long = "output", value_name = "PATTERN")]
     outputs: Vec<PathBuf>,
     /// Frames to render, such as 0-239, 7, or 0-239:10 for every tenth. Default: all of the animation; frame 0
@@ -51,6 +52,13 @@ pub struct BatchArgs {
     /// last part will do where it is one parameter's.
     #[arg(long = "sweep", value_name = "KEY=VALUES")]
     sweeps: Vec<String>,
+    /// The labelled contact sheet of a sweep, .png. Default: SCENE.sheet.png beside the pictures.
+    #[arg(long, value_name = "FILE")]
+    sheet: Option<PathBuf>,
+    /// A table of all pictures with parameters, files and figures, .csv or .json; may be given twice. Default
+    /// of a sweep: SCENE.manifest.csv and .json beside the pictures.
+    #[arg(long = "manifest", value_name = "FILE")]
+    manifests: Vec<PathBuf>,
     /// Renders only every N-th picture, starting with number I (from 0): one of N machines' share.
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(u32, u32)>,
@@ -162,6 +170,8 @@ impl BatchArgs {
             frames: self.frames.clone().map(|f| f.0),
             sweeps: self.sweeps.clone(),
             outputs,
+            sheet: self.sheet.clone(),
+            manifests: self.manifests.clone(),
             shard: self.shard,
             overwrite: self.overwrite,
             keep_going: self.keep_going,
@@ -318,7 +328,7 @@ impl Watcher for Screen<'_> {
                 state.settled += 1;
                 state.rendered += 1;
                 state.share = 0.0;
-                if !self.terminal.is_interactive() {
+                if !self.terminal.is_interactive() && !files.is_empty() {
                     line = Some(format!("{}, {elapsed:.2} s ({})", files.join(", "), state.pace()));
                 }
             }

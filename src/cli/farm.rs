@@ -148,17 +148,19 @@ fn check_batch(job: &Job) -> Result<()> {
             "taki batch would not take the arguments after --: {line}; see taki batch --help"
         ))
     })?;
-    let outputs = matches.subcommand().and_then(|(_, batch)| batch.get_many::<PathBuf>("outputs"));
+    let Some((_, batch)) = matches.subcommand() else { return Ok(()) };
     let whole = |path: &&PathBuf| {
         let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         !path.extension().is_some_and(picture) || !name.contains(['#', '{'])
     };
-    match outputs.into_iter().flatten().find(whole) {
+    let given = |id| batch.get_many::<PathBuf>(id).into_iter().flatten();
+    let (mut outputs, mut wholes) = (given("outputs"), given("sheet").chain(given("manifests")));
+    match outputs.find(whole).or_else(|| wholes.next()) {
         None => Ok(()),
         Some(path) => Err(Error::Usage(format!(
-            "-o {}: this is one file of all pictures, and a shard has only its own; leave it out, and when the job is done run the whole \
-             taki batch without --shard: it keeps the pictures and makes the rest of them",
+            "{} is one file of all pictures, and a shard has only its own; leave it out, and when the job is done \
+             run the whole taki batch without --shard: it keeps the pictures and makes the rest of them",
             path.display()
         ))),
     }

@@ -27,7 +27,7 @@ use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \
-69 no adapter (only with --engine gpu), or no window · 73 cannot create output · 74 I/O error · 75 device lost, try again · \
+69 no adapter (only with --engine gpu), no window, or no ffmpeg · 73 cannot create output · 74 I/O error · 75 device lost, try again · \
 124 the GPU did not answer · 130/143 interrupted · 101 a bug.";
 
 /// Renders matter too fine for geometry, gushing water first, as volume textures on the GPU.

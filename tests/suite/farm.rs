@@ -193,6 +193,8 @@ fn arguments_that_batch_would_not_take_are_refused_before_the_nodes_do() {
     slurm(&["front", "--frames", "9-0"]).refused(2, &["9-0"]);
     slurm(&["--help"]).refused(2, &["help"]);
     slurm(&["front", "-o", "fall.####.exr", "-o", "fall.mp4"]).refused(2, &["fall.mp4", "without --shard"]);
+    slurm(&["front", "--sheet", "all.png"]).refused(2, &["all.png", "without --shard"]);
+    slurm(&["front", "--manifest", "all.csv"]).refused(2, &["all.csv", "without --shard"]);
     slurm(&["front", "-o", "fall.png"]).refused(2, &["fall.png", "without --shard"]);
     slurm(&["front", "-o", "fall.####.exr", "-o", "fall.####.PNG"]).done();
     slurm(&["front", "--sweep", "h=1,2", "-o", "{h}.png"]).done();

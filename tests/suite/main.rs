@@ -15,12 +15,14 @@ mod flow;
 mod gpu;
 mod looking;
 mod mapping;
+mod movie;
 mod presets;
 mod ray;
 mod readme;
 mod scene;
 mod shaders;
 mod shading;
+mod sheet;
 mod tolerance;
 #[cfg(feature = "viewer")]
 mod viewer;

@@ -8,6 +8,7 @@
 //!
 //! A picture's bytes depend on the scene and the frame's number alone.
 
+mod assemble;
 mod existing;
 mod needs;
 mod pattern;
@@ -27,9 +28,12 @@ use std::time::{Duration, SystemTime};
 
 use rayon::prelude::*;
 
+use assemble::MovieFile;
+
 use crate::error::{Error, Result};
-use crate::frame::{Layer, Window, folder_of, remove_stale};
+use crate::frame::{Layer, Output, Window, folder_of, remove_stale};
 use crate::job::{Monitor, Still};
+use crate::movie::MovieKind;
 use crate::scene::{Animation, Place, Scene};
 
 /// Most pictures of one batch.
@@ -45,8 +49,12 @@ pub struct Request {
     pub frames: Option<Vec<u32>>,
     /// `KEY=VALUES`.
     pub sweeps: Vec<String>,
-    /// Patterns of the pictures' files.
+    /// Patterns of the pictures' files and of movies.
     pub outputs: Vec<PathBuf>,
+    /// The contact sheet of a sweep; none: beside the pictures.
+    pub sheet: Option<PathBuf>,
+    /// Tables of all pictures, .csv or .json; none given: beside the pictures of a sweep.
+    pub manifests: Vec<PathBuf>,
     /// (i, n): of the pictures, numbered from 0, those whose number leaves i when divided by n.
     pub shard: Option<(u32, u32)>,
     /// Whether files that are there are replaced.
@@ -70,10 +78,15 @@ pub struct Batch {
     sweeps: Vec<Sweep>,
     frames: Vec<u32>,
     pictures: Vec<Pattern>,
+    movies: Vec<MovieFile>,
+    sheet: Option<PathBuf>,
+    manifests: Vec<PathBuf>,
     /// By number of the picture, whether it is there whole.
     whole: Vec<bool>,
     /// Files that were there before and are to be replaced.
     replaced: HashMap<PathBuf, Stamp>,
+    /// Movies that are there, as new as their pictures.
+    fresh: BTreeSet<PathBuf>,
 }
 
 /// Tells one version of a file from the next.
@@ -115,29 +128,41 @@ impl Batch {
             )));
         };
         let names: Vec<Vec<String>> = sweeps.iter().map(Sweep::names).collect();
-        let pictures = request
-            .outputs
-            .iter()
-            .map(|path| Pattern::new(path, &names))
-            .collect::<Result<Vec<Pattern>>>()?;
-        for (i, pattern) in pictures.iter().enumerate() {
-            check_pattern(pattern, &sweeps, frames.len())?;
-            if pictures[..i].iter().any(|other| other.given() == pattern.given()) {
-                return Err(Error::Usage(format!("-o {} is given twice", pattern.given().display())));
+        let (mut pictures, mut movies) = (Vec::new(), Vec::new());
+        for (i, path) in request.outputs.iter().enumerate() {
+            let pattern = Pattern::new(path, &names)?;
+            if request.outputs[..i].contains(path) {
+                return Err(Error::Usage(format!("-o {} is given twice", path.display())));
+            }
+            match movie_kind(&pattern, frames.len()) {
+                Some(kind) => {
+                    check_pattern(&pattern, &sweeps, 1)?;
+                    movies.push(MovieFile { pattern, kind });
+                }
+                None => {
+                    check_pattern(&pattern, &sweeps, frames.len())?;
+                    pictures.push(pattern);
+                }
             }
         }
+        let (sheet, manifests) = about_all(&request, &base, &sweeps, &pictures)?;
         let mut batch = Batch {
             base,
             request,
             sweeps,
             frames,
             pictures,
+            movies,
+            sheet,
+            manifests,
             whole: vec![false; count],
             replaced: HashMap::new(),
+            fresh: BTreeSet::new(),
         };
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
         batch.look(monitor)?;
+        batch.check_movies()?;
         Ok(batch)
     }
 
@@ -236,6 +261,60 @@ impl Batch {
         folders.iter().for_each(|folder| remove_stale(folder, |_| true));
         Ok(())
     }
+}
+
+/// The format of a movie that a name asks for. A .png of many frames without a place for their numbers is an
+/// animated one.
+fn movie_kind(pattern: &Pattern, frames: usize) -> Option<MovieKind> {
+    let path = pattern.given();
+    let png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    match MovieKind::of(path) {
+        None if png && frames > 1 && !pattern.has_frame() => Some(MovieKind::Apng),
+        kind => kind,
+    }
+}
+
+/// Where the sheet and the manifests go, if there are any.
+fn about_all(
+    request: &Request,
+    base: &Animation,
+    sweeps: &[Sweep],
+    pictures: &[Pattern],
+) -> Result<(Option<PathBuf>, Vec<PathBuf>)> {
+    let (mut sheet, mut manifests) = (request.sheet.clone(), request.manifests.clone());
+    let Some(first) = pictures.first() else {
+        if sheet.is_some() || !manifests.is_empty() || !sweeps.is_empty() {
+            return Err(Error::Usage(
+                "a sweep, a sheet and a manifest need pictures; add -o with a .png or .exr".into(),
+            ));
+        }
+        return Ok((None, Vec::new()));
+    };
+    if sweeps.is_empty() && sheet.is_some() {
+        return Err(Error::Usage("--sheet shows a sweep; add --sweep KEY=VALUES".into()));
+    }
+    if !sweeps.is_empty() {
+        let beside = |what: &str| first.given().with_file_name(format!("{}.{what}", base.name()));
+        sheet = sheet.or_else(|| Some(beside("sheet.png")));
+        if manifests.is_empty() {
+            manifests = vec![beside("manifest.csv"), beside("manifest.json")];
+        }
+    }
+    for path in &manifests {
+        if !assemble::is_csv(path) && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            return Err(Error::Usage(format!("--manifest {}: use .csv or .json", path.display())));
+        }
+    }
+    if let Some(path) = &sheet
+        && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+    {
+        return Err(Error::Usage(format!("--sheet {}: use .png", path.display())));
+    }
+    // Opened and dropped: a folder that is not there is known before the work.
+    if request.shard.is_none() {
+        sheet.iter().chain(&manifests).try_for_each(|path| Output::open(path).map(drop))?;
+    }
+    Ok((sheet, manifests))
 }
 
 /// Different pictures have different names.

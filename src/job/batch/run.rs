@@ -70,6 +70,8 @@ impl Batch {
         let (ended, outcomes) = ended;
         let last = std::mem::take(&mut *outcomes.lock().unwrap_or_else(|e| e.into_inner()));
         let ended = ended.and(work.note(last));
+        let whole = work.failure.is_none();
+        let ended = ended.and_then(|()| if whole { self.assemble(watcher) } else { Ok(()) });
         let Work { mut summary, failure, .. } = work;
         let result = match (ended, failure) {
             (Err(e), _) | (Ok(()), Some(e)) => Err(e),
@@ -142,6 +144,11 @@ impl Work<'_> {
 
     fn attempt(&mut self, number: usize, writer: &Writer) -> Result<Tried> {
         let files = self.batch.files(number);
+        if files.is_empty() {
+            // Frames of a movie alone are nobody else's.
+            self.render(number, None, writer)?;
+            return Ok(Tried::Handed);
+        }
         let claim = match self.claims.ask(&files[0])? {
             Asked::Theirs(who) => return Ok(Tried::Theirs(who)),
             Asked::Ours(claim) => claim,
@@ -153,11 +160,11 @@ impl Work<'_> {
         for owner in &claim.taken_from {
             files.iter().for_each(|file| remove_left_by(owner, file));
         }
-        self.render(number, claim, writer)?;
+        self.render(number, Some(claim), writer)?;
         Ok(Tried::Handed)
     }
 
-    fn render(&mut self, number: usize, claim: Claim, writer: &Writer) -> Result<()> {
+    fn render(&mut self, number: usize, claim: Option<Claim>, writer: &Writer) -> Result<()> {
         let began = Instant::now();
         let name = self.batch.name(number);
         self.watcher.event(&Event::Rendering { picture: &name });
@@ -184,6 +191,8 @@ impl Work<'_> {
             volume: volume.clone(),
             window,
             layers: layers.clone(),
+            movies: self.batch.movies_starting(number, &scene),
+            last: (number + 1).is_multiple_of(self.batch.frames.len()),
             began,
         });
         let several = parts.len() > 1;

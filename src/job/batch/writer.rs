@@ -5,11 +5,12 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use super::report::{Event, Name, Watcher, words};
+use super::report::{Event, Name, Watcher, word, words};
 use crate::error::{Error, Result};
-use crate::frame::{Figures, Frame, Layer, Seconds, Window};
+use crate::frame::{Frame, Layer, Seconds, Window, rgb_rows};
 use crate::job::still::StillWriter;
 use crate::job::{Claim, Still};
+use crate::movie::{Movie, MovieKind, MovieOptions};
 use crate::scene::Scene;
 use crate::volume::VolumeTexture;
 
@@ -20,11 +21,15 @@ pub struct Start {
     pub files: Vec<PathBuf>,
     /// Taken when it is begun.
     pub still: Option<Still>,
-    pub claim: Claim,
+    pub claim: Option<Claim>,
     pub scene: Scene,
     pub volume: Arc<VolumeTexture>,
     pub window: Window,
     pub layers: Vec<Layer>,
+    /// Movies that begin with it.
+    pub movies: Vec<(PathBuf, MovieKind, MovieOptions)>,
+    /// Whether movies end with it.
+    pub last: bool,
     /// When its rendering began.
     pub began: Instant,
 }
@@ -110,23 +115,26 @@ struct Open {
     writer: Option<StillWriter>,
     error: Option<Error>,
     seconds: Seconds,
+    /// R, G, B of the rows so far, for movies.
+    rgb: Vec<u8>,
 }
 
 fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn Watcher) {
     let mut open: Option<Open> = None;
+    let mut movies: Vec<(PathBuf, Movie)> = Vec::new();
     while let Ok(message) = receive.recv() {
         match message {
-            Message::Start(start) => open = Some(begin(*start)),
+            Message::Start(start) => open = Some(begin(*start, &mut movies)),
             Message::Strip(strip) => {
                 if let Some(open) = &mut open {
-                    push(open, &strip);
+                    push(open, &strip, !movies.is_empty());
                 }
             }
             Message::Settle => {}
             Message::Drop => open = None,
             Message::End => {
                 if let Some(open) = open.take() {
-                    let outcome = end(open, watcher);
+                    let outcome = end(open, &mut movies, watcher);
                     outcomes.lock().unwrap_or_else(|e| e.into_inner()).push(outcome);
                 }
             }
@@ -134,7 +142,12 @@ fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn 
     }
 }
 
-fn begin(mut start: Start) -> Open {
+fn begin(mut start: Start, movies: &mut Vec<(PathBuf, Movie)>) -> Open {
+    let opened = start
+        .movies
+        .drain(..)
+        .map(|(path, kind, options)| Ok((path.clone(), Movie::create(&path, kind, &options)?)));
+    let opened = opened.collect::<Result<Vec<_>>>();
     let writer =
         start.still.take().map(|still| still.begin(&start.scene, &start.volume, start.window, &start.layers));
     let (writer, error) = match writer {
@@ -142,11 +155,21 @@ fn begin(mut start: Start) -> Open {
         Some(Err(e)) => (None, Some(e)),
         None => (None, None),
     };
-    Open { start, writer, error, seconds: Seconds::default() }
+    let error = match opened {
+        Ok(opened) => {
+            movies.extend(opened);
+            error
+        }
+        Err(e) => Some(e),
+    };
+    Open { start, writer, error, seconds: Seconds::default(), rgb: Vec::new() }
 }
 
-fn push(open: &mut Open, strip: &Frame) {
+fn push(open: &mut Open, strip: &Frame, movies: bool) {
     let clock = Instant::now();
+    if movies {
+        open.rgb.extend(rgb_rows(strip));
+    }
     if let Some(writer) = &mut open.writer
         && let Err(e) = writer.push(strip)
     {
@@ -158,18 +181,31 @@ fn push(open: &mut Open, strip: &Frame) {
     open.seconds.output += clock.elapsed().as_secs_f64();
 }
 
-fn end(open: Open, watcher: &dyn Watcher) -> (usize, Name, Result<Seconds>) {
-    let Open { start, writer, error, mut seconds } = open;
+fn end(
+    open: Open,
+    movies: &mut Vec<(PathBuf, Movie)>,
+    watcher: &dyn Watcher,
+) -> (usize, Name, Result<Seconds>) {
+    let Open { start, writer, error, mut seconds, rgb } = open;
     let clock = Instant::now();
-    let finished = match (writer, error) {
-        (_, Some(e)) => Err(e),
-        (Some(writer), None) => writer.finish(),
-        (None, None) => Ok(Figures::default()),
+    let finished = match error {
+        Some(e) => Err(e),
+        None => writer.map_or(Ok(()), |writer| writer.finish().map(drop)).and_then(|()| {
+            movies.iter_mut().try_for_each(|(_, movie)| movie.push(&rgb))?;
+            let ending = if start.last { movies.drain(..) } else { movies.drain(..0) };
+            for (path, movie) in ending {
+                movie.finish_watched(watcher)?;
+                watcher.event(&Event::Assembled { file: word(&path) });
+            }
+            Ok(())
+        }),
     };
     seconds.output += clock.elapsed().as_secs_f64();
     match finished {
-        Ok(_) => {
-            start.claim.done();
+        Ok(()) => {
+            if let Some(claim) = start.claim {
+                claim.done();
+            }
             watcher.event(&Event::Saved {
                 picture: &start.name,
                 files: words(&start.files),
@@ -178,6 +214,10 @@ fn end(open: Open, watcher: &dyn Watcher) -> (usize, Name, Result<Seconds>) {
             });
             (start.number, start.name, Ok(seconds))
         }
-        Err(e) => (start.number, start.name, Err(e)),
+        Err(e) => {
+            // A movie that misses a frame is none.
+            movies.clear();
+            (start.number, start.name, Err(e))
+        }
     }
 }

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::{batch, counts, files, folder};
-use crate::faults::{run, wait};
+use crate::faults::{run, taki, wait};
 
 const FRAMES: [&str; 7] = ["--frames", "0-7", "-o", "f.####.png", "-o", "f.####.exr", "--stale=1"];
 
@@ -73,12 +73,15 @@ fn killed_at_any_moment_nothing_is_torn_or_lost_and_the_next_run_completes() {
 
 #[test]
 fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
-    let expected = expected();
     for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
         let dir = folder();
         // Enough samples that the signal comes into the work.
-        let slow = ["--frames", "0-7", "-o", "f.####.png", "--samples", "512", "--events", "json"];
-        let mut child = batch(dir.path(), slow).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let slow = || {
+            let mut command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=512"]);
+            command.args(["--frames", "0-7", "-o", "f.####.png", "--events=json"]).current_dir(dir.path());
+            command
+        };
+        let mut child = slow().stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let begun = Instant::now();
         while !dir.path().join("f.0000.png").exists() {
             assert!(begun.elapsed() < Duration::from_secs(60), "no picture");
@@ -92,10 +95,9 @@ fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
         let mut said = String::new();
         std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut said).unwrap();
         assert!(said.contains("run the same command again to go on"), "{said}");
-        let next = run(&mut batch(dir.path(), slow));
+        let next = run(&mut slow());
         assert_eq!(counts(&next)[..3], [8, left.len() as u64, 8 - left.len() as u64]);
     }
-    drop(expected);
 }
 
 #[test]

@@ -1,0 +1,301 @@
+//! What is made of all pictures: movies, the contact sheet, manifests.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use image::RgbImage;
+use serde::Serialize;
+
+use super::report::{Event, Watcher, word, words};
+use super::{Batch, Pattern, Sweep};
+use crate::cpu::resolve::resolve;
+use crate::error::{Error, Result};
+use crate::frame::{Layer, Output, figures_of, read_exr, read_png};
+use crate::movie::{Movie, MovieKind, MovieOptions};
+use crate::scene::{Image, Scene};
+use crate::sheet::{Axis, Sheet, draw};
+
+/// A file of all frames of a point of the sweep.
+#[derive(Clone, Debug)]
+pub struct MovieFile {
+    /// Its name.
+    pub pattern: Pattern,
+    /// Its format.
+    pub kind: MovieKind,
+}
+
+/// What a manifest says of a picture.
+#[derive(Serialize)]
+struct Row {
+    number: usize,
+    frame: u32,
+    #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
+    parameters: serde_json::Map<String, serde_json::Value>,
+    files: Vec<String>,
+    mean_radiance: Option<[f64; 3]>,
+    mean_transmittance: Option<f64>,
+    covered_pixels: Option<u64>,
+    cells_walked: Option<u64>,
+    light_cells_walked: Option<u64>,
+}
+
+impl Batch {
+    /// Points of the sweep's grid.
+    fn points(&self) -> usize {
+        self.count() / self.frames.len()
+    }
+
+    /// The file of a movie of a point.
+    pub(super) fn movie_path(&self, movie: &MovieFile, point: usize) -> PathBuf {
+        movie.pattern.at(0, &self.words(point * self.frames.len()))
+    }
+
+    /// A movie of the pictures that `scene` has.
+    pub(super) fn movie_options(&self, scene: &Scene) -> MovieOptions {
+        let window = self.window(scene);
+        MovieOptions {
+            size: [window.width, window.height],
+            fps: self.base.fps,
+            frames: self.frames.len() as u64,
+            repeat: true,
+        }
+    }
+
+    /// Movies without pictures are made while the frames are rendered: those whose first frame is picture
+    /// `number`.
+    pub(super) fn movies_starting(
+        &self,
+        number: usize,
+        scene: &Scene,
+    ) -> Vec<(PathBuf, MovieKind, MovieOptions)> {
+        if !self.pictures.is_empty() || !number.is_multiple_of(self.frames.len()) {
+            return Vec::new();
+        }
+        let point = number / self.frames.len();
+        let options = self.movie_options(scene);
+        self.movies.iter().map(|m| (self.movie_path(m, point), m.kind, options)).collect()
+    }
+
+    /// Movies that can be made, and that replace nothing but what may be replaced. Those that are there and
+    /// newer than all their pictures stay.
+    pub(super) fn check_movies(&mut self) -> Result<()> {
+        if self.movies.is_empty() {
+            return Ok(());
+        }
+        if self.request.shard.is_some() {
+            return Err(Error::Usage(
+                "a movie needs all frames, a shard has a part of them; leave the movie out of the shards, and make it \
+                 when they are done by the same command without --shard"
+                    .into(),
+            ));
+        }
+        let scene = self.scene(0)?;
+        let options = self.movie_options(&scene);
+        for movie in &self.movies {
+            for point in 0..self.points() {
+                let path = self.movie_path(movie, point);
+                if path.symlink_metadata().is_ok() && !self.request.overwrite {
+                    if self.is_newer(&path, point) {
+                        self.fresh.insert(path);
+                        continue;
+                    }
+                    return Err(Error::CannotCreate {
+                        path,
+                        why: "it is there, and older than some of its pictures or made without them".into(),
+                        fix: "remove it, choose another name with -o, or replace all with --overwrite".into(),
+                    });
+                }
+                if point == 0 {
+                    // Opened and dropped: the folder, ffmpeg, what the format can hold.
+                    drop(Movie::create(&path, movie.kind, &options)?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a movie is as new as every picture of its point, which are all whole.
+    fn is_newer(&self, movie: &Path, point: usize) -> bool {
+        let time = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
+        let Some(made) = time(movie) else { return false };
+        let numbers = point * self.frames.len()..(point + 1) * self.frames.len();
+        let older = |file: &PathBuf| time(file).is_some_and(|t: SystemTime| t <= made);
+        !self.pictures.is_empty()
+            && numbers.clone().all(|n| self.whole[n])
+            && numbers.flat_map(|n| self.files(n)).all(|file| older(&file))
+    }
+
+    /// Makes movies, sheet and manifests of pictures that are all there.
+    pub(super) fn assemble(&self, watcher: &dyn Watcher) -> Result<()> {
+        if self.request.shard.is_some() {
+            return Ok(());
+        }
+        if !self.pictures.is_empty() {
+            for movie in &self.movies {
+                for point in 0..self.points() {
+                    let path = self.movie_path(movie, point);
+                    if !self.fresh.contains(&path) {
+                        self.make_movie(movie.kind, &path, point, watcher)?;
+                        watcher.event(&Event::Assembled { file: word(&path) });
+                    }
+                }
+            }
+        }
+        if let Some(path) = &self.sheet {
+            let sheet = self.draw_sheet(watcher)?;
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            sheet.write_to(&mut bytes, image::ImageFormat::Png).map_err(|e| Error::write(path, e))?;
+            Output::create(path)?.finish_with(bytes.get_ref())?;
+            watcher.event(&Event::Assembled { file: word(path) });
+        }
+        if !self.manifests.is_empty() {
+            let rows = (0..self.count()).map(|n| self.row(n, watcher)).collect::<Result<Vec<Row>>>()?;
+            for path in &self.manifests {
+                let bytes = if is_csv(path) {
+                    self.csv(&rows)
+                } else {
+                    serde_json::to_vec_pretty(&rows).map_err(Into::into)
+                };
+                let bytes = bytes.map_err(|e: std::io::Error| Error::write(path, e))?;
+                Output::create(path)?.finish_with(&bytes)?;
+                watcher.event(&Event::Assembled { file: word(path) });
+            }
+        }
+        Ok(())
+    }
+
+    fn make_movie(&self, kind: MovieKind, path: &Path, point: usize, watcher: &dyn Watcher) -> Result<()> {
+        let first = point * self.frames.len();
+        let scene = self.scene(first)?;
+        let mut movie = Movie::create(path, kind, &self.movie_options(&scene))?;
+        for (i, number) in (first..first + self.frames.len()).enumerate() {
+            watcher.progress("movie", i as u64, self.frames.len() as u64)?;
+            movie.push(self.picture(number)?.as_raw())?;
+        }
+        movie.finish_watched(watcher)
+    }
+
+    /// A picture as it is seen, from its file.
+    fn picture(&self, number: usize) -> Result<RgbImage> {
+        let files = self.files(number);
+        let png = self.pictures.iter().position(|p| !p.is_exr());
+        match png {
+            Some(i) => picture_of_png(&files[i]),
+            None => picture_of_exr(&files[0], &self.scene(number)?.image),
+        }
+    }
+
+    fn draw_sheet(&self, watcher: &dyn Watcher) -> Result<RgbImage> {
+        let scene = self.scene(0)?;
+        let window = self.window(&scene);
+        let axis = |sweep: &Sweep| Axis {
+            name: sweep.axis(),
+            values: sweep.values.iter().map(|(_, word)| word.clone()).collect(),
+        };
+        let axes: Vec<Axis> = self.sweeps.iter().map(axis).collect();
+        let samples = scene.image.samples;
+        let subtitle = format!(
+            "frame {} · {}×{} pixels · {samples} {}",
+            self.frames[0],
+            window.width,
+            window.height,
+            if samples == 1 { "sample" } else { "samples" }
+        );
+        let sheet = Sheet::of(self.base.name(), &subtitle, &axes, [window.width, window.height]);
+        // The first sweep goes across; the sheet's rows are the others, the last of them fastest. Among the
+        // points of the grid the first is slowest.
+        let rows = self.points() / self.sweeps[0].values.len();
+        draw(&sheet, |row, column| {
+            watcher.progress(
+                "sheet",
+                (row * self.sweeps[0].values.len() + column) as u64,
+                self.points() as u64,
+            )?;
+            self.picture((column * rows + row) * self.frames.len()).map(Some)
+        })
+    }
+
+    fn row(&self, number: usize, watcher: &dyn Watcher) -> Result<Row> {
+        watcher.progress("manifest", number as u64, self.count() as u64)?;
+        let values = self.scene(number)?.values;
+        let parameters = self.sweeps.iter().map(|s| (s.key.clone(), values.get(&s.key).to_json())).collect();
+        let files = self.files(number);
+        // A PNG's text knows all; an EXR's layers know some.
+        let png = self.pictures.iter().position(|p| !p.is_exr()).unwrap_or(0);
+        let figures = figures_of(&files[png])?;
+        Ok(Row {
+            number,
+            frame: self.frame(number),
+            parameters,
+            files: words(&files),
+            mean_radiance: figures.mean_radiance(),
+            mean_transmittance: figures.mean_transmittance(),
+            covered_pixels: figures.covered_pixels,
+            cells_walked: figures.cells_walked,
+            light_cells_walked: figures.light_cells_walked,
+        })
+    }
+
+    fn csv(&self, rows: &[Row]) -> std::io::Result<Vec<u8>> {
+        let mut out = csv::Writer::from_writer(Vec::new());
+        let mut head = vec!["number".to_owned(), "frame".into()];
+        head.extend(self.sweeps.iter().map(|s| s.key.clone()));
+        head.extend(self.pictures.iter().map(|p| if p.is_exr() { "exr".into() } else { "png".into() }));
+        let figures = [
+            "mean_r",
+            "mean_g",
+            "mean_b",
+            "mean_transmittance",
+            "covered_pixels",
+            "cells_walked",
+            "light_cells_walked",
+        ];
+        head.extend(figures.map(str::to_owned));
+        out.write_record(&head)?;
+        for row in rows {
+            let float = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+            let count = |x: Option<u64>| x.map_or(String::new(), |x| x.to_string());
+            let mut record = vec![row.number.to_string(), row.frame.to_string()];
+            record.extend(
+                row.parameters.values().map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned)),
+            );
+            record.extend(row.files.iter().cloned());
+            record.extend((0..3).map(|c| float(row.mean_radiance.map(|m| m[c]))));
+            record.push(float(row.mean_transmittance));
+            record.extend([row.covered_pixels, row.cells_walked, row.light_cells_walked].map(count));
+            out.write_record(&record)?;
+        }
+        out.into_inner().map_err(|e| e.into_error())
+    }
+}
+
+/// Whether a manifest is a table; else it is JSON.
+pub(super) fn is_csv(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+}
+
+fn picture_of_png(path: &Path) -> Result<RgbImage> {
+    let (width, height, pixels) = read_png(path)?;
+    let bytes = pixels.iter().flatten().map(|x| (x * 255.0).round() as u8).collect();
+    RgbImage::from_raw(width, height, bytes).ok_or_else(|| Error::read(path, "its size is not its pixels'"))
+}
+
+/// Tone and 8 bits as the PNG would have them.
+fn picture_of_exr(path: &Path, image: &Image) -> Result<RgbImage> {
+    let (width, height, channels) = read_exr(path)?;
+    let channel = |name: &str| {
+        let found = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+        found.ok_or_else(|| {
+            Error::input(
+                format!("{} has no colour", path.display()),
+                format!("add {} to --layers, or write PNG files too", Layer::Rgb.name()),
+            )
+        })
+    };
+    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+    let mut bytes = Vec::with_capacity(r.len() * 3);
+    for ((r, g), b) in r.iter().zip(g).zip(b) {
+        bytes.extend_from_slice(&resolve(image, [*r, *g, *b, 1.0])[..3]);
+    }
+    RgbImage::from_raw(width, height, bytes).ok_or_else(|| Error::read(path, "its size is not its pixels'"))
+}
