@@ -15,8 +15,8 @@
 //!    a [`movie`] or a labelled [`sheet`].
 //!
 //! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
-//! [`job`] chooses between them and watches over long work. The command line and the viewer are clients
-//! of all this.
+//! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
+//! machines. The command line and the viewer are clients of all this.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -26,6 +26,7 @@ pub mod cli;
 pub mod cpu;
 pub mod curve;
 pub mod error;
+pub mod farm;
 pub mod frame;
 pub mod gpu;
 pub mod job;

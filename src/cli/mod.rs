@@ -4,6 +4,7 @@ mod batch;
 mod bench;
 mod compare;
 mod devices;
+mod farm;
 mod render;
 mod scene;
 mod stitch;
@@ -50,6 +51,8 @@ enum Command {
     Scene(scene::SceneArgs),
     /// Builds a volume texture or prints its statistics.
     Volume(volume::VolumeArgs),
+    /// Writes a job file that splits a batch over the machines of a farm.
+    Farm(farm::FarmArgs),
     /// Measures this machine: passes, engines, volumes, with the work each did.
     Bench(bench::BenchArgs),
     /// Joins crops of one picture to the file of the whole.
@@ -213,6 +216,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::View(args) => view::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
+        Command::Farm(args) => farm::run(&args),
         Command::Bench(args) => bench::run(&args, terminal),
         Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),

@@ -9,6 +9,7 @@ mod big;
 mod closed_forms;
 mod compare;
 mod curve;
+mod farm;
 mod faults;
 mod flow;
 mod gpu;

@@ -50,14 +50,32 @@ fn every_subcommand_and_option_of_the_help_is_in_the_readme() {
         let out = std::process::Command::new(env!("CARGO_BIN_EXE_taki")).args(args).arg("--help").output();
         String::from_utf8(out.expect("help").stdout).expect("UTF-8")
     };
-    let commands =
-        ["render", "scene", "volume", "bench", "stitch", "compare", "presets", "devices", "completions"];
+    let commands = [
+        "render",
+        "scene",
+        "volume",
+        "bench",
+        "stitch",
+        "compare",
+        "presets",
+        "devices",
+        "completions",
+        "farm",
+    ];
     for command in commands {
         assert!(help(&[]).contains(command) && text.contains(&format!("taki {command}")), "{command}");
     }
-    for command in
-        [&["render"][..], &["bench"], &["stitch"], &["compare"], &["volume", "build"], &["volume", "info"]]
-    {
+    for command in [
+        &["render"][..],
+        &["bench"],
+        &["stitch"],
+        &["compare"],
+        &["volume", "build"],
+        &["volume", "info"],
+        &["farm", "slurm"],
+        &["farm", "openjd"],
+        &["farm", "kubernetes"],
+    ] {
         for option in help(command).split_whitespace().filter(|w| w.starts_with("--") && w.len() > 3) {
             let option = option.trim_end_matches([',', ';', '.', ')', '`']).split('=').next().unwrap_or("");
             assert!(option == "--help" || text.contains(option), "{command:?} {option}");

@@ -1,0 +1,190 @@
+//! `taki farm`: job files.
+
+use std::ffi::{OsStr, OsString};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, CommandFactory, Subcommand};
+
+use super::Cli;
+use crate::error::{Error, Result};
+use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
+use crate::frame::Output;
+
+#[derive(Args)]
+pub struct FarmArgs {
+    #[command(subcommand)]
+    engine: Engine,
+}
+
+const SLURM_HELP: &str = "\
+Example, from the folder that the paths start from, on a disk that all nodes share:
+
+  taki farm slurm --shards 8 --time 60 --cpus 4 -- fall.toml --frames 0-239 -o 'out/fall.####.exr' | sbatch
+
+A task that ends with 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed, time limit, \
+preemption) is requeued; scontrol show job and sacct tell every other exit code. Finished frames are kept.";
+
+const OPENJD_HELP: &str = "\
+Example; relative paths start from the template's folder (its parameter Folder):
+
+  taki farm openjd --shards 8 -o fall.yaml -- fall.toml --frames 0-239 -o 'out/fall.####.exr'
+  openjd check fall.yaml && openjd run fall.yaml
+
+The specification has no retry by exit code: after 74 (I/O error), 75 (device lost), 124 (driver hang) or 137 \
+(killed) the task itself runs its shard again. Finished frames are kept.";
+
+const KUBERNETES_HELP: &str = "\
+Example; relative paths start from the root of the volume claim:
+
+  taki farm kubernetes --shards 8 --image IMAGE --claim scenes -- fall.toml --frames 0-239 -o 'out/fall.####.exr' | kubectl apply -f -
+
+A shard that ends with 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed) is run again; \
+2, 65 and 73 end the job, other codes their shard. Finished frames are kept. Needs Kubernetes 1.29 or newer.";
+
+#[derive(Subcommand)]
+enum Engine {
+    /// Writes a Slurm array job, for sbatch.
+    #[command(after_help = SLURM_HELP)]
+    Slurm {
+        #[command(flatten)]
+        job: JobArgs,
+        /// Partitions to run in, separated by commas.
+        #[arg(long, value_name = "NAMES")]
+        partition: Option<String>,
+    },
+    /// Writes an Open Job Description template (2023-09), for openjd, Deadline Cloud and others.
+    #[command(after_help = OPENJD_HELP)]
+    Openjd {
+        #[command(flatten)]
+        job: JobArgs,
+    },
+    /// Writes the manifest of a Kubernetes Indexed Job, for kubectl.
+    #[command(after_help = KUBERNETES_HELP)]
+    Kubernetes {
+        #[command(flatten)]
+        job: JobArgs,
+        /// Container image that holds taki.
+        #[arg(long)]
+        image: String,
+        /// Persistent volume claim with the scenes, and for the frames; all shards write to it.
+        #[arg(long, value_name = "NAME")]
+        claim: String,
+        /// Where the claim is mounted in the container; relative paths start here.
+        #[arg(long, value_name = "DIR", default_value = "/work")]
+        mount: String,
+    },
+}
+
+#[derive(Args)]
+struct JobArgs {
+    /// Pieces that the batch is split into; each is a task of the farm.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    shards: u32,
+    /// The job file; an old one is replaced. Default: stdout.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Name of the job.
+    #[arg(long, default_value = "taki", value_parser = name)]
+    name: String,
+    /// The program on the nodes.
+    #[arg(long, value_name = "PATH", default_value = "taki")]
+    taki: OsString,
+    /// How often one shard may be run again after a fault that may pass.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    retries: u32,
+    /// Longest time of one run of a shard, minutes.
+    #[arg(long, value_name = "MINUTES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    time: Option<u32>,
+    /// Cores of a shard.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    cpus: Option<u32>,
+    /// Memory of a shard, MiB. The batch's own --memory goes after --.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    memory: Option<u32>,
+    /// GPUs of a shard.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    gpus: Option<u32>,
+    /// Scene and options of `taki batch`, passed on as they are; --shard is added.
+    #[arg(last = true, required = true, value_name = "BATCH ARGUMENTS")]
+    batch: Vec<OsString>,
+}
+
+impl JobArgs {
+    fn job(&self) -> Result<Job> {
+        let job = Job {
+            name: self.name.clone(),
+            taki: self.taki.clone(),
+            shards: self.shards,
+            retries: self.retries,
+            minutes: self.time,
+            cpus: self.cpus,
+            memory: self.memory,
+            gpus: self.gpus,
+            batch: self.batch.clone(),
+        };
+        job.check()?;
+        check_batch(&job)?;
+        Ok(job)
+    }
+}
+
+fn name(text: &str) -> std::result::Result<String, String> {
+    check_name(text).map(|()| text.to_string())
+}
+
+/// Reads the arguments as `taki batch` will: a slip of the pen is found here, not on every node. Scenes are
+/// not read; they may be elsewhere.
+fn check_batch(job: &Job) -> Result<()> {
+    let shard = format!("0/{}", job.shards);
+    let start = ["taki", "batch", "--shard", &shard].map(OsString::from);
+    let matches = Cli::command().try_get_matches_from(start.iter().chain(&job.batch)).map_err(|e| {
+        let text = e.render().to_string();
+        let line = match e.use_stderr() {
+            true => text.lines().next().unwrap_or("").trim_start_matches("error: "),
+            false => "they ask for help",
+        };
+        Error::Usage(format!(
+            "taki batch would not take the arguments after --: {line}; see taki batch --help"
+        ))
+    })?;
+    let Some((_, batch)) = matches.subcommand() else { return Ok(()) };
+    let whole = |path: &&PathBuf| {
+        let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        !path.extension().is_some_and(picture) || !name.contains(['#', '{'])
+    };
+    let given = |id| batch.get_many::<PathBuf>(id).into_iter().flatten();
+    let (mut outputs, mut wholes) = (given("outputs"), given("sheet").chain(given("manifests")));
+    match outputs.find(whole).or_else(|| wholes.next()) {
+        None => Ok(()),
+        Some(path) => Err(Error::Usage(format!(
+            "{} is one file of all pictures, and a shard has only its own; leave it out, and when the job is done \
+             run the whole taki batch without --shard: it keeps the pictures and makes the rest of them",
+            path.display()
+        ))),
+    }
+}
+
+pub fn run(args: &FarmArgs) -> Result<()> {
+    let (output, text) = match &args.engine {
+        Engine::Slurm { job, partition } => {
+            (&job.output, slurm::script(&job.job()?, &slurm::Options { partition: partition.clone() })?)
+        }
+        Engine::Openjd { job } => (&job.output, openjd::template(&job.job()?)?),
+        Engine::Kubernetes { job, image, claim, mount } => {
+            let options =
+                kubernetes::Options { image: image.clone(), claim: claim.clone(), mount: mount.clone() };
+            (&job.output, kubernetes::manifest(&job.job()?, &options)?)
+        }
+    };
+    match output {
+        Some(path) => Output::create(path)?.finish_with(text.as_bytes()),
+        // Half a job file in a pipe is no job: unlike a line of news, it may not be lost in silence.
+        None => {
+            let mut out = std::io::stdout();
+            let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+            written.map_err(|e| Error::write(Path::new("stdout"), e))
+        }
+    }
+}
