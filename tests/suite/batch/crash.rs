@@ -172,3 +172,92 @@ fn a_claim_of_another_machine_is_taken_over_when_it_is_not_touched() {
     child.kill().unwrap();
     wait(&mut child);
 }
+
+/// Runs a command under strace, which makes every thread's `when`-th call of `call` fail for want of room;
+/// whether any call did. None where strace may not trace.
+fn without_room(command: &Command, call: &str, when: usize) -> Option<(Option<i32>, bool)> {
+    let log = tempfile::NamedTempFile::new().unwrap();
+    let mut strace = Command::new("strace");
+    strace.args(["-f", "--seccomp-bpf", "-o"]).arg(log.path());
+    strace.args(["-e", &format!("trace={call}"), "-e", &format!("inject={call}:error=ENOSPC:when={when}")]);
+    strace.arg(command.get_program()).args(command.get_args());
+    strace.current_dir(command.get_current_dir().unwrap());
+    let ended = run(&mut strace);
+    let text = fs::read_to_string(log.path()).unwrap();
+    assert!(!ended.stderr().contains("panicked"), "{ended:?}");
+    text.contains("exited with").then(|| (ended.exit_code(), text.contains("INJECTED")))
+}
+
+#[test]
+fn no_room_at_any_write_tears_nothing_and_the_next_run_completes() {
+    let arguments = ["--frames", "3", "-o", "f.####.png", "-o", "f.####.exr"];
+    let whole = folder();
+    run(&mut batch(whole.path(), arguments)).done();
+    let expected = files(whole.path());
+    let (mut failed, mut places) = (0, 0);
+    for call in ["write", "fsync", "rename"] {
+        for when in 1.. {
+            if !long() && when > 10 {
+                break;
+            }
+            let dir = folder();
+            let Some((code, struck)) = without_room(&batch(dir.path(), arguments), call, when) else {
+                assert!(std::env::var_os("CI").is_none(), "strace cannot trace here");
+                eprintln!("not run: strace cannot trace here");
+                return;
+            };
+            none_is_torn(dir.path(), &expected);
+            if !struck {
+                break;
+            }
+            places += 1;
+            // Where what could not be written was a line on stderr or a claim's contents, the work goes on.
+            assert!(matches!(code, Some(0 | 74)), "{call} {when}: {code:?}");
+            failed += usize::from(code == Some(74));
+            run(&mut batch(dir.path(), arguments)).done();
+            assert!(files(dir.path()) == expected, "{call} {when}: {:?}", files(dir.path()).keys());
+        }
+    }
+    assert!(failed >= 4 && places >= 10, "{failed} of {places} writes ended the run");
+}
+
+/// Memory in KiB, threads and open files of a process; none once it has ended.
+fn footprint(pid: u32) -> Option<[u64; 3]> {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let field = |name: &str| {
+        status.lines().find_map(|l| l.strip_prefix(name))?.split_whitespace().next()?.parse::<u64>().ok()
+    };
+    let open = fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as u64;
+    Some([field("VmRSS:")?, field("Threads:")?, open])
+}
+
+/// The largest footprints while the pictures `from` to `to` were made.
+fn grows_not(engine: &str, frames: usize) {
+    let dir = folder();
+    let last = format!("0-{}", frames - 1);
+    let mut command =
+        taki(["batch", "front", "--size=16x12", "--engine", engine, "-o", "f.####.png", "--frames", &last]);
+    command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let mut largest = [[0u64; 3]; 4];
+    while child.try_wait().unwrap().is_none() {
+        let made = fs::read_dir(dir.path()).unwrap().count();
+        if let Some(now) = footprint(child.id()) {
+            let slot = &mut largest[(4 * made / frames).min(3)];
+            (0..3).for_each(|i| slot[i] = slot[i].max(now[i]));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert_eq!(wait(&mut child), Some(0));
+    let [_, early, _, late] = largest;
+    eprintln!("{engine}, {frames} frames: second quarter {early:?}, last {late:?} (KiB, threads, files)");
+    assert!(early[0] > 0 && late[0] > 0, "no footprint seen");
+    assert!(late[0] <= early[0] + early[0] / 50 + 1024, "memory grew: {early:?} {late:?}");
+    assert!(late[1] <= early[1] && late[2] <= early[2], "threads or files grew: {early:?} {late:?}");
+}
+
+#[test]
+fn memory_threads_and_files_stay_flat() {
+    grows_not("cpu", 2000);
+    grows_not("auto", if long() { 2000 } else { 400 });
+}
