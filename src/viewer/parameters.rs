@@ -11,7 +11,7 @@ use super::navigate;
 use crate::scene::{Cost, Kind, Param, Raw, Value};
 
 /// Groups of the panel: title, what it is about, sections of keys.
-const GROUPS: [(&str, &str, &[&str]); 7] = [
+const GROUPS: [(&str, &str, &[&str]); 8] = [
     ("Curves", "The spatial fractal curves that give every cell its flow direction", &["curves"]),
     ("Volume", "The volume texture: cells, density, reflection", &["volume"]),
     ("Mapping", "How the volume lies on the quads", &["materials", "quads"]),
@@ -19,6 +19,7 @@ const GROUPS: [(&str, &str, &[&str]); 7] = [
     ("Surroundings", "Rock and sky", &["rocks", "background"]),
     ("Camera", "Where the picture is seen from", &["camera"]),
     ("Image", "Size, samples and tone of the picture", &["image"]),
+    ("Animation", "What taki batch makes of the scene in time; ▶ plays the flow alone", &["animate"]),
 ];
 
 /// Width of the names.

@@ -52,6 +52,7 @@ fn every_subcommand_and_option_of_the_help_is_in_the_readme() {
     };
     let commands = [
         "render",
+        "batch",
         "scene",
         "volume",
         "bench",
@@ -67,6 +68,8 @@ fn every_subcommand_and_option_of_the_help_is_in_the_readme() {
     }
     for command in [
         &["render"][..],
+        &["batch"],
+        &["scene"],
         &["bench"],
         &["stitch"],
         &["compare"],

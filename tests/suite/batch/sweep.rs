@@ -38,7 +38,6 @@ fn sweeps_that_cannot_be_are_refused_with_the_reason() {
         ("alpha=0.5:2:0.5", 65, "allowed: 0 to 1"),
         ("alfa=1", 65, "unknown key"),
         ("h=x", 65, "allowed: 0 to 8"),
-        ("kind=point", 2, "--sweep"),
         ("width=8,16", 2, "cannot be swept"),
         ("animate.fps=1,2", 2, "cannot be swept"),
         ("lights.moon.intensity=1", 65, "no moon"),
