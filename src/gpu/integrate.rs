@@ -71,12 +71,21 @@ pub struct Integrate {
 pub struct Tiler {
     pixels: f64,
     fixed: bool,
+    /// Of the sizes that were found right.
+    smallest: f64,
 }
 
 impl Tiler {
-    /// Learns the size; with `fixed` every tile has about that many pixels.
-    pub fn new(fixed: Option<u32>) -> Self {
-        Tiler { pixels: fixed.map_or(FIRST_TILE_PIXELS as f64, f64::from), fixed: fixed.is_some() }
+    /// Learns the size; with `fixed` every tile has about that many pixels. `known` is what the last frame of
+    /// the like has learned.
+    pub fn new(fixed: Option<u32>, known: Option<f64>) -> Self {
+        let pixels = fixed.map(f64::from).or(known).unwrap_or(FIRST_TILE_PIXELS as f64);
+        Tiler { pixels, fixed: fixed.is_some(), smallest: f64::INFINITY }
+    }
+
+    /// The size that suited the dearest part of the frame; none if no tile was timed.
+    pub fn learned(&self) -> Option<f64> {
+        self.smallest.is_finite().then_some(self.smallest)
     }
 
     /// Rows at full width when there are enough pixels for several, else a part of one band; `x` and `y`
@@ -85,7 +94,10 @@ impl Tiler {
         let pixels = self.pixels.max(1.0) as u64;
         let rows = (pixels / area.width as u64).min((area.height - y) as u64) as u32;
         if x == 0 && rows >= super::layout::WORKGROUP {
-            let rows = rows - rows % super::layout::WORKGROUP;
+            // Tiles alike, not large ones and a rest: every submission waits for its last workgroup.
+            let left = area.height - y;
+            let rows = left.div_ceil(left.div_ceil(rows));
+            let rows = rows.next_multiple_of(super::layout::WORKGROUP).min(left);
             return Tile { x: area.x, y: area.y + y, width: area.width, height: rows };
         }
         let height = super::layout::WORKGROUP.min(area.height - y);
@@ -98,6 +110,7 @@ impl Tiler {
             let pixels = tile.width as f64 * tile.height as f64;
             let wanted = pixels * TILE_SECONDS / seconds.max(1e-6);
             self.pixels = wanted.clamp(64.0, pixels.max(self.pixels) * TILE_GROWTH);
+            self.smallest = self.smallest.min(self.pixels);
         }
     }
 }

@@ -6,6 +6,7 @@ mod gbuffer;
 mod grid;
 mod integrate;
 pub mod layout;
+mod rasters;
 mod readback;
 mod resolve;
 mod timing;
@@ -29,6 +30,7 @@ use crate::job::Monitor;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
 use layout::Tile;
+use rasters::{Key, Rasters};
 
 /// Bytes on the device for a pixel of a window: targets, sums and picture.
 pub const CANVAS_BYTES: u64 = Targets::BYTES + Sums::BYTES + Resolve::PICTURE_BYTES;
@@ -48,6 +50,8 @@ pub struct RenderOptions {
     /// Only this part of the image, which it must lie in: the frame has its size, and the same bits as this
     /// part of the whole image's frame.
     pub window: Option<Window>,
+    /// Bytes on the device for results of the raster pass that later frames may use again.
+    pub keep_rasters: u64,
     /// How the GPU engine cuts the image; another grid rounds the rock's radiance otherwise.
     pub grid: Grid,
 }
@@ -102,7 +106,13 @@ pub struct GpuRenderer {
     resident: Resident,
     /// The latest first.
     canvases: Vec<Canvas>,
+    rasters: Rasters,
+    /// Pixels of a tile that suited the last frame, and what that frame was.
+    learned: Option<(Like, f64)>,
 }
+
+/// What frames share whose tiles take alike: the pass, where the volume's cells are, the image's size.
+type Like = (Variant, usize, [u32; 2]);
 
 /// Specialised pipelines that are kept: a slider that goes to and fro finds them again.
 const KEPT_PIPELINES: usize = 16;
@@ -156,6 +166,8 @@ impl GpuRenderer {
             integrate: Vec::new(),
             resident: Resident::default(),
             canvases: Vec::new(),
+            rasters: Rasters::default(),
+            learned: None,
         }
     }
 
@@ -189,13 +201,16 @@ impl GpuRenderer {
         let mut frame = Frame::new(part.width, part.height, options.surface);
         let size = options.grid.size(whole);
         let canvas = recent(&mut self.canvases, KEPT_CANVASES, |c| c.size == size, || Canvas::new(gpu, size));
-        let Canvas { targets, sums, picture, .. } = canvas;
+        let Canvas { targets: own, sums, picture, .. } = canvas;
         gpu.check()?;
+        self.rasters.begin();
 
         let samples = options.samples.clone().unwrap_or(0..image.samples);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
-        let mut tiler = Tiler::new(options.tile_pixels);
+        let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
+        let known = self.learned.filter(|(of, _)| *of == like).map(|(_, pixels)| pixels);
+        let mut tiler = Tiler::new(options.tile_pixels, known);
         for window in options.grid.windows(whole, part) {
             // They meet, by the way windows are chosen.
             let Some(wanted) = window.meet(&part) else { continue };
@@ -208,6 +223,12 @@ impl GpuRenderer {
             let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample);
             for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);
+                let key = Key::new(&frame_uniforms, &up.geometry);
+                let kept = match options.keep_rasters {
+                    0 => None,
+                    most => self.rasters.place(gpu, key, size, most),
+                };
+                let targets = kept.map_or(own, |kept| &kept.targets);
                 let inputs = Inputs {
                     gpu,
                     timer: &self.timer,
@@ -217,7 +238,13 @@ impl GpuRenderer {
                     area,
                     frame: &frame_uniforms,
                 };
-                seconds.gbuffer += self.gbuffer.run(&inputs, || monitor.progress("pixels", done, total))?;
+                if kept.is_none_or(|kept| !kept.ready.get()) {
+                    seconds.gbuffer +=
+                        self.gbuffer.run(&inputs, || monitor.progress("pixels", done, total))?;
+                    if let Some(kept) = kept {
+                        kept.ready.set(true);
+                    }
+                }
                 if sample == samples.start
                     && let Some(surface) = &mut frame.surface
                 {
@@ -253,6 +280,7 @@ impl GpuRenderer {
             })?;
             seconds.readback += clock.elapsed().as_secs_f64();
         }
+        self.learned = tiler.learned().map(|pixels| (like, pixels));
         frame.seconds = seconds;
         Ok(frame)
     }

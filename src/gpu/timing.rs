@@ -1,5 +1,5 @@
-//! Seconds of a pass on the device, by timestamp queries; where there are none, by the host's clock
-//! around submission and wait.
+//! Seconds of a pass on the device, by timestamp queries; where there are none, or none to be trusted, by the
+//! host's clock around submission and wait.
 
 use std::time::Instant;
 

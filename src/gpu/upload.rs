@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::device::Gpu;
 use super::layout::{self, Quad};
+use super::rasters::hash_twice;
 use crate::error::{Error, Result};
 use crate::scene::{Mesh, Scene, Vertex};
 use crate::volume::{Cell, VolumeTexture};
@@ -17,8 +18,10 @@ const SLAB_BYTES: usize = 64 << 20;
 pub struct Resident {
     volume: Option<(Arc<Vec<Cell>>, [u32; 3], wgpu::TextureView)>,
     vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
-    /// Of these vertices; previews have fewer triangles than pictures.
-    indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer)>,
+    /// Of these vertices; previews have fewer triangles than pictures. Each upload has a number of its own.
+    indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer, u64)>,
+    /// Uploads of indices so far.
+    uploads: u64,
 }
 
 /// Everything of a scene that does not change from sample to sample.
@@ -37,6 +40,8 @@ pub struct Uploaded {
     pub indices: wgpu::Buffer,
     /// Number of indices.
     pub index_count: u32,
+    /// Hash of quads, lights and mesh: all that is drawn.
+    pub geometry: [u64; 2],
 }
 
 impl Uploaded {
@@ -59,16 +64,15 @@ impl Uploaded {
                 "lower their number or use --engine cpu",
             ));
         }
-        let (vertices, indices) = resident.mesh(gpu, mesh);
+        let (vertices, indices, upload) = resident.mesh(gpu, mesh);
+        let lights = layout::lights(scene);
+        let light_bytes: &[u8] = bytemuck::bytes_of(&lights);
         Ok(Uploaded {
+            geometry: hash_twice(&(quad_bytes, light_bytes, upload)),
             volume: resident.volume(gpu, volume)?,
             quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
             quad_count: quads.len() as u32,
-            lights: gpu.buffer_with(
-                "lights",
-                bytemuck::bytes_of(&layout::lights(scene)),
-                wgpu::BufferUsages::UNIFORM,
-            ),
+            lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::UNIFORM),
             vertices,
             indices,
             index_count: mesh.indices.len() as u32,
@@ -91,8 +95,8 @@ impl Resident {
         Ok(view)
     }
 
-    /// Vertices and indices.
-    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> (wgpu::Buffer, wgpu::Buffer) {
+    /// Vertices, indices, and the number of this pair.
+    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> (wgpu::Buffer, wgpu::Buffer, u64) {
         let vertices = match &self.vertices {
             Some((old, buffer)) if Arc::ptr_eq(old, &mesh.vertices) => buffer.clone(),
             _ => {
@@ -103,18 +107,17 @@ impl Resident {
                 buffer
             }
         };
-        let known = self.indices.iter().find(|(old, _)| Arc::ptr_eq(old, &mesh.indices));
-        let indices = match known {
-            Some((_, buffer)) => buffer.clone(),
-            None => {
-                let bytes = bytemuck::cast_slice(&mesh.indices);
-                let buffer = gpu.buffer_with("indices", bytes, wgpu::BufferUsages::INDEX);
-                self.indices.truncate(1);
-                self.indices.push((mesh.indices.clone(), buffer.clone()));
-                buffer
-            }
-        };
-        (vertices, indices)
+        if let Some((_, buffer, upload)) =
+            self.indices.iter().find(|(old, ..)| Arc::ptr_eq(old, &mesh.indices))
+        {
+            return (vertices, buffer.clone(), *upload);
+        }
+        let bytes = bytemuck::cast_slice(&mesh.indices);
+        let buffer = gpu.buffer_with("indices", bytes, wgpu::BufferUsages::INDEX);
+        self.indices.truncate(1);
+        self.uploads += 1;
+        self.indices.push((mesh.indices.clone(), buffer.clone(), self.uploads));
+        (vertices, buffer, self.uploads)
     }
 }
 

@@ -30,6 +30,7 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
 }
 
 const SURFACE: RenderOptions = RenderOptions {
+    keep_rasters: 0,
     surface: true,
     samples: None,
     tile_pixels: None,
@@ -293,4 +294,57 @@ fn what_stays_on_the_device_is_never_stale() {
             assert!(fresh.surface == other.surface && fresh.counts == other.counts, "{change:?} {name}");
         }
     }
+}
+
+#[test]
+fn kept_results_of_the_raster_pass_change_no_bit_and_are_never_stale() {
+    let Some(mut keeping) = renderer("rasters") else { return };
+    let Some(mut fresh) = renderer("rasters") else { return };
+    let base = ["image.width=70", "image.height=50", "image.samples=2", "rocks.foot.levels=5"];
+    let changes = [
+        "volume.flow=0.25",
+        "volume.flow=0.5",
+        "volume.flow=0.75",
+        "trace.tau=0.2",
+        "image.exposure=1",
+        "light.ambient=[0.5,0.1,0.1]",
+        "lights.sun.intensity=3",
+        "lights.sun.direction=[1,1,1]",
+        "lights.sun.kind=point",
+        "camera.eye=[0.5,-5,12.5]",
+        "camera.up=[0.1,1,0]",
+        "camera.fov=30",
+        "camera.near=11.5",
+        "background.zenith=[1,0,0]",
+        "background.horizon=[0,1,0]",
+        "materials.water.thickness=0.7",
+        "rocks.wall.seed=4",
+        "rocks.wall.color=[0.5,0.5,0.5]",
+        "image.samples=3",
+        "image.width=71",
+        "quads.0.corners=[[-1.27,3.9,-0.0583],[-0.83,4.02,-0.0723],[-0.94,0.5,0.35],[-1.43,0.5,0.35]]",
+    ];
+    let options = RenderOptions { keep_rasters: 64 << 20, ..SURFACE };
+    let mut spared = 0;
+    let mut meshes: Vec<(Vec<taki::scene::Rock>, taki::scene::Mesh)> = Vec::new();
+    let volume = scene("fig5", &base).volume(1 << 30, &Unwatched).expect("a volume");
+    // Each three times over: drawn, kept, and used again; and back to what was first.
+    for change in changes.iter().flat_map(|c| [Some(c), Some(c), Some(c), None, None]) {
+        let sets: Vec<&str> = base.iter().chain(change).copied().collect();
+        let scene = scene("fig5", &sets);
+        let mesh = match meshes.iter().find(|(rocks, _)| *rocks == scene.rocks) {
+            Some((_, mesh)) => mesh.clone(),
+            None => {
+                meshes.push((scene.rocks.clone(), scene.mesh()));
+                meshes[meshes.len() - 1].1.clone()
+            }
+        };
+        let kept = keeping.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
+        let drawn = fresh.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
+        spared += u32::from(kept.seconds.gbuffer == 0.0);
+        assert!(drawn.seconds.gbuffer > 0.0);
+        assert!(kept.radiance == drawn.radiance && kept.counts == drawn.counts, "{change:?}");
+        assert!(kept.picture == drawn.picture && kept.surface == drawn.surface, "{change:?}");
+    }
+    assert!(spared > 40, "only {spared} of 105 frames were spared the raster pass");
 }

@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::Batch;
 use super::report::word;
 use crate::error::{Result, human_bytes};
-use crate::job::memory_of;
+use crate::gpu::CANVAS_BYTES;
+use crate::job::{memory_of, spare_for_rasters};
 
 /// What a run would render, and what it needs for it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -41,7 +42,15 @@ impl Batch {
         let scene = self.scene(own.first().copied().unwrap_or(0))?;
         let window = self.window(&scene);
         let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
-        let (memory_bytes, strips) = memory_of(&scene, window, surface, self.base.limits().memory)?;
+        let memory = self.base.limits().memory;
+        let (needed, strips) = memory_of(&scene, window, surface, memory)?;
+        let rasters = CANVAS_BYTES * window.pixels() * u64::from(scene.image.samples);
+        let kept = if strips.len() > 1 || to_render < 2 {
+            0
+        } else {
+            spare_for_rasters(memory, needed).min(rasters)
+        };
+        let memory_bytes = needed + kept;
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
         let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
         let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();

@@ -8,7 +8,7 @@ use super::writer::{Outcomes, Start, Writer};
 use crate::error::{Error, Result};
 use crate::frame::{Window, remove_left_by};
 use crate::gpu::RenderOptions;
-use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, strips};
+use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, memory_of, spare_for_rasters};
 use crate::scene::{Mesh, Rock, Scene};
 
 /// Between two looks at what others have claimed.
@@ -180,7 +180,7 @@ impl Work<'_> {
             scene.warnings(&volume).iter().for_each(|w| self.watcher.warn(w));
         }
         let mesh = self.mesh(&scene);
-        let parts = strips(&scene, window, surface, memory)?;
+        let (needed, parts) = memory_of(&scene, window, surface, memory)?;
         let mut start = Some(Start {
             number,
             name: name.clone(),
@@ -196,8 +196,9 @@ impl Work<'_> {
             began,
         });
         let several = parts.len() > 1;
+        let keep_rasters = if several { 0 } else { spare_for_rasters(memory, needed) };
         for part in parts {
-            let options = RenderOptions { surface, window: Some(part), ..Default::default() };
+            let options = RenderOptions { surface, window: Some(part), keep_rasters, ..Default::default() };
             let rows = [part.y - window.y, part.height, window.height];
             let watch = Share { watcher: self.watcher, name: &name, rows };
             let frame = match self.engine.render(&scene, &volume, &mesh, &options, &watch) {

@@ -32,6 +32,9 @@ const SETTLE: Duration = Duration::from_millis(60);
 const PATIENCE: Duration = Duration::from_millis(250);
 /// So is the building of a volume, but it is worth a longer wait.
 const BUILD_PATIENCE: Duration = Duration::from_secs(2);
+/// Bytes for results of the raster pass: while the water plays or one slider of the walk moves, previews are
+/// spared it. Two samples of a window's full picture, or all of several previews.
+const KEPT_RASTERS: u64 = 128 << 20;
 /// More than this many lost devices a minute, and the CPU takes over.
 const MAX_REBUILDS: usize = 3;
 /// Preview pixels per side of a full pixel that are tried.
@@ -407,6 +410,7 @@ impl Renderer {
         let options = RenderOptions {
             surface: job.request.layer.of_surface() && samples.start == 0,
             samples: Some(samples.clone()),
+            keep_rasters: KEPT_RASTERS,
             ..Default::default()
         };
         let clock = Instant::now();
