@@ -16,6 +16,9 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::error::{Error, Result};
 use crate::frame::{Life, Owner, folder_of};
 
+/// A claim that still does not say whose it is after so long is stale.
+const NAMELESS: Duration = Duration::from_secs(5);
+
 /// Takes claims, and keeps them fresh.
 pub struct Claims {
     stale: Duration,
@@ -151,7 +154,9 @@ impl Claims {
         if *seen != touched {
             (*seen, *since) = (touched, Instant::now());
         }
-        let stale = !alive && since.elapsed() > self.stale;
+        // Without a name its process was killed between two calls, or is about to write it.
+        let patience = if owner.is_some() { self.stale } else { self.stale.min(NAMELESS) };
+        let stale = !alive && since.elapsed() > patience;
         (owner, stale)
     }
 }

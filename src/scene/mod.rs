@@ -17,7 +17,7 @@ use glam::Vec3;
 pub use animation::Animation;
 pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{Source, parse_value};
+pub use read::{Source, check_names, parse_value};
 pub use rock::{Mesh, Rock, Vertex};
 pub use value::{Key, Place, Raw, Value, Values};
 

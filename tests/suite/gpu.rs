@@ -82,7 +82,7 @@ fn continuous_integration_runs_on_software_vulkan() {
         let names: Vec<String> = adapters().iter().map(|a| a.get_info().name).collect();
         assert!(names.iter().any(|n| n.contains("llvmpipe")), "adapters: {names:?}");
         let renderer = renderer("software Vulkan").expect("an adapter");
-        assert!(renderer.gpu.timestamps, "lavapipe times its passes");
+        assert!(!renderer.gpu.timestamps, "its time stamps are not to be trusted");
     }
 }
 

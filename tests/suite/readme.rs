@@ -80,7 +80,8 @@ fn every_subcommand_and_option_of_the_help_is_in_the_readme() {
         &["farm", "kubernetes"],
     ] {
         for option in help(command).split_whitespace().filter(|w| w.starts_with("--") && w.len() > 3) {
-            let option = option.trim_end_matches([',', ';', '.', ')', '`']).split('=').next().unwrap_or("");
+            let option =
+                option.trim_end_matches([',', ';', '.', ')', ':', '`']).split('=').next().unwrap_or("");
             assert!(option == "--help" || text.contains(option), "{command:?} {option}");
         }
     }

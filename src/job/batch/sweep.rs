@@ -1,7 +1,7 @@
 //! Values to try: `alpha=0.25:1:0.25`, `h=0.6,1,1.4`.
 
 use crate::error::{Error, Result};
-use crate::scene::{PARAMS, Param, Raw, Values, parse_value};
+use crate::scene::{PARAMS, Param, Raw, Values, check_names, parse_value};
 
 /// Most values of one sweep.
 const MAX_VALUES: usize = 1000;
@@ -34,6 +34,8 @@ impl Sweep {
                 Ok(()) => usage("unknown key".into()),
             });
         };
+        check_names(values, &key)
+            .map_err(|(what, fix)| Error::input(format!("--sweep {key}: {what}"), fix))?;
         if key.starts_with("animate.") || key == "image.width" || key == "image.height" || param.is_list() {
             return Err(usage(format!("{key} cannot be swept: all pictures share it")));
         }

@@ -102,7 +102,7 @@ fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
 
 #[test]
 fn workers_that_share_a_folder_make_every_picture_once_even_if_some_are_killed() {
-    let arguments = ["--frames", "0-39", "-o", "f.####.png", "--events", "json"];
+    let arguments = ["--frames", "0-39", "-o", "f.####.png", "--events", "json", "--stale", "2"];
     let alone = folder();
     run(&mut batch(alone.path(), arguments)).done();
     let expected = files(alone.path());
