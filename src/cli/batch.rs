@@ -71,9 +71,9 @@ pub struct BatchArgs {
     /// How often a picture is tried again after the GPU device was lost.
     #[arg(long, value_name = "N", default_value_t = 2)]
     retries: u32,
-    /// A picture that another machine has claimed is taken over when that machine has not been heard of for
-    /// so long.
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
+    /// A picture that another process has claimed is taken over when it has not been heard of for so long, or
+    /// is known to have ended.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = stale)]
     stale: f64,
     /// Size of the pictures in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -136,6 +136,11 @@ fn frames(text: &str) -> std::result::Result<FrameList, String> {
     list.sort_unstable();
     list.dedup();
     Ok(FrameList(list))
+}
+
+/// Seconds, one at least: claims are touched four times in so long.
+fn stale(text: &str) -> std::result::Result<f64, String> {
+    seconds(text).ok().filter(|&s| s >= 1.0).ok_or_else(|| "a number of seconds from 1 to 86400".into())
 }
 
 /// `I/N`.

@@ -1,10 +1,10 @@
 //! Exclusive claims on work, for any number of processes that share a folder.
 //!
 //! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it, which only one process
-//! can create. Its owner touches it now and then. Where the owner is dead (same machine), or has not touched
-//! it for the stale time (another machine: by the watcher's own clock, for clocks differ), the next one
-//! claims `-1`, which again only one can create: so a claim is never taken by two. The highest number
-//! owns the work. Claims are removed once the work is done: who claims after that finds it done.
+//! can create. Its owner touches it now and then. Where the owner is dead (on this machine that is known), or has
+//! not touched it for the stale time (by the watcher's own clock, for clocks differ), the next one claims `-1`,
+//! which again only one can create: so a claim is never taken by two. The highest number owns the work. Claims are
+//! removed once the work is done: who claims after that finds it done.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -22,7 +22,7 @@ const NAMELESS: Duration = Duration::from_secs(5);
 /// Takes claims, and keeps them fresh.
 pub struct Claims {
     stale: Duration,
-    /// Others' claims: when each was last seen to change, and its time stamp then.
+    /// Others' claims: the time stamp of each, and since when it is seen.
     watched: HashMap<PathBuf, (Option<SystemTime>, Instant)>,
     held: Arc<Mutex<Vec<Held>>>,
     /// Dropped to end the thread that touches what is held.
@@ -91,6 +91,9 @@ impl Claims {
                 Ok(mut file) => {
                     // A full disk leaves it empty: then it says by its time alone that someone is here.
                     let _ = file.write_all(serde_json::json!(Owner::me()).to_string().as_bytes());
+                    for older in 0..generation {
+                        self.watched.remove(&claim_path(target, older));
+                    }
                     lock(&self.held).push(Held { path, file });
                     let held = self.held.clone();
                     return Ok(Asked::Ours(Claim {
@@ -135,29 +138,23 @@ impl Claims {
 
     /// Who owns another's claim, and whether it is stale.
     fn watch(&mut self, path: &Path) -> (Option<Owner>, bool) {
+        let Ok(meta) = std::fs::symlink_metadata(path) else {
+            // Gone by now: its owner has finished, or given up. Asked again later, it tells.
+            self.watched.remove(path);
+            return (None, false);
+        };
+        let touched = meta.modified().ok();
         let mut text = String::new();
-        let read = File::open(path).and_then(|file| {
-            let touched = file.metadata()?.modified().ok();
-            file.take(4096).read_to_string(&mut text)?;
-            Ok(touched)
-        });
-        // Gone by now: its owner has finished, or given up. Asked again later, it tells.
-        let Ok(touched) = read else { return (None, false) };
-        let owner: Option<Owner> = serde_json::from_str(&text).ok();
-        if let Some(owner) = &owner
-            && owner.life() == Life::Dead
-        {
-            return (Some(owner.clone()), true);
-        }
-        let alive = owner.as_ref().is_some_and(|o| o.life() == Life::Alive);
+        let read = File::open(path).and_then(|file| file.take(4096).read_to_string(&mut text));
+        let owner: Option<Owner> = read.ok().and_then(|_| serde_json::from_str(&text).ok());
+        let dead = owner.as_ref().is_some_and(|o| o.life() == Life::Dead);
         let (seen, since) = self.watched.entry(path.to_owned()).or_insert((touched, Instant::now()));
         if *seen != touched {
             (*seen, *since) = (touched, Instant::now());
         }
         // Without a name its process was killed between two calls, or is about to write it.
         let patience = if owner.is_some() { self.stale } else { self.stale.min(NAMELESS) };
-        let stale = !alive && since.elapsed() > patience;
-        (owner, stale)
+        (owner, dead || since.elapsed() > patience)
     }
 }
 

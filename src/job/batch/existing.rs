@@ -23,6 +23,15 @@ pub enum Found {
     Other(String),
 }
 
+/// A name that another picture has.
+fn taken(file: &Path, what: &str) -> Error {
+    Error::CannotCreate {
+        path: file.to_owned(),
+        why: format!("another picture has this name: {what}"),
+        fix: "choose other names with -o, or replace it with --overwrite".into(),
+    }
+}
+
 impl Batch {
     /// Decodes what is there. Files of other scenes are refused unless they may be replaced.
     pub(super) fn look(&mut self, monitor: &dyn Monitor) -> Result<()> {
@@ -45,11 +54,7 @@ impl Batch {
                 for (file, found) in files.iter().zip(&found) {
                     match found {
                         Found::Other(what) => {
-                            return Err(Error::CannotCreate {
-                                path: file.clone(),
-                                why: format!("another picture has this name: {what}"),
-                                fix: "choose other names with -o, or replace it with --overwrite".into(),
-                            });
+                            return Err(taken(file, what));
                         }
                         Found::Broken(why) => {
                             monitor.warn(&format!("{}: {why}; it is rendered again", file.display()));
@@ -79,12 +84,23 @@ impl Batch {
         Ok(())
     }
 
-    /// Whether another process has made the picture since this one has looked.
+    /// Whether another process has made the picture since this one has looked. One of another scene is
+    /// refused as at first.
     pub(super) fn made_meanwhile(&self, number: usize) -> Result<bool> {
         let files = self.files(number);
-        let new =
-            |file: &std::path::PathBuf| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
-        Ok(files.iter().all(new) && self.found(number)?.iter().all(|f| *f == Found::Whole))
+        let new = |file: &Path| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
+        if !files.iter().any(|file| new(file)) {
+            return Ok(false);
+        }
+        let found = self.found(number)?;
+        for (file, found) in files.iter().zip(&found) {
+            if let Found::Other(what) = found
+                && new(file)
+            {
+                return Err(taken(file, what));
+            }
+        }
+        Ok(files.iter().all(|file| new(file)) && found.iter().all(|f| *f == Found::Whole))
     }
 
     /// What the names of a picture's files hold.

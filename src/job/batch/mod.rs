@@ -159,6 +159,7 @@ impl Batch {
             replaced: HashMap::new(),
             fresh: BTreeSet::new(),
         };
+        batch.check_names()?;
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
         batch.look(monitor)?;
@@ -232,6 +233,27 @@ impl Batch {
         self.base.with(&changes)?.at(self.frame(number))
     }
 
+    /// No two pictures of a sweep have one name: values may run into one another, or differ in what no
+    /// file's name can hold.
+    fn check_names(&self) -> Result<()> {
+        if self.sweeps.is_empty() {
+            return Ok(());
+        }
+        let mut names: HashMap<PathBuf, usize> = HashMap::new();
+        for number in 0..self.count() {
+            for file in self.files(number) {
+                if let Some(other) = names.insert(file.clone(), number) {
+                    let (other, this) = (self.name(other), self.name(number));
+                    return Err(Error::Usage(format!(
+                        "{} would be {other} and {this}; put something between the places of -o, such as {{h}}-{{alpha}}",
+                        file.display()
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Every frame's scene is valid, or the first that is not says so.
     fn check_scenes(&self, monitor: &dyn Monitor) -> Result<()> {
         let own: Vec<usize> = self.own().collect();
@@ -253,8 +275,8 @@ impl Batch {
     /// Every folder is there and can be written; what dead processes left in it goes.
     fn check_folders(&self) -> Result<()> {
         let files: Vec<PathBuf> = self.own().take(1).flat_map(|n| self.files(n)).collect();
-        let still = Still::open(&files)?;
-        if self.request.layers != Layer::ALL && !still.has_exr() {
+        drop(Still::open(&files)?);
+        if self.request.layers != Layer::ALL && !self.has_exr() {
             return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
         }
         let folders: BTreeSet<&Path> = files.iter().map(|file| folder_of(file)).collect();

@@ -111,7 +111,7 @@ fn workers_that_share_a_folder_make_every_picture_once_even_if_some_are_killed()
         let start =
             || batch(dir.path(), arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut workers: Vec<_> = (0..4).map(|_| start()).collect();
-        while files(dir.path()).len() < 10 + round % 10 {
+        while fs::read_dir(dir.path()).unwrap().count() < 10 + round % 10 {
             std::thread::sleep(Duration::from_millis(1));
         }
         let mut killed = 0;
@@ -171,6 +171,19 @@ fn a_claim_of_another_machine_is_taken_over_when_it_is_not_touched() {
     assert!(!dir.path().join("f.0001.png").exists());
     child.kill().unwrap();
     wait(&mut child);
+}
+
+#[test]
+fn what_is_no_claim_in_a_claims_place_does_not_stop_the_work_for_long() {
+    let dir = folder();
+    fs::create_dir(dir.path().join(".f.0000.png.taki-claim-0")).unwrap();
+    fs::write(dir.path().join(".f.0001.png.taki-claim-0"), "").unwrap();
+    let ended =
+        run(&mut batch(dir.path(), ["--frames", "0-2", "-o", "f.####.png", "--stale=1", "--events=json"]));
+    assert_eq!(counts(&ended), [3, 0, 3, 0, 0]);
+    // A shard without pictures of its own has nothing to do, and nothing to say against it.
+    let none = ["--frames", "0-2", "-o", "g.####.exr", "--shard", "5/8", "--layers", "rgb", "--events=json"];
+    assert_eq!(counts(&run(&mut batch(dir.path(), none))), [0; 5]);
 }
 
 /// Runs a command under strace, which makes every thread's `when`-th call of `call` fail for want of room;

@@ -51,6 +51,20 @@ fn sweeps_that_cannot_be_are_refused_with_the_reason() {
 }
 
 #[test]
+fn two_pictures_of_one_name_are_refused_before_the_work() {
+    let dir = folder();
+    let refused =
+        |arguments: &[&str], words: &[&str]| run(&mut batch(dir.path(), arguments)).refused(2, words);
+    let run_on = ["--sweep", "curves.h=1,1.1", "--sweep", "alpha=1,0.1", "-o"];
+    refused(
+        &["--sweep", "max_cells=1,11", "--sweep", "across=1,11", "-o", "{max_cells}{across}.png"],
+        &["111.png", "trace.max_cells=1", "trace.max_cells=11", "{h}-{alpha}"],
+    );
+    refused(&["--sweep", "volume.file=a/b.npz,a_b.npz", "-o", "{file}.png"], &["a_b.npz.png"]);
+    run(batch(dir.path(), run_on).arg("{h}-{alpha}.png")).done();
+}
+
+#[test]
 fn a_sweep_leaves_a_sheet_and_manifests_that_agree_with_its_pictures() {
     let dir = folder();
     let grid = [
