@@ -422,7 +422,10 @@ impl Renderer {
         let once = clock.elapsed().as_secs_f64() - of_pixels - s.pipelines - s.upload;
         let samples = samples.len() as f64;
         self.speed.per_pixel = Some(of_pixels / samples / (width as f64 * height as f64));
-        self.speed.once[usize::from(coarse)] = once.max(0.0) / samples;
+        // Where results of the raster pass were kept it says nothing of the next picture, which may need it.
+        if s.gbuffer > 0.0 {
+            self.speed.once[usize::from(coarse)] = once.max(0.0) / samples;
+        }
         // People compare passes, not parts of a refinement.
         (s.gbuffer, s.integrate) = (s.gbuffer / samples, s.integrate / samples);
         Ok(frame)
