@@ -61,17 +61,26 @@ pub fn life_of(machine: &str, pid: u32) -> Life {
     let proc = Path::new("/proc");
     if machine != Owner::me().machine {
         Life::Elsewhere
-    } else if !proc.join("self").exists() || proc.join(pid.to_string()).exists() {
+    } else if !proc.join("self").exists() {
         Life::Alive
     } else {
-        Life::Dead
+        match std::fs::read_to_string(proc.join(format!("{pid}/stat"))) {
+            // A zombie has ended; nobody has asked for its exit code yet.
+            Ok(stat) if matches!(fields(&stat).next(), Some("Z" | "X")) => Life::Dead,
+            Ok(_) => Life::Alive,
+            Err(_) if proc.join(pid.to_string()).exists() => Life::Alive,
+            Err(_) => Life::Dead,
+        }
     }
+}
+
+/// The fields of a process's `stat` after its name, which stands in parentheses and may hold any character.
+fn fields(stat: &str) -> std::str::SplitWhitespace<'_> {
+    stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace()
 }
 
 /// When a process started, by field 22 of its `stat`.
 fn started(pid: u32) -> Option<u64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The program's name, in parentheses, may hold spaces and parentheses.
-    let after_name = stat.rsplit_once(')')?.1;
-    after_name.split_whitespace().nth(19)?.parse().ok()
+    fields(&stat).nth(19)?.parse().ok()
 }

@@ -145,8 +145,10 @@ impl Claims {
         };
         let touched = meta.modified().ok();
         let mut text = String::new();
-        let read = File::open(path).and_then(|file| file.take(4096).read_to_string(&mut text));
-        let owner: Option<Owner> = read.ok().and_then(|_| serde_json::from_str(&text).ok());
+        // A pipe of this name would never open.
+        let read =
+            meta.is_file().then(|| File::open(path).and_then(|f| f.take(4096).read_to_string(&mut text)));
+        let owner: Option<Owner> = read.and_then(|_| serde_json::from_str(&text).ok());
         let dead = owner.as_ref().is_some_and(|o| o.life() == Life::Dead);
         let (seen, since) = self.watched.entry(path.to_owned()).or_insert((touched, Instant::now()));
         if *seen != touched {

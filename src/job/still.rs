@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::volume::VolumeTexture;
 
 /// The program that wrote a file.
-const SOFTWARE: &str = concat!("taki ", env!("CARGO_PKG_VERSION"));
+pub(crate) const SOFTWARE: &str = concat!("taki ", env!("CARGO_PKG_VERSION"));
 
 /// Lines of an EXR made at a time, on all cores.
 const LINES: usize = 8;

@@ -19,6 +19,8 @@ const WORK_BYTES: u64 = 64 << 20;
 const PROGRAM_BYTES: u64 = 256 << 20;
 /// Strips are not larger than this without need: more memory would gain no time.
 const STRIP_PIXELS: u64 = 1 << 23;
+/// Fewer rows are not rendered at once: for every strip the whole window is drawn again.
+const LEAST_ROWS: u64 = 64;
 /// Most pixels of an image.
 const MAX_PIXELS: u64 = 1 << 36;
 
@@ -83,7 +85,14 @@ pub fn memory_of(
     let row = u64::from(window.width) * (PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 });
     let [_, drawn] = Grid::default().size([image.width, image.height]);
     let wanted = (STRIP_PIXELS / u64::from(window.width)).max(u64::from(drawn));
-    let most = (left / row).clamp(1, wanted).min(u64::from(u32::MAX)) as u32;
+    let least = LEAST_ROWS.min(u64::from(window.height));
+    let need = parts.saturating_add(WORK_BYTES + least * row);
+    if need > memory {
+        let what =
+            format!("a picture of {}×{} pixels with its volume and rocks", window.width, window.height);
+        return Err(Error::memory(what, need.into(), memory, "lower the sizes or raise --memory"));
+    }
+    let most = (left / row).clamp(least, wanted.max(least)).min(u64::from(u32::MAX)) as u32;
     let strips = cut(window, drawn, most);
     let tallest = strips.iter().map(|s| u64::from(s.height)).max().unwrap_or(0);
     Ok((parts.saturating_add(WORK_BYTES + tallest * row), strips))

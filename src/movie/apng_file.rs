@@ -22,6 +22,7 @@ impl ApngWriter {
             encoder.set_color(png::ColorType::Rgb);
             encoder.set_depth(png::BitDepth::Eight);
             encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+            encoder.add_text_chunk("Comment".into(), options.mark_text())?;
             if options.frames > 1 {
                 encoder.set_animated(options.frames as u32, if options.repeat { 0 } else { 1 })?;
                 let [seconds, parts] = delay(options.fps);

@@ -39,7 +39,7 @@ impl VideoWriter {
         let file = output.file().try_clone().map_err(|e| Error::write(output.path(), e))?;
         let even = options.size.map(|side| side.next_multiple_of(2));
         let mut command = quiet(program);
-        command.args(arguments(kind, even, options.fps)).stdin(Stdio::piped()).stdout(file);
+        command.args(arguments(kind, even, options)).stdin(Stdio::piped()).stdout(file);
         let encoder = Encoder::start(command, program, output.path())?;
         let bytes = if even == options.size { 0 } else { even[0] as usize * even[1] as usize * 3 };
         let padded = Vec::with_capacity(bytes);
@@ -106,8 +106,9 @@ fn absent(program: &Path, e: &std::io::Error) -> Error {
 }
 
 /// What follows [`quiet`]: frames in on stdin, the file out.
-fn arguments(kind: MovieKind, [width, height]: [u32; 2], fps: f64) -> Vec<String> {
-    let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), fps.to_string());
+fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions) -> Vec<String> {
+    let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), options.fps.to_string());
+    let comment = format!("comment={}", options.mark_text());
     let mut all: Vec<&str> = Vec::new();
     all.extend([
         "-f",
@@ -128,6 +129,7 @@ fn arguments(kind: MovieKind, [width, height]: [u32; 2], fps: f64) -> Vec<String
     all.extend(["-color_trc", "bt709", "-c:v", codec]);
     // The number of threads is fixed: the file is then the same on any machine with the same ffmpeg.
     all.extend(["-threads", "4", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]);
+    all.extend(["-metadata", &comment]);
     all.extend(match kind {
         // Water is fine grain: at ffmpeg's own 23 it turns to mud.
         MovieKind::Webm => &["-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "3"][..],

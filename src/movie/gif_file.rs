@@ -56,6 +56,10 @@ impl GifWriter {
         if options.repeat && frames > 1 {
             encoder.set_repeat(Repeat::Infinite).map_err(fail)?;
         }
+        let mark = options.mark_text();
+        encoder
+            .write_raw_extension(gif::AnyExtension(gif::Extension::Comment as u8), &[mark.as_bytes()])
+            .map_err(|e| Error::write(&path, e))?;
         waiting.rewind().map_err(|e| Error::read(&path, e))?;
         let mut rgb = vec![0; options.frame_bytes()];
         let mut before = Vec::new();

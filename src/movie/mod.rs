@@ -83,9 +83,32 @@ pub struct MovieOptions {
     pub frames: u64,
     /// Whether GIF and animated PNG start anew for ever, or play once. Videos leave that to the player.
     pub repeat: bool,
+    /// Tells movies apart: it stands in the file, and [`mark_of`] finds it.
+    pub mark: u64,
+}
+
+/// Stands before the mark in a file.
+const MARK: &str = "taki-movie-";
+
+/// As far as a mark is looked for: the index of an MP4 comes before it.
+const MARK_WITHIN: u64 = 64 << 20;
+
+/// The mark of a movie that this program made.
+pub fn mark_of(path: &Path) -> Option<u64> {
+    let file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut std::io::Read::take(file, MARK_WITHIN), &mut bytes).ok()?;
+    let at = bytes.windows(MARK.len()).position(|w| w == MARK.as_bytes())? + MARK.len();
+    let digits = std::str::from_utf8(bytes.get(at..at + 16)?).ok()?;
+    u64::from_str_radix(digits, 16).ok()
 }
 
 impl MovieOptions {
+    /// What stands in the file for the mark.
+    fn mark_text(&self) -> String {
+        format!("{MARK}{:016x}", self.mark)
+    }
+
     /// Bytes of one frame.
     fn frame_bytes(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize * 3

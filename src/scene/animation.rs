@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use super::keyframes::{CameraPath, Interpolation, Keyframes};
 use super::param::{Kind, Param};
 use super::read::{Source, apply_sets, check_names};
-use super::value::{Place, Raw, Values};
+use super::value::{Place, Raw, Value, Values};
 use super::{Limits, Scene};
 use crate::error::{Error, Result};
 
@@ -50,8 +50,12 @@ impl Animation {
     pub fn new(name: &str, values: Values, folder: Option<PathBuf>, limits: &Limits) -> Result<Animation> {
         let period = Some(values.count("animate.loop")).filter(|&n| n > 0);
         let frames = period.unwrap_or(values.count("animate.frames"));
-        let fps = f64::from(values.float("animate.fps"));
-        let speed = f64::from(values.float("animate.speed"));
+        let number = |key: &str| match values.get(key) {
+            // As written: 23.976 is not its float32.
+            Value::Float(x) => x,
+            _ => f64::from(values.float(key)),
+        };
+        let (fps, speed) = (number("animate.fps"), number("animate.speed"));
         let turn = values.int("animate.turn");
         if let Some(n) = period
             && turn != 0
@@ -148,7 +152,9 @@ impl Animation {
         let time = f64::from(number);
         let moves_flow = self.tracks.iter().any(|(key, _)| key == "volume.flow");
         if self.flow.0 != 0.0 && number != 0 && !moves_flow {
-            let flow = f64::from(values.float("volume.flow")) + self.flow.0 * time / self.flow.1;
+            // Whole lengths change nothing, and would take the digits that long animations need.
+            let moved = (self.flow.0 * time / self.flow.1) % 1.0;
+            let flow = f64::from(values.float("volume.flow")) + moved;
             values.set("volume.flow", &Raw::Float(flow), &place("volume.flow"))?;
         }
         for (key, track) in &self.tracks {
@@ -227,7 +233,12 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
         scratch.set(&key, &raw(&key, value), &Place(format!("{section}.values at frame {frame}")))?;
     }
     let interpolation = Interpolation::of(&values.text(&format!("{section}.interpolation")));
-    match Keyframes::new(&frames, series, interpolation, period) {
+    // Copies of the volume join: a whole length on, the flow is where it was.
+    let closes = |first: &[f64], last: &[f64]| match key.as_str() {
+        "volume.flow" => (last[0] - first[0]).fract() == 0.0,
+        _ => first == last,
+    };
+    match Keyframes::new(&frames, series, interpolation, period, closes) {
         Ok(track) => Ok((key, track)),
         Err(why) => bad(format!("the keyframes of {key} {why}"), "see animate.loop in the README".into()),
     }

@@ -41,19 +41,20 @@ pub struct Keyframes {
 
 impl Keyframes {
     /// Of increasing frames. With a `period` the track comes round: after its last keyframe it goes on to
-    /// its first. The error says what is wrong with the frames.
+    /// its first; `closes` tells whether a last value, a period after the first, is the same. The error says what is wrong with the frames.
     pub fn new(
         frames: &[i64],
         values: Vec<Vec<f64>>,
         interpolation: Interpolation,
         period: Option<u32>,
+        closes: impl Fn(&[f64], &[f64]) -> bool,
     ) -> Result<Self, String> {
         let mut keys: Vec<(f64, Vec<f64>)> = frames.iter().map(|&f| f as f64).zip(values).collect();
         if let Some(n) = period.map(f64::from) {
             check_loop(frames, n)?;
             let (first, last) = (keys[0].clone(), &keys[keys.len() - 1]);
             if last.0 == first.0 + n {
-                if last.1 != first.1 {
+                if !closes(&first.1, &last.1) {
                     return Err(format!(
                         "jump where the loop of {n} frames closes: first and last value differ"
                     ));

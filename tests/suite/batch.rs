@@ -116,11 +116,11 @@ fn a_second_run_keeps_what_is_whole_and_makes_what_is_not() {
     let again = run(&mut batch(dir.path(), arguments));
     assert_eq!(counts(&again), [5, 5, 0, 0, 0]);
 
-    // One is missing, one is cut short, one is no picture: names alone say nothing.
+    // One is missing, one is cut short, one is empty: names alone say nothing.
     fs::remove_file(dir.path().join("f.0001.png")).unwrap();
     let cut = &expected["f.0002.png"][..expected["f.0002.png"].len() - 20];
     fs::write(dir.path().join("f.0002.png"), cut).unwrap();
-    fs::write(dir.path().join("f.0003.png"), "not a picture").unwrap();
+    fs::write(dir.path().join("f.0003.png"), "").unwrap();
     let mended = run(&mut batch(dir.path(), arguments));
     assert_eq!(counts(&mended), [5, 2, 3, 0, 0]);
     assert_eq!(mended.lines("taki: warning:").len(), 2, "{mended:?}");
@@ -138,6 +138,20 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
     run(batch(dir.path(), other).arg("--overwrite")).done();
     let after = files(dir.path());
     assert!(after.len() == 3 && after.iter().all(|(name, bytes)| before[name] != *bytes));
+    // What is no picture of this program is not replaced either.
+    for foreign in [&b"not a picture"[..], b"", b"\x89PNG\r\n\x1a\n and more"] {
+        let place = folder();
+        fs::write(place.path().join("f.0001.png"), foreign).unwrap();
+        let ended = run(&mut batch(place.path(), ["--frames", "0-2", "-o", "f.####.png"]));
+        match foreign {
+            b"" => drop(ended.done()),
+            _ => ended.refused(73, &["f.0001.png", "no picture of taki"]),
+        }
+    }
+    let sheets = folder();
+    fs::write(sheets.path().join("front.manifest.csv"), "mine").unwrap();
+    run(&mut batch(sheets.path(), ["--sweep", "h=1,2", "-o", "{h}.png"]))
+        .refused(73, &["front.manifest.csv"]);
     // Any foreign picture, and another part of the same one.
     run(&mut batch(
         dir.path(),
@@ -154,7 +168,7 @@ fn faults_are_known_before_any_picture() {
     let dir = folder();
     fs::create_dir(dir.path().join("f.0002.png")).unwrap();
     fs::write(dir.path().join("bad.toml"), "version = 1\nbase = \"front\"\n[[animate.tracks]]\nkey = \"camera.eye\"\nframes = [0, 8]\nvalues = [[0, 0, 2], [0, 0, -2]]\n").unwrap();
-    let cases: [(&[&str], i32, &[&str]); 12] = [
+    let cases: [(&[&str], i32, &[&str]); 16] = [
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),
         (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would have one name", "fall.####.png"]),
@@ -165,6 +179,14 @@ fn faults_are_known_before_any_picture() {
         (&["--shard", "8/8", "-o", "f.####.png"], 2, &["0/8"]),
         (&["--sweep", "h=0.5,0.7", "-o", "f.####.png"], 2, &["{h}"]),
         (&["--frames", "1", "-o", "f.#.png", "-o", "f.#.png"], 2, &["given twice"]),
+        (
+            &["--frames", "1", "-o", "f.#.png", "-o", "./f.1.png"],
+            2,
+            &["f.1.png would be frame 1 and frame 1"],
+        ),
+        (&["--frames", "1-2", "-o", "f.#.exr", "-o", "f.gif", "--layers", "depth"], 2, &["needs colour"]),
+        (&["--frames", "1", "-o", "absent/f.#.png", "--shard", "5/8"], 73, &["make the folder"]),
+        (&["--frames", "1", "-o", "f.#.png", "--memory", "16"], 33, &["needs", "raise --memory"]),
         (&["--crop", "10,0,10,4", "--frames", "1", "-o", "g.#.png"], 2, &["columns 0 to 15, rows 0 to 11"]),
         (&["--loop", "0", "--set", "animate.frames=2000000", "-o", "f.#.png"], 65, &["animate.frames"]),
     ];

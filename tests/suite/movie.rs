@@ -26,7 +26,7 @@ const VIDEO_ERROR: f64 = 2.5;
 const GIF_ERROR: f64 = 4.0;
 
 fn options(size: [u32; 2], fps: f64, frames: u64) -> MovieOptions {
-    MovieOptions { size, fps, frames, repeat: true }
+    MovieOptions { size, fps, frames, repeat: true, mark: 7 }
 }
 
 /// Frame `i`: smooth and coloured, with a bright bar that wanders down and a part that never changes.
@@ -139,7 +139,7 @@ fn a_gif_shows_its_frames_for_the_right_time() {
 fn a_gif_of_few_colours_is_exact() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("m.gif");
-    let options = MovieOptions { size: [16, 16], fps: 10.0, frames: 3, repeat: false };
+    let options = MovieOptions { size: [16, 16], fps: 10.0, frames: 3, repeat: false, mark: 7 };
     let mut movie = Movie::create(&path, MovieKind::Gif, &options).unwrap();
     let shades = |i: u8| (0..=255).flat_map(|k: u8| [k / 4, k / 4 + i, 7]).collect::<Vec<u8>>();
     let frames = [shades(0), shades(1), shades(1)];
@@ -155,7 +155,7 @@ fn an_animated_png_keeps_every_bit() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("m.apng");
     for (repeat, frames) in [(true, 5), (false, 2), (true, 1)] {
-        let options = MovieOptions { size: [19, 7], fps: 23.976, frames, repeat };
+        let options = MovieOptions { size: [19, 7], fps: 23.976, frames, repeat, mark: 7 };
         write(&path, MovieKind::Apng, &options).unwrap();
         let decoder = png::Decoder::new(BufReader::new(File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();

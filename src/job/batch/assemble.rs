@@ -1,17 +1,18 @@
 //! What is made of all pictures: movies, the contact sheet, manifests.
 
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use image::RgbImage;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
-use super::{Batch, Pattern, Sweep};
+use super::{Batch, Pattern, Sweep, existing};
 use crate::cpu::resolve::resolve;
 use crate::error::{Error, Result};
 use crate::frame::{Layer, Output, figures_of, read_exr, read_png};
-use crate::movie::{Movie, MovieKind, MovieOptions};
+use crate::job::still::{SOFTWARE, scene_text};
+use crate::movie::{Movie, MovieKind, MovieOptions, mark_of};
 use crate::scene::{Image, Scene};
 use crate::sheet::{Axis, Sheet, draw};
 
@@ -58,6 +59,7 @@ impl Batch {
             fps: self.base.fps,
             frames: self.frames.len() as u64,
             repeat: true,
+            mark: 0,
         }
     }
 
@@ -73,11 +75,14 @@ impl Batch {
         }
         let point = number / self.frames.len();
         let options = self.movie_options(scene);
-        self.movies.iter().map(|m| (self.movie_path(m, point), m.kind, options)).collect()
+        let movies = self.movies.iter().map(|m| (self.movie_path(m, point), m.kind));
+        let missing = movies.filter(|(path, _)| !self.fresh.contains(path));
+        let mark = self.marks.get(point).copied().unwrap_or(0);
+        missing.map(|(path, kind)| (path, kind, MovieOptions { mark, ..options })).collect()
     }
 
-    /// Movies that can be made, and that replace nothing but what may be replaced. Those that are there and
-    /// newer than all their pictures stay.
+    /// Movies that can be made, and that replace nothing but what may be replaced. Those that are there and show
+    /// just these frames stay.
     pub(super) fn check_movies(&mut self) -> Result<()> {
         if self.movies.is_empty() {
             return Ok(());
@@ -91,17 +96,22 @@ impl Batch {
         }
         let scene = self.scene(0)?;
         let options = self.movie_options(&scene);
+        self.marks = (0..self.points()).map(|point| self.mark(point, &options)).collect::<Result<_>>()?;
         for movie in &self.movies {
             for point in 0..self.points() {
                 let path = self.movie_path(movie, point);
                 if path.symlink_metadata().is_ok() && !self.request.overwrite {
-                    if self.is_newer(&path, point) {
-                        self.fresh.insert(path);
-                        continue;
-                    }
+                    let why = match mark_of(&path) {
+                        Some(mark) if mark == self.marks[point] => {
+                            self.fresh.insert(path);
+                            continue;
+                        }
+                        Some(_) => "it is there, a movie of other frames, another scene, size or rate",
+                        None => "it is there, and no movie of taki",
+                    };
                     return Err(Error::CannotCreate {
                         path,
-                        why: "it is there, and older than some of its pictures or made without them".into(),
+                        why: why.into(),
                         fix: "remove it, choose another name with -o, or replace all with --overwrite".into(),
                     });
                 }
@@ -111,18 +121,23 @@ impl Batch {
                 }
             }
         }
+        if self.pictures.is_empty() && self.movies.len() * self.points() == self.fresh.len() {
+            // Nothing is missing, so no frame is either.
+            self.whole.fill(true);
+        }
         Ok(())
     }
 
-    /// Whether a movie is as new as every picture of its point, which are all whole.
-    fn is_newer(&self, movie: &Path, point: usize) -> bool {
-        let time = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
-        let Some(made) = time(movie) else { return false };
+    /// What tells a movie of a point from every other: the scenes of all its frames, its size and its rate.
+    fn mark(&self, point: usize, options: &MovieOptions) -> Result<u64> {
         let numbers = point * self.frames.len()..(point + 1) * self.frames.len();
-        let older = |file: &PathBuf| time(file).is_some_and(|t: SystemTime| t <= made);
-        !self.pictures.is_empty()
-            && numbers.clone().all(|n| self.whole[n])
-            && numbers.flat_map(|n| self.files(n)).all(|file| older(&file))
+        let scenes: Vec<u32> = numbers
+            .into_par_iter()
+            .map(|n| Ok(crc32fast::hash(scene_text(&self.scene(n)?).as_bytes())))
+            .collect::<Result<_>>()?;
+        let text = format!("{:?} {} {scenes:?}", options.size, options.fps);
+        let halves = ["a", "b"].map(|salt| u64::from(crc32fast::hash(format!("{salt}{text}").as_bytes())));
+        Ok(halves[0] << 32 | halves[1])
     }
 
     /// Makes movies, sheet and manifests of pictures that are all there.
@@ -142,10 +157,8 @@ impl Batch {
             }
         }
         if let Some(path) = &self.sheet {
-            let sheet = self.draw_sheet(watcher)?;
-            let mut bytes = std::io::Cursor::new(Vec::new());
-            sheet.write_to(&mut bytes, image::ImageFormat::Png).map_err(|e| Error::write(path, e))?;
-            Output::create(path)?.finish_with(bytes.get_ref())?;
+            let bytes = png_of(&self.draw_sheet(watcher)?).map_err(|e| Error::write(path, e))?;
+            Output::create(path)?.finish_with(&bytes)?;
             watcher.event(&Event::Assembled { file: word(path) });
         }
         if !self.manifests.is_empty() {
@@ -167,7 +180,8 @@ impl Batch {
     fn make_movie(&self, kind: MovieKind, path: &Path, point: usize, watcher: &dyn Watcher) -> Result<()> {
         let first = point * self.frames.len();
         let scene = self.scene(first)?;
-        let mut movie = Movie::create(path, kind, &self.movie_options(&scene))?;
+        let options = MovieOptions { mark: self.marks[point], ..self.movie_options(&scene) };
+        let mut movie = Movie::create(path, kind, &options)?;
         for (i, number) in (first..first + self.frames.len()).enumerate() {
             watcher.progress("movie", i as u64, self.frames.len() as u64)?;
             movie.push(self.picture(number)?.as_raw())?;
@@ -267,6 +281,41 @@ impl Batch {
         }
         out.into_inner().map_err(|e| e.into_error())
     }
+}
+
+/// The sheet's file, with the program's name, by which it is known again.
+fn png_of(sheet: &RgbImage) -> std::result::Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, sheet.width(), sheet.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    encoder.add_text_chunk("Software".into(), SOFTWARE.into())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(sheet.as_raw())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Refuses to replace what is no sheet or manifest of this program.
+pub(super) fn check_replaced(path: &Path) -> Result<()> {
+    if path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let start = existing::start_of(path).unwrap_or_default();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let ours = match extension.as_deref() {
+        Some("csv") => start.starts_with(b"number,frame,"),
+        Some("json") => start.starts_with(b"[\n  {\n    \"number\": "),
+        _ => existing::is_ours(&start),
+    };
+    if ours || start.is_empty() && path.is_file() {
+        return Ok(());
+    }
+    Err(Error::CannotCreate {
+        path: path.to_owned(),
+        why: "a file of another kind has this name".into(),
+        fix: "choose another with --sheet or --manifest, or replace it with --overwrite".into(),
+    })
 }
 
 /// Whether a manifest is a table; else it is JSON.

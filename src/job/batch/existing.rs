@@ -1,5 +1,6 @@
 //! What is there already: whole, broken, or another's.
 
+use std::io::Read;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -7,7 +8,7 @@ use rayon::prelude::*;
 use super::{Batch, stamp};
 use crate::error::{Error, Result};
 use crate::frame::{Kind, Verified, verify};
-use crate::job::still::{scene_text, volume_line};
+use crate::job::still::{SOFTWARE, scene_text, volume_line};
 use crate::job::{Claims, Monitor, VolumeStock};
 use crate::scene::Scene;
 
@@ -23,11 +24,28 @@ pub enum Found {
     Other(String),
 }
 
+/// The first bytes of a regular file.
+pub(super) fn start_of(path: &Path) -> Option<Vec<u8>> {
+    // A pipe would never open.
+    let file = path.is_file().then(|| std::fs::File::open(path).ok())??;
+    let mut start = Vec::new();
+    file.take(4096).read_to_end(&mut start).ok()?;
+    Some(start)
+}
+
+/// Whether a file that begins so is a PNG or EXR that this program wrote: its name stands near the start.
+pub(super) fn is_ours(start: &[u8]) -> bool {
+    let picture = start.starts_with(b"\x89PNG") || start.starts_with(b"\x76\x2f\x31\x01");
+    // Whatever its version.
+    let name = &SOFTWARE.as_bytes()[..SOFTWARE.find(' ').map_or(SOFTWARE.len(), |space| space + 1)];
+    picture && start.windows(name.len()).any(|w| w == name)
+}
+
 /// A name that another picture has.
 fn taken(file: &Path, what: &str) -> Error {
     Error::CannotCreate {
         path: file.to_owned(),
-        why: format!("another picture has this name: {what}"),
+        why: format!("another file has this name: {what}"),
         fix: "choose other names with -o, or replace it with --overwrite".into(),
     }
 }
@@ -113,9 +131,25 @@ impl Batch {
         if file.symlink_metadata().is_err() {
             return Ok(Found::Nothing);
         }
+        if file.is_dir() {
+            return Err(Error::CannotCreate {
+                path: file.to_owned(),
+                why: "a folder has this name".into(),
+                fix: "choose another name with -o".into(),
+            });
+        }
         let verified = match verify(file) {
             Ok(verified) => verified,
-            Err(Error::Input { what, .. }) => return Ok(Found::Broken(what)),
+            Err(Error::Input { what, .. }) => {
+                // What was not ours is nobody's to replace; of ours a part may be left.
+                let start = start_of(file).unwrap_or_default();
+                let ours = file.is_file() && (start.is_empty() || is_ours(&start));
+                return Ok(if ours {
+                    Found::Broken(what)
+                } else {
+                    Found::Other("it is no picture of taki".into())
+                });
+            }
             Err(e) => return Err(e),
         };
         Ok(match self.difference(file, &verified, scene)? {

@@ -87,6 +87,8 @@ pub struct Batch {
     replaced: HashMap<PathBuf, Stamp>,
     /// Movies that are there, as new as their pictures.
     fresh: BTreeSet<PathBuf>,
+    /// By point of the grid, what tells its movies from others.
+    marks: Vec<u64>,
 }
 
 /// Tells one version of a file from the next.
@@ -158,6 +160,7 @@ impl Batch {
             whole: vec![false; count],
             replaced: HashMap::new(),
             fresh: BTreeSet::new(),
+            marks: Vec::new(),
         };
         batch.check_names()?;
         batch.check_scenes(monitor)?;
@@ -233,25 +236,37 @@ impl Batch {
         self.base.with(&changes)?.at(self.frame(number))
     }
 
-    /// No two pictures of a sweep have one name: values may run into one another, or differ in what no
-    /// file's name can hold.
+    /// No two outputs have one name: values of a sweep may run into one another, or differ in what no file's
+    /// name can hold; one file may be written in two ways.
     fn check_names(&self) -> Result<()> {
-        if self.sweeps.is_empty() {
+        let alone = self.sweeps.is_empty() && self.pictures.len() + self.movies.len() == 1;
+        if alone && self.manifests.is_empty() {
             return Ok(());
         }
-        let mut names: HashMap<PathBuf, usize> = HashMap::new();
-        for number in 0..self.count() {
-            for file in self.files(number) {
-                if let Some(other) = names.insert(file.clone(), number) {
-                    let (other, this) = (self.name(other), self.name(number));
-                    return Err(Error::Usage(format!(
-                        "{} would be {other} and {this}; put something between the places of -o, such as {{h}}-{{alpha}}",
-                        file.display()
-                    )));
-                }
+        let mut names: HashMap<PathBuf, String> = HashMap::new();
+        let mut add = |file: PathBuf, what: String| match names
+            .insert(file.components().collect(), what.clone())
+        {
+            None => Ok(()),
+            Some(other) => Err(Error::Usage(format!(
+                "{} would be {other} and {what}; give them different names, such as {{h}}-{{alpha}} for values that \
+                 run into one another",
+                file.display()
+            ))),
+        };
+        for path in &self.manifests {
+            add(path.clone(), "the manifest".into())?;
+        }
+        if let Some(path) = &self.sheet {
+            add(path.clone(), "the sheet".into())?;
+        }
+        for movie in &self.movies {
+            for point in 0..self.count() / self.frames.len() {
+                add(self.movie_path(movie, point), format!("the {}", movie.kind.name()))?;
             }
         }
-        Ok(())
+        (0..self.count())
+            .try_for_each(|n| self.files(n).into_iter().try_for_each(|f| add(f, self.name(n).to_string())))
     }
 
     /// Every frame's scene is valid, or the first that is not says so.
@@ -274,8 +289,18 @@ impl Batch {
 
     /// Every folder is there and can be written; what dead processes left in it goes.
     fn check_folders(&self) -> Result<()> {
-        let files: Vec<PathBuf> = self.own().take(1).flat_map(|n| self.files(n)).collect();
+        // A shard may have no picture of its own: the first of all tells for it.
+        let mut files = self.files(self.own().next().unwrap_or(0));
         drop(Still::open(&files)?);
+        let colour = self.request.layers.contains(&Layer::Rgb) || self.pictures.iter().any(|p| !p.is_exr());
+        let shown = self.sheet.is_some() || !self.movies.is_empty() && !self.pictures.is_empty();
+        if !colour && shown && self.request.shard.is_none() {
+            return Err(Error::Usage(
+                "a sheet or a movie needs colour; add rgb to --layers, or PNG files with -o".into(),
+            ));
+        }
+        files.extend(self.movies.iter().map(|movie| self.movie_path(movie, 0)));
+        files.extend(self.sheet.iter().chain(&self.manifests).cloned());
         if self.request.layers != Layer::ALL && !self.has_exr() {
             return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
         }
@@ -334,7 +359,12 @@ fn about_all(
     }
     // Opened and dropped: a folder that is not there is known before the work.
     if request.shard.is_none() {
-        sheet.iter().chain(&manifests).try_for_each(|path| Output::open(path).map(drop))?;
+        for path in sheet.iter().chain(&manifests) {
+            if !request.overwrite {
+                assemble::check_replaced(path)?;
+            }
+            drop(Output::open(path)?);
+        }
     }
     Ok((sheet, manifests))
 }

@@ -27,7 +27,7 @@ pub struct Needs {
     pub strips: u64,
     /// Memory of the work on host and device, bytes, beside the program's own.
     pub memory_bytes: u64,
-    /// The most that what is missing may take on the disk, bytes: PNG and EXR before compression.
+    /// The most that what is missing may take on the disk, bytes: pictures and movies before compression.
     pub disk_bytes: u64,
 }
 
@@ -54,6 +54,9 @@ impl Batch {
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
         let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
         let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();
+        // A GIF keeps its frames beside it until it is made; other movies are smaller than their frames.
+        let movies = (self.movies.len() * (self.count() / self.frames.len()) - self.fresh.len()) as u64;
+        let movie_bytes = movies * self.frames.len() as u64 * window.pixels() * 3;
         Ok(Needs {
             pictures: own.len() as u64,
             to_render,
@@ -63,7 +66,7 @@ impl Batch {
             samples: scene.image.samples,
             strips: strips.len() as u64,
             memory_bytes,
-            disk_bytes: window.pixels() * pixel * to_render,
+            disk_bytes: window.pixels() * pixel * to_render + movie_bytes,
         })
     }
 

@@ -109,13 +109,16 @@ fn range(text: &str) -> Option<std::result::Result<Vec<(Raw, String)>, String>> 
     if count > MAX_VALUES as f64 {
         return Some(Err(format!("{count} values; at most {MAX_VALUES}")));
     }
-    let whole = [first, last, step].iter().all(|n| n.parse::<i64>().is_ok());
+    let exact = [first, last, step].map(|n| n.parse::<i128>().ok());
     let value = |i: usize| {
+        if let [Some(a), _, Some(step)] = exact {
+            let x = i64::try_from(a + step * i as i128).unwrap_or(i64::MAX);
+            return (Raw::Int(x), x.to_string());
+        }
         let x = a + step_size * i as f64;
         // Twelve digits: 0.1 + 0.2 is 0.3.
         let x: f64 = format!("{x:.12e}").parse().unwrap_or(x);
-        let raw = if whole { Raw::Int(x as i64) } else { Raw::Float(x) };
-        (raw, format!("{x}"))
+        (Raw::Float(x), format!("{x}"))
     };
     Some(Ok((0..count as usize).map(value).collect()))
 }

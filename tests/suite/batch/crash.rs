@@ -275,3 +275,18 @@ fn memory_threads_and_files_stay_flat() {
     grows_not("cpu", 2000);
     grows_not("auto", if long() { 2000 } else { 400 });
 }
+
+#[test]
+fn a_claim_of_a_process_that_has_ended_is_taken_over_at_once_even_if_nobody_buried_it() {
+    let dir = folder();
+    let mut zombie = Command::new("true").spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(200));
+    let machine = &taki::frame::Owner::me().machine;
+    let owner = format!(r#"{{"host":"here","machine":"{machine}","pid":{},"started":0}}"#, zombie.id());
+    fs::write(dir.path().join(".f.0000.png.taki-claim-0"), owner).unwrap();
+    let ended = run(&mut batch(dir.path(), ["--frames", "0-1", "-o", "f.####.png", "--events=json"]));
+    assert_eq!(counts(&ended), [2, 0, 2, 0, 0]);
+    assert!(!ended.stdout().contains("waiting"), "{}", ended.stdout());
+    assert_eq!(files(dir.path()).len(), 2);
+    zombie.wait().unwrap();
+}

@@ -58,7 +58,7 @@ fn two_pictures_of_one_name_are_refused_before_the_work() {
     let run_on = ["--sweep", "curves.h=1,1.1", "--sweep", "alpha=1,0.1", "-o"];
     refused(
         &["--sweep", "max_cells=1,11", "--sweep", "across=1,11", "-o", "{max_cells}{across}.png"],
-        &["111.png", "trace.max_cells=1", "trace.max_cells=11", "{h}-{alpha}"],
+        &["111.png", "trace.max_cells=1", "trace.max_cells=11", "run into one another"],
     );
     refused(&["--sweep", "volume.file=a/b.npz,a_b.npz", "-o", "{file}.png"], &["a_b.npz.png"]);
     run(batch(dir.path(), run_on).arg("{h}-{alpha}.png")).done();
