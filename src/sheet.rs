@@ -188,7 +188,9 @@ impl Sheet {
         let wrapped = self.rows.values.is_empty();
         let count = self.columns.values.len().max(1);
         let caption = if wrapped && !self.columns.values.is_empty() { line + gap / 2 } else { 0 };
-        let pitch = [w + gap, h + caption + gap + if caption > 0 { gap } else { 0 }];
+        // Beside a picture lower than a line stands a line all the same.
+        let slot = if wrapped { h } else { h.max(line) };
+        let pitch = [w + gap, slot + caption + gap + if caption > 0 { gap } else { 0 }];
         let across = if wrapped { wrap(count, pitch) } else { count };
         let down = if wrapped { count.div_ceil(across) } else { self.rows.values.len() };
 
@@ -248,7 +250,7 @@ impl Sheet {
         if !wrapped {
             for (i, value) in self.rows.values.iter().enumerate() {
                 let y =
-                    (i as u32).saturating_mul(pitch[1]).saturating_add(y + h / 2).saturating_sub(line / 2);
+                    (i as u32).saturating_mul(pitch[1]).saturating_add(y + slot / 2).saturating_sub(line / 2);
                 label(value, Rect { x: margin + em, y, w: strip - gap - em, h: line }, text, QUIET, 1.0);
             }
             if down > 1 {
@@ -269,7 +271,7 @@ impl Sheet {
             let [column, row] = [i % across, i / across];
             let [x, y] =
                 [left + column as u32 * pitch[0], y.saturating_add((row as u32).saturating_mul(pitch[1]))];
-            let rect = Rect { x, y, w, h };
+            let rect = Rect { x, y: y.saturating_add((slot - h) / 2), w, h };
             if wrapped { Place { row: 0, column: i, rect } } else { Place { row, column, rect } }
         });
         layout.places = places.collect();

@@ -202,6 +202,16 @@ fn an_error_of_a_picture_ends_the_sheet() {
     assert_eq!((e.unwrap_err().exit_code(), asked), (130, 1));
 }
 
+#[test]
+fn labels_of_pictures_lower_than_a_line_do_not_meet() {
+    for cell in [[1, 1], [40, 3], [3, 40]] {
+        let axis =
+            |name: &str| Axis { name: name.into(), values: ["0.5", "1", "2"].map(String::from).into() };
+        let sheet = Sheet::of("a", "b", &[axis("h"), axis("alpha")], cell);
+        sound(&sheet, &sheet.layout().unwrap());
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

@@ -33,8 +33,8 @@ const PATIENCE: Duration = Duration::from_millis(250);
 /// So is the building of a volume, but it is worth a longer wait.
 const BUILD_PATIENCE: Duration = Duration::from_secs(2);
 /// Bytes for results of the raster pass: while the water plays or one slider of the walk moves, previews are
-/// spared it. Two samples of a window's full picture, or all of several previews.
-const KEPT_RASTERS: u64 = 128 << 20;
+/// spared it. Those of several previews, or of one picture of 1.2 times 720p.
+const KEPT_RASTERS: u64 = 48 << 20;
 /// More than this many lost devices a minute, and the CPU takes over.
 const MAX_REBUILDS: usize = 3;
 /// Preview pixels per side of a full pixel that are tried.
