@@ -244,9 +244,7 @@ impl Batch {
             return Ok(());
         }
         let mut names: HashMap<PathBuf, String> = HashMap::new();
-        let mut add = |file: PathBuf, what: String| match names
-            .insert(file.components().collect(), what.clone())
-        {
+        let mut add = |file: PathBuf, what: String| match names.insert(plain(&file), what.clone()) {
             None => Ok(()),
             Some(other) => Err(Error::Usage(format!(
                 "{} would be {other} and {what}; give them different names, such as {{h}}-{{alpha}} for values that \
@@ -367,6 +365,11 @@ fn about_all(
         }
     }
     Ok((sheet, manifests))
+}
+
+/// A path without `.` in it.
+fn plain(path: &Path) -> PathBuf {
+    path.components().filter(|part| *part != std::path::Component::CurDir).collect()
 }
 
 /// Different pictures have different names.
