@@ -1,7 +1,6 @@
 // What every stage shares with the host: put in front of each stage's source.
 // src/gpu/layout.rs holds the twins; a test compares names, offsets and sizes.
 
-const MAX_LIGHTS: u32 = 16u;
 const WORKGROUP: u32 = 8u;
 
 struct Frame {
@@ -41,15 +40,16 @@ struct Frame {
 }
 
 struct Light {
-    // Unit direction towards a directional light, or the position of a point light.
+    // Unit direction towards a directional light, or the position of a light that has one.
     vector: vec3<f32>,
-    is_point: u32,
+    has_position: u32,
     intensity: vec3<f32>,
-    pad: u32,
-}
-
-struct Lights {
-    list: array<Light, MAX_LIGHTS>,
+    // Cosine at the edge of a spot light's cone, below which it is dark; −2 where there is no cone.
+    cos_edge: f32,
+    // Unit, against a spot light's beam.
+    axis: vec3<f32>,
+    // 1 / (cosine where the full light begins − cos_edge).
+    inverse_soft: f32,
 }
 
 struct Quad {
@@ -87,6 +87,22 @@ fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
 
 fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.x + a.y * b.y;
+}
+
+// Unit direction from a point to a light, and how much of its intensity arrives there. Light::at.
+fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
+    if light.has_position == 0u {
+        return vec4<f32>(light.vector, 1.0);
+    }
+    let away = light.vector - point;
+    let d2 = max(dot3(away, away), 1e-12);
+    let to_light = away / sqrt(d2);
+    var falloff = 1.0 / d2;
+    if light.cos_edge > -2.0 {
+        let s = clamp((dot3(light.axis, to_light) - light.cos_edge) * light.inverse_soft, 0.0, 1.0);
+        falloff *= s * s * (3.0 - 2.0 * s);
+    }
+    return vec4<f32>(to_light, falloff);
 }
 
 // Camera::view_ray: unit direction through a pixel of the whole image.

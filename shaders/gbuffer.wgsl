@@ -6,7 +6,7 @@
 // triangles. CPU twin: src/cpu/gbuffer.rs.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> lights: Lights;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
 
 struct OpaqueVertex {
@@ -49,16 +49,9 @@ fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
     }
     var irradiance = frame.ambient;
     for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights.list[i];
-        var to_light = light.vector;
-        var falloff = 1.0;
-        if light.is_point != 0u {
-            let away = light.vector - in.position_world;
-            let d2 = max(dot3(away, away), 1e-12);
-            to_light = away / sqrt(d2);
-            falloff = 1.0 / d2;
-        }
-        irradiance += light.intensity * (falloff * max(dot3(n, to_light), 0.0));
+        let light = lights[i];
+        let arrives = light_from(light, in.position_world);
+        irradiance += light.intensity * (arrives.w * max(dot3(n, arrives.xyz), 0.0));
     }
     var out: OpaqueTargets;
     out.radiance = vec4<f32>(in.albedo * irradiance, distance);

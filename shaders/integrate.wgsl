@@ -3,12 +3,15 @@
 // One invocation a pixel. Twin: src/cpu/integrate.rs, the same operations in the same order; the reasoning
 // stands there.
 
+// Most lights of one walk: rays keep what they need to know of each, and are walked again for more.
+const LIGHTS_A_WALK: u32 = 16u;
+
 override LIGHTS: u32 = 1u;
 override PER_CELL: bool = false;
 override MARCH: bool = false;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> lights: Lights;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
@@ -70,7 +73,10 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     var count = vec2<u32>(0u);
     if quad_number != 0u {
         let hit = textureLoad(surface, pixel, 0);
-        result = trace(quads[quad_number - 1u], pixel, hit.xyz, behind, &count);
+        result = trace(quads[quad_number - 1u], pixel, hit.xyz, behind, 0u, &count);
+        for (var first = LIGHTS_A_WALK; first < LIGHTS; first += LIGHTS_A_WALK) {
+            result += trace(quads[quad_number - 1u], pixel, hit.xyz, behind, first, &count);
+        }
     }
     if frame.sample_index != 0u {
         result += radiance[index];
@@ -105,16 +111,31 @@ struct View {
     p: f32,
     max_cells: u32,
     layers: i32,
+    // Lights of this walk.
+    lights: u32,
     // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
     metric: vec4<f32>,
     e_v: vec3<f32>,
     first: RayLight,
 }
 
-var<private> others: array<RayLight, MAX_LIGHTS>;
-var<private> sums: array<f32, MAX_LIGHTS>;
+var<private> others: array<RayLight, LIGHTS_A_WALK>;
+var<private> sums: array<f32, LIGHTS_A_WALK>;
 
-fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
+fn lights_of(view: View) -> u32 {
+    // Known when the shader is compiled, in all but a few scenes.
+    return select(view.lights, LIGHTS, LIGHTS <= LIGHTS_A_WALK);
+}
+
+// The lights from number `first` on; the ambient light and what is behind come with the first of all.
+fn trace(
+    quad: Quad,
+    pixel: vec2<u32>,
+    hit: vec3<f32>,
+    behind: vec3<f32>,
+    first: u32,
+    count: ptr<function, vec2<u32>>,
+) -> vec4<f32> {
     let jacobian = cell_frame(quad, hit.xy, frame.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);
@@ -127,6 +148,7 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
     view.p = frame.p;
     view.max_cells = frame.max_cells;
     view.layers = frame.cells.z;
+    view.lights = min(LIGHTS - first, LIGHTS_A_WALK);
     let cx = jacobian.cx;
     let cy = jacobian.cy;
     let depth = jacobian.depth;
@@ -137,10 +159,10 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
         view.e_v = -d_cell / sqrt(dot3(d_cell, d_cell));
     }
     if LIGHTS > 0u {
-        view.first = ray_light(0u, quad, jacobian, side, d_world, hit.z);
+        view.first = ray_light(first, quad, jacobian, side, d_world, hit.z);
     }
-    for (var i = 1u; i < LIGHTS; i++) {
-        others[i] = ray_light(i, quad, jacobian, side, d_world, hit.z);
+    for (var i = 1u; i < lights_of(view); i++) {
+        others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
         sums[i] = 0.0;
     }
 
@@ -169,15 +191,20 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
     }
 
     // Σ_k T_k (1 − e^(−τ_k)) = 1 − T_end carries the ambient light.
-    var color = frame.ambient * (1.0 - ray.transmittance) + behind * ray.transmittance;
+    var result = vec4<f32>(0.0);
+    if first == 0u {
+        let color = frame.ambient * (1.0 - ray.transmittance) + behind * ray.transmittance;
+        result = vec4<f32>(color, ray.transmittance);
+        (*count).x = ray.cells;
+    }
     if LIGHTS > 0u {
-        color += light_intensity(0u, d_world, hit.z) * (ray.first * (1.0 / 255.0));
+        result += vec4<f32>(light_intensity(first, d_world, hit.z) * (ray.first * (1.0 / 255.0)), 0.0);
     }
-    for (var i = 1u; i < LIGHTS; i++) {
-        color += light_intensity(i, d_world, hit.z) * (sums[i] * (1.0 / 255.0));
+    for (var i = 1u; i < lights_of(view); i++) {
+        result += vec4<f32>(light_intensity(first + i, d_world, hit.z) * (sums[i] * (1.0 / 255.0)), 0.0);
     }
-    *count = vec2<u32>(ray.cells, ray.light_cells);
-    return vec4<f32>(color, ray.transmittance);
+    (*count).y += ray.light_cells;
+    return result;
 }
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
@@ -220,7 +247,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         }
         (*ray).first += lit;
     }
-    for (var i = 1u; i < LIGHTS; i++) {
+    for (var i = 1u; i < lights_of(view); i++) {
         var lit = weight * psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
         if MARCH {
             if rho > 0.0 {
@@ -251,17 +278,11 @@ fn ray_light(i: u32, quad: Quad, jacobian: CellFrame, side: f32, d_world: vec3<f
 }
 
 fn light_intensity(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec3<f32> {
-    return lights.list[i].intensity * light_at(i, d_world, t_hit).w;
+    return lights[i].intensity * light_at(i, d_world, t_hit).w;
 }
 
 // Unit direction from the mapped point to light i, and its falloff there (the paper maps the light
 // vectors at the point, not in every cell).
 fn light_at(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec4<f32> {
-    let light = lights.list[i];
-    if light.is_point == 0u {
-        return vec4<f32>(light.vector, 1.0);
-    }
-    let away = light.vector - (frame.eye_world + d_world * t_hit);
-    let d2 = max(dot3(away, away), 1e-12);
-    return vec4<f32>(away / sqrt(d2), 1.0 / d2);
+    return light_from(lights[i], frame.eye_world + d_world * t_hit);
 }

@@ -180,12 +180,23 @@ impl Light {
         match *self {
             Light::Directional { to_light, intensity } => (to_light, intensity),
             Light::Point { position, intensity } => {
-                let away = position - point;
-                let d2 = away.dot(away).max(1e-12);
-                (away / d2.sqrt(), intensity * (1.0 / d2))
+                let (to_light, falloff) = from_point(position, point);
+                (to_light, intensity * falloff)
+            }
+            Light::Spot { position, intensity, cone } => {
+                let (to_light, falloff) = from_point(position, point);
+                let s = ((cone.axis.dot(to_light) - cone.cos_edge) * cone.inverse_soft).clamp(0.0, 1.0);
+                (to_light, intensity * (falloff * (s * s * (3.0 - 2.0 * s))))
             }
         }
     }
+}
+
+/// Unit direction from `point` to a light at `position`, and its falloff there.
+fn from_point(position: Vec3, point: Vec3) -> (Vec3, f32) {
+    let away = position - point;
+    let d2 = away.dot(away).max(1e-12);
+    (away / d2.sqrt(), 1.0 / d2)
 }
 
 /// Cuts a triangle at w = near and gives each part as corners with weights of the original three.

@@ -70,7 +70,10 @@ impl GpuBench {
         let gpu = &self.renderer.gpu;
         let window = Window::whole([direct.image.width, direct.image.height]);
         let frame = layout::Frame::new(direct, volume, window, &(0..1), 0);
-        let pass = |pass| (pass, Tiler::new(None, None), None);
+        let pass = |pass: Integrate| {
+            let variant = pass.variant;
+            (pass, Tiler::new(None, None, variant), None)
+        };
         self.prepared = Some(Prepared {
             up: Uploaded::new(gpu, &mut Resident::default(), direct, volume, mesh)?,
             targets: Targets::new(gpu, window.width, window.height),

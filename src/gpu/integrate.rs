@@ -10,9 +10,9 @@ use crate::shading::whole_exponent;
 /// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
 /// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
 const TILE_SECONDS: f64 = 0.03;
-/// Pixels of the first tile, when nothing is known about the scene's cost. With every pixel at the
-/// cap of 512 cells and a full light walk from each, software Vulkan takes about a second for it.
-const FIRST_TILE_PIXELS: u64 = 1024;
+/// Pixels of the first tile, when nothing is known about the scene's cost; with many lights fewer. With every
+/// pixel at the cap of 512 cells and a full walk to one light from each, software Vulkan takes about a second for it.
+const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
 
@@ -78,8 +78,9 @@ pub struct Tiler {
 impl Tiler {
     /// Learns the size; with `fixed` every tile has about that many pixels. `known` is what the last frame of
     /// the like has learned.
-    pub fn new(fixed: Option<u32>, known: Option<f64>) -> Self {
-        let pixels = fixed.map(f64::from).or(known).unwrap_or(FIRST_TILE_PIXELS as f64);
+    pub fn new(fixed: Option<u32>, known: Option<f64>, variant: Variant) -> Self {
+        let first = (FIRST_TILE_PIXELS / f64::from(variant.lights.max(1))).max(64.0);
+        let pixels = fixed.map(f64::from).or(known).unwrap_or(first);
         Tiler { pixels, fixed: fixed.is_some(), smallest: f64::INFINITY }
     }
 
@@ -234,9 +235,9 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 10] {
         format: TextureFormat::Rg32Uint,
         view_dimension: TextureViewDimension::D3,
     };
-    let quads = buffer(BufferBindingType::Storage { read_only: true });
+    let list = buffer(BufferBindingType::Storage { read_only: true });
     let ids = texture(TextureSampleType::Uint);
-    let types = [uniform, uniform, quads, uniform, volume, floats, ids, floats, sums, sums];
+    let types = [uniform, list, list, uniform, volume, floats, ids, floats, sums, sums];
     let mut binding = 0;
     types.map(|ty| {
         binding += 1;

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::camera::{clip_to_window, sample_offset};
 use crate::frame::Window;
-use crate::scene::{self, AngleFrame, Attenuation, MAX_LIGHTS, Scene, Tone};
+use crate::scene::{self, AngleFrame, Attenuation, Scene, Tone};
 use crate::volume::VolumeTexture;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
@@ -56,9 +56,11 @@ pub struct Frame {
 #[allow(missing_docs)]
 pub struct Light {
     pub vector: [f32; 3],
-    pub is_point: u32,
+    pub has_position: u32,
     pub intensity: [f32; 3],
-    pub pad: u32,
+    pub cos_edge: f32,
+    pub axis: [f32; 3],
+    pub inverse_soft: f32,
 }
 
 /// One quad.
@@ -163,20 +165,33 @@ pub fn flow_cells(flow: f32, ny: u32) -> f32 {
     ((flow as f64).rem_euclid(1.0) * ny as f64) as f32
 }
 
-/// The scene's lights, padded to the buffer's length.
-pub fn lights(scene: &Scene) -> [Light; MAX_LIGHTS] {
-    let mut lights = [Light::default(); MAX_LIGHTS];
-    for (slot, light) in lights.iter_mut().zip(&scene.lights) {
-        *slot = match *light {
-            scene::Light::Directional { to_light, intensity } => {
-                Light { vector: to_light.to_array(), is_point: 0, intensity: intensity.to_array(), pad: 0 }
-            }
-            scene::Light::Point { position, intensity } => {
-                Light { vector: position.to_array(), is_point: 1, intensity: intensity.to_array(), pad: 0 }
-            }
-        };
-    }
+/// The scene's lights; a light that shines on nothing if there are none, for no buffer is empty.
+pub fn lights(scene: &Scene) -> Vec<Light> {
+    let mut lights: Vec<Light> = scene.lights.iter().map(Light::new).collect();
+    lights.resize(lights.len().max(1), Light::default());
     lights
+}
+
+impl Light {
+    fn new(light: &scene::Light) -> Self {
+        let base = |vector: Vec3, has_position, intensity: Vec3| Light {
+            vector: vector.to_array(),
+            has_position,
+            intensity: intensity.to_array(),
+            cos_edge: -2.0,
+            ..Light::default()
+        };
+        match *light {
+            scene::Light::Directional { to_light, intensity } => base(to_light, 0, intensity),
+            scene::Light::Point { position, intensity } => base(position, 1, intensity),
+            scene::Light::Spot { position, intensity, cone } => Light {
+                cos_edge: cone.cos_edge,
+                axis: cone.axis.to_array(),
+                inverse_soft: cone.inverse_soft,
+                ..base(position, 1, intensity)
+            },
+        }
+    }
 }
 
 impl Quad {

@@ -210,7 +210,7 @@ impl GpuRenderer {
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
         let known = self.learned.filter(|(of, _)| *of == like).map(|(_, pixels)| pixels);
-        let mut tiler = Tiler::new(options.tile_pixels, known);
+        let mut tiler = Tiler::new(options.tile_pixels, known, variant);
         for window in options.grid.windows(whole, part) {
             // They meet, by the way windows are chosen.
             let Some(wanted) = window.meet(&part) else { continue };

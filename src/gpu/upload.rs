@@ -32,7 +32,7 @@ pub struct Uploaded {
     pub quads: wgpu::Buffer,
     /// Number of quads.
     pub quad_count: u32,
-    /// `Lights`.
+    /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
     /// Vertices of the opaque mesh.
     pub vertices: wgpu::Buffer,
@@ -55,24 +55,24 @@ impl Uploaded {
     ) -> Result<Self> {
         let limits = gpu.device.limits();
         let quads: Vec<Quad> = scene.quads.iter().map(|q| Quad::new(q, scene.camera.eye)).collect();
-        let quad_bytes: &[u8] = bytemuck::cast_slice(&quads);
-        let largest =
-            [quad_bytes.len(), size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
+        let lights = layout::lights(scene);
+        let (quad_bytes, light_bytes): (&[u8], &[u8]) =
+            (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
+        let mesh_bytes = [size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
+        let largest = [quad_bytes.len(), light_bytes.len(), mesh_bytes[0], mesh_bytes[1]];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
             return Err(Error::input(
-                format!("the scene's quads or rocks are too large for {}", gpu.name()),
+                format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
                 "lower their number or use --engine cpu",
             ));
         }
         let (vertices, indices, upload) = resident.mesh(gpu, mesh);
-        let lights = layout::lights(scene);
-        let light_bytes: &[u8] = bytemuck::bytes_of(&lights);
         Ok(Uploaded {
             geometry: hash_twice(&(quad_bytes, light_bytes, upload)),
             volume: resident.volume(gpu, volume)?,
             quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
             quad_count: quads.len() as u32,
-            lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::UNIFORM),
+            lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
             vertices,
             indices,
             index_count: mesh.indices.len() as u32,

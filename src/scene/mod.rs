@@ -26,8 +26,9 @@ use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
 use crate::volume::{VolumeTexture, WaterSpec, read_npz};
 
-/// Most lights of a scene: the size of the light buffer in `shaders/frame.wgsl`.
-pub const MAX_LIGHTS: usize = 16;
+/// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
+/// tile of a picture would take longer than drivers wait.
+pub const MAX_LIGHTS: usize = 4096;
 
 /// A whole scene, valid.
 #[derive(Clone, Debug)]
@@ -94,6 +95,39 @@ pub enum Light {
         /// Colour × intensity, at 1 m.
         intensity: Vec3,
     },
+    /// From a point into a cone: inside it as a point light.
+    Spot {
+        /// Metres.
+        position: Vec3,
+        /// Colour × intensity, at 1 m.
+        intensity: Vec3,
+        /// Where it shines.
+        cone: Cone,
+    },
+}
+
+/// The cone of a spot light. With c the cosine of the angle between the beam and the way to a point, and
+/// s = (c − `cos_edge`)·`inverse_soft` clamped to 0..1, its light is s²(3 − 2s) of a point light's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Unit, against the beam.
+    pub axis: Vec3,
+    /// Cosine of the half angle.
+    pub cos_edge: f32,
+    /// 1 / (cosine where the full light begins − `cos_edge`).
+    pub inverse_soft: f32,
+}
+
+impl Cone {
+    /// Around the unit vector `axis`, with a half angle in degrees of which the outer share `softness` (0 to 1) is
+    /// the way from full light to none.
+    pub fn new(axis: Vec3, angle: f32, softness: f32) -> Self {
+        let cosine = |degrees: f64| degrees.to_radians().cos();
+        let (edge, full) = (cosine(angle as f64), cosine(angle as f64 * (1.0 - softness as f64)));
+        // A hard edge is a thousandth of a degree wide at most.
+        let inverse_soft = (1.0 / (full - edge).max(1e-7)) as f32;
+        Cone { axis, cos_edge: edge as f32, inverse_soft }
+    }
 }
 
 /// How view rays go through the volume.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Camera, Light, MAX_LIGHTS, Quad, Rock, Values, Vertex};
+use super::{Camera, Cone, Light, MAX_LIGHTS, Quad, Rock, Values, Vertex};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
 
@@ -56,17 +56,23 @@ pub(super) fn lights(v: &Values) -> Result<Vec<Light>> {
                 "lower its color or intensity",
             ));
         }
-        let light = if v.text(&key("kind")) == "point" {
-            Light::Point { position: v.triple(&key("position")), intensity }
-        } else {
+        let position = || v.triple(&key("position"));
+        let to_light = || {
             let direction = v.triple(&key("direction"));
-            let to_light = unit(direction).ok_or_else(|| {
+            unit(direction).ok_or_else(|| {
                 Error::input(
                     format!("{} = {direction} has no direction", key("direction")),
                     "give a vector towards the light",
                 )
-            })?;
-            Light::Directional { to_light, intensity }
+            })
+        };
+        let light = match v.text(&key("kind")).as_str() {
+            "point" => Light::Point { position: position(), intensity },
+            "spot" => {
+                let cone = Cone::new(to_light()?, v.float(&key("angle")), v.float(&key("softness")));
+                Light::Spot { position: position(), intensity, cone }
+            }
+            _ => Light::Directional { to_light: to_light()?, intensity },
         };
         if intensity != Vec3::ZERO {
             lights.push(light);

@@ -92,6 +92,10 @@ impl Scene {
                 Light::Point { position, intensity } => {
                     json!({"kind": "point", "position": position.to_array(), "intensity": intensity.to_array()})
                 }
+                Light::Spot { position, intensity, cone } => json!({
+                    "kind": "spot", "position": position.to_array(), "intensity": intensity.to_array(),
+                    "axis": cone.axis.to_array(), "cos_edge": cone.cos_edge, "inverse_soft": cone.inverse_soft,
+                }),
             })
             .collect();
         let mesh = self.mesh();

@@ -99,13 +99,23 @@ fn the_engines_agree_on_the_papers_figures() {
 fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
     let Some(mut renderer) = renderer("variants") else { return };
     let small = ["image.width=96", "image.height=80", "curves.across=12", "curves.deep=12"];
-    let variants: [&[&str]; 9] = [
+    let spot =
+        ["lights.key.kind=spot", "lights.key.position=[0.4,0.5,1.5]", "lights.key.direction=[0.3,0.4,1.5]"];
+    let variants: [&[&str]; 10] = [
         &["light.visibility=march"],
         &["trace.attenuation=per-cell", "trace.tau=0.3"],
         &["trace.attenuation=per-cell", "light.visibility=march", "light.frame=texture"],
         &["light.frame=texture", "light.p=7.5"],
         &["light.p=255", "trace.max_cells=9"],
         &["lights.key.kind=point", "lights.key.position=[0.4,0.5,1.5]", "light.visibility=march"],
+        &[
+            spot[0],
+            spot[1],
+            spot[2],
+            "lights.key.angle=14",
+            "lights.key.softness=0.5",
+            "light.visibility=march",
+        ],
         &["lights.key.intensity=0", "trace.early_end=0.2"],
         &["materials.water.repeat_u=2.5", "materials.water.repeat_v=0.6", "camera.eye=[1.5,-1.0,1.2]"],
         &["volume.flow=0.3", "materials.water.repeat_v=0.6", "light.visibility=march"],
@@ -121,22 +131,27 @@ fn the_engines_agree_with_many_lights_and_a_volume_of_unequal_sides() {
     let Some(mut renderer) = renderer("lights") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lights.toml");
-    let lights: String = (0..15)
-        .map(|i| {
-            format!(
-                "[lights.l{i}]\ndirection = [{}, 0.5, {}]\nintensity = 0.2\n",
-                i as f32 / 8.0 - 1.0,
-                i % 3
-            )
-        })
-        .collect();
-    let text = format!(
-        "version = 1\nbase = \"front\"\n{lights}[volume]\nnx = 17\nny = 40\nnz = 5\n[image]\nwidth = 64\nheight = 64\n"
-    );
-    std::fs::write(&file, text).expect("written");
-    let scene = Scene::load(&file, &[], &Limits::default()).expect("valid");
-    assert_eq!(scene.lights.len(), 16);
-    assert_parity("16 lights", &both(&mut renderer, &scene));
+    // One walk of a ray takes 16 lights.
+    for count in [16, 17, 40] {
+        let lights: String = (1..count)
+            .map(|i| {
+                format!(
+                    "[lights.l{i}]\ndirection = [{}, 0.5, {}]\nintensity = 0.2\n",
+                    (i % 16) as f32 / 8.0 - 1.0,
+                    i % 3
+                )
+            })
+            .collect();
+        let text = format!(
+            "version = 1\nbase = \"front\"\n{lights}[volume]\nnx = 17\nny = 40\nnz = 5\n[image]\nwidth = 64\nheight = 64\n"
+        );
+        std::fs::write(&file, text).expect("written");
+        let scene = Scene::load(&file, &[], &Limits::default()).expect("valid");
+        assert_eq!(scene.lights.len(), count);
+        let frames = both(&mut renderer, &scene);
+        assert_parity(&format!("{count} lights"), &frames);
+        assert_eq!(frames[0].counts, frames[1].counts, "{count} lights");
+    }
 }
 
 #[test]

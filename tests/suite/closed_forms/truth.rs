@@ -85,6 +85,7 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: DVec3, uv: [f64; 2], x: DVec3
         for light in &scene.lights {
             let (l, intensity) = match *light {
                 Light::Directional { to_light, intensity } => (to_light.as_dvec3(), intensity.as_dvec3()),
+                Light::Spot { .. } => unreachable!("the scenes of these tests have none"),
                 Light::Point { position, intensity } => {
                     let away = position.as_dvec3() - x;
                     (away.normalize(), intensity.as_dvec3() / away.length_squared())
