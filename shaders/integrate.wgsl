@@ -9,6 +9,9 @@ const LIGHTS_A_WALK: u32 = 16u;
 override LIGHTS: u32 = 1u;
 override PER_CELL: bool = false;
 override MARCH: bool = false;
+override CACHED: bool = false;
+// Light volumes that differ over a quad.
+override VARYING: bool = false;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -22,6 +25,9 @@ override MARCH: bool = false;
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
 // Sum over samples of cells walked by view rays, and by light rays.
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
+// Light volumes, src/gpu/visibility.rs: optical depths, and where each light volume is.
+@group(0) @binding(10) var light_depths: texture_storage_3d<r32float, read>;
+@group(0) @binding(11) var<storage, read> light_places: array<vec4<i32>>;
 
 // V_i(k): from the middle of `cell` to where the light ray leaves the slab.
 struct LightWalk {
@@ -60,6 +66,40 @@ fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: V
     (*ray).done |= (z < 0) | (z >= view.layers) | ((*ray).cells >= view.max_cells);
 }
 
+// V_i(k) from the light volumes at the corners of the ray's patch.
+fn kept_visibility(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
+    var depth = textureLoad(light_depths, cell + places.p00).x;
+    if VARYING && places.varies {
+        let near = mix(depth, textureLoad(light_depths, cell + places.p10).x, places.at.x);
+        let far = mix(
+            textureLoad(light_depths, cell + places.p01).x,
+            textureLoad(light_depths, cell + places.p11).x,
+            places.at.x,
+        );
+        depth = mix(near, far, places.at.y);
+    }
+    return exp2(-depth * view.depth_bits);
+}
+
+fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
+    var out: LightPlaces;
+    let patches = light_places[quad_number * LIGHTS + light];
+    if !VARYING | (patches.y == 0) {
+        out.p00 = light_places[patches.x].xyz;
+        return out;
+    }
+    out.varies = true;
+    let at = uv * f32(patches.y);
+    let corner = min(vec2<i32>(at), vec2<i32>(patches.y - 1));
+    let first = patches.x + corner.y * (patches.y + 1) + corner.x;
+    out.at = at - vec2<f32>(corner);
+    out.p00 = light_places[first].xyz;
+    out.p10 = light_places[first + 1].xyz;
+    out.p01 = light_places[first + patches.y + 1].xyz;
+    out.p11 = light_places[first + patches.y + 2].xyz;
+    return out;
+}
+
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= tile.width || id.y >= tile.height {
@@ -73,9 +113,9 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     var count = vec2<u32>(0u);
     if quad_number != 0u {
         let hit = textureLoad(surface, pixel, 0);
-        result = trace(quads[quad_number - 1u], pixel, hit.xyz, behind, 0u, &count);
+        result = trace(quad_number - 1u, pixel, hit.xyz, behind, 0u, &count);
         for (var first = LIGHTS_A_WALK; first < LIGHTS; first += LIGHTS_A_WALK) {
-            result += trace(quads[quad_number - 1u], pixel, hit.xyz, behind, first, &count);
+            result += trace(quad_number - 1u, pixel, hit.xyz, behind, first, &count);
         }
     }
     if frame.sample_index != 0u {
@@ -101,12 +141,26 @@ struct Ray {
 struct RayLight {
     l_v: vec3<f32>,
     l_cell: vec3<f32>,
+    places: LightPlaces,
+}
+
+// Where a light's volumes are, at the corners of a patch, and where in the patch the ray is.
+struct LightPlaces {
+    p00: vec3<i32>,
+    p10: vec3<i32>,
+    p01: vec3<i32>,
+    p11: vec3<i32>,
+    at: vec2<f32>,
+    // Whether they are not all alike, for then the first is enough.
+    varies: bool,
 }
 
 // What is constant along a ray. The frame's values stand here again because a uniform read inside a loop
 // is gathered lane by lane on software Vulkan, about 25 instructions each time.
 struct View {
     extinction: f32,
+    // Bits of transmittance in one unit of a light volume's depth.
+    depth_bits: f32,
     early_end: f32,
     p: f32,
     max_cells: u32,
@@ -129,13 +183,14 @@ fn lights_of(view: View) -> u32 {
 
 // The lights from number `first` on; the ambient light and what is behind come with the first of all.
 fn trace(
-    quad: Quad,
+    quad_number: u32,
     pixel: vec2<u32>,
     hit: vec3<f32>,
     behind: vec3<f32>,
     first: u32,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
+    let quad = quads[quad_number];
     let jacobian = cell_frame(quad, hit.xy, frame.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);
@@ -144,6 +199,7 @@ fn trace(
 
     var view: View;
     view.extinction = frame.extinction;
+    view.depth_bits = frame.extinction * 65535.0 * select(jacobian.depth, 1.0, PER_CELL);
     view.early_end = frame.early_end;
     view.p = frame.p;
     view.max_cells = frame.max_cells;
@@ -160,9 +216,15 @@ fn trace(
     }
     if LIGHTS > 0u {
         view.first = ray_light(first, quad, jacobian, side, d_world, hit.z);
+        if CACHED {
+            view.first.places = light_places_of(quad_number, first, hit.xy);
+        }
     }
     for (var i = 1u; i < lights_of(view); i++) {
         others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
+        if CACHED {
+            others[i].places = light_places_of(quad_number, first + i, hit.xy);
+        }
         sums[i] = 0.0;
     }
 
@@ -245,6 +307,9 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
                 lit *= visibility((*walk).cell, view.first.l_cell, view, ray);
             }
         }
+        if CACHED {
+            lit *= kept_visibility((*walk).cell, view.first.places, view);
+        }
         (*ray).first += lit;
     }
     for (var i = 1u; i < lights_of(view); i++) {
@@ -253,6 +318,9 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
             if rho > 0.0 {
                 lit *= visibility((*walk).cell, others[i].l_cell, view, ray);
             }
+        }
+        if CACHED {
+            lit *= kept_visibility((*walk).cell, others[i].places, view);
         }
         sums[i] += lit;
     }

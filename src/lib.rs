@@ -38,6 +38,7 @@ pub mod shading;
 pub mod sheet;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+pub mod visibility;
 pub mod volume;
 pub mod walk;
 

@@ -52,7 +52,8 @@ use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
 use crate::cpu;
 use crate::error::{Error, Result};
-use crate::gpu::{BenchPass, GpuBench};
+use crate::frame::Window;
+use crate::gpu::GpuBench;
 use crate::job::{Engine, EngineChoice, Monitor, Unwatched};
 use crate::scene::{Limits, Scene};
 use crate::volume::VolumeTexture;
@@ -97,6 +98,13 @@ struct Row {
 /// square of the depth, and 256 layers take minutes a frame.
 const MARCH_LAYERS: u32 = 64;
 
+/// The integrate passes that are measured: their names, and what of the scene differs from direct light.
+const STEPS: &[(&str, &[&str])] = &[
+    ("integrate", &[]),
+    ("integrate march", &["light.visibility=march"]),
+    ("integrate cached", &["light.visibility=cached"]),
+];
+
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -106,7 +114,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     terminal.note(&format!("taki: {line}"));
     let mut gpu = match engine {
         Engine::Gpu(renderer, _) => Some(GpuBench::new(*renderer)),
-        Engine::Cpu => None,
+        Engine::Cpu(_) => None,
     };
     let volumes: Vec<Vec<String>> = match &args.volume {
         Some(file) => {
@@ -119,11 +127,16 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
         for &size in &sizes {
             let mut sets = sets.clone();
             sets.extend(front(size));
-            let direct = load("front", &sets)?;
-            sets.push("light.visibility=march".into());
-            let marched = load("front", &sets)?;
-            let volume = direct.volume(direct_limits().memory, terminal)?;
-            passes(args, terminal, &mut gpu, [&direct, &marched], &volume, &mut rows)?;
+            let volume = load("front", &sets)?.volume(direct_limits().memory, terminal)?;
+            let shallow = volume.size[2] <= MARCH_LAYERS;
+            let mut scenes = Vec::new();
+            for (pass, more) in STEPS {
+                let sets = sets.iter().cloned().chain(more.iter().map(|&set| set.into())).collect::<Vec<_>>();
+                if shallow || more.is_empty() {
+                    scenes.push((*pass, load("front", &sets)?));
+                }
+            }
+            passes(args, terminal, &mut gpu, &scenes, &volume, &mut rows)?;
         }
     }
     if args.volume.is_none() {
@@ -169,10 +182,11 @@ fn passes(
     args: &BenchArgs,
     terminal: &Terminal,
     gpu: &mut Option<GpuBench>,
-    [direct, marched]: [&Scene; 2],
+    scenes: &[(&'static str, Scene)],
     volume: &VolumeTexture,
     rows: &mut Vec<Row>,
 ) -> Result<()> {
+    let direct = &scenes[0].1;
     let mesh = direct.mesh();
     let mut measured: Vec<(&'static str, &'static str, Vec<f64>, u64)> = Vec::new();
     let mut add =
@@ -180,32 +194,35 @@ fn passes(
             Some(m) => m.2.push(seconds),
             None => measured.push((engine, pass, vec![seconds], cells)),
         };
-    let march = volume.size[2] <= MARCH_LAYERS;
     if let Some(gpu) = gpu {
-        gpu.prepare(direct, marched, volume, &mesh)?;
+        let scenes: Vec<_> = scenes.iter().map(|(name, scene)| (*name, scene)).collect();
+        gpu.prepare(&scenes, volume, &mesh)?;
     }
+    let mut kept = cpu::KeptDepths::default();
     // The first round warms caches and tile sizes and is not counted.
     for round in 0..=args.runs {
         terminal.progress("rounds", round as u64, args.runs as u64)?;
         let counted = round > 0;
         if let Some(gpu) = gpu {
-            for pass in BenchPass::ALL.into_iter().filter(|&p| march || p != BenchPass::IntegrateMarch) {
-                let (seconds, cells) = gpu.run(pass)?;
+            for (number, name) in gpu.names().into_iter().enumerate() {
+                let (seconds, cells) = gpu.run(number)?;
                 if counted {
-                    add("gpu", pass.name(), seconds, cells);
+                    add("gpu", name, seconds, cells);
                 }
             }
         }
         // `--engine gpu` asks for the device's rows alone.
         let on_cpu = match args.engine.engine {
             EngineChoice::Gpu => 0,
-            _ => 1 + usize::from(march),
+            _ => scenes.len(),
         };
-        for (pass, scene) in [("integrate", direct), ("integrate march", marched)].into_iter().take(on_cpu) {
-            let frame = cpu::render(scene, volume, &mesh, false, &Unwatched)?;
+        for (pass, scene) in scenes.iter().take(on_cpu) {
+            let (whole, samples) = (Window::whole([scene.image.width, scene.image.height]), 0..1);
+            let frame =
+                cpu::render_samples(scene, volume, &mesh, whole, samples, false, &mut kept, &Unwatched)?;
             if counted {
-                add("cpu", pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
-                if pass == "integrate" {
+                add("cpu", *pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
+                if *pass == "integrate" {
                     add("cpu", "gbuffer", frame.seconds.gbuffer, 0);
                 }
             }

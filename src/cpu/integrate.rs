@@ -3,11 +3,15 @@
 use glam::{IVec3, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
+use super::visibility::{Depths, KeptDepths, optical_depth};
 use crate::camera::sample_offset;
+use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
+use crate::job::Monitor;
 use crate::mapping::CellFrame;
-use crate::scene::{AngleFrame, Attenuation, Scene, Visibility};
+use crate::scene::{AngleFrame, Attenuation, Light, Scene, Visibility};
 use crate::shading::{Metric, fibre_angles, specular_power};
+use crate::visibility::LightVolumes;
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::{Crossing, Walk};
 
@@ -20,6 +24,10 @@ pub struct Integrator<'a> {
     extinction: f32,
     flow_cells: f32,
     per_cell: bool,
+    lights: Vec<Light>,
+    light_volumes: Option<LightVolumes>,
+    /// None: depths are walked when they are asked for.
+    depths: Option<Depths>,
 }
 
 /// What one ray brings home.
@@ -53,12 +61,39 @@ struct RayLight {
     l_v: Vec3,
     /// J⁻¹l.
     l_cell: Vec3,
+    places: LightPlaces,
     intensity: Vec3,
     sum: f32,
 }
 
+/// A light's volumes at the corners of a patch, and where in the patch a ray is.
+#[derive(Clone, Copy, Default)]
+struct LightPlaces {
+    /// At (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all alike on a quad that is not cut.
+    corners: [u32; 4],
+    at: Vec2,
+}
+
 impl<'a> Integrator<'a> {
-    /// For a scene and its volume.
+    /// For a scene and its volume, and many rays: light volumes are walked now if there are to be any and `kept`
+    /// has not got them.
+    pub fn prepared(
+        scene: &'a Scene,
+        volume: &'a VolumeTexture,
+        kept: &mut KeptDepths,
+        monitor: &dyn Monitor,
+    ) -> Result<Self> {
+        let mut integrator = Integrator::new(scene, volume);
+        if scene.visibility == Visibility::Cached {
+            let light_volumes = LightVolumes::new(scene, volume.size, scene.light_cache)?;
+            integrator.depths = Some(kept.get(&light_volumes, volume, monitor)?);
+            integrator.light_volumes = Some(light_volumes);
+        }
+        Ok(integrator)
+    }
+
+    /// For a scene and its volume, and few rays: with cached visibility they walk to the lights as those would
+    /// from whom the light volumes are made.
     pub fn new(scene: &'a Scene, volume: &'a VolumeTexture) -> Self {
         Integrator {
             scene,
@@ -68,6 +103,10 @@ impl<'a> Integrator<'a> {
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             flow_cells: flow_cells(scene.flow, volume.size[1]),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
+            lights: scene.volume_lights(),
+            light_volumes: (scene.visibility == Visibility::Cached)
+                .then(|| LightVolumes::new(scene, volume.size, u64::MAX).expect("what is not kept fits")),
+            depths: None,
         }
     }
 
@@ -107,6 +146,7 @@ impl<'a> Integrator<'a> {
         observer: &mut O,
     ) -> Traced {
         let scene = self.scene;
+        let quad_number = quad;
         let quad = &scene.quads[quad];
         let map = &quad.map;
         let cells = self.size.as_vec3();
@@ -133,16 +173,22 @@ impl<'a> Integrator<'a> {
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
         let point = scene.camera.eye + d_world * hit[2];
-        let mut lights: Vec<RayLight> = scene
+        let depth_bits = self.extinction * 65535.0 * if self.per_cell { 1.0 } else { frame.depth };
+        let mut lights: Vec<RayLight> = self
             .lights
             .iter()
-            .map(|light| {
+            .enumerate()
+            .map(|(i, light)| {
                 let (to_light, intensity) = light.at(point);
                 let l = plane(to_light, to_light.dot(map.n_world) * side);
                 let l_cell = frame.cell_from_plane(l);
                 let l_v =
                     if texture_frame { l_cell / l_cell.dot(l_cell).sqrt() } else { frame.transposed(l) };
-                RayLight { l_v, l_cell, intensity, sum: 0.0 }
+                let places = match &self.light_volumes {
+                    Some(volumes) => light_places_of(volumes, quad_number, i, Vec2::new(hit[0], hit[1])),
+                    None => LightPlaces::default(),
+                };
+                RayLight { l_v, l_cell, places, intensity, sum: 0.0 }
             })
             .collect();
 
@@ -182,6 +228,9 @@ impl<'a> Integrator<'a> {
                 let seen = match scene.visibility {
                     Visibility::None => 1.0,
                     Visibility::March => self.visibility(crossing.cell, light.l_cell, &mut walked[1]),
+                    Visibility::Cached => {
+                        (-self.kept_depth(crossing.cell, &light.places) * depth_bits).exp2()
+                    }
                 };
                 let lit = weight * seen * psi;
                 light.sum += lit;
@@ -217,8 +266,42 @@ impl<'a> Integrator<'a> {
         (-depth * self.extinction).exp2()
     }
 
+    /// The optical depth from a cell to the light, from the light volumes at the corners of the ray's patch.
+    fn kept_depth(&self, cell: IVec3, places: &LightPlaces) -> f32 {
+        let depth = |number: u32| self.light_depth(number as usize, cell);
+        let [p00, p10, p01, p11] = places.corners;
+        if places.corners == [p00; 4] {
+            return depth(p00);
+        }
+        let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
+        let near = mix(depth(p00), depth(p10), places.at.x);
+        let far = mix(depth(p01), depth(p11), places.at.x);
+        mix(near, far, places.at.y)
+    }
+
+    fn light_depth(&self, number: usize, cell: IVec3) -> f32 {
+        let volumes = self.light_volumes.as_ref().expect("visibility is cached");
+        match &self.depths {
+            Some(depths) => depths[number][self.volume.index(cell.x as u32, cell.y as u32, cell.z as u32)],
+            None => optical_depth(self.volume, cell, volumes.directions[number], volumes.medium),
+        }
+    }
+
     #[inline]
     fn cell(&self, c: IVec3) -> Cell {
         self.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
     }
+}
+
+fn light_places_of(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> LightPlaces {
+    let patches = volumes.patches[quad * volumes.lights + light];
+    if patches.side == 0 {
+        return LightPlaces { corners: [volumes.corners[patches.first as usize]; 4], at: Vec2::ZERO };
+    }
+    let at = uv * patches.side as f32;
+    let corner = at.as_uvec2().min(glam::UVec2::splat(patches.side - 1));
+    let first = (patches.first + corner.y * (patches.side + 1) + corner.x) as usize;
+    let row = patches.side as usize + 1;
+    let corners = [first, first + 1, first + row, first + row + 1].map(|i| volumes.corners[i]);
+    LightPlaces { corners, at: at - corner.as_vec2() }
 }

@@ -5,12 +5,15 @@ pub mod gbuffer;
 pub mod integrate;
 pub mod ray;
 pub mod resolve;
+pub mod visibility;
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
+
+pub use visibility::KeptDepths;
 
 use crate::error::Result;
 use crate::frame::{Frame, Seconds, Window};
@@ -27,14 +30,16 @@ pub fn render(
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let window = Window::whole([scene.image.width, scene.image.height]);
-    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, monitor)
+    let kept = &mut KeptDepths::default();
+    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
 }
 
 /// Pixels rendered at once: 44 bytes each, besides the frame.
 const BAND_PIXELS: u64 = 1 << 21;
 
 /// Renders a part of the image with only some of a scene's samples; the radiance is their mean. The pixels
-/// have the same bits whatever the part is.
+/// have the same bits whatever the part is. Light volumes are left in `kept` for later frames.
+#[expect(clippy::too_many_arguments, reason = "what is drawn, which part of it, and what watches")]
 pub fn render_samples(
     scene: &Scene,
     volume: &VolumeTexture,
@@ -42,13 +47,16 @@ pub fn render_samples(
     window: Window,
     samples: Range<u32>,
     surface: bool,
+    kept: &mut KeptDepths,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;
     let width = window.width as usize;
     let mut frame = Frame::new(window.width, window.height, surface);
     let mut seconds = Seconds::default();
-    let integrator = integrate::Integrator::new(scene, volume);
+    let clock = Instant::now();
+    let integrator = integrate::Integrator::prepared(scene, volume, kept, monitor)?;
+    seconds.visibility = clock.elapsed().as_secs_f64();
     let total = window.pixels() * samples.len() as u64;
     let done = AtomicU64::new(0);
     let rows = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);

@@ -43,6 +43,8 @@ pub struct Seconds {
     pub pipelines: f64,
     /// Upload of volume, quads and mesh (host).
     pub upload: f64,
+    /// Light volumes, where they are not kept from the frame before.
+    pub visibility: f64,
     /// Raster pass.
     pub gbuffer: f64,
     /// Walk and light.
@@ -61,6 +63,7 @@ impl std::ops::AddAssign for Seconds {
         self.device += other.device;
         self.pipelines += other.pipelines;
         self.upload += other.upload;
+        self.visibility += other.visibility;
         self.gbuffer += other.gbuffer;
         self.integrate += other.integrate;
         self.resolve += other.resolve;

@@ -3,54 +3,42 @@
 use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
+use super::visibility::{LightDepths, Visibility};
 use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{self, Mesh, Scene};
+use crate::visibility::LightVolumes;
 use crate::volume::VolumeTexture;
 
-/// What can be measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BenchPass {
-    /// Raster pass.
-    Gbuffer,
-    /// The walk without light: `shaders/bare.wgsl`.
-    BareWalk,
-    /// Walk and direct light.
-    Integrate,
-    /// Walk and light attenuated by an exact walk to the light.
-    IntegrateMarch,
-}
-
-impl BenchPass {
-    /// All, in the order of the frame.
-    pub const ALL: [BenchPass; 4] =
-        [BenchPass::Gbuffer, BenchPass::BareWalk, BenchPass::Integrate, BenchPass::IntegrateMarch];
-
-    /// Its name in the table.
-    pub fn name(self) -> &'static str {
-        match self {
-            BenchPass::Gbuffer => "gbuffer",
-            BenchPass::BareWalk => "bare walk",
-            BenchPass::Integrate => "integrate",
-            BenchPass::IntegrateMarch => "integrate march",
-        }
-    }
-}
-
-/// A renderer with a scene on its device.
+/// A renderer with scenes on its device that differ in their light alone.
 pub struct GpuBench {
     renderer: GpuRenderer,
     prepared: Option<Prepared>,
 }
 
 struct Prepared {
-    up: Uploaded,
+    volume: VolumeTexture,
     targets: Targets,
     sums: Sums,
     window: Window,
+    passes: Vec<(&'static str, Pass)>,
+}
+
+/// What can be measured, and what it works on.
+struct Pass {
+    work: Work,
+    up: Uploaded,
     frame: layout::Frame,
-    passes: [(Integrate, Tiler, Option<u64>); 3],
+    light_depths: LightDepths,
+}
+
+enum Work {
+    Gbuffer,
+    /// Light volumes, walked anew.
+    Visibility(LightVolumes),
+    /// The walk, with the cells that it once took.
+    Integrate(Box<Integrate>, Tiler, Option<u64>),
 }
 
 impl GpuBench {
@@ -59,66 +47,101 @@ impl GpuBench {
         GpuBench { renderer, prepared: None }
     }
 
-    /// Uploads a scene (the second one differs in its visibility only).
+    /// Uploads scenes with the names of their integrate passes, and compiles these. The raster pass and the walk
+    /// without light (`shaders/bare.wgsl`) are the first scene's.
     pub fn prepare(
         &mut self,
-        direct: &Scene,
-        marched: &Scene,
+        scenes: &[(&'static str, &Scene)],
         volume: &VolumeTexture,
         mesh: &Mesh,
     ) -> Result<()> {
-        let gpu = &self.renderer.gpu;
-        let window = Window::whole([direct.image.width, direct.image.height]);
-        let frame = layout::Frame::new(direct, volume, window, &(0..1), 0);
-        let pass = |pass: Integrate| {
-            let variant = pass.variant;
-            (pass, Tiler::new(None, None, variant), None)
-        };
+        let GpuRenderer { gpu, timer, .. } = &self.renderer;
+        let first = scenes[0].1;
+        let window = Window::whole([first.image.width, first.image.height]);
+        let mut resident = Resident::default();
+        let mut passes = Vec::new();
+        for (number, &(name, scene)) in scenes.iter().enumerate() {
+            let frame = layout::Frame::new(scene, volume, window, &(0..1), 0);
+            let mut up = || Uploaded::new(gpu, &mut resident, scene, volume, mesh);
+            let light_volumes = match scene.visibility {
+                scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
+                _ => None,
+            };
+            let variant = Variant::of(scene, light_volumes.as_ref());
+            let mut visibility = Visibility::new(gpu);
+            let none = visibility.none();
+            let mut add = |name, work, light_depths: &LightDepths| -> Result<()> {
+                passes.push((name, Pass { work, up: up()?, frame, light_depths: light_depths.clone() }));
+                Ok(())
+            };
+            let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, variant), None);
+            if number == 0 {
+                add("gbuffer", Work::Gbuffer, &none)?;
+                add("bare walk", integrate(Integrate::bare(gpu, variant)), &none)?;
+            }
+            let mut light_depths = none.clone();
+            if let Some(light_volumes) = light_volumes {
+                add("light volumes", Work::Visibility(light_volumes.clone()), &none)?;
+                let up = Uploaded::new(gpu, &mut Resident::default(), scene, volume, mesh)?;
+                let found = visibility.get(gpu, timer, &up, &frame, light_volumes, volume, |_, _| Ok(()))?;
+                light_depths = found.0;
+                passes.push((
+                    name,
+                    Pass { work: integrate(Integrate::new(gpu, variant)), up, frame, light_depths },
+                ));
+            } else {
+                add(name, integrate(Integrate::new(gpu, variant)), &light_depths)?;
+            }
+        }
         self.prepared = Some(Prepared {
-            up: Uploaded::new(gpu, &mut Resident::default(), direct, volume, mesh)?,
+            volume: volume.clone(),
             targets: Targets::new(gpu, window.width, window.height),
             sums: Sums::new(gpu, window.pixels()),
             window,
-            frame,
-            passes: [
-                pass(Integrate::bare(gpu, Variant::of(direct))),
-                pass(Integrate::new(gpu, Variant::of(direct))),
-                pass(Integrate::new(gpu, Variant::of(marched))),
-            ],
+            passes,
         });
-        self.run(BenchPass::Gbuffer).map(drop)
+        self.run(0).map(drop)
     }
 
-    /// Runs one pass: seconds on the device, and the cells it walked.
+    /// The passes' names, in their order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.prepared.iter().flat_map(|p| &p.passes).map(|(name, _)| *name).collect()
+    }
+
+    /// Runs one pass by its place in [`GpuBench::names`]: seconds on the device, and the cells it walked.
     ///
     /// # Panics
     /// Before [`GpuBench::prepare`].
-    pub fn run(&mut self, pass: BenchPass) -> Result<(f64, u64)> {
+    pub fn run(&mut self, number: usize) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
+        let Pass { work, up, frame, light_depths } = &mut p.passes[number].1;
         let (window, area) = (p.window, Tile::whole(p.window));
-        let inputs = Inputs { gpu, timer, up: &p.up, targets: &p.targets, window, area, frame: &p.frame };
-        let number = match pass {
-            BenchPass::Gbuffer => return Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
-            BenchPass::BareWalk => 0,
-            BenchPass::Integrate => 1,
-            BenchPass::IntegrateMarch => 2,
-        };
-        let (integrate, tiler, cells) = &mut p.passes[number];
-        let seconds = integrate.run(&inputs, &p.sums, tiler, |_| Ok(()))?;
-        let cells = match cells {
-            Some(cells) => *cells,
-            None => {
-                let mut sum = 0;
-                readback::read_rows(gpu, &p.sums.counts, 8, window.width, area, |_, bytes| {
-                    sum += bytes
-                        .chunks_exact(4)
-                        .map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64)
-                        .sum::<u64>();
-                })?;
-                *cells.insert(sum)
+        let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, light_depths };
+        match work {
+            Work::Gbuffer => Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
+            Work::Visibility(volumes) => {
+                let mut pass = Visibility::new(gpu);
+                let found = pass.get(gpu, timer, up, frame, volumes.clone(), &p.volume, |_, _| Ok(()))?;
+                Ok((found.1, 0))
             }
-        };
-        Ok((seconds, cells))
+            Work::Integrate(integrate, tiler, cells) => {
+                let seconds = integrate.run(&inputs, &p.sums, tiler, |_| Ok(()))?;
+                let cells = match cells {
+                    Some(cells) => *cells,
+                    None => *cells.insert(cells_walked(gpu, &p.sums, window)?),
+                };
+                Ok((seconds, cells))
+            }
+        }
     }
+}
+
+fn cells_walked(gpu: &super::Gpu, sums: &Sums, window: Window) -> Result<u64> {
+    let mut sum = 0;
+    readback::read_rows(gpu, &sums.counts, 8, window.width, Tile::whole(window), |_, bytes| {
+        let counts = bytes.chunks_exact(4).map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64);
+        sum += counts.sum::<u64>();
+    })?;
+    Ok(sum)
 }

@@ -77,6 +77,8 @@ impl Gpu {
             max_texture_dimension_3d: has.max_texture_dimension_3d,
             max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
             max_buffer_size: has.max_buffer_size,
+            // Quads, lights, light places, radiance and counts; WebGPU grants 8 everywhere.
+            max_storage_buffers_per_shader_stage: has.max_storage_buffers_per_shader_stage.min(8),
             ..wgpu::Limits::downlevel_defaults()
         };
         // Software Vulkan writes the first time stamp of a compute pass when it gets round to it: after a

@@ -6,6 +6,7 @@ use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::{Attenuation, Scene, Visibility};
 use crate::shading::whole_exponent;
+use crate::visibility::LightVolumes;
 
 /// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
 /// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
@@ -22,16 +23,20 @@ pub struct Variant {
     lights: u32,
     per_cell: bool,
     march: bool,
+    cached: bool,
+    varying: bool,
     exponent: u32,
 }
 
 impl Variant {
-    /// For a scene.
-    pub fn of(scene: &Scene) -> Self {
+    /// For a scene, and the light volumes it has if its visibility is cached.
+    pub fn of(scene: &Scene, light_volumes: Option<&LightVolumes>) -> Self {
         Variant {
-            lights: scene.lights.len() as u32,
+            lights: scene.volume_lights().len() as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             march: scene.visibility == Visibility::March,
+            cached: light_volumes.is_some(),
+            varying: light_volumes.is_some_and(LightVolumes::varying),
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
     }
@@ -119,10 +124,13 @@ impl Tiler {
 impl Integrate {
     /// Compiles the pipeline for one variant.
     pub fn new(gpu: &Gpu, variant: Variant) -> Self {
+        let number = |on: bool| f64::from(u8::from(on));
         let constants = [
             ("LIGHTS", variant.lights as f64),
-            ("PER_CELL", f64::from(u8::from(variant.per_cell))),
-            ("MARCH", f64::from(u8::from(variant.march))),
+            ("PER_CELL", number(variant.per_cell)),
+            ("MARCH", number(variant.march)),
+            ("CACHED", number(variant.cached)),
+            ("VARYING", number(variant.varying)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, include_str!("../../shaders/integrate.wgsl"), &constants)
@@ -164,7 +172,7 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, .. } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, light_depths, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
@@ -181,6 +189,8 @@ impl Integrate {
             entry(7, wgpu::BindingResource::TextureView(&opaque)),
             entry(8, sums.radiance.as_entire_binding()),
             entry(9, sums.counts.as_entire_binding()),
+            entry(10, wgpu::BindingResource::TextureView(&light_depths.texture)),
+            entry(11, light_depths.places.as_entire_binding()),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -216,7 +226,7 @@ impl Integrate {
 }
 
 /// The bindings of `shaders/integrate.wgsl`, in order.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 10] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 12] {
     use wgpu::{
         BindingType, BufferBindingType, StorageTextureAccess, TextureFormat, TextureSampleType,
         TextureViewDimension,
@@ -230,14 +240,15 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 10] {
     };
     let floats = texture(TextureSampleType::Float { filterable: false });
     let sums = buffer(BufferBindingType::Storage { read_only: false });
-    let volume = BindingType::StorageTexture {
+    let cells = |format| BindingType::StorageTexture {
         access: StorageTextureAccess::ReadOnly,
-        format: TextureFormat::Rg32Uint,
+        format,
         view_dimension: TextureViewDimension::D3,
     };
+    let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Float));
     let list = buffer(BufferBindingType::Storage { read_only: true });
     let ids = texture(TextureSampleType::Uint);
-    let types = [uniform, list, list, uniform, volume, floats, ids, floats, sums, sums];
+    let types = [uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list];
     let mut binding = 0;
     types.map(|ty| {
         binding += 1;

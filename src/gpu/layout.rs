@@ -83,6 +83,17 @@ pub struct Quad {
     pub pad_g: [f32; 2],
 }
 
+/// The light volume that one submission fills, or a part of it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct LightVolume {
+    pub direction: [f32; 3],
+    pub first_cell: u32,
+    pub offset: [i32; 3],
+    pub cell_count: u32,
+}
+
 /// The part of a window that one submission works on, pixels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -167,7 +178,7 @@ pub fn flow_cells(flow: f32, ny: u32) -> f32 {
 
 /// The scene's lights; a light that shines on nothing if there are none, for no buffer is empty.
 pub fn lights(scene: &Scene) -> Vec<Light> {
-    let mut lights: Vec<Light> = scene.lights.iter().map(Light::new).collect();
+    let mut lights: Vec<Light> = scene.volume_lights().iter().map(Light::new).collect();
     lights.resize(lights.len().max(1), Light::default());
     lights
 }

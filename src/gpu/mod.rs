@@ -11,8 +11,9 @@ mod readback;
 mod resolve;
 mod timing;
 mod upload;
+mod visibility;
 
-pub use bench::{BenchPass, GpuBench};
+pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
@@ -20,6 +21,7 @@ pub use integrate::{Integrate, Sums, Tiler, Variant};
 pub use resolve::Resolve;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
+pub use visibility::{LightDepths, Visibility};
 
 use std::ops::Range;
 use std::time::Instant;
@@ -27,7 +29,8 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{self, Mesh, Scene};
+use crate::visibility::LightVolumes;
 use crate::volume::VolumeTexture;
 use layout::Tile;
 use rasters::{Key, Rasters};
@@ -92,6 +95,8 @@ pub struct Inputs<'a> {
     pub area: Tile,
     /// The window's uniforms.
     pub frame: &'a layout::Frame,
+    /// The light volumes.
+    pub light_depths: &'a LightDepths,
 }
 
 /// The renderer: a device and its compiled passes.
@@ -104,6 +109,7 @@ pub struct GpuRenderer {
     /// The latest first.
     integrate: Vec<Integrate>,
     resident: Resident,
+    visibility: Visibility,
     /// The latest first.
     canvases: Vec<Canvas>,
     rasters: Rasters,
@@ -158,6 +164,7 @@ impl GpuRenderer {
     /// Compiles the passes that do not depend on the scene.
     pub fn new(gpu: Gpu) -> Self {
         let (timer, gbuffer, resolve) = (Timer::new(&gpu), Gbuffer::new(&gpu), Resolve::new(&gpu));
+        let visibility = Visibility::new(&gpu);
         GpuRenderer {
             gpu,
             timer,
@@ -165,6 +172,7 @@ impl GpuRenderer {
             resolve,
             integrate: Vec::new(),
             resident: Resident::default(),
+            visibility,
             canvases: Vec::new(),
             rasters: Rasters::default(),
             learned: None,
@@ -184,7 +192,11 @@ impl GpuRenderer {
         let gpu = &self.gpu;
         let mut seconds = Seconds::default();
         let clock = Instant::now();
-        let variant = Variant::of(scene);
+        let light_volumes = match scene.visibility {
+            scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
+            _ => None,
+        };
+        let variant = Variant::of(scene, light_volumes.as_ref());
         let integrate = recent(
             &mut self.integrate,
             KEPT_PIPELINES,
@@ -206,6 +218,17 @@ impl GpuRenderer {
         self.rasters.begin();
 
         let samples = options.samples.clone().unwrap_or(0..image.samples);
+        let light_depths = match light_volumes {
+            None => self.visibility.none(),
+            Some(light_volumes) => {
+                let frame = layout::Frame::new(scene, volume, part, &samples, samples.start);
+                let watch = |done, all| monitor.progress("light volumes", done, all);
+                let found =
+                    self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, volume, watch)?;
+                seconds.visibility = found.1;
+                found.0
+            }
+        };
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
@@ -237,6 +260,7 @@ impl GpuRenderer {
                     window,
                     area,
                     frame: &frame_uniforms,
+                    light_depths: &light_depths,
                 };
                 if kept.is_none_or(|kept| !kept.ready.get()) {
                     seconds.gbuffer +=

@@ -25,17 +25,23 @@ pub enum Engine {
     /// On a device.
     Gpu(Box<GpuRenderer>, DeviceOptions),
     /// On all cores.
-    Cpu,
+    Cpu(cpu::KeptDepths),
 }
 
 /// Pixels a submission after a device was lost: small enough for the shortest watchdog known.
 const CAREFUL_TILE_PIXELS: u32 = 4096;
 
 impl Engine {
+    /// The CPU engine.
+    pub fn cpu() -> Engine {
+        Engine::Cpu(cpu::KeptDepths::default())
+    }
+
     /// Opens the engine; says in one line what was taken and why.
     pub fn open(choice: EngineChoice, device: &DeviceOptions) -> Result<(Engine, String)> {
-        let cpu =
-            |why: &str| (Engine::Cpu, format!("engine cpu on {} threads{why}", rayon::current_num_threads()));
+        let cpu = |why: &str| {
+            (Engine::cpu(), format!("engine cpu on {} threads{why}", rayon::current_num_threads()))
+        };
         match choice {
             EngineChoice::Cpu => Ok(cpu("")),
             EngineChoice::Gpu => Engine::open_gpu(device),
@@ -70,7 +76,7 @@ impl Engine {
     pub fn word(&self) -> &'static str {
         match self {
             Engine::Gpu(..) => "gpu",
-            Engine::Cpu => "cpu",
+            Engine::Cpu(_) => "cpu",
         }
     }
 
@@ -78,7 +84,7 @@ impl Engine {
     pub fn adapter(&self) -> Option<String> {
         match self {
             Engine::Gpu(renderer, _) => Some(renderer.gpu.name()),
-            Engine::Cpu => None,
+            Engine::Cpu(_) => None,
         }
     }
 
@@ -93,10 +99,10 @@ impl Engine {
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
         match self {
-            Engine::Cpu => {
+            Engine::Cpu(kept) => {
                 let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
                 let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
-                cpu::render_samples(scene, volume, mesh, window, samples, options.surface, monitor)
+                cpu::render_samples(scene, volume, mesh, window, samples, options.surface, kept, monitor)
             }
             Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
                 Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {

@@ -57,6 +57,8 @@ pub struct Scene {
     pub frame: AngleFrame,
     /// Attenuation between light and cell.
     pub visibility: Visibility,
+    /// Bytes that light volumes may take.
+    pub light_cache: u64,
     /// Exponent of the specular term.
     pub p: f32,
     /// The camera.
@@ -172,6 +174,8 @@ pub enum Visibility {
     None,
     /// Exact walk from the cell's centre to the light.
     March,
+    /// The same, walked once for every cell of the volume and kept.
+    Cached,
 }
 
 /// A pinhole camera.
@@ -315,11 +319,12 @@ impl Scene {
             rocks: parts::rocks(v, limits.memory)?,
             trace,
             frame: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
-            visibility: if v.text("light.visibility") == "none" {
-                Visibility::None
-            } else {
-                Visibility::March
+            visibility: match v.text("light.visibility").as_str() {
+                "none" => Visibility::None,
+                "cached" => Visibility::Cached,
+                _ => Visibility::March,
             },
+            light_cache: u64::from(v.count("light.cache")) << 20,
             p: v.float("light.p"),
             camera,
             background: Background {
@@ -337,6 +342,11 @@ impl Scene {
             Some(path) => read_npz(path, memory),
             None => crate::volume::build_water(&self.water, monitor),
         }
+    }
+
+    /// The lights that shine on the volume.
+    pub fn volume_lights(&self) -> Vec<Light> {
+        self.lights.clone()
     }
 
     /// All rocks as one mesh.

@@ -253,10 +253,19 @@ pub const PARAMS: &[Param] = &[
         "light.visibility",
         "V",
         "",
-        Choice(&["march", "none"]),
+        Choice(&["march", "cached", "none"]),
         Uniform,
-        "Attenuation between light and cell: an exact walk from the cell's centre, or none.",
+        "Attenuation between light and cell: an exact walk from the cell's centre, the same walked once for every cell and kept, or none.",
     ),
+    p(
+        "light.cache",
+        "",
+        "MiB",
+        Int(1, 65536, 512),
+        Uniform,
+        "Most memory that visibility cached may take, in light volumes of four bytes a cell.",
+    )
+    .slider(16.0, 4096.0),
     p(
         "light.p",
         "p",

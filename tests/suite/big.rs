@@ -53,7 +53,8 @@ impl Subject {
             (window.y, rows.iter().copied().chain(std::iter::repeat(rows[rows.len() - 1])));
         while y < window.bottom() {
             let height = rows.next().expect("endless").min(window.bottom() - y);
-            let strip = self.render(&mut Engine::Cpu, Some(Window { y, height, ..window }), Grid::default());
+            let strip =
+                self.render(&mut Engine::cpu(), Some(Window { y, height, ..window }), Grid::default());
             writer.push(&strip).expect("written");
             y += height;
         }
@@ -116,7 +117,7 @@ fn crops(size: [u32; 2], count: usize) -> Vec<Window> {
 #[test]
 fn a_part_of_an_image_is_that_part_of_the_whole_bit_for_bit_on_both_engines() {
     let subject = Subject::small();
-    let mut engines = vec![Engine::Cpu];
+    let mut engines = vec![Engine::cpu()];
     engines.extend(renderer("crops").map(|r| Engine::Gpu(Box::new(r), DeviceOptions::default())));
     // As many windows of the device as a picture of gigapixels has.
     for grid in [Grid { side: 32, pixels: 32 * 16 }, Grid { side: 64, pixels: 64 * 64 }, Grid::default()] {
@@ -203,7 +204,7 @@ fn a_file_does_not_depend_on_how_its_rows_came() {
                     std::fs::read(file("a")).expect("a") == std::fs::read(file(name)).expect("another");
                 assert!(same, "{extension} {window} {name}");
             }
-            let frame = subject.render(&mut Engine::Cpu, Some(window), Grid::default());
+            let frame = subject.render(&mut Engine::cpu(), Some(window), Grid::default());
             assert_eq!(figures, Figures::of(&frame));
             let verified = verify(&file("a")).expect("whole");
             assert_eq!((verified.size, verified.window), ([97, 61], window));
@@ -248,7 +249,7 @@ fn check_contents(path: &Path, frame: &Frame, window: Window) {
 #[test]
 fn figures_of_parts_add_up_to_those_of_the_whole() {
     let subject = Subject::small();
-    let frame = subject.render(&mut Engine::Cpu, None, Grid::default());
+    let frame = subject.render(&mut Engine::cpu(), None, Grid::default());
     let whole = Figures::of(&frame);
     assert_eq!([whole.cells_walked, whole.light_cells_walked], frame.cells_walked());
     assert_eq!((whole.pixels, whole.covered_pixels), (97 * 61, frame.covered_pixels()));

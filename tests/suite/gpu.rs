@@ -38,7 +38,7 @@ const SURFACE: RenderOptions = RenderOptions {
     grid: Grid { side: 4096, pixels: 1 << 21 },
 };
 
-fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
+pub fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
     let on_gpu = renderer.render(scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
@@ -51,7 +51,7 @@ fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
 }
 
 /// Parity of final radiance and transmittance, and of the raster pass's layers.
-fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
+pub fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
     let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
     let least = |what: &str, a: &[[f32; 3]], b: &[[f32; 3]]| {
         let d = Difference::new(gpu.width, a, b, tolerance);
@@ -256,7 +256,7 @@ fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
     let scene = scene("fig5", &["image.width=65", "image.height=63", "image.samples=4"]);
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
-    let mut engines = vec![taki::job::Engine::Cpu];
+    let mut engines = vec![taki::job::Engine::cpu()];
     engines.extend(renderer("parts").map(|r| taki::job::Engine::Gpu(Box::new(r), DeviceOptions::default())));
     for engine in &mut engines {
         let mut part = |samples| {

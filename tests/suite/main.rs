@@ -27,6 +27,7 @@ mod sheet;
 mod tolerance;
 #[cfg(feature = "viewer")]
 mod viewer;
+mod visibility;
 mod volume;
 mod walk;
 #[cfg(all(feature = "viewer", target_os = "linux"))]

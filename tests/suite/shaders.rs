@@ -10,7 +10,7 @@ use wgpu::naga;
 /// Files that are put in front of every stage.
 const SHARED: [&str; 4] = ["frame.wgsl", "mapping.wgsl", "shading.wgsl", "walk.wgsl"];
 /// The stages.
-const STAGES: [&str; 4] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl"];
+const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 fn file(name: &str) -> String {
     let path = format!("{}/shaders/{name}", env!("CARGO_MANIFEST_DIR"));

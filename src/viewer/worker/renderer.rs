@@ -221,10 +221,10 @@ impl Renderer {
             Ok(opened) => opened,
             Err(e) => {
                 self.say(MessageKind::Error, format!("{e}. The CPU engine goes on"));
-                (Engine::Cpu, "engine cpu".into())
+                (Engine::cpu(), "engine cpu".into())
             }
         };
-        if matches!(engine, Engine::Cpu) && self.choice != EngineChoice::Cpu {
+        if matches!(engine, Engine::Cpu(_)) && self.choice != EngineChoice::Cpu {
             self.say(MessageKind::Warning, line.clone());
         }
         self.engine = Some(engine);
@@ -440,7 +440,7 @@ impl Renderer {
         options: &RenderOptions,
         watch: &dyn Monitor,
     ) -> Result<Frame> {
-        match self.engine.get_or_insert(Engine::Cpu) {
+        match self.engine.get_or_insert(Engine::cpu()) {
             Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
             cpu => cpu.render(scene, volume, mesh, options, watch),
         }

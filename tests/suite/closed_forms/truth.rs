@@ -101,7 +101,7 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: DVec3, uv: [f64; 2], x: DVec3
             let psi = k_d * angle_l.sin() + k_s * specular;
             let seen = match scene.visibility {
                 Visibility::None => 1.0,
-                Visibility::March => {
+                Visibility::March | Visibility::Cached => {
                     let (path, tie) = walk(size, cell.as_dvec3() + 0.5, cell_from_world * l);
                     near_tie |= tie;
                     let skip = usize::from(per_cell);

@@ -1,0 +1,241 @@
+//! §5 Light volumes: the compute pass that fills them, and what is kept of them. CPU twin:
+//! `src/cpu/visibility.rs`; why and in which units: `src/visibility.rs`.
+
+use std::sync::Arc;
+
+use super::device::Gpu;
+use super::layout::{Frame, LightVolume};
+use super::shader;
+use super::timing::Timer;
+use super::upload::Uploaded;
+use crate::error::{Error, Result};
+use crate::visibility::{LightVolumes, Medium};
+use crate::volume::{Cell, VolumeTexture};
+
+/// Cells of the first submission, and most of any: its time is learned as for tiles.
+const FIRST_CELLS: u32 = 1 << 13;
+/// One dimension of a dispatch: 65535 workgroups of 64.
+const MOST_CELLS: u32 = 65535 * 64;
+/// A submission aims at this many seconds, as tiles of the integrate pass.
+const SECONDS: f64 = 0.03;
+
+/// The pass, and the light volumes of the last frame that had any.
+pub struct Visibility {
+    pipelines: Vec<(bool, wgpu::ComputePipeline)>,
+    occupied: Option<(Arc<Vec<Cell>>, wgpu::Buffer, u32)>,
+    kept: Option<Kept>,
+    none: LightDepths,
+}
+
+struct Kept {
+    cells: Arc<Vec<Cell>>,
+    size: [u32; 3],
+    volumes: LightVolumes,
+    depths: LightDepths,
+}
+
+/// Light volumes on the device, as the integrate pass reads them.
+#[derive(Clone)]
+pub struct LightDepths {
+    /// All light volumes, side by side in one `r32float` texture.
+    pub texture: wgpu::TextureView,
+    /// `array<vec4<i32>>`: of every quad and light its first corner and patches a side; then of every corner where
+    /// its light volume begins in the texture.
+    pub places: wgpu::Buffer,
+}
+
+/// Where the light volumes lie in their texture: as many as fit along x, then y, then z.
+struct Shelf {
+    size: [u32; 3],
+    along: [u32; 3],
+}
+
+impl Shelf {
+    fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
+        let most = gpu.device.limits().max_texture_dimension_3d;
+        // Along z first: the order of the volume's own slices.
+        let mut along = [1; 3];
+        let mut left = count;
+        for axis in [2, 1, 0] {
+            along[axis] = left.clamp(1, (most / size[axis]).max(1));
+            left = left.div_ceil(along[axis]);
+        }
+        if left > 1 {
+            let [nx, ny, nz] = size;
+            return Err(Error::input(
+                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too many for {}", gpu.name()),
+                "use light.visibility=march, or --engine cpu",
+            ));
+        }
+        Ok(Shelf { size, along })
+    }
+
+    fn extent(&self) -> [u32; 3] {
+        [0, 1, 2].map(|axis| self.size[axis] * self.along[axis])
+    }
+
+    fn place(&self, number: u32) -> [i32; 3] {
+        let [kx, _, kz] = self.along;
+        let steps = [number / kz % kx, number / kz / kx, number % kz];
+        [0, 1, 2].map(|axis| (steps[axis] * self.size[axis]) as i32)
+    }
+}
+
+impl Visibility {
+    /// Nothing is compiled before it is needed.
+    pub fn new(gpu: &Gpu) -> Self {
+        let none = LightDepths {
+            texture: texture(gpu, [1; 3]),
+            places: gpu.buffer_with("light places", &[], wgpu::BufferUsages::STORAGE),
+        };
+        Visibility { pipelines: Vec::new(), occupied: None, kept: None, none }
+    }
+
+    /// What the integrate pass binds where no light volumes are asked for.
+    pub fn none(&self) -> LightDepths {
+        self.none.clone()
+    }
+
+    /// The depths of `volumes`, walked unless they are those of the last call; and the device's seconds for
+    /// it. `between` is called with the cells done and all there are, and may stop the work.
+    #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
+    pub fn get(
+        &mut self,
+        gpu: &Gpu,
+        timer: &Timer,
+        up: &Uploaded,
+        frame: &Frame,
+        volumes: LightVolumes,
+        volume: &VolumeTexture,
+        mut between: impl FnMut(u64, u64) -> Result<()>,
+    ) -> Result<(LightDepths, f64)> {
+        if let Some(kept) = &self.kept
+            && Arc::ptr_eq(&kept.cells, &volume.cells)
+            && kept.size == volume.size
+            && kept.volumes == volumes
+        {
+            return Ok((kept.depths.clone(), 0.0));
+        }
+        // The old ones go first: both might not fit.
+        self.kept = None;
+        let shelf = Shelf::new(gpu, volume.size, volumes.directions.len() as u32)?;
+        let depths =
+            LightDepths { texture: texture(gpu, shelf.extent()), places: places(gpu, &volumes, &shelf) };
+        gpu.check()?;
+        let (occupied, count) = self.occupied(gpu, volume);
+        let pipeline = self.pipeline(gpu, volumes.medium);
+        let frame = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let part = gpu.buffer(
+            "light volume",
+            size_of::<LightVolume>() as u64,
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        );
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("visibility"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[
+                entry(0, frame.as_entire_binding()),
+                entry(1, part.as_entire_binding()),
+                entry(2, wgpu::BindingResource::TextureView(&up.volume)),
+                entry(3, occupied.as_entire_binding()),
+                entry(4, wgpu::BindingResource::TextureView(&depths.texture)),
+            ],
+        });
+        let total = u64::from(count) * volumes.directions.len() as u64;
+        let (mut seconds, mut done, mut cells) = (0.0, 0, FIRST_CELLS);
+        for (number, direction) in volumes.directions.iter().enumerate() {
+            let mut first_cell = 0;
+            while first_cell < count {
+                let cell_count = cells.min(count - first_cell);
+                let uniform = LightVolume {
+                    direction: direction.to_array(),
+                    first_cell,
+                    offset: shelf.place(number as u32),
+                    cell_count,
+                };
+                gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
+                let took = timer.run(gpu, "visibility", |encoder, span| {
+                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                        label: Some("visibility"),
+                        timestamp_writes: span.compute(),
+                    });
+                    pass.set_pipeline(&pipeline);
+                    pass.set_bind_group(0, &group, &[]);
+                    pass.dispatch_workgroups(cell_count.div_ceil(64), 1, 1);
+                })?;
+                seconds += took;
+                first_cell += cell_count;
+                done += u64::from(cell_count);
+                between(done, total)?;
+                let wanted = f64::from(cell_count) * SECONDS / took.max(1e-6);
+                cells = wanted.clamp(64.0, f64::from(cells.saturating_mul(4).min(MOST_CELLS))) as u32;
+            }
+        }
+        let kept = Kept { cells: volume.cells.clone(), size: volume.size, volumes, depths: depths.clone() };
+        self.kept = Some(kept);
+        Ok((depths, seconds))
+    }
+
+    /// Linear indices of the cells with density, and their number.
+    fn occupied(&mut self, gpu: &Gpu, volume: &VolumeTexture) -> (wgpu::Buffer, u32) {
+        if let Some((cells, buffer, count)) = &self.occupied
+            && Arc::ptr_eq(cells, &volume.cells)
+        {
+            return (buffer.clone(), *count);
+        }
+        let numbered = volume.cells.iter().zip(0u32..);
+        let indices: Vec<u32> = numbered.filter(|(cell, _)| cell.rho_code() > 0).map(|(_, i)| i).collect();
+        let buffer =
+            gpu.buffer_with("occupied cells", bytemuck::cast_slice(&indices), wgpu::BufferUsages::STORAGE);
+        self.occupied = Some((volume.cells.clone(), buffer.clone(), indices.len() as u32));
+        (buffer, indices.len() as u32)
+    }
+
+    fn pipeline(&mut self, gpu: &Gpu, medium: Medium) -> wgpu::ComputePipeline {
+        let per_cell = medium.per_cell;
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == per_cell) {
+            return pipeline.clone();
+        }
+        let module = shader(gpu, "visibility", include_str!("../../shaders/visibility.wgsl"));
+        let constants = [("PER_CELL", f64::from(u8::from(per_cell)))];
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("visibility"),
+            layout: None,
+            module: &module,
+            entry_point: Some("visibility"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        self.pipelines.push((per_cell, pipeline.clone()));
+        pipeline
+    }
+}
+
+fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("light volumes"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: depth },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::R32Float,
+        usage: wgpu::TextureUsages::STORAGE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&Default::default())
+}
+
+fn places(gpu: &Gpu, volumes: &LightVolumes, shelf: &Shelf) -> wgpu::Buffer {
+    let before = volumes.patches.len() as u32;
+    let patches = volumes.patches.iter().map(|p| [(before + p.first) as i32, p.side as i32, 0, 0]);
+    let corners = volumes.corners.iter().map(|&number| {
+        let [x, y, z] = shelf.place(number);
+        [x, y, z, 0]
+    });
+    let all: Vec<[i32; 4]> = patches.chain(corners).collect();
+    gpu.buffer_with("light places", bytemuck::cast_slice(&all), wgpu::BufferUsages::STORAGE)
+}

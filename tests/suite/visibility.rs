@@ -1,0 +1,194 @@
+//! Cached visibility: light volumes say what an exact walk from every cell would.
+
+use glam::{IVec3, Vec3};
+use taki::cpu::{self, visibility::optical_depth};
+use taki::frame::Frame;
+use taki::job::Unwatched;
+use taki::scene::{Light, Limits, Scene};
+use taki::visibility::{LightVolumes, Medium};
+use taki::volume::VolumeTexture;
+
+use crate::gpu::renderer;
+
+fn scene(preset: &str, sets: &[&str]) -> Scene {
+    let sets: Vec<String> = sets.iter().map(|&set| set.into()).collect();
+    Scene::load(preset.as_ref(), &sets, &Limits::default()).expect("valid")
+}
+
+fn volume(scene: &Scene) -> VolumeTexture {
+    scene.volume(1 << 30, &Unwatched).expect("a volume")
+}
+
+/// Root of the mean squared difference of the radiances, relative to the mean radiance of the second.
+fn rmse([a, b]: [&Frame; 2]) -> f64 {
+    let (mut squares, mut sum, mut n) = (0.0, 0.0, 0.0);
+    for (a, b) in a.radiance.iter().zip(&b.radiance) {
+        for c in 0..3 {
+            squares += f64::from(a[c] - b[c]).powi(2);
+            sum += f64::from(b[c]);
+            n += 1.0;
+        }
+    }
+    (squares / n).sqrt() / (sum / n)
+}
+
+fn on_cpu(scene: &Scene) -> Frame {
+    cpu::render(scene, &volume(scene), &scene.mesh(), false, &Unwatched).expect("a frame")
+}
+
+#[test]
+fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
+    let size = [40; 3];
+    let of = |sets: &[&str]| LightVolumes::new(&scene("front", sets), size, u64::MAX).expect("they fit");
+    let one = of(&[]);
+    assert_eq!((one.directions.len(), one.varying(), one.patches.len()), (1, false, 1));
+    // The same parallelogram twice, elsewhere; another thickness; another place of the eye on the same side.
+    let mut two = scene("front", &[]);
+    let mut moved = two.quads[0];
+    moved.corners = moved.corners.map(|c| c + Vec3::new(3.0, 1.0, -2.0));
+    moved.map.a_world = moved.corners[0];
+    two.quads.push(moved);
+    let volumes = LightVolumes::new(&two, size, u64::MAX).expect("they fit");
+    assert_eq!((volumes.directions.len(), volumes.patches.len()), (1, 2));
+    two.quads[1].material.thickness_m *= 2.0;
+    assert_eq!(LightVolumes::new(&two, size, u64::MAX).expect("they fit").directions.len(), 2);
+    let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4", "trace.sigma=3"]);
+    assert_eq!(elsewhere, one, "camera, exposure, flow and σ leave light volumes as they are");
+    // From behind, the face is the other one.
+    let behind = of(&["camera.eye=[0,0,-3.5]"]);
+    assert!((behind.directions[0] * Vec3::new(1.0, 1.0, -1.0) - one.directions[0]).length() < 1e-5);
+}
+
+#[test]
+fn a_point_light_near_a_quad_cuts_it_into_patches_and_a_far_one_does_not() {
+    let of = |position: &str| {
+        let position = format!("lights.key.position={position}");
+        let scene = scene("front", &["lights.key.kind=point", &position]);
+        LightVolumes::new(&scene, [40; 3], u64::MAX).expect("they fit")
+    };
+    let near = of("[0.2,0.3,0.8]");
+    assert!(near.varying() && near.directions.len() > 4, "{:?}", near.patches);
+    assert!(!of("[200,300,800]").varying());
+}
+
+#[test]
+fn light_volumes_over_the_budget_are_coarser_and_then_refused_with_what_they_need() {
+    let near = ["lights.key.kind=point", "lights.key.position=[0.2,0.3,0.8]", "light.visibility=cached"];
+    let of = |budget: u64| LightVolumes::new(&scene("front", &near), [40; 3], budget);
+    let whole = of(u64::MAX).expect("they fit");
+    let tight = of(whole.bytes([40; 3]) as u64 - 1).expect("coarser ones fit");
+    assert!(tight.directions.len() < whole.directions.len());
+    let error = of(100_000).expect_err("nothing fits");
+    assert_eq!(error.exit_code(), 33);
+    let words = error.to_string();
+    assert!(words.contains("light.cache") && words.contains("light.visibility=march"), "{words}");
+}
+
+#[test]
+fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
+    let mut front = scene("front", &[]);
+    let mut uniform = volume(&front);
+    let full = uniform.cells.iter().find(|c| c.rho_code() == 0xffff).copied().expect("a full cell");
+    uniform.cells = vec![full; 40 * 40 * 40].into();
+    for (towards, cosine) in
+        [(Vec3::Z, 1.0), (Vec3::new(0.6, 0.0, 0.8), 0.8), (Vec3::new(0.0, -0.8, -0.6), 0.6)]
+    {
+        front.lights = vec![Light::Directional { to_light: towards, intensity: Vec3::ONE }];
+        let volumes = LightVolumes::new(&front, uniform.size, u64::MAX).expect("they fit");
+        for z in [0, 7, 39] {
+            let cell = IVec3::new(3, 5, z);
+            let depth = optical_depth(&uniform, cell, volumes.directions[0], volumes.medium);
+            let above = if towards.z > 0.0 { z as f32 + 0.5 } else { 39.5 - z as f32 };
+            assert!((depth * cosine / above - 1.0).abs() < 1e-5, "{towards} {z}: {depth}");
+        }
+    }
+    // Per cell the cell itself does not hide its own light.
+    let medium = Medium { per_cell: true, max_cells: 512 };
+    assert_eq!(optical_depth(&uniform, IVec3::new(3, 5, 7), Vec3::new(0.0, 0.0, -1.0), medium), 7.0);
+}
+
+#[test]
+fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
+    let size = ["image.width=200", "image.height=200"];
+    let near = ["lights.key.kind=point", "lights.key.position=[0.3,0.4,1.2]", "lights.key.intensity=2"];
+    let cell = ["trace.attenuation=per-cell", "trace.tau=0.3"];
+    // A directional light on a parallelogram is exact but for rounding. Under a point light half the quad's width
+    // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
+    for (preset, more, allowed) in [
+        ("front", &[][..], 1e-4),
+        ("front", &cell[..], 1e-4),
+        ("front", &near[..], 0.06),
+        ("fig5", &[][..], 0.02),
+        ("waterfall", &[][..], 0.02),
+    ] {
+        let sets: Vec<&str> = size.iter().chain(more).copied().collect();
+        let [march, cached, none] = ["march", "cached", "none"].map(|visibility| {
+            let visibility = format!("light.visibility={visibility}");
+            on_cpu(&scene(preset, &[&sets[..], &[&visibility]].concat()))
+        });
+        let error = rmse([&cached, &march]);
+        println!("{preset} {more:?}: cached {error:.5}, none {:.3}", rmse([&none, &march]));
+        assert!(error <= allowed, "{preset} {more:?}: {error}");
+        // The comparison can fail: without attenuation it does.
+        assert!(rmse([&none, &march]) > 0.02, "{preset} {more:?}");
+    }
+}
+
+#[test]
+fn the_engines_agree_on_light_volumes() {
+    let Some(mut renderer) = renderer("light volumes") else { return };
+    let small = ["image.width=96", "image.height=80", "light.visibility=cached"];
+    let near = ["lights.key.kind=point", "lights.key.position=[0.3,0.4,1.2]"];
+    let behind = ["camera.eye=[0.3,0.2,-3.5]"];
+    let cell = ["trace.attenuation=per-cell", "light.frame=texture", "trace.max_cells=30"];
+    for (preset, more) in
+        [("front", &near[..]), ("front", &behind[..]), ("front", &cell[..]), ("fig5", &[][..])]
+    {
+        let sets: Vec<&str> = small.iter().chain(more).copied().collect();
+        let scene = scene(preset, &sets);
+        crate::gpu::assert_parity(&format!("{preset} {more:?}"), &crate::gpu::both(&mut renderer, &scene));
+    }
+}
+
+#[test]
+fn light_volumes_on_the_device_are_kept_and_never_stale() {
+    let Some(mut kept) = renderer("kept light volumes") else { return };
+    let base = ["image.width=60", "image.height=50", "light.visibility=cached"];
+    let changes: [(&str, bool); 10] = [
+        ("volume.seed=1", true),
+        ("camera.eye=[0.5,0.2,3]", false),
+        ("image.exposure=1", false),
+        ("volume.flow=0.3", false),
+        ("trace.sigma=4", false),
+        ("lights.key.intensity=2", false),
+        ("lights.key.direction=[0.1,0.9,0.4]", true),
+        ("materials.water.thickness=0.9", true),
+        ("trace.attenuation=per-cell", true),
+        ("camera.eye=[0,0,-3]", true),
+    ];
+    let mut sets: Vec<&str> = base.to_vec();
+    let mut of: Option<VolumeTexture> = None;
+    for (change, walks) in changes {
+        sets.push(change);
+        let scene = scene("front", &sets);
+        let (volume, mesh) = (of.get_or_insert_with(|| volume(&scene)).clone(), scene.mesh());
+        let frame = kept.render(&scene, &volume, &mesh, &Default::default(), &Unwatched).expect("a frame");
+        assert_eq!(frame.seconds.visibility > 0.0, walks, "{change}");
+        let mut fresh = renderer("a new renderer").expect("as before");
+        let new = fresh.render(&scene, &volume, &mesh, &Default::default(), &Unwatched).expect("a frame");
+        assert_eq!(frame.radiance, new.radiance, "{change}");
+    }
+}
+
+#[test]
+fn bad_values_of_cached_visibility_have_their_line() {
+    for (set, words) in [
+        ("light.visibility=kept", "march, cached, none"),
+        ("light.cache=0", "1 to 65536"),
+        ("light.cache=1.5", "1 to 65536"),
+    ] {
+        let error =
+            Scene::load("front".as_ref(), &[set.into()], &Limits::default()).expect_err(set).to_string();
+        assert!(error.contains(words), "{set}: {error}");
+    }
+}
