@@ -13,7 +13,7 @@ override MARCH: bool = false;
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
 @group(0) @binding(5) var surface: texture_2d<f32>;
-@group(0) @binding(6) var quad_id: texture_2d<u32>;
+@group(0) @binding(6) var quad_id: texture_2d_array<u32>;
 @group(0) @binding(7) var opaque_radiance: texture_2d<f32>;
 // Sum over samples of radiance, and of transmittance.
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
@@ -64,13 +64,28 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
     let index = pixel.y * frame.window_width + pixel.x;
-    let quad_number = textureLoad(quad_id, pixel, 0).x;
+    var quad_number = textureLoad(quad_id, pixel, 0u, 0).x;
     let behind = textureLoad(opaque_radiance, pixel, 0).rgb;
     var result = vec4<f32>(behind, 1.0);
     var count = vec2<u32>(0u);
     if quad_number != 0u {
-        let hit = textureLoad(surface, pixel, 0);
-        result = trace(quads[quad_number - 1u], pixel, hit.xyz, behind, &count);
+        result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
+        var hit = textureLoad(surface, pixel, 0).xyz;
+        for (var layer = 1u; quad_number != 0u; layer++) {
+            var next = 0u;
+            if layer < frame.layers {
+                next = textureLoad(quad_id, pixel, layer, 0).x;
+            }
+            result = trace(quads[quad_number - 1u], pixel, hit, behind, result, next == 0u, &count);
+            if result.w < frame.early_end {
+                break;
+            }
+            quad_number = next;
+            if next != 0u {
+                let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+                hit = quad_hit(quads[next - 1u], d_world);
+            }
+        }
     }
     if frame.sample_index != 0u {
         result += radiance[index];
@@ -114,7 +129,16 @@ struct View {
 var<private> others: array<RayLight, MAX_LIGHTS>;
 var<private> sums: array<f32, MAX_LIGHTS>;
 
-fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
+// One sheet: `before` is the radiance of those in front of it, and what they let through.
+fn trace(
+    quad: Quad,
+    pixel: vec2<u32>,
+    hit: vec3<f32>,
+    behind: vec3<f32>,
+    before: vec4<f32>,
+    is_last: bool,
+    count: ptr<function, vec2<u32>>,
+) -> vec4<f32> {
     let jacobian = cell_frame(quad, hit.xy, frame.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);
@@ -146,7 +170,7 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
 
     var ray: Ray;
     var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
-    ray.transmittance = 1.0;
+    ray.transmittance = before.w;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
         if MARCH {
@@ -168,16 +192,18 @@ fn trace(quad: Quad, pixel: vec2<u32>, hit: vec3<f32>, behind: vec3<f32>, count:
         }
     }
 
-    // Σ_k T_k (1 − e^(−τ_k)) = 1 − T_end carries the ambient light.
-    var color = frame.ambient * (1.0 - ray.transmittance) + behind * ray.transmittance;
+    // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
+    let ends = is_last | (ray.transmittance < view.early_end);
+    let passed = select(vec3<f32>(0.0), behind * ray.transmittance, ends);
+    var color = frame.ambient * (before.w - ray.transmittance) + passed;
     if LIGHTS > 0u {
         color += light_intensity(0u, d_world, hit.z) * (ray.first * (1.0 / 255.0));
     }
     for (var i = 1u; i < LIGHTS; i++) {
         color += light_intensity(i, d_world, hit.z) * (sums[i] * (1.0 / 255.0));
     }
-    *count = vec2<u32>(ray.cells, ray.light_cells);
-    return vec4<f32>(color, ray.transmittance);
+    *count += vec2<u32>(ray.cells, ray.light_cells);
+    return vec4<f32>(before.rgb + color, ray.transmittance);
 }
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.

@@ -6,6 +6,7 @@ use super::layout::{self, Tile};
 use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
+use crate::overlap;
 use crate::scene::{Mesh, Scene};
 use crate::volume::VolumeTexture;
 
@@ -69,11 +70,12 @@ impl GpuBench {
     ) -> Result<()> {
         let gpu = &self.renderer.gpu;
         let window = Window::whole([direct.image.width, direct.image.height]);
-        let frame = layout::Frame::new(direct, volume, window, &(0..1), 0);
+        let layers = overlap::sheets(direct);
+        let frame = layout::Frame::new(direct, volume, window, &(0..1), 0, layers);
         let pass = |pass| (pass, Tiler::new(None, None), None);
         self.prepared = Some(Prepared {
             up: Uploaded::new(gpu, &mut Resident::default(), direct, volume, mesh)?,
-            targets: Targets::new(gpu, window.width, window.height),
+            targets: Targets::new(gpu, window.width, window.height, layers),
             sums: Sums::new(gpu, window.pixels()),
             window,
             frame,

@@ -29,7 +29,7 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
     Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a valid scene")
 }
 
-const SURFACE: RenderOptions = RenderOptions {
+pub const SURFACE: RenderOptions = RenderOptions {
     keep_rasters: 0,
     surface: true,
     samples: None,
@@ -38,7 +38,7 @@ const SURFACE: RenderOptions = RenderOptions {
     grid: Grid { side: 4096, pixels: 1 << 21 },
 };
 
-fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
+pub fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
     let on_gpu = renderer.render(scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
@@ -51,7 +51,7 @@ fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
 }
 
 /// Parity of final radiance and transmittance, and of the raster pass's layers.
-fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
+pub fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
     let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
     let least = |what: &str, a: &[[f32; 3]], b: &[[f32; 3]]| {
         let d = Difference::new(gpu.width, a, b, tolerance);
