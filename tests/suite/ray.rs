@@ -186,6 +186,26 @@ mod panel {
     }
 
     #[test]
+    fn the_inspector_lists_every_face_and_says_which_one_a_cell_belongs_to() {
+        let scene = crate::layers::crossing();
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let report = inspect(&scene, &volume, &crate::layers::no_rock(), [20, 24]);
+        assert_eq!(report.faces.iter().map(|f| f.quad).collect::<Vec<_>>(), [1, 0]);
+        let panel = harness(&report, Theme::Dark);
+        panel.get_by_label("face");
+        for (face, place) in report.faces.iter().zip(["", "face 1"]) {
+            panel.get_by_label(&format!("{}   u {:.4}   v {:.4}", face.quad, face.uv[0], face.uv[1]));
+            panel.get_by_label(&format!("{:.3} m", face.depth_m));
+            assert!(place.is_empty() || panel.query_by_label(place).is_some());
+        }
+        let away = report.faces[1].depth_m - report.faces[0].depth_m;
+        let second = report.steps.iter().find(|s| s.face == 1).expect("a cell of the second");
+        assert_eq!(report.behind_nearest_m(second), [away, away + second.exit_m]);
+        let [wet, _] = reports();
+        assert!(harness(&wet, Theme::Dark).query_by_label("face").is_none());
+    }
+
+    #[test]
     fn a_row_under_the_pointer_marks_its_cell_and_the_panel_comes_to_rest() {
         let [wet, _] = reports();
         let mut panel = harness(&wet, Theme::Light);
