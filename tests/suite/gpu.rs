@@ -38,7 +38,7 @@ pub const SURFACE: RenderOptions = RenderOptions {
     grid: Grid { side: 4096, pixels: 1 << 21 },
 };
 
-pub fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
+fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
     let on_gpu = renderer.render(scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
