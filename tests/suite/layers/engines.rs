@@ -6,6 +6,7 @@ use taki::cpu::gbuffer;
 use taki::frame::{Frame, Window};
 use taki::gpu::{Grid, RenderOptions};
 use taki::job::Unwatched;
+use taki::scene::Scene;
 
 use super::{
     assert_composited, crossing, curves, folded, heap, no_rock, on_cpu, preset, quad, rock, sheets, uniform,
