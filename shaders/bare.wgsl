@@ -6,7 +6,7 @@
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
 @group(0) @binding(5) var surface: texture_2d<f32>;
-@group(0) @binding(6) var quad_id: texture_2d<u32>;
+@group(0) @binding(6) var quad_id: texture_2d_array<u32>;
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
 
@@ -16,31 +16,47 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
-    let quad_number = textureLoad(quad_id, pixel, 0).x;
-    if quad_number == 0u {
-        return;
-    }
-    let quad = quads[quad_number - 1u];
-    let hit = textureLoad(surface, pixel, 0);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    var sum = 0u;
+    var n = 0u;
+    for (var layer = 0u; layer < frame.layers; layer++) {
+        let quad_number = textureLoad(quad_id, pixel, layer, 0).x;
+        if quad_number == 0u {
+            break;
+        }
+        var hit = textureLoad(surface, pixel, 0).xyz;
+        if layer != 0u {
+            hit = quad_hit(quads[quad_number - 1u], d_world);
+        }
+        sheet(quads[quad_number - 1u], hit, d_world, &sum, &n);
+    }
+    let index = pixel.y * frame.window_width + pixel.x;
+    radiance[index] = vec4<f32>(f32(sum), 0.0, 0.0, 1.0);
+    counts[index] = vec2<u32>(n, 0u);
+}
+
+fn sheet(
+    quad: Quad,
+    hit: vec3<f32>,
+    d_world: vec3<f32>,
+    sum: ptr<function, u32>,
+    total: ptr<function, u32>,
+) {
     let d = view_in_plane(quad, seen_side(quad, d_world), d_world);
     let d_cell = cell_from_plane(cell_frame(quad, hit.xy, frame.cells), d);
     var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
-    var sum = 0u;
     var n = 0u;
     var done = false;
     // Uniforms read inside the loop would be gathered lane by lane on software Vulkan.
     let layers = frame.cells.z;
     let max_cells = frame.max_cells;
     while !done {
-        visit(&walk, &sum, &n, &done, layers, max_cells);
-        visit(&walk, &sum, &n, &done, layers, max_cells);
-        visit(&walk, &sum, &n, &done, layers, max_cells);
-        visit(&walk, &sum, &n, &done, layers, max_cells);
+        visit(&walk, sum, &n, &done, layers, max_cells);
+        visit(&walk, sum, &n, &done, layers, max_cells);
+        visit(&walk, sum, &n, &done, layers, max_cells);
+        visit(&walk, sum, &n, &done, layers, max_cells);
     }
-    let index = pixel.y * frame.window_width + pixel.x;
-    radiance[index] = vec4<f32>(f32(sum), 0.0, 0.0, 1.0);
-    counts[index] = vec2<u32>(n, 0u);
+    *total += n;
 }
 
 fn visit(

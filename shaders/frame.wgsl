@@ -36,7 +36,8 @@ struct Frame {
     window_height: u32,
     // How far the volume has moved down the flow, in cells: 0 to ny.
     flow_cells: f32,
-    pad: u32,
+    // Layers of the quad ids: most sheets one ray goes through.
+    layers: u32,
 }
 
 struct Light {

@@ -3,11 +3,14 @@
 // Pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `opaque` shades the
 // rock; `volume` finds the point of its quad under the pixel's own ray and maps it by the exact
 // inverse bilinear map (src/mapping.rs, QuadMap::uv), so nothing depends on how a quad is cut into
-// triangles. CPU twin: src/cpu/gbuffer.rs.
+// triangles; `peel` finds the sheets behind the nearest, in a pass each. CPU twin: src/cpu/gbuffer.rs.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
+// Of the sheets before: the last one's depth, and the numbers of all.
+@group(0) @binding(3) var known_depth: texture_depth_2d;
+@group(0) @binding(4) var known_ids: texture_2d_array<u32>;
 
 struct OpaqueVertex {
     @location(0) position_world: vec3<f32>,
@@ -83,24 +86,30 @@ fn volume_vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) qu
 
 @fragment
 fn volume_fragment(in: VolumeVarying) -> VolumeTargets {
-    let quad = quads[in.quad];
     let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
-    let d_n = dot3(d, quad.n);
-    let t = clamp(-quad.eye_plane.z / select(d_n, 1e-20, abs(d_n) < 1e-20), 0.0, 1e9);
-    let hh = quad.eye_plane.xy + vec2<f32>(dot3(d, quad.e1), dot3(d, quad.e2)) * t;
-
-    let k2 = cross2(quad.g, quad.f);
-    let k1 = cross2(quad.e, quad.f) + cross2(hh, quad.g);
-    let k0 = cross2(hh, quad.e);
-    let s = sqrt(max(k1 * k1 - 4.0 * k0 * k2, 0.0));
-    let v = select((s - k1) / (2.0 * k2), -2.0 * k0 / (k1 + s), k1 >= 0.0);
-    let along = quad.e + quad.g * v;
-    let u = dot2(hh - quad.f * v, along) / dot2(along, along);
-
     var out: VolumeTargets;
-    out.surface = vec4<f32>(clamp(u, 0.0, 1.0), clamp(v, 0.0, 1.0), t, 0.0);
+    out.surface = vec4<f32>(quad_hit(quads[in.quad], d), 0.0);
     out.quad_id = in.quad + 1u;
     return out;
+}
+
+// The next sheet of each pixel (depth peeling, Everitt 2001): of the quads that come after the last one that
+// is known, the nearest. Equal depths come in the order of the quads, and no quad comes twice.
+@fragment
+fn peel_fragment(in: VolumeVarying) -> @location(0) u32 {
+    let pixel = vec2<u32>(in.clip.xy);
+    let id = in.quad + 1u;
+    let known = textureNumLayers(known_ids);
+    let depth = textureLoad(known_depth, pixel, 0);
+    let last = textureLoad(known_ids, pixel, known - 1u, 0).x;
+    var out = in.clip.z > depth || (in.clip.z == depth && id < last);
+    for (var layer = 0u; layer < known; layer++) {
+        out |= textureLoad(known_ids, pixel, layer, 0).x == id;
+    }
+    if out {
+        discard;
+    }
+    return id;
 }
 
 // One triangle over the whole image, at infinity.

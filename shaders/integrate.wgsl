@@ -19,7 +19,7 @@ override VARYING: bool = false;
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
 @group(0) @binding(5) var surface: texture_2d<f32>;
-@group(0) @binding(6) var quad_id: texture_2d<u32>;
+@group(0) @binding(6) var quad_id: texture_2d_array<u32>;
 @group(0) @binding(7) var opaque_radiance: texture_2d<f32>;
 // Sum over samples of radiance, and of transmittance.
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
@@ -107,15 +107,14 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
     let index = pixel.y * frame.window_width + pixel.x;
-    let quad_number = textureLoad(quad_id, pixel, 0).x;
+    let quad_number = textureLoad(quad_id, pixel, 0u, 0).x;
     let behind = textureLoad(opaque_radiance, pixel, 0).rgb;
     var result = vec4<f32>(behind, 1.0);
     var count = vec2<u32>(0u);
     if quad_number != 0u {
-        let hit = textureLoad(surface, pixel, 0);
-        result = trace(quad_number - 1u, pixel, hit.xyz, behind, 0u, &count);
+        result = sheets(quad_number, pixel, behind, 0u, &count);
         for (var first = LIGHTS_A_WALK; first < LIGHTS; first += LIGHTS_A_WALK) {
-            result += trace(quad_number - 1u, pixel, hit.xyz, behind, first, &count);
+            result += vec4<f32>(sheets(quad_number, pixel, behind, first, &count).rgb, 0.0);
         }
     }
     if frame.sample_index != 0u {
@@ -181,12 +180,44 @@ fn lights_of(view: View) -> u32 {
     return select(view.lights, LIGHTS, LIGHTS <= LIGHTS_A_WALK);
 }
 
-// The lights from number `first` on; the ambient light and what is behind come with the first of all.
+// All sheets of a pixel, the nearest of which is quad `nearest` − 1, in the lights from number `first` on; the ambient
+// light and what is behind come with the first of all.
+fn sheets(
+    nearest: u32,
+    pixel: vec2<u32>,
+    behind: vec3<f32>,
+    first: u32,
+    count: ptr<function, vec2<u32>>,
+) -> vec4<f32> {
+    var quad_number = nearest;
+    var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
+    var hit = textureLoad(surface, pixel, 0).xyz;
+    for (var layer = 1u; quad_number != 0u; layer++) {
+        var next = 0u;
+        if layer < frame.layers {
+            next = textureLoad(quad_id, pixel, layer, 0).x;
+        }
+        result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, first, count);
+        if result.w < frame.early_end {
+            break;
+        }
+        quad_number = next;
+        if next != 0u {
+            let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+            hit = quad_hit(quads[next - 1u], d_world);
+        }
+    }
+    return result;
+}
+
+// One sheet: `before` is the radiance of those in front of it, and what they let through.
 fn trace(
     quad_number: u32,
     pixel: vec2<u32>,
     hit: vec3<f32>,
     behind: vec3<f32>,
+    before: vec4<f32>,
+    is_last: bool,
     first: u32,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
@@ -230,7 +261,7 @@ fn trace(
 
     var ray: Ray;
     var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
-    ray.transmittance = 1.0;
+    ray.transmittance = before.w;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
         if MARCH {
@@ -252,21 +283,22 @@ fn trace(
         }
     }
 
-    // Σ_k T_k (1 − e^(−τ_k)) = 1 − T_end carries the ambient light.
-    var result = vec4<f32>(0.0);
+    // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
+    var color = vec3<f32>(0.0);
     if first == 0u {
-        let color = frame.ambient * (1.0 - ray.transmittance) + behind * ray.transmittance;
-        result = vec4<f32>(color, ray.transmittance);
-        (*count).x = ray.cells;
+        let ends = is_last | (ray.transmittance < view.early_end);
+        let passed = select(vec3<f32>(0.0), behind * ray.transmittance, ends);
+        color = frame.ambient * (before.w - ray.transmittance) + passed;
+        (*count).x += ray.cells;
     }
     if LIGHTS > 0u {
-        result += vec4<f32>(light_intensity(first, d_world, hit.z) * (ray.first * (1.0 / 255.0)), 0.0);
+        color += light_intensity(first, d_world, hit.z) * (ray.first * (1.0 / 255.0));
     }
     for (var i = 1u; i < lights_of(view); i++) {
-        result += vec4<f32>(light_intensity(first + i, d_world, hit.z) * (sums[i] * (1.0 / 255.0)), 0.0);
+        color += light_intensity(first + i, d_world, hit.z) * (sums[i] * (1.0 / 255.0));
     }
     (*count).y += ray.light_cells;
-    return result;
+    return vec4<f32>(before.rgb + color, ray.transmittance);
 }
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.

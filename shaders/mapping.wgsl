@@ -49,3 +49,19 @@ fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> ve
     let xy = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) * cells - vec2<f32>(0.0, flow_cells);
     return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
 }
+
+// map_quad: where the ray `d` meets a quad: u, v and metres.
+fn quad_hit(quad: Quad, d: vec3<f32>) -> vec3<f32> {
+    let d_n = dot3(d, quad.n);
+    let t = clamp(-quad.eye_plane.z / select(d_n, 1e-20, abs(d_n) < 1e-20), 0.0, 1e9);
+    let hh = quad.eye_plane.xy + vec2<f32>(dot3(d, quad.e1), dot3(d, quad.e2)) * t;
+
+    let k2 = cross2(quad.g, quad.f);
+    let k1 = cross2(quad.e, quad.f) + cross2(hh, quad.g);
+    let k0 = cross2(hh, quad.e);
+    let s = sqrt(max(k1 * k1 - 4.0 * k0 * k2, 0.0));
+    let v = select((s - k1) / (2.0 * k2), -2.0 * k0 / (k1 + s), k1 >= 0.0);
+    let along = quad.e + quad.g * v;
+    let u = dot2(hh - quad.f * v, along) / dot2(along, along);
+    return vec3<f32>(clamp(u, 0.0, 1.0), clamp(v, 0.0, 1.0), t);
+}

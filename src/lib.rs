@@ -8,7 +8,8 @@
 //! 3. [`volume`] gives each cell density ρ, flow direction v and reflection coefficients k (§2), packed
 //!    to 64 bits.
 //! 4. [`mapping`] is the one-to-one map between a quad and the volume's face (§3): the raster pass
-//!    (`gbuffer`) finds the quad and its texture coordinates under each pixel.
+//!    (`gbuffer`) finds the quads under each pixel, as many as [`overlap`] tells, in order of depth, and the
+//!    texture coordinates there.
 //! 5. [`shading`] is the light of one cell (§5); the compute pass (`integrate`) walks the cells under
 //!    each pixel (§4) and adds them up.
 //! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR; many frames become
@@ -32,6 +33,7 @@ pub mod gpu;
 pub mod job;
 pub mod mapping;
 pub mod movie;
+pub mod overlap;
 pub mod random;
 pub mod scene;
 pub mod shading;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::camera::sample_offset;
 use crate::frame::Window;
+use crate::overlap;
 use crate::scene::{Image, Light, Mesh, Quad, Scene};
 
 /// The targets of one sample of a part of the image, row by row.
@@ -16,10 +17,21 @@ pub struct Gbuffer {
     pub opaque: Vec<[f32; 4]>,
     /// Its normal.
     pub normal: Vec<Vec3>,
-    /// u, v, metres from the eye.
+    /// Faces of a pixel that are kept.
+    pub layers: usize,
+    /// u, v, metres from the eye; `layers` for each pixel, the nearest first.
     pub surface: Vec<[f32; 3]>,
-    /// Quad number plus 1; 0: none.
+    /// Quad number plus 1; 0: none. As many.
     pub quad_id: Vec<u32>,
+}
+
+impl Gbuffer {
+    /// The faces of pixel `i` in order of depth: number of the quad, and u, v, metres from the eye.
+    pub fn faces(&self, i: usize) -> impl Iterator<Item = (usize, [f32; 3])> {
+        let own = i * self.layers..(i + 1) * self.layers;
+        let ids = self.quad_id[own.clone()].iter().take_while(|&&id| id != 0);
+        ids.zip(&self.surface[own]).map(|(&id, &hit)| (id as usize - 1, hit))
+    }
 }
 
 /// A triangle in pixels, clipped at the near plane.
@@ -80,6 +92,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
         project([a, b, c], i as u32, &mut water);
         project([a, c, d], i as u32, &mut water);
     }
+    let layers = overlap::sheets(scene) as usize;
     let rows = 16.min(height);
     let rock_bins = bins(&rock, window, rows);
     let water_bins = bins(&water, window, rows);
@@ -89,15 +102,16 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
         window,
         opaque: vec![[0.0; 4]; width * height],
         normal: vec![Vec3::ZERO; width * height],
-        surface: vec![[0.0; 3]; width * height],
-        quad_id: vec![0; width * height],
+        layers,
+        surface: vec![[0.0; 3]; width * height * layers],
+        quad_id: vec![0; width * height * layers],
     };
     let band = rows * width;
     out.opaque
         .par_chunks_mut(band)
         .zip(out.normal.par_chunks_mut(band))
-        .zip(out.surface.par_chunks_mut(band))
-        .zip(out.quad_id.par_chunks_mut(band))
+        .zip(out.surface.par_chunks_mut(band * layers))
+        .zip(out.quad_id.par_chunks_mut(band * layers))
         .enumerate()
         .for_each(|(i, (((opaque, normal), surface), quad_id))| {
             let band =
@@ -105,7 +119,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
             let pixel = |k: usize| [band.x + (k % width) as u32, band.y + (k / width) as u32];
             let ray = |k: usize| scene.camera.view_ray(image.width, image.height, pixel(k), offset);
             let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
-            rasterise(&rock, &rock_bins[i], near, band, &mut covered);
+            rasterise(&rock, &rock_bins[i], near, band, &mut covered, 1);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id == 0 {
                     opaque[k] = scene.background.radiance(ray(k)).extend(0.0).to_array();
@@ -126,13 +140,15 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                     normal[k] = n;
                 }
             }
-            covered.iter_mut().for_each(|c| c.1 = 0);
-            rasterise(&water, &water_bins[i], near, band, &mut covered);
+            let mut covered: Vec<Covered> =
+                covered.iter().flat_map(|&(depth, _)| std::iter::repeat_n((depth, 0), layers)).collect();
+            rasterise(&water, &water_bins[i], near, band, &mut covered, layers);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id != 0 {
                     let quad = water[id as usize - 1].id;
                     quad_id[k] = quad + 1;
-                    surface[k] = map_quad(&scene.quads[quad as usize], eye_plane[quad as usize], ray(k));
+                    surface[k] =
+                        map_quad(&scene.quads[quad as usize], eye_plane[quad as usize], ray(k / layers));
                 }
             }
         });
@@ -294,14 +310,16 @@ fn bins(triangles: &[ScreenTriangle], window: Window, rows: usize) -> Vec<Vec<u3
     bins
 }
 
-/// Draws triangles into the band of rows that `covered` holds; nearer ones win, the first of equals
-/// stays.
+/// Draws triangles into the band of rows that `covered` holds, `layers` for each pixel, the nearest first, of
+/// equals the first. Of one `id` only the nearest stays: where snapping folds a quad seen from its edge, its two
+/// triangles lie over one another.
 fn rasterise(
     triangles: &[ScreenTriangle],
     numbers: &[u32],
     near: f64,
     band: Window,
     covered: &mut [Covered],
+    layers: usize,
 ) {
     let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
     for &number in numbers {
@@ -316,12 +334,25 @@ fn rasterise(
                 if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
                     let inverse_w = (0..3).map(|i| e[i] * t.inverse_w[i]).sum::<f64>() / area;
                     let depth = (near * inverse_w) as f32;
-                    let slot = &mut covered[(y - top) * width + x - left];
-                    if depth > slot.0 {
-                        *slot = (depth, number + 1);
-                    }
+                    let pixel = ((y - top) * width + x - left) * layers;
+                    insert(&mut covered[pixel..pixel + layers], (depth, number + 1), |other| {
+                        triangles[other as usize - 1].id == t.id
+                    });
                 }
             }
         }
     }
+}
+
+/// Puts a triangle where it belongs among those that cover a pixel; the last one falls out. Twin:
+/// `peel_fragment`.
+fn insert(faces: &mut [Covered], new: Covered, same: impl Fn(u32) -> bool) {
+    let Some(place) = faces.iter().position(|face| new.0 > face.0) else { return };
+    if faces[..place].iter().any(|face| face.1 != 0 && same(face.1)) {
+        return;
+    }
+    let last = faces[place..].iter().position(|face| face.1 != 0 && same(face.1));
+    let last = last.map_or(faces.len() - 1, |behind| place + behind);
+    faces.copy_within(place..last, place + 1);
+    faces[place] = new;
 }

@@ -43,6 +43,8 @@ pub struct Traced {
 
 /// Watches a ray on its way, cell by cell. With the empty one, `()`, nothing is left of it.
 pub trait Observer {
+    /// The ray meets a sheet: what follows is of this one, until the next.
+    fn sheet(&mut self) {}
     /// The ray is in a cell, empty or not, and has `transmittance` left.
     fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _transmittance: f32) {}
     /// The cell sends this much of the ambient light to the eye.
@@ -121,28 +123,52 @@ impl<'a> Integrator<'a> {
         let image = &self.scene.image;
         let i = gbuffer.window.index(pixel);
         let behind = Vec3::from_slice(&gbuffer.opaque[i]);
-        match gbuffer.quad_id[i] {
-            0 => Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] },
-            id => {
-                let d = self.scene.camera.view_ray(
-                    image.width,
-                    image.height,
-                    pixel,
-                    sample_offset(sample, image.samples),
-                );
-                self.trace(id as usize - 1, d, gbuffer.surface[i], behind, observer)
+        let mut faces = gbuffer.faces(i).peekable();
+        if faces.peek().is_none() {
+            return Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] };
+        }
+        let offset = sample_offset(sample, image.samples);
+        let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
+        let mut all = Traced { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
+        while let Some((quad, hit)) = faces.next() {
+            observer.sheet();
+            let is_last = faces.peek().is_none();
+            let sheet = self.sheet(quad, d, hit, behind, all.transmittance, is_last, observer);
+            all.radiance += sheet.radiance;
+            all.transmittance = sheet.transmittance;
+            all.cells = [0, 1].map(|c| all.cells[c] + sheet.cells[c]);
+            if all.transmittance < self.scene.trace.early_end {
+                break;
             }
         }
+        all
     }
 
     /// Walks the volume of quad number `quad` from its point `hit` = (u, v, metres) along the world
-    /// direction `d_world`.
+    /// direction `d_world`, with nothing in front of it and `behind` behind it.
     pub fn trace<O: Observer>(
         &self,
         quad: usize,
         d_world: Vec3,
         hit: [f32; 3],
         behind: Vec3,
+        observer: &mut O,
+    ) -> Traced {
+        self.sheet(quad, d_world, hit, behind, 1.0, true, observer)
+    }
+
+    /// One of the sheets of a ray, composited face by face: the ray comes with T = `before` to the face and
+    /// goes through the whole slab, though that may reach behind the face of the next. The radiance is that of
+    /// this sheet, and what is left of `behind` if the ray ends here: `is_last`, or early.
+    #[allow(clippy::too_many_arguments)]
+    fn sheet<O: Observer>(
+        &self,
+        quad: usize,
+        d_world: Vec3,
+        hit: [f32; 3],
+        behind: Vec3,
+        before: f32,
+        is_last: bool,
         observer: &mut O,
     ) -> Traced {
         let scene = self.scene;
@@ -196,7 +222,7 @@ impl<'a> Integrator<'a> {
         // Where the volume has moved down, what is met lies further up in it.
         let y = hit[1] * quad.material.repeat_v * cells.y - self.flow_cells;
         let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
-        let mut transmittance = 1.0f32;
+        let mut transmittance = before;
         let mut walked = [0u32; 2];
         for crossing in
             Walk::new(self.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
@@ -239,7 +265,9 @@ impl<'a> Integrator<'a> {
             transmittance = passed;
         }
 
-        let mut radiance = scene.ambient * (1.0 - transmittance) + behind * transmittance;
+        let ends = is_last || transmittance < scene.trace.early_end;
+        let passed = if ends { behind * transmittance } else { Vec3::ZERO };
+        let mut radiance = scene.ambient * (before - transmittance) + passed;
         for light in &lights {
             radiance += light.intensity * (light.sum * (1.0 / 255.0));
         }

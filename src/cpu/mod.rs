@@ -34,7 +34,7 @@ pub fn render(
     render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
 }
 
-/// Pixels rendered at once: 44 bytes each, besides the frame.
+/// Pixels rendered at once: 28 bytes each and 16 for every layer of quads, besides the frame.
 const BAND_PIXELS: u64 = 1 << 21;
 
 /// Renders a part of the image with only some of a scene's samples; the radiance is their mean. The pixels
@@ -71,10 +71,11 @@ pub fn render_samples(
             if sample == samples.start
                 && let Some(surface) = &mut frame.surface
             {
-                for i in 0..gbuffer.quad_id.len() {
-                    let [u, v, t] = gbuffer.surface[i];
+                for i in 0..gbuffer.opaque.len() {
+                    let nearest = i * gbuffer.layers;
+                    let [u, v, t] = gbuffer.surface[nearest];
                     let behind = (gbuffer.opaque[i][3], gbuffer.normal[i]);
-                    surface.set(first + i, scene, gbuffer.quad_id[i], [u, v, t, 0.0], behind);
+                    surface.set(first + i, scene, gbuffer.quad_id[nearest], [u, v, t, 0.0], behind);
                 }
             }
             let clock = Instant::now();

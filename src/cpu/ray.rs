@@ -16,8 +16,9 @@ use crate::walk::Crossing;
 pub struct RayReport {
     /// Column and row in the image.
     pub pixel: [u32; 2],
-    /// Where the ray meets the water, if it does.
-    pub face: Option<RayFace>,
+    /// Where the ray meets water, in order of depth: `trace.layers` quads at most. Where it ends early no
+    /// step belongs to the last of them.
+    pub faces: Vec<RayFace>,
     /// Radiance of the opaque scene or background behind the water.
     pub behind: Vec3,
     /// Where the ray meets the opaque scene, metres; none where it leaves to the background.
@@ -35,7 +36,18 @@ pub struct RayReport {
 impl RayReport {
     /// The first point the ray meets, water or rock, metres.
     pub fn surface_point(&self) -> Option<Vec3> {
-        self.face.map(|face| face.point).or(self.opaque)
+        self.face().map(|face| face.point).or(self.opaque)
+    }
+
+    /// The nearest face, whose are the frame's layers.
+    pub fn face(&self) -> Option<RayFace> {
+        self.faces.first().copied()
+    }
+
+    /// Metres along the ray from the nearest face to where it enters a step's cell, and to where it leaves it.
+    pub fn behind_nearest_m(&self, step: &RayStep) -> [f32; 2] {
+        let away = self.faces[step.face].depth_m - self.faces[0].depth_m;
+        [away + step.enter_m, away + step.exit_m]
     }
 }
 
@@ -55,11 +67,13 @@ pub struct RayFace {
 /// One cell of a ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayStep {
+    /// Number of its face in [`RayReport::faces`].
+    pub face: usize,
     /// x, y and z in the volume; x and y inside the tile.
     pub cell: [u32; 3],
-    /// Metres along the ray from the face to where it enters the cell.
+    /// Metres along the ray from its face to where it enters the cell.
     pub enter_m: f32,
-    /// Metres along the ray from the face to where it leaves the cell.
+    /// Metres along the ray from its face to where it leaves the cell.
     pub exit_m: f32,
     /// α·ρ, as in a volume file.
     pub rho: f32,
@@ -91,15 +105,18 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let d_world = scene.camera.view_ray(image.width, image.height, pixel, offset);
     let at = |metres: f32| scene.camera.eye + d_world * metres;
     let opaque_m = gbuffer.opaque[0][3];
-    let face = (gbuffer.quad_id[0] as usize).checked_sub(1).map(|quad| {
-        let [u, v, depth_m] = gbuffer.surface[0];
-        RayFace { quad, uv: [u, v], depth_m, point: at(depth_m) }
-    });
-    let mut recorder = Recorder { alpha: volume.alpha, steps: Vec::new() };
+    let face = |(quad, [u, v, depth_m]): (usize, [f32; 3])| RayFace {
+        quad,
+        uv: [u, v],
+        depth_m,
+        point: at(depth_m),
+    };
+    let faces = gbuffer.faces(0).map(face).collect();
+    let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
     let traced = Integrator::new(scene, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
     RayReport {
         pixel,
-        face,
+        faces,
         behind: Vec3::from_slice(&gbuffer.opaque[0]),
         opaque: (opaque_m > 0.0).then(|| at(opaque_m)),
         steps: recorder.steps,
@@ -112,13 +129,20 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
 /// Writes a ray's cells down.
 struct Recorder {
     alpha: f32,
+    /// Met so far.
+    faces: usize,
     steps: Vec<RayStep>,
 }
 
 impl Observer for Recorder {
+    fn sheet(&mut self) {
+        self.faces += 1;
+    }
+
     fn enter(&mut self, crossing: &Crossing, cell: Cell, transmittance: f32) {
         let (k_d, k_s) = cell.k();
         self.steps.push(RayStep {
+            face: self.faces - 1,
             cell: crossing.cell.as_uvec3().to_array(),
             enter_m: crossing.t_enter,
             exit_m: crossing.t_exit,

@@ -7,6 +7,7 @@ use super::visibility::{LightDepths, Visibility};
 use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
+use crate::overlap;
 use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
 use crate::volume::VolumeTexture;
@@ -58,10 +59,11 @@ impl GpuBench {
         let GpuRenderer { gpu, timer, .. } = &self.renderer;
         let first = scenes[0].1;
         let window = Window::whole([first.image.width, first.image.height]);
+        let layers = overlap::sheets(first);
         let mut resident = Resident::default();
         let mut passes = Vec::new();
         for (number, &(name, scene)) in scenes.iter().enumerate() {
-            let frame = layout::Frame::new(scene, volume, window, &(0..1), 0);
+            let frame = layout::Frame::new(scene, volume, window, &(0..1), 0, layers);
             let mut up = || Uploaded::new(gpu, &mut resident, scene, volume, mesh);
             let light_volumes = match scene.visibility {
                 scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
@@ -95,7 +97,7 @@ impl GpuBench {
         }
         self.prepared = Some(Prepared {
             volume: volume.clone(),
-            targets: Targets::new(gpu, window.width, window.height),
+            targets: Targets::new(gpu, window.width, window.height, layers),
             sums: Sums::new(gpu, window.pixels()),
             window,
             passes,

@@ -19,21 +19,26 @@ pub struct Targets {
     pub normal: wgpu::Texture,
     /// u, v and metres from the eye of the nearest volume quad.
     pub surface: wgpu::Texture,
-    /// Its number plus 1; 0: none.
+    /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no more.
     pub quad_id: wgpu::Texture,
-    depth: wgpu::TextureView,
+    /// The z-buffer; with several layers it and the second hold that of the even and of the odd ones in turn,
+    /// and the third that of the opaque scene.
+    depth: Vec<wgpu::Texture>,
 }
 
 impl Targets {
-    /// Bytes a pixel: three of four floats, the quad's number, depth.
-    pub const BYTES: u64 = 3 * 16 + 4 + 4;
+    /// Bytes a pixel: three of four floats, the quads' numbers, depths. The points of the sheets behind the
+    /// nearest are not kept: what finds them again costs less than a cell of the walk.
+    pub const fn bytes(layers: u32) -> u64 {
+        3 * 16 + 4 * layers as u64 + if layers > 1 { 3 * 4 } else { 4 }
+    }
 
-    /// Targets for a window of `width` × `height` pixels.
-    pub fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
-        let texture = |label, format, usage| {
+    /// Targets for a window of `width` × `height` pixels under which `layers` quads may lie.
+    pub fn new(gpu: &Gpu, width: u32, height: u32, layers: u32) -> Self {
+        let texture = |label, format, usage, layers| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -43,21 +48,40 @@ impl Targets {
             })
         };
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let (depths, depth_usage) = match layers {
+            1 => (1, wgpu::TextureUsages::empty()),
+            _ => (3, read | wgpu::TextureUsages::COPY_DST),
+        };
         Targets {
-            opaque: texture("opaque radiance", FLOATS, read),
-            normal: texture("opaque normal", FLOATS, wgpu::TextureUsages::COPY_SRC),
-            surface: texture("surface", FLOATS, read),
-            quad_id: texture("quad id", wgpu::TextureFormat::R32Uint, read),
-            depth: texture("depth", DEPTH, wgpu::TextureUsages::empty()).create_view(&Default::default()),
+            opaque: texture("opaque radiance", FLOATS, read, 1),
+            normal: texture("opaque normal", FLOATS, wgpu::TextureUsages::COPY_SRC, 1),
+            surface: texture("surface", FLOATS, read, 1),
+            quad_id: texture("quad id", wgpu::TextureFormat::R32Uint, read, layers),
+            depth: (0..depths).map(|_| texture("depth", DEPTH, depth_usage, 1)).collect(),
         }
+    }
+
+    /// The quads' numbers in some of the layers.
+    pub fn ids(&self, layers: std::ops::Range<u32>) -> wgpu::TextureView {
+        self.quad_id.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            base_array_layer: layers.start,
+            array_layer_count: Some(layers.len() as u32),
+            ..Default::default()
+        })
+    }
+
+    fn depth_view(&self, number: usize) -> wgpu::TextureView {
+        self.depth[number].create_view(&Default::default())
     }
 }
 
-/// The pass: two pipelines.
+/// The pass: its pipelines.
 pub struct Gbuffer {
     background: wgpu::RenderPipeline,
     opaque: wgpu::RenderPipeline,
     volume: wgpu::RenderPipeline,
+    peel: wgpu::RenderPipeline,
 }
 
 impl Gbuffer {
@@ -66,7 +90,8 @@ impl Gbuffer {
         let module = shader(gpu, "gbuffer", include_str!("../../shaders/gbuffer.wgsl"));
         let target =
             |format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
-        let pipeline = |name: &str,
+        let pipeline = |vertex: &str,
+                        name: &str,
                         buffers: &[Option<wgpu::VertexBufferLayout>],
                         targets: &[Option<wgpu::ColorTargetState>],
                         compare| {
@@ -75,7 +100,7 @@ impl Gbuffer {
                 layout: None,
                 vertex: wgpu::VertexState {
                     module: &module,
-                    entry_point: Some(&format!("{name}_vertex")),
+                    entry_point: Some(&format!("{vertex}_vertex")),
                     compilation_options: Default::default(),
                     buffers,
                 },
@@ -105,29 +130,41 @@ impl Gbuffer {
             attributes: &attributes,
         };
         let opaque_targets = [target(FLOATS), target(FLOATS)];
+        let ids = target(wgpu::TextureFormat::R32Uint);
+        let nearer = wgpu::CompareFunction::Greater;
         Gbuffer {
-            background: pipeline("background", &[], &opaque_targets, wgpu::CompareFunction::Always),
-            opaque: pipeline("opaque", &[Some(vertices)], &opaque_targets, wgpu::CompareFunction::Greater),
-            volume: pipeline(
-                "volume",
+            background: pipeline(
+                "background",
+                "background",
                 &[],
-                &[target(FLOATS), target(wgpu::TextureFormat::R32Uint)],
+                &opaque_targets,
+                wgpu::CompareFunction::Always,
+            ),
+            opaque: pipeline(
+                "opaque",
+                "opaque",
+                &[Some(vertices)],
+                &opaque_targets,
                 wgpu::CompareFunction::Greater,
             ),
+            volume: pipeline("volume", "volume", &[], &[target(FLOATS), ids.clone()], nearer),
+            peel: pipeline("volume", "peel", &[], &[ids], nearer),
         }
     }
 
     /// Fills the targets with one sample of a window; seconds on the device. A large mesh is drawn in
-    /// parts; `between` is called before each but the first, and may stop the work.
+    /// parts, and each layer behind the nearest in one of its own; `between` is called before each but the
+    /// first, and may stop the work.
     pub fn run(&self, inputs: &Inputs, mut between: impl FnMut() -> Result<()>) -> Result<f64> {
         let Inputs { gpu, timer, up, targets, window, frame, .. } = *inputs;
+        let layers = frame.layers;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
-        let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, &wgpu::Buffer)]| {
+        let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, wgpu::BindingResource)]| {
             let entries: Vec<_> = entries
                 .iter()
-                .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
                     binding: *binding,
-                    resource: buffer.as_entire_binding(),
+                    resource: resource.clone(),
                 })
                 .collect();
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -136,18 +173,29 @@ impl Gbuffer {
                 entries: &entries,
             })
         };
-        let sky = bind(&self.background, &[(0, &uniform)]);
-        let rock = bind(&self.opaque, &[(0, &uniform), (1, &up.lights)]);
-        let water = bind(&self.volume, &[(0, &uniform), (2, &up.quads)]);
-        let views = [&targets.opaque, &targets.normal, &targets.surface, &targets.quad_id]
-            .map(|t| t.create_view(&Default::default()));
+        let [frame, lights, quads] = [&uniform, &up.lights, &up.quads].map(|b| b.as_entire_binding());
+        let sky = bind(&self.background, &[(0, frame.clone())]);
+        let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights)]);
+        let water = bind(&self.volume, &[(0, frame.clone()), (2, quads.clone())]);
+        let [opaque, normal, surface] =
+            [&targets.opaque, &targets.normal, &targets.surface].map(|t| t.create_view(&Default::default()));
+        let depth_views: Vec<_> = (0..targets.depth.len()).map(|i| targets.depth_view(i)).collect();
+        let id_view = |layer| {
+            targets.quad_id.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer: layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            })
+        };
+        let id_views: Vec<_> = (0..layers).map(id_view).collect();
         let colour = |view, load| {
             let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
             Some(wgpu::RenderPassColorAttachment { view, resolve_target: None, depth_slice: None, ops })
         };
         let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-        let depth = |load| wgpu::RenderPassDepthStencilAttachment {
-            view: &targets.depth,
+        let depth = |number: usize, load| wgpu::RenderPassDepthStencilAttachment {
+            view: &depth_views[number],
             depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
             stencil_ops: None,
         };
@@ -169,8 +217,8 @@ impl Gbuffer {
                 };
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("gbuffer opaque"),
-                    color_attachments: &[colour(&views[0], load), colour(&views[1], load)],
-                    depth_stencil_attachment: Some(depth(load_depth)),
+                    color_attachments: &[colour(&opaque, load), colour(&normal, load)],
+                    depth_stencil_attachment: Some(depth(0, load_depth)),
                     timestamp_writes: span.render(true, !last),
                     ..Default::default()
                 });
@@ -192,10 +240,13 @@ impl Gbuffer {
                 if !last {
                     return;
                 }
+                if layers > 1 {
+                    copy(encoder, &targets.depth[0], &targets.depth[2]);
+                }
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("gbuffer volume"),
-                    color_attachments: &[colour(&views[2], clear), colour(&views[3], clear)],
-                    depth_stencil_attachment: Some(depth(wgpu::LoadOp::Load)),
+                    color_attachments: &[colour(&surface, clear), colour(&id_views[0], clear)],
+                    depth_stencil_attachment: Some(depth(0, wgpu::LoadOp::Load)),
                     timestamp_writes: span.render(false, true),
                     ..Default::default()
                 });
@@ -207,6 +258,40 @@ impl Gbuffer {
                 }
             })?;
         }
+        for layer in 1..layers {
+            between()?;
+            let (known, own) = ((layer as usize - 1) % 2, layer as usize % 2);
+            let ids = targets.ids(0..layer);
+            let group = bind(
+                &self.peel,
+                &[
+                    (0, frame.clone()),
+                    (2, quads.clone()),
+                    (3, wgpu::BindingResource::TextureView(&depth_views[known])),
+                    (4, wgpu::BindingResource::TextureView(&ids)),
+                ],
+            );
+            seconds += timer.run(gpu, "gbuffer", |encoder, span| {
+                // What lies behind the opaque scene is not there.
+                copy(encoder, &targets.depth[2], &targets.depth[own]);
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("gbuffer peel"),
+                    color_attachments: &[colour(&id_views[layer as usize], clear)],
+                    depth_stencil_attachment: Some(depth(own, wgpu::LoadOp::Load)),
+                    timestamp_writes: span.render(true, true),
+                    ..Default::default()
+                });
+                place(&mut pass);
+                pass.set_pipeline(&self.peel);
+                pass.set_bind_group(0, &group, &[]);
+                pass.draw(0..6, 0..up.quad_count);
+            })?;
+        }
         Ok(seconds)
     }
+}
+
+/// Copies a whole texture to one of its size: of a depth texture a part cannot be copied.
+fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Texture) {
+    encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
 }

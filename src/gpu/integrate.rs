@@ -176,8 +176,8 @@ impl Integrate {
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
-        let (surface, quad_id, opaque) =
-            (view(&targets.surface), view(&targets.quad_id), view(&targets.opaque));
+        let (surface, opaque) = (view(&targets.surface), view(&targets.opaque));
+        let quad_id = targets.ids(0..frame.layers);
         let entries = [
             entry(0, uniform.as_entire_binding()),
             entry(1, up.lights.as_entire_binding()),
@@ -233,12 +233,12 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 12] {
     };
     let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let uniform = buffer(BufferBindingType::Uniform);
-    let texture = |sample_type| BindingType::Texture {
+    let texture = |sample_type, view_dimension| BindingType::Texture {
         sample_type,
-        view_dimension: TextureViewDimension::D2,
+        view_dimension,
         multisampled: false,
     };
-    let floats = texture(TextureSampleType::Float { filterable: false });
+    let floats = texture(TextureSampleType::Float { filterable: false }, TextureViewDimension::D2);
     let sums = buffer(BufferBindingType::Storage { read_only: false });
     let cells = |format| BindingType::StorageTexture {
         access: StorageTextureAccess::ReadOnly,
@@ -247,7 +247,7 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 12] {
     };
     let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Float));
     let list = buffer(BufferBindingType::Storage { read_only: true });
-    let ids = texture(TextureSampleType::Uint);
+    let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
     let types = [uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list];
     let mut binding = 0;
     types.map(|ty| {

@@ -47,7 +47,7 @@ pub struct Frame {
     pub window_width: u32,
     pub window_height: u32,
     pub flow_cells: f32,
-    pub pad: u32,
+    pub layers: u32,
 }
 
 /// One light.
@@ -113,13 +113,15 @@ impl Tile {
 }
 
 impl Frame {
-    /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with.
+    /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with; the targets have
+    /// `layers` layers.
     pub fn new(
         scene: &Scene,
         volume: &VolumeTexture,
         window: Window,
         samples: &Range<u32>,
         sample: u32,
+        layers: u32,
     ) -> Self {
         let camera = &scene.camera;
         let image = &scene.image;
@@ -155,7 +157,7 @@ impl Frame {
             window_width: window.width,
             window_height: window.height,
             flow_cells: flow_cells(scene.flow, volume.size[1]),
-            pad: 0,
+            layers,
         }
     }
 }

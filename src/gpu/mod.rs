@@ -29,14 +29,17 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
+use crate::overlap;
 use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
 use crate::volume::VolumeTexture;
 use layout::Tile;
 use rasters::{Key, Rasters};
 
-/// Bytes on the device for a pixel of a window: targets, sums and picture.
-pub const CANVAS_BYTES: u64 = Targets::BYTES + Sums::BYTES + Resolve::PICTURE_BYTES;
+/// Bytes on the device for a pixel of a window under which `layers` quads may lie: targets, sums and picture.
+pub const fn canvas_bytes(layers: u32) -> u64 {
+    Targets::bytes(layers) + Sums::BYTES + Resolve::PICTURE_BYTES
+}
 
 /// Pixels of the raster pass's layers brought back at once: 52 bytes each, twice.
 const SURFACE_PIXELS: u32 = 1 << 17;
@@ -125,21 +128,23 @@ const KEPT_PIPELINES: usize = 16;
 /// Canvases that are kept: an interactive renderer changes between its preview sizes.
 const KEPT_CANVASES: usize = 5;
 
-/// Targets and sums of one size.
+/// Targets and sums of one size and number of layers.
 struct Canvas {
     size: [u32; 2],
+    layers: u32,
     targets: Targets,
     sums: Sums,
     picture: wgpu::Buffer,
 }
 
 impl Canvas {
-    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2], layers: u32) -> Self {
         let pixels = width as u64 * height as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         Canvas {
             size: [width, height],
-            targets: Targets::new(gpu, width, height),
+            layers,
+            targets: Targets::new(gpu, width, height, layers),
             sums: Sums::new(gpu, pixels),
             picture: gpu.buffer("picture", pixels * Resolve::PICTURE_BYTES, usage),
         }
@@ -212,7 +217,13 @@ impl GpuRenderer {
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut frame = Frame::new(part.width, part.height, options.surface);
         let size = options.grid.size(whole);
-        let canvas = recent(&mut self.canvases, KEPT_CANVASES, |c| c.size == size, || Canvas::new(gpu, size));
+        let layers = overlap::sheets(scene);
+        let canvas = recent(
+            &mut self.canvases,
+            KEPT_CANVASES,
+            |c| c.size == size && c.layers == layers,
+            || Canvas::new(gpu, size, layers),
+        );
         let Canvas { targets: own, sums, picture, .. } = canvas;
         gpu.check()?;
         self.rasters.begin();
@@ -221,7 +232,7 @@ impl GpuRenderer {
         let light_depths = match light_volumes {
             None => self.visibility.none(),
             Some(light_volumes) => {
-                let frame = layout::Frame::new(scene, volume, part, &samples, samples.start);
+                let frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
                 let watch = |done, all| monitor.progress("light volumes", done, all);
                 let found =
                     self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, volume, watch)?;
@@ -243,13 +254,13 @@ impl GpuRenderer {
                 width: wanted.width,
                 height: wanted.height,
             };
-            let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample);
+            let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample, layers);
             for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);
                 let key = Key::new(&frame_uniforms, &up.geometry);
                 let kept = match options.keep_rasters {
                     0 => None,
-                    most => self.rasters.place(gpu, key, size, most),
+                    most => self.rasters.place(gpu, key, size, layers, most),
                 };
                 let targets = kept.map_or(own, |kept| &kept.targets);
                 let inputs = Inputs {

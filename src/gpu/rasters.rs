@@ -76,9 +76,9 @@ impl Rasters {
         self.turn += 1;
     }
 
-    /// The place for a pass of `size` pixels: kept targets, filled or to be filled; none if the pass is new, or
+    /// The place for a pass of `size` pixels and `layers` layers: kept targets, filled or to be filled; none if the pass is new, or
     /// there is no room in `most` bytes. Targets that neither this frame nor the last has used make room.
-    pub fn place(&mut self, gpu: &Gpu, key: Key, size: [u32; 2], most: u64) -> Option<&Kept> {
+    pub fn place(&mut self, gpu: &Gpu, key: Key, size: [u32; 2], layers: u32, most: u64) -> Option<&Kept> {
         if let Some(i) = self.kept.iter().position(|kept| kept.key == key) {
             self.kept[i].used = self.turn;
             return Some(&self.kept[i]);
@@ -88,7 +88,7 @@ impl Rasters {
             self.seen.push_front(key);
             return None;
         }
-        let bytes = u64::from(size[0]) * u64::from(size[1]) * Targets::BYTES;
+        let bytes = u64::from(size[0]) * u64::from(size[1]) * Targets::bytes(layers);
         let total = |kept: &[Kept]| kept.iter().map(|k| k.bytes).sum::<u64>();
         if total(&self.kept) + bytes > most {
             let turn = self.turn;
@@ -97,7 +97,7 @@ impl Rasters {
         if total(&self.kept) + bytes > most {
             return None;
         }
-        let targets = Targets::new(gpu, size[0], size[1]);
+        let targets = Targets::new(gpu, size[0], size[1], layers);
         self.kept.push(Kept { key, targets, ready: Cell::new(false), bytes, used: self.turn });
         self.kept.last()
     }

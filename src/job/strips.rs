@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::frame::Window;
-use crate::gpu::{CANVAS_BYTES, Grid};
+use crate::gpu::{Grid, canvas_bytes};
+use crate::overlap;
 use crate::scene::{Image, Scene, Vertex};
 use crate::volume::Cell;
 
@@ -24,11 +25,11 @@ const LEAST_ROWS: u64 = 64;
 /// Most pixels of an image.
 const MAX_PIXELS: u64 = 1 << 36;
 
-/// Bytes for the window that is drawn: [`CANVAS_BYTES`] a pixel on the device. The CPU engine's targets have
-/// as many pixels, at most, and 44 bytes for each.
-fn canvas(image: &Image) -> u64 {
+/// Bytes for the window that is drawn, under which `layers` quads may lie: [`canvas_bytes`] a pixel on the
+/// device. The CPU engine's targets have as many pixels, at most, and 28 bytes for each and 16 for each layer.
+fn canvas(image: &Image, layers: u32) -> u64 {
     let [columns, rows] = Grid::default().size([image.width, image.height]);
-    u64::from(columns) * u64::from(rows) * CANVAS_BYTES
+    u64::from(columns) * u64::from(rows) * canvas_bytes(layers).max(28 + 16 * u64::from(layers))
 }
 
 /// Refuses an image that cannot be rendered in any strips within `memory` bytes: one window and one row of
@@ -42,7 +43,7 @@ pub fn check_image(image: &Image, memory: u64) -> Result<()> {
         let fix = "a picture has at most 6.8e10 pixels, however large --memory is: lower the size";
         return Err(Error::memory(what, need, memory, fix));
     }
-    let need = canvas(image) + width * (PIXEL_BYTES + SURFACE_BYTES);
+    let need = canvas(image, 1) + width * (PIXEL_BYTES + SURFACE_BYTES);
     if need > memory {
         return Err(Error::memory(what, need.into(), memory, "lower the size or raise --memory"));
     }
@@ -53,8 +54,8 @@ pub fn check_image(image: &Image, memory: u64) -> Result<()> {
 /// `memory` bytes together with the device's targets, the scene's volume and its rocks: whole rows of the
 /// windows that are drawn (see [`Grid`]) where they fit, else even parts of one.
 ///
-/// A pixel of a strip takes 34 bytes, with `surface_layers` 62; a pixel of the window that is drawn 84, and
-/// there are at most 2²¹ of those. 64 MiB more are for read-back and encoders, and a quarter of `memory`,
+/// A pixel of a strip takes 34 bytes, with `surface_layers` 62; a pixel of the window that is drawn 84, or
+/// where n quads lie over one another 88 + 4·n, and there are at most 2²¹ of those. 64 MiB more are for read-back and encoders, and a quarter of `memory`,
 /// at most 256 MiB, for the program and the driver. These make strips smaller, down to an eighth of
 /// `memory`; only a single row and window that do not fit are an [`Error::Memory`].
 pub fn strips(scene: &Scene, window: Window, surface_layers: bool, memory: u64) -> Result<Vec<Window>> {
@@ -80,7 +81,7 @@ pub fn memory_of(
     let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
-    let parts = canvas(image).saturating_add(volume).saturating_add(rocks);
+    let parts = canvas(image, overlap::sheets(scene)).saturating_add(volume).saturating_add(rocks);
     let left = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let row = u64::from(window.width) * (PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 });
     let [_, drawn] = Grid::default().size([image.width, image.height]);

@@ -141,6 +141,8 @@ pub struct Trace {
     pub max_cells: u32,
     /// A ray ends where T falls below this; 0: never.
     pub early_end: f32,
+    /// Most sheets one ray goes through.
+    pub layers: u32,
 }
 
 /// τ_k of a cell with density ρ.
@@ -307,6 +309,7 @@ impl Scene {
             },
             max_cells: v.count("trace.max_cells"),
             early_end: v.float("trace.early_end"),
+            layers: v.count("trace.layers"),
         };
         Ok(Scene {
             name: name.into(),

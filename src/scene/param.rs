@@ -242,6 +242,14 @@ pub const PARAMS: &[Param] = &[
         "A view ray ends where its transmittance falls below this; 0: never.",
     ),
     p(
+        "trace.layers",
+        "",
+        "sheets",
+        Int(1, 16, 4),
+        Uniform,
+        "Most quads one view ray goes through, the nearest first; those behind are left out.",
+    ),
+    p(
         "light.frame",
         "",
         "",

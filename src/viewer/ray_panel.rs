@@ -21,11 +21,14 @@ const AXIS_HEIGHT: f32 = 34.0;
 const FIGURES_WIDTH: f32 = 48.0;
 /// Size of the table's figures and of the plots' titles, points: a row of the table is wide.
 const SMALL: f32 = 11.0;
+/// The column of what a ray through one sheet does not have.
+const FACE: &str = "face";
 /// Heads, widths in points and meanings of the table's columns.
-const COLUMNS: [(&str, f32, &str); 10] = [
+const COLUMNS: [(&str, f32, &str); 11] = [
     ("#", 22.0, "Place of the cell on the ray, from 0"),
+    (FACE, 30.0, "The sheet the cell belongs to, by its place above, from 0"),
     ("x  y  z", 58.0, "The cell in the volume"),
-    ("from – to m", 96.0, "Where the ray enters and leaves the cell, metres behind the face"),
+    ("from – to m", 96.0, "Where the ray enters and leaves the cell, metres behind its face"),
     ("ρ", 36.0, "Density, α·ρ"),
     ("T", 36.0, "Transmittance before the cell"),
     ("radiance", 134.0, "Linear RGB the cell adds towards the eye, ambient light included"),
@@ -48,8 +51,12 @@ pub fn show(ui: &mut Ui, report: &RayReport) {
     let row: Option<usize> = ui.data(|data| data.get_temp(pointed_row)).flatten();
     let marked = row.and_then(|row| report.steps.get(row));
     let depth = plots(ui, report, marked);
-    let selected =
-        depth.and_then(|m| report.steps.iter().position(|s| (s.enter_m..s.exit_m).contains(&(m as f32))));
+    let selected = depth.and_then(|m| {
+        report.steps.iter().position(|step| {
+            let [enter, exit] = report.behind_nearest_m(step);
+            (enter..exit).contains(&(m as f32))
+        })
+    });
     ui.add_space(4.0);
     let rows = rows(ui, report);
     let hovered = table(ui, report, &rows, selected);
@@ -89,12 +96,16 @@ fn headline(ui: &mut Ui, report: &RayReport) {
         pair(ui, "transmittance", figure(report.transmittance));
         ui.end_row();
         pair(ui, "behind", triple(report.behind));
-        pair(ui, "depth", report.face.map_or("–".into(), |f| format!("{:.3} m", f.depth_m)));
+        pair(ui, "depth", report.face().map_or("–".into(), |f| format!("{:.3} m", f.depth_m)));
         ui.end_row();
-        if let Some(face) = &report.face {
+        for (i, face) in report.faces.iter().enumerate() {
             let [u, v] = face.uv;
             pair(ui, "quad", format!("{}   u {u:.4}   v {v:.4}", face.quad));
-            pair(ui, "cells", format!("{}, {} on the way to lights", report.cells[0], report.cells[1]));
+            if i == 0 {
+                pair(ui, "cells", format!("{}, {} on the way to lights", report.cells[0], report.cells[1]));
+            } else {
+                pair(ui, &format!("face {i}"), format!("{:.3} m", face.depth_m));
+            }
             ui.end_row();
         }
     });
@@ -107,13 +118,15 @@ fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f6
         let [r, g, b] = if dark { on_dark } else { on_light };
         Color32::from_rgb(r, g, b)
     };
-    let density = steps(&report.steps, |s| s.rho);
-    let radiance = steps(&report.steps, |s| s.radiance.dot(LUMINANCE));
+    let density = steps(report, |s| s.rho);
+    let radiance = steps(report, |s| s.radiance.dot(LUMINANCE));
     let mut transmittance: Vec<[f64; 2]> =
-        report.steps.iter().map(|s| [s.enter_m as f64, s.transmittance as f64]).collect();
+        report.steps.iter().map(|s| [report.behind_nearest_m(s)[0] as f64, s.transmittance as f64]).collect();
     if let Some(last) = report.steps.last() {
-        transmittance.push([last.exit_m as f64, report.transmittance as f64]);
+        transmittance.push([report.behind_nearest_m(last)[1] as f64, report.transmittance as f64]);
     }
+    let axis =
+        if report.faces.len() > 1 { "metres behind the nearest face" } else { "metres behind the face" };
     let group = ui.scope_id().with("depth");
     let plots = [
         ("density α·ρ", density, color([110, 180, 255], [20, 100, 190]), None),
@@ -133,9 +146,7 @@ fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f6
             .link_axis(group, Vec2b::new(true, false))
             .link_cursor(group, Vec2b::new(true, false))
             .show_axes(Vec2b::new(i == last, true))
-            .custom_x_axes(vec![
-                AxisHints::new_x().label("metres behind the face").label_spacing(Rangef::new(24.0, 32.0)),
-            ])
+            .custom_x_axes(vec![AxisHints::new_x().label(axis).label_spacing(Rangef::new(24.0, 32.0))])
             .custom_y_axes(vec![
                 AxisHints::new_y().min_thickness(FIGURES_WIDTH).label_spacing(Rangef::new(12.0, 18.0)),
             ])
@@ -156,10 +167,10 @@ fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f6
             Some(top) => plot.include_y(top),
             None => plot,
         };
-        let mark = marked.map(|step| (step.enter_m as f64, step.exit_m as f64));
+        let mark = marked.map(|step| report.behind_nearest_m(step).map(f64::from));
         let weak = ui.visuals().weak_text_color();
         let shown = plot.show(ui, |plot| {
-            if let Some((enter, exit)) = mark {
+            if let Some([enter, exit]) = mark {
                 plot.span(Span::new("", enter..=exit).fill(weak.gamma_multiply(0.25)).border_width(0.0));
                 plot.vline(VLine::new("", enter).color(weak).allow_hover(false));
             }
@@ -173,9 +184,25 @@ fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f6
     depth
 }
 
-/// A value of each cell from where the ray enters it to where it leaves it.
-fn steps(steps: &[RayStep], value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
-    steps.iter().flat_map(|s| [s.enter_m, s.exit_m].map(|metres| [metres as f64, value(s) as f64])).collect()
+/// A value of each cell from where the ray enters it to where it leaves it; nothing between the sheets.
+fn steps(report: &RayReport, value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    let mut face = 0;
+    for step in &report.steps {
+        let [enter, exit] = report.behind_nearest_m(step).map(f64::from);
+        if step.face != face {
+            face = step.face;
+            points.extend(points.last().map(|&[metres, _]| [metres, 0.0]));
+            points.push([enter, 0.0]);
+        }
+        points.extend([enter, exit].map(|metres| [metres, value(step) as f64]));
+    }
+    points
+}
+
+/// Whether a column is shown.
+fn shown(report: &RayReport, name: &str) -> bool {
+    name != FACE || report.faces.len() > 1
 }
 
 /// The cells `rows`, of which `selected` is shown as such; the one under the pointer.
@@ -193,7 +220,7 @@ fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize
             .min_scrolled_height(3.0 * row_height)
             .max_scroll_height(height)
             .cell_layout(Layout::right_to_left(Align::Center));
-        for (_, width, _) in COLUMNS {
+        for (_, width, _) in COLUMNS.into_iter().filter(|(name, ..)| shown(report, name)) {
             table = table.column(Column::initial(width).at_least(width.min(36.0)).clip(true));
         }
         if let Some(row) = selected.and_then(|number| rows.iter().position(|&row| row == number)) {
@@ -201,7 +228,7 @@ fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize
         }
         table
             .header(row_height + 2.0, |mut header| {
-                for (name, _, tip) in COLUMNS {
+                for (name, _, tip) in COLUMNS.into_iter().filter(|(name, ..)| shown(report, name)) {
                     header.col(|ui| {
                         ui.add(
                             Label::new(RichText::new(name).size(SMALL + 1.0).strong())
@@ -216,7 +243,10 @@ fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize
                     let number = rows[row.index()];
                     let step = &report.steps[number];
                     row.set_selected(selected == Some(number));
-                    for text in cells(number, step) {
+                    for ((name, ..), text) in COLUMNS.into_iter().zip(cells(number, step)) {
+                        if !shown(report, name) {
+                            continue;
+                        }
                         row.col(|ui| {
                             // What is empty steps back.
                             let text = RichText::new(text).monospace().size(SMALL);
@@ -234,12 +264,13 @@ fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize
 }
 
 /// A row of the table, in the order of [`COLUMNS`].
-fn cells(number: usize, step: &RayStep) -> [String; 10] {
+fn cells(number: usize, step: &RayStep) -> [String; 11] {
     let [x, y, z] = step.cell;
     let occupied = step.rho > 0.0;
     let only = |text: String| if occupied { text } else { String::new() };
     [
         number.to_string(),
+        step.face.to_string(),
         format!("{x:>2} {y:>2} {z:>2}"),
         format!("{:.4}–{:.4}", step.enter_m, step.exit_m),
         only(format!("{:.3}", step.rho)),

@@ -29,7 +29,7 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
     Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a valid scene")
 }
 
-const SURFACE: RenderOptions = RenderOptions {
+pub const SURFACE: RenderOptions = RenderOptions {
     keep_rasters: 0,
     surface: true,
     samples: None,

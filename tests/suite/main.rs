@@ -13,6 +13,7 @@ mod farm;
 mod faults;
 mod flow;
 mod gpu;
+mod layers;
 mod lights;
 mod looking;
 mod mapping;

@@ -37,15 +37,17 @@ fn scenes() -> [(&'static str, Scene); 3] {
 }
 
 /// The report says where its radiance comes from, without a gap.
-fn assert_whole(what: &str, report: &RayReport) {
+pub fn assert_whole(what: &str, report: &RayReport) {
     let sum: Vec3 = report.steps.iter().map(|s| s.radiance).sum();
     let all = sum + report.behind * report.transmittance;
     let bound = 1e-5 * report.radiance.abs().max_element() + 1e-6;
     assert!((all - report.radiance).abs().max_element() <= bound, "{what}: {all}, not {}", report.radiance);
     assert_eq!(report.steps.len() as u32, report.cells[0], "{what}");
-    assert_eq!(report.face.is_some(), !report.steps.is_empty(), "{what}");
+    assert_eq!(report.face().is_some(), !report.steps.is_empty(), "{what}");
     for pair in report.steps.windows(2) {
-        assert_eq!(pair[0].exit_m, pair[1].enter_m, "{what}");
+        let next = usize::from(pair[0].face != pair[1].face);
+        assert_eq!(pair[1].face, pair[0].face + next, "{what}");
+        assert_eq!(pair[1].enter_m, if next == 0 { pair[0].exit_m } else { 0.0 }, "{what}");
         assert!(pair[0].transmittance >= pair[1].transmittance, "{what}");
     }
     if let Some(first) = report.steps.first() {
@@ -70,7 +72,7 @@ fn a_rays_report_is_the_pixel_of_the_frame_on_every_pixel() {
             assert_eq!(report.radiance.extend(report.transmittance).to_array(), frame.radiance[i], "{what}");
             assert_eq!(report.cells, frame.counts[i], "{what}");
             assert_whole(&what, &report);
-            let Some(face) = report.face else {
+            let Some(face) = report.face() else {
                 assert!(report.radiance == report.behind && report.transmittance == 1.0, "{what}");
                 dry += 1;
                 continue;
@@ -104,16 +106,12 @@ fn a_window_of_the_raster_pass_has_the_bits_of_the_whole() {
         Window { x: 0, y: 20, width: 96, height: 17 },
     ] {
         let part = gbuffer::run_window(scene, &mesh, window, 0);
-        assert_eq!(part.quad_id.len() as u32, window.width * window.height);
+        assert_eq!(part.opaque.len() as u32, window.width * window.height);
         for y in window.y..window.y + window.height {
             for x in window.x..window.x + window.width {
                 let (p, w) = (window.index([x, y]), whole.window.index([x, y]));
                 assert_eq!((part.opaque[p], part.normal[p]), (whole.opaque[w], whole.normal[w]), "{x} {y}");
-                assert_eq!(
-                    (part.surface[p], part.quad_id[p]),
-                    (whole.surface[w], whole.quad_id[w]),
-                    "{x} {y}"
-                );
+                assert!(part.faces(p).eq(whole.faces(w)), "{x} {y}");
             }
         }
     }
@@ -163,7 +161,7 @@ mod panel {
     #[test]
     fn the_inspector_tells_a_pixel_in_words_and_figures() {
         let [wet, dry] = reports();
-        let face = wet.face.expect("water");
+        let face = wet.face().expect("water");
         let mut panel = harness(&wet, Theme::Dark);
         panel.get_by_label("Pixel 130, 200");
         panel.get_by_label(&format!("{:.3} m", face.depth_m));
@@ -185,6 +183,26 @@ mod panel {
         panel.get_by_label("Pixel 5, 5");
         panel.get_by_label_contains("No water covers this pixel");
         assert!(panel.query_by_label("k_d").is_none());
+    }
+
+    #[test]
+    fn the_inspector_lists_every_face_and_says_which_one_a_cell_belongs_to() {
+        let scene = crate::layers::crossing();
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let report = inspect(&scene, &volume, &crate::layers::no_rock(), [20, 24]);
+        assert_eq!(report.faces.iter().map(|f| f.quad).collect::<Vec<_>>(), [1, 0]);
+        let panel = harness(&report, Theme::Dark);
+        panel.get_by_label("face");
+        for (face, place) in report.faces.iter().zip(["", "face 1"]) {
+            panel.get_by_label(&format!("{}   u {:.4}   v {:.4}", face.quad, face.uv[0], face.uv[1]));
+            panel.get_by_label(&format!("{:.3} m", face.depth_m));
+            assert!(place.is_empty() || panel.query_by_label(place).is_some());
+        }
+        let away = report.faces[1].depth_m - report.faces[0].depth_m;
+        let second = report.steps.iter().find(|s| s.face == 1).expect("a cell of the second");
+        assert_eq!(report.behind_nearest_m(second), [away, away + second.exit_m]);
+        let [wet, _] = reports();
+        assert!(harness(&wet, Theme::Dark).query_by_label("face").is_none());
     }
 
     #[test]

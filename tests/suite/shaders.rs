@@ -73,7 +73,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&shader_source(&file("integrate.wgsl"))).expect("valid");
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
-        texture_frame exposure filmic window_x window_y window_width window_height flow_cells pad);
+        texture_frame exposure filmic window_x window_y window_width window_height flow_cells layers);
     assert_eq!(members(&module, "Frame"), frame);
     assert_eq!(
         members(&module, "Light"),

@@ -5,8 +5,9 @@ use serde::Serialize;
 use super::Batch;
 use super::report::word;
 use crate::error::{Result, human_bytes};
-use crate::gpu::CANVAS_BYTES;
+use crate::gpu::canvas_bytes;
 use crate::job::{memory_of, spare_for_rasters};
+use crate::overlap;
 
 /// What a run would render, and what it needs for it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,7 +45,8 @@ impl Batch {
         let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
         let memory = self.base.limits().memory;
         let (needed, strips) = memory_of(&scene, window, surface, memory)?;
-        let rasters = CANVAS_BYTES * window.pixels() * u64::from(scene.image.samples);
+        let rasters =
+            canvas_bytes(overlap::sheets(&scene)) * window.pixels() * u64::from(scene.image.samples);
         let kept = if strips.len() > 1 || to_render < 2 {
             0
         } else {
