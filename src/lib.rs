@@ -10,7 +10,7 @@
 //! 4. [`mapping`] is the one-to-one map between a quad and the volume's face (§3): the raster pass
 //!    (`gbuffer`) finds the quad and its texture coordinates under each pixel.
 //! 5. [`shading`] is the light of one cell (§5); the compute pass (`integrate`) walks the cells under
-//!    each pixel (§4) and adds them up.
+//!    each pixel (§4) and adds them up; [`scatter`] is the light that is scattered more than once.
 //! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR; many frames become
 //!    a [`movie`] or a labelled [`sheet`].
 //!
@@ -33,6 +33,7 @@ pub mod job;
 pub mod mapping;
 pub mod movie;
 pub mod random;
+pub mod scatter;
 pub mod scene;
 pub mod shading;
 pub mod sheet;

@@ -19,6 +19,7 @@ mod movie;
 mod presets;
 mod ray;
 mod readme;
+mod scatter;
 mod scene;
 mod shaders;
 mod shading;
