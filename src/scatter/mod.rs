@@ -24,8 +24,8 @@
 //!
 //! Why the *layers'* mean depths and not the depths along the cell's own line: scattered light comes from a
 //! neighbourhood as wide as its free path, which is wider than the strands. Against a path tracer
-//! (`tests/suite/scatter`) the local depths had twice the error. Attenuation series (Wrenninge, Kulla and Lundqvist, "Oz: The Great
-//! and Volumetric", SIGGRAPH 2013) came to half of the light at best; Zinke's dual scattering (2008) is made for
+//! (`tests/suite/scatter`) the local depths had 1.7 times the error. Attenuation series (Wrenninge, Kulla and Lundqvist, "Oz: The Great
+//! and Volumetric", SIGGRAPH 2013) were wrong by a third of the light at best; Zinke's dual scattering (2008) is made for
 //! fibres that scatter forward only, and knows nothing of a slab's faces.
 //!
 //! `shaders/scatter.wgsl` is the twin of what works along a ray.
@@ -205,6 +205,8 @@ pub struct Row {
 
 impl Row {
     /// For a light whose direction has the cosine `l_n` with the seen face's normal; less than 0: it comes from behind.
+    /// With per-cell attenuation a slanted line meets more cells instead of more metres: −z/(|x| + |y| + |z|) of
+    /// the direction in cells takes the cosine's place.
     pub fn new(l_n: f32, layers: u32) -> Row {
         let place = l_n.abs().min(1.0).sqrt() * (COSINES - 1) as f32;
         let below = (place as u32).min(COSINES - 2);

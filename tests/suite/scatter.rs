@@ -2,6 +2,7 @@
 //! closed forms.
 
 mod closed_forms;
+mod parity;
 mod pictures;
 mod tracer;
 
