@@ -11,7 +11,7 @@
 //!    (`gbuffer`) finds the quads under each pixel, as many as [`overlap`] tells, in order of depth, and the
 //!    texture coordinates there.
 //! 5. [`shading`] is the light of one cell (§5); the compute pass (`integrate`) walks the cells under
-//!    each pixel (§4) and adds them up.
+//!    each pixel (§4) and adds them up; [`scatter`] is the light that is scattered more than once.
 //! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR; many frames become
 //!    a [`movie`] or a labelled [`sheet`].
 //!
@@ -35,6 +35,7 @@ pub mod mapping;
 pub mod movie;
 pub mod overlap;
 pub mod random;
+pub mod scatter;
 pub mod scene;
 pub mod shading;
 pub mod sheet;

@@ -69,6 +69,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/mapping.wgsl"),
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
+        include_str!("../../shaders/scatter.wgsl"),
         stage,
     ]
     .join("\n")

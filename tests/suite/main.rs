@@ -21,6 +21,7 @@ mod movie;
 mod presets;
 mod ray;
 mod readme;
+mod scatter;
 mod scene;
 mod shaders;
 mod shading;

@@ -8,7 +8,7 @@ use taki::gpu::shader_source;
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
-const SHARED: [&str; 4] = ["frame.wgsl", "mapping.wgsl", "shading.wgsl", "walk.wgsl"];
+const SHARED: [&str; 5] = ["frame.wgsl", "mapping.wgsl", "scatter.wgsl", "shading.wgsl", "walk.wgsl"];
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
@@ -97,6 +97,7 @@ fn constants_are_the_same_on_both_sides() {
         }
     };
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
 }

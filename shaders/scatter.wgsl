@@ -1,0 +1,75 @@
+// §5 Light scattered more than once. Twin: src/scatter/mod.rs, where the formula and its reasons stand.
+
+const COSINES: u32 = 12u;
+const LN_2: f32 = 0.693147180559945309;
+
+// Per colour: a = 1 − ωg, ω, b' = ω'/4 and b = ω(1 − g)/4.
+struct Similarity {
+    extinction: vec3<f32>,
+    g: f32,
+    albedo: vec3<f32>,
+    pad_0: f32,
+    reduced: vec3<f32>,
+    pad_1: f32,
+    isotropic: vec3<f32>,
+    pad_2: f32,
+}
+
+// Where a light's values stand in a profile: between two rows of `layers` values.
+struct Row {
+    near: u32,
+    far: u32,
+    share: f32,
+}
+
+// h₂ … h₅, and h₆.
+struct Peak {
+    first: vec4<f32>,
+    last: f32,
+}
+
+fn scatter_row(l_n: f32, layers: u32) -> Row {
+    let place = sqrt(min(abs(l_n), 1.0)) * f32(COSINES - 1u);
+    let below = min(u32(place), COSINES - 2u);
+    let near = (select(0u, COSINES, l_n < 0.0) + below) * layers;
+    return Row(near, near + layers, place - f32(below));
+}
+
+// P, from the profile's values at row.near + z and row.far + z.
+fn scatter_diffuse(near: vec3<f32>, far: vec3<f32>, row: Row) -> vec3<f32> {
+    return near + (far - near) * row.share;
+}
+
+fn scatter_peak(g: f32, cos: f32) -> Peak {
+    let g2 = g * g;
+    let power = vec4<f32>(g2, g2 * g, g2 * g * g, g2 * g * g * g);
+    let last = power.w * g;
+    let s = 1.0 + power * power - 2.0 * power * cos;
+    let s_last = 1.0 + last * last - 2.0 * last * cos;
+    let peak = (1.0 - power * power) / (s * sqrt(s)) - (1.0 - power);
+    let peak_last = (1.0 - last * last) / (s_last * sqrt(s_last)) - (1.0 - last);
+    return Peak(0.25 * max(peak, vec4<f32>(0.0)), 0.25 * max(peak_last, 0.0));
+}
+
+fn scatter_multiple(
+    similarity: Similarity,
+    peak: Peak,
+    diffuse: vec3<f32>,
+    view: f32,
+    cell: f32,
+    light: f32,
+) -> vec3<f32> {
+    let passed = exp2(similarity.extinction * -view);
+    let weight_reduced = passed - exp2(similarity.extinction * -(view + cell));
+    let seen_reduced = exp2(similarity.extinction * -light);
+    let once = exp2(-(view + light)) * (1.0 - exp2(-cell));
+    let s = similarity.albedo * (light * LN_2);
+    // Σ h_n s^(n−1)/(n−1)! by Horner's rule.
+    var forward = vec3<f32>(peak.last * 0.2);
+    forward = (forward * s + peak.first.w) * 0.25;
+    forward = (forward * s + peak.first.z) * (1.0 / 3.0);
+    forward = (forward * s + peak.first.y) * 0.5;
+    forward = (forward * s + peak.first.x) * s;
+    return weight_reduced * (diffuse + similarity.reduced * seen_reduced)
+        + (similarity.albedo * forward - similarity.isotropic) * once;
+}
