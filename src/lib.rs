@@ -36,6 +36,7 @@ pub mod random;
 pub mod scene;
 pub mod shading;
 pub mod sheet;
+pub mod strand;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod volume;

@@ -9,6 +9,7 @@ pub mod layout;
 mod rasters;
 mod readback;
 mod resolve;
+mod strand;
 mod timing;
 mod upload;
 
@@ -18,6 +19,7 @@ pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
 pub use integrate::{Integrate, Sums, Tiler, Variant};
 pub use resolve::Resolve;
+pub use strand::StrandTexture;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
 
@@ -63,6 +65,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/mapping.wgsl"),
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
+        include_str!("../../shaders/strand.wgsl"),
         stage,
     ]
     .join("\n")
