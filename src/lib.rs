@@ -39,6 +39,7 @@ pub mod scatter;
 pub mod scene;
 pub mod shading;
 pub mod sheet;
+pub mod strand;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod visibility;

@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use crate::camera::{clip_to_window, sample_offset};
 use crate::frame::Window;
 use crate::scene::{self, AngleFrame, Attenuation, Scene, Tone};
+use crate::strand::table::StrandShading;
 use crate::volume::VolumeTexture;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
@@ -94,6 +95,17 @@ pub struct LightVolume {
     pub cell_count: u32,
 }
 
+/// The reflection model of flowing water, beside its table.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Strand {
+    pub squeeze: f32,
+    pub spread: f32,
+    pub aeration: f32,
+    pub g: f32,
+}
+
 /// The part of a window that one submission works on, pixels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -103,6 +115,13 @@ pub struct Tile {
     pub y: u32,
     pub width: u32,
     pub height: u32,
+}
+
+impl From<&StrandShading> for Strand {
+    fn from(shading: &StrandShading) -> Self {
+        let table = &shading.table;
+        Strand { squeeze: table.squeeze, spread: table.spread, aeration: shading.aeration, g: shading.g }
+    }
 }
 
 impl Tile {

@@ -9,6 +9,7 @@ pub mod layout;
 mod rasters;
 mod readback;
 mod resolve;
+mod strand;
 mod timing;
 mod upload;
 mod visibility;
@@ -19,6 +20,7 @@ pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
 pub use integrate::{Integrate, Sums, Tiler, Variant};
 pub use resolve::Resolve;
+pub use strand::StrandTexture;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
 pub use visibility::{LightDepths, Visibility};
@@ -70,6 +72,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
         include_str!("../../shaders/scatter.wgsl"),
+        include_str!("../../shaders/strand.wgsl"),
         stage,
     ]
     .join("\n")

@@ -26,6 +26,7 @@ mod scene;
 mod shaders;
 mod shading;
 mod sheet;
+mod strand;
 mod tolerance;
 #[cfg(feature = "viewer")]
 mod viewer;

@@ -3,12 +3,13 @@
 
 use std::mem::offset_of;
 
-use taki::gpu::layout::{Frame, Light, Quad, Tile, WORKGROUP};
+use taki::gpu::layout::{Frame, Light, Quad, Strand, Tile, WORKGROUP};
 use taki::gpu::shader_source;
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
-const SHARED: [&str; 5] = ["frame.wgsl", "mapping.wgsl", "scatter.wgsl", "shading.wgsl", "walk.wgsl"];
+const SHARED: [&str; 6] =
+    ["frame.wgsl", "mapping.wgsl", "scatter.wgsl", "shading.wgsl", "strand.wgsl", "walk.wgsl"];
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
@@ -82,6 +83,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane pad e f g pad_g);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
+    assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
 }
 
 #[test]
@@ -100,4 +102,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
+    assert_eq!(constant("SINE_SHARE"), taki::strand::table::SINE_SHARE as f64);
+    let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
+    assert_eq!(size, taki::strand::table::SIZE);
 }

@@ -1,0 +1,42 @@
+// §5 A reflection model made for flowing water: Ψ of strands from a table, and of air between them. Twin:
+// src/strand/table.rs, where the axes of the table are described; the model stands in src/strand/mod.rs.
+
+// Nodes of the table.
+const STRAND_X: f32 = 40.0;
+const STRAND_Y: f32 = 48.0;
+const STRAND_Z: f32 = 128.0;
+// Of its z axis.
+const SINE_SHARE: f32 = 0.75;
+
+struct Strand {
+    // Of the table: k of its x axis, v_R/2 of its texels.
+    squeeze: f32,
+    spread: f32,
+    // Share of air in a cell with k_d = k_s.
+    aeration: f32,
+    // Mean cosine of the scattering by air.
+    g: f32,
+}
+
+// Ψ = π·Φ of a cell with coefficients k, in any unit, from the cosines between unit vectors: t along the flow, l to
+// the light, e to the eye.
+fn strand_psi(table: texture_3d<f32>, linear: sampler, strand: Strand, k_d: f32, k_s: f32, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> vec3<f32> {
+    let sisi = t_dot_l * t_dot_e;
+    let coco = sqrt(max(1.0 - t_dot_l * t_dot_l, 0.0) * max(1.0 - t_dot_e * t_dot_e, 0.0));
+    let s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));
+    let cos_d = sqrt(clamp((1.0 + coco + sisi) * 0.5, 0.0, 1.0));
+    let sin2_half_phi = clamp((coco + sisi - l_dot_e) / (2.0 * max(coco, 1e-6)), 0.0, 1.0);
+    let x = s * (1.0 + strand.squeeze) / (s + strand.squeeze);
+    let z = SINE_SHARE * sqrt(sin2_half_phi) + (1.0 - SINE_SHARE) * (1.0 - sqrt(1.0 - sin2_half_phi));
+    let size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
+    let node = vec3<f32>(x, cos_d, z) * (size - 1.0);
+    let texel = textureSampleLevel(table, linear, (node + 0.5) / size, 0.0).rgb;
+    let of_strands = texel / sqrt(coco + strand.spread);
+
+    let k = k_d + k_s;
+    let a = select(strand.aeration, clamp(strand.aeration * (2.0 * k_d / k), 0.0, 1.0), k > 0.0);
+    let g = strand.g;
+    let turn = max(1.0 + g * g + 2.0 * g * l_dot_e, 1e-6);
+    let of_air = a * (0.25 * (1.0 - g * g)) / (turn * sqrt(turn));
+    return of_strands * (1.0 - a) + of_air;
+}

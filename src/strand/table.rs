@@ -1,0 +1,231 @@
+//! Ψ of a strand as a table over three angles, for the renderers. `shaders/strand.wgsl` is the twin of the lookup:
+//! the same operations in the same order.
+//!
+//! | axis | runs over | nodes |
+//! |---|---|---|
+//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: from the mirror cone on, in steps as fine as it is narrow | 40 |
+//! | y | cos θ_d | 48 |
+//! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the light's side, where the bow is, to the far one | 128 |
+//!
+//! All come from the cosines between the directions by square roots alone. A texel holds
+//! Ψ·√(cos θ_i·cos θ_o + v_R/2), linear RGB, in float16: near the mirror cone M is inversely proportional to that
+//! root, within a factor of 1.8 over all inclinations, and without it the steps of y would be too coarse where the
+//! strand is seen end on.
+//!
+//! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in units of
+//! Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones (tests/suite/strand.rs).
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use glam::{DVec3, Vec3};
+use half::f16;
+use rayon::prelude::*;
+
+use super::{PSI_PER_PHI, Strand, StrandParams, cell_aeration};
+
+/// Nodes along x, y and z.
+pub const SIZE: [usize; 3] = [40, 48, 128];
+/// w of the z axis: with 1 the steps of φ grow without bound at the far side, with 0 at the light's.
+pub const SINE_SHARE: f32 = 0.75;
+/// Tables kept: those of a slider that goes back and forth, and of the scenes of a gallery.
+const CACHED: usize = 4;
+
+/// Ψ of the strands alone, tabulated.
+pub struct StrandTable {
+    key: [u32; 4],
+    /// k of the x axis.
+    pub squeeze: f32,
+    /// v_R/2.
+    pub spread: f32,
+    /// Ψ·cos θ_d, as float16 holds it; x runs fastest, then y. The fourth is 0.
+    texels: Vec<[f32; 4]>,
+    moments: OnceLock<Moments>,
+}
+
+/// Means over all directions of light and eye, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moments {
+    /// Share of the light that is scattered.
+    pub albedo: DVec3,
+    /// Mean cosine of the angle by which it is turned.
+    pub mean_cosine: DVec3,
+}
+
+impl StrandTable {
+    /// The table of a strand, from the cache or built.
+    pub fn of(params: &StrandParams) -> Arc<StrandTable> {
+        static CACHE: Mutex<Vec<Arc<StrandTable>>> = Mutex::new(Vec::new());
+        let key = key(params);
+        let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
+        let table = match cache.iter().position(|t| t.key == key) {
+            Some(i) => cache.remove(i),
+            None => Arc::new(StrandTable::build(params)),
+        };
+        cache.insert(0, table.clone());
+        cache.truncate(CACHED);
+        table
+    }
+
+    /// Builds the table; aeration does not enter.
+    pub fn build(params: &StrandParams) -> StrandTable {
+        let strand = Strand::new(params);
+        let [nx, ny, nz] = SIZE;
+        let node = |i: usize, n: usize| i as f64 / (n - 1) as f64;
+        let squeeze = strand.v[0].sqrt().min(1.0) as f32;
+        let spread = (strand.v[0] / 2.0) as f32;
+        let (k, half_v) = (squeeze as f64, spread as f64);
+        let rows: Vec<_> = (0..ny)
+            .into_par_iter()
+            .map(|iy| {
+                let cos_d = node(iy, ny);
+                let around = strand.around(cos_d);
+                let n: Vec<_> = (0..nz).map(|iz| around.at(azimuth_of(node(iz, nz)))).collect();
+                let m: Vec<_> = (0..nx)
+                    .map(|ix| {
+                        let x = node(ix, nx);
+                        let s = x * k / (1.0 + k - x);
+                        // Outside the triangle of real directions, S > cos θ_d, its edge goes on.
+                        let coco = (cos_d * cos_d - s * s).max(0.0);
+                        let sisi = coco - 1.0 + 2.0 * s * s;
+                        let (half_sum, theta_d) = (s.asin(), cos_d.acos());
+                        strand
+                            .along(half_sum - theta_d, half_sum + theta_d, coco, sisi)
+                            .map(|m| m * PSI_PER_PHI * (coco + half_v).sqrt())
+                    })
+                    .collect();
+                (n, m)
+            })
+            .collect();
+        let texels = (0..nz * ny)
+            .into_par_iter()
+            .flat_map_iter(|i| {
+                let (n, m) = &rows[i % ny];
+                let n = n[i / ny];
+                m.iter().map(move |m| {
+                    let psi: DVec3 = (0..n.len()).map(|p| n[p] * m[p]).sum();
+                    [psi.x, psi.y, psi.z, 0.0].map(|v| f16::from_f64(v).to_f32())
+                })
+            })
+            .collect();
+        StrandTable { key: key(params), squeeze, spread, texels, moments: OnceLock::new() }
+    }
+
+    /// The texels as the bits of `rgba16float`, x fastest, then y, then z.
+    pub fn texels_f16(&self) -> Vec<[u16; 4]> {
+        self.texels.iter().map(|t| t.map(|v| f16::from_f32(v).to_bits())).collect()
+    }
+
+    /// Ψ of the strands alone, from t·l, t·e and l·e of unit vectors.
+    pub fn psi(&self, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> Vec3 {
+        let sisi = t_dot_l * t_dot_e;
+        let coco = ((1.0 - t_dot_l * t_dot_l).max(0.0) * (1.0 - t_dot_e * t_dot_e).max(0.0)).sqrt();
+        let s = ((1.0 - coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
+        let cos_d = ((1.0 + coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
+        let sin2_half_phi = ((coco + sisi - l_dot_e) / (2.0 * coco.max(1e-6))).clamp(0.0, 1.0);
+        let x = s * (1.0 + self.squeeze) / (s + self.squeeze);
+        let z = SINE_SHARE * sin2_half_phi.sqrt() + (1.0 - SINE_SHARE) * (1.0 - (1.0 - sin2_half_phi).sqrt());
+        self.sample(Vec3::new(x, cos_d, z)) / (coco + self.spread).sqrt()
+    }
+
+    /// Trilinear, as a sampler does it.
+    fn sample(&self, at: Vec3) -> Vec3 {
+        let [nx, ny, nz] = SIZE;
+        let split = |x: f32, n: usize| {
+            let x = x * (n - 1) as f32;
+            let i = (x as usize).min(n - 2);
+            (i, x - i as f32)
+        };
+        let (ix, fx) = split(at.x, nx);
+        let (iy, fy) = split(at.y, ny);
+        let (iz, fz) = split(at.z, nz);
+        let texel = |i: usize| Vec3::from_slice(&self.texels[i]);
+        let along_x = |i: usize| texel(i).lerp(texel(i + 1), fx);
+        let along_y = |i: usize| along_x(i).lerp(along_x(i + nx), fy);
+        let i = (iz * ny + iy) * nx + ix;
+        along_y(i).lerp(along_y(i + nx * ny), fz)
+    }
+
+    /// Albedo and mean cosine of the strands alone, by quadrature of the table.
+    pub fn moments(&self) -> Moments {
+        *self.moments.get_or_init(|| self.quadrature())
+    }
+
+    fn quadrature(&self) -> Moments {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        const THETA: usize = 160;
+        const PHI: usize = 64;
+        let step = PI / THETA as f64;
+        let theta = |i: usize| (i as f64 + 0.5) * step - FRAC_PI_2;
+        let weight = |i: usize| (theta(i) + 0.5 * step).sin() - (theta(i) - 0.5 * step).sin();
+        let cos_phi: Vec<f64> = (0..PHI).map(|i| ((i as f64 + 0.5) * PI / PHI as f64).cos()).collect();
+        // Turning the flow round changes nothing: light from one side is enough.
+        let (albedo, cosine) = (THETA / 2..THETA)
+            .into_par_iter()
+            .map(|i| {
+                let (sin_i, cos_i) = theta(i).sin_cos();
+                let (mut albedo, mut cosine) = (DVec3::ZERO, DVec3::ZERO);
+                for o in 0..THETA {
+                    let (sin_o, cos_o) = theta(o).sin_cos();
+                    for cos_phi in &cos_phi {
+                        let l_dot_e = sin_i * sin_o + cos_i * cos_o * cos_phi;
+                        let psi = self.psi(sin_i as f32, sin_o as f32, l_dot_e as f32).as_dvec3();
+                        albedo += psi * (weight(i) * weight(o));
+                        cosine -= psi * (weight(i) * weight(o) * l_dot_e);
+                    }
+                }
+                (albedo, cosine)
+            })
+            .collect::<Vec<_>>()
+            .into_iter()
+            .fold((DVec3::ZERO, DVec3::ZERO), |a, b| (a.0 + b.0, a.1 + b.1));
+        let per_direction = 2.0 / PHI as f64;
+        // What the table's error adds must not be taken for light.
+        Moments { albedo: (albedo * per_direction).min(DVec3::ONE), mean_cosine: cosine / albedo }
+    }
+}
+
+/// φ of a place on the z axis.
+fn azimuth_of(z: f64) -> f64 {
+    let (w, rest) = (SINE_SHARE as f64, 1.0 - SINE_SHARE as f64);
+    2.0 * (rest.atan2(w) + ((z - rest) / w.hypot(rest)).clamp(-1.0, 1.0).asin())
+}
+
+fn key(params: &StrandParams) -> [u32; 4] {
+    [params.radius_m, params.absorption, params.roughness_m, params.roughness_n].map(f32::to_bits)
+}
+
+/// The whole model as the renderers evaluate it: strands from the table, and air.
+pub struct StrandShading {
+    /// The strands.
+    pub table: Arc<StrandTable>,
+    /// Share of air in a cell with k_d = k_s.
+    pub aeration: f32,
+    /// Mean cosine of the scattering by air.
+    pub g: f32,
+}
+
+impl StrandShading {
+    /// For a strand like this.
+    pub fn new(params: &StrandParams) -> Self {
+        StrandShading { table: StrandTable::of(params), aeration: params.aeration, g: params.g }
+    }
+
+    /// Ψ = π·Φ of a cell with coefficients k, in any unit.
+    pub fn psi(&self, k_d: f32, k_s: f32, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> Vec3 {
+        let a = cell_aeration(self.aeration, k_d, k_s);
+        let g = self.g;
+        // The angle light is turned by has the cosine −l·e.
+        let x = (1.0 + g * g + 2.0 * g * l_dot_e).max(1e-6);
+        let air = a * (0.25 * (1.0 - g * g)) / (x * x.sqrt());
+        self.table.psi(t_dot_l, t_dot_e, l_dot_e) * (1.0 - a) + Vec3::splat(air)
+    }
+
+    /// Albedo and mean cosine of the mixture in a cell with k_d = k_s.
+    pub fn moments(&self) -> Moments {
+        let strand = self.table.moments();
+        let (a, g) = (self.aeration as f64, self.g as f64);
+        let albedo = strand.albedo * (1.0 - a) + DVec3::splat(a);
+        let cosine = strand.albedo * strand.mean_cosine * (1.0 - a) + DVec3::splat(a * g);
+        Moments { albedo, mean_cosine: cosine / albedo }
+    }
+}
