@@ -63,7 +63,8 @@ struct Quad {
     repeat_v: f32,
     // The eye relative to corner A, along e1, e2 and n.
     eye_plane: vec3<f32>,
-    pad: u32,
+    // Where the profile of its material begins, of multiple scattering.
+    profile: u32,
     e: vec2<f32>,
     f: vec2<f32>,
     g: vec2<f32>,

@@ -12,6 +12,10 @@ override MARCH: bool = false;
 override CACHED: bool = false;
 // Light volumes that differ over a quad.
 override VARYING: bool = false;
+// The reflection model of flowing water in place of fibres.
+override STRAND: bool = false;
+// Light that is scattered more than once.
+override MULTIPLE: bool = false;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -28,8 +32,19 @@ override VARYING: bool = false;
 // Light volumes, src/gpu/visibility.rs: optical depths, and where each light volume is.
 @group(0) @binding(10) var light_depths: texture_storage_3d<r32float, read>;
 @group(0) @binding(11) var<storage, read> light_places: array<vec4<i32>>;
+// Strand model and scattering, src/gpu/reflection.rs.
+@group(0) @binding(12) var<uniform> reflection: Reflection;
+@group(0) @binding(13) var strand_table: texture_3d<f32>;
+@group(0) @binding(14) var linear: sampler;
+// P of every material, one profile after the other.
+@group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
 
-// V_i(k): from the middle of `cell` to where the light ray leaves the slab.
+struct Reflection {
+    strand: Strand,
+    similarity: Similarity,
+}
+
+// From the middle of `cell` to where the light ray leaves the slab.
 struct LightWalk {
     depth: f32,
     t: f32,
@@ -37,7 +52,7 @@ struct LightWalk {
     done: bool,
 }
 
-fn visibility(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<function, Ray>) -> f32 {
+fn marched_depth(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<function, Ray>) -> f32 {
     var ray: LightWalk;
     var walk = walk_new(frame.cells, vec3<f32>(cell) + 0.5, direction);
     while !ray.done {
@@ -47,7 +62,7 @@ fn visibility(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<func
         visit_light(&walk, &ray, view);
     }
     (*total).light_cells += ray.cells;
-    return exp2(-ray.depth * view.extinction);
+    return ray.depth * view.extinction;
 }
 
 fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: View) {
@@ -66,8 +81,22 @@ fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: V
     (*ray).done |= (z < 0) | (z >= view.layers) | ((*ray).cells >= view.max_cells);
 }
 
-// V_i(k) from the light volumes at the corners of the ray's patch.
-fn kept_visibility(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
+// The optical depth in bits from an occupied cell to a light: −log₂ of V_i(k).
+fn light_depth(rho: f32, cell: vec3<i32>, light: RayLight, view: View, total: ptr<function, Ray>) -> f32 {
+    var depth = 0.0;
+    if MARCH {
+        if rho > 0.0 {
+            depth = marched_depth(cell, light.l_cell, view, total);
+        }
+    }
+    if CACHED {
+        depth = kept_depth(cell, light.places, view);
+    }
+    return depth;
+}
+
+// From the light volumes at the corners of the ray's patch.
+fn kept_depth(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
     var depth = textureLoad(light_depths, cell + places.p00).x;
     if VARYING && places.varies {
         let near = mix(depth, textureLoad(light_depths, cell + places.p10).x, places.at.x);
@@ -78,7 +107,7 @@ fn kept_visibility(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
         );
         depth = mix(near, far, places.at.y);
     }
-    return exp2(-depth * view.depth_bits);
+    return depth * view.depth_bits;
 }
 
 fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
@@ -134,6 +163,8 @@ struct Ray {
     cells: u32,
     light_cells: u32,
     done: bool,
+    // Optical depth so far, in bits; only where light is scattered more than once.
+    depth: f32,
 }
 
 // One light as a ray sees it: Jᵀl (or J⁻¹l normalised), and J⁻¹l.
@@ -141,6 +172,11 @@ struct RayLight {
     l_v: vec3<f32>,
     l_cell: vec3<f32>,
     places: LightPlaces,
+    // Cosine between light and eye, in the frame where angles are measured.
+    l_dot_e: f32,
+    // Of multiple scattering.
+    row: Row,
+    peak: Peak,
 }
 
 // Where a light's volumes are, at the corners of a patch, and where in the patch the ray is.
@@ -164,8 +200,13 @@ struct View {
     p: f32,
     max_cells: u32,
     layers: i32,
+    // The model's constants, where they are asked for.
+    strand: Strand,
+    similarity: Similarity,
     // Lights of this walk.
     lights: u32,
+    // Where the quad's profile begins.
+    profile: u32,
     // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
     metric: vec4<f32>,
     e_v: vec3<f32>,
@@ -174,6 +215,12 @@ struct View {
 
 var<private> others: array<RayLight, LIGHTS_A_WALK>;
 var<private> sums: array<f32, LIGHTS_A_WALK>;
+// Where light has a colour of its own in every cell.
+var<private> colours: array<vec3<f32>, LIGHTS_A_WALK>;
+
+fn in_colour() -> bool {
+    return STRAND || MULTIPLE;
+}
 
 fn lights_of(view: View) -> u32 {
     // Known when the shader is compiled, in all but a few scenes.
@@ -236,6 +283,7 @@ fn trace(
     view.max_cells = frame.max_cells;
     view.layers = frame.cells.z;
     view.lights = min(LIGHTS - first, LIGHTS_A_WALK);
+    view.profile = quad.profile;
     let cx = jacobian.cx;
     let cy = jacobian.cy;
     let depth = jacobian.depth;
@@ -245,13 +293,38 @@ fn trace(
         view.metric = vec4<f32>(1.0, 0.0, 1.0, 1.0);
         view.e_v = -d_cell / sqrt(dot3(d_cell, d_cell));
     }
-    if LIGHTS > 0u {
+    if in_colour() {
+        view.strand = reflection.strand;
+        view.similarity = reflection.similarity;
+        for (var i = 0u; i < lights_of(view); i++) {
+            others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
+            colours[i] = vec3<f32>(0.0);
+            let light = &others[i];
+            if CACHED {
+                (*light).places = light_places_of(quad_number, first + i, hit.xy);
+            }
+            let l = light_at(first + i, d_world, hit.z).xyz;
+            (*light).l_dot_e = -dot3(l, d_world);
+            if MULTIPLE {
+                (*light).peak = scatter_peak(view.similarity.g, (*light).l_dot_e * -1.0);
+                var l_n = dot3(l, quad.n) * side;
+                if PER_CELL {
+                    let c = abs((*light).l_cell);
+                    l_n = -(*light).l_cell.z / (c.x + c.y + c.z);
+                }
+                (*light).row = scatter_row(l_n, u32(frame.cells.z));
+            }
+            if frame.texture_frame != 0u {
+                (*light).l_dot_e = dot3((*light).l_v, view.e_v);
+            }
+        }
+    } else if LIGHTS > 0u {
         view.first = ray_light(first, quad, jacobian, side, d_world, hit.z);
         if CACHED {
             view.first.places = light_places_of(quad_number, first, hit.xy);
         }
     }
-    for (var i = 1u; i < lights_of(view); i++) {
+    for (var i = 1u; !in_colour() && i < lights_of(view); i++) {
         others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
         if CACHED {
             others[i].places = light_places_of(quad_number, first + i, hit.xy);
@@ -261,6 +334,7 @@ fn trace(
 
     var ray: Ray;
     var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
+    ray.depth = -log2(max(before.w, 1e-30));
     ray.transmittance = before.w;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
@@ -291,11 +365,15 @@ fn trace(
         color = frame.ambient * (before.w - ray.transmittance) + passed;
         (*count).x += ray.cells;
     }
-    if LIGHTS > 0u {
+    if LIGHTS > 0u && !in_colour() {
         color += light_intensity(first, d_world, hit.z) * (ray.first * (1.0 / 255.0));
     }
-    for (var i = 1u; i < lights_of(view); i++) {
-        color += light_intensity(first + i, d_world, hit.z) * (sums[i] * (1.0 / 255.0));
+    for (var i = select(1u, 0u, in_colour()); i < lights_of(view); i++) {
+        var sum = colours[i];
+        if !in_colour() {
+            sum = vec3<f32>(sums[i] * (1.0 / 255.0));
+        }
+        color += light_intensity(first + i, d_world, hit.z) * sum;
     }
     (*count).y += ray.light_cells;
     return vec4<f32>(before.rgb + color, ray.transmittance);
@@ -332,29 +410,38 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let inverse_q = 1.0 / max(q, 1e-30);
     let t_dot_e = dot3(v, view.e_v);
     let sin2_e = max(1.0 - t_dot_e * t_dot_e * inverse_q, 0.0);
-    if LIGHTS > 0u {
-        var lit = weight * psi(view.p, k_d, k_s, v, view.first.l_v, t_dot_e, sin2_e, inverse_q);
-        if MARCH {
-            if rho > 0.0 {
-                lit *= visibility((*walk).cell, view.first.l_cell, view, ray);
+    if in_colour() {
+        let root = sqrt(inverse_q);
+        for (var i = 0u; i < lights_of(view); i++) {
+            let depth = light_depth(rho, (*walk).cell, others[i], view, ray);
+            let t_dot_l = dot3(v, others[i].l_v);
+            let seen = weight * exp2(-depth);
+            var lit: vec3<f32>;
+            if STRAND {
+                let l_dot_e = others[i].l_dot_e;
+                lit = seen * strand_psi(strand_table, linear, view.strand, k_d, k_s, t_dot_l * root, t_dot_e * root, l_dot_e);
+            } else {
+                let fibre = psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
+                lit = vec3<f32>(seen * fibre * (1.0 / 255.0));
             }
+            if MULTIPLE {
+                let row = others[i].row;
+                let z = u32((*walk).cell.z) + view.profile;
+                let diffuse = scatter_diffuse(profiles[row.near + z].rgb, profiles[row.far + z].rgb, row);
+                lit += scatter_multiple(view.similarity, others[i].peak, diffuse, (*ray).depth, tau_bits, depth);
+            }
+            colours[i] += lit;
         }
-        if CACHED {
-            lit *= kept_visibility((*walk).cell, view.first.places, view);
-        }
-        (*ray).first += lit;
+    } else if LIGHTS > 0u {
+        let lit = weight * psi(view.p, k_d, k_s, v, view.first.l_v, t_dot_e, sin2_e, inverse_q);
+        (*ray).first += lit * exp2(-light_depth(rho, (*walk).cell, view.first, view, ray));
     }
-    for (var i = 1u; i < lights_of(view); i++) {
-        var lit = weight * psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
-        if MARCH {
-            if rho > 0.0 {
-                lit *= visibility((*walk).cell, others[i].l_cell, view, ray);
-            }
-        }
-        if CACHED {
-            lit *= kept_visibility((*walk).cell, others[i].places, view);
-        }
-        sums[i] += lit;
+    for (var i = 1u; !in_colour() && i < lights_of(view); i++) {
+        let lit = weight * psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
+        sums[i] += lit * exp2(-light_depth(rho, (*walk).cell, others[i], view, ray));
+    }
+    if MULTIPLE {
+        (*ray).depth += tau_bits;
     }
 
     (*ray).cells += select(1u, 0u, (*ray).done);

@@ -103,6 +103,11 @@ const STEPS: &[(&str, &[&str])] = &[
     ("integrate", &[]),
     ("integrate march", &["light.visibility=march"]),
     ("integrate cached", &["light.visibility=cached"]),
+    ("cached, multiple", &["light.visibility=cached", "light.scattering=multiple"]),
+    (
+        "cached, multiple, strand",
+        &["light.visibility=cached", "light.scattering=multiple", "light.reflection=strand"],
+    ),
 ];
 
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];

@@ -9,8 +9,11 @@ use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
 use crate::job::Monitor;
 use crate::mapping::CellFrame;
-use crate::scene::{AngleFrame, Attenuation, Light, Scene, Visibility};
+use crate::scatter::media::{Media, thicknesses};
+use crate::scatter::{ORDERS, Row, forward_peak, multiple};
+use crate::scene::{AngleFrame, Attenuation, Light, Reflection, Scattering, Scene, Visibility};
 use crate::shading::{Metric, fibre_angles, specular_power};
+use crate::strand::table::StrandShading;
 use crate::visibility::LightVolumes;
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::{Crossing, Walk};
@@ -28,6 +31,10 @@ pub struct Integrator<'a> {
     light_volumes: Option<LightVolumes>,
     /// None: depths are walked when they are asked for.
     depths: Option<Depths>,
+    strand: Option<StrandShading>,
+    media: Option<Media>,
+    /// Number of each quad's profile.
+    profile_of_quad: Vec<u32>,
 }
 
 /// What one ray brings home.
@@ -66,6 +73,12 @@ struct RayLight {
     places: LightPlaces,
     intensity: Vec3,
     sum: f32,
+    /// Where light has a colour of its own in every cell.
+    colour: Vec3,
+    /// Cosine between light and eye, in the frame where angles are measured.
+    l_dot_e: f32,
+    row: Row,
+    peak: [f32; ORDERS - 1],
 }
 
 /// A light's volumes at the corners of a patch, and where in the patch a ray is.
@@ -109,6 +122,12 @@ impl<'a> Integrator<'a> {
             light_volumes: (scene.visibility == Visibility::Cached)
                 .then(|| LightVolumes::new(scene, volume.size, u64::MAX).expect("what is not kept fits")),
             depths: None,
+            strand: match &scene.reflection {
+                Reflection::Strand(params) => Some(StrandShading::new(params)),
+                Reflection::KajiyaKay => None,
+            },
+            media: (scene.scattering == Scattering::Multiple).then(|| Media::new(scene, volume)),
+            profile_of_quad: thicknesses(scene).1,
         }
     }
 
@@ -214,7 +233,17 @@ impl<'a> Integrator<'a> {
                     Some(volumes) => light_places_of(volumes, quad_number, i, Vec2::new(hit[0], hit[1])),
                     None => LightPlaces::default(),
                 };
-                RayLight { l_v, l_cell, places, intensity, sum: 0.0 }
+                let cosine = to_light.dot(d_world);
+                let l_dot_e = if texture_frame { l_v.dot(e_v) } else { -cosine };
+                let mut l_n = to_light.dot(map.n_world) * side;
+                if self.per_cell {
+                    let c = l_cell.abs();
+                    l_n = -l_cell.z / (c.x + c.y + c.z);
+                }
+                let row = Row::new(l_n, self.volume.size[2]);
+                let peak = forward_peak(self.media.as_ref().map_or(0.0, |m| m.similarity.g), cosine);
+                let (sum, colour) = (0.0, Vec3::ZERO);
+                RayLight { l_v, l_cell, places, intensity, sum, colour, l_dot_e, row, peak }
             })
             .collect();
 
@@ -223,7 +252,9 @@ impl<'a> Integrator<'a> {
         let y = hit[1] * quad.material.repeat_v * cells.y - self.flow_cells;
         let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
         let mut transmittance = before;
+        let mut depth = -before.max(1e-30).log2();
         let mut walked = [0u32; 2];
+        let in_colour = self.strand.is_some() || self.media.is_some();
         for crossing in
             Walk::new(self.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
         {
@@ -248,35 +279,59 @@ impl<'a> Integrator<'a> {
             let v = cell.v_code();
             let inverse_q = 1.0 / metric.squared(v).max(1e-30);
             let t_dot_e = v.dot(e_v);
+            let root = inverse_q.sqrt();
             for light in &mut lights {
-                let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
-                let psi = k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p);
-                let seen = match scene.visibility {
-                    Visibility::None => 1.0,
-                    Visibility::March => self.visibility(crossing.cell, light.l_cell, &mut walked[1]),
-                    Visibility::Cached => {
-                        (-self.kept_depth(crossing.cell, &light.places) * depth_bits).exp2()
+                let t_dot_l = v.dot(light.l_v);
+                let light_depth = match scene.visibility {
+                    Visibility::None => 0.0,
+                    Visibility::March => {
+                        self.marched_depth(crossing.cell, light.l_cell, &mut walked[1]) * self.extinction
                     }
+                    Visibility::Cached => self.kept_depth(crossing.cell, &light.places) * depth_bits,
                 };
-                let lit = weight * seen * psi;
-                light.sum += lit;
-                observer.light(seen, light.intensity * (lit * (1.0 / 255.0)));
+                let seen = (-light_depth).exp2();
+                let fibre = || {
+                    let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
+                    k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p)
+                };
+                if !in_colour {
+                    let lit = weight * fibre() * seen;
+                    light.sum += lit;
+                    observer.light(seen, light.intensity * (lit * (1.0 / 255.0)));
+                    continue;
+                }
+                let mut lit = match &self.strand {
+                    Some(strand) => {
+                        let [k_d, k_s] = [k_d, k_s].map(|k| k as f32);
+                        strand.psi(k_d, k_s, t_dot_l * root, t_dot_e * root, light.l_dot_e) * (weight * seen)
+                    }
+                    None => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
+                };
+                if let Some(media) = &self.media {
+                    let profile = &media.profiles[self.profile_of_quad[quad_number] as usize];
+                    let diffuse = profile.at(&light.row, crossing.cell.z as u32);
+                    lit += multiple(&media.similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
+                }
+                light.colour += lit;
+                observer.light(seen, light.intensity * lit);
             }
             transmittance = passed;
+            depth += tau_bits;
         }
 
         let ends = is_last || transmittance < scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
         let mut radiance = scene.ambient * (before - transmittance) + passed;
         for light in &lights {
-            radiance += light.intensity * (light.sum * (1.0 / 255.0));
+            let sum = if in_colour { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
+            radiance += light.intensity * sum;
         }
         Traced { radiance, transmittance, cells: walked }
     }
 
-    /// V_i(k): from the middle of `start` to where the light ray leaves the slab. With per-cell
-    /// attenuation the cell itself does not hide its own light.
-    fn visibility(&self, start: IVec3, direction: Vec3, light_cells: &mut u32) -> f32 {
+    /// From the middle of `start` to where the light ray leaves the slab. With per-cell attenuation the cell
+    /// itself does not hide its own light.
+    fn marched_depth(&self, start: IVec3, direction: Vec3, light_cells: &mut u32) -> f32 {
         let mut depth = 0.0f32;
         let walk = Walk::new(self.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
         for (n, crossing) in walk.take(self.scene.trace.max_cells as usize).enumerate() {
@@ -291,7 +346,7 @@ impl<'a> Integrator<'a> {
                 depth += rho * (crossing.t_exit - crossing.t_enter);
             }
         }
-        (-depth * self.extinction).exp2()
+        depth
     }
 
     /// The optical depth from a cell to the light, from the light volumes at the corners of the ray's patch.

@@ -4,7 +4,7 @@ use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
 use super::visibility::{LightDepths, Visibility};
-use super::{GpuRenderer, Inputs, Resident, Uploaded, readback};
+use super::{BoundReflection, GpuRenderer, Inputs, Reflections, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
 use crate::overlap;
@@ -32,6 +32,7 @@ struct Pass {
     up: Uploaded,
     frame: layout::Frame,
     light_depths: LightDepths,
+    reflection: BoundReflection,
 }
 
 enum Work {
@@ -70,29 +71,27 @@ impl GpuBench {
                 _ => None,
             };
             let variant = Variant::of(scene, light_volumes.as_ref());
-            let mut visibility = Visibility::new(gpu);
-            let none = visibility.none();
-            let mut add = |name, work, light_depths: &LightDepths| -> Result<()> {
-                passes.push((name, Pass { work, up: up()?, frame, light_depths: light_depths.clone() }));
-                Ok(())
-            };
             let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, variant), None);
+            let mut visibility = Visibility::new(gpu);
+            let mut work = Vec::new();
             if number == 0 {
-                add("gbuffer", Work::Gbuffer, &none)?;
-                add("bare walk", integrate(Integrate::bare(gpu, variant)), &none)?;
+                work.push(("gbuffer", Work::Gbuffer));
+                work.push(("bare walk", integrate(Integrate::bare(gpu, variant))));
             }
-            let mut light_depths = none.clone();
+            let mut light_depths = visibility.none();
             if let Some(light_volumes) = light_volumes {
-                add("light volumes", Work::Visibility(light_volumes.clone()), &none)?;
-                let up = Uploaded::new(gpu, &mut Resident::default(), scene, volume, mesh)?;
-                let found = visibility.get(gpu, timer, &up, &frame, light_volumes, volume, |_, _| Ok(()))?;
-                light_depths = found.0;
-                passes.push((
-                    name,
-                    Pass { work: integrate(Integrate::new(gpu, variant)), up, frame, light_depths },
-                ));
-            } else {
-                add(name, integrate(Integrate::new(gpu, variant)), &light_depths)?;
+                let up = up()?;
+                let volumes = light_volumes.clone();
+                light_depths = visibility.get(gpu, timer, &up, &frame, volumes, volume, |_, _| Ok(()))?.0;
+                if !passes.iter().any(|(name, _)| *name == "light volumes") {
+                    work.push(("light volumes", Work::Visibility(light_volumes)));
+                }
+            }
+            work.push((name, integrate(Integrate::new(gpu, variant))));
+            for (name, work) in work {
+                let reflection = Reflections::default().bind(gpu, scene, volume);
+                let light_depths = light_depths.clone();
+                passes.push((name, Pass { work, up: up()?, frame, light_depths, reflection }));
             }
         }
         self.prepared = Some(Prepared {
@@ -117,9 +116,10 @@ impl GpuBench {
     pub fn run(&mut self, number: usize) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
-        let Pass { work, up, frame, light_depths } = &mut p.passes[number].1;
+        let Pass { work, up, frame, light_depths, reflection } = &mut p.passes[number].1;
         let (window, area) = (p.window, Tile::whole(p.window));
-        let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, light_depths };
+        let inputs =
+            Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, light_depths, reflection };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
             Work::Visibility(volumes) => {

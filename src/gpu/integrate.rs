@@ -4,7 +4,7 @@ use super::device::Gpu;
 use super::layout::Tile;
 use super::{Inputs, shader};
 use crate::error::Result;
-use crate::scene::{Attenuation, Scene, Visibility};
+use crate::scene::{Attenuation, Reflection, Scattering, Scene, Visibility};
 use crate::shading::whole_exponent;
 use crate::visibility::LightVolumes;
 
@@ -25,6 +25,8 @@ pub struct Variant {
     march: bool,
     cached: bool,
     varying: bool,
+    strand: bool,
+    multiple: bool,
     exponent: u32,
 }
 
@@ -37,6 +39,8 @@ impl Variant {
             march: scene.visibility == Visibility::March,
             cached: light_volumes.is_some(),
             varying: light_volumes.is_some_and(LightVolumes::varying),
+            strand: matches!(scene.reflection, Reflection::Strand(_)),
+            multiple: scene.scattering == Scattering::Multiple,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
     }
@@ -131,6 +135,8 @@ impl Integrate {
             ("MARCH", number(variant.march)),
             ("CACHED", number(variant.cached)),
             ("VARYING", number(variant.varying)),
+            ("STRAND", number(variant.strand)),
+            ("MULTIPLE", number(variant.multiple)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, include_str!("../../shaders/integrate.wgsl"), &constants)
@@ -172,7 +178,7 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, light_depths, .. } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, light_depths, reflection, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
@@ -191,6 +197,10 @@ impl Integrate {
             entry(9, sums.counts.as_entire_binding()),
             entry(10, wgpu::BindingResource::TextureView(&light_depths.texture)),
             entry(11, light_depths.places.as_entire_binding()),
+            entry(12, reflection.uniform.as_entire_binding()),
+            entry(13, wgpu::BindingResource::TextureView(&reflection.table)),
+            entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
+            entry(15, reflection.profiles.as_entire_binding()),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -226,10 +236,10 @@ impl Integrate {
 }
 
 /// The bindings of `shaders/integrate.wgsl`, in order.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 12] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 16] {
     use wgpu::{
-        BindingType, BufferBindingType, StorageTextureAccess, TextureFormat, TextureSampleType,
-        TextureViewDimension,
+        BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
+        TextureSampleType, TextureViewDimension,
     };
     let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let uniform = buffer(BufferBindingType::Uniform);
@@ -248,7 +258,12 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 12] {
     let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Float));
     let list = buffer(BufferBindingType::Storage { read_only: true });
     let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
-    let types = [uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list];
+    let table = texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3);
+    let linear = BindingType::Sampler(SamplerBindingType::Filtering);
+    let types = [
+        uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list, uniform, table,
+        linear, list,
+    ];
     let mut binding = 0;
     types.map(|ty| {
         binding += 1;

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::camera::{clip_to_window, sample_offset};
 use crate::frame::Window;
+use crate::scatter;
 use crate::scene::{self, AngleFrame, Attenuation, Scene, Tone};
 use crate::strand::table::StrandShading;
 use crate::volume::VolumeTexture;
@@ -77,7 +78,7 @@ pub struct Quad {
     pub n: [f32; 3],
     pub repeat_v: f32,
     pub eye_plane: [f32; 3],
-    pub pad: u32,
+    pub profile: u32,
     pub e: [f32; 2],
     pub f: [f32; 2],
     pub g: [f32; 2],
@@ -97,7 +98,7 @@ pub struct LightVolume {
 
 /// The reflection model of flowing water, beside its table.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
 pub struct Strand {
     pub squeeze: f32,
@@ -115,6 +116,46 @@ pub struct Tile {
     pub y: u32,
     pub width: u32,
     pub height: u32,
+}
+
+/// Constants of multiple scattering.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Similarity {
+    pub extinction: [f32; 3],
+    pub g: f32,
+    pub albedo: [f32; 3],
+    pub pad_0: f32,
+    pub reduced: [f32; 3],
+    pub pad_1: f32,
+    pub isotropic: [f32; 3],
+    pub pad_2: f32,
+}
+
+/// What the integrate pass knows of how the volume's matter reflects.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Reflection {
+    pub strand: Strand,
+    pub similarity: Similarity,
+}
+
+impl Reflection {
+    /// Of the parts that are asked for.
+    pub fn new(strand: Option<&StrandShading>, similarity: Option<&scatter::Similarity>) -> Self {
+        let similarity = similarity.map(|s| Similarity {
+            extinction: s.extinction.to_array(),
+            g: s.g,
+            albedo: s.albedo.to_array(),
+            reduced: s.reduced.to_array(),
+            isotropic: s.isotropic.to_array(),
+            ..Similarity::default()
+        });
+        let strand = strand.map(Strand::from);
+        Reflection { strand: strand.unwrap_or_default(), similarity: similarity.unwrap_or_default() }
+    }
 }
 
 impl From<&StrandShading> for Strand {
@@ -228,8 +269,8 @@ impl Light {
 
 impl Quad {
     /// A quad seen by an eye. The eye's place relative to the quad is taken in float64: far eyes
-    /// would lose the digits that texture coordinates need.
-    pub fn new(quad: &scene::Quad, eye: Vec3) -> Self {
+    /// would lose the digits that texture coordinates need. `profile` is where its material's profile begins.
+    pub fn new(quad: &scene::Quad, eye: Vec3, profile: u32) -> Self {
         let map = &quad.map;
         let away: DVec3 = eye.as_dvec3() - map.a_world.as_dvec3();
         let along = |axis: Vec3| away.dot(axis.as_dvec3()) as f32;
@@ -242,7 +283,7 @@ impl Quad {
             n: map.n_world.to_array(),
             repeat_v: quad.material.repeat_v,
             eye_plane: [along(map.e1_world), along(map.e2_world), along(map.n_world)],
-            pad: 0,
+            profile,
             e: map.e.to_array(),
             f: map.f.to_array(),
             g: map.g.to_array(),

@@ -8,6 +8,7 @@ mod integrate;
 pub mod layout;
 mod rasters;
 mod readback;
+mod reflection;
 mod resolve;
 mod strand;
 mod timing;
@@ -19,6 +20,7 @@ pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
 pub use integrate::{Integrate, Sums, Tiler, Variant};
+pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
 pub use strand::StrandTexture;
 pub use timing::Timer;
@@ -104,6 +106,8 @@ pub struct Inputs<'a> {
     pub frame: &'a layout::Frame,
     /// The light volumes.
     pub light_depths: &'a LightDepths,
+    /// The reflection model and multiple scattering.
+    pub reflection: &'a BoundReflection,
 }
 
 /// The renderer: a device and its compiled passes.
@@ -117,6 +121,7 @@ pub struct GpuRenderer {
     integrate: Vec<Integrate>,
     resident: Resident,
     visibility: Visibility,
+    reflections: Reflections,
     /// The latest first.
     canvases: Vec<Canvas>,
     rasters: Rasters,
@@ -182,6 +187,7 @@ impl GpuRenderer {
             integrate: Vec::new(),
             resident: Resident::default(),
             visibility,
+            reflections: Reflections::default(),
             canvases: Vec::new(),
             rasters: Rasters::default(),
             learned: None,
@@ -215,6 +221,7 @@ impl GpuRenderer {
         seconds.pipelines = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
+        let reflection = self.reflections.bind(gpu, scene, volume);
         seconds.upload = clock.elapsed().as_secs_f64();
 
         let whole = [image.width, image.height];
@@ -276,6 +283,7 @@ impl GpuRenderer {
                     area,
                     frame: &frame_uniforms,
                     light_depths: &light_depths,
+                    reflection: &reflection,
                 };
                 if kept.is_none_or(|kept| !kept.ready.get()) {
                     seconds.gbuffer +=

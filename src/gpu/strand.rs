@@ -14,7 +14,15 @@ pub struct StrandTexture {
 impl StrandTexture {
     /// Uploads a table, 2 MB.
     pub fn new(gpu: &Gpu, table: &StrandTable) -> Self {
-        let [width, height, depth_or_array_layers] = SIZE.map(|n| n as u32);
+        Self::with(gpu, SIZE.map(|n| n as u32), &table.texels_f16())
+    }
+
+    /// One texel, to be bound where the model is not asked for.
+    pub fn empty(gpu: &Gpu) -> Self {
+        Self::with(gpu, [1; 3], &[[0; 4]])
+    }
+
+    fn with(gpu: &Gpu, [width, height, depth_or_array_layers]: [u32; 3], texels: &[[u16; 4]]) -> Self {
         let size = wgpu::Extent3d { width, height, depth_or_array_layers };
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("strand"),
@@ -28,7 +36,7 @@ impl StrandTexture {
         });
         gpu.queue.write_texture(
             texture.as_image_copy(),
-            bytemuck::cast_slice(&table.texels_f16()),
+            bytemuck::cast_slice(texels),
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
                 bytes_per_row: Some(8 * width),

@@ -6,6 +6,7 @@ use super::device::Gpu;
 use super::layout::{self, Quad};
 use super::rasters::hash_twice;
 use crate::error::{Error, Result};
+use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene, Vertex};
 use crate::volume::{Cell, VolumeTexture};
 
@@ -54,7 +55,11 @@ impl Uploaded {
         mesh: &Mesh,
     ) -> Result<Self> {
         let limits = gpu.device.limits();
-        let quads: Vec<Quad> = scene.quads.iter().map(|q| Quad::new(q, scene.camera.eye)).collect();
+        let (_, thickness_of_quad) = thicknesses(scene);
+        let length = profile_length(volume.size[2]);
+        let numbered = scene.quads.iter().zip(thickness_of_quad);
+        let quads: Vec<Quad> =
+            numbered.map(|(quad, which)| Quad::new(quad, scene.camera.eye, which * length)).collect();
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));

@@ -30,6 +30,7 @@
 //!
 //! `shaders/scatter.wgsl` is the twin of what works along a ray.
 
+pub mod media;
 pub mod slab;
 
 use glam::Vec3;

@@ -24,6 +24,7 @@ pub use value::{Key, Place, Raw, Value, Values};
 use crate::curve::{CurveShape, levels_for};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
+use crate::strand::StrandParams;
 use crate::volume::{VolumeTexture, WaterSpec, read_npz};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
@@ -59,6 +60,10 @@ pub struct Scene {
     pub visibility: Visibility,
     /// Bytes that light volumes may take.
     pub light_cache: u64,
+    /// How a cell reflects.
+    pub reflection: Reflection,
+    /// Whether light may be scattered more than once.
+    pub scattering: Scattering,
     /// Exponent of the specular term.
     pub p: f32,
     /// The camera.
@@ -178,6 +183,24 @@ pub enum Visibility {
     March,
     /// The same, walked once for every cell of the volume and kept.
     Cached,
+}
+
+/// How a cell reflects light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reflection {
+    /// The paper's: fibres with the coefficients of the cell.
+    KajiyaKay,
+    /// Strands of water and air.
+    Strand(StrandParams),
+}
+
+/// How often light may be scattered on its way through the volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scattering {
+    /// Once.
+    Single,
+    /// As often as it is.
+    Multiple,
 }
 
 /// A pinhole camera.
@@ -328,6 +351,11 @@ impl Scene {
                 _ => Visibility::March,
             },
             light_cache: u64::from(v.count("light.cache")) << 20,
+            reflection: match v.text("light.reflection").as_str() {
+                "strand" => Reflection::Strand(parts::strand(v)),
+                _ => Reflection::KajiyaKay,
+            },
+            scattering: parts::scattering(v)?,
             p: v.float("light.p"),
             camera,
             background: Background {

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Camera, Cone, Light, MAX_LIGHTS, Quad, Rock, Values, Vertex};
+use super::{Camera, Cone, Light, MAX_LIGHTS, Quad, Rock, Scattering, Values, Vertex};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
+use crate::strand::StrandParams;
 
 pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
@@ -139,6 +140,30 @@ pub(super) fn camera(v: &Values) -> Result<Camera> {
         tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
         near: v.float("camera.near"),
     })
+}
+
+pub(super) fn strand(v: &Values) -> StrandParams {
+    StrandParams {
+        radius_m: v.float("strand.radius"),
+        roughness_m: v.float("strand.roughness_m"),
+        roughness_n: v.float("strand.roughness_n"),
+        absorption: v.float("strand.absorption"),
+        aeration: v.float("strand.aeration"),
+        g: v.float("strand.g"),
+    }
+}
+
+pub(super) fn scattering(v: &Values) -> Result<Scattering> {
+    if v.text("light.scattering") == "single" {
+        return Ok(Scattering::Single);
+    }
+    if v.text("light.visibility") == "none" {
+        return Err(Error::input(
+            "light.scattering = \"multiple\" with light.visibility = \"none\": there is no light left to scatter",
+            "use light.visibility=cached or march",
+        ));
+    }
+    Ok(Scattering::Multiple)
 }
 
 /// Normalised in float64, so that neither tiny nor huge vectors lose their direction.

@@ -80,7 +80,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
-    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane pad e f g pad_g);
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g pad_g);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
