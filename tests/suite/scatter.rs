@@ -4,6 +4,7 @@
 mod closed_forms;
 mod parity;
 mod pictures;
+mod renderer;
 mod tracer;
 
 use glam::DVec3;

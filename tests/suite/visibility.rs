@@ -181,11 +181,20 @@ fn light_volumes_on_the_device_are_kept_and_never_stale() {
 }
 
 #[test]
-fn bad_values_of_cached_visibility_have_their_line() {
+fn bad_values_of_light_in_the_volume_have_their_line() {
     for (set, words) in [
         ("light.visibility=kept", "march, cached, none"),
         ("light.cache=0", "1 to 65536"),
         ("light.cache=1.5", "1 to 65536"),
+        ("light.reflection=water", "kajiya-kay, strand"),
+        ("light.scattering=twice", "single, multiple"),
+        ("light.scattering=multiple", "use light.visibility=cached or march"),
+        ("strand.radius=0", "1e-5 to 1"),
+        ("strand.roughness_m=0.05", "0.1 to 1"),
+        ("strand.roughness_n=1.01", "0.1 to 1"),
+        ("strand.absorption=-1", "0 to 10000"),
+        ("strand.aeration=1.5", "0 to 1"),
+        ("strand.g=1", "-0.99 to 0.99"),
     ] {
         let error =
             Scene::load("front".as_ref(), &[set.into()], &Limits::default()).expect_err(set).to_string();
