@@ -5,14 +5,14 @@ use crate::strand::table::{SIZE, StrandTable};
 
 /// A table as `shaders/strand.wgsl` reads it.
 pub struct StrandTexture {
-    /// `texture_3d<f32>`, `rgba16float`.
+    /// `texture_3d<f32>`, `rgb9e5ufloat`.
     pub view: wgpu::TextureView,
     /// Trilinear.
     pub sampler: wgpu::Sampler,
 }
 
 impl StrandTexture {
-    /// Uploads a table, 2 MB.
+    /// Uploads a table, 1 MB.
     pub fn new(gpu: &Gpu, table: &StrandTable) -> Self {
         let [width, height, depth_or_array_layers] = SIZE.map(|n| n as u32);
         let size = wgpu::Extent3d { width, height, depth_or_array_layers };
@@ -22,16 +22,16 @@ impl StrandTexture {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D3,
-            format: wgpu::TextureFormat::Rgba16Float,
+            format: wgpu::TextureFormat::Rgb9e5Ufloat,
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
         gpu.queue.write_texture(
             texture.as_image_copy(),
-            bytemuck::cast_slice(&table.texels_f16()),
+            bytemuck::cast_slice(&table.texels()),
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(8 * width),
+                bytes_per_row: Some(4 * width),
                 rows_per_image: Some(height),
             },
             size,
