@@ -10,8 +10,8 @@ override LIGHTS: u32 = 1u;
 override PER_CELL: bool = false;
 override MARCH: bool = false;
 override CACHED: bool = false;
-// Light volumes that differ over a quad.
-override VARYING: bool = false;
+// Light volumes at the corners of patches.
+override CORNERED: bool = false;
 // The reflection model of flowing water in place of fibres.
 override STRAND: bool = false;
 // Light that is scattered more than once.
@@ -95,10 +95,10 @@ fn light_depth(rho: f32, cell: vec3<i32>, light: RayLight, view: View, total: pt
     return depth;
 }
 
-// From the light volumes at the corners of the ray's patch.
+// From the light volumes of the ray's patch.
 fn kept_depth(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
     var depth = textureLoad(light_depths, cell + places.p00).x;
-    if VARYING && places.varies {
+    if CORNERED && places.cornered {
         let near = mix(depth, textureLoad(light_depths, cell + places.p10).x, places.at.x);
         let far = mix(
             textureLoad(light_depths, cell + places.p01).x,
@@ -113,19 +113,20 @@ fn kept_depth(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
 fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
     var out: LightPlaces;
     let patches = light_places[quad_number * LIGHTS + light];
-    if !VARYING | (patches.y == 0) {
-        out.p00 = light_places[patches.x].xyz;
+    let at = uv * vec2<f32>(patches.yz);
+    let patch_at = min(vec2<i32>(at), patches.yz - 1);
+    if !CORNERED | (patches.w == 0) {
+        out.p00 = light_places[patches.x + patch_at.y * patches.y + patch_at.x].xyz;
         return out;
     }
-    out.varies = true;
-    let at = uv * f32(patches.y);
-    let corner = min(vec2<i32>(at), vec2<i32>(patches.y - 1));
-    let first = patches.x + corner.y * (patches.y + 1) + corner.x;
-    out.at = at - vec2<f32>(corner);
+    let row = patches.y + 1;
+    let first = patches.x + patch_at.y * row + patch_at.x;
+    out.cornered = true;
+    out.at = at - vec2<f32>(patch_at);
     out.p00 = light_places[first].xyz;
     out.p10 = light_places[first + 1].xyz;
-    out.p01 = light_places[first + patches.y + 1].xyz;
-    out.p11 = light_places[first + patches.y + 2].xyz;
+    out.p01 = light_places[first + row].xyz;
+    out.p11 = light_places[first + row + 1].xyz;
     return out;
 }
 
@@ -186,8 +187,8 @@ struct LightPlaces {
     p01: vec3<i32>,
     p11: vec3<i32>,
     at: vec2<f32>,
-    // Whether they are not all alike, for then the first is enough.
-    varies: bool,
+    // Whether the patch has four; else the first is its own.
+    cornered: bool,
 }
 
 // What is constant along a ray. The frame's values stand here again because a uniform read inside a loop

@@ -1,6 +1,6 @@
 //! §4 and §5 on the CPU. Twin: `shaders/integrate.wgsl`, the same operations in the same order.
 
-use glam::{IVec3, Vec2, Vec3};
+use glam::{IVec3, UVec2, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
 use super::visibility::{Depths, KeptDepths, optical_depth};
@@ -84,8 +84,8 @@ struct RayLight {
 /// A light's volumes at the corners of a patch, and where in the patch a ray is.
 #[derive(Clone, Copy, Default)]
 struct LightPlaces {
-    /// At (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all alike on a quad that is not cut.
-    corners: [u32; 4],
+    /// At (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all alike where it has one.
+    numbers: [u32; 4],
     at: Vec2,
 }
 
@@ -352,8 +352,8 @@ impl<'a> Integrator<'a> {
     /// The optical depth from a cell to the light, from the light volumes at the corners of the ray's patch.
     fn kept_depth(&self, cell: IVec3, places: &LightPlaces) -> f32 {
         let depth = |number: u32| self.light_depth(number as usize, cell);
-        let [p00, p10, p01, p11] = places.corners;
-        if places.corners == [p00; 4] {
+        let [p00, p10, p01, p11] = places.numbers;
+        if places.numbers == [p00; 4] {
             return depth(p00);
         }
         let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
@@ -378,13 +378,14 @@ impl<'a> Integrator<'a> {
 
 fn light_places_of(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> LightPlaces {
     let patches = volumes.patches[quad * volumes.lights + light];
-    if patches.side == 0 {
-        return LightPlaces { corners: [volumes.corners[patches.first as usize]; 4], at: Vec2::ZERO };
+    let [nu, nv] = patches.count;
+    let at = uv * Vec2::new(nu as f32, nv as f32);
+    let patch = at.as_uvec2().min(UVec2::new(nu - 1, nv - 1));
+    let number = |x: u32, y: u32, row: u32| volumes.numbers[(patches.first + y * row + x) as usize];
+    if !patches.cornered {
+        return LightPlaces { numbers: [number(patch.x, patch.y, nu); 4], at: Vec2::ZERO };
     }
-    let at = uv * patches.side as f32;
-    let corner = at.as_uvec2().min(glam::UVec2::splat(patches.side - 1));
-    let first = (patches.first + corner.y * (patches.side + 1) + corner.x) as usize;
-    let row = patches.side as usize + 1;
-    let corners = [first, first + 1, first + row, first + row + 1].map(|i| volumes.corners[i]);
-    LightPlaces { corners, at: at - corner.as_vec2() }
+    let [x, y] = patch.to_array();
+    let numbers = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| number(x, y, nu + 1));
+    LightPlaces { numbers, at: at - patch.as_vec2() }
 }

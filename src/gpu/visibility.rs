@@ -39,8 +39,8 @@ struct Kept {
 pub struct LightDepths {
     /// All light volumes, side by side in one `r32float` texture.
     pub texture: wgpu::TextureView,
-    /// `array<vec4<i32>>`: of every quad and light its first corner and patches a side; then of every corner where
-    /// its light volume begins in the texture.
+    /// `array<vec4<i32>>`: of every quad and light where its numbers begin, patches along u and v, whether they are
+    /// cornered; then for every number where its light volume begins in the texture.
     pub places: wgpu::Buffer,
 }
 
@@ -231,11 +231,14 @@ fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
 
 fn places(gpu: &Gpu, volumes: &LightVolumes, shelf: &Shelf) -> wgpu::Buffer {
     let before = volumes.patches.len() as u32;
-    let patches = volumes.patches.iter().map(|p| [(before + p.first) as i32, p.side as i32, 0, 0]);
-    let corners = volumes.corners.iter().map(|&number| {
+    let patches = volumes.patches.iter().map(|p| {
+        let [nu, nv] = p.count.map(|n| n as i32);
+        [(before + p.first) as i32, nu, nv, i32::from(p.cornered)]
+    });
+    let numbers = volumes.numbers.iter().map(|&number| {
         let [x, y, z] = shelf.place(number);
         [x, y, z, 0]
     });
-    let all: Vec<[i32; 4]> = patches.chain(corners).collect();
+    let all: Vec<[i32; 4]> = patches.chain(numbers).collect();
     gpu.buffer_with("light places", bytemuck::cast_slice(&all), wgpu::BufferUsages::STORAGE)
 }

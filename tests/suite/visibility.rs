@@ -41,7 +41,7 @@ fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     let size = [40; 3];
     let of = |sets: &[&str]| LightVolumes::new(&scene("front", sets), size, u64::MAX).expect("they fit");
     let one = of(&[]);
-    assert_eq!((one.directions.len(), one.varying(), one.patches.len()), (1, false, 1));
+    assert_eq!((one.directions.len(), one.cornered(), one.patches.len()), (1, false, 1));
     // The same parallelogram twice, elsewhere; another thickness; another place of the eye on the same side.
     let mut two = scene("front", &[]);
     let mut moved = two.quads[0];
@@ -67,8 +67,8 @@ fn a_point_light_near_a_quad_cuts_it_into_patches_and_a_far_one_does_not() {
         LightVolumes::new(&scene, [40; 3], u64::MAX).expect("they fit")
     };
     let near = of("[0.2,0.3,0.8]");
-    assert!(near.varying() && near.directions.len() > 4, "{:?}", near.patches);
-    assert!(!of("[200,300,800]").varying());
+    assert!(near.cornered() && near.directions.len() > 16, "{:?}", near.patches);
+    assert!(!of("[200,300,800]").cornered());
 }
 
 #[test]

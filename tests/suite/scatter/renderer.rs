@@ -31,7 +31,7 @@ fn picture(scene: &Scene, volume: &VolumeTexture, e: DVec3) -> Vec<f64> {
         .into_par_iter()
         .map(|i| {
             let ray = |ray: usize| {
-                let [a, b] = [0.754_877_666, 0.569_840_291].map(|r| (0.5 + ray as f32 * r).fract());
+                let [a, b] = [0.754_877_7, 0.569_840_3].map(|r| (0.5 + ray as f32 * r).fract());
                 let u = ((i % PIXELS) as f32 + a) / PIXELS as f32;
                 let v = ((i / PIXELS) as f32 + b) / PIXELS as f32;
                 integrator.trace(0, d, [u, v, 0.0], Vec3::ZERO, &mut ()).radiance.x as f64
@@ -73,11 +73,9 @@ fn the_renderers_radiance_is_the_path_tracers() {
         let [multiple, single, cached] = [&multiple, &single, &cached].map(|s| picture(s, &volume, e));
         let once: f64 = truth.iter().map(|p| p.single).sum();
         println!("g {g} {light} {depth}: {:+.3} single {:+.3}", share(&multiple), share(&single));
-        // Cell centres stand for cells in single scattering: a per cent or two at a depth of a tenth a cell.
-        assert!(
-            (single.iter().sum::<f64>() / once - 1.0).abs() < 0.03,
-            "single scattering, g {g} {light} {depth}"
-        );
+        // Cell centres stand for cells: some per cent of what is scattered once, of the whole less.
+        let off = (single.iter().sum::<f64>() - once) / whole;
+        assert!(off.abs() < 0.01, "single scattering, g {g} {light} {depth}: {off}");
         // The model's own mean error (README) and that.
         let allowed = if g > 0.0 { 0.13 } else { 0.06 };
         assert!(share(&multiple).abs() < allowed, "g {g} {light} {depth}: {}", share(&multiple));

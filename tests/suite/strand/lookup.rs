@@ -155,9 +155,9 @@ fn the_shader_looks_up_what_the_cpu_does() {
             let want = shading.psi(k_d, 1.0 - k_d, l, e, le);
             worst = worst.max(((got - want).abs() / (want + 0.25)).max_element());
         }
-        // The coordinates differ by fused products: 1e-7 near the mirror cone is 3e-4 of S, a tenth of a
-        // node. Filters with 8 bits between texels are not told from ours by more than 2e-3 of their difference.
+        // The coordinates differ by fused products, 1e-6 on software Vulkan. Most of the bound is for devices
+        // whose filters place a sample on one of 256 steps between two texels: half a step of a difference of
+        // a texel's own size.
         assert!(worst < 2e-3, "{worst}");
-        println!("largest difference {worst}");
     }
 }

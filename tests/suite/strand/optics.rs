@@ -139,6 +139,16 @@ fn around_the_strand_nothing_is_lost() {
 }
 
 #[test]
+fn roughness_spreads_the_lobes_as_chiang_and_others_say() {
+    let [r, tt, trt, residual] = variances(0.3);
+    // (0.726·0.3 + 0.812·0.3²)² radians², half as wide through the strand, twice as wide after a reflection.
+    assert!((r.sqrt() - 0.29088).abs() < 1e-6, "{r}");
+    assert_eq!([tt, trt, residual], [r / 4.0, 4.0 * r, 4.0 * r]);
+    // √(π/8)·(0.265·0.2 + 1.194·0.2²).
+    assert!((logistic_scale(0.2) - 0.063141).abs() < 1e-6, "{}", logistic_scale(0.2));
+}
+
+#[test]
 fn the_trimmed_logistic_holds_one_turn() {
     for s in [0.02, 0.5, 4.0] {
         let d = Logistic::new(s);
