@@ -11,6 +11,8 @@
 // Of the sheets before: the last one's depth, and the numbers of all.
 @group(0) @binding(3) var known_depth: texture_depth_2d;
 @group(0) @binding(4) var known_ids: texture_2d_array<u32>;
+@group(0) @binding(5) var<uniform> environment: Environment;
+@group(0) @binding(6) var environment_map: texture_2d<f32>;
 
 struct OpaqueVertex {
     @location(0) position_world: vec3<f32>,
@@ -41,16 +43,17 @@ fn opaque_vertex(in: OpaqueVertex) -> OpaqueVarying {
     return out;
 }
 
-// shade_opaque: Lambert, two-sided.
-@fragment
-fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
+fn seen_normal(in: OpaqueVarying) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
+    return select(n, -n, dot3(n, to_eye) < 0.0);
+}
+
+// Lambert, two-sided.
+fn shade_opaque(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let distance = sqrt(dot3(to_eye, to_eye));
-    var n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
-    if dot3(n, to_eye) < 0.0 {
-        n = -n;
-    }
-    var irradiance = frame.ambient;
+    var irradiance = ambient;
     for (var i = 0u; i < frame.light_count; i++) {
         let light = lights[i];
         let arrives = light_from(light, in.position_world);
@@ -60,6 +63,18 @@ fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
     out.radiance = vec4<f32>(in.albedo * irradiance, distance);
     out.normal = vec4<f32>(n, 1.0);
     return out;
+}
+
+@fragment
+fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    return shade_opaque(in, seen_normal(in), frame.ambient);
+}
+
+// Under an environment.
+@fragment
+fn opaque_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    let n = seen_normal(in);
+    return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n));
 }
 
 struct VolumeVarying {
@@ -124,6 +139,16 @@ fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
     var out: OpaqueTargets;
     out.radiance = vec4<f32>(frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0), 0.0);
+    out.normal = vec4<f32>(0.0);
+    return out;
+}
+
+// Environment::radiance.
+@fragment
+fn background_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
+    let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
+    var out: OpaqueTargets;
+    out.radiance = vec4<f32>(environment_radiance(environment, environment_map, d), 0.0);
     out.normal = vec4<f32>(0.0);
     return out;
 }

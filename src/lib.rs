@@ -26,6 +26,7 @@ pub mod camera;
 pub mod cli;
 pub mod cpu;
 pub mod curve;
+pub mod environment;
 pub mod error;
 pub mod farm;
 pub mod frame;

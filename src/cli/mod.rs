@@ -93,7 +93,11 @@ struct SceneOptions {
 
 impl SceneOptions {
     fn limits(&self) -> Limits {
-        Limits { allow_paths: self.allow_paths.clone(), memory: self.memory.saturating_mul(1 << 20) }
+        Limits {
+            allow_paths: self.allow_paths.clone(),
+            memory: self.memory.saturating_mul(1 << 20),
+            ..Limits::default()
+        }
     }
 
     /// Loads the scene; `more` are settings of other options, which come last.

@@ -70,6 +70,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let volume = scene.volume(args.scene.limits().memory, terminal)?;
     let volume_seconds = clock.elapsed().as_secs_f64();
     scene.warnings(&volume).iter().for_each(|w| terminal.warn(w));
+    if let Some(environment) = &scene.environment {
+        terminal.note(&format!("taki: {}", environment.words()));
+    }
     let clock = Instant::now();
     let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
     terminal.note(&format!("taki: {line}"));

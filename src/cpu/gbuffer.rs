@@ -122,7 +122,11 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
             rasterise(&rock, &rock_bins[i], near, band, &mut covered, 1);
             for (k, &(_, id)) in covered.iter().enumerate() {
                 if id == 0 {
-                    opaque[k] = scene.background.radiance(ray(k)).extend(0.0).to_array();
+                    let radiance = match &scene.environment {
+                        None => scene.background.radiance(ray(k)),
+                        Some(environment) => environment.radiance(ray(k)),
+                    };
+                    opaque[k] = radiance.extend(0.0).to_array();
                 } else {
                     let triangle = &rock[id as usize - 1];
                     let centre = pixel(k).map(|p| p as f64 + 0.5);
@@ -174,7 +178,7 @@ pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
     [uv.x, uv.y, t]
 }
 
-/// Lambert, two-sided: (radiance and metres from the eye, normal). Twin: `opaque_fragment`.
+/// Lambert, two-sided: (radiance and metres from the eye, normal). Twin: `shade_opaque`.
 fn shade_opaque(scene: &Scene, position: Vec3, normal: Vec3, albedo: Vec3) -> ([f32; 4], Vec3) {
     let to_eye = scene.camera.eye - position;
     let distance = to_eye.dot(to_eye).sqrt();
@@ -183,6 +187,9 @@ fn shade_opaque(scene: &Scene, position: Vec3, normal: Vec3, albedo: Vec3) -> ([
         n = -n;
     }
     let mut irradiance = scene.ambient;
+    if let Some(environment) = &scene.environment {
+        irradiance += environment.irradiance.at(n);
+    }
     for light in &scene.lights {
         let (to_light, intensity) = light.at(position);
         irradiance += intensity * n.dot(to_light).max(0.0);

@@ -1,6 +1,9 @@
 //! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
 
+use std::cell::OnceCell;
+
 use super::device::Gpu;
+use super::upload::UploadedEnvironment;
 use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::Vertex;
@@ -82,74 +85,23 @@ pub struct Gbuffer {
     opaque: wgpu::RenderPipeline,
     volume: wgpu::RenderPipeline,
     peel: wgpu::RenderPipeline,
+    module: wgpu::ShaderModule,
+    /// Background and opaque scene under an environment; compiled for the first scene that has one.
+    environment: OnceCell<[wgpu::RenderPipeline; 2]>,
 }
 
 impl Gbuffer {
     /// Compiles the pipelines.
     pub fn new(gpu: &Gpu) -> Self {
         let module = shader(gpu, "gbuffer", include_str!("../../shaders/gbuffer.wgsl"));
-        let target =
-            |format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
-        let pipeline = |vertex: &str,
-                        name: &str,
-                        buffers: &[Option<wgpu::VertexBufferLayout>],
-                        targets: &[Option<wgpu::ColorTargetState>],
-                        compare| {
-            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(name),
-                layout: None,
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(&format!("{vertex}_vertex")),
-                    compilation_options: Default::default(),
-                    buffers,
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: DEPTH,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(compare),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                multisample: Default::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(&format!("{name}_fragment")),
-                    compilation_options: Default::default(),
-                    targets,
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+        let [background, opaque] = behind(gpu, &module, "");
+        let ids = wgpu::TextureFormat::R32Uint;
+        let water = |fragment, targets: &[wgpu::TextureFormat]| {
+            let nearer = wgpu::CompareFunction::Greater;
+            pipeline(gpu, &module, ["volume_vertex", fragment], &[], targets, nearer)
         };
-        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
-        let vertices = wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &attributes,
-        };
-        let opaque_targets = [target(FLOATS), target(FLOATS)];
-        let ids = target(wgpu::TextureFormat::R32Uint);
-        let nearer = wgpu::CompareFunction::Greater;
-        Gbuffer {
-            background: pipeline(
-                "background",
-                "background",
-                &[],
-                &opaque_targets,
-                wgpu::CompareFunction::Always,
-            ),
-            opaque: pipeline(
-                "opaque",
-                "opaque",
-                &[Some(vertices)],
-                &opaque_targets,
-                wgpu::CompareFunction::Greater,
-            ),
-            volume: pipeline("volume", "volume", &[], &[target(FLOATS), ids.clone()], nearer),
-            peel: pipeline("volume", "peel", &[], &[ids], nearer),
-        }
+        let (volume, peel) = (water("volume_fragment", &[FLOATS, ids]), water("peel_fragment", &[ids]));
+        Gbuffer { background, opaque, volume, peel, module, environment: OnceCell::new() }
     }
 
     /// Fills the targets with one sample of a window; seconds on the device. A large mesh is drawn in
@@ -174,10 +126,24 @@ impl Gbuffer {
             })
         };
         let [frame, lights, quads] = [&uniform, &up.lights, &up.quads].map(|b| b.as_entire_binding());
-        let sky = bind(&self.background, &[(0, frame.clone())]);
-        let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights)]);
+        let (background, opaque, sky, rock) = match &up.environment {
+            None => {
+                let sky = bind(&self.background, &[(0, frame.clone())]);
+                let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights)]);
+                (&self.background, &self.opaque, sky, rock)
+            }
+            Some(UploadedEnvironment { uniform, map }) => {
+                let [background, opaque] =
+                    self.environment.get_or_init(|| behind(gpu, &self.module, "_environment"));
+                let uniform = uniform.as_entire_binding();
+                let map = wgpu::BindingResource::TextureView(map);
+                let sky = bind(background, &[(0, frame.clone()), (5, uniform.clone()), (6, map)]);
+                let rock = bind(opaque, &[(0, frame.clone()), (1, lights), (5, uniform)]);
+                (background, opaque, sky, rock)
+            }
+        };
         let water = bind(&self.volume, &[(0, frame.clone()), (2, quads.clone())]);
-        let [opaque, normal, surface] =
+        let [radiance, normal, surface] =
             [&targets.opaque, &targets.normal, &targets.surface].map(|t| t.create_view(&Default::default()));
         let depth_views: Vec<_> = (0..targets.depth.len()).map(|i| targets.depth_view(i)).collect();
         let id_view = |layer| {
@@ -217,20 +183,20 @@ impl Gbuffer {
                 };
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("gbuffer opaque"),
-                    color_attachments: &[colour(&opaque, load), colour(&normal, load)],
+                    color_attachments: &[colour(&radiance, load), colour(&normal, load)],
                     depth_stencil_attachment: Some(depth(0, load_depth)),
                     timestamp_writes: span.render(true, !last),
                     ..Default::default()
                 });
                 place(&mut pass);
                 if part == 0 {
-                    pass.set_pipeline(&self.background);
+                    pass.set_pipeline(background);
                     pass.set_bind_group(0, &sky, &[]);
                     pass.draw(0..3, 0..1);
                 }
                 if up.index_count > 0 {
                     let first = part * PART_INDICES;
-                    pass.set_pipeline(&self.opaque);
+                    pass.set_pipeline(opaque);
                     pass.set_bind_group(0, &rock, &[]);
                     pass.set_vertex_buffer(0, up.vertices.slice(..));
                     pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -294,4 +260,62 @@ impl Gbuffer {
 /// Copies a whole texture to one of its size: of a depth texture a part cannot be copied.
 fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Texture) {
     encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
+}
+
+/// Background and opaque scene, with the fragment shaders of this `kind`.
+fn behind(gpu: &Gpu, module: &wgpu::ShaderModule, kind: &str) -> [wgpu::RenderPipeline; 2] {
+    let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
+    let vertices = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Vertex>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &attributes,
+    };
+    let behind = |name: &str, buffers: &[Option<wgpu::VertexBufferLayout>], compare| {
+        let [vertex, fragment] = [format!("{name}_vertex"), format!("{name}{kind}_fragment")];
+        pipeline(gpu, module, [&vertex, &fragment], buffers, &[FLOATS; 2], compare)
+    };
+    [
+        behind("background", &[], wgpu::CompareFunction::Always),
+        behind("opaque", &[Some(vertices)], wgpu::CompareFunction::Greater),
+    ]
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    [vertex, fragment]: [&str; 2],
+    buffers: &[Option<wgpu::VertexBufferLayout>],
+    targets: &[wgpu::TextureFormat],
+    compare: wgpu::CompareFunction,
+) -> wgpu::RenderPipeline {
+    let target =
+        |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
+    let targets: Vec<_> = targets.iter().map(target).collect();
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(fragment),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some(vertex),
+            compilation_options: Default::default(),
+            buffers,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(compare),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(fragment),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
 }

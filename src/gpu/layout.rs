@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use crate::camera::{clip_to_window, sample_offset};
+use crate::environment;
 use crate::frame::Window;
 use crate::scatter;
 use crate::scene::{self, AngleFrame, Attenuation, Scene, Tone};
@@ -105,6 +106,40 @@ pub struct Strand {
     pub spread: f32,
     pub aeration: f32,
     pub g: f32,
+}
+
+/// The environment of a scene that has one; `shaders/environment.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Environment {
+    pub irradiance: [[f32; 4]; 9],
+    pub to_sun: [f32; 3],
+    pub rim2: f32,
+    pub sun_radiance: [f32; 3],
+    pub intensity: f32,
+    pub turn: f32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
+}
+
+impl Environment {
+    /// Of an environment.
+    pub fn new(environment: &environment::Environment) -> Self {
+        let sun = environment.sun;
+        Environment {
+            irradiance: environment.irradiance.0.map(|c| c.extend(0.0).to_array()),
+            to_sun: sun.map_or([0.0; 3], |sun| sun.to_sun.to_array()),
+            rim2: sun.map_or(0.0, |sun| sun.rim2),
+            sun_radiance: sun.map_or([0.0; 3], |sun| sun.radiance.to_array()),
+            intensity: environment.intensity,
+            turn: environment.turn,
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
+        }
+    }
 }
 
 /// The part of a window that one submission works on, pixels.
@@ -238,7 +273,8 @@ pub fn flow_cells(flow: f32, ny: u32) -> f32 {
     ((flow as f64).rem_euclid(1.0) * ny as f64) as f32
 }
 
-/// The scene's lights; a light that shines on nothing if there are none, for no buffer is empty.
+/// The scene's lights, then those that stand for its environment in the volume; a light that shines on nothing if there
+/// are none, for no buffer is empty.
 pub fn lights(scene: &Scene) -> Vec<Light> {
     let mut lights: Vec<Light> = scene.volume_lights().iter().map(Light::new).collect();
     lights.resize(lights.len().max(1), Light::default());

@@ -73,6 +73,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/mapping.wgsl"),
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
+        include_str!("../../shaders/environment.wgsl"),
         include_str!("../../shaders/scatter.wgsl"),
         include_str!("../../shaders/strand.wgsl"),
         stage,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::device::Gpu;
 use super::layout::{self, Quad};
 use super::rasters::hash_twice;
+use crate::environment::Map;
 use crate::error::{Error, Result};
 use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene, Vertex};
@@ -21,7 +22,9 @@ pub struct Resident {
     vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
     /// Of these vertices; previews have fewer triangles than pictures. Each upload has a number of its own.
     indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer, u64)>,
-    /// Uploads of indices so far.
+    /// The environment's map, and its number.
+    map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
+    /// Uploads of indices and maps so far.
     uploads: u64,
 }
 
@@ -41,8 +44,18 @@ pub struct Uploaded {
     pub indices: wgpu::Buffer,
     /// Number of indices.
     pub index_count: u32,
-    /// Hash of quads, lights and mesh: all that is drawn.
+    /// The environment, where the scene has one.
+    pub environment: Option<UploadedEnvironment>,
+    /// Hash of quads, lights, mesh and environment: all that is drawn.
     pub geometry: [u64; 2],
+}
+
+/// An environment on the device.
+pub struct UploadedEnvironment {
+    /// `Environment`.
+    pub uniform: wgpu::Buffer,
+    /// Its map, `rgba32float`.
+    pub map: wgpu::TextureView,
 }
 
 impl Uploaded {
@@ -72,8 +85,16 @@ impl Uploaded {
             ));
         }
         let (vertices, indices, upload) = resident.mesh(gpu, mesh);
+        let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
+        let environment = scene.environment.as_ref().map(layout::Environment::new);
+        let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
+        let number = map.as_ref().map(|(_, number)| *number);
         Ok(Uploaded {
-            geometry: hash_twice(&(quad_bytes, light_bytes, upload)),
+            geometry: hash_twice(&(quad_bytes, light_bytes, upload, environment_bytes, number)),
+            environment: map.map(|(map, _)| UploadedEnvironment {
+                uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
+                map,
+            }),
             volume: resident.volume(gpu, volume)?,
             quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
             quad_count: quads.len() as u32,
@@ -98,6 +119,20 @@ impl Resident {
         let view = upload_volume(gpu, volume)?;
         self.volume = Some((volume.cells.clone(), volume.size, view.clone()));
         Ok(view)
+    }
+
+    /// The map, and its number.
+    fn map(&mut self, gpu: &Gpu, map: &Arc<Map>) -> Result<(wgpu::TextureView, u64)> {
+        if let Some((old, view, upload)) = &self.map
+            && Arc::ptr_eq(old, map)
+        {
+            return Ok((view.clone(), *upload));
+        }
+        self.map = None;
+        let view = upload_map(gpu, map)?;
+        self.uploads += 1;
+        self.map = Some((map.clone(), view.clone(), self.uploads));
+        Ok((view, self.uploads))
     }
 
     /// Vertices, indices, and the number of this pair.
@@ -164,6 +199,48 @@ fn upload_volume(gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView>
             wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: (cells.len() / layer) as u32 },
         );
         gpu.run(gpu.encoder("upload volume"))?;
+    }
+    Ok(texture.create_view(&Default::default()))
+}
+
+fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
+    let Map { width, height, .. } = *map;
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    if width.max(height) > most {
+        return Err(Error::input(
+            format!("an environment map of {width}×{height} texels is too large for {}", gpu.name()),
+            format!("it has at most {most} on a side there; make it smaller or use --engine cpu"),
+        ));
+    }
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("environment"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let row = width as usize * 16;
+    let rows = (SLAB_BYTES / row).max(1);
+    for (slab, texels) in map.texels.chunks(rows * width as usize).enumerate() {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
+            wgpu::Extent3d {
+                width,
+                height: (texels.len() / width as usize) as u32,
+                depth_or_array_layers: 1,
+            },
+        );
+        gpu.run(gpu.encoder("upload environment"))?;
     }
     Ok(texture.create_view(&Default::default()))
 }

@@ -5,6 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::environment::Source;
 use crate::error::{Error, Result};
 use crate::frame::{
     CROP_TEXT, ExrWriter, FIGURES_TEXT, Figures, Frame, Layer, Output, PngWriter, SCENE_TEXT, Seconds,
@@ -12,7 +13,7 @@ use crate::frame::{
 };
 use crate::gpu::RenderOptions;
 use crate::job::Monitor;
-use crate::scene::Scene;
+use crate::scene::{REFERENCES, Scene};
 use crate::volume::VolumeTexture;
 
 /// The program that wrote a file.
@@ -95,12 +96,14 @@ pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
     format!("# volume texture: crc32 {:08x}", volume.checksum())
 }
 
-/// The scene that made a picture, as a scene file. A volume file stands in a picture by its contents, not by
-/// its path: equal pictures are equal files, and nobody's folders are published.
+/// The scene that made a picture, as a scene file. A volume or environment from a file stands in a picture by its
+/// contents, not by its path: equal pictures are equal files, and nobody's folders are published.
 pub(crate) fn scene_text(scene: &Scene) -> String {
+    let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
+    let map = map.map(|e| format!("# environment map: crc32 {:08x}\n", e.map.checksum()));
     let mut scene = scene.clone();
-    scene.values.clear_under("volume.file");
-    scene.to_toml()
+    REFERENCES.iter().for_each(|key| scene.values.clear_under(key));
+    map.unwrap_or_default() + &scene.to_toml()
 }
 
 fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Output)> {

@@ -81,7 +81,11 @@ pub fn memory_of(
     let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
-    let parts = canvas(image, overlap::sheets(scene)).saturating_add(volume).saturating_add(rocks);
+    let environment = scene.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
+    let parts = canvas(image, overlap::sheets(scene))
+        .saturating_add(volume)
+        .saturating_add(rocks)
+        .saturating_add(environment);
     let left = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let row = u64::from(window.width) * (PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 });
     let [_, drawn] = Grid::default().size([image.width, image.height]);

@@ -42,7 +42,7 @@ impl Animation {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
-        let folder = apply_sets(&mut values, sets, &source)?;
+        let folder = apply_sets(&mut values, sets, &source, limits)?;
         Animation::new(&source.name, values, folder, limits)
     }
 

@@ -16,12 +16,14 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
+pub use parts::resolve;
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{Source, check_names, parse_value};
+pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::curve::{CurveShape, levels_for};
+use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
 use crate::strand::StrandParams;
@@ -46,8 +48,12 @@ pub struct Scene {
     pub flow: f32,
     /// The volume's quads.
     pub quads: Vec<Quad>,
-    /// The lights, those without intensity left out.
+    /// The lights, those without intensity left out; the environment's sun is the last.
     pub lights: Vec<Light>,
+    /// Light of the surroundings: rock's irradiance, and seen instead of the background.
+    pub environment: Option<Environment>,
+    /// The lights that stand for the environment in the volume, after `lights`.
+    pub environment_lights: Vec<Light>,
     /// Light of the whole surroundings.
     pub ambient: Vec3,
     /// Opaque geometry.
@@ -260,11 +266,13 @@ pub struct Limits {
     pub allow_paths: Vec<PathBuf>,
     /// Bytes the work may use.
     pub memory: u64,
+    /// Environments that its scenes share.
+    pub environments: EnvironmentStock,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { allow_paths: Vec::new(), memory: 4 << 30 }
+        Limits { allow_paths: Vec::new(), memory: 4 << 30, environments: EnvironmentStock::default() }
     }
 }
 
@@ -273,7 +281,7 @@ impl Scene {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
-        let folder = read::apply_sets(&mut values, sets, &source)?;
+        let folder = read::apply_sets(&mut values, sets, &source, limits)?;
         Scene::from_values(&source.name, values, folder.as_deref(), limits)
     }
 
@@ -303,7 +311,7 @@ impl Scene {
         };
         let volume_file = match v.text("volume.file") {
             file if file.is_empty() => None,
-            file => Some(parts::confine(Path::new(&file), folder, &limits.allow_paths)?),
+            file => Some(parts::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
         };
         if volume_file.is_none() {
             crate::volume::check_budget(size, limits.memory)?;
@@ -334,13 +342,18 @@ impl Scene {
             early_end: v.float("trace.early_end"),
             layers: v.count("trace.layers"),
         };
+        let environment = parts::environment(v, folder, limits)?;
+        let sun = environment.as_ref().and_then(Environment::sunlight);
+        let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
         Ok(Scene {
             name: name.into(),
             water,
             volume_file,
             flow: v.float("volume.flow"),
             quads: parts::quads(v)?,
-            lights: parts::lights(v)?,
+            lights: parts::lights(v, sun, environment_lights.len())?,
+            environment_lights,
+            environment,
             ambient: v.triple("light.ambient"),
             rocks: parts::rocks(v, limits.memory)?,
             trace,
@@ -375,9 +388,19 @@ impl Scene {
         }
     }
 
-    /// The lights that shine on the volume.
+    /// The files it is made from besides its own, resolved, and the keys that name them.
+    pub fn references(&self) -> Vec<(&'static str, PathBuf)> {
+        let map = self.environment.as_ref().and_then(|e| match &e.source {
+            environment::Source::File(path) => Some(path.clone()),
+            environment::Source::Sky(_) => None,
+        });
+        let files = [self.volume_file.clone(), map];
+        REFERENCES.into_iter().zip(files).filter_map(|(key, file)| Some((key, file?))).collect()
+    }
+
+    /// The lights that shine on the volume: the scene's own, then those that stand for its environment.
     pub fn volume_lights(&self) -> Vec<Light> {
-        self.lights.clone()
+        self.lights.iter().chain(&self.environment_lights).copied().collect()
     }
 
     /// All rocks as one mesh.
@@ -389,8 +412,9 @@ impl Scene {
 
     /// What is valid but surely not meant.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
-        let mut warnings = Vec::new();
-        let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO;
+        let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
+        let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
+        let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
         if self.quads.is_empty() && self.rocks.is_empty() {
             warnings
                 .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());

@@ -470,6 +470,77 @@ pub const PARAMS: &[Param] = &[
         Uniform,
         "Radiance of the background at and below the horizon.",
     ),
+    p(
+        "environment.kind",
+        "",
+        "",
+        Choice(&["none", "sky", "file"]),
+        Upload,
+        "Light of the surroundings, seen in place of the background: none, the clear sky of [sky], or a map from a file.",
+    ),
+    p(
+        "environment.file",
+        "",
+        "",
+        Text(""),
+        Upload,
+        "Equirectangular map of linear radiance, .hdr or .exr: the middle is seen looking along −z, +y is up.",
+    ),
+    p(
+        "environment.intensity",
+        "",
+        "",
+        Float(0.0, 1e4, 1.0),
+        Uniform,
+        "Factor on the light of the environment, its sun included.",
+    )
+    .slider(0.0, 4.0),
+    p(
+        "environment.turn",
+        "",
+        "°",
+        Float(-36_000.0, 36_000.0, 0.0),
+        Uniform,
+        "Turns the environment about the y axis, from +z towards +x.",
+    )
+    .slider(-180.0, 180.0),
+    p(
+        "environment.lights",
+        "",
+        "",
+        Int(1, 1024, 24),
+        Uniform,
+        "Most directional lights that stand for the environment in the water; the time for light walks grows with them.",
+    )
+    .slider(1.0, 256.0),
+    p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload, "Height of the sun above the horizon."),
+    p(
+        "sky.azimuth",
+        "",
+        "°",
+        Float(-360.0, 360.0, 30.0),
+        Uniform,
+        "Direction of the sun, from +z towards +x; environment.turn adds to it.",
+    )
+    .slider(-180.0, 180.0),
+    p("sky.turbidity", "", "", Float(1.0, 10.0, 3.0), Upload, "Haze: 2 is very clear, 3 clear, 6 hazy."),
+    p(
+        "sky.ground",
+        "",
+        "",
+        Color([0.2, 0.2, 0.2]),
+        Upload,
+        "Albedo of the ground below the horizon, at most 1 each: it is lit by sky and sun, and lights the sky.",
+    ),
+    p(
+        "sky.sun",
+        "",
+        "",
+        Float(0.0, 1e4, 1.0),
+        Upload,
+        "Factor on the sun's own light; 0: no sun, as in the shade.",
+    )
+    .slider(0.0, 4.0),
     p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform, "Width of the picture.")
         .slider(16.0, 8192.0),
     p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform, "Height of the picture.")

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Camera, Cone, Light, MAX_LIGHTS, Quad, Rock, Scattering, Values, Vertex};
+use super::{Camera, Cone, Light, Limits, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Values, Vertex};
+use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
 use crate::strand::StrandParams;
@@ -46,7 +47,45 @@ pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
     Ok(quads)
 }
 
-pub(super) fn lights(v: &Values) -> Result<Vec<Light>> {
+pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<Environment>> {
+    let source = match v.text("environment.kind").as_str() {
+        "sky" => {
+            let ground = v.triple("sky.ground");
+            if ground.max_element() > 1.0 {
+                return Err(Error::input(
+                    format!("sky.ground = {ground} sends back more light than it gets"),
+                    "an albedo is at most 1 in each component",
+                ));
+            }
+            Source::Sky(Sky {
+                elevation: v.float("sky.elevation"),
+                turbidity: v.float("sky.turbidity"),
+                ground,
+                sun: v.float("sky.sun"),
+            })
+        }
+        "file" => match v.text("environment.file") {
+            file if file.is_empty() => {
+                return Err(Error::input(
+                    "environment.kind = \"file\" without a file",
+                    "give environment.file an equirectangular .hdr or .exr",
+                ));
+            }
+            file => Source::File(confine("environment.file", Path::new(&file), folder, &limits.allow_paths)?),
+        },
+        _ => return Ok(None),
+    };
+    let settings = Settings {
+        intensity: v.float("environment.intensity"),
+        turn: v.float("environment.turn"),
+        azimuth: v.float("sky.azimuth"),
+        lights: v.count("environment.lights"),
+    };
+    Environment::new(source, settings, &limits.environments, limits.memory).map(Some)
+}
+
+/// The scene's own lights, and the `sun` of its environment, for which `others` more will stand.
+pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     for name in v.names("lights") {
         let key = |what: &str| format!("lights.{name}.{what}");
@@ -79,9 +118,10 @@ pub(super) fn lights(v: &Values) -> Result<Vec<Light>> {
             lights.push(light);
         }
     }
-    if lights.len() > MAX_LIGHTS {
+    lights.extend(sun);
+    if lights.len() + others > MAX_LIGHTS {
         return Err(Error::input(
-            format!("the scene has {} lights", lights.len()),
+            format!("the scene has {} lights, those of its environment included", lights.len() + others),
             format!("at most {MAX_LIGHTS}"),
         ));
     }
@@ -172,13 +212,30 @@ fn unit(v: Vec3) -> Option<Vec3> {
     (d.length() > 1e-12).then(|| d.normalize().as_vec3())
 }
 
+/// Puts the whole path in place of the reference `key`, if the scene has one that it uses.
+///
+/// # Errors
+/// Where it leads out of the scene's folder, or nowhere.
+pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<()> {
+    let file = values.text(key);
+    let unused = key == "environment.file" && values.text("environment.kind") != "file";
+    if file.is_empty() || unused {
+        return Ok(());
+    }
+    let whole = confine(key, Path::new(&file), folder, allowed)?;
+    let whole = whole.into_os_string().into_string().map_err(|path| {
+        Error::input(format!("{key}: {} is not UTF-8", path.display()), "rename its folders")
+    })?;
+    values.set(key, &Raw::Text(whole), &Place("the scene".into()))
+}
+
 /// Resolves a reference inside the scene's folder (or an allowed one), following links.
-pub(super) fn confine(file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
+pub(super) fn confine(key: &str, file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
     let Some(folder) = folder else { return Ok(file.to_owned()) };
     let joined = folder.join(file);
     let real = joined.canonicalize().map_err(|e| {
         Error::input(
-            format!("volume.file = {:?}: {} {e}", file.display().to_string(), joined.display()),
+            format!("{key} = {:?}: {} {e}", file.display().to_string(), joined.display()),
             "check the path",
         )
     })?;
@@ -188,7 +245,7 @@ pub(super) fn confine(file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -
         .any(|dir| real.starts_with(dir));
     if !inside {
         return Err(Error::input(
-            format!("volume.file = {:?} leads out of the scene's folder", file.display().to_string()),
+            format!("{key} = {:?} leads out of the scene's folder", file.display().to_string()),
             format!("allow it with --allow-path {}", real.parent().unwrap_or(&real).display()),
         ));
     }

@@ -11,6 +11,11 @@ const PRESETS: &[Preset] = &[
         include_str!("../../assets/scenes/waterfall.toml"),
     ),
     (
+        "evening",
+        "the same under a clear sky, before sunset",
+        include_str!("../../assets/scenes/evening.toml"),
+    ),
+    (
         "fig5",
         "the paper's figure 5: a 40×40×40 volume on 8 quads",
         include_str!("../../assets/scenes/fig5.toml"),

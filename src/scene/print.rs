@@ -82,8 +82,8 @@ impl Scene {
             root.insert("quads".into(), numbered.into_iter().map(|(_, quad)| quad).collect());
         }
         let camera = &self.camera;
-        let lights: Vec<Json> = self
-            .lights
+        let lights = |lights: &[Light]| -> Vec<Json> {
+            lights
             .iter()
             .map(|light| match light {
                 Light::Directional { to_light, intensity } => {
@@ -97,7 +97,29 @@ impl Scene {
                     "axis": cone.axis.to_array(), "cos_edge": cone.cos_edge, "inverse_soft": cone.inverse_soft,
                 }),
             })
-            .collect();
+            .collect()
+        };
+        let environment = self.environment.as_ref().map(|environment| {
+            json!({
+                "map": {
+                    "width": environment.map.width,
+                    "height": environment.map.height,
+                    "crc32": format!("{:08x}", environment.map.checksum()),
+                },
+                // Columns of u are looked up this much further right.
+                "turn": environment.turn,
+                "intensity": environment.intensity,
+                "irradiance": environment.irradiance.0.map(|c| c.to_array()),
+                "irradiance_error": environment.irradiance_error(),
+                "lights": lights(&self.environment_lights),
+                "lights_error": environment.error(),
+                "sun": environment.sun.map(|sun| json!({
+                    "to_sun": sun.to_sun.to_array(),
+                    "radiance": sun.radiance.to_array(),
+                    "angular_radius": crate::environment::ANGULAR_RADIUS,
+                })),
+            })
+        });
         let mesh = self.mesh();
         let column = |get: fn(&super::Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
         root.insert(
@@ -119,7 +141,8 @@ impl Scene {
                         .map(|s| crate::camera::sample_offset(s, self.image.samples))
                         .collect::<Vec<_>>(),
                 },
-                "lights": lights,
+                "lights": lights(&self.lights),
+                "environment": environment,
                 "mesh": {
                     "positions": column(|v| v.position),
                     "normals": column(|v| v.normal),

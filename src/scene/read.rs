@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::param::{Kind, PARAMS, Param};
 use super::preset;
 use super::value::{Key, Place, Raw, Values};
+use super::{Limits, parts};
 use crate::error::{Error, Result};
 
 /// Scene files larger than this are refused: four million numbers are no scene, but a mistake.
@@ -261,12 +262,30 @@ fn raw(value: &DeValue) -> Raw {
     }
 }
 
-/// Applies `--set`s in order; the folder in which references of the scene resolve.
-pub fn apply_sets(values: &mut Values, sets: &[String], source: &Source) -> Result<Option<PathBuf>> {
+/// The keys whose values are paths.
+pub const REFERENCES: [&str; 2] = ["volume.file", "environment.file"];
+
+/// Whether `--set`s name files: paths on the command line are the user's own word, relative to the current folder.
+pub fn set_by_hand(sets: &[String], reference: &str) -> bool {
+    sets.iter().any(|s| s.split('=').next().is_some_and(|key| key.trim() == reference))
+}
+
+/// Applies `--set`s in order; the folder in which references of the scene resolve. None if all may be trusted: then
+/// those of the scene's own were resolved.
+pub fn apply_sets(
+    values: &mut Values,
+    sets: &[String],
+    source: &Source,
+    limits: &Limits,
+) -> Result<Option<PathBuf>> {
     sets.iter().try_for_each(|setting| apply_set(values, setting))?;
-    // A path on the command line is the user's own word: relative to the current folder.
-    let set_by_hand = sets.iter().any(|s| s.split('=').next().is_some_and(|k| k.trim() == "volume.file"));
-    Ok((!set_by_hand).then(|| source.folder.clone()))
+    if !REFERENCES.iter().any(|key| set_by_hand(sets, key)) {
+        return Ok(Some(source.folder.clone()));
+    }
+    let own = REFERENCES.iter().filter(|key| !set_by_hand(sets, key));
+    own.into_iter()
+        .try_for_each(|key| parts::resolve(values, key, Some(&source.folder), &limits.allow_paths))?;
+    Ok(None)
 }
 
 /// Applies one `--set key=value`. The value is TOML; what is not TOML is taken as a word.

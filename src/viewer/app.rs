@@ -421,8 +421,15 @@ impl Viewer {
                 let set = self.document.use_volume_file(path);
                 self.tell(set);
             }
+            Some("hdr" | "exr") => {
+                let set = self.document.use_environment_file(path);
+                self.tell(set);
+            }
             _ => {
-                let what = format!("{} is neither a scene (.toml) nor a volume (.npz)", path.display());
+                let what = format!(
+                    "{} is neither a scene (.toml) nor a volume (.npz) nor an environment (.hdr, .exr)",
+                    path.display()
+                );
                 self.say(MessageKind::Error, what);
             }
         }

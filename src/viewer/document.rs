@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::scene::{Cost, Key, Kind, Limits, Param, Place, Raw, Scene, Source, Value, Values};
+use crate::scene::{
+    Cost, Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
+    set_by_hand,
+};
 
 /// Steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -42,11 +45,11 @@ impl Document {
         let plain = Scene::load(source, &[], limits)?;
         let scene = if sets.is_empty() { plain.clone() } else { Scene::load(source, sets, limits)? };
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
-        let set_by_hand = sets.iter().any(|s| s.trim_start().starts_with("volume.file"));
+        let by_hand = REFERENCES.iter().any(|key| set_by_hand(sets, key));
         Ok(Document {
             name: found.name,
             path: (!is_preset).then(|| source.to_owned()),
-            folder: (!set_by_hand).then_some(found.folder),
+            folder: (!by_hand).then_some(found.folder),
             limits: limits.clone(),
             values: scene.values.clone(),
             saved: plain.values,
@@ -122,8 +125,27 @@ impl Document {
 
     /// Takes the volume from a file that the user gave by hand: it may lie anywhere.
     pub fn use_volume_file(&mut self, path: &Path) -> Result<()> {
+        self.use_files(&[("volume.file", Raw::Text(path.display().to_string()))])
+    }
+
+    /// Takes the environment from a file that the user gave by hand: it may lie anywhere.
+    pub fn use_environment_file(&mut self, path: &Path) -> Result<()> {
+        let file = Raw::Text(path.display().to_string());
+        self.use_files(&[("environment.file", file), ("environment.kind", Raw::Text("file".into()))])
+    }
+
+    fn use_files(&mut self, edits: &[(&str, Raw)]) -> Result<()> {
+        let mut values = self.values.clone();
+        for (key, raw) in edits {
+            values.set(key, raw, &Place("viewer".into()))?;
+        }
+        // What lay in the scene's folder stays there.
+        for key in REFERENCES.iter().filter(|key| edits.iter().all(|(edited, _)| edited != *key)) {
+            resolve(&mut values, key, self.folder.as_deref(), &self.limits.allow_paths)?;
+        }
         self.folder = None;
-        self.set("volume.file", &Raw::Text(path.display().to_string()), None)
+        self.replace(values, None);
+        Ok(())
     }
 
     /// The scene with some other values, which the document does not keep.
@@ -222,20 +244,19 @@ impl Document {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
         // A reference is relative to the scene's folder: in another folder it must lead to the same file.
         let mut scene = (*self.scene).clone();
-        if let Some(file) = &scene.volume_file
-            && self.folder.as_ref() != Some(&folder)
-        {
-            let whole = file.canonicalize().map_err(|e| Error::read(file, e))?;
+        let moved = self.folder.as_ref() != Some(&folder);
+        for (key, file) in scene.references().into_iter().filter(|_| moved) {
+            let whole = file.canonicalize().map_err(|e| Error::read(&file, e))?;
             let inside =
                 folder.canonicalize().ok().and_then(|f| whole.strip_prefix(f).ok().map(Path::to_owned));
             let Some(inside) = inside else {
                 return Err(Error::input(
                     format!("the scene uses {}, which is not in {}", whole.display(), folder.display()),
-                    "save the scene beside the volume file",
+                    format!("save the scene beside the {} file", key.trim_end_matches(".file")),
                 ));
             };
             let raw = Raw::Text(inside.display().to_string());
-            scene.values.set("volume.file", &raw, &Place("viewer".into()))?;
+            scene.values.set(key, &raw, &Place("viewer".into()))?;
         }
         crate::frame::Output::create(path)?.finish_with(scene.to_toml().as_bytes())?;
         self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -16,7 +16,11 @@ const GROUPS: [(&str, &str, &[&str]); 8] = [
     ("Volume", "The volume texture: cells, density, reflection", &["volume"]),
     ("Mapping", "How the volume lies on the quads", &["materials", "quads"]),
     ("Light", "Walk, attenuation, reflection and lights", &["trace", "light", "lights"]),
-    ("Surroundings", "Rock and sky", &["rocks", "background"]),
+    (
+        "Surroundings",
+        "Rock, background and the light of the environment",
+        &["rocks", "background", "environment", "sky"],
+    ),
     ("Camera", "Where the picture is seen from", &["camera"]),
     ("Image", "Size, samples and tone of the picture", &["image"]),
     ("Animation", "What taki batch makes of the scene in time; ▶ plays the flow alone", &["animate"]),
@@ -120,6 +124,10 @@ impl ParameterPanel {
                 }
                 open = place.into();
                 self.row(ui, document, costs, key);
+                let environment = document.scene().environment.as_ref();
+                if let Some(environment) = environment.filter(|_| *key == "environment.lights") {
+                    ui.weak(environment.words());
+                }
             }
             ui.add_space(6.0);
         });

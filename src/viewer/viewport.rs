@@ -192,7 +192,9 @@ fn show_light(painter: &egui::Painter, image: Rect, values: &Values, pose: &Pose
     painter.text(at, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
 }
 
-/// Whether a light can be turned at all.
+/// Whether a light can be turned at all; the sun of a sky turns with its angles.
 pub fn has_directional(scene: &Scene) -> bool {
-    scene.lights.iter().any(|light| matches!(light, Light::Directional { .. }))
+    let sun = scene.environment.as_ref().and_then(|e| e.sunlight());
+    let own = &scene.lights[..scene.lights.len() - usize::from(sun.is_some())];
+    own.iter().any(|light| matches!(light, Light::Directional { .. }))
 }

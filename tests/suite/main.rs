@@ -9,6 +9,7 @@ mod big;
 mod closed_forms;
 mod compare;
 mod curve;
+mod environment;
 mod farm;
 mod faults;
 mod flow;

@@ -3,13 +3,20 @@
 
 use std::mem::offset_of;
 
-use taki::gpu::layout::{Frame, Light, Quad, Strand, Tile, WORKGROUP};
+use taki::gpu::layout::{Environment, Frame, Light, Quad, Strand, Tile, WORKGROUP};
 use taki::gpu::shader_source;
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
-const SHARED: [&str; 6] =
-    ["frame.wgsl", "mapping.wgsl", "scatter.wgsl", "shading.wgsl", "strand.wgsl", "walk.wgsl"];
+const SHARED: [&str; 7] = [
+    "environment.wgsl",
+    "frame.wgsl",
+    "mapping.wgsl",
+    "scatter.wgsl",
+    "shading.wgsl",
+    "strand.wgsl",
+    "walk.wgsl",
+];
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
@@ -82,6 +89,9 @@ fn host_structs_have_the_layout_the_shaders_read() {
     );
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g pad_g);
     assert_eq!(members(&module, "Quad"), quad);
+    let environment =
+        fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
+    assert_eq!(members(&module, "Environment"), environment);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
 }

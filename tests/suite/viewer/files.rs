@@ -424,6 +424,35 @@ fn drop_on(window: &mut Window, path: &Path) {
 }
 
 #[test]
+fn an_environment_is_opened_by_dropping_its_map_on_the_window_and_saved_beside_it() {
+    let mut window = wide().open();
+    let map = window.path("even.hdr");
+    let text = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".as_slice();
+    std::fs::write(&map, [text, &[128, 128, 128, 129, 128, 128, 128, 129]].concat()).expect("written");
+    drop_on(&mut window, &map);
+    window.settle();
+    let environment = |window: &Window| window.viewer().document().scene().environment.is_some();
+    assert!(environment(&window));
+    let background = |window: &Window| window.picture().frame.radiance.iter().any(|p| p[..3] == [1.0; 3]);
+    assert!(background(&window), "a radiance of 1 is seen where nothing is");
+    let other = tempfile::tempdir().expect("a folder");
+    save_as(&mut window, &other.path().join("x.toml"));
+    assert!(window.reads("save the scene beside the environment file"));
+    window.press("Cancel");
+    let beside = window.path("beside.toml");
+    save_as(&mut window, &beside);
+    assert_eq!(window.value("environment.file"), Value::Text("even.hdr".into()));
+    window.settle();
+    assert!(environment(&window) && background(&window));
+    // A volume given by hand does not lead the map astray.
+    let npz = window.path("v.npz");
+    taki(&["volume", "build", beside.to_str().expect("UTF-8"), "-o", npz.to_str().expect("UTF-8")]);
+    drop_on(&mut window, &npz);
+    window.settle();
+    assert!(environment(&window) && window.viewer().document().fault().is_none());
+}
+
+#[test]
 fn a_scene_or_a_volume_is_opened_by_dropping_it_on_the_window() {
     let mut window = wide().open();
     let scene = window.path("dropped.toml");
