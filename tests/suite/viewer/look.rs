@@ -10,11 +10,16 @@ fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
     let context = egui::Context::default();
     let mut missing = Vec::new();
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let viewer = std::fs::read_dir(sources.join("viewer"))
-        .expect("sources")
-        .map(|e| e.expect("a file").path())
-        .filter(|path| path.is_file());
-    let mut files: Vec<PathBuf> = viewer.collect();
+    let mut files = Vec::new();
+    let mut folders = vec![sources.join("viewer")];
+    while let Some(folder) = folders.pop() {
+        let entries = std::fs::read_dir(folder).expect("sources");
+        let (inner, found): (Vec<PathBuf>, Vec<PathBuf>) =
+            entries.map(|e| e.expect("an entry").path()).partition(|path| path.is_dir());
+        folders.extend(inner);
+        files.extend(found);
+    }
+    assert!(files.len() > 20, "{files:?}");
     files.extend(["scene/param.rs", "job/engine.rs", "error.rs"].map(|file| sources.join(file)));
     let _ = context.run_ui(egui::RawInput::default(), |ui| {
         for file in &files {
