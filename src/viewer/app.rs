@@ -19,6 +19,7 @@ use super::document::Document;
 use super::drive::Drive;
 use super::gallery::Gallery;
 use super::layer_image::show_legend;
+use super::lights::Lights;
 use super::metrics;
 use super::navigate::Pose;
 use super::parameters::{Costs, ParameterPanel};
@@ -32,7 +33,7 @@ use super::{Kept, Loss, Options};
 use crate::cpu::ray::RayReport;
 use crate::error::Result;
 use crate::frame::Layer;
-use crate::scene::Scene;
+use crate::scene::{Raw, Scene};
 
 /// The inspectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,6 +64,7 @@ pub struct Viewer {
     loss: Loss,
 
     parameters: ParameterPanel,
+    lights: Lights,
     volume_panel: VolumePanel,
     curves_panel: CurvesPanel,
     gallery: Gallery,
@@ -155,6 +157,7 @@ impl Viewer {
             measured,
             loss,
             parameters: ParameterPanel::default(),
+            lights: Lights::default(),
             volume_panel: VolumePanel::default(),
             curves_panel: CurvesPanel::default(),
             gallery: Gallery::default(),
@@ -292,6 +295,7 @@ impl Viewer {
             ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         dropped.iter().for_each(|path| self.drop_file(path));
         self.flow(&ctx);
+        self.lights.follow(self.document.values());
 
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui));
         egui::Panel::top("toolbar").show(ui, |ui| self.toolbar(ui));
@@ -300,7 +304,7 @@ impl Viewer {
             let costs = Costs { volume_seconds: self.worker.state().volume_seconds };
             egui::Panel::left("parameters").default_size(340.0).size_range(280.0..=560.0).show(ui, |ui| {
                 ui.add_space(4.0);
-                self.parameters.show(ui, &mut self.document, costs);
+                self.parameters.show(ui, &mut self.document, &mut self.lights, costs);
             });
         }
         if self.settings.inspectors {
@@ -347,7 +351,7 @@ impl Viewer {
             marked: self.marked.filter(|_| self.settings.inspectors && self.inspector == Inspector::Pixel),
             tool: self.tool,
         };
-        let (rect, actions) = viewport::show(ui, &shown, self.document.values());
+        let (rect, actions) = viewport::show(ui, &shown, self.document.values(), &mut self.lights);
         if let Some(picture) = &self.picture
             && picture.layer != Layer::Rgb
         {
@@ -362,8 +366,10 @@ impl Viewer {
         if let Some(pose) = actions.pose {
             self.move_camera(pose, Some("camera"));
         }
-        if let Some((key, direction)) = actions.light {
-            let set = self.document.set(&key, &super::navigate::raw(direction), Some("light"));
+        if !actions.lights.is_empty() {
+            let edits: Vec<(&str, Raw)> =
+                actions.lights.iter().map(|(k, v)| (k.as_str(), v.clone())).collect();
+            let set = self.document.set_all(&edits, Some("light"));
             self.tell(set);
         }
         if let Some(place) = actions.inspect {

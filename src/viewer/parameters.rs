@@ -1,5 +1,6 @@
 //! The parameter panel: every entry of the parameter table as a widget.
 
+pub mod lights;
 mod widget;
 
 use std::collections::HashMap;
@@ -9,19 +10,24 @@ use egui::{Align, Color32, Layout, Response, RichText, Ui};
 
 use self::widget::{direction_angles, list, triple, widget};
 use super::document::Document;
+use super::lights::Lights;
 use crate::scene::{Cost, Kind, Param, Raw, Value};
 
 /// Groups of the panel: title, what it is about, sections of keys.
-const GROUPS: [(&str, &str, &[&str]); 8] = [
+const GROUPS: [(&str, &str, &[&str]); 9] = [
     ("Curves", "The spatial fractal curves that give every cell its flow direction", &["curves"]),
     ("Volume", "The volume texture: cells, density, reflection", &["volume"]),
     ("Mapping", "How the volume lies on the quads", &["materials", "quads"]),
-    ("Light", "Walk, attenuation, reflection and lights", &["trace", "light", "lights"]),
+    ("Light", "Walk, attenuation and reflection", &["trace", "light"]),
+    ("Lights", "", LIGHTS),
     ("Surroundings", "Rock and sky", &["rocks", "background"]),
     ("Camera", "Where the picture is seen from", &["camera"]),
     ("Image", "Size, samples and tone of the picture", &["image"]),
     ("Animation", "What taki batch makes of the scene in time; ▶ plays the flow alone", &["animate"]),
 ];
+
+/// The group that is a list of its own.
+const LIGHTS: &[&str] = &["lights"];
 
 /// Width of the names.
 const NAME_WIDTH: f32 = 104.0;
@@ -46,7 +52,7 @@ pub struct Costs {
 
 impl ParameterPanel {
     /// Shows the panel and applies what is changed in it.
-    pub fn show(&mut self, ui: &mut Ui, document: &mut Document, costs: Costs) {
+    pub fn show(&mut self, ui: &mut Ui, document: &mut Document, lights: &mut Lights, costs: Costs) {
         ui.horizontal(|ui| {
             let hint = egui::TextEdit::singleline(&mut self.search).hint_text("Search parameters");
             let field = ui.add(hint.desired_width(ui.available_width() - 44.0));
@@ -66,6 +72,10 @@ impl ParameterPanel {
             // The scroll bar lies over the contents: it is not to hide the marks.
             ui.set_max_width(ui.available_width() - 8.0);
             for (title, about, sections) in GROUPS {
+                if sections == LIGHTS {
+                    shown += self.lights(ui, document, lights, costs, &search);
+                    continue;
+                }
                 let of_group = |key: &&String| sections.contains(&key.split('.').next().unwrap_or(""));
                 let mut found: Vec<&String> =
                     keys.iter().filter(of_group).filter(|key| matches(key, &search)).collect();

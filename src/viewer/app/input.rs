@@ -14,7 +14,44 @@ use crate::viewer::settings::Theme;
 use crate::viewer::transfer::Purpose;
 use crate::viewer::viewport::Tool;
 
+/// What the Edit menu and keys do with the selected light.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum LightCommand {
+    Rename,
+    Duplicate,
+    Remove,
+}
+
+impl LightCommand {
+    /// All, with their words and keys.
+    pub(super) const ALL: [(LightCommand, &'static str, &'static str); 3] = [
+        (LightCommand::Rename, "Rename the light", "F2"),
+        (LightCommand::Duplicate, "Duplicate the light", "Ctrl+D"),
+        (LightCommand::Remove, "Remove the light", "Delete"),
+    ];
+}
+
 impl Viewer {
+    pub(super) fn add_light(&mut self, kind: &str) {
+        let added = self.lights.add(&mut self.document, kind);
+        self.tell(added);
+    }
+
+    /// Does something with the selected light, if there is one.
+    pub(super) fn with_light(&mut self, command: LightCommand) {
+        let Some(light) = self.lights.selected().map(str::to_owned) else { return };
+        match command {
+            LightCommand::Rename => {
+                // Its name is written in the list.
+                self.settings.parameters = true;
+                self.parameters.search.clear();
+                self.lights.begin_renaming(&light);
+            }
+            LightCommand::Duplicate => self.lights.duplicate(&mut self.document, &light),
+            LightCommand::Remove => self.lights.remove(&mut self.document, &light),
+        }
+    }
+
     pub(super) fn shortcuts(&mut self, ctx: &egui::Context) {
         // The question about unsaved changes comes first, and Esc is an answer to it.
         if self.leaving.is_some() {
@@ -33,6 +70,8 @@ impl Viewer {
             self.document.redo();
         } else if hit(Key::Z, CTRL) {
             self.document.undo();
+        } else if hit(Key::D, CTRL) {
+            self.with_light(LightCommand::Duplicate);
         } else if hit(Key::C, ctrl_shift) {
             self.copy_command(ctx);
         } else if hit(Key::O, CTRL) {
@@ -70,6 +109,12 @@ impl Viewer {
         }
         if plain(Key::V) {
             self.settings.inspectors = !self.settings.inspectors;
+        }
+        if plain(Key::F2) {
+            self.with_light(LightCommand::Rename);
+        }
+        if plain(Key::Delete) {
+            self.with_light(LightCommand::Remove);
         }
         if plain(Key::Home) {
             self.move_camera(self.first_pose, None);

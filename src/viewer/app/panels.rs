@@ -5,14 +5,16 @@ use std::path::Path;
 use eframe::egui;
 use egui::{RichText, Ui};
 
+use super::input::LightCommand;
 use super::{Inspector, Viewer};
 use crate::error::human_bytes;
 use crate::frame::Layer;
+use crate::viewer::parameters::lights::add_menu;
 use crate::viewer::parameters::{cost_color, name};
 use crate::viewer::ray_panel;
 use crate::viewer::settings::Theme;
 use crate::viewer::transfer::Purpose;
-use crate::viewer::viewport::{self, Tool};
+use crate::viewer::viewport::Tool;
 
 impl Viewer {
     pub(super) fn menus(&mut self, ui: &mut Ui) {
@@ -63,6 +65,18 @@ impl Viewer {
                 if ui.add_enabled(redo, egui::Button::new("Redo").shortcut_text("Ctrl+Shift+Z")).clicked() {
                     self.document.redo();
                 }
+                ui.separator();
+                ui.menu_button("Add a light", |ui| {
+                    if let Some(kind) = add_menu(ui) {
+                        self.add_light(kind);
+                    }
+                });
+                for (command, text, keys) in LightCommand::ALL {
+                    let button = egui::Button::new(text).shortcut_text(keys);
+                    if ui.add_enabled(self.lights.selected().is_some(), button).clicked() {
+                        self.with_light(command);
+                    }
+                }
             });
             ui.menu_button("View", |ui| {
                 ui.checkbox(&mut self.settings.parameters, "Parameters");
@@ -102,7 +116,7 @@ impl Viewer {
     pub(super) fn toolbar(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             for (tool, text, key, what) in Tool::ALL {
-                let able = tool != Tool::Light || viewport::has_directional(self.document.scene());
+                let able = tool != Tool::Light || !self.document.values().names("lights").is_empty();
                 let button = ui.add_enabled(able, egui::Button::selectable(self.tool == tool, text));
                 if button.on_hover_text(format!("{what} ({})", key.name())).clicked() {
                     self.tool = tool;

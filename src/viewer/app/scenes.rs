@@ -7,6 +7,7 @@ use eframe::egui;
 use super::{Leaving, Viewer};
 use crate::scene::Raw;
 use crate::viewer::document::Document;
+use crate::viewer::lights::Lights;
 use crate::viewer::navigate::Pose;
 use crate::viewer::transfer::Purpose;
 use crate::viewer::worker::{Export, MessageKind};
@@ -29,6 +30,7 @@ impl Viewer {
                 }
                 self.first_pose = Pose::of(document.values());
                 self.document = document;
+                self.lights = Lights::default();
                 self.marked = None;
                 self.ray = None;
                 self.playing = false;
@@ -93,8 +95,14 @@ impl Viewer {
     }
 
     pub(super) fn copy_command(&mut self, ctx: &egui::Context) {
-        ctx.copy_text(self.document.command_line());
-        self.say(MessageKind::Note, "the command line that renders this picture is on the clipboard");
+        match self.document.command_line() {
+            Ok(line) => {
+                ctx.copy_text(line);
+                let done = "the command line that renders this picture is on the clipboard";
+                self.say(MessageKind::Note, done);
+            }
+            Err(e) => self.say(MessageKind::Error, e.to_string()),
+        }
     }
 
     pub(super) fn open_export(&mut self) {

@@ -182,19 +182,29 @@ fn is_logarithmic(low: f64, high: f64, default: f64) -> bool {
 
 /// A linear colour: the button holds its hue, the factor its brightness past 1.
 fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
-    let factor = t.iter().copied().fold(1.0, f64::max);
-    let mut rgb = t.map(|x| (x / factor) as f32);
+    let picked = color_button(ui, key, t);
+    let factor = brightness(t);
     let mut scale = factor;
-    let button = ui.color_edit_button_rgb(&mut rgb);
-    name(&button, key);
-    // The open picker turns the colour into hue and back: what that rounds is no change.
-    let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
-    let picked = button.changed() && rgb.iter().zip(&t).any(moved);
     if factor > 1.0 {
         let drag = DragValue::new(&mut scale).range(1.0..=1e4).speed(0.02).prefix("× ").max_decimals(3);
         name(&ui.add(drag), &format!("{key} factor"));
     }
     ui.weak(format!("{:.3} {:.3} {:.3}", t[0], t[1], t[2]));
-    let new = rgb.map(|x| f64::from(x) * scale);
-    (picked || scale != factor).then(|| list(new))
+    picked.or((scale != factor).then(|| list(t.map(|x| x / factor * scale))))
+}
+
+/// A button that opens a picker of a linear colour; it keeps the brightness past 1.
+pub(super) fn color_button(ui: &mut Ui, label: &str, t: [f64; 3]) -> Option<Raw> {
+    let factor = brightness(t);
+    let mut rgb = t.map(|x| (x / factor) as f32);
+    let button = ui.color_edit_button_rgb(&mut rgb);
+    name(&button, label);
+    // The open picker turns the colour into hue and back: what that rounds is no change.
+    let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
+    let picked = button.changed() && rgb.iter().zip(&t).any(moved);
+    picked.then(|| list(rgb.map(|x| f64::from(x) * factor)))
+}
+
+fn brightness(t: [f64; 3]) -> f64 {
+    t.into_iter().fold(1.0, f64::max)
 }
