@@ -116,6 +116,12 @@ impl Values {
         };
     }
 
+    /// Whether any key lies under `prefix`.
+    pub fn has_under(&self, prefix: &str) -> bool {
+        let prefix = Key::new(prefix);
+        self.0.range(&prefix..).next().is_some_and(|(key, _)| key.0.starts_with(&prefix.0))
+    }
+
     /// Takes every key that `other` has under `from`, as a key under `to`.
     pub fn copy_under(&mut self, other: &Values, from: &str, to: &str) {
         let (from, to) = (Key::new(from), Key::new(to));

@@ -100,7 +100,7 @@ impl Document {
     /// Whether a section's names or values are others than when the scene was opened or saved.
     pub fn section_differs(&self, section: &str) -> bool {
         let of_section = |key: &String| key.split('.').next() == Some(section);
-        changed_keys(&self.saved, &self.values).iter().any(of_section)
+        self.values != self.saved && changed_keys(&self.saved, &self.values).iter().any(of_section)
     }
 
     /// Sets one value. Edits of the same `gesture` (one drag of a slider) are one step of undo.
@@ -303,7 +303,7 @@ impl Document {
 fn is_of_values(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {
-        (Some("lights"), Some(name)) => values.names("lights").iter().any(|light| light == name),
+        (Some("lights"), Some(name)) => values.has_under(&format!("lights.{name}")),
         _ => true,
     }
 }

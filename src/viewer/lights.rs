@@ -65,15 +65,14 @@ impl Lights {
 
     /// Takes note of what an undo, a slider or another scene did to the lights.
     pub fn follow(&mut self, values: &Values) {
-        let names = values.names("lights");
-        let gone = |name: &str| !names.iter().any(|other| other == name);
+        let gone = |name: &str| !values.has_under(&format!("lights.{name}"));
         if self.selected.as_deref().is_some_and(gone) {
             self.select(None);
         }
         if self.renaming.as_ref().is_some_and(|renaming| gone(&renaming.light)) {
             self.renaming = None;
         }
-        for name in names {
+        for name in values.names("lights") {
             let intensity = f64::from(values.float(&format!("lights.{name}.intensity")));
             if intensity > 0.0 {
                 self.shone.insert(name, intensity);

@@ -16,6 +16,9 @@ use crate::viewer::settings::Theme;
 use crate::viewer::transfer::Purpose;
 use crate::viewer::viewport::Tool;
 
+/// Of the renderer's progress and its stop.
+const PROGRESS_WIDTH: f32 = 172.0;
+
 impl Viewer {
     pub(super) fn menus(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
@@ -166,7 +169,12 @@ impl Viewer {
                 }
             }
             ui.separator();
-            self.progress(ui);
+            // It takes no more room while it works than at rest: the picture below would change its size, and
+            // would be rendered anew, for ever.
+            let room = egui::vec2(PROGRESS_WIDTH, ui.spacing().interact_size.y);
+            let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
+            let layout = egui::Layout::left_to_right(egui::Align::Center);
+            self.progress(&mut ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(layout)));
         });
     }
 

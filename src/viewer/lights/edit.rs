@@ -27,8 +27,7 @@ pub fn takes(kind: &str, what: &str) -> bool {
 /// A name that no light has: `wanted`, or the first free of wanted-2, wanted-3, … with a number that it
 /// ends in left out.
 pub fn free_name(values: &Values, wanted: &str) -> String {
-    let names = values.names("lights");
-    if !names.iter().any(|name| name == wanted) {
+    if !is_taken(values, wanted) {
         return wanted.into();
     }
     let is_number = |tail: &str| !tail.is_empty() && tail.bytes().all(|b| b.is_ascii_digit());
@@ -36,8 +35,12 @@ pub fn free_name(values: &Values, wanted: &str) -> String {
         Some((stem, tail)) if !stem.is_empty() && is_number(tail) => stem,
         _ => wanted,
     };
-    let numbered = (2..).map(|n| format!("{stem}-{n}")).find(|name| !names.contains(name));
+    let numbered = (2..).map(|n| format!("{stem}-{n}")).find(|name| !is_taken(values, name));
     numbered.unwrap_or_default()
+}
+
+fn is_taken(values: &Values, name: &str) -> bool {
+    values.has_under(&format!("lights.{name}"))
 }
 
 /// Adds a light where the camera sees what it does: before the target, above it and to the left, as bright
@@ -96,7 +99,7 @@ pub fn rename(values: &Values, name: &str, new: &str) -> std::result::Result<Val
     if new == name {
         return Ok(values.clone());
     }
-    if values.names("lights").iter().any(|other| other == new) {
+    if is_taken(values, new) {
         return Err(format!("another light is named {new}"));
     }
     let mut renamed = values.clone();

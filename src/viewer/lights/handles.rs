@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::projection::View;
 use super::{Lights, edit, shines, turned};
-use crate::scene::{Param, Raw, Values};
+use crate::scene::{Raw, Values};
 use crate::viewer::navigate::{Pose, angles, direction, raw};
 use crate::viewer::parameters::name as label;
 
@@ -82,11 +82,11 @@ pub fn show(
         }
     }
     let is_directional = |light: &String| values.text(&format!("lights.{light}.kind")) == "directional";
-    if let Some(light) = turned(values, lights.selected()).filter(is_directional) {
-        let wanted = tool || turning || lights.selected() == Some(light.as_str());
-        if wanted {
-            canvas.dial(&light);
-        }
+    let at_hand = turned(values, lights.selected()).filter(is_directional);
+    // Beside a spot light that is turned the tool still shows the sun's dial.
+    let dial = at_hand.or_else(|| turned(values, None).filter(|_| tool));
+    if let Some(light) = dial.filter(|light| tool || turning || lights.selected() == Some(light)) {
+        canvas.dial(&light);
     }
     canvas.done
 }
@@ -152,27 +152,27 @@ impl Canvas<'_> {
         }
     }
 
-    /// The rim of a spot light's cone, and four lines to it.
+    /// A spot light's cone: where its light ends, where it is full, and four lines to the light.
     fn cone(&self, position: DVec3, to_light: DVec3, reach: f64, light: &str, color: Color32) {
-        let angle = format!("lights.{light}.angle");
-        if Param::find(&angle).is_none() {
-            return;
-        }
-        // A wider one has no rim that is near enough to see.
-        let half = f64::from(self.values.float(&angle)).min(80.0).to_radians();
+        let number = |what: &str| f64::from(self.values.float(&format!("lights.{light}.{what}")));
         let (u, v) = to_light.any_orthonormal_pair();
-        let rim = |i: i32| {
+        // A wider one has no rim that is near enough to see.
+        let radius = |angle: f64| reach * angle.min(80.0).to_radians().tan();
+        let circle = |radius: f64, i: i32| {
             let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
-            position - to_light * reach + (u * cos + v * sin) * (reach * half.tan())
+            position - to_light * reach + (u * cos + v * sin) * radius
         };
-        let stroke = Stroke::new(1.0, color.gamma_multiply(0.8));
-        let line = |a: DVec3, b: DVec3| {
+        let line = |a: DVec3, b: DVec3, faint: f32| {
             if let (Some(a), Some(b)) = (self.view.project(a).0, self.view.project(b).0) {
+                let stroke = Stroke::new(1.0, color.gamma_multiply(faint));
                 self.painter.line_segment([at_point(a), at_point(b)], stroke);
             }
         };
-        (0..48).for_each(|i| line(rim(i), rim(i + 1)));
-        (0..48).step_by(12).for_each(|i| line(position, rim(i)));
+        let edge = radius(number("angle"));
+        let full = radius(number("angle") * (1.0 - number("softness")));
+        (0..48).for_each(|i| line(circle(edge, i), circle(edge, i + 1), 0.8));
+        (0..48).for_each(|i| line(circle(full, i), circle(full, i + 1), 0.35));
+        (0..48).step_by(12).for_each(|i| line(position, circle(edge, i), 0.8));
     }
 
     /// The dial on which a directional light is turned.

@@ -2,13 +2,17 @@
 
 use eframe::egui;
 use egui::collapsing_header::CollapsingState;
-use egui::{Align, Button, Layout, Response, Ui};
+use egui::{Align, Button, Layout, Rect, Response, Ui};
 
 use super::widget::color_button;
 use super::{Costs, ParameterPanel, matches, name};
 use crate::scene::{PARAMS, Raw};
 use crate::viewer::document::Document;
 use crate::viewer::lights::{Lights, edit};
+
+/// Of more lights than this those that are folded and scrolled away are left out: every frame would lay out
+/// thousands of buttons.
+const MANY: usize = 200;
 
 /// What is asked of one light.
 enum Ask {
@@ -67,6 +71,11 @@ impl ParameterPanel {
                 ui.weak("No light but the surroundings'.");
             }
             for (light, keys) in &found {
+                let to_unfold = lights.unfold.as_ref() == Some(light);
+                if found.len() > MANY && !to_unfold && is_out_of_sight(ui, light) {
+                    ui.add_space(ui.spacing().interact_size.y);
+                    continue;
+                }
                 self.light(ui, document, lights, costs, (light, keys, !search.is_empty(), names.len() == 1));
             }
             ui.add_space(6.0);
@@ -249,6 +258,12 @@ fn keys(document: &Document, light: &str, search: &str) -> Vec<String> {
     let parts = PARAMS.iter().filter_map(|param| param.key.strip_prefix("lights.*."));
     let keys = parts.filter(|what| edit::takes(&kind, what)).map(|what| format!("lights.{light}.{what}"));
     keys.filter(|key| matches(key, search)).collect()
+}
+
+fn is_out_of_sight(ui: &Ui, light: &str) -> bool {
+    let row = Rect::from_min_size(ui.cursor().min, ui.spacing().interact_size);
+    let open = CollapsingState::load(ui.ctx(), fold(ui, light)).is_some_and(|state| state.is_open());
+    !open && !ui.is_rect_visible(row)
 }
 
 /// What the entry of a light is known by while it is folded and unfolded.

@@ -232,3 +232,41 @@ fn a_selected_light_is_the_one_that_ctrl_and_drag_turns() {
     window.press("Light sun");
     assert_eq!(drag(&mut window), (false, true), "the first that shines");
 }
+
+#[test]
+fn a_spot_light_is_aimed_by_the_point_it_shines_at() {
+    let mut setup = Setup { size: [1000.0, 700.0], ..Setup::default() };
+    setup.scene +=
+        "[lights.spot]\nkind = \"spot\"\nposition = [1.5, 0.5, 3.0]\ndirection = [0.6, 0.4, 1.0]\n";
+    let mut window = setup.open();
+    window.press("Light spot");
+    let text = window.viewer().document().scene().to_toml();
+    let key = "lights.spot.direction";
+    let position = window.point("lights.spot.position");
+    let reach = position.distance(window.point("camera.target"));
+    let aim = position - window.point(key).normalize() * reach;
+    let from = handle(&window, "Aim of spot").center();
+    let by = egui::vec2(-50.0, 30.0);
+    window.drag(from, by, Modifiers::NONE);
+    let direction = window.point(key);
+    assert!((direction.length() - 1.0).abs() < 1e-6, "unit");
+    assert!((handle(&window, "Aim of spot").center() - from - by).length() < 0.01, "under the pointer");
+    // The new aim lies on the ray from the light against its direction, in the old aim's plane.
+    let forward = (window.point("camera.target") - window.point("camera.eye")).normalize();
+    let along = (position - aim).dot(forward) / direction.dot(forward);
+    let moved = position - direction * along - aim;
+    let right = forward.cross(DVec3::Y).normalize();
+    let up = right.cross(forward);
+    let metres =
+        2.0 * pose(&window).tan_half_fov * depth(&window, aim) / f64::from(window.image_rect().height());
+    let want = (right * f64::from(by.x) - up * f64::from(by.y)) * metres;
+    assert!((moved - want).length() < 0.01 * want.length(), "{moved} for {want}");
+    assert_eq!(window.point("lights.spot.position"), position, "the light stays");
+    window.undo();
+    assert_eq!(window.viewer().document().scene().to_toml(), text);
+    // The light itself takes its direction along.
+    let place = handle(&window, "Handle of spot").center();
+    window.drag(place, egui::vec2(20.0, 10.0), Modifiers::NONE);
+    assert!(window.point("lights.spot.position") != position);
+    assert!(window.viewer().document().scene().to_toml().contains("direction = [0.6, 0.4, 1]"));
+}

@@ -250,8 +250,28 @@ fn a_light_shows_the_parameters_of_its_kind_only() {
     assert_eq!(parts(&window, "sun"), set(&["kind", "direction", "color", "intensity"]));
     window.choose("lights.sun.kind", "point");
     assert_eq!(parts(&window, "sun"), set(&["kind", "position", "color", "intensity"]));
+    window.choose("lights.sun.kind", "spot");
+    let all = ["kind", "direction", "position", "angle", "softness", "color", "intensity"];
+    assert_eq!(parts(&window, "sun"), set(&all));
+    window.undo();
     window.undo();
     assert_eq!(parts(&window, "sun"), set(&["kind", "direction", "color", "intensity"]));
+}
+
+#[test]
+fn of_a_thousand_lights_those_in_sight_are_laid_out() {
+    let mut scene: String = SCENE.into();
+    for i in 0..1000 {
+        scene += &format!("[lights.l{i}]\nkind = \"point\"\nintensity = 0.0\n");
+    }
+    let mut window = Setup { scene, ..with_list() }.open();
+    let drawn = window.names(Role::Button).iter().filter(|name| name.starts_with("Remove l")).count();
+    assert!(drawn > 3 && drawn < 200, "{drawn} of 1000 entries are laid out");
+    assert_eq!(lights(&window).len(), 1001);
+    add(&mut window, "spot");
+    window.widget(Role::Button, "Remove spot");
+    window.press("Remove spot");
+    assert_eq!(lights(&window).len(), 1001);
 }
 
 #[test]

@@ -36,6 +36,24 @@ fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
     assert!(missing.is_empty(), "a system without fonts shows boxes for {missing:?}");
 }
 
+#[test]
+fn the_picture_has_the_same_place_while_the_renderer_works_and_at_rest() {
+    for width in (8..=20).map(|n| n as f32 * 75.0) {
+        let mut window = Setup { size: [width, 240.0], ..Setup::bare() }.open();
+        let rest = window.image_rect();
+        window.set("curves.h", Raw::Float(0.3));
+        let mut works = false;
+        for _ in 0..20 {
+            window.harness.step();
+            works |= !window.viewer().is_settled();
+            assert_eq!(window.image_rect(), rest, "{width} wide");
+        }
+        assert!(works, "it was seen at work");
+        window.settle();
+        assert_eq!(window.image_rect(), rest, "{width} wide");
+    }
+}
+
 /// Small enough that a snapshot stays under 64 KiB.
 const SIZE: [f32; 2] = [860.0, 520.0];
 const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
