@@ -270,7 +270,7 @@ impl Canvas<'_> {
             let place = place.filter(|at| self.view.contains(*at));
             let offset = place.map_or(DVec2::ZERO, |at| at - pressed);
             let depth = if depth > 0.0 { depth } else { self.view.project(self.pose.target).1 };
-            lights.grip = Some(Grip { light: light.into(), part, at: pointer + offset, offset, depth });
+            lights.grip = Some(Grip { light: light.into(), part, at: pressed + offset, offset, depth });
         }
         let grip = lights.grip.as_mut().filter(|grip| grip.light == light && grip.part == part)?;
         if self.ui.input(|i| i.modifiers.shift) {

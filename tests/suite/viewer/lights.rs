@@ -63,6 +63,7 @@ fn a_light_of_each_kind_is_added_seen_and_undone_to_the_last_byte() {
         window.settle();
         assert!(toml(&window) == added && shown(&window) == lit, "{kind}: redo");
         window.undo();
+        window.settle();
         assert!(!window.viewer().document().can_undo(), "{kind}: one step");
     }
 }
