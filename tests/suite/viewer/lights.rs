@@ -125,6 +125,8 @@ fn names_of_new_lights_and_copies_never_collide() {
             assert_eq!(some.names("lights").len(), seen.len(), "{free} is a light of its own");
         }
     }
+    let some = values(&[("lights.sun.kind", point()), ("lights.sun-2.kind", point())]);
+    assert_eq!(edit::free_name(&some, "sun-2"), "sun-3", "a copy of a copy goes on counting");
     assert!(seen.contains("sun-3") && seen.contains("point-2") && seen.contains("7-2"), "{seen:?}");
 }
 
