@@ -116,6 +116,22 @@ impl Values {
         };
     }
 
+    /// Whether any key lies under `prefix`.
+    pub fn has_under(&self, prefix: &str) -> bool {
+        let prefix = Key::new(prefix);
+        self.0.range(&prefix..).next().is_some_and(|(key, _)| key.0.starts_with(&prefix.0))
+    }
+
+    /// Takes every key that `other` has under `from`, as a key under `to`.
+    pub fn copy_under(&mut self, other: &Values, from: &str, to: &str) {
+        let (from, to) = (Key::new(from), Key::new(to));
+        for (key, value) in &other.0 {
+            if let Some(rest) = key.0.strip_prefix(from.0.as_slice()) {
+                self.0.insert(Key([&to.0, rest].concat()), value.clone());
+            }
+        }
+    }
+
     /// The names (or numbers) below `section`, in order.
     pub fn names(&self, section: &str) -> Vec<String> {
         let section = Key::new(section);

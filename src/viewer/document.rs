@@ -94,9 +94,16 @@ impl Document {
         self.saved.get(key)
     }
 
-    /// Whether `key` has another value than when the scene was opened or saved.
+    /// Whether `key` has another value than when the scene was opened or saved. What belongs to a light that
+    /// was not there then has nothing to differ from.
     pub fn differs(&self, key: &str) -> bool {
-        self.values.get(key) != self.saved.get(key)
+        is_of_values(&self.saved, key) && self.values.get(key) != self.saved.get(key)
+    }
+
+    /// Whether a section's names or values are others than when the scene was opened or saved.
+    pub fn section_differs(&self, section: &str) -> bool {
+        let of_section = |key: &String| key.split('.').next() == Some(section);
+        self.values != self.saved && changed_keys(&self.saved, &self.values).iter().any(of_section)
     }
 
     /// Sets one value. Edits of the same `gesture` (one drag of a slider) are one step of undo.
@@ -166,10 +173,29 @@ impl Document {
         self.replace(values, None);
     }
 
-    /// Removes a value, so that the table's default holds.
+    /// Puts a whole section back to what it was when the scene was opened or saved: what was added goes,
+    /// what was removed comes back.
+    pub fn reset_section(&mut self, section: &str) {
+        let mut values = self.values.clone();
+        values.clear_under(section);
+        values.copy_under(&self.saved, section, section);
+        self.replace(values, None);
+    }
+
+    /// Gives a value the table's default.
     pub fn reset_to_default(&mut self, key: &str) {
         let mut values = self.values.clone();
         values.clear_under(key);
+        if !is_of_values(&values, key) {
+            // A light without a key would be no light.
+            let default = values.get(key);
+            values.0.insert(Key::new(key), default);
+        }
+        self.replace(values, None);
+    }
+
+    /// Takes all values anew, as one step.
+    pub fn edit(&mut self, values: Values) {
         self.replace(values, None);
     }
 
@@ -269,7 +295,16 @@ impl Document {
     }
 
     /// The command that renders this picture: the file or preset, and a `--set` for each change.
-    pub fn command_line(&self) -> String {
+    ///
+    /// # Errors
+    /// If lights were added, removed or renamed: no `--set` does that.
+    pub fn command_line(&self) -> Result<String> {
+        if self.values.names("lights") != self.saved.names("lights") {
+            return Err(Error::input(
+                "a command line cannot add, remove or rename lights",
+                "save the scene, then copy the command line",
+            ));
+        }
         let scene = self.path.as_ref().map_or(self.name.clone(), |p| p.display().to_string());
         let mut words = vec!["taki".to_owned(), "render".into(), scene];
         for key in changed_keys(&self.saved, &self.values) {
@@ -281,7 +316,16 @@ impl Document {
             // Only a NUL cannot be quoted, and no path or value holds one.
             Err(_) => String::new(),
         };
-        words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+        Ok(words.iter().map(quoted).collect::<Vec<_>>().join(" "))
+    }
+}
+
+/// Whether the light that a key belongs to is there; a light with every default is not the same as none.
+fn is_of_values(values: &Values, key: &str) -> bool {
+    let mut parts = key.split('.');
+    match (parts.next(), parts.next()) {
+        (Some("lights"), Some(name)) => values.has_under(&format!("lights.{name}")),
+        _ => true,
     }
 }
 
@@ -290,8 +334,8 @@ pub fn changed_keys(a: &Values, b: &Values) -> Vec<String> {
     let keys: BTreeSet<&Key> = a.0.keys().chain(b.0.keys()).collect();
     // Set to its default or left out is the same.
     let value = |values: &Values, key: &str| {
-        let known = values.is_set(key) || Param::find(key).is_some_and(|p| p.kind != Kind::Corners);
-        known.then(|| values.get(key))
+        let has_default = Param::find(key).is_some_and(|p| p.kind != Kind::Corners);
+        (values.is_set(key) || has_default && is_of_values(values, key)).then(|| values.get(key))
     };
     keys.iter().map(ToString::to_string).filter(|key| value(a, key) != value(b, key)).collect()
 }

@@ -41,6 +41,13 @@ impl Pose {
         (self.target - self.eye).cross(self.up).normalize_or(DVec3::X)
     }
 
+    /// Unit vectors to the right of the image, up in it, and into it.
+    pub fn axes(&self) -> [DVec3; 3] {
+        let forward = (self.target - self.eye).normalize_or(-DVec3::Z);
+        let right = self.right();
+        [right, right.cross(forward).normalize_or(self.up), forward]
+    }
+
     /// Turns the eye around the target: `yaw` to the left, `pitch` upwards, radians.
     pub fn orbit(mut self, yaw: f64, pitch: f64) -> Pose {
         let away = self.eye - self.target;

@@ -3,9 +3,10 @@
 use eframe::egui;
 use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2, pos2, vec2};
 
+use super::lights::{self, Lights};
 use super::navigate::{self, Pose};
 use super::parameters::name;
-use crate::scene::{Light, Scene, Values};
+use crate::scene::{Raw, Values};
 
 /// What dragging in the picture does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -15,7 +16,7 @@ pub enum Tool {
     Orbit,
     /// Moves the camera along the image.
     Pan,
-    /// Turns the first directional light.
+    /// Turns a light; shows the handles of all.
     Light,
     /// Shows the ray under the pointer.
     Inspect,
@@ -26,7 +27,12 @@ impl Tool {
     pub const ALL: [(Tool, &'static str, egui::Key, &'static str); 4] = [
         (Tool::Orbit, "Orbit", egui::Key::O, "Drag to turn the camera; Shift or the right button pans"),
         (Tool::Pan, "Pan", egui::Key::P, "Drag to move the camera along the image"),
-        (Tool::Light, "Light", egui::Key::L, "Drag to turn the first directional light (or Ctrl and drag)"),
+        (
+            Tool::Light,
+            "Light",
+            egui::Key::L,
+            "Drag to turn the selected light, or a light's handle (or Ctrl and drag)",
+        ),
         (Tool::Inspect, "Inspect", egui::Key::I, "Click or drag to see the ray of a pixel, cell by cell"),
     ];
 }
@@ -36,8 +42,8 @@ impl Tool {
 pub struct Actions {
     /// The camera was moved to here.
     pub pose: Option<Pose>,
-    /// The light of this key was turned to here.
-    pub light: Option<(String, glam::DVec3)>,
+    /// Lights were turned or moved: keys and new values.
+    pub lights: Vec<(String, Raw)>,
     /// Where in the image (0 to 1) a ray is asked for.
     pub inspect: Option<[f32; 2]>,
     /// Where in the image the camera is to focus.
@@ -66,16 +72,8 @@ pub fn fit(outer: Rect, aspect: f32, pixels_per_point: f32) -> Rect {
     Rect::from_min_size(pos2(whole(corner.x), whole(corner.y)), size)
 }
 
-/// The key of the first directional light that shines.
-pub fn first_directional(values: &Values) -> Option<String> {
-    values.names("lights").into_iter().find(|light| {
-        let key = |what: &str| format!("lights.{light}.{what}");
-        values.text(&key("kind")) == "directional" && values.float(&key("intensity")) > 0.0
-    })
-}
-
 /// Shows the picture; what was done in it.
-pub fn show(ui: &mut Ui, shown: &Shown, values: &Values) -> (Rect, Actions) {
+pub fn show(ui: &mut Ui, shown: &Shown, values: &Values, lights: &mut Lights) -> (Rect, Actions) {
     let outer = ui.available_rect_before_wrap();
     let image = fit(outer, shown.aspect, ui.ctx().pixels_per_point());
     let response = ui.allocate_rect(outer, Sense::click_and_drag());
@@ -122,22 +120,28 @@ pub fn show(ui: &mut Ui, shown: &Shown, values: &Values) -> (Rect, Actions) {
             Tool::Orbit => actions.pose = Some(pose.orbit(-dx * turn, dy * turn)),
             Tool::Pan => actions.pose = Some(pose.pan(-dx / height, dy / height)),
             Tool::Light => {
-                actions.light = first_directional(values).map(|light| {
+                actions.lights.extend(lights::turned(values, lights.selected()).map(|light| {
                     let key = format!("lights.{light}.direction");
                     let direction = values.triple(&key).as_dvec3();
-                    (key, navigate::turn_light(direction, &pose, dx * turn, -dy * turn))
-                });
+                    let turned = navigate::turn_light(direction, &pose, dx * turn, -dy * turn);
+                    (key, navigate::raw(turned))
+                }));
             }
             Tool::Inspect => {
                 actions.inspect = response.interact_pointer_pos().and_then(place);
             }
         }
     }
-    if response.hovered() {
+    let turning = modifiers.command && response.dragged();
+    let handles = lights::show_handles(ui, image, values, lights, (shown.tool == Tool::Light, turning));
+    actions.lights.extend(handles.edits);
+    if response.hovered() || handles.hovered {
         let factor = f64::from(scroll * -0.002).exp() / f64::from(pinch);
         if (factor - 1.0).abs() > 1e-6 {
             actions.pose = Some(actions.pose.unwrap_or(pose).zoom(factor));
         }
+    }
+    if response.hovered() {
         let cursor = match shown.tool {
             Tool::Inspect => egui::CursorIcon::Crosshair,
             _ if response.dragged() => egui::CursorIcon::Grabbing,
@@ -152,9 +156,6 @@ pub fn show(ui: &mut Ui, shown: &Shown, values: &Values) -> (Rect, Actions) {
             actions.inspect = Some(at);
         }
     }
-    if shown.tool == Tool::Light || (modifiers.command && response.dragged()) {
-        show_light(&painter, image, values, &pose);
-    }
     (image, actions)
 }
 
@@ -168,33 +169,4 @@ fn mark(painter: &egui::Painter, image: Rect, at: Pos2) {
         }
         painter.circle_stroke(at, 4.0, stroke);
     }
-}
-
-/// Where the light comes from, as a small sphere seen by the camera.
-fn show_light(painter: &egui::Painter, image: Rect, values: &Values, pose: &Pose) {
-    let Some(light) = first_directional(values) else { return };
-    let direction =
-        values.triple(&format!("lights.{light}.direction")).as_dvec3().normalize_or(glam::DVec3::Y);
-    let forward = (pose.target - pose.eye).normalize_or(-glam::DVec3::Z);
-    let right = forward.cross(pose.up).normalize_or(glam::DVec3::X);
-    let up = right.cross(forward);
-    let radius = 34.0;
-    let centre = image.right_bottom() + vec2(-radius - 50.0, -radius - 30.0);
-    painter.circle(centre, radius, Color32::from_black_alpha(140), Stroke::new(1.0, Color32::from_gray(170)));
-    let tip = centre + vec2(direction.dot(right) as f32, -direction.dot(up) as f32) * radius;
-    let front = direction.dot(forward) < 0.0;
-    let color = if front { Color32::from_rgb(255, 214, 110) } else { Color32::from_rgb(130, 110, 70) };
-    painter.line_segment([centre, tip], Stroke::new(1.5, color));
-    painter.circle_filled(tip, 5.0, color);
-    let [azimuth, elevation] = navigate::angles(direction);
-    let text = format!("{light}: {azimuth:.0}°, {elevation:.0}° up");
-    let at = centre + vec2(0.0, radius + 4.0);
-    painter.text(at, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
-}
-
-/// Whether a light can be turned at all; the sun of a sky turns with its angles.
-pub fn has_directional(scene: &Scene) -> bool {
-    let sun = scene.environment.as_ref().and_then(|e| e.sunlight());
-    let own = &scene.lights[..scene.lights.len() - usize::from(sun.is_some())];
-    own.iter().any(|light| matches!(light, Light::Directional { .. }))
 }

@@ -4,8 +4,11 @@
 mod costs;
 mod files;
 mod hand;
+mod handles;
+mod lights;
 mod look;
 mod picture;
+mod projection;
 mod soak;
 mod widgets;
 

@@ -1,25 +1,23 @@
-//! The panels around the picture and the windows over it.
+//! The panels around the picture.
 
 use std::path::Path;
-use std::time::Duration;
 
 use eframe::egui;
 use egui::{RichText, Ui};
 
+use super::input::LightCommand;
 use super::{Inspector, Viewer};
 use crate::error::human_bytes;
 use crate::frame::Layer;
+use crate::viewer::parameters::lights::add_menu;
 use crate::viewer::parameters::{cost_color, name};
 use crate::viewer::ray_panel;
 use crate::viewer::settings::Theme;
-use crate::viewer::transfer::{ExportAnswer, Purpose, UnsavedAnswer, ask_unsaved};
-use crate::viewer::viewport::{self, Tool};
-use crate::viewer::worker::MessageKind;
+use crate::viewer::transfer::Purpose;
+use crate::viewer::viewport::Tool;
 
-/// Messages shown at once, the newest; older ones come forth as these are closed.
-const MAX_BANNERS: usize = 4;
-/// Notes vanish after this time, warnings and errors stay until they are closed.
-const NOTE_TIME: Duration = Duration::from_secs(8);
+/// Of the renderer's progress and its stop.
+const PROGRESS_WIDTH: f32 = 172.0;
 
 impl Viewer {
     pub(super) fn menus(&mut self, ui: &mut Ui) {
@@ -70,6 +68,18 @@ impl Viewer {
                 if ui.add_enabled(redo, egui::Button::new("Redo").shortcut_text("Ctrl+Shift+Z")).clicked() {
                     self.document.redo();
                 }
+                ui.separator();
+                ui.menu_button("Add a light", |ui| {
+                    if let Some(kind) = add_menu(ui) {
+                        self.add_light(kind);
+                    }
+                });
+                for (command, text, keys) in LightCommand::ALL {
+                    let button = egui::Button::new(text).shortcut_text(keys);
+                    if ui.add_enabled(self.lights.selected().is_some(), button).clicked() {
+                        self.with_light(command);
+                    }
+                }
             });
             ui.menu_button("View", |ui| {
                 ui.checkbox(&mut self.settings.parameters, "Parameters");
@@ -109,7 +119,7 @@ impl Viewer {
     pub(super) fn toolbar(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             for (tool, text, key, what) in Tool::ALL {
-                let able = tool != Tool::Light || viewport::has_directional(self.document.scene());
+                let able = tool != Tool::Light || !self.document.values().names("lights").is_empty();
                 let button = ui.add_enabled(able, egui::Button::selectable(self.tool == tool, text));
                 if button.on_hover_text(format!("{what} ({})", key.name())).clicked() {
                     self.tool = tool;
@@ -159,7 +169,12 @@ impl Viewer {
                 }
             }
             ui.separator();
-            self.progress(ui);
+            // It takes no more room while it works than at rest: the picture below would change its size, and
+            // would be rendered anew, for ever.
+            let room = egui::vec2(PROGRESS_WIDTH, ui.spacing().interact_size.y);
+            let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
+            let layout = egui::Layout::left_to_right(egui::Align::Center);
+            self.progress(&mut ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(layout)));
         });
     }
 
@@ -268,129 +283,6 @@ impl Viewer {
             }
         });
     }
-
-    pub(super) fn show_banners(&mut self, ctx: &egui::Context, at: egui::Rect) {
-        self.banners.retain(|(m, since)| m.kind != MessageKind::Note || since.elapsed() < NOTE_TIME);
-        let mut lines: Vec<(MessageKind, String, Option<usize>)> = Vec::new();
-        let faults = self.document.fault().map(str::to_owned).into_iter().chain(self.fault.clone());
-        lines.extend(faults.map(|fault| (MessageKind::Error, fault, None)));
-        let first = self.banners.len().saturating_sub(MAX_BANNERS);
-        let newest = self.banners.iter().enumerate().skip(first);
-        lines.extend(newest.map(|(i, (m, _))| (m.kind, m.text.clone(), Some(i))));
-        if lines.is_empty() {
-            return;
-        }
-        if self.banners.iter().any(|(m, _)| m.kind == MessageKind::Note) {
-            ctx.request_repaint_after(Duration::from_millis(500));
-        }
-        let mut closed = None;
-        let mut undo = false;
-        egui::Area::new(egui::Id::unique("banners"))
-            .fixed_pos(at.left_top() + egui::vec2(8.0, 8.0))
-            .order(egui::Order::Middle)
-            .show(ctx, |ui| {
-                ui.set_max_width((at.width() - 16.0).max(120.0));
-                for (kind, text, index) in &lines {
-                    let (sign, color) = match kind {
-                        MessageKind::Note => ("ℹ", ui.visuals().hyperlink_color),
-                        MessageKind::Warning => ("⚠", ui.visuals().warn_fg_color),
-                        MessageKind::Error => ("⛔", ui.visuals().error_fg_color),
-                    };
-                    egui::Frame::popup(ui.style()).show(ui, |ui| {
-                        ui.horizontal(|ui| {
-                            ui.colored_label(color, sign);
-                            let width = (at.width() - 110.0).clamp(80.0, 620.0);
-                            ui.scope(|ui| {
-                                ui.set_max_width(width);
-                                ui.add(egui::Label::new(text).wrap());
-                            });
-                            if let Some(i) = index {
-                                let close = ui.small_button("✖").on_hover_text("Close");
-                                closed = close.clicked().then_some(*i).or(closed);
-                            } else if self.document.can_undo() {
-                                undo |= ui.button("Undo").clicked();
-                            }
-                        });
-                    });
-                }
-            });
-        if let Some(i) = closed {
-            self.banners.remove(i);
-        }
-        if undo {
-            self.document.undo();
-        }
-    }
-
-    fn help_window(&mut self, ctx: &egui::Context) {
-        let mut open = self.help;
-        let window = egui::Window::new("Keys and mouse").open(&mut open).resizable(false).collapsible(false);
-        let middle = ctx.content_rect().center();
-        window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
-            let height = (ctx.content_rect().height() - 90.0).max(120.0);
-            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
-                    for (keys, what) in HELP {
-                        ui.monospace(*keys);
-                        ui.label(*what);
-                        ui.end_row();
-                    }
-                });
-            });
-        });
-        self.help = open;
-    }
-
-    pub(super) fn windows(&mut self, ctx: &egui::Context) {
-        if let Some(preset) = self.gallery.show(ctx) {
-            self.open(Path::new(preset));
-        }
-        if self.help {
-            self.help_window(ctx);
-        }
-        if self.export.open {
-            let exporting = self.exporting.then(|| self.busy.map_or(0.0, |b| b.share));
-            let image = &self.document.scene().image;
-            let aspect = f64::from(image.width) / f64::from(image.height);
-            match self.export.show(ctx, aspect, exporting) {
-                ExportAnswer::Start => self.start_export(),
-                ExportAnswer::Cancel => self.worker.cancel_exports(),
-                ExportAnswer::Nothing => {}
-            }
-        }
-        let recent = self.settings.recent.clone();
-        let opening = self.paths.show(ctx, |ui| {
-            let mut chosen = None;
-            for path in recent.iter().take(6) {
-                if ui.link(path.display().to_string()).clicked() {
-                    chosen = Some(path.clone());
-                }
-            }
-            chosen
-        });
-        match opening {
-            Some((Purpose::Open, path)) => self.open(&path),
-            Some((Purpose::Save, path)) => self.save_to(&path),
-            None => {}
-        }
-        // A save that was given up takes what was to follow it along.
-        if !self.paths.is_open() {
-            self.leave_after_save = None;
-        }
-        if let Some(leaving) = self.leaving.clone()
-            && let Some(answer) = ask_unsaved(ctx, &self.document.name)
-        {
-            self.leaving = None;
-            match answer {
-                UnsavedAnswer::Stay => {}
-                UnsavedAnswer::Discard => self.leave(leaving),
-                UnsavedAnswer::Save => {
-                    self.leave_after_save = Some(leaving);
-                    self.save();
-                }
-            }
-        }
-    }
 }
 
 fn item(ui: &mut Ui, text: &str, keys: &str) -> bool {
@@ -418,29 +310,3 @@ fn resident_memory() -> Option<u64> {
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024)
 }
-
-/// Keys and mouse, for the help window.
-const HELP: &[(&str, &str)] = &[
-    ("drag", "the tool in hand: orbit, pan, light or inspect"),
-    ("Shift+drag, right drag", "pan"),
-    ("Ctrl+drag", "turn the first directional light"),
-    ("wheel, pinch", "zoom"),
-    ("click", "inspect the ray of a pixel"),
-    ("double click", "focus on the point under the pointer"),
-    ("O  P  L  I", "tools: orbit, pan, light, inspect"),
-    ("1 … 7", "layers: rgb, depth, uv, quad, transmittance, cells, normal"),
-    ("Space", "play or pause the water"),
-    ("F", "frame all"),
-    ("Home", "the camera as the scene was opened"),
-    ("Esc", "stop the work in hand"),
-    ("Tab", "parameters"),
-    ("V", "inspectors"),
-    ("G", "gallery of scenes"),
-    ("T", "light or dark"),
-    ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
-    ("Ctrl+O, Ctrl+S", "open, save (Ctrl+Shift+S: save as)"),
-    ("Ctrl+E", "export PNG and EXR"),
-    ("Ctrl+Shift+C", "copy as command line"),
-    ("Ctrl +, Ctrl −, Ctrl 0", "size of the interface"),
-    ("?", "this list"),
-];

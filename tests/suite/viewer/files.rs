@@ -194,7 +194,7 @@ fn a_save_that_was_cancelled_leaves_nothing_for_the_next_one_to_do() {
 }
 
 fn assert_command_line_gives_the_scene(window: &Window) {
-    let line = window.viewer().document().command_line();
+    let line = window.viewer().document().command_line().expect("a line");
     let mut words = shlex::split(&line).expect("words");
     assert_eq!(words[..2], ["taki", "render"]);
     words[1] = "scene".into();
@@ -285,7 +285,7 @@ fn an_export_is_what_the_command_line_renders(engine: EngineChoice, name: &str) 
     assert_eq!((width, height), (75, 44));
     assert!(channels.len() > 4, "layers beside the colours");
     assert!(window.reads("wrote "));
-    let line = window.viewer().document().command_line();
+    let line = window.viewer().document().command_line().expect("a line");
     let words = shlex::split(&line).expect("words");
     for kind in ["png", "exr"] {
         let again = text(&window.path(&format!("again.{kind}")));
@@ -498,6 +498,6 @@ fn the_command_line_is_copied_to_the_clipboard() {
         _ => None,
     });
     let copied = copied.expect("something was copied");
-    assert_eq!(copied, window.viewer().document().command_line());
+    assert_eq!(copied, window.viewer().document().command_line().expect("a line"));
     assert!(copied.starts_with("taki render ") && copied.contains("trace.sigma=3.5"), "{copied}");
 }

@@ -10,11 +10,16 @@ fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
     let context = egui::Context::default();
     let mut missing = Vec::new();
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let viewer = std::fs::read_dir(sources.join("viewer"))
-        .expect("sources")
-        .map(|e| e.expect("a file").path())
-        .filter(|path| path.is_file());
-    let mut files: Vec<PathBuf> = viewer.collect();
+    let mut files = Vec::new();
+    let mut folders = vec![sources.join("viewer")];
+    while let Some(folder) = folders.pop() {
+        let entries = std::fs::read_dir(folder).expect("sources");
+        let (inner, found): (Vec<PathBuf>, Vec<PathBuf>) =
+            entries.map(|e| e.expect("an entry").path()).partition(|path| path.is_dir());
+        folders.extend(inner);
+        files.extend(found);
+    }
+    assert!(files.len() > 20, "{files:?}");
     files.extend(["scene/param.rs", "job/engine.rs", "error.rs"].map(|file| sources.join(file)));
     let _ = context.run_ui(egui::RawInput::default(), |ui| {
         for file in &files {
@@ -29,6 +34,24 @@ fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
         }
     });
     assert!(missing.is_empty(), "a system without fonts shows boxes for {missing:?}");
+}
+
+#[test]
+fn the_picture_has_the_same_place_while_the_renderer_works_and_at_rest() {
+    for width in (8..=20).map(|n| n as f32 * 75.0) {
+        let mut window = Setup { size: [width, 240.0], ..Setup::bare() }.open();
+        let rest = window.image_rect();
+        window.set("curves.h", Raw::Float(0.3));
+        let mut works = false;
+        for _ in 0..20 {
+            window.harness.step();
+            works |= !window.viewer().is_settled();
+            assert_eq!(window.image_rect(), rest, "{width} wide");
+        }
+        assert!(works, "it was seen at work");
+        window.settle();
+        assert_eq!(window.image_rect(), rest, "{width} wide");
+    }
 }
 
 /// Small enough that a snapshot stays under 64 KiB.

@@ -20,9 +20,18 @@ fn values(window: &Window) -> Values {
     window.viewer().document().values().clone()
 }
 
+/// All but those of lights that mean nothing for their kind.
 fn keys(window: &Window) -> Vec<(String, &'static Param)> {
     let keys = window.viewer().document().scene().keys();
-    keys.into_iter().map(|key| (key.clone(), Param::find(&key).expect("a parameter"))).collect()
+    let shown = |key: &String| {
+        let mut parts = key.split('.');
+        let (Some("lights"), Some(light), Some(what)) = (parts.next(), parts.next(), parts.next()) else {
+            return true;
+        };
+        let kind = window.viewer().document().values().text(&format!("lights.{light}.kind"));
+        taki::viewer::lights::edit::takes(&kind, what)
+    };
+    keys.into_iter().filter(shown).map(|key| (key.clone(), Param::find(&key).expect("a parameter"))).collect()
 }
 
 fn is_material(key: &str) -> bool {

@@ -1,0 +1,330 @@
+//! Handles over the picture: a light is dragged to its place, or turned on a dial.
+
+use eframe::egui;
+use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use glam::{DVec2, DVec3};
+
+use super::projection::View;
+use super::{Lights, edit, shines, turned};
+use crate::scene::{Raw, Values};
+use crate::viewer::navigate::{Pose, angles, direction, raw};
+use crate::viewer::parameters::name as label;
+
+/// Half the side of the square in which a handle is taken, points.
+const REACH: f32 = 11.0;
+/// The dial's radius, points, in a large picture.
+const DIAL: f32 = 46.0;
+/// A drag over the image's height multiplies the depth by e to this.
+const PUSH: f64 = 3.0;
+/// No light is moved nearer to the eye or farther from it, metres along the view axis.
+const DEPTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
+/// What was done with handles.
+#[derive(Debug, Default)]
+pub struct Drawn {
+    /// New values of lights.
+    pub edits: Vec<(String, Raw)>,
+    /// The pointer is over a handle.
+    pub hovered: bool,
+}
+
+/// What a drag holds.
+pub(super) struct Grip {
+    light: String,
+    part: Part,
+    /// Where the handle is, and how far from the pointer it was taken, points of the window.
+    at: DVec2,
+    offset: DVec2,
+    /// Of the handle along the view axis, metres.
+    depth: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    /// The light itself.
+    Place,
+    /// The point that a spot light is aimed at.
+    Aim,
+}
+
+/// What is drawn and where.
+struct Canvas<'a> {
+    ui: &'a Ui,
+    painter: egui::Painter,
+    image: Rect,
+    view: View,
+    values: &'a Values,
+    pose: Pose,
+    done: Drawn,
+}
+
+/// Shows the handles of the selected light; with `tool` in hand those of all lights, and with `turning`
+/// the dial of the light that is turned.
+pub fn show(
+    ui: &Ui,
+    image: Rect,
+    values: &Values,
+    lights: &mut Lights,
+    (tool, turning): (bool, bool),
+) -> Drawn {
+    let pose = Pose::of(values);
+    let view = View::new(&pose, point(image.min), point(pos2(image.width(), image.height())));
+    let painter = ui.painter_at(image);
+    let mut canvas = Canvas { ui, painter, image, view, values, pose, done: Drawn::default() };
+    for light in values.names("lights") {
+        let selected = lights.selected() == Some(light.as_str());
+        let kind = values.text(&format!("lights.{light}.kind"));
+        if (selected || tool) && edit::takes(&kind, "position") {
+            canvas.place(lights, &light, selected);
+            if selected && kind == "spot" {
+                canvas.aim(lights, &light);
+            }
+        }
+    }
+    let is_directional = |light: &String| values.text(&format!("lights.{light}.kind")) == "directional";
+    let at_hand = turned(values, lights.selected()).filter(is_directional);
+    // Beside a spot light that is turned the tool still shows the sun's dial.
+    let dial = at_hand.or_else(|| turned(values, None).filter(|_| tool));
+    if let Some(light) = dial.filter(|light| tool || turning || lights.selected() == Some(light)) {
+        canvas.dial(&light);
+    }
+    canvas.done
+}
+
+impl Canvas<'_> {
+    /// The light itself, dragged parallel to the image, or with Shift along the depth.
+    fn place(&mut self, lights: &mut Lights, light: &str, selected: bool) {
+        let key = format!("lights.{light}.position");
+        let position = self.values.triple(&key).as_dvec3();
+        let (seen, at) = self.seen(position);
+        let response = self.handle(at, &format!("Handle of {light}"));
+        if response.clicked() || response.drag_started() {
+            lights.select(Some(light));
+        }
+        if let Some(moved) = self.drag(lights, &response, (light, Part::Place), position) {
+            self.done.edits.push((key, raw(moved)));
+        }
+        let color = color_of(self.values, light);
+        let alpha = if selected || response.hovered() { 1.0 } else { 0.7 };
+        bulb(&self.painter, at, color.map(|c| c.gamma_multiply(alpha)), selected);
+        if !seen {
+            // It lies farther that way.
+            let out = (at - self.image.center()).normalized();
+            let side = out.rot90() * 4.0;
+            let tip = vec![at + out * 13.0, at + out * 9.0 + side, at + out * 9.0 - side];
+            self.painter.add(egui::Shape::convex_polygon(tip, Color32::WHITE, Stroke::NONE));
+        }
+        let held = lights.grip.as_ref().is_some_and(|grip| grip.light == light && grip.part == Part::Place);
+        if held || response.hovered() {
+            let deep = self.view.project(position).1;
+            let [x, y, z] = position.to_array();
+            self.words(at, &format!("{light}: {x:.2}, {y:.2}, {z:.2} m, {deep:.2} m deep"));
+        } else if selected || self.ui.input(|i| i.modifiers.is_none()) {
+            self.words(at, light);
+        }
+    }
+
+    /// The point that a spot light is aimed at, and its cone.
+    fn aim(&mut self, lights: &mut Lights, light: &str) {
+        let key = |what: &str| format!("lights.{light}.{what}");
+        let position = self.values.triple(&key("position")).as_dvec3();
+        let to_light = self.values.triple(&key("direction")).as_dvec3().normalize_or(DVec3::Y);
+        let far = position.distance(self.pose.target).max(1e-3);
+        let reach = *lights.reach.get_or_insert(far);
+        let aim = position - to_light * reach;
+        let (_, at) = self.seen(aim);
+        let color = color_of(self.values, light).unwrap_or(Color32::GRAY);
+        self.cone(position, to_light, reach, light, color);
+        let response = self.handle(at, &format!("Aim of {light}"));
+        if let Some(moved) = self.drag(lights, &response, (light, Part::Aim), aim) {
+            let away = position - moved;
+            // A spot light aimed at itself keeps its direction.
+            if away.length() > 1e-6 {
+                lights.reach = Some(away.length());
+                self.done.edits.push((key("direction"), raw(away.normalize())));
+            }
+        }
+        for (width, color) in [(3.5, Color32::from_black_alpha(170)), (1.5, color)] {
+            let stroke = Stroke::new(width, color);
+            self.painter.circle_stroke(at, 6.0, stroke);
+            self.painter.line_segment([at - vec2(9.0, 0.0), at + vec2(9.0, 0.0)], stroke);
+            self.painter.line_segment([at - vec2(0.0, 9.0), at + vec2(0.0, 9.0)], stroke);
+        }
+    }
+
+    /// A spot light's cone: where its light ends, where it is full, and four lines to the light.
+    fn cone(&self, position: DVec3, to_light: DVec3, reach: f64, light: &str, color: Color32) {
+        let number = |what: &str| f64::from(self.values.float(&format!("lights.{light}.{what}")));
+        let (u, v) = to_light.any_orthonormal_pair();
+        // A wider one has no rim that is near enough to see.
+        let radius = |angle: f64| reach * angle.min(80.0).to_radians().tan();
+        let circle = |radius: f64, i: i32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
+            position - to_light * reach + (u * cos + v * sin) * radius
+        };
+        let line = |a: DVec3, b: DVec3, faint: f32| {
+            if let (Some(a), Some(b)) = (self.view.project(a).0, self.view.project(b).0) {
+                let stroke = Stroke::new(1.0, color.gamma_multiply(faint));
+                self.painter.line_segment([at_point(a), at_point(b)], stroke);
+            }
+        };
+        let edge = radius(number("angle"));
+        let full = radius(number("angle") * (1.0 - number("softness")));
+        (0..48).for_each(|i| line(circle(edge, i), circle(edge, i + 1), 0.8));
+        (0..48).for_each(|i| line(circle(full, i), circle(full, i + 1), 0.35));
+        (0..48).step_by(12).for_each(|i| line(position, circle(edge, i), 0.8));
+    }
+
+    /// The dial on which a directional light is turned.
+    fn dial(&mut self, light: &str) {
+        let key = format!("lights.{light}.direction");
+        let radius = DIAL.min(self.image.height() * 0.2).min(self.image.width() * 0.2);
+        let centre = self.image.right_bottom() - vec2(radius + 12.0, radius + 26.0);
+        let on_dial = |place: DVec2| centre + vec2(place.x as f32, -place.y as f32) * radius;
+        let square = Rect::from_center_size(centre, vec2(radius, radius) * 2.0);
+        let id = self.ui.scope_id().with(("light dial", light));
+        let response = self.ui.interact(square, id, Sense::click_and_drag());
+        label(&response, &format!("Dial of {light}"));
+        self.done.hovered |= response.hovered();
+        let mut to_light = self.values.triple(&key).as_dvec3().normalize_or(DVec3::Y);
+        if (response.dragged_by(egui::PointerButton::Primary) || response.clicked())
+            && let Some(pointer) = response.interact_pointer_pos()
+        {
+            let d = (pointer - centre) / radius;
+            to_light = self.view.dial_direction(DVec2::new(f64::from(d.x), f64::from(-d.y)));
+            self.done.edits.push((key, raw(to_light)));
+        }
+        response.on_hover_cursor(egui::CursorIcon::Crosshair);
+
+        let painter = &self.painter;
+        let ground = square.expand(6.0).union(square.translate(vec2(0.0, 20.0)));
+        painter.rect_filled(ground, 8.0, Color32::from_black_alpha(120));
+        painter.circle(
+            centre,
+            radius,
+            Color32::from_black_alpha(120),
+            Stroke::new(1.0, Color32::from_gray(170)),
+        );
+        let front = Color32::from_white_alpha(22);
+        painter.circle(centre, radius * 0.5, front, Stroke::new(1.0, Color32::from_gray(110)));
+        let horizon = (0..=90).map(|i| on_dial(self.view.dial_place(direction([f64::from(i) * 4.0, 0.0]))));
+        let horizon: Vec<Pos2> = horizon.collect();
+        for pair in horizon.windows(2).filter(|pair| pair[0].distance(pair[1]) < radius * 0.5) {
+            painter.line_segment([pair[0], pair[1]], Stroke::new(1.0, Color32::from_rgb(120, 150, 180)));
+        }
+        for other in self.values.names("lights") {
+            let key = |what: &str| format!("lights.{other}.{what}");
+            if other != light && self.values.text(&key("kind")) == "directional" {
+                let d = self.values.triple(&key("direction")).as_dvec3().normalize_or(DVec3::Y);
+                painter.circle_filled(on_dial(self.view.dial_place(d)), 2.5, Color32::from_gray(160));
+            }
+        }
+        let tip = on_dial(self.view.dial_place(to_light));
+        let color = color_of(self.values, light);
+        for (width, color) in [(3.5, Color32::from_black_alpha(170)), (1.5, color.unwrap_or(Color32::GRAY))] {
+            painter.line_segment([centre, tip], Stroke::new(width, color));
+        }
+        bulb(painter, tip, color, true);
+        let [azimuth, elevation] = angles(to_light);
+        let side = if elevation < 0.0 { "down" } else { "up" };
+        let text = format!("{light}: {azimuth:.0}°, {:.0}° {side}", elevation.abs());
+        let below = centre + vec2(0.0, radius + 4.0);
+        painter.text(below, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
+    }
+
+    /// Whether a point of the world is seen in the picture, and where its handle is drawn: what is not seen
+    /// has it at the border.
+    fn seen(&self, point: DVec3) -> (bool, Pos2) {
+        let place = self.view.project(point).0;
+        let at = place.unwrap_or_else(|| self.view.border_towards(point));
+        (place.is_some_and(|at| self.view.contains(at)), at_point(self.view.nearest(at, 14.0)))
+    }
+
+    fn handle(&mut self, at: Pos2, words: &str) -> Response {
+        let rect = Rect::from_center_size(at, vec2(REACH, REACH) * 2.0);
+        let response = self.ui.interact(rect, self.ui.scope_id().with(words), Sense::click_and_drag());
+        label(&response, words);
+        self.done.hovered |= response.hovered();
+        response.on_hover_and_drag_cursor(egui::CursorIcon::Move)
+    }
+
+    /// Goes on with a drag of a handle that stands for a point; where the point is moved to.
+    fn drag(
+        &self,
+        lights: &mut Lights,
+        response: &Response,
+        (light, part): (&str, Part),
+        now: DVec3,
+    ) -> Option<DVec3> {
+        if response.drag_stopped() {
+            lights.grip = None;
+        }
+        if !response.dragged_by(egui::PointerButton::Primary) {
+            return None;
+        }
+        let pointer = point(response.interact_pointer_pos()?);
+        if response.drag_started() {
+            let (place, depth) = self.view.project(now);
+            let pressed = self.ui.input(|i| i.pointer.press_origin()).map_or(pointer, point);
+            // A handle at the border comes to the pointer, and from behind the eye into the scene.
+            let place = place.filter(|at| self.view.contains(*at));
+            let offset = place.map_or(DVec2::ZERO, |at| at - pressed);
+            let depth = if depth > 0.0 { depth } else { self.view.project(self.pose.target).1 };
+            lights.grip = Some(Grip { light: light.into(), part, at: pressed + offset, offset, depth });
+        }
+        let grip = lights.grip.as_mut().filter(|grip| grip.light == light && grip.part == part)?;
+        if self.ui.input(|i| i.modifiers.shift) {
+            let up = f64::from(-response.drag_delta().y) / f64::from(self.image.height().max(1.0));
+            grip.depth = (grip.depth * (up * PUSH).exp()).clamp(*DEPTHS.start(), *DEPTHS.end());
+            grip.offset = grip.at - pointer;
+        } else {
+            grip.at = pointer + grip.offset;
+        }
+        Some(self.view.unproject(grip.at, grip.depth))
+    }
+
+    /// Words beside a handle, inside the picture.
+    fn words(&self, at: Pos2, text: &str) {
+        let font = FontId::proportional(12.0);
+        let galley = self.painter.layout_no_wrap(text.to_owned(), font, Color32::WHITE);
+        let size = galley.size();
+        let right = at + vec2(14.0, -size.y * 0.5);
+        let most = self.image.right_bottom() - size - vec2(4.0, 4.0);
+        let corner = right.min(most).max(self.image.left_top() + vec2(4.0, 4.0));
+        let ground = Rect::from_min_size(corner, size).expand2(vec2(4.0, 1.0));
+        self.painter.rect_filled(ground, 3.0, Color32::from_black_alpha(130));
+        self.painter.galley(corner, galley, Color32::WHITE);
+    }
+}
+
+/// A light's colour at full brightness; none if it does not shine.
+fn color_of(values: &Values, light: &str) -> Option<Color32> {
+    let rgb = values.triple(&format!("lights.{light}.color"));
+    let full = rgb.max_element();
+    shines(values, light).then(|| {
+        let [r, g, b] = (rgb / full).to_array();
+        egui::Rgba::from_rgb(r, g, b).into()
+    })
+}
+
+/// A small lamp that is seen on bright water and on dark rock.
+fn bulb(painter: &egui::Painter, at: Pos2, color: Option<Color32>, selected: bool) {
+    let dark = Color32::from_black_alpha(170);
+    if selected {
+        for (width, color) in [(3.5, dark), (1.5, Color32::WHITE)] {
+            painter.circle_stroke(at, 8.0, Stroke::new(width, color));
+        }
+    }
+    match color {
+        Some(color) => painter.circle(at, 5.0, color, Stroke::new(1.5, dark)),
+        None => painter.circle(at, 5.0, Color32::from_black_alpha(90), Stroke::new(1.5, Color32::GRAY)),
+    };
+}
+
+fn point(at: Pos2) -> DVec2 {
+    DVec2::new(f64::from(at.x), f64::from(at.y))
+}
+
+fn at_point(at: DVec2) -> Pos2 {
+    pos2(at.x as f32, at.y as f32)
+}

@@ -1,0 +1,210 @@
+//! The widget of one value.
+
+use eframe::egui;
+use egui::{Align, ComboBox, DragValue, Layout, Slider, SliderClamping, Ui};
+use rand::RngExt;
+
+use super::{MARKS_WIDTH, NAME_WIDTH, VALUE_WIDTH, name};
+use crate::scene::{Kind, Param, Raw, Value};
+use crate::viewer::document::Document;
+use crate::viewer::navigate;
+
+pub(super) fn list(p: [f64; 3]) -> Raw {
+    Raw::List(p.into_iter().map(Raw::Float).collect())
+}
+
+/// Three numbers in one row; whether one changed.
+pub(super) fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bool {
+    let mut changed = false;
+    let width = ((ui.available_width() - MARKS_WIDTH) / 3.0 - ui.spacing().item_spacing.x).max(36.0);
+    for (x, axis) in t.iter_mut().zip(["x", "y", "z"]) {
+        let drag = DragValue::new(x).speed(speed).max_decimals(3).update_while_editing(false).clip_text(true);
+        let response = ui.add_sized([width, ui.spacing().interact_size.y], drag);
+        name(&response, &format!("{key} {axis}"));
+        changed |= response.changed();
+    }
+    changed
+}
+
+pub(super) fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
+    let mut angles = navigate::angles(t.into());
+    let mut changed = false;
+    for (angle, (word, range)) in
+        angles.iter_mut().zip([("azimuth", -180.0..=180.0), ("elevation", -89.0..=89.0)])
+    {
+        ui.horizontal(|ui| {
+            ui.add_space(10.0);
+            ui.allocate_ui_with_layout(
+                egui::vec2(NAME_WIDTH - 10.0, ui.spacing().interact_size.y),
+                Layout::left_to_right(Align::Center),
+                |ui| {
+                    ui.set_min_width(ui.available_width());
+                    ui.weak(word);
+                },
+            );
+            ui.spacing_mut().slider_width = slider_width(ui);
+            let before = *angle;
+            let slider = Slider::new(angle, range).suffix("°").max_decimals(1).update_while_editing(false);
+            let response = ui.add(slider);
+            name(&response, &format!("{key} {word}"));
+            // A slider rounds what it is given: that alone is no change.
+            changed |= response.changed() && (*angle - before).abs() > 0.051;
+        });
+    }
+    changed.then(|| navigate::raw(navigate::direction(angles)))
+}
+
+fn slider_width(ui: &Ui) -> f32 {
+    (ui.available_width() - VALUE_WIDTH - MARKS_WIDTH).max(40.0)
+}
+
+/// The widget of one value; what it was changed to.
+pub(super) fn widget(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    param: &Param,
+    value: &Value,
+) -> Option<Raw> {
+    let suffix = match param.unit {
+        "" => String::new(),
+        "°" => "°".into(),
+        unit if unit.len() <= 4 => format!(" {unit}"),
+        // Long units stand in the tooltip.
+        _ => String::new(),
+    };
+    ui.spacing_mut().slider_width = slider_width(ui);
+    match (param.kind, value) {
+        (Kind::Float(min, max, default), Value::Float(x)) => {
+            let mut new = *x;
+            let (low, high) = param.slider.unwrap_or((min, max));
+            let slider = Slider::new(&mut new, low..=high)
+                .logarithmic(is_logarithmic(low, high, default))
+                .smallest_positive((high * 1e-4).min(default.abs() * 0.1).max(1e-6))
+                .clamping(SliderClamping::Never)
+                .max_decimals(4)
+                .update_while_editing(false)
+                .suffix(suffix);
+            let response = ui.add(slider);
+            name(&response, key);
+            // Typed numbers may lie beyond the slider, but not beyond what is allowed.
+            (response.changed() && new != *x).then(|| Raw::Float(new.clamp(min, max)))
+        }
+        (Kind::Int(min, max, default), Value::Int(x)) => {
+            let mut new = *x;
+            let response = match param.slider {
+                Some((low, high)) => ui.add(
+                    Slider::new(&mut new, low as i64..=high as i64)
+                        .logarithmic(is_logarithmic(low, high, default as f64))
+                        .clamping(SliderClamping::Never)
+                        .update_while_editing(false)
+                        .suffix(if param.unit == "cells" { "" } else { &suffix }),
+                ),
+                None if max <= 64 => ui.add(Slider::new(&mut new, min..=max).update_while_editing(false)),
+                None => {
+                    let drag = DragValue::new(&mut new).range(min..=max).update_while_editing(false);
+                    ui.add_sized([VALUE_WIDTH, ui.spacing().interact_size.y], drag)
+                }
+            };
+            name(&response, key);
+            if key.ends_with(".seed") {
+                let dice = ui.button("🎲").on_hover_text("Another random seed");
+                name(&dice, &format!("Dice {key}"));
+                if dice.clicked() {
+                    new = i64::from(rand::rng().random::<u32>() >> 4);
+                }
+            }
+            (new != *x).then(|| Raw::Int(new.clamp(min, max)))
+        }
+        (Kind::Choice(words), Value::Text(word)) => {
+            let mut new = word.clone();
+            let combo = ComboBox::from_id_salt(key).selected_text(word).show_ui(ui, |ui| {
+                for option in words {
+                    ui.selectable_value(&mut new, (*option).to_owned(), *option);
+                }
+            });
+            name(&combo.response, key);
+            (new != *word).then_some(Raw::Text(new))
+        }
+        (Kind::Color(_), Value::Triple(t)) => color(ui, key, *t),
+        (Kind::Point(_), Value::Triple(t)) => {
+            let mut new = *t;
+            let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
+            triple(ui, key, &mut new, (length * 0.005).max(0.005)).then(|| list(new))
+        }
+        (Kind::Text(_), Value::Text(text)) if key.ends_with(".material") => {
+            let mut new = text.clone();
+            let combo = ComboBox::from_id_salt(key).selected_text(text).show_ui(ui, |ui| {
+                let mut names = document.values().names("materials");
+                if !names.iter().any(|n| n == "water") {
+                    names.push("water".into());
+                }
+                for option in names {
+                    ui.selectable_value(&mut new, option.clone(), option);
+                }
+            });
+            name(&combo.response, key);
+            (new != *text).then_some(Raw::Text(new))
+        }
+        (Kind::Text(_), Value::Text(text)) => {
+            // Half a path is no path: the field keeps what is typed until it is left.
+            let id = ui.make_persistent_id(("text", key));
+            let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| text.clone());
+            let width = ui.available_width() - MARKS_WIDTH;
+            let field = egui::TextEdit::singleline(&mut typed)
+                .hint_text(if key == "volume.file" { "built" } else { "" })
+                .desired_width(width);
+            let response = ui.add(field);
+            name(&response, key);
+            if response.has_focus() {
+                ui.data_mut(|d| d.insert_temp(id, typed.clone()));
+                return None;
+            }
+            let entered = ui.data_mut(|d| d.remove_temp::<String>(id));
+            entered.filter(|new| new != text).map(Raw::Text)
+        }
+        (Kind::Frames | Kind::Series, list) => {
+            // Keyframes are written in the scene file.
+            let label = egui::Label::new(egui::RichText::new(list.to_toml()).weak()).truncate();
+            name(&ui.add(label), key);
+            None
+        }
+        _ => None,
+    }
+}
+
+/// Whether a slider over this range is easier with equal ratios than with equal steps.
+fn is_logarithmic(low: f64, high: f64, default: f64) -> bool {
+    let wide = high / low.max(1.0) >= 64.0;
+    let small = default > 0.0 && default < 0.02 * high;
+    low >= 0.0 && (wide || small)
+}
+
+/// A linear colour: the button holds its hue, the factor its brightness past 1.
+fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
+    let picked = color_button(ui, key, t);
+    let factor = brightness(t);
+    let mut scale = factor;
+    if factor > 1.0 {
+        let drag = DragValue::new(&mut scale).range(1.0..=1e4).speed(0.02).prefix("× ").max_decimals(3);
+        name(&ui.add(drag), &format!("{key} factor"));
+    }
+    ui.weak(format!("{:.3} {:.3} {:.3}", t[0], t[1], t[2]));
+    picked.or((scale != factor).then(|| list(t.map(|x| x / factor * scale))))
+}
+
+/// A button that opens a picker of a linear colour; it keeps the brightness past 1.
+pub(super) fn color_button(ui: &mut Ui, label: &str, t: [f64; 3]) -> Option<Raw> {
+    let factor = brightness(t);
+    let mut rgb = t.map(|x| (x / factor) as f32);
+    let button = ui.color_edit_button_rgb(&mut rgb);
+    name(&button, label);
+    // The open picker turns the colour into hue and back: what that rounds is no change.
+    let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
+    let picked = button.changed() && rgb.iter().zip(&t).any(moved);
+    picked.then(|| list(rgb.map(|x| f64::from(x) * factor)))
+}
+
+fn brightness(t: [f64; 3]) -> f64 {
+    t.into_iter().fold(1.0, f64::max)
+}
