@@ -186,6 +186,7 @@ fn bad_values_of_light_in_the_volume_have_their_line() {
         ("light.visibility=kept", "march, cached, none"),
         ("light.cache=0", "1 to 65536"),
         ("light.cache=1.5", "1 to 65536"),
+        ("trace.layers=17", "1 to 16"),
         ("light.reflection=water", "kajiya-kay, strand"),
         ("light.scattering=twice", "single, multiple"),
         ("light.scattering=multiple", "use light.visibility=cached or march"),
