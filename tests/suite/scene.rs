@@ -248,7 +248,7 @@ fn misspelt_keys_and_presets_suggest_the_right_one() {
     for (wrong, right) in [("fig55", "did you mean fig5?"), ("waterfal", "did you mean waterfall?")] {
         run(&mut taki(["scene", wrong])).refused(65, &[wrong, right]);
     }
-    run(&mut taki(["scene", "xyz"])).refused(65, &["xyz", "presets: waterfall, fig5"]);
+    run(&mut taki(["scene", "xyz"])).refused(65, &["xyz", "presets: waterfall, evening"]);
     run(&mut taki(["scene", "fig5", "--set", "curves.h"])).refused(2, &["--set KEY=VALUE"]);
 }
 
