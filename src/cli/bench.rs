@@ -98,15 +98,47 @@ struct Row {
 /// square of the depth, and 256 layers take minutes a frame.
 const MARCH_LAYERS: u32 = 64;
 
-/// The integrate passes that are measured: their names, and what of the scene differs from direct light.
-const STEPS: &[(&str, &[&str])] = &[
+/// A pass, and what is set for it.
+type Step = (&'static str, &'static [&'static str]);
+
+/// The integrate passes that are measured on `front`.
+const PASSES: &[Step] = &[
     ("integrate", &[]),
     ("integrate march", &["light.visibility=march"]),
     ("integrate cached", &["light.visibility=cached"]),
-    ("cached, multiple", &["light.visibility=cached", "light.scattering=multiple"]),
+];
+
+/// The steps of light in water, on `fig5`: each is the one before and more. The README shows their pictures.
+const STEPS: &[Step] = &[
+    ("no attenuation", &["light.visibility=none"]),
+    ("march", &["light.visibility=march"]),
+    ("cached", &["light.visibility=cached"]),
+    ("multiple", &["light.visibility=cached", "light.scattering=multiple"]),
     (
-        "cached, multiple, strand",
-        &["light.visibility=cached", "light.scattering=multiple", "light.reflection=strand"],
+        "strand",
+        &[
+            "light.visibility=cached",
+            "light.scattering=multiple",
+            "light.reflection=strand",
+            "strand.aeration=0",
+            "trace.tau=4",
+        ],
+    ),
+    (
+        "aerated",
+        &["light.visibility=cached", "light.scattering=multiple", "light.reflection=strand", "trace.tau=4"],
+    ),
+    (
+        "sky",
+        &[
+            "light.visibility=cached",
+            "light.scattering=multiple",
+            "light.reflection=strand",
+            "trace.tau=4",
+            "environment.kind=sky",
+            "light.ambient=[0,0,0]",
+            "lights.sun.intensity=0",
+        ],
     ),
 ];
 
@@ -135,16 +167,17 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             let volume = load("front", &sets)?.volume(direct_limits().memory, terminal)?;
             let shallow = volume.size[2] <= MARCH_LAYERS;
             let mut scenes = Vec::new();
-            for (pass, more) in STEPS {
+            for (pass, more) in PASSES {
                 let sets = sets.iter().cloned().chain(more.iter().map(|&set| set.into())).collect::<Vec<_>>();
                 if shallow || more.is_empty() {
                     scenes.push((*pass, load("front", &sets)?));
                 }
             }
-            passes(args, terminal, &mut gpu, &scenes, &volume, &mut rows)?;
+            passes(args, terminal, &mut gpu, "front", &scenes, &volume, &mut rows)?;
         }
     }
     if args.volume.is_none() {
+        steps(args, terminal, &mut gpu, &mut rows)?;
         builds(args, terminal, &mut rows)?;
         processes(args, terminal, &mut rows)?;
     }
@@ -182,11 +215,28 @@ fn summary(mut times: Vec<f64>) -> [f64; 2] {
     [times[times.len() / 2], times[0]]
 }
 
-/// Rows of one scene and size: all passes in turn, `runs` times.
+/// Rows of light in water, at the figure's own size with one sample.
+fn steps(
+    args: &BenchArgs,
+    terminal: &Terminal,
+    gpu: &mut Option<GpuBench>,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let mut scenes = Vec::new();
+    for (pass, sets) in STEPS {
+        let sets: Vec<String> = sets.iter().chain(&["image.samples=1"]).map(|&set| set.into()).collect();
+        scenes.push((*pass, load("fig5", &sets)?));
+    }
+    let volume = scenes[0].1.volume(direct_limits().memory, terminal)?;
+    passes(args, terminal, gpu, "fig5", &scenes, &volume, rows)
+}
+
+/// Rows of scenes that differ in their light: all passes in turn, `runs` times.
 fn passes(
     args: &BenchArgs,
     terminal: &Terminal,
     gpu: &mut Option<GpuBench>,
+    name: &'static str,
     scenes: &[(&'static str, Scene)],
     volume: &VolumeTexture,
     rows: &mut Vec<Row>,
@@ -227,7 +277,7 @@ fn passes(
                 cpu::render_samples(scene, volume, &mesh, whole, samples, false, &mut kept, &Unwatched)?;
             if counted {
                 add("cpu", *pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
-                if *pass == "integrate" {
+                if *pass == scenes[0].0 {
                     add("cpu", "gbuffer", frame.seconds.gbuffer, 0);
                 }
             }
@@ -235,7 +285,7 @@ fn passes(
     }
     let [nx, ny, nz] = volume.size;
     for (engine, pass, times, cells) in measured {
-        rows.push(row("front", format!("{nx}×{ny}×{nz}"), direct, engine, pass, summary(times), cells));
+        rows.push(row(name, format!("{nx}×{ny}×{nz}"), direct, engine, pass, summary(times), cells));
     }
     Ok(())
 }
@@ -338,7 +388,8 @@ fn print(json: bool, line: &str, rows: &[Row]) {
     }
     for bare in rows.iter().filter(|r| r.pass == "bare walk") {
         let same = |r: &&Row| {
-            r.pass == "integrate" && r.engine == "gpu" && (&r.volume, &r.size) == (&bare.volume, &bare.size)
+            let of = (bare.scene, &bare.volume, &bare.size);
+            r.pass == "integrate" && r.engine == "gpu" && (r.scene, &r.volume, &r.size) == of
         };
         if let Some(integrate) = rows.iter().find(same) {
             let ratio = integrate.seconds / bare.seconds;

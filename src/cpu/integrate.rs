@@ -91,7 +91,7 @@ struct LightPlaces {
 
 impl<'a> Integrator<'a> {
     /// For a scene and its volume, and many rays: light volumes are walked now if there are to be any and `kept`
-    /// has not got them.
+    /// has not got them; if there are to be none it lets go of the old ones.
     pub fn prepared(
         scene: &'a Scene,
         volume: &'a VolumeTexture,
@@ -103,6 +103,8 @@ impl<'a> Integrator<'a> {
             let light_volumes = LightVolumes::new(scene, volume.size, scene.light_cache)?;
             integrator.depths = Some(kept.get(&light_volumes, volume, monitor)?);
             integrator.light_volumes = Some(light_volumes);
+        } else {
+            *kept = KeptDepths::default();
         }
         Ok(integrator)
     }

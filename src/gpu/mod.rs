@@ -242,7 +242,10 @@ impl GpuRenderer {
 
         let samples = options.samples.clone().unwrap_or(0..image.samples);
         let light_depths = match light_volumes {
-            None => self.visibility.none(),
+            None => {
+                self.visibility.forget();
+                self.visibility.none()
+            }
             Some(light_volumes) => {
                 let frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
                 let watch = |done, all| monitor.progress("light volumes", done, all);

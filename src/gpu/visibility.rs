@@ -96,6 +96,11 @@ impl Visibility {
         self.none.clone()
     }
 
+    /// Lets go of what the last frame had.
+    pub fn forget(&mut self) {
+        self.kept = None;
+    }
+
     /// The depths of `volumes`, walked unless they are those of the last call; and the device's seconds for
     /// it. `between` is called with the cells done and all there are, and may stop the work.
     #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
