@@ -70,7 +70,7 @@ impl GpuBench {
                 scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
                 _ => None,
             };
-            let variant = Variant::of(scene, light_volumes.as_ref());
+            let variant = Variant::of(scene, layers, light_volumes.as_ref());
             let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, variant), None);
             let mut visibility = Visibility::new(gpu);
             let mut work = Vec::new();

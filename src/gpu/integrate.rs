@@ -27,12 +27,14 @@ pub struct Variant {
     cornered: bool,
     strand: bool,
     multiple: bool,
+    sheets: bool,
     exponent: u32,
 }
 
 impl Variant {
-    /// For a scene, and the light volumes it has if its visibility is cached.
-    pub fn of(scene: &Scene, light_volumes: Option<&LightVolumes>) -> Self {
+    /// For a scene of which at most `layers` sheets lie under a pixel, and the light volumes it has if its
+    /// visibility is cached.
+    pub fn of(scene: &Scene, layers: u32, light_volumes: Option<&LightVolumes>) -> Self {
         Variant {
             lights: scene.volume_lights().len() as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
@@ -41,6 +43,7 @@ impl Variant {
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
+            sheets: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
     }
@@ -137,6 +140,7 @@ impl Integrate {
             ("CORNERED", number(variant.cornered)),
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
+            ("SHEETS", number(variant.sheets)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, include_str!("../../shaders/integrate.wgsl"), &constants)

@@ -208,11 +208,12 @@ impl GpuRenderer {
         let gpu = &self.gpu;
         let mut seconds = Seconds::default();
         let clock = Instant::now();
+        let layers = overlap::sheets(scene);
         let light_volumes = match scene.visibility {
             scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
             _ => None,
         };
-        let variant = Variant::of(scene, light_volumes.as_ref());
+        let variant = Variant::of(scene, layers, light_volumes.as_ref());
         let integrate = recent(
             &mut self.integrate,
             KEPT_PIPELINES,
@@ -229,7 +230,6 @@ impl GpuRenderer {
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut frame = Frame::new(part.width, part.height, options.surface);
         let size = options.grid.size(whole);
-        let layers = overlap::sheets(scene);
         let canvas = recent(
             &mut self.canvases,
             KEPT_CANVASES,

@@ -100,6 +100,7 @@ fn soak() {
         eprintln!("resident in the first {WARM} changes {warm:.0} MiB, in the last {late:.0} MiB");
         assert!(late - warm <= MAX_GROWTH_MIB, "{warm:.0} MiB became {late:.0} MiB");
     }
+    keys.push("light.cache".into());
     window.harness.state_mut().document_mut().reset(&keys);
     window.harness.set_size([300.0, 300.0].into());
     window.harness.run_steps(2);
