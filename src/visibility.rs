@@ -108,7 +108,7 @@ impl LightVolumes {
             ),
             need,
             budget,
-            "raise light.cache, or use light.visibility=march",
+            "raise light.cache (at most half of --memory counts), or use light.visibility=march",
         ))
     }
 

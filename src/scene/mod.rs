@@ -64,7 +64,7 @@ pub struct Scene {
     pub frame: AngleFrame,
     /// Attenuation between light and cell.
     pub visibility: Visibility,
-    /// Bytes that light volumes may take.
+    /// Bytes that light volumes may take: at most half of what the work may use.
     pub light_cache: u64,
     /// How a cell reflects.
     pub reflection: Reflection,
@@ -363,7 +363,7 @@ impl Scene {
                 "cached" => Visibility::Cached,
                 _ => Visibility::March,
             },
-            light_cache: u64::from(v.count("light.cache")) << 20,
+            light_cache: (u64::from(v.count("light.cache")) << 20).min(limits.memory / 2),
             reflection: match v.text("light.reflection").as_str() {
                 "strand" => Reflection::Strand(parts::strand(v)),
                 _ => Reflection::KajiyaKay,

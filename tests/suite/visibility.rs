@@ -82,6 +82,8 @@ fn light_volumes_over_the_budget_are_coarser_and_then_refused_with_what_they_nee
     assert_eq!(error.exit_code(), 33);
     let words = error.to_string();
     assert!(words.contains("light.cache") && words.contains("light.visibility=march"), "{words}");
+    let limits = Limits { memory: 100 << 20, ..Limits::default() };
+    assert_eq!(Scene::load("front".as_ref(), &[], &limits).expect("valid").light_cache, 50 << 20);
 }
 
 #[test]
