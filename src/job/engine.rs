@@ -104,15 +104,23 @@ impl Engine {
                 let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
                 cpu::render_samples(scene, volume, mesh, window, samples, options.surface, kept, monitor)
             }
-            Engine::Gpu(renderer, device) => match renderer.render(scene, volume, mesh, options, monitor) {
-                Err(e @ (Error::DeviceLost(_) | Error::Memory { .. })) => {
-                    monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
-                    **renderer = GpuRenderer::new(Gpu::open(device)?);
-                    let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
-                    renderer.render(scene, volume, mesh, &careful, monitor)
+            Engine::Gpu(renderer, device) => {
+                let result = renderer.render(scene, volume, mesh, options, monitor);
+                let again = match &result {
+                    Err(Error::DeviceLost(_)) => true,
+                    // What was refused before the device was asked would be refused again.
+                    Err(Error::Memory { .. }) => renderer.gpu.check().is_err(),
+                    _ => false,
+                };
+                let Err(e) = &result else { return result };
+                if !again {
+                    return result;
                 }
-                other => other,
-            },
+                monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
+                **renderer = GpuRenderer::new(Gpu::open(device)?);
+                let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
+                renderer.render(scene, volume, mesh, &careful, monitor)
+            }
         }
     }
 }

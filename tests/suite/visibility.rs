@@ -87,6 +87,23 @@ fn light_volumes_over_the_budget_are_coarser_and_then_refused_with_what_they_nee
 }
 
 #[test]
+fn a_frame_whose_light_volumes_do_not_fit_is_refused_once_and_in_one_line() {
+    let sets = [
+        "--set=light.visibility=cached",
+        "--set=light.cache=1",
+        "--set=volume.nx=128",
+        "--set=volume.ny=128",
+    ];
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out.png");
+    let mut args = vec!["render", "front", "-o", out.to_str().expect("UTF-8")];
+    args.extend(sets);
+    let run = crate::faults::run(&mut crate::faults::taki(&args));
+    run.refused(33, &["cached visibility of 1 lights on 1 quads needs 2.5 MiB", "light.cache"]);
+    assert!(!run.stderr().contains("once more"), "{}", run.stderr());
+}
+
+#[test]
 fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     let mut front = scene("front", &[]);
     let mut uniform = volume(&front);
