@@ -3,8 +3,10 @@
 //! u runs from left to right, v from top (straight up, +y) to bottom. The middle column is seen looking along −z,
 //! as a camera stands by default, with +x to its right; the left and the right edge meet at +z:
 //!
-//!     u = ½ + atan2(x, −z)/2π        x =  cos φ · sin 2π(u − ½)
-//!     v = ½ − φ/π,  sin φ = y        z = −cos φ · cos 2π(u − ½)
+//! ```text
+//! u = ½ + atan2(x, −z)/2π        x =  cos φ · sin 2π(u − ½)
+//! v = ½ − φ/π,  sin φ = y        z = −cos φ · cos 2π(u − ½)
+//! ```
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
