@@ -9,6 +9,7 @@ mod irradiance;
 mod lights;
 mod map;
 mod moments;
+mod overview;
 mod sky;
 mod stock;
 mod sun;

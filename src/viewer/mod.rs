@@ -10,6 +10,7 @@ mod drive;
 mod gallery;
 pub mod layer_image;
 pub mod lights;
+pub mod lobes;
 pub mod metrics;
 pub mod navigate;
 pub mod parameters;

@@ -1,6 +1,8 @@
 //! The parameter panel: every entry of the parameter table as a widget.
 
 pub mod lights;
+mod lobes;
+mod overview;
 mod widget;
 
 use std::collections::HashMap;
@@ -8,6 +10,8 @@ use std::collections::HashMap;
 use eframe::egui;
 use egui::{Align, Color32, Layout, Response, RichText, Ui};
 
+use self::lobes::LobesPlot;
+use self::overview::Overview;
 use self::widget::{direction_angles, list, triple, widget};
 use super::document::Document;
 use super::lights::Lights;
@@ -45,6 +49,8 @@ pub struct ParameterPanel {
     /// Only parameters with this text in key, symbol or description are shown.
     pub search: String,
     fault: Option<String>,
+    lobes: LobesPlot,
+    overview: Overview,
 }
 
 /// What the panel says about costs.
@@ -86,7 +92,7 @@ impl ParameterPanel {
                 together(&mut found);
                 shown += found.len();
                 if !found.is_empty() {
-                    self.group(ui, document, costs, (title, about), &found, !search.is_empty());
+                    self.group(ui, (document, lights), costs, (title, about), &found, !search.is_empty());
                 }
             }
             if shown == 0 {
@@ -98,7 +104,7 @@ impl ParameterPanel {
     fn group(
         &mut self,
         ui: &mut Ui,
-        document: &mut Document,
+        (document, lights): (&mut Document, &Lights),
         costs: Costs,
         (title, about): (&str, &str),
         keys: &[&String],
@@ -136,9 +142,18 @@ impl ParameterPanel {
                 open = place.into();
                 self.row(ui, document, costs, key);
                 let environment = document.scene().environment.as_ref();
-                if let Some(environment) = environment.filter(|_| *key == "environment.lights") {
-                    ui.weak(environment.words());
+                match (key.as_str(), environment) {
+                    ("environment.kind", Some(environment)) => {
+                        self.overview.show(ui, environment, &document.scene().image);
+                    }
+                    ("environment.lights", Some(environment)) => {
+                        ui.weak(environment.words());
+                    }
+                    _ => {}
                 }
+            }
+            if keys.iter().any(|key| *key == "light.reflection") {
+                self.lobes.show(ui, document.scene(), document.values(), lights.selected());
             }
             ui.add_space(6.0);
         });

@@ -1,0 +1,211 @@
+//! How the water's reflection is spread over directions, for one light: the numbers behind the plot of the lobes.
+
+use std::f64::consts::{FRAC_1_PI, PI};
+
+use glam::DVec3;
+
+use super::lights::shines;
+use crate::environment::luminance;
+use crate::scene::{Reflection, Scene, Values};
+use crate::shading::{fibre_angles, specular_power};
+use crate::strand::{Lobes, Strand, cell_aeration};
+
+/// Directions around a plot: one a degree, less than half the standard deviation of the narrowest lobe.
+pub const STEPS: usize = 360;
+/// Powers of ten from the middle of a plot to its rim, at most.
+pub const DECADES: i32 = 4;
+
+/// The circle of directions to the eye over which the lobes are drawn; a place on it is an angle α.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plane {
+    /// The mirror cone θ_o = −θ_i around the strand: α is the azimuth φ, and the light's is 0.
+    #[default]
+    Around,
+    /// The plane of strand and light: cos α and sin α are the parts of the direction across the strand, towards the
+    /// light, and along it. θ_o = α and φ = 0 on the light's side, θ_o = π − α and φ = π on the other.
+    Along,
+}
+
+impl Plane {
+    /// θ_o and φ at α, −π to π, for a light of inclination `theta_i`, radians.
+    pub fn direction(self, theta_i: f64, alpha: f64) -> (f64, f64) {
+        match self {
+            Plane::Around => (-theta_i, alpha),
+            Plane::Along if alpha.abs() <= 0.5 * PI => (alpha, 0.0),
+            Plane::Along => (PI.copysign(alpha) - alpha, PI),
+        }
+    }
+}
+
+/// All that a plot depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// The model.
+    pub reflection: Reflection,
+    /// Coefficients of the cell.
+    pub k_d: f32,
+    /// See `k_d`.
+    pub k_s: f32,
+    /// Exponent of the fibre model's specular term.
+    pub p: f32,
+    /// Inclination of the light to the plane across the strand, −π/2 to π/2.
+    pub theta_i: f64,
+    /// Where the eye goes.
+    pub plane: Plane,
+}
+
+impl Setting {
+    /// For the cells of `scene` before their noise, and a light of inclination `theta_i`.
+    pub fn new(scene: &Scene, theta_i: f64, plane: Plane) -> Setting {
+        let (k_d, k_s) = (scene.water.k_d, scene.water.k_s);
+        Setting { reflection: scene.reflection, k_d, k_s, p: scene.p, theta_i, plane }
+    }
+}
+
+/// One lobe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// As the legend has it.
+    pub name: &'static str,
+    /// What it is.
+    pub doc: &'static str,
+    /// Luminance of Φ, 1/sr, at α = i·360°/[`STEPS`].
+    pub values: Vec<f64>,
+}
+
+impl Curve {
+    /// The largest value.
+    pub fn peak(&self) -> f64 {
+        self.values.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+/// α of a direction of the plots, −π to π.
+pub fn alpha(step: usize) -> f64 {
+    let turn = step % STEPS;
+    let signed = if 2 * turn > STEPS { turn as f64 - STEPS as f64 } else { turn as f64 };
+    signed * (2.0 * PI / STEPS as f64)
+}
+
+/// The lobes, the last of them their sum. A strand's take some 30 ms.
+pub fn curves(setting: &Setting) -> Vec<Curve> {
+    match setting.reflection {
+        Reflection::KajiyaKay => fibre(setting),
+        Reflection::Strand(mut params) => {
+            params.aeration = cell_aeration(params.aeration, setting.k_d, setting.k_s);
+            strand(&Strand::new(&params), setting)
+        }
+    }
+}
+
+type Part<T> = (&'static str, &'static str, fn(&T) -> f64);
+
+fn strand(strand: &Strand, setting: &Setting) -> Vec<Curve> {
+    let parts: [Part<Lobes>; 6] = [
+        ("R", "Reflected from the outside of the strand", |l| luminance(l.r)),
+        ("TT", "Through the strand", |l| luminance(l.tt)),
+        ("TRT", "Reflected once inside: the bow", |l| luminance(l.trt)),
+        ("rest", "Reflected inside twice or more often", |l| luminance(l.residual)),
+        ("aerated", "By bubbles of air", |l| luminance(l.aerated)),
+        ("total", "Φ, the sum", |l| luminance(l.total())),
+    ];
+    let at = |(theta_o, phi)| strand.lobes(setting.theta_i, theta_o, phi);
+    sampled(&parts, setting, at)
+}
+
+/// Ψ/π: per steradian, as Φ of the strand.
+fn fibre(setting: &Setting) -> Vec<Curve> {
+    let parts: [Part<[f64; 2]>; 3] = [
+        ("diffuse", "k_d·sin(t,l)/π", |[d, _]| *d),
+        ("specular", "k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p/π", |[_, s]| *s),
+        ("total", "Ψ/π, the sum", |[d, s]| d + s),
+    ];
+    let at = |(theta_o, _): (f64, f64)| {
+        let (sin_l, base) = fibre_angles(setting.theta_i.sin() as f32, theta_o.sin() as f32, 1.0);
+        let specular = setting.k_s * specular_power(base.max(0.0), setting.p);
+        [setting.k_d * sin_l, specular].map(|x| f64::from(x) * FRAC_1_PI)
+    };
+    sampled(&parts, setting, at)
+}
+
+fn sampled<T>(parts: &[Part<T>], setting: &Setting, at: impl Fn((f64, f64)) -> T) -> Vec<Curve> {
+    let all: Vec<T> = (0..STEPS).map(|i| at(setting.plane.direction(setting.theta_i, alpha(i)))).collect();
+    let curve = |(name, doc, part): &Part<T>| Curve { name, doc, values: all.iter().map(part).collect() };
+    parts.iter().map(curve).collect()
+}
+
+/// The radius of a polar plot: the logarithm of a value, so that lobes a hundred times weaker are seen as well.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// Power of ten in the middle.
+    pub middle: i32,
+    /// The same at the rim, which the largest value reaches.
+    pub rim: f64,
+}
+
+impl Scale {
+    /// For curves.
+    pub fn new(curves: &[Curve]) -> Scale {
+        let peak = curves.iter().map(Curve::peak).fold(0.0, f64::max);
+        let rim = if peak > 0.0 && peak.is_finite() { peak.log10() } else { 0.0 };
+        Scale { middle: rim.ceil() as i32 - DECADES, rim }
+    }
+
+    /// 0 to 1, and 0 for all that is not above the middle's power of ten.
+    pub fn radius(self, value: f64) -> f64 {
+        let middle = f64::from(self.middle);
+        ((value.log10() - middle) / (self.rim - middle)).max(0.0)
+    }
+
+    /// The powers of ten between middle and rim, and their radii.
+    pub fn rings(self) -> impl Iterator<Item = (i32, f64)> {
+        let last = self.rim.floor() as i32;
+        (self.middle + 1..=last).map(move |power| (power, self.radius(10f64.powi(power))))
+    }
+}
+
+/// A light as the strands of the first quad have it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Incidence {
+    /// Of which light.
+    pub light: String,
+    /// Its inclination θ_i to the plane across the flow, radians: positive where the flow goes towards it.
+    pub theta_i: f64,
+}
+
+/// The incidence of the light that is selected; else of the first that shines, the sky's sun, the first. Nothing
+/// where there is no light, or none that is in any direction from the middle of the quad.
+pub fn incidence(scene: &Scene, values: &Values, selected: Option<&str>) -> Option<Incidence> {
+    let names = values.names("lights");
+    let chosen = selected.or_else(|| names.iter().find(|name| shines(values, name)).map(String::as_str));
+    let sun = scene.environment.as_ref().and_then(|e| e.sun);
+    let (light, to_light) = match (chosen, sun, names.first()) {
+        (Some(name), ..) => (name, to_light(scene, values, name)),
+        (None, Some(sun), _) => ("the sky's sun", sun.to_sun.as_dvec3()),
+        (None, None, Some(first)) => (first.as_str(), to_light(scene, values, first)),
+        (None, None, None) => return None,
+    };
+    let sin = flow(scene).dot(to_light.try_normalize()?);
+    Some(Incidence { light: light.to_owned(), theta_i: sin.clamp(-1.0, 1.0).asin() })
+}
+
+/// Unit direction of the flow: v of the first quad in its middle; down without quads.
+pub fn flow(scene: &Scene) -> DVec3 {
+    let down = scene.quads.first().map(|quad| {
+        let [a, b, c, d] = quad.corners.map(|p| p.as_dvec3());
+        (d - a + c - b).normalize_or(DVec3::NEG_Y)
+    });
+    down.unwrap_or(DVec3::NEG_Y)
+}
+
+fn to_light(scene: &Scene, values: &Values, name: &str) -> DVec3 {
+    let triple = |what: &str| values.triple(&format!("lights.{name}.{what}")).as_dvec3();
+    if values.text(&format!("lights.{name}.kind")) == "directional" {
+        return triple("direction");
+    }
+    let middle = scene
+        .quads
+        .first()
+        .map_or(DVec3::ZERO, |quad| quad.corners.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / 4.0);
+    triple("position") - middle
+}
