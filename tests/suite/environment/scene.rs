@@ -15,8 +15,8 @@ use super::uneven;
 use crate::faults::{run, taki};
 use crate::gpu::{assert_parity, both, renderer, scene};
 
-/// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much inside a
-/// pixel that the two engines' interpolations differ by more than their shading may.
+/// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much
+/// inside a pixel that the two engines' interpolations differ by more than their shading may.
 const SMALL: [&str; 9] = [
     "image.width=80",
     "image.height=60",
@@ -172,7 +172,7 @@ fn the_lights_come_from_where_the_background_is_bright_and_the_rock_is_lit_from_
         for d in super::directions(300).map(|d| d.as_vec3()).filter(|d| d.dot(to_light) < 0.99) {
             assert_eq!(environment.radiance(d), Vec3::ZERO, "{turn} {d}");
         }
-        // Rock that faces it gets E/π, less the orders beyond the second of a spot: 1/32 of 4 at the peak and alike.
+        // Of a spot the three orders have ¼ + ½ + 5/16 of E/π where the rock faces it; those left out have −1/16.
         let facing = environment.irradiance.at(to_light);
         assert!((facing / intensity - Vec3::splat(1.0625)).abs().max_element() < 0.01, "{turn} {facing}");
     }
