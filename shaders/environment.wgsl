@@ -1,5 +1,6 @@
 // The environment: radiance of an equirectangular map, and irradiance from its spherical harmonics. Twins:
-// src/environment/map.rs and irradiance.rs, the same operations in the same order; the convention stands there.
+// src/environment/map.rs and irradiance.rs, the same operations in the same order; the convention stands
+// there.
 
 const HALF_PI: f32 = 1.5707964;
 const PI: f32 = 3.1415927;

@@ -1,10 +1,10 @@
-//! Environment maps from files: Radiance `.hdr` (RGBE) and OpenEXR `.exr` (R, G, B of the first part that has them; half,
-//! float or integer, lines or tiles, any compression but DWA, the finest level).
+//! Environment maps from files: Radiance `.hdr` (RGBE) and OpenEXR `.exr` (R, G, B of the first part that has
+//! them; half, float or integer, lines or tiles, any compression but DWA, the finest level).
 //!
-//! Values are linear radiance with the primaries of Rec. 709. Those of an `.hdr` are divided by its EXPOSURE and COLORCORR. An
-//! alpha channel is not looked at: colours of an EXR are multiplied by it already. Values below zero, which resampling
-//! leaves beside bright texels, count as 0 and are counted; a value that is no number, infinite or larger than
-//! [`MAX_RADIANCE`] refuses the file.
+//! Values are linear radiance with the primaries of Rec. 709. Those of an `.hdr` are divided by its EXPOSURE
+//! and COLORCORR. An alpha channel is not looked at: colours of an EXR are multiplied by it already. Values
+//! below zero, which resampling leaves beside bright texels, count as 0 and are counted; a value that is no
+//! number, infinite or larger than [`MAX_RADIANCE`] refuses the file.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -36,7 +36,8 @@ pub struct FileMap {
     pub negative: u64,
 }
 
-/// Reads a map. Nothing of the size that the file claims is allocated before that was compared with `budget` bytes.
+/// Reads a map. Nothing of the size that the file claims is allocated before that was compared with `budget`
+/// bytes.
 ///
 /// # Errors
 /// [`Error::Input`] naming the file where it is none of these, broken, or holds a value that is no radiance;
@@ -67,8 +68,8 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     )
 }
 
-/// A file that ends too early, or leads to places that no file has, is broken; others that cannot be read are a fault
-/// of the disk.
+/// A file that ends too early, or leads to places that no file has, is broken; others that cannot be read are
+/// a fault of the disk.
 fn unreadable(path: &Path, e: std::io::Error) -> Error {
     match e.kind() {
         ErrorKind::UnexpectedEof | ErrorKind::InvalidInput | ErrorKind::InvalidData => bad(path, e),

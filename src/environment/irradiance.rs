@@ -1,6 +1,6 @@
-//! Irradiance on a surface of any direction from nine numbers a colour: the spherical harmonics of a map up to the
-//! second order, times those of the clamped cosine (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for
-//! Irradiance Environment Maps", eqs. 5 to 10).
+//! Irradiance on a surface of any direction from nine numbers a colour: the spherical harmonics of a map up
+//! to the second order, times those of the clamped cosine (Ramamoorthi and Hanrahan 2001, "An Efficient
+//! Representation for Irradiance Environment Maps", eqs. 5 to 10).
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,8 @@ use glam::{DVec3, Vec3};
 
 use super::moments::TERMS;
 
-/// E(n)/π: what a white diffuse surface with normal n sends back, in the radiance's unit. The coefficients of 1, x, y, z,
-/// xy, yz, 3y² − 1, xz and x² − z².
+/// E(n)/π: what a white diffuse surface with normal n sends back, in the radiance's unit. The coefficients of
+/// 1, x, y, z, xy, yz, 3y² − 1, xz and x² − z².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Irradiance(pub [Vec3; TERMS]);
 
@@ -27,8 +27,8 @@ const COSINE: [f64; TERMS] = [
 ];
 
 impl Irradiance {
-    /// From a map's moments, for an environment that is `factor` as bright and turned by `turn` (1: once round)
-    /// about +y, from +z towards +x.
+    /// From a map's moments, for an environment that is `factor` as bright and turned by `turn` (1: once
+    /// round) about +y, from +z towards +x.
     pub fn new(moments: &[DVec3; TERMS], turn: f64, factor: f64) -> Irradiance {
         let [one, x, y, z, xy, yz, yy, xz, xx_zz] = *moments;
         let (sin, cos) = (turn * 2.0 * PI).sin_cos();

@@ -1,8 +1,9 @@
 //! Directional lights that stand for a map where every light is walked to: the volume.
 //!
-//! The map is cut into rectangles, each time where the cut takes most of the variance of direction in them, weighted by
-//! power (Viriyothai and Debevec 2009, "Variance Minimization Light Probe Sampling"; the median cut of Debevec 2005 cuts
-//! into equal powers instead). A rectangle becomes one light with all its power from its power's centroid.
+//! The map is cut into rectangles, each time where the cut takes most of the variance of direction in them,
+//! weighted by power (Viriyothai and Debevec 2009, "Variance Minimization Light Probe Sampling"; the median
+//! cut of Debevec 2005 cuts into equal powers instead). A rectangle becomes one light with all its power from
+//! its power's centroid.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -91,8 +92,8 @@ impl Table {
 }
 
 impl LightSet {
-    /// At most `count` lights for a map; fewer where more would gain nothing, none where no light comes from. Their
-    /// irradiances sum up to the map's ∫ L dω.
+    /// At most `count` lights for a map; fewer where more would gain nothing, none where no light comes from.
+    /// Their irradiances sum up to the map's ∫ L dω.
     pub fn new(cells: &Cells, count: u32) -> LightSet {
         let table = Table::new(cells);
         let whole = Region { from: [0, 0], to: cells.size };

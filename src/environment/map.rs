@@ -1,7 +1,7 @@
 //! The equirectangular map: where a direction lies in it, and the radiance it has there.
 //!
-//! u runs from left to right, v from top (straight up, +y) to bottom. The middle column is seen looking along −z,
-//! as a camera stands by default, with +x to its right; the left and the right edge meet at +z:
+//! u runs from left to right, v from top (straight up, +y) to bottom. The middle column is seen looking along
+//! −z, as a camera stands by default, with +x to its right; the left and the right edge meet at +z:
 //!
 //! ```text
 //! u = ½ + atan2(x, −z)/2π        x =  cos φ · sin 2π(u − ½)
@@ -29,8 +29,8 @@ impl std::fmt::Debug for Map {
     }
 }
 
-/// Coefficients of arctan x ≈ x·Σ a_k·x^(2k) on 0 ≤ x ≤ 1, good to 2e-8 (Abramowitz and Stegun 1964, 4.4.49). Devices
-/// have an arctangent of their own; here the map is to be seen at the same place by both engines.
+/// Coefficients of arctan x ≈ x·Σ a_k·x^(2k) on 0 ≤ x ≤ 1, good to 2e-8 (Abramowitz and Stegun 1964, 4.4.49).
+/// Devices have an arctangent of their own; here the map is to be seen at the same place by both engines.
 pub const ARCTAN: [f32; 9] = [
     1.0,
     -0.333_331_47,
@@ -62,8 +62,8 @@ pub fn angle_of(y: f32, x: f32) -> f32 {
     if y < 0.0 { -angle } else { angle }
 }
 
-/// Where a unit direction lies in a map that was turned by `turn` (1: once round) about +y, from +z towards +x:
-/// u from 0 to 1, v from 0 to 1.
+/// Where a unit direction lies in a map that was turned by `turn` (1: once round) about +y, from +z towards
+/// +x: u from 0 to 1, v from 0 to 1.
 pub fn uv_of(d: Vec3, turn: f32) -> [f32; 2] {
     let u = 0.5 + angle_of(d.x, -d.z) * (0.5 * FRAC_1_PI) + turn;
     let v = 0.5 - angle_of(d.y, (d.x * d.x + d.z * d.z).sqrt()) * FRAC_1_PI;
@@ -78,8 +78,8 @@ pub fn direction_at(u: f64, v: f64) -> DVec3 {
 }
 
 impl Map {
-    /// The radiance between the four texels around a place: linear, across the left and right edge too; above the
-    /// middles of the first row, and below those of the last, theirs. Twin: `environment_radiance`.
+    /// The radiance between the four texels around a place: linear, across the left and right edge too; above
+    /// the middles of the first row, and below those of the last, theirs. Twin: `environment_radiance`.
     pub fn radiance(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (columns, rows) = (self.width as f32, self.height as f32);
         let s = u * columns - 0.5;

@@ -1,8 +1,10 @@
-//! The light of the surroundings: a sky or a picture of somewhere, seen where nothing is, lighting rock and water.
+//! The light of the surroundings: a sky or a picture of somewhere, seen where nothing is, lighting rock and
+//! water.
 //!
-//! One [`Map`] of radiance serves three ways. The background is the map itself. Rock takes its irradiance from nine
-//! [spherical harmonics](Irradiance). Water is walked through towards lights, so there a [`LightSet`] stands for the map,
-//! and how far it is off is [measured](Environment::error). The sun of a sky is none of this but a light of its own.
+//! One [`Map`] of radiance serves three ways. The background is the map itself. Rock takes its irradiance
+//! from nine [spherical harmonics](Irradiance). Water is walked through towards lights, so there a
+//! [`LightSet`] stands for the map, and how far it is off is [measured](Environment::error). The sun of a sky
+//! is none of this but a light of its own.
 
 mod file;
 mod irradiance;

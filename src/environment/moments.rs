@@ -1,6 +1,6 @@
-//! Integrals of a map's radiance over the sphere, exact for a map whose texels are even: the solid angle and every
-//! product of the direction's components are integrated over each texel in closed form, row by row and column by
-//! column (φ and θ separate), never sampled at its middle.
+//! Integrals of a map's radiance over the sphere, exact for a map whose texels are even: the solid angle and
+//! every product of the direction's components are integrated over each texel in closed form, row by row and
+//! column by column (φ and θ separate), never sampled at its middle.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -13,8 +13,9 @@ use super::map::Map;
 /// [`Irradiance`](super::Irradiance): 1, x, y, z, xy, yz, 3y² − 1, xz, x² − z².
 pub const TERMS: usize = 9;
 
-/// Cells that lights are chosen from: at most so many columns and rows. A cell of 0.7° keeps its power and its
-/// centroid exactly; finer ones would move no boundary between 1024 lights by more than a twentieth of its size.
+/// Cells that lights are chosen from: at most so many columns and rows. A cell of 0.7° keeps its power and
+/// its centroid exactly; finer ones would move no boundary between 1024 lights by more than a twentieth of
+/// its size.
 const CELLS: [usize; 2] = [512, 256];
 
 /// ∫ over the latitudes of one row: cos φ dφ times 1, y, r, y², r², y·r, where y = sin φ and r = cos φ.

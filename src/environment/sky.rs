@@ -1,5 +1,5 @@
-//! The clear sky of Hosek and Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", in a map: with the
-//! sun at −z, in its middle column.
+//! The clear sky of Hosek and Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", in a map:
+//! with the sun at −z, in its middle column.
 
 use glam::{DVec3, Vec3};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
@@ -12,8 +12,8 @@ use super::sun;
 /// Size of the map: half a degree at the aureole, a row's edge on the horizon.
 const SIZE: [u32; 2] = [1024, 512];
 
-/// Radiance of 1 is this many cd/m². With it the sun of a clear noon has an I of about 3 and the sky a radiance of about
-/// ½: as bright as the lights of the presets.
+/// Radiance of 1 is this many cd/m². With it the sun of a clear noon has an I of about 3 and the sky a
+/// radiance of about ½: as bright as the lights of the presets.
 pub const UNIT_CD_M2: f64 = 10_000.0;
 
 /// The model's radiance, W/(m²·sr) weighted by the eye, to the program's unit.
@@ -47,7 +47,8 @@ impl Sky {
         DVec3::new(0.0, elevation.sin(), -elevation.cos())
     }
 
-    /// Evaluates the model. Where its fit is negative it is black. The ground is diffuse and even, lit by sky and sun.
+    /// Evaluates the model. Where its fit is negative it is black. The ground is diffuse and even, lit by sky
+    /// and sun.
     pub fn bake(&self) -> BakedSky {
         let elevation = self.elevation.to_radians().min(std::f32::consts::FRAC_PI_2);
         let params = SkyParams { elevation, turbidity: self.turbidity, albedo: self.ground.to_array() };

@@ -2,37 +2,40 @@
 
 use glam::DVec3;
 
-/// Angular radius of the sun's disc seen from the mean distance, radians: 959.63″ (IAU, Astronomical Almanac).
+/// Angular radius of the sun's disc seen from the mean distance, radians: 959.63″ (IAU, Astronomical
+/// Almanac).
 pub const ANGULAR_RADIUS: f64 = 959.63 / 3600.0 * std::f64::consts::PI / 180.0;
 
 /// Width of a band and middle of the first, nm.
 const BAND: f64 = 20.0;
 const FIRST: f64 = 390.0;
 
-/// Spectral irradiance above the air, W/(m²·nm): the extraterrestrial column of ASTM G-173, in means over bands.
+/// Spectral irradiance above the air, W/(m²·nm): the extraterrestrial column of ASTM G-173, in means over
+/// bands.
 const ABOVE: [f64; 17] = [
     1.080, 1.729, 1.651, 1.973, 2.021, 1.946, 1.873, 1.881, 1.851, 1.834, 1.798, 1.725, 1.664, 1.563, 1.534,
     1.461, 1.389,
 ];
 
-/// Optical depth of 300 Dobson units of ozone straight up: cross-sections at 233 K (Serdyuchenko et al. 2014), in
-/// means over the bands, times 8.06e22 molecules/m².
+/// Optical depth of 300 Dobson units of ozone straight up: cross-sections at 233 K (Serdyuchenko et al.
+/// 2014), in means over the bands, times 8.06e22 molecules/m².
 const OZONE: [f64; 17] = [
     0.00004, 0.00017, 0.00056, 0.00157, 0.00347, 0.00675, 0.0124, 0.0197, 0.0266, 0.0360, 0.0367, 0.0376,
     0.0280, 0.0197, 0.0134, 0.0087, 0.0057,
 ];
 
-/// Air that a ray from `elevation` (radians, 0 to π/2) passes, relative to straight up: Kasten and Young 1989.
+/// Air that a ray from `elevation` (radians, 0 to π/2) passes, relative to straight up: Kasten and Young
+/// 1989.
 pub fn air_mass(elevation: f64) -> f64 {
     let degrees = elevation.to_degrees();
     1.0 / (elevation.sin() + 0.50572 * (degrees + 6.07995).powf(-1.6364))
 }
 
-/// Irradiance of the sun alone on a surface that faces it, linear RGB (Rec. 709), in lux/683 a channel: the unit of the sky
-/// model's radiance times sr. `elevation` in radians, turbidity 1 to 10.
+/// Irradiance of the sun alone on a surface that faces it, linear RGB (Rec. 709), in lux/683 a channel: the
+/// unit of the sky model's radiance times sr. `elevation` in radians, turbidity 1 to 10.
 ///
-/// Rayleigh scattering, haze and ozone as in Preetham, Shirley and Smits 1999 (appendix 2, after Iqbal 1983); water vapour
-/// and the other gases absorb next to nothing where the eye sees.
+/// Rayleigh scattering, haze and ozone as in Preetham, Shirley and Smits 1999 (appendix 2, after Iqbal 1983);
+/// water vapour and the other gases absorb next to nothing where the eye sees.
 pub fn irradiance(elevation: f64, turbidity: f64) -> DVec3 {
     let mass = air_mass(elevation);
     // Ångström's turbidity; pure air has none.
@@ -47,8 +50,8 @@ pub fn irradiance(elevation: f64, turbidity: f64) -> DVec3 {
     rgb_of(xyz).max(DVec3::ZERO)
 }
 
-/// The CIE 1931 matching functions as sums of lobes: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the
-/// CIE XYZ Color Matching Functions".
+/// The CIE 1931 matching functions as sums of lobes: Wyman, Sloan and Shirley 2013, "Simple Analytic
+/// Approximations to the CIE XYZ Color Matching Functions".
 fn matching(nm: f64) -> DVec3 {
     let lobe = |height: f64, middle: f64, left: f64, right: f64| {
         let t = (nm - middle) / if nm < middle { left } else { right };

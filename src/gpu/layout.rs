@@ -273,8 +273,8 @@ pub fn flow_cells(flow: f32, ny: u32) -> f32 {
     ((flow as f64).rem_euclid(1.0) * ny as f64) as f32
 }
 
-/// The scene's lights, then those that stand for its environment in the volume; a light that shines on nothing if there
-/// are none, for no buffer is empty.
+/// The scene's lights, then those that stand for its environment in the volume; a light that shines on
+/// nothing if there are none, for no buffer is empty.
 pub fn lights(scene: &Scene) -> Vec<Light> {
     let mut lights: Vec<Light> = scene.volume_lights().iter().map(Light::new).collect();
     lights.resize(lights.len().max(1), Light::default());

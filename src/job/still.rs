@@ -96,8 +96,8 @@ pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
     format!("# volume texture: crc32 {:08x}", volume.checksum())
 }
 
-/// The scene that made a picture, as a scene file. A volume or environment from a file stands in a picture by its
-/// contents, not by its path: equal pictures are equal files, and nobody's folders are published.
+/// The scene that made a picture, as a scene file. A volume or environment from a file stands in a picture by
+/// its contents, not by its path: equal pictures are equal files, and nobody's folders are published.
 pub(crate) fn scene_text(scene: &Scene) -> String {
     let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
     let map = map.map(|e| format!("# environment map: crc32 {:08x}\n", e.map.checksum()));

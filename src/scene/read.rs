@@ -265,13 +265,14 @@ fn raw(value: &DeValue) -> Raw {
 /// The keys whose values are paths.
 pub const REFERENCES: [&str; 2] = ["volume.file", "environment.file"];
 
-/// Whether `--set`s name files: paths on the command line are the user's own word, relative to the current folder.
+/// Whether `--set`s name files: paths on the command line are the user's own word, relative to the current
+/// folder.
 pub fn set_by_hand(sets: &[String], reference: &str) -> bool {
     sets.iter().any(|s| s.split('=').next().is_some_and(|key| key.trim() == reference))
 }
 
-/// Applies `--set`s in order; the folder in which references of the scene resolve. None if all may be trusted: then
-/// those of the scene's own were resolved.
+/// Applies `--set`s in order; the folder in which references of the scene resolve. None if all may be
+/// trusted: then those of the scene's own were resolved.
 pub fn apply_sets(
     values: &mut Values,
     sets: &[String],

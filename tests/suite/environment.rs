@@ -1,5 +1,5 @@
-//! Environments against closed forms in float64; files and their faults in `file`, the sky in `sky`, both engines in
-//! `scene`.
+//! Environments against closed forms in float64; files and their faults in `file`, the sky in `sky`, both
+//! engines in `scene`.
 
 mod file;
 mod scene;
@@ -136,7 +136,8 @@ fn even_light_gives_pi_times_its_radiance_on_every_normal_exactly() {
 
 #[test]
 fn moments_are_the_integrals_of_the_directions_products() {
-    // A fine map of a polynomial, whose products have integrals in closed form: ∫x²=4π/3, ∫x⁴=4π/5, ∫x²y²=4π/15.
+    // A fine map of a polynomial, whose products have integrals in closed form: ∫x²=4π/3, ∫x⁴=4π/5,
+    // ∫x²y²=4π/15.
     let (a, b) = (0.7, 0.4);
     let fine = map(512, 256, |d| DVec3::new(1.0 + a * d.x, 1.0 + b * d.y * d.z, 1.0 + d.x * d.x - d.z * d.z));
     let m = moments_of_map(&fine);
@@ -289,12 +290,13 @@ fn more_lights_are_nearer_to_the_map_and_the_error_is_what_it_says() {
         [1, 4, 24, 128, 1024].iter().map(|&n| LightSet::new(&cells, n).error(&cells)).collect();
     assert!(errors.windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{errors:?}");
     assert!(errors[2] < 0.05 && errors[4] < 0.002, "{errors:?}");
-    // One light from above for even light: E = 4π·max(0, y) instead of π. Mean square of 4max(0,y) − 1: 16/6 − 2 + 1.
+    // One light from above for even light: E = 4π·max(0, y) instead of π. Mean square of 4max(0,y) − 1: 16/6
+    // − 2 + 1.
     let even = Cells::new(&map(64, 32, |_| DVec3::ONE));
     let one = LightSet::new(&even, 1).error(&even);
     assert!((one - (16.0 / 6.0 - 1.0f64).sqrt()).abs() < 1e-3, "{one}");
-    // The map's own irradiance is no error, and twice it is one of 1, but for the cells that horizons cut: of a band
-    // of half their height h on both sides, 2h² of the mean at most.
+    // The map's own irradiance is no error, and twice it is one of 1, but for the cells that horizons cut: of
+    // a band of half their height h on both sides, 2h² of the mean at most.
     let even = Cells::new(&map(512, 256, |_| DVec3::ONE));
     let cut = 2.0 * (PI / 64.0 / 2.0f64).powi(2);
     assert!(error_of(&even, |_| PI) < cut);

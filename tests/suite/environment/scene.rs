@@ -15,8 +15,8 @@ use super::uneven;
 use crate::faults::{run, taki};
 use crate::gpu::{assert_parity, both, renderer, scene};
 
-/// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much inside a
-/// pixel that the two engines' interpolations differ by more than their shading may.
+/// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much
+/// inside a pixel that the two engines' interpolations differ by more than their shading may.
 const SMALL: [&str; 9] = [
     "image.width=80",
     "image.height=60",
@@ -61,12 +61,14 @@ fn the_engines_agree_on_background_rock_and_water_under_an_environment() {
         format!("environment.file={}", hdr(tempdir().expect("a folder").keep().as_path(), 1, 1, uneven));
     let sky = "environment.kind=sky";
     let map = "environment.kind=file";
-    let variants: [&[&str]; 8] = [
+    let variants: [&[&str]; 9] = [
         &[sky],
         &[sky, "sky.elevation=2", "sky.azimuth=170", "camera.fov=100"],
         // The sun in the picture, and the pole.
         &[sky, "sky.elevation=80", "camera.target=[0,60,-10]", "camera.fov=60"],
         &[map, &file, "camera.fov=140"],
+        // The map's edge in the middle of the picture.
+        &[map, &file, "camera.fov=140", "environment.turn=180"],
         &[map, &file, "environment.turn=77", "environment.intensity=3", "light.visibility=none"],
         &[map, &file, "environment.turn=-200", "camera.target=[0,1,60]", "environment.lights=37"],
         &[map, &one],
@@ -146,6 +148,10 @@ fn the_volumes_lights_are_the_scenes_own_the_sun_and_those_of_the_map() {
     let up = sun.to_sun.cross(Vec3::Z).normalize();
     let off = |degrees: f32| (sun.to_sun + up * degrees.to_radians().tan()).normalize();
     assert!(brightest(&low, off(0.26)) > 1e3 && brightest(&low, off(0.275)) < 10.0);
+    // Of a sun on the horizon the lower half is not seen.
+    let setting = of(&["sky.elevation=0", "sky.azimuth=0", "sky.turbidity=1"]);
+    let at = |degrees: f32| Vec3::new(0.0, degrees.to_radians().sin(), degrees.to_radians().cos());
+    assert!(brightest(&setting, at(0.1)) > 1e2 && brightest(&setting, at(-0.1)) < 10.0);
     // Its radiance times its solid angle is its irradiance.
     let omega = 2.0 * std::f64::consts::PI * (1.0 - taki::environment::ANGULAR_RADIUS.cos());
     let ratio = f64::from(sun.radiance.x) * omega / (f64::from(sun.intensity.x) * std::f64::consts::PI);
@@ -172,7 +178,7 @@ fn the_lights_come_from_where_the_background_is_bright_and_the_rock_is_lit_from_
         for d in super::directions(300).map(|d| d.as_vec3()).filter(|d| d.dot(to_light) < 0.99) {
             assert_eq!(environment.radiance(d), Vec3::ZERO, "{turn} {d}");
         }
-        // Rock that faces it gets E/π, less the orders beyond the second of a spot: 1/32 of 4 at the peak and alike.
+        // Of a spot the three orders have ¼ + ½ + 5/16 of E/π where the rock faces it; those left out have −1/16.
         let facing = environment.irradiance.at(to_light);
         assert!((facing / intensity - Vec3::splat(1.0625)).abs().max_element() < 0.01, "{turn} {facing}");
     }

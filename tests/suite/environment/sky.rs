@@ -16,8 +16,8 @@ fn at(sky: &BakedSky, x: u32, y: u32) -> Vec3 {
 
 #[test]
 fn a_pure_sky_under_a_sun_at_the_zenith_has_the_published_radiance() {
-    // Hosek and Wilkie's RGB data at turbidity 1, albedo 0 and the last of the elevation's control points: nine
-    // coefficients and the mean radiance of red and blue, and eq. 8 of the paper.
+    // Hosek and Wilkie's RGB data at turbidity 1, albedo 0 and the last of the elevation's control points:
+    // nine coefficients and the mean radiance of red and blue, and eq. 8 of the paper.
     type Published = (usize, [f64; 9], f64);
     let published: [Published; 2] = [
         (
