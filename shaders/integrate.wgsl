@@ -16,8 +16,6 @@ override CORNERED: bool = false;
 override STRAND: bool = false;
 // Light that is scattered more than once.
 override MULTIPLE: bool = false;
-// Whether pixels may have more sheets than one: the loop over them costs what is inside it a third.
-override SHEETS: bool = true;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -46,92 +44,6 @@ struct Reflection {
     similarity: Similarity,
 }
 
-// From the middle of `cell` to where the light ray leaves the slab.
-struct LightWalk {
-    depth: f32,
-    t: f32,
-    cells: u32,
-    done: bool,
-}
-
-fn marched_depth(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<function, Ray>) -> f32 {
-    var ray: LightWalk;
-    var walk = walk_new(frame.cells, vec3<f32>(cell) + 0.5, direction);
-    while !ray.done {
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-    }
-    (*total).light_cells += ray.cells;
-    return ray.depth * view.extinction;
-}
-
-fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: View) {
-    let t_exit = walk_exit(*walk);
-    let rho = f32(textureLoad(volume, (*walk).cell).x & 0xffffu);
-    if PER_CELL {
-        // The cell itself does not hide its own light.
-        (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));
-    } else {
-        (*ray).depth += select(rho * (t_exit - (*ray).t), 0.0, (*ray).done);
-    }
-    (*ray).cells += select(1u, 0u, (*ray).done);
-    (*ray).t = t_exit;
-    walk_step(walk, true);
-    let z = (*walk).cell.z;
-    (*ray).done |= (z < 0) | (z >= view.layers) | ((*ray).cells >= view.max_cells);
-}
-
-// The optical depth in bits from an occupied cell to a light: −log₂ of V_i(k).
-fn light_depth(rho: f32, cell: vec3<i32>, light: RayLight, view: View, total: ptr<function, Ray>) -> f32 {
-    var depth = 0.0;
-    if MARCH {
-        if rho > 0.0 {
-            depth = marched_depth(cell, light.l_cell, view, total);
-        }
-    }
-    if CACHED {
-        depth = kept_depth(cell, light.places, view);
-    }
-    return depth;
-}
-
-// From the light volumes of the ray's patch.
-fn kept_depth(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
-    var depth = textureLoad(light_depths, cell + places.p00).x;
-    if CORNERED && places.cornered {
-        let near = mix(depth, textureLoad(light_depths, cell + places.p10).x, places.at.x);
-        let far = mix(
-            textureLoad(light_depths, cell + places.p01).x,
-            textureLoad(light_depths, cell + places.p11).x,
-            places.at.x,
-        );
-        depth = mix(near, far, places.at.y);
-    }
-    return depth * view.depth_bits;
-}
-
-fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
-    var out: LightPlaces;
-    let patches = light_places[quad_number * LIGHTS + light];
-    let at = uv * vec2<f32>(patches.yz);
-    let patch_at = min(vec2<i32>(at), patches.yz - 1);
-    if !CORNERED | (patches.w == 0) {
-        out.p00 = light_places[patches.x + patch_at.y * patches.y + patch_at.x].xyz;
-        return out;
-    }
-    let row = patches.y + 1;
-    let first = patches.x + patch_at.y * row + patch_at.x;
-    out.cornered = true;
-    out.at = at - vec2<f32>(patch_at);
-    out.p00 = light_places[first].xyz;
-    out.p10 = light_places[first + 1].xyz;
-    out.p01 = light_places[first + row].xyz;
-    out.p11 = light_places[first + row + 1].xyz;
-    return out;
-}
-
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= tile.width || id.y >= tile.height {
@@ -144,10 +56,7 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     var result = vec4<f32>(behind, 1.0);
     var count = vec2<u32>(0u);
     if quad_number != 0u {
-        result = sheets(quad_number, pixel, behind, 0u, &count);
-        for (var first = LIGHTS_A_WALK; first < LIGHTS; first += LIGHTS_A_WALK) {
-            result += vec4<f32>(sheets(quad_number, pixel, behind, first, &count).rgb, 0.0);
-        }
+        result = sheets(quad_number, pixel, behind, &count);
     }
     if frame.sample_index != 0u {
         result += radiance[index];
@@ -168,29 +77,6 @@ struct Ray {
     done: bool,
     // Optical depth so far, in bits; only where light is scattered more than once.
     depth: f32,
-}
-
-// One light as a ray sees it: Jᵀl (or J⁻¹l normalised), and J⁻¹l.
-struct RayLight {
-    l_v: vec3<f32>,
-    l_cell: vec3<f32>,
-    places: LightPlaces,
-    // Cosine between light and eye, in the frame where angles are measured.
-    l_dot_e: f32,
-    // Of multiple scattering.
-    row: Row,
-    peak: Peak,
-}
-
-// Where a light's volumes are, at the corners of a patch, and where in the patch the ray is.
-struct LightPlaces {
-    p00: vec3<i32>,
-    p10: vec3<i32>,
-    p01: vec3<i32>,
-    p11: vec3<i32>,
-    at: vec2<f32>,
-    // Whether the patch has four; else the first is its own.
-    cornered: bool,
 }
 
 // What is constant along a ray. The frame's values stand here again because a uniform read inside a loop
@@ -228,39 +114,6 @@ fn in_colour() -> bool {
 fn lights_of(view: View) -> u32 {
     // Known when the shader is compiled, in all but a few scenes.
     return select(view.lights, LIGHTS, LIGHTS <= LIGHTS_A_WALK);
-}
-
-// All sheets of a pixel, the nearest of which is quad `nearest` − 1, in the lights from number `first` on; the ambient
-// light and what is behind come with the first of all.
-fn sheets(
-    nearest: u32,
-    pixel: vec2<u32>,
-    behind: vec3<f32>,
-    first: u32,
-    count: ptr<function, vec2<u32>>,
-) -> vec4<f32> {
-    var quad_number = nearest;
-    var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
-    var hit = textureLoad(surface, pixel, 0).xyz;
-    if !SHEETS {
-        return trace(quad_number - 1u, pixel, hit, behind, result, true, first, count);
-    }
-    for (var layer = 1u; quad_number != 0u; layer++) {
-        var next = 0u;
-        if layer < frame.layers {
-            next = textureLoad(quad_id, pixel, layer, 0).x;
-        }
-        result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, first, count);
-        if result.w < frame.early_end {
-            break;
-        }
-        quad_number = next;
-        if next != 0u {
-            let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-            hit = quad_hit(quads[next - 1u], d_world);
-        }
-    }
-    return result;
 }
 
 // One sheet: `before` is the radiance of those in front of it, and what they let through.
@@ -456,26 +309,4 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     walk_step(walk, true);
     (*ray).done |= ((*walk).cell.z >= view.layers) | (passed < view.early_end)
         | ((*ray).cells >= view.max_cells);
-}
-
-fn ray_light(i: u32, quad: Quad, jacobian: CellFrame, side: f32, d_world: vec3<f32>, t_hit: f32) -> RayLight {
-    let to_light = light_at(i, d_world, t_hit).xyz;
-    let l = plane_from_world(quad, side, to_light);
-    var out: RayLight;
-    out.l_cell = cell_from_plane(jacobian, l);
-    out.l_v = transposed(jacobian, l);
-    if frame.texture_frame != 0u {
-        out.l_v = out.l_cell / sqrt(dot3(out.l_cell, out.l_cell));
-    }
-    return out;
-}
-
-fn light_intensity(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec3<f32> {
-    return lights[i].intensity * light_at(i, d_world, t_hit).w;
-}
-
-// Unit direction from the mapped point to light i, and its falloff there (the paper maps the light
-// vectors at the point, not in every cell).
-fn light_at(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec4<f32> {
-    return light_from(lights[i], frame.eye_world + d_world * t_hit);
 }

@@ -17,6 +17,20 @@ const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
 
+/// The parts of the stage's shader: the walk, its lights, and a pixel's sheets, where there may be `many` (or many
+/// lights) or one.
+pub fn source(many: bool) -> String {
+    let sheets = match many {
+        false => include_str!("../../shaders/integrate_one.wgsl"),
+        true => include_str!("../../shaders/integrate_many.wgsl"),
+    };
+    let walk = include_str!("../../shaders/integrate.wgsl");
+    [walk, include_str!("../../shaders/integrate_light.wgsl"), sheets].join("\n")
+}
+
+/// Lights of one walk of a ray; `LIGHTS_A_WALK` of the shader.
+pub const LIGHTS_A_WALK: u32 = 16;
+
 /// What the pipeline is specialised to (`override` constants of the shader).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
@@ -27,7 +41,7 @@ pub struct Variant {
     cornered: bool,
     strand: bool,
     multiple: bool,
-    sheets: bool,
+    many: bool,
     exponent: u32,
 }
 
@@ -43,7 +57,7 @@ impl Variant {
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
-            sheets: layers > 1,
+            many: layers > 1 || scene.volume_lights().len() as u32 > LIGHTS_A_WALK,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
     }
@@ -140,10 +154,9 @@ impl Integrate {
             ("CORNERED", number(variant.cornered)),
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
-            ("SHEETS", number(variant.sheets)),
             ("EXPONENT", variant.exponent as f64),
         ];
-        Self::compile(gpu, variant, include_str!("../../shaders/integrate.wgsl"), &constants)
+        Self::compile(gpu, variant, &source(variant.many), &constants)
     }
 
     /// The bench's bare walk: the same bindings, no light.

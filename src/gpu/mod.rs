@@ -19,7 +19,7 @@ pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
-pub use integrate::{Integrate, Sums, Tiler, Variant};
+pub use integrate::{Integrate, LIGHTS_A_WALK, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
 pub use strand::StrandTexture;

@@ -4,7 +4,7 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{Environment, Frame, Light, Quad, Strand, Tile, WORKGROUP};
-use taki::gpu::shader_source;
+use taki::gpu::{LIGHTS_A_WALK, integrate_source, shader_source};
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
@@ -19,6 +19,17 @@ const SHARED: [&str; 7] = [
 ];
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
+
+/// What is put after integrate.wgsl.
+const PARTS: [&str; 3] = ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl"];
+
+/// All of a stage's shader.
+fn stage(name: &str) -> String {
+    match name {
+        "integrate.wgsl" => shader_source(&integrate_source(true)),
+        _ => shader_source(&file(name)),
+    }
+}
 
 fn file(name: &str) -> String {
     let path = format!("{}/shaders/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -40,7 +51,7 @@ fn every_file_in_shaders_is_a_known_stage_or_shared_and_none_is_missing() {
         .expect("the folder of shaders")
         .map(|entry| entry.expect("an entry").file_name().into_string().expect("UTF-8"))
         .collect();
-    let mut known: Vec<&str> = SHARED.iter().chain(&STAGES).copied().collect();
+    let mut known: Vec<&str> = SHARED.iter().chain(&STAGES).chain(&PARTS).copied().collect();
     found.sort_unstable();
     known.sort_unstable();
     assert_eq!(found, known);
@@ -48,10 +59,13 @@ fn every_file_in_shaders_is_a_known_stage_or_shared_and_none_is_missing() {
 
 #[test]
 fn every_stage_is_valid_wgsl() {
-    for stage in STAGES {
-        if let Err(e) = validate(&shader_source(&file(stage))) {
-            panic!("{stage}:\n{e}");
+    for name in STAGES {
+        if let Err(e) = validate(&stage(name)) {
+            panic!("{name}:\n{e}");
         }
+    }
+    if let Err(e) = validate(&shader_source(&integrate_source(false))) {
+        panic!("integrate_one.wgsl:\n{e}");
     }
 }
 
@@ -78,7 +92,7 @@ macro_rules! fields {
 
 #[test]
 fn host_structs_have_the_layout_the_shaders_read() {
-    let module = validate(&shader_source(&file("integrate.wgsl"))).expect("valid");
+    let module = validate(&stage("integrate.wgsl")).expect("valid");
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
         texture_frame exposure filmic window_x window_y window_width window_height flow_cells layers);
@@ -98,7 +112,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    let module = validate(&shader_source(&file("integrate.wgsl"))).expect("valid");
+    let module = validate(&stage("integrate.wgsl")).expect("valid");
     let constant = |name: &str| {
         let found = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name));
         let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
@@ -109,6 +123,7 @@ fn constants_are_the_same_on_both_sides() {
         }
     };
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(constant("LIGHTS_A_WALK"), LIGHTS_A_WALK as f64);
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
