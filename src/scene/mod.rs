@@ -8,6 +8,7 @@ mod preset;
 mod print;
 mod read;
 mod rock;
+mod types;
 mod value;
 
 use std::path::{Path, PathBuf};
@@ -20,13 +21,15 @@ pub use parts::resolve;
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
+pub use types::{
+    AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Quad, Reflection, Scattering, Tone,
+    Trace, Visibility,
+};
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::curve::{CurveShape, levels_for};
 use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
-use crate::mapping::{Material, QuadMap};
-use crate::strand::StrandParams;
 use crate::volume::{VolumeTexture, WaterSpec, read_npz};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
@@ -78,185 +81,6 @@ pub struct Scene {
     pub background: Background,
     /// Size, samples and tone.
     pub image: Image,
-}
-
-/// A quad with its material.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quad {
-    /// A, B, C, D in the world.
-    pub corners: [Vec3; 4],
-    /// The quad in its plane.
-    pub map: QuadMap,
-    /// How the volume lies on it.
-    pub material: Material,
-}
-
-/// A light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Light {
-    /// From infinitely far: unit vector towards it, radiance factor I.
-    Directional {
-        /// Unit.
-        to_light: Vec3,
-        /// Colour × intensity.
-        intensity: Vec3,
-    },
-    /// From a point: I at 1 m, falling with the square of the distance.
-    Point {
-        /// Metres.
-        position: Vec3,
-        /// Colour × intensity, at 1 m.
-        intensity: Vec3,
-    },
-    /// From a point into a cone: inside it as a point light.
-    Spot {
-        /// Metres.
-        position: Vec3,
-        /// Colour × intensity, at 1 m.
-        intensity: Vec3,
-        /// Where it shines.
-        cone: Cone,
-    },
-}
-
-/// The cone of a spot light. With c the cosine of the angle between the beam and the way to a point, and
-/// s = (c − `cos_edge`)·`inverse_soft` clamped to 0..1, its light is s²(3 − 2s) of a point light's.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cone {
-    /// Unit, against the beam.
-    pub axis: Vec3,
-    /// Cosine of the half angle.
-    pub cos_edge: f32,
-    /// 1 / (cosine where the full light begins − `cos_edge`).
-    pub inverse_soft: f32,
-}
-
-impl Cone {
-    /// Around the unit vector `axis`, with a half angle in degrees of which the outer share `softness` (0 to 1) is
-    /// the way from full light to none.
-    pub fn new(axis: Vec3, angle: f32, softness: f32) -> Self {
-        let cosine = |degrees: f64| degrees.to_radians().cos();
-        let (edge, full) = (cosine(angle as f64), cosine(angle as f64 * (1.0 - softness as f64)));
-        // A hard edge is a thousandth of a degree wide at most.
-        let inverse_soft = (1.0 / (full - edge).max(1e-7)) as f32;
-        Cone { axis, cos_edge: edge as f32, inverse_soft }
-    }
-}
-
-/// How view rays go through the volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trace {
-    /// τ_k of a cell.
-    pub attenuation: Attenuation,
-    /// Most cells of one ray.
-    pub max_cells: u32,
-    /// A ray ends where T falls below this; 0: never.
-    pub early_end: f32,
-    /// Most sheets one ray goes through.
-    pub layers: u32,
-}
-
-/// τ_k of a cell with density ρ.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Attenuation {
-    /// σ·ρ·Δs, σ in 1/m.
-    PathLength {
-        /// Extinction at ρ = 1, 1/m.
-        sigma: f32,
-    },
-    /// τ·ρ.
-    PerCell {
-        /// Optical depth at ρ = 1.
-        tau: f32,
-    },
-}
-
-/// Where the fibre model's angles are measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AngleFrame {
-    /// t = normalize(J v) against world vectors.
-    World,
-    /// v against J⁻¹l and J⁻¹e, normalised: the paper's.
-    Texture,
-}
-
-/// V_i(k).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Visibility {
-    /// 1.
-    None,
-    /// Exact walk from the cell's centre to the light.
-    March,
-    /// The same, walked once for every cell of the volume and kept.
-    Cached,
-}
-
-/// How a cell reflects light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reflection {
-    /// The paper's: fibres with the coefficients of the cell.
-    KajiyaKay,
-    /// Strands of water and air.
-    Strand(StrandParams),
-}
-
-/// How often light may be scattered on its way through the volume.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scattering {
-    /// Once.
-    Single,
-    /// As often as it is.
-    Multiple,
-}
-
-/// A pinhole camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Metres.
-    pub eye: Vec3,
-    /// Unit, to the right of the image.
-    pub right: Vec3,
-    /// Unit, up in the image.
-    pub up: Vec3,
-    /// Unit, into the image.
-    pub forward: Vec3,
-    /// Tangent of half the vertical field of view.
-    pub tan_half_fov: f32,
-    /// Near plane, metres along `forward`.
-    pub near: f32,
-}
-
-/// Radiance where nothing is seen: horizon + (zenith − horizon)·max(0, d·y).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Background {
-    /// Straight up.
-    pub zenith: Vec3,
-    /// At and below the horizon.
-    pub horizon: Vec3,
-}
-
-/// The picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Image {
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// Samples a pixel.
-    pub samples: u32,
-    /// Stops.
-    pub exposure: f32,
-    /// Tone curve.
-    pub tone: Tone,
-}
-
-/// Tone curve of the PNG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
-    /// Clamp only.
-    None,
-    /// Narkowicz 2015.
-    Filmic,
 }
 
 /// What the command line allows a scene.
@@ -426,19 +250,5 @@ impl Scene {
             warnings.push("the volume is empty: no cell has density".into());
         }
         warnings
-    }
-}
-
-impl Image {
-    /// Pictures are made in parts: refused are those of which no part fits.
-    fn check_budget(&self, memory: u64) -> Result<()> {
-        crate::job::check_image(self, memory)
-    }
-}
-
-impl Background {
-    /// Radiance along a unit direction.
-    pub fn radiance(&self, d: Vec3) -> Vec3 {
-        self.horizon + (self.zenith - self.horizon) * d.y.max(0.0)
     }
 }

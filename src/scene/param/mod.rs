@@ -1,0 +1,231 @@
+//! The parameter table: every number, choice, colour and file a scene can set, once.
+//!
+//! It feeds the scene file, `--set`, the resolved print, the README's table and the viewer's sliders.
+//! A `*` in a key stands for a name the scene chooses, or for the number of a quad.
+
+mod light;
+mod picture;
+mod place;
+mod trace;
+mod water;
+
+use Cost::*;
+use Kind::*;
+
+/// What a change of a parameter costs an interactive renderer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// The volume texture is built again from its curves.
+    Volume,
+    /// Something already built is packed or uploaded again.
+    Upload,
+    /// A few bytes of uniforms.
+    Uniform,
+}
+
+impl Cost {
+    /// The word in tables and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Volume => "volume",
+            Upload => "upload",
+            Uniform => "uniform",
+        }
+    }
+}
+
+/// Type, range and default of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A float32: smallest, largest, default.
+    Float(f64, f64, f64),
+    /// A whole number: smallest, largest, default.
+    Int(i64, i64, i64),
+    /// One of the words; the first is the default.
+    Choice(&'static [&'static str]),
+    /// Linear RGB, each 0 to 10000.
+    Color([f64; 3]),
+    /// A point or direction, each component −1e7 to 1e7.
+    Point([f64; 3]),
+    /// A path or name; empty means none.
+    Text(&'static str),
+    /// Four points A, B, C, D; there is no default.
+    Corners,
+    /// Numbers of frames, each larger than the one before; empty by default.
+    Frames,
+    /// A list of numbers, of triples or of four corners, all alike; empty by default.
+    Series,
+}
+
+/// One parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Param {
+    /// Dotted key in the scene file and for `--set`.
+    pub key: &'static str,
+    /// The paper's symbol, if it has one.
+    pub symbol: &'static str,
+    /// Unit, or empty.
+    pub unit: &'static str,
+    /// Type, range and default.
+    pub kind: Kind,
+    /// What a change costs.
+    pub cost: Cost,
+    /// What it is, in one sentence.
+    pub doc: &'static str,
+    /// Where a slider runs, if that is not the whole of the allowed range.
+    pub slider: Option<(f64, f64)>,
+}
+
+/// Largest colour component.
+pub const COLOR_MAX: f64 = 1.0e4;
+/// Largest coordinate, metres.
+pub const POINT_MAX: f64 = 1.0e7;
+/// Most keyframes of a track.
+pub const MAX_KEYFRAMES: usize = 10_000;
+/// Largest number of a frame.
+pub const MAX_FRAME: i64 = 999_999_999;
+
+const fn p(
+    key: &'static str,
+    symbol: &'static str,
+    unit: &'static str,
+    kind: Kind,
+    cost: Cost,
+    doc: &'static str,
+) -> Param {
+    Param { key, symbol, unit, kind, cost, doc, slider: None }
+}
+
+/// The table, in the order of the method.
+pub const PARAMS: &[Param] = &joined();
+
+const SECTIONS: [&[Param]; 5] = [water::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
+
+const fn count() -> usize {
+    let (mut sum, mut section) = (0, 0);
+    while section < SECTIONS.len() {
+        sum += SECTIONS[section].len();
+        section += 1;
+    }
+    sum
+}
+
+const fn joined() -> [Param; count()] {
+    let mut all = [SECTIONS[0][0]; count()];
+    let (mut at, mut section) = (0, 0);
+    while section < SECTIONS.len() {
+        let mut i = 0;
+        while i < SECTIONS[section].len() {
+            all[at] = SECTIONS[section][i];
+            (at, i) = (at + 1, i + 1);
+        }
+        section += 1;
+    }
+    all
+}
+
+fn matches(pattern: &str, key: &str) -> bool {
+    let mut parts = key.split('.');
+    pattern
+        .split('.')
+        .all(|want| parts.next().is_some_and(|got| if want == "*" { !got.is_empty() } else { want == got }))
+        && parts.next().is_none()
+}
+
+/// Known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
+pub fn nearest(key: &str) -> Option<String> {
+    let parts: Vec<&str> = key.split('.').collect();
+    PARAMS
+        .iter()
+        .map(|param| {
+            let named: Vec<&str> = param
+                .key
+                .split('.')
+                .enumerate()
+                .map(|(i, want)| if want == "*" { parts.get(i).copied().unwrap_or("NAME") } else { want })
+                .collect();
+            named.join(".")
+        })
+        .map(|candidate| {
+            // A bare last word (`sigma` for `trace.sigma`) is the commonest slip.
+            let last = candidate.rsplit('.').next().unwrap_or("").to_owned();
+            let score = strsim::jaro_winkler(key, &candidate).max(strsim::jaro_winkler(key, &last));
+            (score, candidate)
+        })
+        .filter(|(score, _)| *score > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+impl Param {
+    const fn slider(self, low: f64, high: f64) -> Self {
+        Param { slider: Some((low, high)), ..self }
+    }
+
+    /// Whether it holds a list, which only a scene file or `--set` can give.
+    pub fn is_list(&self) -> bool {
+        matches!(self.kind, Frames | Series)
+    }
+
+    /// The entry a concrete key such as `lights.sun.color` belongs to.
+    pub fn find(key: &str) -> Option<&'static Param> {
+        PARAMS.iter().find(|param| matches(param.key, key))
+    }
+
+    /// Range in words, for messages and tables.
+    pub fn range(&self) -> String {
+        match self.kind {
+            Float(min, max, _) => format!("{} to {}", number(min), number(max)),
+            Int(min, i64::MAX, _) => format!("{min} to 2^63−1"),
+            Int(min, max, _) => format!("{min} to {max}"),
+            Choice(words) => words.join(", "),
+            Color(_) => format!("three numbers, 0 to {}", number(COLOR_MAX)),
+            Point(_) => format!("three numbers, ±{}", number(POINT_MAX)),
+            Text(_) => "text".into(),
+            Corners => format!("four points of three numbers, ±{}", number(POINT_MAX)),
+            Frames => format!(
+                "at most {MAX_KEYFRAMES} whole numbers, 0 to {MAX_FRAME}, each larger than the one before"
+            ),
+            Series => format!("at most {MAX_KEYFRAMES} values of one kind: numbers, triples or corners"),
+        }
+    }
+
+    /// Default in words.
+    pub fn default_words(&self) -> String {
+        match self.kind {
+            Float(.., d) => number(d),
+            Int(.., d) => d.to_string(),
+            Choice(words) => words[0].into(),
+            Color(c) | Point(c) => format!("[{}, {}, {}]", number(c[0]), number(c[1]), number(c[2])),
+            Text("") => "none".into(),
+            Text(t) => t.into(),
+            Corners => "required".into(),
+            Frames | Series => "none".into(),
+        }
+    }
+}
+
+/// A number as people write it.
+fn number(x: f64) -> String {
+    if x != 0.0 && (x.abs() >= 1e5 || x.abs() < 1e-3) { format!("{x:e}") } else { format!("{x}") }
+}
+
+/// The table as Markdown, for the README.
+pub fn markdown_table() -> String {
+    let mut text = String::from(
+        "| key | symbol | unit | default | allowed | a change costs | what |\n|---|---|---|---|---|---|---|\n",
+    );
+    for param in PARAMS {
+        text += &format!(
+            "| `{}` | {} | {} | {} | {} | {} | {} |\n",
+            param.key,
+            param.symbol,
+            param.unit,
+            param.default_words(),
+            param.range(),
+            param.cost.word(),
+            param.doc
+        );
+    }
+    text
+}

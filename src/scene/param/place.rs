@@ -1,0 +1,163 @@
+//! What the water is in: rock, camera and surroundings.
+
+use super::Cost::*;
+use super::Kind::*;
+use super::{Param, p};
+
+pub(super) const TABLE: &[Param] = &[
+    p(
+        "rocks.*.corners",
+        "",
+        "m",
+        Corners,
+        Upload,
+        "Corners of the patch that the fractal height field is raised on, counter-clockwise from the outside.",
+    ),
+    p(
+        "rocks.*.levels",
+        "",
+        "",
+        Int(0, crate::scene::rock::MAX_LEVELS as i64, 7),
+        Upload,
+        "Subdivisions: the mesh has 2^levels squares a side.",
+    )
+    .slider(0.0, 9.0),
+    p(
+        "rocks.*.h",
+        "",
+        "",
+        Float(0.0, 8.0, 0.9),
+        Upload,
+        "Roughness of the height field, as h of the curves.",
+    )
+    .slider(0.0, 2.0),
+    p(
+        "rocks.*.amplitude",
+        "",
+        "m",
+        Float(0.0, 1e4, 0.5),
+        Upload,
+        "Standard deviation of the displacement at the first level.",
+    )
+    .slider(0.0, 5.0),
+    p(
+        "rocks.*.bulge",
+        "",
+        "m",
+        Float(-1e4, 1e4, 0.0),
+        Upload,
+        "Height of the patch's middle over its border, before it is made rough.",
+    )
+    .slider(-5.0, 5.0),
+    p("rocks.*.seed", "", "", Int(0, i64::MAX, 1), Upload, "Seed of the rock."),
+    p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload, "Mean albedo."),
+    p(
+        "rocks.*.color_noise",
+        "",
+        "",
+        Float(0.0, 1.0, 0.3),
+        Upload,
+        "Relative fractal variation of the albedo.",
+    ),
+    p("rocks.*.cavity", "", "", Float(0.0, 1.0, 0.6), Upload, "How much hollows are darker than ridges."),
+    p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform, "Where the camera is."),
+    p("camera.target", "", "m", Point([0.0, 0.0, 0.0]), Uniform, "The point in the middle of the image."),
+    p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform, "Direction that is up in the image."),
+    p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform, "Vertical field of view.").slider(5.0, 120.0),
+    p(
+        "camera.near",
+        "",
+        "m",
+        Float(1e-4, 1e4, 0.01),
+        Uniform,
+        "Geometry nearer than this, along the view axis, is cut off.",
+    )
+    .slider(0.001, 10.0),
+    p(
+        "background.zenith",
+        "",
+        "",
+        Color([0.0, 0.0, 0.0]),
+        Uniform,
+        "Radiance of the background straight up.",
+    ),
+    p(
+        "background.horizon",
+        "",
+        "",
+        Color([0.0, 0.0, 0.0]),
+        Uniform,
+        "Radiance of the background at and below the horizon.",
+    ),
+    p(
+        "environment.kind",
+        "",
+        "",
+        Choice(&["none", "sky", "file"]),
+        Upload,
+        "Light of the surroundings, seen in place of the background: none, the clear sky of [sky], or a map from a file.",
+    ),
+    p(
+        "environment.file",
+        "",
+        "",
+        Text(""),
+        Upload,
+        "Equirectangular map of linear radiance, .hdr or .exr: the middle is seen looking along −z, +y is up.",
+    ),
+    p(
+        "environment.intensity",
+        "",
+        "",
+        Float(0.0, 1e4, 1.0),
+        Uniform,
+        "Factor on the light of the environment, its sun included.",
+    )
+    .slider(0.0, 4.0),
+    p(
+        "environment.turn",
+        "",
+        "°",
+        Float(-36_000.0, 36_000.0, 0.0),
+        Uniform,
+        "Turns the environment about the y axis, from +z towards +x.",
+    )
+    .slider(-180.0, 180.0),
+    p(
+        "environment.lights",
+        "",
+        "",
+        Int(1, 1024, 24),
+        Uniform,
+        "Most directional lights that stand for the environment in the water; the time for light walks grows with them.",
+    )
+    .slider(1.0, 256.0),
+    p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload, "Height of the sun above the horizon."),
+    p(
+        "sky.azimuth",
+        "",
+        "°",
+        Float(-360.0, 360.0, 30.0),
+        Uniform,
+        "Direction of the sun, from +z towards +x; environment.turn adds to it.",
+    )
+    .slider(-180.0, 180.0),
+    p("sky.turbidity", "", "", Float(1.0, 10.0, 3.0), Upload, "Haze: 2 is very clear, 3 clear, 6 hazy."),
+    p(
+        "sky.ground",
+        "",
+        "",
+        Color([0.2, 0.2, 0.2]),
+        Upload,
+        "Albedo of the ground below the horizon, at most 1 each: it is lit by sky and sun, and lights the sky.",
+    ),
+    p(
+        "sky.sun",
+        "",
+        "",
+        Float(0.0, 1e4, 1.0),
+        Upload,
+        "Factor on the sun's own light; 0: no sun, as in the shade.",
+    )
+    .slider(0.0, 4.0),
+];
