@@ -127,6 +127,7 @@ impl Scene {
                 sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
                 levels,
             },
+            structure: parts::structure(v),
             seed: v.int("volume.seed") as u64,
             alpha: v.float("volume.alpha"),
             k_d: v.float("volume.k_d"),
@@ -138,7 +139,7 @@ impl Scene {
             file => Some(parts::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
         };
         if volume_file.is_none() {
-            crate::volume::check_budget(size, limits.memory)?;
+            crate::volume::check_budget(size, water.strand_bytes(), limits.memory)?;
             let curves = water.across as u128 * water.deep as u128;
             let points = curves << levels;
             if points > 1 << 36 {

@@ -9,6 +9,7 @@ use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
 use crate::mapping::{Material, QuadMap};
 use crate::strand::StrandParams;
+use crate::volume::Structure;
 
 pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
@@ -163,6 +164,23 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
         ));
     }
     Ok(rocks)
+}
+
+/// Lengths are fractions of the volume, so that a look survives a change of resolution.
+pub(super) fn structure(v: &Values) -> Structure {
+    let bundles = v.count("curves.bundles");
+    Structure {
+        bundles,
+        // What is not used does not make volumes differ.
+        radius_cells: if bundles > 0 { v.float("curves.radius") * v.count("volume.nx") as f32 } else { 0.0 },
+        wander_cells: if bundles > 0 { v.float("curves.wander") * v.count("volume.ny") as f32 } else { 0.0 },
+        breathe: if bundles > 0 { v.float("curves.breathe") } else { 0.0 },
+        loose: if bundles > 0 { v.float("curves.loose") } else { 0.0 },
+        coherence: v.float("volume.coherence"),
+        strand_length: v.float("volume.strand_length"),
+        coverage: v.float("volume.coverage"),
+        crest: v.float("volume.crest"),
+    }
 }
 
 pub(super) fn camera(v: &Values) -> Result<Camera> {
