@@ -92,6 +92,8 @@ struct View {
     // The model's constants, where they are asked for.
     strand: Strand,
     similarity: Similarity,
+    // What the sheet makes of the cells.
+    matter: Matter,
     // Lights of this walk.
     lights: u32,
     // Where the quad's profile begins.
@@ -136,7 +138,8 @@ fn trace(
 
     var view: View;
     view.extinction = frame.extinction;
-    view.depth_bits = frame.extinction * 65535.0 * select(jacobian.depth, 1.0, PER_CELL);
+    view.matter = matter_at(quad, hit.xy);
+    view.depth_bits = frame.extinction * 65535.0 * view.matter.left * select(jacobian.depth, 1.0, PER_CELL);
     view.early_end = frame.early_end;
     view.p = frame.p;
     view.max_cells = frame.max_cells;
@@ -240,7 +243,7 @@ fn trace(
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
-    let empty = (textureLoad(volume, (*walk).cell).x & 0xffffu) == 0u;
+    let empty = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, view.matter) == 0.0;
     let on = *seeking & empty & !(*ray).done;
     (*ray).cells += select(0u, 1u, on);
     (*ray).t = select((*ray).t, walk_exit(*walk), on);
@@ -253,7 +256,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let texel = textureLoad(volume, (*walk).cell);
     let t_exit = walk_exit(*walk);
-    let rho = f32(select(texel.x & 0xffffu, 0u, (*ray).done));
+    let rho = select(matter_rho(texel.x & 0xffffu, view.matter), 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
     if !PER_CELL {
         tau_bits *= t_exit - (*ray).t;
@@ -276,11 +279,11 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
             let t_dot_l = dot3(v, others[i].l_v);
             let seen = weight * exp2(-depth);
             var lit: vec3<f32>;
-            if STRAND {
+            if STRAND && !is_mist(view) {
                 let l_dot_e = others[i].l_dot_e;
                 lit = seen * strand_psi(strand_table, linear, view.strand, k_d, k_s, t_dot_l * root, t_dot_e * root, l_dot_e);
             } else {
-                let fibre = psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
+                let fibre = psi_of(view, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
                 lit = vec3<f32>(seen * fibre * (1.0 / 255.0));
             }
             if MULTIPLE {
@@ -292,11 +295,11 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
             colours[i] += lit;
         }
     } else if LIGHTS > 0u {
-        let lit = weight * psi(view.p, k_d, k_s, v, view.first.l_v, t_dot_e, sin2_e, inverse_q);
+        let lit = weight * psi_of(view, k_d, k_s, v, view.first.l_v, t_dot_e, sin2_e, inverse_q);
         (*ray).first += lit * exp2(-light_depth(rho, (*walk).cell, view.first, view, ray));
     }
     for (var i = 1u; !in_colour() && i < lights_of(view); i++) {
-        let lit = weight * psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
+        let lit = weight * psi_of(view, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
         sums[i] += lit * exp2(-light_depth(rho, (*walk).cell, others[i], view, ray));
     }
     if MULTIPLE {

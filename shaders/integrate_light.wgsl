@@ -68,6 +68,9 @@ fn light_at(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec4<f32> {
 // The optical depth in bits from an occupied cell to a light: −log₂ of V_i(k).
 fn light_depth(rho: f32, cell: vec3<i32>, light: RayLight, view: View, total: ptr<function, Ray>) -> f32 {
     var depth = 0.0;
+    if (MARCH | CACHED) && is_mist(view) {
+        return select(0.0, mist_depth(cell, light.l_cell, view), rho > 0.0);
+    }
     if MARCH {
         if rho > 0.0 {
             depth = marched_depth(cell, light.l_cell, view, total);
@@ -105,7 +108,7 @@ fn marched_depth(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<f
 
 fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: View) {
     let t_exit = walk_exit(*walk);
-    let rho = f32(textureLoad(volume, (*walk).cell).x & 0xffffu);
+    let rho = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, view.matter);
     if PER_CELL {
         // The cell itself does not hide its own light.
         (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));

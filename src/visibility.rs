@@ -92,12 +92,16 @@ impl LightVolumes {
     /// For a scene and a volume of `size` cells; refused if even the coarsest need more than `budget` bytes.
     pub fn new(scene: &Scene, size: [u32; 3], budget: u64) -> Result<Self> {
         let mut need = 0;
-        for doubling in 0..=DOUBLINGS {
-            let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
-            let volumes = LightVolumes::at_angles(scene, size, angles);
-            need = volumes.bytes(size);
-            if need <= u128::from(budget) {
-                return Ok(volumes);
+        // Sheets of many small quads: only where each cannot have its own do they share light volumes.
+        for shared in [false, true] {
+            for doubling in 0..=DOUBLINGS {
+                let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
+                let same = if shared { angles[0] as f32 } else { SAME_DIRECTION };
+                let volumes = LightVolumes::at_angles(scene, size, angles, same);
+                need = volumes.bytes(size);
+                if need <= u128::from(budget) {
+                    return Ok(volumes);
+                }
             }
         }
         Err(Error::memory(
@@ -123,11 +127,12 @@ impl LightVolumes {
         self.patches.iter().any(|patches| patches.cornered)
     }
 
-    fn at_angles(scene: &Scene, size: [u32; 3], angles: [f64; 2]) -> Self {
+    /// Directions that differ by less than `same` of their length share a light volume.
+    fn at_angles(scene: &Scene, size: [u32; 3], angles: [f64; 2], same: f32) -> Self {
         let mut directions: Vec<Vec3> = Vec::new();
         let mut known: HashMap<[i64; 3], u32> = HashMap::new();
         let mut number = |d: Vec3| {
-            let step = SAME_DIRECTION * d.length().max(1e-30);
+            let step = same * d.length().max(1e-30);
             // The step is a power of two, so that equal directions fall into equal squares.
             let step = step.log2().floor().exp2();
             let key = d.to_array().map(|x| (x / step).round() as i64);
@@ -141,6 +146,12 @@ impl LightVolumes {
         for quad in &scene.quads {
             let side_seen = if quad_seen_from_behind(quad, scene.camera.eye) { -1.0 } else { 1.0 };
             for light in &lights {
+                if quad.mist > 0.0 {
+                    // Its light is not asked for.
+                    patches.push(Patches { first: numbers.len() as u32, count: [1, 1], cornered: false });
+                    numbers.push(0);
+                    continue;
+                }
                 let at = |u: f32, v: f32| direction(quad, light, side_seen, size, Vec2::new(u, v));
                 let (count, cornered) = cut(&at, angles);
                 patches.push(Patches { first: numbers.len() as u32, count, cornered });
@@ -151,6 +162,9 @@ impl LightVolumes {
                     numbers.push(number(at(place(i, count[0]), place(j, count[1]))));
                 }
             }
+        }
+        if directions.is_empty() && !numbers.is_empty() {
+            directions.push(Vec3::Z);
         }
         let medium = Medium::of(scene);
         LightVolumes { directions, numbers, patches, lights: lights.len(), medium }

@@ -3,6 +3,7 @@
 use glam::{IVec3, UVec2, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
+use super::matter::Matter;
 use super::visibility::{Depths, KeptDepths, optical_depth};
 use crate::camera::sample_offset;
 use crate::error::Result;
@@ -220,7 +221,10 @@ impl<'a> Integrator<'a> {
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
         let point = scene.camera.eye + d_world * hit[2];
-        let depth_bits = self.extinction * 65535.0 * if self.per_cell { 1.0 } else { frame.depth };
+        let matter = Matter::new(quad, Vec2::new(hit[0], hit[1]));
+        // What is left of light volumes' ρ, in the mean over the cells that count.
+        let depth_bits =
+            self.extinction * 65535.0 * matter.left * if self.per_cell { 1.0 } else { frame.depth };
         let mut lights: Vec<RayLight> = self
             .lights
             .iter()
@@ -249,9 +253,9 @@ impl<'a> Integrator<'a> {
             })
             .collect();
 
-        let x = hit[0] * quad.material.repeat_u * cells.x;
+        let x = (hit[0] * quad.material.repeat_u + quad.offset.x) * cells.x;
         // Where the volume has moved down, what is met lies further up in it.
-        let y = hit[1] * quad.material.repeat_v * cells.y - self.flow_cells;
+        let y = (hit[1] * quad.material.repeat_v + quad.offset.y) * cells.y - self.flow_cells;
         let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
         let mut transmittance = before;
         let mut depth = -before.max(1e-30).log2();
@@ -266,10 +270,11 @@ impl<'a> Integrator<'a> {
             walked[0] += 1;
             let cell = self.cell(crossing.cell);
             observer.enter(&crossing, cell, transmittance);
-            if cell.rho_code() == 0 {
+            let rho = matter.rho(cell.rho_code());
+            if rho <= 0.0 {
                 continue;
             }
-            let mut tau_bits = cell.rho_code() as f32 * self.extinction;
+            let mut tau_bits = rho * self.extinction;
             if !self.per_cell {
                 tau_bits *= crossing.t_exit - crossing.t_enter;
             }
@@ -286,13 +291,22 @@ impl<'a> Integrator<'a> {
                 let t_dot_l = v.dot(light.l_v);
                 let light_depth = match scene.visibility {
                     Visibility::None => 0.0,
+                    _ if matter.mist > 0.0 => {
+                        matter.depth(crossing.cell.z, light.l_cell, self.size.z, self.per_cell)
+                            * self.extinction
+                    }
                     Visibility::March => {
-                        self.marched_depth(crossing.cell, light.l_cell, &mut walked[1]) * self.extinction
+                        let direction = light.l_cell;
+                        self.marched_depth(crossing.cell, direction, &matter, &mut walked[1])
+                            * self.extinction
                     }
                     Visibility::Cached => self.kept_depth(crossing.cell, &light.places) * depth_bits,
                 };
                 let seen = (-light_depth).exp2();
                 let fibre = || {
+                    if matter.mist > 0.0 {
+                        return matter.mist;
+                    }
                     let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
                     k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p)
                 };
@@ -303,11 +317,11 @@ impl<'a> Integrator<'a> {
                     continue;
                 }
                 let mut lit = match &self.strand {
-                    Some(strand) => {
+                    Some(strand) if matter.mist == 0.0 => {
                         let [k_d, k_s] = [k_d, k_s].map(|k| k as f32);
                         strand.psi(k_d, k_s, t_dot_l * root, t_dot_e * root, light.l_dot_e) * (weight * seen)
                     }
-                    None => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
+                    _ => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
                 };
                 if let Some(media) = &self.media {
                     let profile = &media.profiles[self.profile_of_quad[quad_number] as usize];
@@ -333,7 +347,7 @@ impl<'a> Integrator<'a> {
 
     /// From the middle of `start` to where the light ray leaves the slab. With per-cell attenuation the cell
     /// itself does not hide its own light.
-    fn marched_depth(&self, start: IVec3, direction: Vec3, light_cells: &mut u32) -> f32 {
+    fn marched_depth(&self, start: IVec3, direction: Vec3, matter: &Matter, light_cells: &mut u32) -> f32 {
         let mut depth = 0.0f32;
         let walk = Walk::new(self.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
         for (n, crossing) in walk.take(self.scene.trace.max_cells as usize).enumerate() {
@@ -341,7 +355,7 @@ impl<'a> Integrator<'a> {
                 break;
             }
             *light_cells += 1;
-            let rho = self.cell(crossing.cell).rho_code() as f32;
+            let rho = matter.rho(self.cell(crossing.cell).rho_code());
             if self.per_cell {
                 depth += if n == 0 { 0.0 } else { rho };
             } else {

@@ -17,7 +17,7 @@ const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
 
-/// The parts of the stage's shader: the walk, its lights, and a pixel's sheets, where there may be `many` (or many
+/// The parts of the stage's shader: the walk, its lights, what sheets make of the cells, and a pixel's sheets, where there may be `many` (or many
 /// lights) or one.
 pub fn source(many: bool) -> String {
     let sheets = match many {
@@ -25,7 +25,8 @@ pub fn source(many: bool) -> String {
         true => include_str!("../../shaders/integrate_many.wgsl"),
     };
     let walk = include_str!("../../shaders/integrate.wgsl");
-    [walk, include_str!("../../shaders/integrate_light.wgsl"), sheets].join("\n")
+    let light = include_str!("../../shaders/integrate_light.wgsl");
+    [walk, light, include_str!("../../shaders/matter.wgsl"), sheets].join("\n")
 }
 
 /// Lights of one walk of a ray; `LIGHTS_A_WALK` of the shader.
@@ -41,6 +42,7 @@ pub struct Variant {
     cornered: bool,
     strand: bool,
     multiple: bool,
+    eroded: bool,
     many: bool,
     exponent: u32,
 }
@@ -57,6 +59,7 @@ impl Variant {
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
+            eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
             many: layers > 1 || scene.volume_lights().len() as u32 > LIGHTS_A_WALK,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -154,6 +157,7 @@ impl Integrate {
             ("CORNERED", number(variant.cornered)),
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
+            ("ERODED", number(variant.eroded)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants)

@@ -8,6 +8,7 @@ mod preset;
 mod print;
 mod read;
 mod rock;
+mod sheet;
 mod types;
 mod value;
 
@@ -21,6 +22,7 @@ pub use parts::resolve;
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
+pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
     AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Quad, Reflection, Scattering, Tone,
     Trace, Visibility,

@@ -1,0 +1,61 @@
+// What a sheet makes of the cells: eroded ρ, and mist. Part of the stage integrate. Twin: src/cpu/matter.rs.
+
+// Sheets that are eroded, or of mist.
+override ERODED: bool = false;
+
+// Share of mist's ρ that is the cells', and ρ of even mist in codes.
+const MIST_OF_CELLS: f32 = 0.3;
+const MIST_RHO: f32 = 32768.0;
+
+// Constant along a ray. ρ' = max(scale·ρ + shift, 0), in codes.
+struct Matter {
+    scale: f32,
+    shift: f32,
+    // 255·Ψ of mist; 0 where there is none.
+    mist: f32,
+    // ρ of even mist.
+    even: f32,
+    left: f32,
+}
+
+fn matter_at(quad: Quad, uv: vec2<f32>) -> Matter {
+    if !ERODED {
+        return Matter(1.0, 0.0, 0.0, 0.0, 1.0);
+    }
+    let near = quad.erosion.x + (quad.erosion.y - quad.erosion.x) * uv.x;
+    let far = quad.erosion.w + (quad.erosion.z - quad.erosion.w) * uv.x;
+    let e = clamp(near + (far - near) * uv.y, 0.0, 1.0);
+    let left = 1.0 - e;
+    if quad.mist > 0.0 {
+        let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;
+        return Matter(MIST_OF_CELLS * left, shift, quad.mist * 255.0, MIST_RHO * left, left);
+    }
+    return Matter(1.0, e * -65535.0, 0.0, 0.0, left);
+}
+
+fn matter_rho(code: u32, matter: Matter) -> f32 {
+    if ERODED {
+        return max(f32(code) * matter.scale + matter.shift, 0.0);
+    }
+    return f32(code);
+}
+
+fn is_mist(view: View) -> bool {
+    return ERODED && view.matter.mist > 0.0;
+}
+
+// 255·Ψ of strands, or of mist.
+fn psi_of(view: View, k_d: f32, k_s: f32, v: vec3<f32>, l_v: vec3<f32>, t_dot_e: f32, sin2_e: f32, inverse_q: f32) -> f32 {
+    let strands = psi(view.p, k_d, k_s, v, l_v, t_dot_e, sin2_e, inverse_q);
+    return select(strands, view.matter.mist, is_mist(view));
+}
+
+// From the middle of a cell to where the light ray leaves the slab, as through even mist.
+fn mist_depth(cell: vec3<i32>, direction: vec3<f32>, view: View) -> f32 {
+    let z = f32(cell.z) + 0.5;
+    let way = select(f32(view.layers) - z, z, direction.z < 0.0);
+    let t = way / max(abs(direction.z), 1e-6);
+    let c = abs(direction);
+    let length = select(t, t * (c.x + c.y + c.z), PER_CELL);
+    return view.matter.even * min(length, 1e9) * view.extinction;
+}
