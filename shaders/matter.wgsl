@@ -15,6 +15,7 @@ struct Matter {
     mist: f32,
     // ρ of even mist.
     even: f32,
+    // Share of the mean ρ that is left.
     left: f32,
 }
 
@@ -25,12 +26,12 @@ fn matter_at(quad: Quad, uv: vec2<f32>) -> Matter {
     let near = quad.erosion.x + (quad.erosion.y - quad.erosion.x) * uv.x;
     let far = quad.erosion.w + (quad.erosion.z - quad.erosion.w) * uv.x;
     let e = clamp(near + (far - near) * uv.y, 0.0, 1.0);
-    let left = 1.0 - e;
     if quad.mist > 0.0 {
+        let left = 1.0 - e;
         let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;
         return Matter(MIST_OF_CELLS * left, shift, quad.mist * 255.0, MIST_RHO * left, left);
     }
-    return Matter(1.0, e * -65535.0, 0.0, 0.0, left);
+    return Matter(1.0, e * -65535.0, 0.0, 0.0, (1.0 - e) * (1.0 - 0.383 * e));
 }
 
 fn matter_rho(code: u32, matter: Matter) -> f32 {

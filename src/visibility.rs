@@ -27,7 +27,8 @@ pub const DEPTH_BYTES: u64 = 4;
 /// size of single cells.
 const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 
-/// Where the light volumes do not fit into the budget the angles are doubled so many times: at 8 and 32
+/// Where the light volumes do not fit into the budget the angles are doubled so many times (once more where quads
+/// share light volumes, for else there would be no picture): at 8 and 32
 /// degrees shadows in the middle of a patch are seen double.
 const DOUBLINGS: i32 = 3;
 
@@ -94,7 +95,7 @@ impl LightVolumes {
         let mut need = 0;
         // Sheets of many small quads: only where each cannot have its own do they share light volumes.
         for shared in [false, true] {
-            for doubling in 0..=DOUBLINGS {
+            for doubling in 0..=DOUBLINGS + i32::from(shared) {
                 let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
                 let same = if shared { angles[0] as f32 } else { SAME_DIRECTION };
                 let volumes = LightVolumes::at_angles(scene, size, angles, same);

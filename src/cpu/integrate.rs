@@ -53,8 +53,9 @@ pub struct Traced {
 pub trait Observer {
     /// The ray meets a sheet: what follows is of this one, until the next.
     fn sheet(&mut self) {}
-    /// The ray is in a cell, empty or not, and has `transmittance` left.
-    fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _transmittance: f32) {}
+    /// The ray is in a cell, empty or not, of which the sheet leaves or makes `rho` before α, and has
+    /// `transmittance` left.
+    fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _rho: f32, _transmittance: f32) {}
     /// The cell sends this much of the ambient light to the eye.
     fn ambient(&mut self, _radiance: Vec3) {}
     /// The cell sees the next of the scene's lights by `_visibility` (V), and sends this much of it to
@@ -269,8 +270,8 @@ impl<'a> Integrator<'a> {
             }
             walked[0] += 1;
             let cell = self.cell(crossing.cell);
-            observer.enter(&crossing, cell, transmittance);
             let rho = matter.rho(cell.rho_code());
+            observer.enter(&crossing, cell, rho / 65535.0, transmittance);
             if rho <= 0.0 {
                 continue;
             }

@@ -131,6 +131,10 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let size = ["image.width=200", "image.height=200"];
     let near = ["lights.key.kind=point", "lights.key.position=[0.3,0.4,1.2]", "lights.key.intensity=2"];
     let cell = ["trace.attenuation=per-cell", "trace.tau=0.3"];
+    let keys = ["main.edge", "main.breakup", "main.fade", "leap.edge", "leap.breakup"];
+    let more = ["thread.edge", "thread.breakup", "far.edge", "far.breakup"];
+    let whole: Vec<String> = keys.iter().chain(&more).map(|key| format!("sheets.{key}=0")).collect();
+    let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
     // A directional light on a parallelogram is exact but for rounding. Under a point light half the quad's width
     // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
     for (preset, more, allowed) in [
@@ -138,7 +142,9 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
         ("front", &cell[..], 1e-4),
         ("front", &near[..], 0.06),
         ("fig5", &[][..], 0.02),
-        ("waterfall", &[][..], 0.02),
+        ("waterfall", &whole[..], 0.02),
+        // Of eroded water depths are lessened in the mean over cells, not cell by cell.
+        ("waterfall", &[][..], 0.05),
     ] {
         let sets: Vec<&str> = size.iter().chain(more).copied().collect();
         let [march, cached, none] = ["march", "cached", "none"].map(|visibility| {
