@@ -68,7 +68,15 @@ struct Quad {
     e: vec2<f32>,
     f: vec2<f32>,
     g: vec2<f32>,
-    pad_g: vec2<f32>,
+    // Where in the texture corner A is, copies of the volume.
+    offset: vec2<f32>,
+    // e at A, B, C and D.
+    erosion: vec4<f32>,
+    // Ψ of droplets in place of the cells', if above 0.
+    mist: f32,
+    pad_a: f32,
+    pad_b: f32,
+    pad_c: f32,
 }
 
 // The part of the window that one submission works on.

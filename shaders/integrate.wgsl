@@ -99,6 +99,8 @@ struct View {
     // The model's constants, where they are asked for.
     strand: Strand,
     similarity: Similarity,
+    // What the sheet makes of the cells.
+    matter: Matter,
     // Where the quad's profile begins.
     profile: u32,
     // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
@@ -133,7 +135,8 @@ fn trace(
 
     var view: View;
     view.extinction = frame.extinction;
-    view.depth_bits = frame.extinction * select(jacobian.depth, 1.0, PER_CELL);
+    view.matter = matter_at(quad, hit.xy);
+    view.depth_bits = frame.extinction * view.matter.left * select(jacobian.depth, 1.0, PER_CELL);
     view.early_end = frame.early_end;
     view.p = frame.p;
     view.max_cells = frame.max_cells;
@@ -207,7 +210,7 @@ fn trace(
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
-    let empty = (textureLoad(volume, (*walk).cell).x & 0xffffu) == 0u;
+    let empty = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, view.matter) == 0.0;
     let on = *seeking & empty & !(*ray).done;
     (*ray).cells += select(0u, 1u, on);
     (*ray).t = select((*ray).t, walk_exit(*walk), on);
@@ -220,42 +223,42 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let texel = textureLoad(volume, (*walk).cell);
     let t_exit = walk_exit(*walk);
-    let rho = f32(select(texel.x & 0xffffu, 0u, (*ray).done));
+    let rho = select(matter_rho(texel.x & 0xffffu, view.matter), 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
     if !PER_CELL {
         tau_bits *= t_exit - (*ray).t;
     }
     let passed = (*ray).transmittance * exp2(-tau_bits);
 
-    var matter: Matter;
-    matter.cell = (*walk).cell;
-    matter.occupied = rho > 0.0;
-    matter.tau_bits = tau_bits;
-    matter.weight = (*ray).transmittance - passed;
-    matter.k_d = f32((texel.x >> 16u) & 0xffu);
-    matter.k_s = f32(texel.x >> 24u);
+    var seen: Seen;
+    seen.cell = (*walk).cell;
+    seen.occupied = rho > 0.0;
+    seen.tau_bits = tau_bits;
+    seen.weight = (*ray).transmittance - passed;
+    seen.k_d = f32((texel.x >> 16u) & 0xffu);
+    seen.k_s = f32(texel.x >> 24u);
     let v = v_code(texel.y);
     let m = view.metric;
     let q = (m.x * v.x + m.y * v.y) * v.x + m.z * v.y * v.y + m.w * v.z * v.z;
     let inverse_q = 1.0 / max(q, 1e-30);
-    matter.v = v;
-    matter.t_dot_e = dot3(v, view.e_v);
-    matter.sin2_e = max(1.0 - matter.t_dot_e * matter.t_dot_e * inverse_q, 0.0);
-    matter.inverse_q = inverse_q;
+    seen.v = v;
+    seen.t_dot_e = dot3(v, view.e_v);
+    seen.sin2_e = max(1.0 - seen.t_dot_e * seen.t_dot_e * inverse_q, 0.0);
+    seen.inverse_q = inverse_q;
     if LIGHTS == 1u && in_colour() {
-        (*ray).light += lit_in_colour(matter, view.light, view, ray);
+        (*ray).light += lit_in_colour(seen, view.light, view, ray);
     } else if LIGHTS == 1u {
-        (*ray).light.x += lit(matter, view.light, view, ray);
+        (*ray).light.x += lit(seen, view.light, view, ray);
     } else if LIGHTS > 1u {
         // What a light is to the ray is worked out again in every cell: arrays indexed in a loop become trees of
         // selects on software Vulkan, which take seconds to compile.
-        if matter.occupied {
+        if seen.occupied {
             for (var i = 0u; i < view.lights; i++) {
                 let light = ray_light(i, view.place, view.size, view.lights);
                 if in_colour() {
-                    (*ray).light += light.intensity * lit_in_colour(matter, light, view, ray);
+                    (*ray).light += light.intensity * lit_in_colour(seen, light, view, ray);
                 } else {
-                    (*ray).light += light.intensity * (lit(matter, light, view, ray) * (1.0 / 255.0));
+                    (*ray).light += light.intensity * (lit(seen, light, view, ray) * (1.0 / 255.0));
                 }
             }
         }

@@ -42,7 +42,7 @@ struct Place {
 }
 
 // What a cell is to every light.
-struct Matter {
+struct Seen {
     cell: vec3<i32>,
     occupied: bool,
     tau_bits: f32,
@@ -112,41 +112,55 @@ fn light_places_of(entry: u32, uv: vec2<f32>) -> LightPlaces {
     return out;
 }
 
+fn is_mist(view: View) -> bool {
+    return ERODED && view.matter.mist > 0.0;
+}
+
+// 255·Ψ of strands, or of mist.
+fn psi_of(seen: Seen, l_v: vec3<f32>, view: View) -> f32 {
+    let strands = psi(view.p, seen.k_d, seen.k_s, seen.v, l_v, seen.t_dot_e, seen.sin2_e, seen.inverse_q);
+    return select(strands, view.matter.mist, is_mist(view));
+}
+
 // What a cell sends to the eye of a light of intensity 1, in 255ths.
-fn lit(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
-    let fibre = psi(view.p, matter.k_d, matter.k_s, matter.v, light.l_v, matter.t_dot_e, matter.sin2_e, matter.inverse_q);
-    return matter.weight * fibre * visibility_of(matter, light, view, ray).x;
+fn lit(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
+    let fibre = psi_of(seen, light.l_v, view);
+    return seen.weight * fibre * visibility_of(seen, light, view, ray).x;
 }
 
 // The same where it has a colour: strands, or light scattered more than once.
-fn lit_in_colour(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
-    let visibility = visibility_of(matter, light, view, ray);
-    let seen = matter.weight * visibility.x;
+fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
+    let visibility = visibility_of(seen, light, view, ray);
+    let weight = seen.weight * visibility.x;
     var lit: vec3<f32>;
-    if STRAND {
-        let root = sqrt(matter.inverse_q);
-        let t_dot_l = dot3(matter.v, light.l_v) * root;
-        let t_dot_e = matter.t_dot_e * root;
-        let k_d = matter.k_d;
-        lit = seen * strand_psi(strand_table, linear, view.strand, k_d, matter.k_s, t_dot_l, t_dot_e, light.l_dot_e);
+    if STRAND && !is_mist(view) {
+        let root = sqrt(seen.inverse_q);
+        let t_dot_l = dot3(seen.v, light.l_v) * root;
+        let t_dot_e = seen.t_dot_e * root;
+        let k_d = seen.k_d;
+        lit = weight * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot_l, t_dot_e, light.l_dot_e);
     } else {
-        let fibre = psi(view.p, matter.k_d, matter.k_s, matter.v, light.l_v, matter.t_dot_e, matter.sin2_e, matter.inverse_q);
-        lit = vec3<f32>(seen * fibre * (1.0 / 255.0));
+        let fibre = psi_of(seen, light.l_v, view);
+        lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
     }
     if MULTIPLE {
-        let z = u32(matter.cell.z) + view.profile;
+        let z = u32(seen.cell.z) + view.profile;
         let diffuse = scatter_diffuse(profiles[light.row.near + z].rgb, profiles[light.row.far + z].rgb, light.row);
-        lit += scatter_multiple(view.similarity, light.peak, diffuse, (*ray).depth, matter.tau_bits, visibility.y);
+        lit += scatter_multiple(view.similarity, light.peak, diffuse, (*ray).depth, seen.tau_bits, visibility.y);
     }
     return lit;
 }
 
 // V_i(k); and −log₂ of it, which is 0 where codes are kept.
-fn visibility_of(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
+fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
     var depth = 0.0;
+    if (MARCH | CACHED) && is_mist(view) {
+        depth = select(0.0, mist_depth(seen.cell.z, light.l_cell, view), seen.occupied);
+        return vec2<f32>(exp2(-depth), depth);
+    }
     if MARCH {
-        if matter.occupied {
-            let walked = optical_depth(volume, view.size, matter.cell, light.l_cell, view.max_cells);
+        if seen.occupied {
+            let walked = optical_depth(volume, view.size, view.matter, seen.cell, light.l_cell, view.max_cells);
             (*ray).light_cells += walked.cells;
             (*ray).cut |= !walked.done;
             depth = walked.depth * view.extinction;
@@ -155,13 +169,17 @@ fn visibility_of(matter: Matter, light: RayLight, view: View, ray: ptr<function,
     if CACHED {
         var code = 0.0;
         // Light volumes of many patches are larger than caches: empty cells need not ask for theirs.
-        if matter.occupied {
-            let kept = kept_of(matter.cell, light.places);
+        if seen.occupied {
+            let kept = kept_of(seen.cell, light.places);
             code = kept;
             depth = kept * view.depth_bits;
         }
         if CODES {
-            return vec2<f32>(code * code * (1.0 / 65025.0), 0.0);
+            let transmittance = code * code * (1.0 / 65025.0);
+            if ERODED {
+                return vec2<f32>(exp2(view.matter.left * log2(max(transmittance, 1e-9))), 0.0);
+            }
+            return vec2<f32>(transmittance, 0.0);
         }
     }
     return vec2<f32>(exp2(-depth), depth);
@@ -183,4 +201,14 @@ fn kept_at(cell: vec3<i32>, place: vec3<i32>) -> f32 {
         return code_in_word(textureLoad(light_volumes, vec3<i32>(cell.xy, cell.z >> 2u) + place).x, cell.z);
     }
     return bitcast<f32>(textureLoad(light_volumes, cell + place).x);
+}
+
+// From the middle of a cell in layer `layer` to where the light ray leaves the slab, as through even mist.
+fn mist_depth(layer: i32, direction: vec3<f32>, view: View) -> f32 {
+    let z = f32(layer) + 0.5;
+    let way = select(f32(view.size.z) - z, z, direction.z < 0.0);
+    let t = way / max(abs(direction.z), 1e-6);
+    let c = abs(direction);
+    let length = select(t, t * (c.x + c.y + c.z), PER_CELL);
+    return view.matter.even * min(length, 1e9) * view.extinction;
 }

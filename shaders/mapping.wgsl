@@ -46,7 +46,8 @@ fn view_in_plane(quad: Quad, side: f32, d_world: vec3<f32>) -> vec3<f32> {
 // Where on the face z = 0 the walk begins, inside the tile: the volume has moved by `flow_cells` along y.
 fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> vec3<f32> {
     let cells = vec2<f32>(size.xy);
-    let xy = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) * cells - vec2<f32>(0.0, flow_cells);
+    let copies = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) + quad.offset;
+    let xy = copies * cells - vec2<f32>(0.0, flow_cells);
     return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
 }
 

@@ -16,6 +16,7 @@ struct LightWalk {
 fn optical_depth(
     volume: texture_storage_3d<rg32uint, read>,
     size: vec3<i32>,
+    matter: Matter,
     cell: vec3<i32>,
     direction: vec3<f32>,
     max_cells: u32,
@@ -23,23 +24,24 @@ fn optical_depth(
     var ray: LightWalk;
     var walk = walk_new(size, vec3<f32>(cell) + 0.5, direction);
     while !ray.done {
-        pass_cell(volume, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
     }
     return ray;
 }
 
 fn pass_cell(
     volume: texture_storage_3d<rg32uint, read>,
+    matter: Matter,
     walk: ptr<function, Walk>,
     ray: ptr<function, LightWalk>,
     layers: i32,
     max_cells: u32,
 ) {
     let t_exit = walk_exit(*walk);
-    let rho = f32(textureLoad(volume, (*walk).cell).x & 0xffffu);
+    let rho = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, matter);
     if PER_CELL {
         // The cell itself does not hide its own light.
         (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));

@@ -36,13 +36,15 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     let x = i32(index % u32(size.x));
     let y = i32((index % of_slice) / u32(size.x));
     let column = i32(index / of_slice);
+    // Sheets of one volume share a light volume, whatever they make of it.
+    let whole = Matter(1.0, 0.0, 0.0, 0.0, 1.0);
     var word = 0u;
     for (var i = 0; i < CELLS_A_WORD; i++) {
         let cell = vec3<i32>(x, y, column * CELLS_A_WORD + i);
         if cell.z >= size.z || (textureLoad(volume, cell).x & 0xffffu) == 0u {
             continue;
         }
-        let depth = optical_depth(volume, size, cell, direction, max_cells).depth;
+        let depth = optical_depth(volume, size, whole, cell, direction, max_cells).depth;
         if CODES {
             word |= transmittance_code(depth * light_volume.bits) << u32(8 * i);
         } else {

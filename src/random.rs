@@ -16,6 +16,12 @@ pub enum Stream {
     Cell = 2,
     /// Height and albedo of one vertex of a rock mesh; index: its place in the finest grid.
     Rock = 3,
+    /// The parent curve of a bundle; index: its number.
+    Bundle = 4,
+    /// Which bundle a curve belongs to, and where in it; index: as of [`Stream::Curve`].
+    Child = 5,
+    /// Density along one curve; index: as of [`Stream::Curve`].
+    Strand = 6,
 }
 
 /// A family of generators: one seed and one stream.

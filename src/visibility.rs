@@ -34,7 +34,8 @@ const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 /// all its loops 65535 turns.
 const MOST_CELLS: u32 = 65_000;
 
-/// Where the light volumes do not fit into the budget the angles are doubled so many times: at 8 and 32
+/// Where the light volumes do not fit into the budget the angles are doubled so many times (once more where quads
+/// share light volumes, for else there would be no picture): at 8 and 32
 /// degrees shadows in the middle of a patch are seen double.
 const DOUBLINGS: i32 = 3;
 
@@ -125,12 +126,16 @@ impl LightVolumes {
     /// more than `budget` bytes.
     pub fn new(scene: &Scene, size: [u32; 3], alpha: f32, budget: u64) -> Result<Self> {
         let mut need = 0;
-        for doubling in 0..=DOUBLINGS {
-            let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
-            let volumes = LightVolumes::at_angles(scene, size, alpha, angles);
-            need = volumes.bytes(size);
-            if need <= u128::from(budget) {
-                return Ok(volumes);
+        // Sheets of many small quads: only where each cannot have its own do they share light volumes.
+        for shared in [false, true] {
+            for doubling in 0..=DOUBLINGS + i32::from(shared) {
+                let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
+                let same = if shared { angles[0] as f32 } else { SAME_DIRECTION };
+                let volumes = LightVolumes::at_angles(scene, size, alpha, angles, same);
+                need = volumes.bytes(size);
+                if need <= u128::from(budget) {
+                    return Ok(volumes);
+                }
             }
         }
         Err(Error::memory(
@@ -164,7 +169,8 @@ impl LightVolumes {
         self.patches.iter().any(|patches| patches.cornered)
     }
 
-    fn at_angles(scene: &Scene, size: [u32; 3], alpha: f32, angles: [f64; 2]) -> Self {
+    /// Directions that differ by less than `same` of their length share a light volume.
+    fn at_angles(scene: &Scene, size: [u32; 3], alpha: f32, angles: [f64; 2], same: f32) -> Self {
         let mut medium = Medium::of(scene);
         medium.max_cells = medium.max_cells.min(MOST_CELLS);
         let form = match scene.scattering {
@@ -174,7 +180,7 @@ impl LightVolumes {
         let mut volumes: Vec<LightVolume> = Vec::new();
         let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
         let mut number = |direction: Vec3, bits: f32| {
-            let step = SAME_DIRECTION * direction.length().max(1e-30);
+            let step = same * direction.length().max(1e-30);
             // The step is a power of two, so that equal directions fall into equal squares.
             let step = step.log2().floor().exp2();
             let key = (direction.to_array().map(|x| (x / step).round() as i64), bits.to_bits());
@@ -193,6 +199,12 @@ impl LightVolumes {
             };
             let side_seen = if quad_seen_from_behind(quad, scene.camera.eye) { -1.0 } else { 1.0 };
             for light in &lights {
+                if quad.mist > 0.0 {
+                    // Its light is not asked for.
+                    patches.push(Patches { first: numbers.len() as u32, count: [1, 1], cornered: false });
+                    numbers.push(0);
+                    continue;
+                }
                 let at = |u: f32, v: f32| direction(quad, light, side_seen, size, Vec2::new(u, v));
                 let (count, cornered) = cut(&at, angles);
                 patches.push(Patches { first: numbers.len() as u32, count, cornered });
@@ -203,6 +215,9 @@ impl LightVolumes {
                     numbers.push(number(at(place(i, count[0]), place(j, count[1])), bits));
                 }
             }
+        }
+        if volumes.is_empty() && !numbers.is_empty() {
+            volumes.push(LightVolume { direction: Vec3::Z, bits: 1.0 });
         }
         LightVolumes { volumes, numbers, patches, lights: lights.len(), medium, form }
     }

@@ -3,6 +3,7 @@
 use glam::{IVec3, UVec2, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
+use super::matter::Matter;
 use super::visibility::{Filled, KeptVolumes, number, optical_depth};
 use crate::camera::sample_offset;
 use crate::error::Result;
@@ -53,8 +54,9 @@ pub struct Traced {
 pub trait Observer {
     /// The ray meets a sheet: what follows is of this one, until the next.
     fn sheet(&mut self) {}
-    /// The ray is in a cell, empty or not, and has `transmittance` left.
-    fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _transmittance: f32) {}
+    /// The ray is in a cell, empty or not, of which the sheet leaves or makes `rho` before α, and has
+    /// `transmittance` left.
+    fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _rho: f32, _transmittance: f32) {}
     /// The cell sends this much of the ambient light to the eye.
     fn ambient(&mut self, _radiance: Vec3) {}
     /// The cell sees the next of the scene's lights by `_visibility` (V), and sends this much of it to
@@ -223,7 +225,9 @@ impl<'a> Integrator<'a> {
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
         let point = scene.camera.eye + d_world * hit[2];
-        let depth_bits = self.extinction * if self.per_cell { 1.0 } else { frame.depth };
+        let matter = Matter::new(quad, Vec2::new(hit[0], hit[1]));
+        // What is left of light volumes' ρ, in the mean over the cells that count.
+        let depth_bits = self.extinction * matter.left * if self.per_cell { 1.0 } else { frame.depth };
         let mut lights: Vec<RayLight> = self
             .lights
             .iter()
@@ -252,9 +256,9 @@ impl<'a> Integrator<'a> {
             })
             .collect();
 
-        let x = hit[0] * quad.material.repeat_u * cells.x;
+        let x = (hit[0] * quad.material.repeat_u + quad.offset.x) * cells.x;
         // Where the volume has moved down, what is met lies further up in it.
-        let y = hit[1] * quad.material.repeat_v * cells.y - self.flow_cells;
+        let y = (hit[1] * quad.material.repeat_v + quad.offset.y) * cells.y - self.flow_cells;
         let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
         let mut transmittance = before;
         let mut depth = -before.max(1e-30).log2();
@@ -268,11 +272,12 @@ impl<'a> Integrator<'a> {
             }
             walked[0] += 1;
             let cell = self.cell(crossing.cell);
-            observer.enter(&crossing, cell, transmittance);
-            if cell.rho_code() == 0 {
+            let rho = matter.rho(cell.rho_code());
+            observer.enter(&crossing, cell, rho / 65535.0, transmittance);
+            if rho <= 0.0 {
                 continue;
             }
-            let mut tau_bits = cell.rho_code() as f32 * self.extinction;
+            let mut tau_bits = rho * self.extinction;
             if !self.per_cell {
                 tau_bits *= crossing.t_exit - crossing.t_enter;
             }
@@ -288,8 +293,11 @@ impl<'a> Integrator<'a> {
             for light in &mut lights {
                 let t_dot_l = v.dot(light.l_v);
                 let (seen, light_depth) =
-                    self.visibility_of(crossing.cell, light, depth_bits, &mut walked[1]);
+                    self.visibility_of(crossing.cell, light, &matter, depth_bits, &mut walked[1]);
                 let fibre = || {
+                    if matter.mist > 0.0 {
+                        return matter.mist;
+                    }
                     let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
                     k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p)
                 };
@@ -300,11 +308,11 @@ impl<'a> Integrator<'a> {
                     continue;
                 }
                 let mut lit = match &self.strand {
-                    Some(strand) => {
+                    Some(strand) if matter.mist == 0.0 => {
                         let [k_d, k_s] = [k_d, k_s].map(|k| k as f32);
                         strand.psi(k_d, k_s, t_dot_l * root, t_dot_e * root, light.l_dot_e) * (weight * seen)
                     }
-                    None => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
+                    _ => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
                 };
                 if let Some(media) = &self.media {
                     let profile = &media.profiles[self.profile_of_quad[quad_number] as usize];
@@ -329,16 +337,30 @@ impl<'a> Integrator<'a> {
     }
 
     /// V_i(k); and −log₂ of it, which is 0 where codes are kept.
-    fn visibility_of(&self, cell: IVec3, light: &RayLight, depth_bits: f32, walked: &mut u32) -> (f32, f32) {
+    fn visibility_of(
+        &self,
+        cell: IVec3,
+        light: &RayLight,
+        matter: &Matter,
+        depth_bits: f32,
+        walked: &mut u32,
+    ) -> (f32, f32) {
         let depth = match self.scene.visibility {
             Visibility::None => 0.0,
+            _ if matter.mist > 0.0 => {
+                matter.depth(cell.z, light.l_cell, self.size.z, self.per_cell) * self.extinction
+            }
             Visibility::March => {
-                optical_depth(self.volume, cell, light.l_cell, self.medium, walked) * self.extinction
+                optical_depth(self.volume, matter, cell, light.l_cell, self.medium, walked) * self.extinction
             }
             Visibility::Cached => {
                 let kept = self.kept_of(cell, &light.places);
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
-                    return (kept * kept * (1.0 / 65025.0), 0.0);
+                    let transmittance = kept * kept * (1.0 / 65025.0);
+                    if matter.left < 1.0 {
+                        return ((matter.left * transmittance.max(1e-9).log2()).exp2(), 0.0);
+                    }
+                    return (transmittance, 0.0);
                 }
                 kept * depth_bits
             }

@@ -3,6 +3,7 @@
 
 pub mod gbuffer;
 pub mod integrate;
+mod matter;
 pub mod ray;
 pub mod resolve;
 pub mod visibility;
@@ -13,6 +14,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+pub use matter::{MIST_OF_CELLS, MIST_RHO, Matter};
 pub use visibility::KeptVolumes;
 
 use crate::error::Result;

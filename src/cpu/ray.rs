@@ -75,7 +75,7 @@ pub struct RayStep {
     pub enter_m: f32,
     /// Metres along the ray from its face to where it leaves the cell.
     pub exit_m: f32,
-    /// α·ρ, as in a volume file.
+    /// α·ρ, as in a volume file but for what the sheet erodes, or is mist.
     pub rho: f32,
     /// Direction of the flow, unit; zero where there is none.
     pub v: Vec3,
@@ -139,14 +139,14 @@ impl Observer for Recorder {
         self.faces += 1;
     }
 
-    fn enter(&mut self, crossing: &Crossing, cell: Cell, transmittance: f32) {
+    fn enter(&mut self, crossing: &Crossing, cell: Cell, rho: f32, transmittance: f32) {
         let (k_d, k_s) = cell.k();
         self.steps.push(RayStep {
             face: self.faces - 1,
             cell: crossing.cell.as_uvec3().to_array(),
             enter_m: crossing.t_enter,
             exit_m: crossing.t_exit,
-            rho: cell.rho() * self.alpha,
+            rho: rho * self.alpha,
             v: cell.v(),
             k_d,
             k_s,

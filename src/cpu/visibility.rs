@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
+use super::matter::Matter;
 use crate::error::Result;
 use crate::job::Monitor;
 use crate::visibility::{Form, LightVolume, LightVolumes, Medium, transmittance_code};
@@ -71,7 +72,7 @@ impl KeptVolumes {
                     Numbers::Codes(filled(volume, |cell| code(volume, cell, light_volume, plan.medium)))
                 }
                 Form::Depths => Numbers::Depths(filled(volume, |cell| {
-                    optical_depth(volume, cell, light_volume.direction, plan.medium, &mut 0)
+                    optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, plan.medium, &mut 0)
                 })),
             });
         }
@@ -96,7 +97,7 @@ fn filled<T: Copy + Default + Send>(volume: &VolumeTexture, of: impl Fn(IVec3) -
 }
 
 fn code(volume: &VolumeTexture, cell: IVec3, light_volume: &LightVolume, medium: Medium) -> u8 {
-    let depth = optical_depth(volume, cell, light_volume.direction, medium, &mut 0);
+    let depth = optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, &mut 0);
     transmittance_code(depth * light_volume.bits)
 }
 
@@ -110,14 +111,15 @@ pub fn number(
 ) -> f32 {
     match form {
         Form::Codes => code(volume, cell, light_volume, medium).into(),
-        Form::Depths => optical_depth(volume, cell, light_volume.direction, medium, &mut 0),
+        Form::Depths => optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, &mut 0),
     }
 }
 
 /// From the middle of `start` to where the light ray leaves the slab: Σ ρ code × length, in units of
-/// `direction`, or Σ ρ code over the cells but the first. `walked` grows by the cells of the way.
+/// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. `walked` grows by the cells of the way.
 pub fn optical_depth(
     volume: &VolumeTexture,
+    matter: &Matter,
     start: IVec3,
     direction: Vec3,
     medium: Medium,
@@ -132,7 +134,7 @@ pub fn optical_depth(
         }
         *walked += 1;
         let c = crossing.cell.as_uvec3();
-        let rho = volume.cells[volume.index(c.x, c.y, c.z)].rho_code() as f32;
+        let rho = matter.rho(volume.cells[volume.index(c.x, c.y, c.z)].rho_code());
         if medium.per_cell {
             // The cell itself does not hide its own light.
             depth += if n == 0 { 0.0 } else { rho };

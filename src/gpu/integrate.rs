@@ -17,15 +17,20 @@ const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
 
-/// The parts of the stage's shader: the walk, its lights, and a pixel's sheets, where there may be `many` or one.
+/// The parts of the stage's shader: what sheets make of the cells, walks, lights, and a pixel's sheets, where there may be `many` or one.
 pub fn source(many: bool) -> String {
     let sheets = match many {
         false => include_str!("../../shaders/integrate_one.wgsl"),
         true => include_str!("../../shaders/integrate_many.wgsl"),
     };
-    let walks =
-        [include_str!("../../shaders/optical_depth.wgsl"), include_str!("../../shaders/integrate.wgsl")];
-    [walks[0], walks[1], include_str!("../../shaders/integrate_light.wgsl"), sheets].join("\n")
+    [
+        include_str!("../../shaders/matter.wgsl"),
+        include_str!("../../shaders/optical_depth.wgsl"),
+        include_str!("../../shaders/integrate.wgsl"),
+        include_str!("../../shaders/integrate_light.wgsl"),
+        sheets,
+    ]
+    .join("\n")
 }
 
 /// What the pipeline is specialised to (`override` constants of the shader).
@@ -40,6 +45,7 @@ pub struct Variant {
     cornered: bool,
     strand: bool,
     multiple: bool,
+    eroded: bool,
     many: bool,
     exponent: u32,
 }
@@ -57,6 +63,7 @@ impl Variant {
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
+            eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -158,6 +165,7 @@ impl Integrate {
             ("CORNERED", number(variant.cornered)),
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
+            ("ERODED", number(variant.eroded)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants)

@@ -83,7 +83,12 @@ pub struct Quad {
     pub e: [f32; 2],
     pub f: [f32; 2],
     pub g: [f32; 2],
-    pub pad_g: [f32; 2],
+    pub offset: [f32; 2],
+    pub erosion: [f32; 4],
+    pub mist: f32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
 }
 
 /// The light volume that one submission fills, or a part of it.
@@ -325,7 +330,12 @@ impl Quad {
             e: map.e.to_array(),
             f: map.f.to_array(),
             g: map.g.to_array(),
-            pad_g: [0.0; 2],
+            offset: quad.offset.to_array(),
+            erosion: quad.erosion,
+            mist: quad.mist,
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
         }
     }
 }

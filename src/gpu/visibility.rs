@@ -14,8 +14,12 @@ use crate::volume::{Cell, VolumeTexture};
 
 /// The text of the stage's own shader.
 pub fn source() -> String {
-    [include_str!("../../shaders/optical_depth.wgsl"), include_str!("../../shaders/visibility.wgsl")]
-        .join("\n")
+    [
+        include_str!("../../shaders/matter.wgsl"),
+        include_str!("../../shaders/optical_depth.wgsl"),
+        include_str!("../../shaders/visibility.wgsl"),
+    ]
+    .join("\n")
 }
 
 /// Columns of the first submission, and most of any: its time is learned as for tiles.

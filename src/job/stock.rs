@@ -7,7 +7,7 @@ use std::time::SystemTime;
 use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::{Cost, Scene};
-use crate::volume::{VolumeTexture, WaterSpec, set_density_and_reflection};
+use crate::volume::{Structure, VolumeTexture, WaterSpec, set_density_and_reflection};
 
 /// Keeps one volume texture.
 #[derive(Default)]
@@ -66,5 +66,7 @@ impl VolumeStock {
 
 /// Whether the two only differ in what [`set_density_and_reflection`] does, or in α.
 fn same_curves(a: &WaterSpec, b: &WaterSpec) -> bool {
-    WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, ..*a } == *b
+    let structure = Structure { crest: b.structure.crest, ..a.structure };
+    WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, structure, ..*a } == *b
+        && a.density_is_of_cells()
 }

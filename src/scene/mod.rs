@@ -8,6 +8,7 @@ mod preset;
 mod print;
 mod read;
 mod rock;
+mod sheet;
 mod types;
 mod value;
 
@@ -21,6 +22,7 @@ pub use parts::resolve;
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
+pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
     AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Quad, Reflection, Scattering, Tone,
     Trace, Visibility,
@@ -127,6 +129,7 @@ impl Scene {
                 sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
                 levels,
             },
+            structure: parts::structure(v),
             seed: v.int("volume.seed") as u64,
             alpha: v.float("volume.alpha"),
             k_d: v.float("volume.k_d"),
@@ -138,7 +141,7 @@ impl Scene {
             file => Some(parts::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
         };
         if volume_file.is_none() {
-            crate::volume::check_budget(size, limits.memory)?;
+            crate::volume::check_budget(size, water.strand_bytes(), limits.memory)?;
             let curves = water.across as u128 * water.deep as u128;
             let points = curves << levels;
             if points > 1 << 36 {

@@ -129,6 +129,15 @@ impl Scene {
                     "levels": self.water.shape.levels,
                     "sigma_g_cells": self.water.shape.sigma_g_cells,
                 },
+                "quads": self.quads.iter().map(|quad| json!({
+                    "corners": quad.corners.map(|c| c.to_array()),
+                    "thickness": quad.material.thickness_m,
+                    // Copies of the volume before its corner A, and on it.
+                    "offset": quad.offset.to_array(),
+                    "extent": [quad.material.repeat_u, quad.material.repeat_v],
+                    "erosion": quad.erosion,
+                    "mist": quad.mist,
+                })).collect::<Vec<_>>(),
                 "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
                 "camera": {
                     "eye": camera.eye.to_array(),

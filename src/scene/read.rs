@@ -22,7 +22,7 @@ pub const VERSION: i64 = 1;
 const TRACKS: &str = "animate.tracks";
 
 /// The sections whose second key part is a name the scene chooses.
-const NAMED: [&str; 3] = ["lights", "materials", "rocks"];
+const NAMED: [&str; 4] = ["lights", "materials", "rocks", "sheets"];
 
 /// A scene as text, with its name and the folder its references resolve in.
 pub struct Source {
@@ -228,6 +228,7 @@ impl File<'_> {
         let key = match section {
             "lights" => format!("{path}.kind"),
             "materials" => format!("{path}.thickness"),
+            "sheets" => format!("{path}.points"),
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
@@ -318,7 +319,9 @@ pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (Strin
     }
     let mut names = values.names(section);
     if section == "materials" {
-        names.extend(values.names("quads").iter().map(|q| values.text(&format!("quads.{q}.material"))));
+        for user in ["quads", "sheets"] {
+            names.extend(values.names(user).iter().map(|n| values.text(&format!("{user}.{n}.material"))));
+        }
     }
     if names.iter().any(|n| n == name) {
         return Ok(());

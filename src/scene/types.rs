@@ -1,9 +1,9 @@
 //! What a scene is made of.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::error::Result;
-use crate::mapping::{Material, QuadMap};
+use crate::mapping::{Material, QuadFault, QuadMap};
 use crate::strand::StrandParams;
 
 /// A quad with its material.
@@ -15,6 +15,23 @@ pub struct Quad {
     pub map: QuadMap,
     /// How the volume lies on it.
     pub material: Material,
+    /// Where in the texture A is, copies of the volume along u and v.
+    pub offset: Vec2,
+    /// e at A, B, C and D, bilinear between: of ρ max(ρ − e, 0) is left.
+    pub erosion: [f32; 4],
+    /// Ψ of droplets that have no direction, in place of the cells'; 0: a quad of cells.
+    pub mist: f32,
+}
+
+impl Quad {
+    /// A quad by itself: with the whole texture, and all of ρ.
+    ///
+    /// # Errors
+    /// Where the corners are those of no quad.
+    pub fn new(corners: [Vec3; 4], material: Material) -> std::result::Result<Quad, QuadFault> {
+        let map = QuadMap::new(corners)?;
+        Ok(Quad { corners, map, material, offset: Vec2::ZERO, erosion: [0.0; 4], mist: 0.0 })
+    }
 }
 
 /// A light.

@@ -142,7 +142,7 @@ impl Reader<'_> {
         if size.contains(&0) {
             return Err(bad(self.path, format!("rho has shape {shape:?}: a volume has at least one cell")));
         }
-        check_budget(size, self.budget)?;
+        check_budget(size, 0, self.budget)?;
         let mut cells = vec![Cell::default(); (nx * ny * nz) as usize];
         self.each("v", Some(&[nz, ny, nx, 3]), |i, v: [f32; 3]| {
             let v = Vec3::from_array(v);

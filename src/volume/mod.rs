@@ -1,12 +1,17 @@
 //! §2 The volume texture: density ρ, flow direction v and reflection coefficients k in every cell.
 
+mod bundle;
 mod cell;
 mod file;
+mod flow;
+mod ripple;
 mod water;
 
+pub use bundle::{Structure, curve_points};
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
-pub use water::{WaterSpec, build_water, curve_points, set_density_and_reflection};
+pub use ripple::Ripple;
+pub use water::{WaterSpec, build_water, set_density_and_reflection};
 
 use std::sync::Arc;
 
@@ -135,9 +140,9 @@ pub struct Statistics {
 }
 
 /// Checks, before anything is allocated, that a volume of `size` cells fits into `budget` bytes.
-/// Building needs the packed cells and one vector per cell.
-pub fn check_budget(size: [u32; 3], budget: u64) -> Result<()> {
-    let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>()) as u128;
+/// Building needs the packed cells and one vector per cell, and `extra` bytes more per cell.
+pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
+    let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>() + extra) as u128;
     let need = size.iter().map(|&n| n as u128).product::<u128>() * per_cell;
     if need > budget as u128 {
         let [nx, ny, nz] = size;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use taki::cpu::integrate::{Integrator, Traced};
-use taki::mapping::{Material, QuadMap};
+use taki::mapping::Material;
 use taki::scene::{Attenuation, Light, Limits, Quad, Scene, Visibility};
 use taki::volume::{Cell, VolumeTexture};
 
@@ -15,7 +15,7 @@ use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 /// The benchmark scene with one quad of our own, no lights, no ambient, every cell walked.
 fn scene(corners: [Vec3; 4], material: Material) -> Scene {
     let mut scene = Scene::load(Path::new("front"), &[], &Limits::default()).unwrap();
-    scene.quads = vec![Quad { corners, map: QuadMap::new(corners).unwrap(), material }];
+    scene.quads = vec![Quad::new(corners, material).unwrap()];
     scene.lights.clear();
     scene.ambient = Vec3::ZERO;
     scene.visibility = Visibility::None;

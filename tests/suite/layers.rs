@@ -11,7 +11,7 @@ use taki::cpu::integrate::{Integrator, Traced};
 use taki::cpu::{self, ray::inspect};
 use taki::frame::Frame;
 use taki::job::Unwatched;
-use taki::mapping::{Material, QuadMap};
+use taki::mapping::Material;
 use taki::overlap;
 use taki::scene::{Attenuation, Light, Mesh, Quad, Scene, Vertex};
 use taki::volume::{Cell, VolumeTexture};
@@ -29,7 +29,7 @@ const DOUBT_M: f64 = 1e-3;
 
 fn quad(corners: [Vec3; 4], thickness_m: f32) -> Quad {
     let material = Material { thickness_m, repeat_u: 1.0, repeat_v: 1.0 };
-    Quad { corners, map: QuadMap::new(corners).expect("a quad"), material }
+    Quad::new(corners, material).expect("a quad")
 }
 
 /// An upright rectangle from x, y to x, y at z.

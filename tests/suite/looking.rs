@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 use taki::curve::CurveShape;
 use taki::job::Unwatched;
-use taki::volume::{Cell, VolumeTexture, WaterSpec, build_water, curve_points};
+use taki::volume::{Cell, Structure, VolumeTexture, WaterSpec, build_water, curve_points};
 use taki::walk::Walk;
 
 fn spec(size: [u32; 3], across: u32, deep: u32) -> WaterSpec {
@@ -17,6 +17,7 @@ fn spec(size: [u32; 3], across: u32, deep: u32) -> WaterSpec {
         across,
         deep,
         shape: CurveShape { h: 0.9, sigma_g_cells: 0.05 * size[1] as f32, levels: 7 },
+        structure: Structure::default(),
         seed: 7,
         alpha: 0.6,
         k_d: 0.5,

@@ -10,6 +10,7 @@ mod closed_forms;
 mod compare;
 mod curve;
 mod environment;
+mod falling;
 mod farm;
 mod faults;
 mod flow;

@@ -21,6 +21,9 @@ kind = \"directional\"
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 [materials.a]
 repeat_u = 2.0
+[sheets.a]
+points = [[0, 1, 0], [0, 0, 1]]
+material = \"a\"
 [[quads]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 material = \"a\"
@@ -79,6 +82,7 @@ fn another(param: &Param) -> String {
         Kind::Text(_) => "some file.npz".into(),
         Kind::Corners => "[[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]".into(),
         Kind::Frames => "[0, 7, 999999999]".into(),
+        Kind::Series if param.key.ends_with("widths") => "[0.25, 3.0]".into(),
         Kind::Series => "[[0.25, -3.0, 10000.0], [1.0, 2.0, 3.0]]".into(),
     }
 }

@@ -21,8 +21,13 @@ const SHARED: [&str; 7] = [
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 /// What some stages are put together from besides.
-const PARTS: [&str; 4] =
-    ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl", "optical_depth.wgsl"];
+const PARTS: [&str; 5] = [
+    "integrate_light.wgsl",
+    "integrate_many.wgsl",
+    "integrate_one.wgsl",
+    "matter.wgsl",
+    "optical_depth.wgsl",
+];
 
 /// All of a stage's shader.
 fn stage(name: &str) -> String {
@@ -103,7 +108,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
-    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g pad_g);
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset erosion mist pad_a pad_b pad_c);
     assert_eq!(members(&module, "Quad"), quad);
     let environment =
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
@@ -136,6 +141,8 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
+    assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::cpu::MIST_OF_CELLS));
+    assert_eq!(constant("MIST_RHO"), f64::from(taki::cpu::MIST_RHO));
     assert_eq!(constant("SINE_SHARE"), taki::strand::table::SINE_SHARE as f64);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::strand::table::SIZE);

@@ -1,7 +1,7 @@
 //! Cached visibility: light volumes say what an exact walk from every cell would.
 
 use glam::{IVec3, Vec3};
-use taki::cpu::{self, visibility::optical_depth};
+use taki::cpu::{self, Matter, visibility::optical_depth};
 use taki::frame::Frame;
 use taki::job::Unwatched;
 use taki::scene::{Light, Limits, Scene};
@@ -121,8 +121,14 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
         let volumes = LightVolumes::new(&front, uniform.size, 1.0, u64::MAX).expect("they fit");
         for z in [0, 7, 39] {
             let cell = IVec3::new(3, 5, z);
-            let depth =
-                optical_depth(&uniform, cell, volumes.volumes[0].direction, volumes.medium, &mut 0) / 65535.0;
+            let depth = optical_depth(
+                &uniform,
+                &Matter::WHOLE,
+                cell,
+                volumes.volumes[0].direction,
+                volumes.medium,
+                &mut 0,
+            ) / 65535.0;
             let above = if towards.z > 0.0 { z as f32 + 0.5 } else { 39.5 - z as f32 };
             assert!((depth * cosine / above - 1.0).abs() < 1e-5, "{towards} {z}: {depth}");
         }
@@ -130,7 +136,8 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     // Per cell the cell itself does not hide its own light.
     let medium = Medium { per_cell: true, max_cells: 512 };
     let mut walked = 0;
-    let depth = optical_depth(&uniform, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, &mut walked);
+    let depth =
+        optical_depth(&uniform, &Matter::WHOLE, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, &mut walked);
     assert_eq!((depth, walked), (7.0 * 65535.0, 8));
 }
 
@@ -139,6 +146,10 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let size = ["image.width=200", "image.height=200"];
     let near = ["lights.key.kind=point", "lights.key.position=[0.3,0.4,1.2]", "lights.key.intensity=2"];
     let cell = ["trace.attenuation=per-cell", "trace.tau=0.3"];
+    let keys = ["main.edge", "main.breakup", "main.fade", "leap.edge", "leap.breakup"];
+    let more = ["thread.edge", "thread.breakup", "far.edge", "far.breakup"];
+    let whole: Vec<String> = keys.iter().chain(&more).map(|key| format!("sheets.{key}=0")).collect();
+    let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
     // A directional light on a parallelogram is exact but for the codes: √T in 255ths is T to 0.0039·√T at most and
     // 0.0023·√T in the mean, relative to T more where it is dark, less in the mean of a ray's cells. Under a point light half the quad's width
     // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
@@ -147,7 +158,9 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
         ("front", &cell[..], 2.5e-3),
         ("front", &near[..], 0.06),
         ("fig5", &[][..], 0.02),
-        ("waterfall", &[][..], 0.02),
+        ("waterfall", &whole[..], 0.02),
+        // Of eroded water depths are lessened in the mean over cells, not cell by cell.
+        ("waterfall", &[][..], 0.05),
     ] {
         let sets: Vec<&str> = size.iter().chain(more).copied().collect();
         let [march, cached, none] = ["march", "cached", "none"].map(|visibility| {

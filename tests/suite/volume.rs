@@ -2,6 +2,7 @@
 
 mod cell;
 mod file;
+mod structure;
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,7 +11,7 @@ use rand::RngExt;
 use taki::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use taki::job::Unwatched;
 use taki::random::{Family, Stream};
-use taki::volume::{VolumeTexture, WaterSpec, build_water};
+use taki::volume::{Structure, VolumeTexture, WaterSpec, build_water};
 
 fn spec(size: [u32; 3], grid: u32) -> WaterSpec {
     WaterSpec {
@@ -18,6 +19,7 @@ fn spec(size: [u32; 3], grid: u32) -> WaterSpec {
         across: grid,
         deep: grid,
         shape: CurveShape { h: 0.9, sigma_g_cells: 0.05 * size[1] as f32, levels: levels_for(size[1]) },
+        structure: Structure::default(),
         seed: 7,
         alpha: 1.0,
         k_d: 0.5,

@@ -6,6 +6,7 @@
 mod light;
 mod picture;
 mod place;
+mod sheet;
 mod trace;
 mod water;
 
@@ -99,7 +100,8 @@ const fn p(
 /// The table, in the order of the method.
 pub const PARAMS: &[Param] = &joined();
 
-const SECTIONS: [&[Param]; 5] = [water::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
+const SECTIONS: [&[Param]; 6] =
+    [water::TABLE, sheet::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
 
 const fn count() -> usize {
     let (mut sum, mut section) = (0, 0);

@@ -33,6 +33,14 @@ pub(super) const TABLE: &[Param] = &[
     )
     .slider(0.1, 20.0),
     p(
+        "materials.*.mist",
+        "",
+        "",
+        Float(0.0, 4.0, 0.0),
+        Uniform,
+        "Ψ of droplets without a direction, which fill the volume in place of its strands; 0: a material of strands.",
+    ),
+    p(
         "quads.*.corners",
         "A B C D",
         "m",
