@@ -7,6 +7,7 @@ use super::visibility::{Depths, KeptDepths, optical_depth};
 use crate::camera::sample_offset;
 use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
+use crate::haze::EyeHaze;
 use crate::job::Monitor;
 use crate::mapping::CellFrame;
 use crate::scatter::media::{Media, thicknesses};
@@ -35,6 +36,7 @@ pub struct Integrator<'a> {
     media: Option<Media>,
     /// Number of each quad's profile.
     profile_of_quad: Vec<u32>,
+    haze: EyeHaze,
 }
 
 /// What one ray brings home.
@@ -130,6 +132,7 @@ impl<'a> Integrator<'a> {
             },
             media: (scene.scattering == Scattering::Multiple).then(|| Media::new(scene, volume)),
             profile_of_quad: thicknesses(scene).1,
+            haze: scene.haze.seen_from(scene.camera.eye),
         }
     }
 
@@ -161,6 +164,12 @@ impl<'a> Integrator<'a> {
             if all.transmittance < self.scene.trace.early_end {
                 break;
             }
+        }
+        if self.haze.density != 0.0
+            && let Some((_, [.., t])) = gbuffer.faces(i).next()
+        {
+            let haze = self.haze.transmittance(d.y, t);
+            all.radiance = self.haze.over_water(all.radiance, behind, all.transmittance, haze);
         }
         all
     }

@@ -99,9 +99,10 @@ pub fn render_samples(
     }
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;
+    let resolver = resolve::Resolver::new(&image.look);
     frame.radiance.par_iter_mut().zip(frame.picture.par_iter_mut()).for_each(|(sum, picture)| {
         *sum = sum.map(|x| x * inverse);
-        *picture = resolve::resolve(image, *sum);
+        *picture = resolver.pixel(*sum);
     });
     seconds.resolve = clock.elapsed().as_secs_f64();
     frame.seconds = seconds;

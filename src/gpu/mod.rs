@@ -74,6 +74,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
         include_str!("../../shaders/environment.wgsl"),
+        include_str!("../../shaders/haze.wgsl"),
         include_str!("../../shaders/scatter.wgsl"),
         include_str!("../../shaders/strand.wgsl"),
         stage,
@@ -255,6 +256,7 @@ impl GpuRenderer {
                 found.0
             }
         };
+        let develop = layout::Develop::new(&image.look);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
@@ -307,8 +309,9 @@ impl GpuRenderer {
                 })?;
                 done += wanted.pixels();
             }
+            let uniforms = uniforms(samples.start);
             seconds.resolve +=
-                self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms(samples.start))?;
+                self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms, &develop)?;
             let clock = Instant::now();
             let inverse = 1.0 / samples.len() as f32;
             let range = |row: u32| {

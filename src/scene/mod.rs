@@ -22,14 +22,15 @@ pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
 pub use types::{
-    AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Quad, Reflection, Scattering, Tone,
-    Trace, Visibility,
+    AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Look, Quad, Reflection, Scattering,
+    Tone, Trace, Visibility,
 };
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::curve::{CurveShape, levels_for};
 use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
+use crate::haze::Haze;
 use crate::volume::{VolumeTexture, WaterSpec, read_npz};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
@@ -79,6 +80,8 @@ pub struct Scene {
     pub camera: Camera,
     /// What is seen where nothing is.
     pub background: Background,
+    /// What lies between the eye and everything.
+    pub haze: Haze,
     /// Size, samples and tone.
     pub image: Image,
 }
@@ -152,8 +155,7 @@ impl Scene {
             width: v.count("image.width"),
             height: v.count("image.height"),
             samples: v.count("image.samples"),
-            exposure: v.float("image.exposure"),
-            tone: if v.text("image.tone") == "none" { Tone::None } else { Tone::Filmic },
+            look: parts::look(v),
         };
         image.check_budget(limits.memory)?;
         let camera = parts::camera(v)?;
@@ -199,6 +201,7 @@ impl Scene {
                 zenith: v.triple("background.zenith"),
                 horizon: v.triple("background.horizon"),
             },
+            haze: parts::haze(v),
             image,
             values,
         })

@@ -4,9 +4,12 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Camera, Cone, Light, Limits, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Values, Vertex};
+use super::{
+    Camera, Cone, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Tone, Values, Vertex,
+};
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
+use crate::haze::Haze;
 use crate::mapping::{Material, QuadMap};
 use crate::strand::StrandParams;
 
@@ -180,6 +183,29 @@ pub(super) fn camera(v: &Values) -> Result<Camera> {
         tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
         near: v.float("camera.near"),
     })
+}
+
+pub(super) fn haze(v: &Values) -> Haze {
+    Haze {
+        density: v.float("haze.density"),
+        color: v.triple("haze.color"),
+        height: v.float("haze.height"),
+        level: v.float("haze.level"),
+        far: v.float("haze.far"),
+    }
+}
+
+pub(super) fn look(v: &Values) -> Look {
+    Look {
+        exposure: v.float("image.exposure"),
+        temperature: v.float("image.temperature"),
+        tint: v.float("image.tint"),
+        tone: match v.text("image.tone").as_str() {
+            "none" => Tone::None,
+            "agx" => Tone::Agx,
+            _ => Tone::Filmic,
+        },
+    }
 }
 
 pub(super) fn strand(v: &Values) -> StrandParams {

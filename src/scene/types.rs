@@ -170,8 +170,19 @@ pub struct Image {
     pub height: u32,
     /// Samples a pixel.
     pub samples: u32,
+    /// How the PNG is made from the radiance.
+    pub look: Look,
+}
+
+/// How a picture is made from linear radiance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
     /// Stops.
     pub exposure: f32,
+    /// Colour temperature that is adapted to 6500 K, kelvin.
+    pub temperature: f32,
+    /// Its distance from the black body's curve, thousandths of Duv.
+    pub tint: f32,
     /// Tone curve.
     pub tone: Tone,
 }
@@ -183,6 +194,8 @@ pub enum Tone {
     None,
     /// Narkowicz 2015.
     Filmic,
+    /// Sobotka 2022.
+    Agx,
 }
 
 impl Image {

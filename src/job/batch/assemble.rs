@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
 use super::{Batch, Pattern, Sweep, existing};
-use crate::cpu::resolve::resolve;
+use crate::cpu::resolve::Resolver;
 use crate::error::{Error, Result};
 use crate::frame::{Layer, Output, figures_of, read_exr, read_png};
 use crate::job::still::{SOFTWARE, scene_text};
@@ -343,8 +343,9 @@ fn picture_of_exr(path: &Path, image: &Image) -> Result<RgbImage> {
     };
     let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
     let mut bytes = Vec::with_capacity(r.len() * 3);
+    let resolver = Resolver::new(&image.look);
     for ((r, g), b) in r.iter().zip(g).zip(b) {
-        bytes.extend_from_slice(&resolve(image, [*r, *g, *b, 1.0])[..3]);
+        bytes.extend_from_slice(&resolver.pixel([*r, *g, *b, 1.0])[..3]);
     }
     RgbImage::from_raw(width, height, bytes).ok_or_else(|| Error::read(path, "its size is not its pixels'"))
 }

@@ -28,12 +28,29 @@ pub(super) const TABLE: &[Param] = &[
     )
     .slider(-8.0, 8.0),
     p(
+        "image.temperature",
+        "",
+        "K",
+        Float(1500.0, 15000.0, 6500.0),
+        Uniform,
+        "White balance of the PNG: light of this colour temperature is shown as that of 6500 K; lower turns the picture blue.",
+    )
+    .slider(2500.0, 12000.0),
+    p(
+        "image.tint",
+        "",
+        "Duv/1000",
+        Float(-50.0, 50.0, 0.0),
+        Uniform,
+        "How much greener than a black body that light is; above 0 turns the picture magenta.",
+    ),
+    p(
         "image.tone",
         "",
         "",
-        Choice(&["filmic", "none"]),
+        Choice(&["filmic", "agx", "none"]),
         Uniform,
-        "Tone curve of the PNG: Narkowicz's fit of ACES, or none.",
+        "Tone curve of the PNG: Narkowicz's fit of ACES, Sobotka's AgX, or none.",
     ),
     p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform, "Frames of the animation; --frames chooses others.")
         .slider(1.0, 1000.0),

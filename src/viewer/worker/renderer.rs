@@ -9,7 +9,7 @@ use eframe::egui;
 use rayon::prelude::*;
 
 use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
-use crate::cpu::resolve::resolve;
+use crate::cpu::resolve::Resolver;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
@@ -336,7 +336,7 @@ impl Renderer {
         }
         let mut frame = old.frame;
         let image = &request.scene.image;
-        if (old.scene.image.exposure, old.scene.image.tone) != (image.exposure, image.tone) {
+        if old.scene.image.look != image.look {
             develop(Arc::make_mut(&mut frame), image);
         }
         Some(Rendered { scene: request.scene.clone(), frame, ..old })
@@ -552,11 +552,12 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, image: &Image) {
 
 /// Makes the picture from the radiance.
 fn develop(frame: &mut Frame, image: &Image) {
+    let resolver = Resolver::new(&image.look);
     frame
         .picture
         .par_iter_mut()
         .zip(&frame.radiance)
-        .for_each(|(picture, linear)| *picture = resolve(image, *linear));
+        .for_each(|(picture, linear)| *picture = resolver.pixel(*linear));
 }
 
 /// Watches one piece of work for the render thread: ends it when something newer is wanted.
