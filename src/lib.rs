@@ -14,7 +14,7 @@
 //!    left of the lights in every cell, [`environment`] makes lights of sun, sky and maps; the compute pass
 //!    (`integrate`) walks the cells under each pixel (§4) and adds them up; [`scatter`] is the light that is
 //!    scattered more than once, [`haze`] what lies before all of it.
-//! 6. `resolve` makes the picture from the linear [`frame`], with its [`white_balance`], exposure and tone; that becomes
+//! 6. `resolve` makes the picture from the linear [`frame`], with its bloom, [`white_balance`], [`exposure`] and tone; that becomes
 //!    PNG or EXR; many frames become
 //!    a [`movie`] or a labelled [`sheet`].
 //!
@@ -31,6 +31,7 @@ pub mod cpu;
 pub mod curve;
 pub mod environment;
 pub mod error;
+pub mod exposure;
 pub mod farm;
 pub mod frame;
 pub mod gpu;

@@ -170,7 +170,7 @@ impl BatchArgs {
             given => given.to_vec(),
         };
         let size = ["image.width", "image.height"].map(|side| animation.values().count(side));
-        let crop = self.crop.map(|crop| window(Some(crop), size)).transpose()?;
+        let crop = self.crop.map(|crop| window("--crop", Some(crop), size)).transpose()?;
         Ok(Request {
             frames: self.frames.clone().map(|f| f.0),
             sweeps: self.sweeps.clone(),

@@ -59,7 +59,7 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
 pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gbuffer {
     let image = &scene.image;
     let (width, height) = (window.width as usize, window.height as usize);
-    let offset = sample_offset(sample, image.samples);
+    let offset = sample_offset(image, sample);
     let clip_from_world = scene.camera.clip_from_world(image.width, image.height, offset);
     let near = scene.camera.near as f64;
     let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {

@@ -151,7 +151,7 @@ impl<'a> Integrator<'a> {
         if faces.peek().is_none() {
             return Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] };
         }
-        let offset = sample_offset(sample, image.samples);
+        let offset = sample_offset(image, sample);
         let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
         let mut all = Traced { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
         while let Some((quad, hit)) = faces.next() {

@@ -101,7 +101,7 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let pixel = [pixel[0].min(image.width - 1), pixel[1].min(image.height - 1)];
     let window = Window { x: pixel[0], y: pixel[1], width: 1, height: 1 };
     let gbuffer = gbuffer::run_window(scene, mesh, window, SAMPLE);
-    let offset = sample_offset(SAMPLE, image.samples);
+    let offset = sample_offset(image, SAMPLE);
     let d_world = scene.camera.view_ray(image.width, image.height, pixel, offset);
     let at = |metres: f32| scene.camera.eye + d_world * metres;
     let opaque_m = gbuffer.opaque[0][3];

@@ -1,5 +1,9 @@
 //! The picture from linear radiance, on the CPU. Twin: `shaders/resolve.wgsl`.
 
+use rayon::prelude::*;
+
+use super::bloom::Bloom;
+use crate::frame::Frame;
 use crate::gpu::layout::{Develop, TONE_AGX, TONE_FILMIC};
 use crate::scene::Look;
 
@@ -68,5 +72,17 @@ impl Resolver {
             _ => x.map(|x| byte(srgb(x.clamp(0.0, 1.0)))),
         };
         [r, g, b, 255]
+    }
+}
+
+/// Makes the picture of a frame from its radiance. Bloom is that of a whole image: a part of one gets none.
+pub fn develop(frame: &mut Frame, look: &Look, whole: bool) {
+    let resolver = Resolver::new(look);
+    let picture = frame.picture.par_iter_mut().enumerate();
+    if whole && look.bloom > 0.0 {
+        let bloom = Bloom::new(&frame.radiance, frame.width as usize, frame.height as usize, look);
+        picture.for_each(|(i, picture)| *picture = resolver.pixel(bloom.pixel(i)));
+    } else {
+        picture.for_each(|(i, picture)| *picture = resolver.pixel(frame.radiance[i]));
     }
 }

@@ -260,7 +260,7 @@ impl Frame {
         let camera = &scene.camera;
         let image = &scene.image;
         let haze = scene.haze.seen_from(camera.eye);
-        let [jitter_x, jitter_y] = sample_offset(sample, image.samples);
+        let [jitter_x, jitter_y] = sample_offset(image, sample);
         let (right, up) = camera.image_plane(image.width, image.height);
         let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
         Frame {

@@ -30,6 +30,7 @@ pub use visibility::{LightDepths, Visibility};
 use std::ops::Range;
 use std::time::Instant;
 
+use crate::cpu::resolve::develop;
 use crate::error::Result;
 use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
@@ -256,7 +257,7 @@ impl GpuRenderer {
                 found.0
             }
         };
-        let develop = layout::Develop::new(&image.look);
+        let look = layout::Develop::new(&image.look);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
@@ -310,8 +311,7 @@ impl GpuRenderer {
                 done += wanted.pixels();
             }
             let uniforms = uniforms(samples.start);
-            seconds.resolve +=
-                self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms, &develop)?;
+            seconds.resolve += self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms, &look)?;
             let clock = Instant::now();
             let inverse = 1.0 / samples.len() as f32;
             let range = |row: u32| {
@@ -333,6 +333,12 @@ impl GpuRenderer {
                 bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);
             })?;
             seconds.readback += clock.elapsed().as_secs_f64();
+        }
+        // Bloom needs the whole image, which may be drawn in several windows.
+        if image.look.bloom > 0.0 && part == Window::whole(whole) {
+            let clock = Instant::now();
+            develop(&mut frame, &image.look, true);
+            seconds.resolve += clock.elapsed().as_secs_f64();
         }
         self.learned = tiler.learned().map(|pixels| (like, pixels));
         frame.seconds = seconds;

@@ -22,8 +22,8 @@ pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
 pub use types::{
-    AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Look, Quad, Reflection, Scattering,
-    Tone, Trace, Visibility,
+    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Quad,
+    Reflection, Scattering, Tone, Trace, Visibility,
 };
 pub use value::{Key, Place, Raw, Value, Values};
 
@@ -103,6 +103,18 @@ impl Default for Limits {
     }
 }
 
+/// Puts `stops` more in place of an automatic exposure; the exposure that comes of it.
+fn expose(values: &mut Values, stops: f32) -> f32 {
+    let exposure = (values.float("image.exposure") + stops).clamp(-32.0, 32.0);
+    let place = Place("image.auto_exposure".into());
+    for (key, raw) in
+        [("image.exposure", Raw::Float(exposure.into())), ("image.auto_exposure", Raw::Text("none".into()))]
+    {
+        values.set(key, &raw, &place).expect("inside the table's range");
+    }
+    exposure
+}
+
 impl Scene {
     /// Reads a preset or file, applies `--set`s in order, and checks the whole.
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
@@ -155,6 +167,7 @@ impl Scene {
             width: v.count("image.width"),
             height: v.count("image.height"),
             samples: v.count("image.samples"),
+            filter: parts::filter(v),
             look: parts::look(v),
         };
         image.check_budget(limits.memory)?;
@@ -205,6 +218,14 @@ impl Scene {
             image,
             values,
         })
+    }
+
+    /// The same scene with `stops` more in place of an automatic exposure.
+    pub fn exposed(mut self, stops: f32) -> Scene {
+        let look = &mut self.image.look;
+        look.exposure = expose(&mut self.values, stops);
+        look.auto_exposure = AutoExposure::None;
+        self
     }
 
     /// Builds the volume texture, or reads it from the scene's file.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 use super::{
-    Camera, Cone, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Tone, Values, Vertex,
+    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering,
+    Tone, Values, Vertex,
 };
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
@@ -189,15 +190,30 @@ pub(super) fn haze(v: &Values) -> Haze {
     Haze {
         density: v.float("haze.density"),
         color: v.triple("haze.color"),
-        height: v.float("haze.height"),
+        height: v.float("haze.scale_height"),
         level: v.float("haze.level"),
         far: v.float("haze.far"),
+    }
+}
+
+pub(super) fn filter(v: &Values) -> Filter {
+    match v.text("image.filter").as_str() {
+        "gaussian" => Filter::Gaussian,
+        "blackman-harris" => Filter::BlackmanHarris,
+        _ => Filter::Box,
     }
 }
 
 pub(super) fn look(v: &Values) -> Look {
     Look {
         exposure: v.float("image.exposure"),
+        auto_exposure: match v.text("image.auto_exposure").as_str() {
+            "average" => AutoExposure::Average,
+            "highlights" => AutoExposure::Highlights,
+            _ => AutoExposure::None,
+        },
+        bloom: v.float("image.bloom"),
+        bloom_radius: v.float("image.bloom_radius"),
         temperature: v.float("image.temperature"),
         tint: v.float("image.tint"),
         tone: match v.text("image.tone").as_str() {

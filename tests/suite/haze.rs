@@ -104,7 +104,7 @@ fn haze_of_the_colour_of_all_it_hides_is_not_seen() {
         "background.horizon=[0.3,0.5,0.7]",
         "haze.color=[0.3,0.5,0.7]",
         "haze.density=0.4",
-        "haze.height=2",
+        "haze.scale_height=2",
         "haze.far=9",
         "image.width=64",
         "image.height=64",
@@ -132,7 +132,7 @@ const ROCKS: [&str; 5] = [
 #[test]
 fn the_engines_agree_in_haze() {
     let Some(mut renderer) = renderer("haze") else { return };
-    let haze = ["haze.density=0.05", "haze.height=3", "haze.level=-5", "haze.far=60"];
+    let haze = ["haze.density=0.05", "haze.scale_height=3", "haze.level=-5", "haze.far=60"];
     for preset in ["waterfall", "evening"] {
         let sets = [&SMALL[..], &haze[..], &ROCKS[..], &["environment.lights=2"]].concat();
         assert_parity(preset, &both(&mut renderer, &scene(preset, &sets)));

@@ -102,6 +102,7 @@ fn stamp(path: &Path) -> Option<Stamp> {
 impl Batch {
     /// Checks what is asked for and what is there.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
+        let (base, _) = base.exposed(monitor)?;
         let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
         let keys = first.keys();
         let sweeps = request
@@ -109,6 +110,13 @@ impl Batch {
             .iter()
             .map(|text| Sweep::parse(text, &keys, base.values()))
             .collect::<Result<Vec<Sweep>>>()?;
+        if sweeps.iter().any(|sweep| sweep.key == "image.auto_exposure") {
+            return Err(Error::Usage(
+                "--sweep image.auto_exposure: a batch has one exposure, measured on its first frame; sweep \
+                 image.exposure"
+                    .into(),
+            ));
+        }
         for (i, sweep) in sweeps.iter().enumerate() {
             if sweeps[..i].iter().any(|other| other.key == sweep.key) {
                 return Err(Error::Usage(format!(
@@ -165,6 +173,7 @@ impl Batch {
         batch.check_names()?;
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
+        batch.check_bloom()?;
         batch.look(monitor)?;
         batch.check_movies()?;
         Ok(batch)

@@ -19,6 +19,14 @@ pub(super) const TABLE: &[Param] = &[
     )
     .slider(1.0, 256.0),
     p(
+        "image.filter",
+        "",
+        "",
+        Choice(&["box", "gaussian", "blackman-harris"]),
+        Uniform,
+        "How several samples are spread about a pixel: evenly over it, or three pixels wide and denser in the middle.",
+    ),
+    p(
         "image.exposure",
         "",
         "stops",
@@ -27,6 +35,31 @@ pub(super) const TABLE: &[Param] = &[
         "Factor 2^exposure on the radiance, in the PNG only.",
     )
     .slider(-8.0, 8.0),
+    p(
+        "image.auto_exposure",
+        "",
+        "",
+        Choice(&["none", "average", "highlights"]),
+        Uniform,
+        "Adds stops measured on frame 0: the logarithmic mean becomes middle grey, or the brightest hundredth begins at 1.",
+    ),
+    p(
+        "image.bloom",
+        "",
+        "",
+        Float(0.0, 1.0, 0.0),
+        Uniform,
+        "Share of the light that is spread around bright things, in the PNG only; of whole pictures only.",
+    )
+    .slider(0.0, 0.5),
+    p(
+        "image.bloom_radius",
+        "",
+        "heights",
+        Float(0.0, 0.25, 0.04),
+        Uniform,
+        "How far it is spread: standard deviation of the widest of its six octaves, in heights of the image.",
+    ),
     p(
         "image.temperature",
         "",

@@ -100,7 +100,7 @@ pub(super) const TABLE: &[Param] = &[
     .slider(0.0, 0.2),
     p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform, "Radiance of endless haze."),
     p(
-        "haze.height",
+        "haze.scale_height",
         "H",
         "m",
         Float(0.0, 1e5, 0.0),
