@@ -3,13 +3,12 @@
 // One invocation a pixel. Twin: src/cpu/integrate.rs, the same operations in the same order; the reasoning
 // stands there.
 
-// Most lights of one walk: rays keep what they need to know of each, and are walked again for more.
-const LIGHTS_A_WALK: u32 = 16u;
-
+// None, one, or (2) several.
 override LIGHTS: u32 = 1u;
-override PER_CELL: bool = false;
 override MARCH: bool = false;
 override CACHED: bool = false;
+// Light volumes hold codes of transmittances, not optical depths.
+override CODES: bool = false;
 // Light volumes at the corners of patches.
 override CORNERED: bool = false;
 // The reflection model of flowing water in place of fibres.
@@ -29,8 +28,8 @@ override MULTIPLE: bool = false;
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
 // Sum over samples of cells walked by view rays, and by light rays.
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
-// Light volumes, src/gpu/visibility.rs: optical depths, and where each light volume is.
-@group(0) @binding(10) var light_depths: texture_storage_3d<r32float, read>;
+// Light volumes, src/gpu/visibility.rs, and where each is.
+@group(0) @binding(10) var light_volumes: texture_storage_3d<r32uint, read>;
 @group(0) @binding(11) var<storage, read> light_places: array<vec4<i32>>;
 // Strand model and scattering, src/gpu/reflection.rs.
 @group(0) @binding(12) var<uniform> reflection: Reflection;
@@ -75,8 +74,9 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
 struct Ray {
     transmittance: f32,
     t: f32,
-    // The first light's sum lives apart from the others': indexed arrays cost a tenth of the pass.
-    first: f32,
+    // The lights' sum, in colour with more than one of them or where light has a colour of its own in every cell;
+    // else of the one light's share, in x.
+    light: vec3<f32>,
     cells: u32,
     light_cells: u32,
     done: bool,
@@ -93,32 +93,23 @@ struct View {
     early_end: f32,
     p: f32,
     max_cells: u32,
-    layers: i32,
+    size: vec3<i32>,
     // The model's constants, where they are asked for.
     strand: Strand,
     similarity: Similarity,
-    // Lights of this walk.
-    lights: u32,
     // Where the quad's profile begins.
     profile: u32,
     // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
     metric: vec4<f32>,
     e_v: vec3<f32>,
-    first: RayLight,
+    // The only light's, or those of any.
+    light: RayLight,
+    lights: u32,
+    place: Place,
 }
-
-var<private> others: array<RayLight, LIGHTS_A_WALK>;
-var<private> sums: array<f32, LIGHTS_A_WALK>;
-// Where light has a colour of its own in every cell.
-var<private> colours: array<vec3<f32>, LIGHTS_A_WALK>;
 
 fn in_colour() -> bool {
     return STRAND || MULTIPLE;
-}
-
-fn lights_of(view: View) -> u32 {
-    // Known when the shader is compiled, in all but a few scenes.
-    return select(view.lights, LIGHTS, LIGHTS <= LIGHTS_A_WALK);
 }
 
 // One sheet: `before` is the radiance of those in front of it, and what they let through.
@@ -129,7 +120,6 @@ fn trace(
     behind: vec3<f32>,
     before: vec4<f32>,
     is_last: bool,
-    first: u32,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
     let quad = quads[quad_number];
@@ -141,12 +131,11 @@ fn trace(
 
     var view: View;
     view.extinction = frame.extinction;
-    view.depth_bits = frame.extinction * 65535.0 * select(jacobian.depth, 1.0, PER_CELL);
+    view.depth_bits = frame.extinction * select(jacobian.depth, 1.0, PER_CELL);
     view.early_end = frame.early_end;
     view.p = frame.p;
     view.max_cells = frame.max_cells;
-    view.layers = frame.cells.z;
-    view.lights = min(LIGHTS - first, LIGHTS_A_WALK);
+    view.size = frame.cells;
     view.profile = quad.profile;
     let cx = jacobian.cx;
     let cy = jacobian.cy;
@@ -160,40 +149,12 @@ fn trace(
     if in_colour() {
         view.strand = reflection.strand;
         view.similarity = reflection.similarity;
-        for (var i = 0u; i < lights_of(view); i++) {
-            others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
-            colours[i] = vec3<f32>(0.0);
-            let light = &others[i];
-            if CACHED {
-                (*light).places = light_places_of(quad_number, first + i, hit.xy);
-            }
-            let l = light_at(first + i, d_world, hit.z).xyz;
-            (*light).l_dot_e = -dot3(l, d_world);
-            if MULTIPLE {
-                (*light).peak = scatter_peak(view.similarity.g, (*light).l_dot_e * -1.0);
-                var l_n = dot3(l, quad.n) * side;
-                if PER_CELL {
-                    let c = abs((*light).l_cell);
-                    l_n = -(*light).l_cell.z / (c.x + c.y + c.z);
-                }
-                (*light).row = scatter_row(l_n, u32(frame.cells.z));
-            }
-            if frame.texture_frame != 0u {
-                (*light).l_dot_e = dot3((*light).l_v, view.e_v);
-            }
-        }
-    } else if LIGHTS > 0u {
-        view.first = ray_light(first, quad, jacobian, side, d_world, hit.z);
-        if CACHED {
-            view.first.places = light_places_of(quad_number, first, hit.xy);
-        }
     }
-    for (var i = 1u; !in_colour() && i < lights_of(view); i++) {
-        others[i] = ray_light(first + i, quad, jacobian, side, d_world, hit.z);
-        if CACHED {
-            others[i].places = light_places_of(quad_number, first + i, hit.xy);
-        }
-        sums[i] = 0.0;
+    view.place = Place(jacobian, quad.e1, quad.e2, quad.n, side, d_world, frame.eye_world + d_world * hit.z,
+        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g);
+    view.lights = arrayLength(&lights);
+    if LIGHTS == 1u {
+        view.light = ray_light(0u, view.place, view.size, view.lights);
     }
 
     var ray: Ray;
@@ -213,6 +174,9 @@ fn trace(
                 seek(&walk, &ray, &seeking, view);
             }
             visit(&walk, &ray, view);
+        } else if LIGHTS > 1u {
+            // With a loop in it, once: there is little left to gain, and each would be compiled anew.
+            visit(&walk, &ray, view);
         } else {
             visit(&walk, &ray, view);
             visit(&walk, &ray, view);
@@ -222,24 +186,17 @@ fn trace(
     }
 
     // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
-    var color = vec3<f32>(0.0);
-    if first == 0u {
-        let ends = is_last | (ray.transmittance < view.early_end);
-        let passed = select(vec3<f32>(0.0), behind * ray.transmittance, ends);
-        color = frame.ambient * (before.w - ray.transmittance) + passed;
-        (*count).x += ray.cells;
+    let ends = is_last | (ray.transmittance < view.early_end);
+    let passed = select(vec3<f32>(0.0), behind * ray.transmittance, ends);
+    var color = frame.ambient * (before.w - ray.transmittance) + passed;
+    if LIGHTS == 1u && in_colour() {
+        color += view.light.intensity * ray.light;
+    } else if LIGHTS == 1u {
+        color += view.light.intensity * (ray.light.x * (1.0 / 255.0));
+    } else {
+        color += ray.light;
     }
-    if LIGHTS > 0u && !in_colour() {
-        color += light_intensity(first, d_world, hit.z) * (ray.first * (1.0 / 255.0));
-    }
-    for (var i = select(1u, 0u, in_colour()); i < lights_of(view); i++) {
-        var sum = colours[i];
-        if !in_colour() {
-            sum = vec3<f32>(sums[i] * (1.0 / 255.0));
-        }
-        color += light_intensity(first + i, d_world, hit.z) * sum;
-    }
-    (*count).y += ray.light_cells;
+    *count += vec2<u32>(ray.cells, ray.light_cells);
     return vec4<f32>(before.rgb + color, ray.transmittance);
 }
 
@@ -250,7 +207,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     (*ray).cells += select(0u, 1u, on);
     (*ray).t = select((*ray).t, walk_exit(*walk), on);
     walk_step(walk, on);
-    (*ray).done |= ((*walk).cell.z >= view.layers) | ((*ray).cells >= view.max_cells);
+    (*ray).done |= ((*walk).cell.z >= view.size.z) | ((*ray).cells >= view.max_cells);
     *seeking = on & !(*ray).done;
 }
 
@@ -264,45 +221,39 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         tau_bits *= t_exit - (*ray).t;
     }
     let passed = (*ray).transmittance * exp2(-tau_bits);
-    let weight = (*ray).transmittance - passed;
 
-    let k_d = f32((texel.x >> 16u) & 0xffu);
-    let k_s = f32(texel.x >> 24u);
+    var matter: Matter;
+    matter.cell = (*walk).cell;
+    matter.occupied = rho > 0.0;
+    matter.tau_bits = tau_bits;
+    matter.weight = (*ray).transmittance - passed;
+    matter.k_d = f32((texel.x >> 16u) & 0xffu);
+    matter.k_s = f32(texel.x >> 24u);
     let v = v_code(texel.y);
     let m = view.metric;
     let q = (m.x * v.x + m.y * v.y) * v.x + m.z * v.y * v.y + m.w * v.z * v.z;
     let inverse_q = 1.0 / max(q, 1e-30);
-    let t_dot_e = dot3(v, view.e_v);
-    let sin2_e = max(1.0 - t_dot_e * t_dot_e * inverse_q, 0.0);
-    if in_colour() {
-        let root = sqrt(inverse_q);
-        for (var i = 0u; i < lights_of(view); i++) {
-            let depth = light_depth(rho, (*walk).cell, others[i], view, ray);
-            let t_dot_l = dot3(v, others[i].l_v);
-            let seen = weight * exp2(-depth);
-            var lit: vec3<f32>;
-            if STRAND {
-                let l_dot_e = others[i].l_dot_e;
-                lit = seen * strand_psi(strand_table, linear, view.strand, k_d, k_s, t_dot_l * root, t_dot_e * root, l_dot_e);
-            } else {
-                let fibre = psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
-                lit = vec3<f32>(seen * fibre * (1.0 / 255.0));
+    matter.v = v;
+    matter.t_dot_e = dot3(v, view.e_v);
+    matter.sin2_e = max(1.0 - matter.t_dot_e * matter.t_dot_e * inverse_q, 0.0);
+    matter.inverse_q = inverse_q;
+    if LIGHTS == 1u && in_colour() {
+        (*ray).light += lit_in_colour(matter, view.light, view, ray);
+    } else if LIGHTS == 1u {
+        (*ray).light.x += lit(matter, view.light, view, ray);
+    } else if LIGHTS > 1u {
+        // What a light is to the ray is worked out again in every cell: arrays indexed in a loop become trees of
+        // selects on software Vulkan, which take seconds to compile.
+        if matter.occupied {
+            for (var i = 0u; i < view.lights; i++) {
+                let light = ray_light(i, view.place, view.size, view.lights);
+                if in_colour() {
+                    (*ray).light += light.intensity * lit_in_colour(matter, light, view, ray);
+                } else {
+                    (*ray).light += light.intensity * (lit(matter, light, view, ray) * (1.0 / 255.0));
+                }
             }
-            if MULTIPLE {
-                let row = others[i].row;
-                let z = u32((*walk).cell.z) + view.profile;
-                let diffuse = scatter_diffuse(profiles[row.near + z].rgb, profiles[row.far + z].rgb, row);
-                lit += scatter_multiple(view.similarity, others[i].peak, diffuse, (*ray).depth, tau_bits, depth);
-            }
-            colours[i] += lit;
         }
-    } else if LIGHTS > 0u {
-        let lit = weight * psi(view.p, k_d, k_s, v, view.first.l_v, t_dot_e, sin2_e, inverse_q);
-        (*ray).first += lit * exp2(-light_depth(rho, (*walk).cell, view.first, view, ray));
-    }
-    for (var i = 1u; !in_colour() && i < lights_of(view); i++) {
-        let lit = weight * psi(view.p, k_d, k_s, v, others[i].l_v, t_dot_e, sin2_e, inverse_q);
-        sums[i] += lit * exp2(-light_depth(rho, (*walk).cell, others[i], view, ray));
     }
     if MULTIPLE {
         (*ray).depth += tau_bits;
@@ -312,6 +263,6 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     (*ray).transmittance = passed;
     (*ray).t = t_exit;
     walk_step(walk, true);
-    (*ray).done |= ((*walk).cell.z >= view.layers) | (passed < view.early_end)
+    (*ray).done |= ((*walk).cell.z >= view.size.z) | (passed < view.early_end)
         | ((*ray).cells >= view.max_cells);
 }

@@ -1,9 +1,11 @@
-// The lights as a ray sees them: the second half of shaders/integrate.wgsl, which holds the bindings.
+// The lights as a ray sees them, and what a cell sends on of them: the second half of shaders/integrate.wgsl, which
+// holds the bindings.
 
 // One light as a ray sees it: Jᵀl (or J⁻¹l normalised), and J⁻¹l.
 struct RayLight {
     l_v: vec3<f32>,
     l_cell: vec3<f32>,
+    intensity: vec3<f32>,
     places: LightPlaces,
     // Cosine between light and eye, in the frame where angles are measured.
     l_dot_e: f32,
@@ -23,21 +25,76 @@ struct LightPlaces {
     cornered: bool,
 }
 
-fn ray_light(i: u32, quad: Quad, jacobian: CellFrame, side: f32, d_world: vec3<f32>, t_hit: f32) -> RayLight {
-    let to_light = light_at(i, d_world, t_hit).xyz;
-    let l = plane_from_world(quad, side, to_light);
+// Where a ray meets a quad: all that its lights depend on.
+struct Place {
+    jacobian: CellFrame,
+    e1: vec3<f32>,
+    e2: vec3<f32>,
+    n: vec3<f32>,
+    side: f32,
+    d_world: vec3<f32>,
+    point: vec3<f32>,
+    e_v: vec3<f32>,
+    uv: vec2<f32>,
+    quad_number: u32,
+    texture_frame: bool,
+    g: f32,
+}
+
+// What a cell is to every light.
+struct Matter {
+    cell: vec3<i32>,
+    occupied: bool,
+    tau_bits: f32,
+    // T before it less T behind it.
+    weight: f32,
+    k_d: f32,
+    k_s: f32,
+    v: vec3<f32>,
+    t_dot_e: f32,
+    sin2_e: f32,
+    inverse_q: f32,
+}
+
+// Light `i` of `count` (the paper maps the light vectors at the point, not in every cell).
+fn ray_light(i: u32, place: Place, size: vec3<i32>, count: u32) -> RayLight {
+    let light = lights[i];
+    let found = light_from(light, place.point);
+    let to_light = found.xyz;
+    let l_n = dot3(to_light, place.n) * place.side;
+    let l = vec3<f32>(dot3(to_light, place.e1), dot3(to_light, place.e2), l_n);
     var out: RayLight;
-    out.l_cell = cell_from_plane(jacobian, l);
-    out.l_v = transposed(jacobian, l);
-    if frame.texture_frame != 0u {
+    out.intensity = light.intensity * found.w;
+    out.l_cell = cell_from_plane(place.jacobian, l);
+    out.l_v = transposed(place.jacobian, l);
+    if place.texture_frame {
         out.l_v = out.l_cell / sqrt(dot3(out.l_cell, out.l_cell));
+    }
+    if CACHED {
+        out.places = light_places_of(place.quad_number * count + i, place.uv);
+    }
+    if in_colour() {
+        let cosine = dot3(to_light, place.d_world);
+        out.l_dot_e = -cosine;
+        if MULTIPLE {
+            out.peak = scatter_peak(place.g, cosine);
+            var slab = l_n;
+            if PER_CELL {
+                let c = abs(out.l_cell);
+                slab = -out.l_cell.z / (c.x + c.y + c.z);
+            }
+            out.row = scatter_row(slab, u32(size.z));
+        }
+        if place.texture_frame {
+            out.l_dot_e = dot3(out.l_v, place.e_v);
+        }
     }
     return out;
 }
 
-fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
+fn light_places_of(entry: u32, uv: vec2<f32>) -> LightPlaces {
     var out: LightPlaces;
-    let patches = light_places[quad_number * LIGHTS + light];
+    let patches = light_places[entry];
     let at = uv * vec2<f32>(patches.yz);
     let patch_at = min(vec2<i32>(at), patches.yz - 1);
     if !CORNERED | (patches.w == 0) {
@@ -55,81 +112,74 @@ fn light_places_of(quad_number: u32, light: u32, uv: vec2<f32>) -> LightPlaces {
     return out;
 }
 
-fn light_intensity(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec3<f32> {
-    return lights[i].intensity * light_at(i, d_world, t_hit).w;
+// What a cell sends to the eye of a light of intensity 1, in 255ths.
+fn lit(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
+    let fibre = psi(view.p, matter.k_d, matter.k_s, matter.v, light.l_v, matter.t_dot_e, matter.sin2_e, matter.inverse_q);
+    return matter.weight * fibre * visibility_of(matter, light, view, ray).x;
 }
 
-// Unit direction from the mapped point to light i, and its falloff there (the paper maps the light
-// vectors at the point, not in every cell).
-fn light_at(i: u32, d_world: vec3<f32>, t_hit: f32) -> vec4<f32> {
-    return light_from(lights[i], frame.eye_world + d_world * t_hit);
+// The same where it has a colour: strands, or light scattered more than once.
+fn lit_in_colour(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
+    let visibility = visibility_of(matter, light, view, ray);
+    let seen = matter.weight * visibility.x;
+    var lit: vec3<f32>;
+    if STRAND {
+        let root = sqrt(matter.inverse_q);
+        let t_dot_l = dot3(matter.v, light.l_v) * root;
+        let t_dot_e = matter.t_dot_e * root;
+        let k_d = matter.k_d;
+        lit = seen * strand_psi(strand_table, linear, view.strand, k_d, matter.k_s, t_dot_l, t_dot_e, light.l_dot_e);
+    } else {
+        let fibre = psi(view.p, matter.k_d, matter.k_s, matter.v, light.l_v, matter.t_dot_e, matter.sin2_e, matter.inverse_q);
+        lit = vec3<f32>(seen * fibre * (1.0 / 255.0));
+    }
+    if MULTIPLE {
+        let z = u32(matter.cell.z) + view.profile;
+        let diffuse = scatter_diffuse(profiles[light.row.near + z].rgb, profiles[light.row.far + z].rgb, light.row);
+        lit += scatter_multiple(view.similarity, light.peak, diffuse, (*ray).depth, matter.tau_bits, visibility.y);
+    }
+    return lit;
 }
 
-// The optical depth in bits from an occupied cell to a light: −log₂ of V_i(k).
-fn light_depth(rho: f32, cell: vec3<i32>, light: RayLight, view: View, total: ptr<function, Ray>) -> f32 {
+// V_i(k); and −log₂ of it, which is 0 where codes are kept.
+fn visibility_of(matter: Matter, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
     var depth = 0.0;
     if MARCH {
-        if rho > 0.0 {
-            depth = marched_depth(cell, light.l_cell, view, total);
+        if matter.occupied {
+            let walked = optical_depth(volume, view.size, matter.cell, light.l_cell, view.max_cells);
+            (*ray).light_cells += walked.cells;
+            depth = walked.depth * view.extinction;
         }
     }
     if CACHED {
+        var code = 0.0;
         // Light volumes of many patches are larger than caches: empty cells need not ask for theirs.
-        if rho > 0.0 {
-            depth = kept_depth(cell, light.places, view);
+        if matter.occupied {
+            let kept = kept_of(matter.cell, light.places);
+            code = kept;
+            depth = kept * view.depth_bits;
+        }
+        if CODES {
+            return vec2<f32>(code * code * (1.0 / 65025.0), 0.0);
         }
     }
-    return depth;
-}
-
-// From the middle of `cell` to where the light ray leaves the slab.
-struct LightWalk {
-    depth: f32,
-    t: f32,
-    cells: u32,
-    done: bool,
-}
-
-fn marched_depth(cell: vec3<i32>, direction: vec3<f32>, view: View, total: ptr<function, Ray>) -> f32 {
-    var ray: LightWalk;
-    var walk = walk_new(frame.cells, vec3<f32>(cell) + 0.5, direction);
-    while !ray.done {
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-        visit_light(&walk, &ray, view);
-    }
-    (*total).light_cells += ray.cells;
-    return ray.depth * view.extinction;
-}
-
-fn visit_light(walk: ptr<function, Walk>, ray: ptr<function, LightWalk>, view: View) {
-    let t_exit = walk_exit(*walk);
-    let rho = f32(textureLoad(volume, (*walk).cell).x & 0xffffu);
-    if PER_CELL {
-        // The cell itself does not hide its own light.
-        (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));
-    } else {
-        (*ray).depth += select(rho * (t_exit - (*ray).t), 0.0, (*ray).done);
-    }
-    (*ray).cells += select(1u, 0u, (*ray).done);
-    (*ray).t = t_exit;
-    walk_step(walk, true);
-    let z = (*walk).cell.z;
-    (*ray).done |= (z < 0) | (z >= view.layers) | ((*ray).cells >= view.max_cells);
+    return vec2<f32>(exp2(-depth), depth);
 }
 
 // From the light volumes of the ray's patch.
-fn kept_depth(cell: vec3<i32>, places: LightPlaces, view: View) -> f32 {
-    var depth = textureLoad(light_depths, cell + places.p00).x;
-    if CORNERED && places.cornered {
-        let near = mix(depth, textureLoad(light_depths, cell + places.p10).x, places.at.x);
-        let far = mix(
-            textureLoad(light_depths, cell + places.p01).x,
-            textureLoad(light_depths, cell + places.p11).x,
-            places.at.x,
-        );
-        depth = mix(near, far, places.at.y);
+fn kept_of(cell: vec3<i32>, places: LightPlaces) -> f32 {
+    let kept = kept_at(cell, places.p00);
+    if !CORNERED | !places.cornered {
+        return kept;
     }
-    return depth * view.depth_bits;
+    let near = mix(kept, kept_at(cell, places.p10), places.at.x);
+    let far = mix(kept_at(cell, places.p01), kept_at(cell, places.p11), places.at.x);
+    return mix(near, far, places.at.y);
+}
+
+fn kept_at(cell: vec3<i32>, place: vec3<i32>) -> f32 {
+    if CODES {
+        return code_in_word(textureLoad(light_volumes, vec3<i32>(cell.xy, cell.z >> 2u) + place).x, cell.z);
+    }
+    return bitcast<f32>(textureLoad(light_volumes, cell + place).x);
 }

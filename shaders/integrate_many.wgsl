@@ -1,30 +1,25 @@
-// All that a pixel sees of the water: its sheets, front to back, in all lights. Part of the stage integrate. One call of
-// the walk in two loops, for every call is compiled anew.
+// All that a pixel sees of the water: its sheets, front to back. Part of the stage integrate. One call of the walk in a
+// loop, for every call is compiled anew.
 
 // The nearest sheet is that of quad `nearest` − 1.
 fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
-    var total = vec4<f32>(0.0, 0.0, 0.0, 1.0);
-    // The ambient light, what is behind and T come with the first lights.
-    for (var first = 0u; first == 0u || first < LIGHTS; first += LIGHTS_A_WALK) {
-        var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
-        var quad_number = nearest;
-        var hit = textureLoad(surface, pixel, 0).xyz;
-        for (var layer = 1u; quad_number != 0u; layer++) {
-            var next = 0u;
-            if layer < frame.layers {
-                next = textureLoad(quad_id, pixel, layer, 0).x;
-            }
-            result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, first, count);
-            if result.w < frame.early_end {
-                break;
-            }
-            quad_number = next;
-            if next != 0u {
-                let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-                hit = quad_hit(quads[next - 1u], d_world);
-            }
+    var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
+    var quad_number = nearest;
+    var hit = textureLoad(surface, pixel, 0).xyz;
+    for (var layer = 1u; quad_number != 0u; layer++) {
+        var next = 0u;
+        if layer < frame.layers {
+            next = textureLoad(quad_id, pixel, layer, 0).x;
         }
-        total = vec4<f32>(total.rgb + result.rgb, result.w);
+        result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
+        if result.w < frame.early_end {
+            break;
+        }
+        quad_number = next;
+        if next != 0u {
+            let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+            hit = quad_hit(quads[next - 1u], d_world);
+        }
     }
-    return total;
+    return result;
 }

@@ -4,7 +4,7 @@
 //! every size of picture and on both engines, and nothing flickers. What is chosen is written into the scene as an
 //! ordinary `image.exposure`.
 
-use crate::cpu::{self, KeptDepths};
+use crate::cpu::{self, KeptVolumes};
 use crate::error::Result;
 use crate::frame::Window;
 use crate::job::Monitor;
@@ -35,7 +35,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
     let window = Window::whole([image.width, image.height]);
     let watch = Quiet(monitor);
-    let kept = &mut KeptDepths::default();
+    let kept = &mut KeptVolumes::default();
     let frame = cpu::render_samples(&small, volume, mesh, window, 0..1, false, kept, &watch)?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }

@@ -5,21 +5,24 @@
 //! so for a directional light and a parallelogram one light volume says what an exact walk from every cell
 //! would. Where the direction in cells changes over a quad it is cut into patches: a little (the map is no
 //! parallelogram's), and each has a light volume; more (a point light), and they have one at each corner,
-//! between which depths are interpolated.
+//! between which is interpolated.
 //!
-//! Depths are in units of one cell's depth at ρ = 1, so that they depend neither on σ nor on α. Passes:
-//! `src/gpu/visibility.rs` with `shaders/visibility.wgsl`, and `src/cpu/visibility.rs`.
+//! What is kept of a cell is a code of its transmittance T to the light, √T in 255ths: a byte, so that many patches
+//! fit into a processor's caches, with no exponential left to the view ray. Where light is scattered more than once
+//! optical depths are kept, for its formula asks for them. Passes: `src/gpu/visibility.rs` with
+//! `shaders/visibility.wgsl`, and `src/cpu/visibility.rs`.
 
 use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
 use crate::error::{Error, Result};
+use crate::gpu::layout::extinction;
 use crate::mapping::CellFrame;
-use crate::scene::{Attenuation, Light, Quad, Scene};
+use crate::scene::{Attenuation, Light, Quad, Scattering, Scene};
 
-/// Bytes of a cell in one light volume.
-pub const DEPTH_BYTES: u64 = 4;
+/// Codes in one word of a light volume, of cells that follow one another along z.
+pub const CELLS_A_WORD: u32 = 4;
 
 /// Angles, in degrees, that the light's direction (in cells) may turn by over a patch with one light volume, and
 /// between the corners of a patch with four. With these, pictures of directional lights are within 2 % of exact
@@ -45,16 +48,41 @@ const SAME_DIRECTION: f32 = 1e-6;
 /// The light volumes of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightVolumes {
-    /// Towards the light, in cells per cell depth: J⁻¹l·(H/nz). One light volume for each.
-    pub directions: Vec<Vec3>,
+    /// Each of them once.
+    pub volumes: Vec<LightVolume>,
     /// Numbers of light volumes: of patches, or of their corners, row by row along u.
     pub numbers: Vec<u32>,
     /// Of quad q and light i the entry q·lights + i.
     pub patches: Vec<Patches>,
     /// Number of lights.
     pub lights: usize,
-    /// What the depths are of.
+    /// What the light goes through.
     pub medium: Medium,
+    /// What is kept.
+    pub form: Form,
+}
+
+/// One light volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightVolume {
+    /// Towards the light, in cells per cell depth: J⁻¹l·(H/nz).
+    pub direction: Vec3,
+    /// Bits of transmittance in one unit of optical depth; of optical depths, 1.
+    pub bits: f32,
+}
+
+/// What a light volume holds for a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// √T in 255ths.
+    Codes,
+    /// Optical depth: Σ ρ code × length, in depths of a cell; or Σ ρ code.
+    Depths,
+}
+
+/// √T in 255ths, from −log₂ T: steps are finest where it is dark.
+pub fn transmittance_code(depth_bits: f32) -> u8 {
+    (255.0 * (-0.5 * depth_bits).exp2() + 0.5) as u8
 }
 
 /// How a quad is cut for one light.
@@ -64,7 +92,7 @@ pub struct Patches {
     pub first: u32,
     /// Patches along u and along v.
     pub count: [u32; 2],
-    /// Whether there is a light volume for each corner, between which depths are interpolated, or one for each
+    /// Whether there is a light volume for each corner, between which is interpolated, or one for each
     /// patch.
     pub cornered: bool,
 }
@@ -89,12 +117,13 @@ impl Medium {
 }
 
 impl LightVolumes {
-    /// For a scene and a volume of `size` cells; refused if even the coarsest need more than `budget` bytes.
-    pub fn new(scene: &Scene, size: [u32; 3], budget: u64) -> Result<Self> {
+    /// For a scene and a volume of `size` cells whose density is scaled by `alpha`; refused if even the coarsest need
+    /// more than `budget` bytes.
+    pub fn new(scene: &Scene, size: [u32; 3], alpha: f32, budget: u64) -> Result<Self> {
         let mut need = 0;
         for doubling in 0..=DOUBLINGS {
             let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
-            let volumes = LightVolumes::at_angles(scene, size, angles);
+            let volumes = LightVolumes::at_angles(scene, size, alpha, angles);
             need = volumes.bytes(size);
             if need <= u128::from(budget) {
                 return Ok(volumes);
@@ -114,31 +143,49 @@ impl LightVolumes {
 
     /// Bytes of all light volumes.
     pub fn bytes(&self, size: [u32; 3]) -> u128 {
-        let cells = size.iter().map(|&n| u128::from(n)).product::<u128>();
-        cells * u128::from(DEPTH_BYTES) * self.directions.len() as u128
+        let [nx, ny, nz] = self.words(size).map(u128::from);
+        nx * ny * nz * 4 * self.volumes.len() as u128
     }
 
-    /// Whether depths are interpolated anywhere.
+    /// Words of four bytes in one of them, along x, y and z.
+    pub fn words(&self, [nx, ny, nz]: [u32; 3]) -> [u32; 3] {
+        match self.form {
+            Form::Codes => [nx, ny, nz.div_ceil(CELLS_A_WORD)],
+            Form::Depths => [nx, ny, nz],
+        }
+    }
+
+    /// Whether is interpolated anywhere.
     pub fn cornered(&self) -> bool {
         self.patches.iter().any(|patches| patches.cornered)
     }
 
-    fn at_angles(scene: &Scene, size: [u32; 3], angles: [f64; 2]) -> Self {
-        let mut directions: Vec<Vec3> = Vec::new();
-        let mut known: HashMap<[i64; 3], u32> = HashMap::new();
-        let mut number = |d: Vec3| {
-            let step = SAME_DIRECTION * d.length().max(1e-30);
+    fn at_angles(scene: &Scene, size: [u32; 3], alpha: f32, angles: [f64; 2]) -> Self {
+        let medium = Medium::of(scene);
+        let form = match scene.scattering {
+            Scattering::Single => Form::Codes,
+            Scattering::Multiple => Form::Depths,
+        };
+        let mut volumes: Vec<LightVolume> = Vec::new();
+        let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
+        let mut number = |direction: Vec3, bits: f32| {
+            let step = SAME_DIRECTION * direction.length().max(1e-30);
             // The step is a power of two, so that equal directions fall into equal squares.
             let step = step.log2().floor().exp2();
-            let key = d.to_array().map(|x| (x / step).round() as i64);
+            let key = (direction.to_array().map(|x| (x / step).round() as i64), bits.to_bits());
             *known.entry(key).or_insert_with(|| {
-                directions.push(d);
-                directions.len() as u32 - 1
+                volumes.push(LightVolume { direction, bits });
+                volumes.len() as u32 - 1
             })
         };
         let (mut numbers, mut patches) = (Vec::new(), Vec::new());
         let lights = scene.volume_lights();
         for quad in &scene.quads {
+            let cell_depth = if medium.per_cell { 1.0 } else { quad.material.thickness_m / size[2] as f32 };
+            let bits = match form {
+                Form::Codes => extinction(&scene.trace.attenuation, alpha) * cell_depth,
+                Form::Depths => 1.0,
+            };
             let side_seen = if quad_seen_from_behind(quad, scene.camera.eye) { -1.0 } else { 1.0 };
             for light in &lights {
                 let at = |u: f32, v: f32| direction(quad, light, side_seen, size, Vec2::new(u, v));
@@ -148,12 +195,11 @@ impl LightVolumes {
                 let offset = if cornered { 0.0 } else { 0.5 };
                 for (j, i) in (0..nv).flat_map(|j| (0..nu).map(move |i| (j, i))) {
                     let place = |i: u32, n: u32| (i as f32 + offset) / n as f32;
-                    numbers.push(number(at(place(i, count[0]), place(j, count[1]))));
+                    numbers.push(number(at(place(i, count[0]), place(j, count[1])), bits));
                 }
             }
         }
-        let medium = Medium::of(scene);
-        LightVolumes { directions, numbers, patches, lights: lights.len(), medium }
+        LightVolumes { volumes, numbers, patches, lights: lights.len(), medium, form }
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::{IVec3, UVec2, Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
-use super::visibility::{Depths, KeptDepths, optical_depth};
+use super::visibility::{Filled, KeptVolumes, number, optical_depth};
 use crate::camera::sample_offset;
 use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
@@ -15,7 +15,7 @@ use crate::scatter::{ORDERS, Row, forward_peak, multiple};
 use crate::scene::{AngleFrame, Attenuation, Light, Reflection, Scattering, Scene, Visibility};
 use crate::shading::{Metric, fibre_angles, specular_power};
 use crate::strand::table::StrandShading;
-use crate::visibility::LightVolumes;
+use crate::visibility::{Form, LightVolumes, Medium};
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::{Crossing, Walk};
 
@@ -30,8 +30,9 @@ pub struct Integrator<'a> {
     per_cell: bool,
     lights: Vec<Light>,
     light_volumes: Option<LightVolumes>,
-    /// None: depths are walked when they are asked for.
-    depths: Option<Depths>,
+    /// None: what they hold is walked when it is asked for.
+    filled: Option<Filled>,
+    medium: Medium,
     strand: Option<StrandShading>,
     media: Option<Media>,
     /// Number of each quad's profile.
@@ -97,16 +98,16 @@ impl<'a> Integrator<'a> {
     pub fn prepared(
         scene: &'a Scene,
         volume: &'a VolumeTexture,
-        kept: &mut KeptDepths,
+        kept: &mut KeptVolumes,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
         let mut integrator = Integrator::new(scene, volume);
         if scene.visibility == Visibility::Cached {
-            let light_volumes = LightVolumes::new(scene, volume.size, scene.light_cache)?;
-            integrator.depths = Some(kept.get(&light_volumes, volume, monitor)?);
+            let light_volumes = LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?;
+            integrator.filled = Some(kept.get(&light_volumes, volume, monitor)?);
             integrator.light_volumes = Some(light_volumes);
         } else {
-            *kept = KeptDepths::default();
+            *kept = KeptVolumes::default();
         }
         Ok(integrator)
     }
@@ -123,9 +124,11 @@ impl<'a> Integrator<'a> {
             flow_cells: flow_cells(scene.flow, volume.size[1]),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             lights: scene.volume_lights(),
-            light_volumes: (scene.visibility == Visibility::Cached)
-                .then(|| LightVolumes::new(scene, volume.size, u64::MAX).expect("what is not kept fits")),
-            depths: None,
+            light_volumes: (scene.visibility == Visibility::Cached).then(|| {
+                LightVolumes::new(scene, volume.size, volume.alpha, u64::MAX).expect("what is not kept fits")
+            }),
+            filled: None,
+            medium: Medium::of(scene),
             strand: match &scene.reflection {
                 Reflection::Strand(params) => Some(StrandShading::new(params)),
                 Reflection::KajiyaKay => None,
@@ -229,7 +232,7 @@ impl<'a> Integrator<'a> {
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
         let point = scene.camera.eye + d_world * hit[2];
-        let depth_bits = self.extinction * 65535.0 * if self.per_cell { 1.0 } else { frame.depth };
+        let depth_bits = self.extinction * if self.per_cell { 1.0 } else { frame.depth };
         let mut lights: Vec<RayLight> = self
             .lights
             .iter()
@@ -293,14 +296,8 @@ impl<'a> Integrator<'a> {
             let root = inverse_q.sqrt();
             for light in &mut lights {
                 let t_dot_l = v.dot(light.l_v);
-                let light_depth = match scene.visibility {
-                    Visibility::None => 0.0,
-                    Visibility::March => {
-                        self.marched_depth(crossing.cell, light.l_cell, &mut walked[1]) * self.extinction
-                    }
-                    Visibility::Cached => self.kept_depth(crossing.cell, &light.places) * depth_bits,
-                };
-                let seen = (-light_depth).exp2();
+                let (seen, light_depth) =
+                    self.visibility_of(crossing.cell, light, depth_bits, &mut walked[1]);
                 let fibre = || {
                     let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
                     k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p)
@@ -340,44 +337,42 @@ impl<'a> Integrator<'a> {
         Traced { radiance, transmittance, cells: walked }
     }
 
-    /// From the middle of `start` to where the light ray leaves the slab. With per-cell attenuation the cell
-    /// itself does not hide its own light.
-    fn marched_depth(&self, start: IVec3, direction: Vec3, light_cells: &mut u32) -> f32 {
-        let mut depth = 0.0f32;
-        let walk = Walk::new(self.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
-        for (n, crossing) in walk.take(self.scene.trace.max_cells as usize).enumerate() {
-            if crossing.cell.z < 0 || crossing.cell.z >= self.size.z {
-                break;
+    /// V_i(k); and −log₂ of it, which is 0 where codes are kept.
+    fn visibility_of(&self, cell: IVec3, light: &RayLight, depth_bits: f32, walked: &mut u32) -> (f32, f32) {
+        let depth = match self.scene.visibility {
+            Visibility::None => 0.0,
+            Visibility::March => {
+                optical_depth(self.volume, cell, light.l_cell, self.medium, walked) * self.extinction
             }
-            *light_cells += 1;
-            let rho = self.cell(crossing.cell).rho_code() as f32;
-            if self.per_cell {
-                depth += if n == 0 { 0.0 } else { rho };
-            } else {
-                depth += rho * (crossing.t_exit - crossing.t_enter);
+            Visibility::Cached => {
+                let kept = self.kept_of(cell, &light.places);
+                if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
+                    return (kept * kept * (1.0 / 65025.0), 0.0);
+                }
+                kept * depth_bits
             }
-        }
-        depth
+        };
+        ((-depth).exp2(), depth)
     }
 
-    /// The optical depth from a cell to the light, from the light volumes at the corners of the ray's patch.
-    fn kept_depth(&self, cell: IVec3, places: &LightPlaces) -> f32 {
-        let depth = |number: u32| self.light_depth(number as usize, cell);
+    /// From the light volumes at the corners of the ray's patch.
+    fn kept_of(&self, cell: IVec3, places: &LightPlaces) -> f32 {
+        let kept = |number: u32| self.kept_at(number as usize, cell);
         let [p00, p10, p01, p11] = places.numbers;
         if places.numbers == [p00; 4] {
-            return depth(p00);
+            return kept(p00);
         }
         let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
-        let near = mix(depth(p00), depth(p10), places.at.x);
-        let far = mix(depth(p01), depth(p11), places.at.x);
+        let near = mix(kept(p00), kept(p10), places.at.x);
+        let far = mix(kept(p01), kept(p11), places.at.x);
         mix(near, far, places.at.y)
     }
 
-    fn light_depth(&self, number: usize, cell: IVec3) -> f32 {
-        let volumes = self.light_volumes.as_ref().expect("visibility is cached");
-        match &self.depths {
-            Some(depths) => depths[number][self.volume.index(cell.x as u32, cell.y as u32, cell.z as u32)],
-            None => optical_depth(self.volume, cell, volumes.directions[number], volumes.medium),
+    fn kept_at(&self, i: usize, cell: IVec3) -> f32 {
+        let plan = self.light_volumes.as_ref().expect("visibility is cached");
+        match &self.filled {
+            Some(filled) => filled[i].at(self.volume.index(cell.x as u32, cell.y as u32, cell.z as u32)),
+            None => number(self.volume, cell, &plan.volumes[i], plan.medium, plan.form),
         }
     }
 

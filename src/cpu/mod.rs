@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-pub use visibility::KeptDepths;
+pub use visibility::KeptVolumes;
 
 use crate::error::Result;
 use crate::frame::{Frame, Seconds, Window};
@@ -31,7 +31,7 @@ pub fn render(
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let window = Window::whole([scene.image.width, scene.image.height]);
-    let kept = &mut KeptDepths::default();
+    let kept = &mut KeptVolumes::default();
     render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
 }
 
@@ -48,7 +48,7 @@ pub fn render_samples(
     window: Window,
     samples: Range<u32>,
     surface: bool,
-    kept: &mut KeptDepths,
+    kept: &mut KeptVolumes,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;

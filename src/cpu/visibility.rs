@@ -1,4 +1,5 @@
-//! §5 Light volumes on the CPU. Twin: `shaders/visibility.wgsl`.
+//! §5 What lies between cells and lights, and light volumes on the CPU. Twins: `shaders/optical_depth.wgsl` and
+//! `shaders/visibility.wgsl`.
 
 use std::sync::Arc;
 
@@ -7,70 +8,121 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::job::Monitor;
-use crate::visibility::{LightVolumes, Medium};
+use crate::visibility::{Form, LightVolume, LightVolumes, Medium, transmittance_code};
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::Walk;
 
 /// Light volumes that are kept from frame to frame.
 #[derive(Default)]
-pub struct KeptDepths(Option<Kept>);
+pub struct KeptVolumes(Option<Kept>);
 
 struct Kept {
     cells: Arc<Vec<Cell>>,
     size: [u32; 3],
-    volumes: LightVolumes,
-    depths: Depths,
+    plan: LightVolumes,
+    filled: Filled,
 }
 
-/// All light volumes: number by number as their directions, each in the volume's order of cells.
-pub type Depths = Arc<Vec<Vec<f32>>>;
+/// All light volumes: number by number, each in the volume's order of cells.
+pub type Filled = Arc<Vec<Numbers>>;
 
-impl KeptDepths {
-    /// The depths of `volumes`, walked unless they are those of the last call.
-    pub fn get(
-        &mut self,
-        volumes: &LightVolumes,
-        volume: &VolumeTexture,
-        monitor: &dyn Monitor,
-    ) -> Result<Depths> {
-        if let Some(kept) = &self.0
-            && Arc::ptr_eq(&kept.cells, &volume.cells)
-            && kept.size == volume.size
-            && kept.volumes.directions == volumes.directions
-            && kept.volumes.medium == volumes.medium
-        {
-            return Ok(kept.depths.clone());
+/// What one light volume holds.
+pub enum Numbers {
+    /// √T in 255ths.
+    Codes(Vec<u8>),
+    /// Optical depths.
+    Depths(Vec<f32>),
+}
+
+impl Numbers {
+    /// Of the cell with this index, as a number.
+    pub fn at(&self, index: usize) -> f32 {
+        match self {
+            Numbers::Codes(codes) => codes[index].into(),
+            Numbers::Depths(depths) => depths[index],
         }
-        // The old ones go first: both might not fit.
-        self.0 = None;
-        let total = volumes.directions.len() as u64;
-        let mut all = Vec::with_capacity(volumes.directions.len());
-        for (number, &direction) in volumes.directions.iter().enumerate() {
-            monitor.progress("light volumes", number as u64, total)?;
-            all.push(light_volume(volume, direction, volumes.medium));
-        }
-        let (cells, size, depths) = (volume.cells.clone(), volume.size, Arc::new(all));
-        self.0 = Some(Kept { cells, size, volumes: volumes.clone(), depths: depths.clone() });
-        Ok(depths)
     }
 }
 
-fn light_volume(volume: &VolumeTexture, direction: Vec3, medium: Medium) -> Vec<f32> {
+impl KeptVolumes {
+    /// The light volumes that are planned, walked unless they are those of the last call.
+    pub fn get(
+        &mut self,
+        plan: &LightVolumes,
+        volume: &VolumeTexture,
+        monitor: &dyn Monitor,
+    ) -> Result<Filled> {
+        if let Some(kept) = &self.0
+            && Arc::ptr_eq(&kept.cells, &volume.cells)
+            && kept.size == volume.size
+            && kept.plan.volumes == plan.volumes
+            && (kept.plan.medium, kept.plan.form) == (plan.medium, plan.form)
+        {
+            return Ok(kept.filled.clone());
+        }
+        // The old ones go first: both might not fit.
+        self.0 = None;
+        let total = plan.volumes.len() as u64;
+        let mut all = Vec::with_capacity(plan.volumes.len());
+        for (number, light_volume) in plan.volumes.iter().enumerate() {
+            monitor.progress("light volumes", number as u64, total)?;
+            all.push(match plan.form {
+                Form::Codes => {
+                    Numbers::Codes(filled(volume, |cell| code(volume, cell, light_volume, plan.medium)))
+                }
+                Form::Depths => Numbers::Depths(filled(volume, |cell| {
+                    optical_depth(volume, cell, light_volume.direction, plan.medium, &mut 0)
+                })),
+            });
+        }
+        let (cells, size, filled) = (volume.cells.clone(), volume.size, Arc::new(all));
+        self.0 = Some(Kept { cells, size, plan: plan.clone(), filled: filled.clone() });
+        Ok(filled)
+    }
+}
+
+/// A number for every cell; for those without density the default.
+fn filled<T: Copy + Default + Send>(volume: &VolumeTexture, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
     let [nx, ny, nz] = volume.size.map(|n| n as usize);
-    let mut depths = vec![0.0; nx * ny * nz];
-    depths.par_chunks_mut(nx).enumerate().for_each(|(row, depths)| {
-        for (x, depth) in depths.iter_mut().enumerate() {
+    let mut numbers = vec![T::default(); nx * ny * nz];
+    numbers.par_chunks_mut(nx).enumerate().for_each(|(row, numbers)| {
+        for (x, number) in numbers.iter_mut().enumerate() {
             if volume.cells[row * nx + x].rho_code() > 0 {
-                let cell = IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32);
-                *depth = optical_depth(volume, cell, direction, medium);
+                *number = of(IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32));
             }
         }
     });
-    depths
+    numbers
 }
 
-/// What a light volume holds for an occupied cell.
-pub fn optical_depth(volume: &VolumeTexture, start: IVec3, direction: Vec3, medium: Medium) -> f32 {
+fn code(volume: &VolumeTexture, cell: IVec3, light_volume: &LightVolume, medium: Medium) -> u8 {
+    let depth = optical_depth(volume, cell, light_volume.direction, medium, &mut 0);
+    transmittance_code(depth * light_volume.bits)
+}
+
+/// What a light volume of a form holds for an occupied cell.
+pub fn number(
+    volume: &VolumeTexture,
+    cell: IVec3,
+    light_volume: &LightVolume,
+    medium: Medium,
+    form: Form,
+) -> f32 {
+    match form {
+        Form::Codes => code(volume, cell, light_volume, medium).into(),
+        Form::Depths => optical_depth(volume, cell, light_volume.direction, medium, &mut 0),
+    }
+}
+
+/// From the middle of `start` to where the light ray leaves the slab: Σ ρ code × length, in units of
+/// `direction`, or Σ ρ code over the cells but the first. `walked` grows by the cells of the way.
+pub fn optical_depth(
+    volume: &VolumeTexture,
+    start: IVec3,
+    direction: Vec3,
+    medium: Medium,
+    walked: &mut u32,
+) -> f32 {
     let size = glam::UVec3::from(volume.size).as_ivec3();
     let mut depth = 0.0f32;
     let walk = Walk::new(size, start.as_vec3() + 0.5, direction, f32::INFINITY);
@@ -78,6 +130,7 @@ pub fn optical_depth(volume: &VolumeTexture, start: IVec3, direction: Vec3, medi
         if crossing.cell.z < 0 || crossing.cell.z >= size.z {
             break;
         }
+        *walked += 1;
         let c = crossing.cell.as_uvec3();
         let rho = volume.cells[volume.index(c.x, c.y, c.z)].rho_code() as f32;
         if medium.per_cell {
@@ -87,5 +140,5 @@ pub fn optical_depth(volume: &VolumeTexture, start: IVec3, direction: Vec3, medi
             depth += rho * (crossing.t_exit - crossing.t_enter);
         }
     }
-    depth * (1.0 / 65535.0)
+    depth
 }

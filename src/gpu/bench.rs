@@ -3,7 +3,7 @@
 use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
-use super::visibility::{LightDepths, Visibility};
+use super::visibility::{FilledVolumes, Visibility};
 use super::{BoundReflection, GpuRenderer, Inputs, Reflections, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
@@ -31,7 +31,7 @@ struct Pass {
     work: Work,
     up: Uploaded,
     frame: layout::Frame,
-    light_depths: LightDepths,
+    filled: FilledVolumes,
     reflection: BoundReflection,
 }
 
@@ -67,22 +67,26 @@ impl GpuBench {
             let frame = layout::Frame::new(scene, volume, window, &(0..1), 0, layers);
             let mut up = || Uploaded::new(gpu, &mut resident, scene, volume, mesh);
             let light_volumes = match scene.visibility {
-                scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
+                scene::Visibility::Cached => {
+                    Some(LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?)
+                }
                 _ => None,
             };
             let variant = Variant::of(scene, layers, light_volumes.as_ref());
-            let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, variant), None);
+            let integrate = |pass| {
+                Work::Integrate(Box::new(pass), Tiler::new(None, None, scene.volume_lights().len()), None)
+            };
             let mut visibility = Visibility::new(gpu);
             let mut work = Vec::new();
             if number == 0 {
                 work.push(("gbuffer", Work::Gbuffer));
                 work.push(("bare walk", integrate(Integrate::bare(gpu, variant))));
             }
-            let mut light_depths = visibility.none();
+            let mut filled = visibility.none();
             if let Some(light_volumes) = light_volumes {
                 let up = up()?;
                 let volumes = light_volumes.clone();
-                light_depths = visibility.get(gpu, timer, &up, &frame, volumes, volume, |_, _| Ok(()))?.0;
+                filled = visibility.get(gpu, timer, &up, &frame, volumes, volume, |_, _| Ok(()))?.0;
                 if !passes.iter().any(|(name, _)| *name == "light volumes") {
                     work.push(("light volumes", Work::Visibility(light_volumes)));
                 }
@@ -90,8 +94,8 @@ impl GpuBench {
             work.push((name, integrate(Integrate::new(gpu, variant))));
             for (name, work) in work {
                 let reflection = Reflections::default().bind(gpu, scene, volume);
-                let light_depths = light_depths.clone();
-                passes.push((name, Pass { work, up: up()?, frame, light_depths, reflection }));
+                let filled = filled.clone();
+                passes.push((name, Pass { work, up: up()?, frame, filled, reflection }));
             }
         }
         self.prepared = Some(Prepared {
@@ -116,10 +120,9 @@ impl GpuBench {
     pub fn run(&mut self, number: usize) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
-        let Pass { work, up, frame, light_depths, reflection } = &mut p.passes[number].1;
+        let Pass { work, up, frame, filled, reflection } = &mut p.passes[number].1;
         let (window, area) = (p.window, Tile::whole(p.window));
-        let inputs =
-            Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, light_depths, reflection };
+        let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, filled, reflection };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
             Work::Visibility(volumes) => {

@@ -6,7 +6,7 @@ use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::{Attenuation, Reflection, Scattering, Scene, Visibility};
 use crate::shading::whole_exponent;
-use crate::visibility::LightVolumes;
+use crate::visibility::{Form, LightVolumes};
 
 /// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
 /// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
@@ -17,27 +17,26 @@ const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
 
-/// The parts of the stage's shader: the walk, its lights, and a pixel's sheets, where there may be `many` (or many
-/// lights) or one.
+/// The parts of the stage's shader: the walk, its lights, and a pixel's sheets, where there may be `many` or one.
 pub fn source(many: bool) -> String {
     let sheets = match many {
         false => include_str!("../../shaders/integrate_one.wgsl"),
         true => include_str!("../../shaders/integrate_many.wgsl"),
     };
-    let walk = include_str!("../../shaders/integrate.wgsl");
-    [walk, include_str!("../../shaders/integrate_light.wgsl"), sheets].join("\n")
+    let walks =
+        [include_str!("../../shaders/optical_depth.wgsl"), include_str!("../../shaders/integrate.wgsl")];
+    [walks[0], walks[1], include_str!("../../shaders/integrate_light.wgsl"), sheets].join("\n")
 }
-
-/// Lights of one walk of a ray; `LIGHTS_A_WALK` of the shader.
-pub const LIGHTS_A_WALK: u32 = 16;
 
 /// What the pipeline is specialised to (`override` constants of the shader).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
+    /// None, one, or (2) several.
     lights: u32,
     per_cell: bool,
     march: bool,
     cached: bool,
+    codes: bool,
     cornered: bool,
     strand: bool,
     multiple: bool,
@@ -50,14 +49,15 @@ impl Variant {
     /// visibility is cached.
     pub fn of(scene: &Scene, layers: u32, light_volumes: Option<&LightVolumes>) -> Self {
         Variant {
-            lights: scene.volume_lights().len() as u32,
+            lights: scene.volume_lights().len().min(2) as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             march: scene.visibility == Visibility::March,
             cached: light_volumes.is_some(),
+            codes: light_volumes.is_some_and(|volumes| volumes.form == Form::Codes),
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
-            many: layers > 1 || scene.volume_lights().len() as u32 > LIGHTS_A_WALK,
+            many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
     }
@@ -103,9 +103,9 @@ pub struct Tiler {
 
 impl Tiler {
     /// Learns the size; with `fixed` every tile has about that many pixels. `known` is what the last frame of
-    /// the like has learned.
-    pub fn new(fixed: Option<u32>, known: Option<f64>, variant: Variant) -> Self {
-        let first = (FIRST_TILE_PIXELS / f64::from(variant.lights.max(1))).max(64.0);
+    /// the like has learned; `lights` is their number.
+    pub fn new(fixed: Option<u32>, known: Option<f64>, lights: usize) -> Self {
+        let first = (FIRST_TILE_PIXELS / lights.max(1) as f64).max(64.0);
         let pixels = fixed.map(f64::from).or(known).unwrap_or(first);
         Tiler { pixels, fixed: fixed.is_some(), smallest: f64::INFINITY }
     }
@@ -151,6 +151,7 @@ impl Integrate {
             ("PER_CELL", number(variant.per_cell)),
             ("MARCH", number(variant.march)),
             ("CACHED", number(variant.cached)),
+            ("CODES", number(variant.codes)),
             ("CORNERED", number(variant.cornered)),
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
@@ -195,7 +196,7 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, light_depths, reflection, .. } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, filled, reflection, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
@@ -212,8 +213,8 @@ impl Integrate {
             entry(7, wgpu::BindingResource::TextureView(&opaque)),
             entry(8, sums.radiance.as_entire_binding()),
             entry(9, sums.counts.as_entire_binding()),
-            entry(10, wgpu::BindingResource::TextureView(&light_depths.texture)),
-            entry(11, light_depths.places.as_entire_binding()),
+            entry(10, wgpu::BindingResource::TextureView(&filled.texture)),
+            entry(11, filled.places.as_entire_binding()),
             entry(12, reflection.uniform.as_entire_binding()),
             entry(13, wgpu::BindingResource::TextureView(&reflection.table)),
             entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
@@ -272,7 +273,7 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 16] {
         format,
         view_dimension: TextureViewDimension::D3,
     };
-    let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Float));
+    let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Uint));
     let list = buffer(BufferBindingType::Storage { read_only: true });
     let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
     let table = texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3);

@@ -95,9 +95,11 @@ pub struct Quad {
 #[allow(missing_docs)]
 pub struct LightVolume {
     pub direction: [f32; 3],
-    pub first_cell: u32,
+    pub first_column: u32,
     pub offset: [i32; 3],
-    pub cell_count: u32,
+    pub column_count: u32,
+    pub bits: f32,
+    pub pad: [u32; 3],
 }
 
 /// The reflection model of flowing water, beside its table.

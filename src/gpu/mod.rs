@@ -19,13 +19,13 @@ pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
-pub use integrate::{Integrate, LIGHTS_A_WALK, Sums, Tiler, Variant, source as integrate_source};
+pub use integrate::{Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
 pub use strand::StrandTexture;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
-pub use visibility::{LightDepths, Visibility};
+pub use visibility::{FilledVolumes, Visibility, source as visibility_source};
 
 use std::ops::Range;
 use std::time::Instant;
@@ -108,7 +108,7 @@ pub struct Inputs<'a> {
     /// The window's uniforms.
     pub frame: &'a layout::Frame,
     /// The light volumes.
-    pub light_depths: &'a LightDepths,
+    pub filled: &'a FilledVolumes,
     /// The reflection model and multiple scattering.
     pub reflection: &'a BoundReflection,
 }
@@ -212,7 +212,9 @@ impl GpuRenderer {
         let clock = Instant::now();
         let layers = overlap::sheets(scene);
         let light_volumes = match scene.visibility {
-            scene::Visibility::Cached => Some(LightVolumes::new(scene, volume.size, scene.light_cache)?),
+            scene::Visibility::Cached => {
+                Some(LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?)
+            }
             _ => None,
         };
         let variant = Variant::of(scene, layers, light_volumes.as_ref());
@@ -243,7 +245,7 @@ impl GpuRenderer {
         self.rasters.begin();
 
         let samples = options.samples.clone().unwrap_or(0..image.samples);
-        let light_depths = match light_volumes {
+        let filled = match light_volumes {
             None => {
                 self.visibility.forget();
                 self.visibility.none()
@@ -262,7 +264,7 @@ impl GpuRenderer {
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
         let known = self.learned.filter(|(of, _)| *of == like).map(|(_, pixels)| pixels);
-        let mut tiler = Tiler::new(options.tile_pixels, known, variant);
+        let mut tiler = Tiler::new(options.tile_pixels, known, scene.volume_lights().len());
         for window in options.grid.windows(whole, part) {
             // They meet, by the way windows are chosen.
             let Some(wanted) = window.meet(&part) else { continue };
@@ -289,7 +291,7 @@ impl GpuRenderer {
                     window,
                     area,
                     frame: &frame_uniforms,
-                    light_depths: &light_depths,
+                    filled: &filled,
                     reflection: &reflection,
                 };
                 if kept.is_none_or(|kept| !kept.ready.get()) {

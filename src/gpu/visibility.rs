@@ -9,35 +9,44 @@ use super::shader;
 use super::timing::Timer;
 use super::upload::Uploaded;
 use crate::error::{Error, Result};
-use crate::visibility::{LightVolumes, Medium};
+use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
 use crate::volume::{Cell, VolumeTexture};
 
-/// Cells of the first submission, and most of any: its time is learned as for tiles.
-const FIRST_CELLS: u32 = 1 << 13;
+/// The text of the stage's own shader.
+pub fn source() -> String {
+    [include_str!("../../shaders/optical_depth.wgsl"), include_str!("../../shaders/visibility.wgsl")]
+        .join("\n")
+}
+
+/// Columns of the first submission, and most of any: its time is learned as for tiles.
+const FIRST_COLUMNS: u32 = 1 << 12;
 /// One dimension of a dispatch: 65535 workgroups of 64.
-const MOST_CELLS: u32 = 65535 * 64;
+const MOST_COLUMNS: u32 = 65535 * 64;
 /// A submission aims at this many seconds, as tiles of the integrate pass.
 const SECONDS: f64 = 0.03;
 
 /// The pass, and the light volumes of the last frame that had any.
 pub struct Visibility {
-    pipelines: Vec<(bool, wgpu::ComputePipeline)>,
+    pipelines: Vec<(Kind, wgpu::ComputePipeline)>,
     occupied: Option<(Arc<Vec<Cell>>, wgpu::Buffer, u32)>,
     kept: Option<Kept>,
-    none: LightDepths,
+    none: FilledVolumes,
 }
+
+/// What the pipeline is specialised to: attenuation per cell, and what is kept.
+type Kind = (bool, Form);
 
 struct Kept {
     cells: Arc<Vec<Cell>>,
     size: [u32; 3],
-    volumes: LightVolumes,
-    depths: LightDepths,
+    plan: LightVolumes,
+    filled: FilledVolumes,
 }
 
 /// Light volumes on the device, as the integrate pass reads them.
 #[derive(Clone)]
-pub struct LightDepths {
-    /// All light volumes, side by side in one `r32float` texture.
+pub struct FilledVolumes {
+    /// All light volumes, side by side in one `r32uint` texture: words of four codes, or the bits of optical depths.
     pub texture: wgpu::TextureView,
     /// `array<vec4<i32>>`: of every quad and light where its numbers begin, patches along u and v, whether they are
     /// cornered; then for every number where its light volume begins in the texture.
@@ -84,7 +93,7 @@ impl Shelf {
 impl Visibility {
     /// Nothing is compiled before it is needed.
     pub fn new(gpu: &Gpu) -> Self {
-        let none = LightDepths {
+        let none = FilledVolumes {
             texture: texture(gpu, [1; 3]),
             places: gpu.buffer_with("light places", &[], wgpu::BufferUsages::STORAGE),
         };
@@ -92,7 +101,7 @@ impl Visibility {
     }
 
     /// What the integrate pass binds where no light volumes are asked for.
-    pub fn none(&self) -> LightDepths {
+    pub fn none(&self) -> FilledVolumes {
         self.none.clone()
     }
 
@@ -101,8 +110,8 @@ impl Visibility {
         self.kept = None;
     }
 
-    /// The depths of `volumes`, walked unless they are those of the last call; and the device's seconds for
-    /// it. `between` is called with the cells done and all there are, and may stop the work.
+    /// The light volumes that are planned, walked unless they are those of the last call; and the device's seconds
+    /// for it. `between` is called with the columns of cells done and all there are, and may stop the work.
     #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
     pub fn get(
         &mut self,
@@ -110,25 +119,25 @@ impl Visibility {
         timer: &Timer,
         up: &Uploaded,
         frame: &Frame,
-        volumes: LightVolumes,
+        plan: LightVolumes,
         volume: &VolumeTexture,
         mut between: impl FnMut(u64, u64) -> Result<()>,
-    ) -> Result<(LightDepths, f64)> {
+    ) -> Result<(FilledVolumes, f64)> {
         if let Some(kept) = &self.kept
             && Arc::ptr_eq(&kept.cells, &volume.cells)
             && kept.size == volume.size
-            && kept.volumes == volumes
+            && kept.plan == plan
         {
-            return Ok((kept.depths.clone(), 0.0));
+            return Ok((kept.filled.clone(), 0.0));
         }
         // The old ones go first: both might not fit.
         self.kept = None;
-        let shelf = Shelf::new(gpu, volume.size, volumes.directions.len() as u32)?;
-        let depths =
-            LightDepths { texture: texture(gpu, shelf.extent()), places: places(gpu, &volumes, &shelf) };
+        let shelf = Shelf::new(gpu, plan.words(volume.size), plan.volumes.len() as u32)?;
+        let filled =
+            FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
         let (occupied, count) = self.occupied(gpu, volume);
-        let pipeline = self.pipeline(gpu, volumes.medium);
+        let pipeline = self.pipeline(gpu, (plan.medium.per_cell, plan.form));
         let frame = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let part = gpu.buffer(
             "light volume",
@@ -144,20 +153,22 @@ impl Visibility {
                 entry(1, part.as_entire_binding()),
                 entry(2, wgpu::BindingResource::TextureView(&up.volume)),
                 entry(3, occupied.as_entire_binding()),
-                entry(4, wgpu::BindingResource::TextureView(&depths.texture)),
+                entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
             ],
         });
-        let total = u64::from(count) * volumes.directions.len() as u64;
-        let (mut seconds, mut done, mut cells) = (0.0, 0, FIRST_CELLS);
-        for (number, direction) in volumes.directions.iter().enumerate() {
-            let mut first_cell = 0;
-            while first_cell < count {
-                let cell_count = cells.min(count - first_cell);
+        let total = u64::from(count) * plan.volumes.len() as u64;
+        let (mut seconds, mut done, mut columns) = (0.0, 0, FIRST_COLUMNS);
+        for (number, light_volume) in plan.volumes.iter().enumerate() {
+            let mut first_column = 0;
+            while first_column < count {
+                let column_count = columns.min(count - first_column);
                 let uniform = LightVolume {
-                    direction: direction.to_array(),
-                    first_cell,
+                    direction: light_volume.direction.to_array(),
+                    first_column,
                     offset: shelf.place(number as u32),
-                    cell_count,
+                    column_count,
+                    bits: light_volume.bits,
+                    pad: [0; 3],
                 };
                 gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
                 let took = timer.run(gpu, "visibility", |encoder, span| {
@@ -167,43 +178,50 @@ impl Visibility {
                     });
                     pass.set_pipeline(&pipeline);
                     pass.set_bind_group(0, &group, &[]);
-                    pass.dispatch_workgroups(cell_count.div_ceil(64), 1, 1);
+                    pass.dispatch_workgroups(column_count.div_ceil(64), 1, 1);
                 })?;
                 seconds += took;
-                first_cell += cell_count;
-                done += u64::from(cell_count);
+                first_column += column_count;
+                done += u64::from(column_count);
                 between(done, total)?;
-                let wanted = f64::from(cell_count) * SECONDS / took.max(1e-6);
-                cells = wanted.clamp(64.0, f64::from(cells.saturating_mul(4).min(MOST_CELLS))) as u32;
+                let wanted = f64::from(column_count) * SECONDS / took.max(1e-6);
+                columns = wanted.clamp(64.0, f64::from(columns.saturating_mul(4).min(MOST_COLUMNS))) as u32;
             }
         }
-        let kept = Kept { cells: volume.cells.clone(), size: volume.size, volumes, depths: depths.clone() };
+        let kept = Kept { cells: volume.cells.clone(), size: volume.size, plan, filled: filled.clone() };
         self.kept = Some(kept);
-        Ok((depths, seconds))
+        Ok((filled, seconds))
     }
 
-    /// Linear indices of the cells with density, and their number.
+    /// Linear indices of the columns of cells with density, and their number.
     fn occupied(&mut self, gpu: &Gpu, volume: &VolumeTexture) -> (wgpu::Buffer, u32) {
         if let Some((cells, buffer, count)) = &self.occupied
             && Arc::ptr_eq(cells, &volume.cells)
         {
             return (buffer.clone(), *count);
         }
-        let numbered = volume.cells.iter().zip(0u32..);
-        let indices: Vec<u32> = numbered.filter(|(cell, _)| cell.rho_code() > 0).map(|(_, i)| i).collect();
+        let [nx, ny, nz] = volume.size;
+        let of_slice = nx * ny;
+        let occupied = |column: u32| {
+            let (z, xy) = (column / of_slice * CELLS_A_WORD, column % of_slice);
+            (z..(z + CELLS_A_WORD).min(nz)).any(|z| volume.cells[(z * of_slice + xy) as usize].rho_code() > 0)
+        };
+        let columns = of_slice * nz.div_ceil(CELLS_A_WORD);
+        let indices: Vec<u32> = (0..columns).filter(|&column| occupied(column)).collect();
         let buffer =
-            gpu.buffer_with("occupied cells", bytemuck::cast_slice(&indices), wgpu::BufferUsages::STORAGE);
+            gpu.buffer_with("occupied columns", bytemuck::cast_slice(&indices), wgpu::BufferUsages::STORAGE);
         self.occupied = Some((volume.cells.clone(), buffer.clone(), indices.len() as u32));
         (buffer, indices.len() as u32)
     }
 
-    fn pipeline(&mut self, gpu: &Gpu, medium: Medium) -> wgpu::ComputePipeline {
-        let per_cell = medium.per_cell;
-        if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == per_cell) {
+    fn pipeline(&mut self, gpu: &Gpu, kind: Kind) -> wgpu::ComputePipeline {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == kind) {
             return pipeline.clone();
         }
-        let module = shader(gpu, "visibility", include_str!("../../shaders/visibility.wgsl"));
-        let constants = [("PER_CELL", f64::from(u8::from(per_cell)))];
+        let module = shader(gpu, "visibility", &source());
+        let (per_cell, form) = kind;
+        let number = |on: bool| f64::from(u8::from(on));
+        let constants = [("PER_CELL", number(per_cell)), ("CODES", number(form == Form::Codes))];
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("visibility"),
             layout: None,
@@ -215,7 +233,7 @@ impl Visibility {
             },
             cache: None,
         });
-        self.pipelines.push((per_cell, pipeline.clone()));
+        self.pipelines.push((kind, pipeline.clone()));
         pipeline
     }
 }
@@ -227,20 +245,20 @@ fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D3,
-        format: wgpu::TextureFormat::R32Float,
+        format: wgpu::TextureFormat::R32Uint,
         usage: wgpu::TextureUsages::STORAGE_BINDING,
         view_formats: &[],
     });
     texture.create_view(&Default::default())
 }
 
-fn places(gpu: &Gpu, volumes: &LightVolumes, shelf: &Shelf) -> wgpu::Buffer {
-    let before = volumes.patches.len() as u32;
-    let patches = volumes.patches.iter().map(|p| {
+fn places(gpu: &Gpu, plan: &LightVolumes, shelf: &Shelf) -> wgpu::Buffer {
+    let before = plan.patches.len() as u32;
+    let patches = plan.patches.iter().map(|p| {
         let [nu, nv] = p.count.map(|n| n as i32);
         [(before + p.first) as i32, nu, nv, i32::from(p.cornered)]
     });
-    let numbers = volumes.numbers.iter().map(|&number| {
+    let numbers = plan.numbers.iter().map(|&number| {
         let [x, y, z] = shelf.place(number);
         [x, y, z, 0]
     });

@@ -25,7 +25,7 @@ pub enum Engine {
     /// On a device.
     Gpu(Box<GpuRenderer>, DeviceOptions),
     /// On all cores.
-    Cpu(cpu::KeptDepths),
+    Cpu(cpu::KeptVolumes),
 }
 
 /// Pixels a submission after a device was lost: small enough for the shortest watchdog known.
@@ -34,7 +34,7 @@ const CAREFUL_TILE_PIXELS: u32 = 4096;
 impl Engine {
     /// The CPU engine.
     pub fn cpu() -> Engine {
-        Engine::Cpu(cpu::KeptDepths::default())
+        Engine::Cpu(cpu::KeptVolumes::default())
     }
 
     /// Opens the engine; says in one line what was taken and why.

@@ -4,9 +4,9 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{
-    Develop, Environment, Frame, Light, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile, WORKGROUP,
+    Develop, Environment, Frame, Light, LightVolume, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile, WORKGROUP,
 };
-use taki::gpu::{LIGHTS_A_WALK, integrate_source, shader_source};
+use taki::gpu::{integrate_source, shader_source, visibility_source};
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
@@ -23,13 +23,15 @@ const SHARED: [&str; 8] = [
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
-/// What is put after integrate.wgsl.
-const PARTS: [&str; 3] = ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl"];
+/// What some stages are put together from besides.
+const PARTS: [&str; 4] =
+    ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl", "optical_depth.wgsl"];
 
 /// All of a stage's shader.
 fn stage(name: &str) -> String {
     match name {
         "integrate.wgsl" => shader_source(&integrate_source(true)),
+        "visibility.wgsl" => shader_source(&visibility_source()),
         _ => shader_source(&file(name)),
     }
 }
@@ -114,6 +116,11 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
     let module = validate(&stage("resolve.wgsl")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
+    let module = validate(&stage("visibility.wgsl")).expect("valid");
+    // Padded on the host to what a uniform takes.
+    let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
+    light_volume.pop();
+    assert_eq!(members(&module, "LightVolume"), (light_volume, size));
 }
 
 #[test]
@@ -125,6 +132,7 @@ fn constants_are_the_same_on_both_sides() {
         let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
         match module.global_expressions[constant.init] {
             naga::Expression::Literal(naga::Literal::U32(x)) => x as f64,
+            naga::Expression::Literal(naga::Literal::I32(x)) => x as f64,
             naga::Expression::Literal(naga::Literal::F32(x)) => x as f64,
             ref other => panic!("{name} is {other:?}"),
         }
@@ -133,7 +141,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(of(&resolve, "TONE_FILMIC"), TONE_FILMIC as f64);
     assert_eq!(of(&resolve, "TONE_AGX"), TONE_AGX as f64);
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
-    assert_eq!(constant("LIGHTS_A_WALK"), LIGHTS_A_WALK as f64);
+    assert_eq!(constant("CELLS_A_WORD"), taki::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);

@@ -39,24 +39,29 @@ fn on_cpu(scene: &Scene) -> Frame {
 #[test]
 fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     let size = [40; 3];
-    let of = |sets: &[&str]| LightVolumes::new(&scene("front", sets), size, u64::MAX).expect("they fit");
+    let of = |sets: &[&str]| LightVolumes::new(&scene("front", sets), size, 1.0, u64::MAX).expect("they fit");
     let one = of(&[]);
-    assert_eq!((one.directions.len(), one.cornered(), one.patches.len()), (1, false, 1));
+    assert_eq!((one.volumes.len(), one.cornered(), one.patches.len()), (1, false, 1));
     // The same parallelogram twice, elsewhere; another thickness; another place of the eye on the same side.
     let mut two = scene("front", &[]);
     let mut moved = two.quads[0];
     moved.corners = moved.corners.map(|c| c + Vec3::new(3.0, 1.0, -2.0));
     moved.map.a_world = moved.corners[0];
     two.quads.push(moved);
-    let volumes = LightVolumes::new(&two, size, u64::MAX).expect("they fit");
-    assert_eq!((volumes.directions.len(), volumes.patches.len()), (1, 2));
+    let volumes = LightVolumes::new(&two, size, 1.0, u64::MAX).expect("they fit");
+    assert_eq!((volumes.volumes.len(), volumes.patches.len()), (1, 2));
     two.quads[1].material.thickness_m *= 2.0;
-    assert_eq!(LightVolumes::new(&two, size, u64::MAX).expect("they fit").directions.len(), 2);
-    let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4", "trace.sigma=3"]);
-    assert_eq!(elsewhere, one, "camera, exposure, flow and σ leave light volumes as they are");
+    assert_eq!(LightVolumes::new(&two, size, 1.0, u64::MAX).expect("they fit").volumes.len(), 2);
+    let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4"]);
+    assert_eq!(elsewhere, one, "camera, exposure and flow leave light volumes as they are");
+    // Of optical depths σ does.
+    let many = of(&["light.visibility=cached", "light.scattering=multiple"]);
+    assert_eq!(of(&["light.visibility=cached", "light.scattering=multiple", "trace.sigma=3"]), many);
     // From behind, the face is the other one.
     let behind = of(&["camera.eye=[0,0,-3.5]"]);
-    assert!((behind.directions[0] * Vec3::new(1.0, 1.0, -1.0) - one.directions[0]).length() < 1e-5);
+    assert!(
+        (behind.volumes[0].direction * Vec3::new(1.0, 1.0, -1.0) - one.volumes[0].direction).length() < 1e-5
+    );
 }
 
 #[test]
@@ -64,20 +69,20 @@ fn a_point_light_near_a_quad_cuts_it_into_patches_and_a_far_one_does_not() {
     let of = |position: &str| {
         let position = format!("lights.key.position={position}");
         let scene = scene("front", &["lights.key.kind=point", &position]);
-        LightVolumes::new(&scene, [40; 3], u64::MAX).expect("they fit")
+        LightVolumes::new(&scene, [40; 3], 1.0, u64::MAX).expect("they fit")
     };
     let near = of("[0.2,0.3,0.8]");
-    assert!(near.cornered() && near.directions.len() > 16, "{:?}", near.patches);
+    assert!(near.cornered() && near.volumes.len() > 16, "{:?}", near.patches);
     assert!(!of("[200,300,800]").cornered());
 }
 
 #[test]
 fn light_volumes_over_the_budget_are_coarser_and_then_refused_with_what_they_need() {
     let near = ["lights.key.kind=point", "lights.key.position=[0.2,0.3,0.8]", "light.visibility=cached"];
-    let of = |budget: u64| LightVolumes::new(&scene("front", &near), [40; 3], budget);
+    let of = |budget: u64| LightVolumes::new(&scene("front", &near), [40; 3], 1.0, budget);
     let whole = of(u64::MAX).expect("they fit");
     let tight = of(whole.bytes([40; 3]) as u64 - 1).expect("coarser ones fit");
-    assert!(tight.directions.len() < whole.directions.len());
+    assert!(tight.volumes.len() < whole.volumes.len());
     let error = of(100_000).expect_err("nothing fits");
     assert_eq!(error.exit_code(), 33);
     let words = error.to_string();
@@ -91,8 +96,8 @@ fn a_frame_whose_light_volumes_do_not_fit_is_refused_once_and_in_one_line() {
     let sets = [
         "--set=light.visibility=cached",
         "--set=light.cache=1",
-        "--set=volume.nx=128",
-        "--set=volume.ny=128",
+        "--set=volume.nx=256",
+        "--set=volume.ny=256",
     ];
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out.png");
@@ -113,17 +118,20 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
         [(Vec3::Z, 1.0), (Vec3::new(0.6, 0.0, 0.8), 0.8), (Vec3::new(0.0, -0.8, -0.6), 0.6)]
     {
         front.lights = vec![Light::Directional { to_light: towards, intensity: Vec3::ONE }];
-        let volumes = LightVolumes::new(&front, uniform.size, u64::MAX).expect("they fit");
+        let volumes = LightVolumes::new(&front, uniform.size, 1.0, u64::MAX).expect("they fit");
         for z in [0, 7, 39] {
             let cell = IVec3::new(3, 5, z);
-            let depth = optical_depth(&uniform, cell, volumes.directions[0], volumes.medium);
+            let depth =
+                optical_depth(&uniform, cell, volumes.volumes[0].direction, volumes.medium, &mut 0) / 65535.0;
             let above = if towards.z > 0.0 { z as f32 + 0.5 } else { 39.5 - z as f32 };
             assert!((depth * cosine / above - 1.0).abs() < 1e-5, "{towards} {z}: {depth}");
         }
     }
     // Per cell the cell itself does not hide its own light.
     let medium = Medium { per_cell: true, max_cells: 512 };
-    assert_eq!(optical_depth(&uniform, IVec3::new(3, 5, 7), Vec3::new(0.0, 0.0, -1.0), medium), 7.0);
+    let mut walked = 0;
+    let depth = optical_depth(&uniform, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, &mut walked);
+    assert_eq!((depth, walked), (7.0 * 65535.0, 8));
 }
 
 #[test]
@@ -131,11 +139,12 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let size = ["image.width=200", "image.height=200"];
     let near = ["lights.key.kind=point", "lights.key.position=[0.3,0.4,1.2]", "lights.key.intensity=2"];
     let cell = ["trace.attenuation=per-cell", "trace.tau=0.3"];
-    // A directional light on a parallelogram is exact but for rounding. Under a point light half the quad's width
+    // A directional light on a parallelogram is exact but for the codes: √T in 255ths is T to 0.0039·√T at most and
+    // 0.0023·√T in the mean, relative to T more where it is dark, less in the mean of a ray's cells. Under a point light half the quad's width
     // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
     for (preset, more, allowed) in [
-        ("front", &[][..], 1e-4),
-        ("front", &cell[..], 1e-4),
+        ("front", &[][..], 2.5e-3),
+        ("front", &cell[..], 2.5e-3),
         ("front", &near[..], 0.06),
         ("fig5", &[][..], 0.02),
         ("waterfall", &[][..], 0.02),
@@ -178,7 +187,7 @@ fn light_volumes_on_the_device_are_kept_and_never_stale() {
         ("camera.eye=[0.5,0.2,3]", false),
         ("image.exposure=1", false),
         ("volume.flow=0.3", false),
-        ("trace.sigma=4", false),
+        ("trace.sigma=4", true),
         ("lights.key.intensity=2", false),
         ("lights.key.direction=[0.1,0.9,0.4]", true),
         ("materials.water.thickness=0.9", true),

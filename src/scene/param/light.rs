@@ -27,7 +27,7 @@ pub(super) const TABLE: &[Param] = &[
         "MiB",
         Int(1, 65536, 512),
         Uniform,
-        "Most memory that visibility cached may take, in light volumes of four bytes a cell.",
+        "Most memory that visibility cached may take, in light volumes of a byte a cell, or four where light is scattered more than once.",
     )
     .slider(16.0, 4096.0),
     p(

@@ -1,0 +1,67 @@
+// §5 V_i(k): what lies between a cell and a light. Shared by the stages visibility and integrate. Twin:
+// src/cpu/visibility.rs, optical_depth.
+
+// Whether cells count whole, not by the length of the way in them.
+override PER_CELL: bool = false;
+
+// From the middle of a cell to where the light ray leaves the slab.
+struct LightWalk {
+    // Σ ρ code · length, or Σ ρ code.
+    depth: f32,
+    t: f32,
+    cells: u32,
+    done: bool,
+}
+
+fn optical_depth(
+    volume: texture_storage_3d<rg32uint, read>,
+    size: vec3<i32>,
+    cell: vec3<i32>,
+    direction: vec3<f32>,
+    max_cells: u32,
+) -> LightWalk {
+    var ray: LightWalk;
+    var walk = walk_new(size, vec3<f32>(cell) + 0.5, direction);
+    while !ray.done {
+        pass_cell(volume, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, &walk, &ray, size.z, max_cells);
+    }
+    return ray;
+}
+
+fn pass_cell(
+    volume: texture_storage_3d<rg32uint, read>,
+    walk: ptr<function, Walk>,
+    ray: ptr<function, LightWalk>,
+    layers: i32,
+    max_cells: u32,
+) {
+    let t_exit = walk_exit(*walk);
+    let rho = f32(textureLoad(volume, (*walk).cell).x & 0xffffu);
+    if PER_CELL {
+        // The cell itself does not hide its own light.
+        (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));
+    } else {
+        (*ray).depth += select(rho * (t_exit - (*ray).t), 0.0, (*ray).done);
+    }
+    (*ray).cells += select(1u, 0u, (*ray).done);
+    (*ray).t = t_exit;
+    walk_step(walk, true);
+    let z = (*walk).cell.z;
+    (*ray).done |= (z < 0) | (z >= layers) | ((*ray).cells >= max_cells);
+}
+
+// Codes of transmittances that one word of a light volume holds, of cells that follow one another along z.
+const CELLS_A_WORD: i32 = 4;
+
+// √T in 255ths, from −log₂ T: steps are finest where it is dark.
+fn transmittance_code(depth_bits: f32) -> u32 {
+    return u32(255.0 * exp2(-0.5 * depth_bits) + 0.5);
+}
+
+// The code of cell `z` of its column, as a number.
+fn code_in_word(word: u32, z: i32) -> f32 {
+    return f32((word >> u32(8 * (z & 3))) & 0xffu);
+}
