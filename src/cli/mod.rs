@@ -159,6 +159,11 @@ fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
         .ok_or_else(|| "column, row, width and height in pixels, such as 0,0,640,360".into())
 }
 
+/// What an automatic exposure has chosen.
+fn measured_words(stops: f32) -> String {
+    format!("taki: automatic exposure: {stops:+.2} stops")
+}
+
 /// The part of the image that is asked for by `option`.
 fn window(option: &str, crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
     let Some(crop) = crop else { return Ok(Window::whole(size)) };

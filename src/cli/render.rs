@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, default_output, size, window};
+use super::{EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
 use crate::error::{Error, Result};
 use crate::frame::{Figures, Layer, Window};
 use crate::gpu::RenderOptions;
@@ -75,10 +75,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         terminal.note(&format!("taki: {}", environment.words()));
     }
     if let Some(stops) = measured {
-        terminal.note(&format!(
-            "taki: automatic exposure {stops:+.2} stops, with image.exposure {:+.2}",
-            scene.image.look.exposure
-        ));
+        terminal.note(&measured_words(stops));
     }
     let clock = Instant::now();
     let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;

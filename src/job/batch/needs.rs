@@ -24,6 +24,8 @@ pub struct Needs {
     pub size: [u32; 2],
     /// Samples a pixel.
     pub samples: u32,
+    /// Stops of the automatic exposure, where there is one.
+    pub auto_exposure: Option<f32>,
     /// Parts that a picture is rendered in.
     pub strips: u64,
     /// Memory of the work on host and device, bytes, beside the program's own.
@@ -66,6 +68,7 @@ impl Batch {
             last: files(own.last()),
             size: [window.width, window.height],
             samples: scene.image.samples,
+            auto_exposure: self.measured,
             strips: strips.len() as u64,
             memory_bytes,
             disk_bytes: window.pixels() * pixel * to_render + movie_bytes,
