@@ -38,6 +38,10 @@ override MULTIPLE: bool = false;
 // P of every material, one profile after the other.
 @group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
 
+// Instead of a number of cells, where the device ended a walk before it was done: software Vulkan grants all loops of a
+// pixel 65535 turns.
+const CUT: u32 = 0xffffffffu;
+
 struct Reflection {
     strand: Strand,
     similarity: Similarity,
@@ -64,7 +68,8 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     if frame.sample_index != 0u {
         result += radiance[index];
-        count += counts[index];
+        let before = counts[index];
+        count = select(count + before, vec2<u32>(CUT), (count.x == CUT) | (before.x == CUT));
     }
     radiance[index] = result;
     counts[index] = count;
@@ -80,6 +85,8 @@ struct Ray {
     cells: u32,
     light_cells: u32,
     done: bool,
+    // Whether a light walk was ended by the device.
+    cut: bool,
     // Optical depth so far, in bits; only where light is scattered more than once.
     depth: f32,
 }
@@ -197,6 +204,9 @@ fn trace(
         color += ray.light;
     }
     *count += vec2<u32>(ray.cells, ray.light_cells);
+    if ray.cut | !ray.done {
+        *count = vec2<u32>(CUT);
+    }
     return vec4<f32>(before.rgb + color, ray.transmittance);
 }
 

@@ -148,6 +148,7 @@ fn visibility_of(matter: Matter, light: RayLight, view: View, ray: ptr<function,
         if matter.occupied {
             let walked = optical_depth(volume, view.size, matter.cell, light.l_cell, view.max_cells);
             (*ray).light_cells += walked.cells;
+            (*ray).cut |= !walked.done;
             depth = walked.depth * view.extinction;
         }
     }

@@ -12,7 +12,7 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
             next = textureLoad(quad_id, pixel, layer, 0).x;
         }
         result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
-        if result.w < frame.early_end {
+        if result.w < frame.early_end || (*count).x == CUT {
             break;
         }
         quad_number = next;

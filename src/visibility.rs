@@ -30,6 +30,10 @@ pub const CELLS_A_WORD: u32 = 4;
 /// size of single cells.
 const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 
+/// Most cells of a walk that is kept: one invocation makes four of them, four cells a turn, and software Vulkan grants
+/// all its loops 65535 turns.
+const MOST_CELLS: u32 = 65_000;
+
 /// Where the light volumes do not fit into the budget the angles are doubled so many times: at 8 and 32
 /// degrees shadows in the middle of a patch are seen double.
 const DOUBLINGS: i32 = 3;
@@ -161,7 +165,8 @@ impl LightVolumes {
     }
 
     fn at_angles(scene: &Scene, size: [u32; 3], alpha: f32, angles: [f64; 2]) -> Self {
-        let medium = Medium::of(scene);
+        let mut medium = Medium::of(scene);
+        medium.max_cells = medium.max_cells.min(MOST_CELLS);
         let form = match scene.scattering {
             Scattering::Single => Form::Codes,
             Scattering::Multiple => Form::Depths,

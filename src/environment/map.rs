@@ -101,6 +101,18 @@ impl Map {
         Vec3::new(r, g, b)
     }
 
+    /// The same map with at least so many columns and rows; none if it has them.
+    pub fn enlarged(&self, columns: u32, rows: u32) -> Option<Map> {
+        if self.width >= columns && self.height >= rows {
+            return None;
+        }
+        let (width, height) = (self.width.max(columns), self.height.max(rows));
+        let place = |i: u32, n: u32| (i as f32 + 0.5) / n as f32;
+        let texel = |x, y| self.radiance([place(x, width), place(y, height)]).extend(0.0).to_array();
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
+        Some(Map { width, height, texels })
+    }
+
     /// Bytes of its texels.
     pub fn bytes(&self) -> u64 {
         self.texels.len() as u64 * 16

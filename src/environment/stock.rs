@@ -43,12 +43,18 @@ struct Lights {
     error: Option<f64>,
 }
 
+/// Fewest columns and rows that are summed over: smaller maps are enlarged for it.
+const FINE: [u32; 2] = [128, 64];
+
 impl Baked {
     /// What follows from a map.
     pub fn new(map: Map, sun: DVec3, negative: u64) -> Baked {
+        // Sums over texels are good where these are small.
+        let fine = map.enlarged(FINE[0], FINE[1]);
+        let summed = fine.as_ref().unwrap_or(&map);
         Baked {
-            moments: of_map(&map),
-            cells: Cells::new(&map),
+            moments: of_map(summed),
+            cells: Cells::new(summed),
             sun,
             brightest: map.texels.iter().flatten().copied().fold(0.0, f32::max),
             negative,

@@ -63,6 +63,9 @@ impl Variant {
     }
 }
 
+/// What stands for both numbers of cells where the device ended a walk; `CUT` of the shader.
+pub const CUT: u32 = u32::MAX;
+
 /// Sums over samples, per pixel of a window.
 pub struct Sums {
     /// Radiance rgb and transmittance, `vec4<f32>`.

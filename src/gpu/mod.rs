@@ -19,7 +19,7 @@ pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Targets};
 pub use grid::Grid;
-pub use integrate::{Integrate, Sums, Tiler, Variant, source as integrate_source};
+pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
 pub use strand::StrandTexture;
@@ -31,7 +31,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use crate::cpu::resolve::develop;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
 use crate::overlap;
@@ -251,7 +251,8 @@ impl GpuRenderer {
                 self.visibility.none()
             }
             Some(light_volumes) => {
-                let frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
+                let mut frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
+                frame.max_cells = light_volumes.medium.max_cells;
                 let watch = |done, all| monitor.progress("light volumes", done, all);
                 let found =
                     self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, volume, watch)?;
@@ -331,6 +332,16 @@ impl GpuRenderer {
             readback::read_rows(gpu, &sums.counts, 8, window.width, area, |row, bytes| {
                 bytemuck::cast_slice_mut(&mut frame.counts[range(row)]).copy_from_slice(bytes);
             })?;
+            let cut = (0..wanted.height).flat_map(range).filter(|&i| frame.counts[i][0] == CUT).count();
+            if cut > 0 {
+                return Err(Error::input(
+                    format!(
+                        "{} ended the walks of {cut} pixels before they were done: too many cells",
+                        gpu.name()
+                    ),
+                    "use light.visibility=cached, fewer lights, a smaller trace.max_cells, or --engine cpu",
+                ));
+            }
             readback::read_rows(gpu, picture, 4, window.width, area, |row, bytes| {
                 bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);
             })?;

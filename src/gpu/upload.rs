@@ -96,7 +96,12 @@ impl Uploaded {
                 map,
             }),
             volume: resident.volume(gpu, volume)?,
-            quads: gpu.buffer_with("quads", quad_bytes, wgpu::BufferUsages::STORAGE),
+            // A buffer without any would be too small to bind.
+            quads: gpu.buffer_with(
+                "quads",
+                if quads.is_empty() { &[0; size_of::<Quad>()] } else { quad_bytes },
+                wgpu::BufferUsages::STORAGE,
+            ),
             quad_count: quads.len() as u32,
             lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
             vertices,

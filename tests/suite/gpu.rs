@@ -233,6 +233,43 @@ fn tiles_do_not_change_a_single_bit_and_the_grid_no_more_than_rounding() {
 }
 
 #[test]
+fn scenes_without_quads_are_drawn_by_both_engines() {
+    let Some(mut renderer) = renderer("scenes without quads") else { return };
+    let mut rocks = scene("waterfall", &["image.width=96", "image.height=54"]);
+    rocks.rocks.iter_mut().for_each(|rock| rock.levels = 3);
+    rocks.quads.clear();
+    let mut nothing = rocks.clone();
+    nothing.rocks.clear();
+    for (name, scene) in [("rocks", rocks), ("nothing", nothing)] {
+        assert_parity(name, &both(&mut renderer, &scene));
+    }
+}
+
+#[test]
+fn walks_that_the_device_ends_early_are_refused_and_not_shown() {
+    let Some(mut renderer) = renderer("long walks") else { return };
+    // Light along the face from every cell of a ray: over 262,000 cells a pixel, four a turn.
+    let long = ["lights.key.direction=[1,0,0]", "trace.max_cells=65536", "image.width=9", "image.height=9"];
+    let render = |renderer: &mut GpuRenderer, more: &[&str]| {
+        let scene = scene("front", &[&long[..], more].concat());
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        (renderer.render(&scene, &volume, &scene.mesh(), &SURFACE, &Unwatched), scene, volume)
+    };
+    let (frame, scene, volume) = render(&mut renderer, &["light.visibility=march"]);
+    let right = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame");
+    match frame {
+        Ok(frame) => assert_eq!(frame.counts, right.counts, "a device that walks to the end"),
+        Err(e) => {
+            assert_eq!(e.exit_code(), 65);
+            assert!(e.to_string().contains("light.visibility=cached"), "{e}");
+        }
+    }
+    let (frame, scene, volume) = render(&mut renderer, &["light.visibility=cached"]);
+    let right = cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame");
+    assert_parity("the same light, kept", &[frame.expect("a frame"), right]);
+}
+
+#[test]
 fn parity_fails_when_sigma_or_a_quad_changes() {
     let Some(mut renderer) = renderer("harness") else { return };
     let base = ["image.width=64", "image.height=64"];

@@ -141,6 +141,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(of(&resolve, "TONE_FILMIC"), TONE_FILMIC as f64);
     assert_eq!(of(&resolve, "TONE_AGX"), TONE_AGX as f64);
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(constant("CUT"), taki::gpu::CUT as f64);
     assert_eq!(constant("CELLS_A_WORD"), taki::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);

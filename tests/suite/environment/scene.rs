@@ -185,6 +185,25 @@ fn the_lights_come_from_where_the_background_is_bright_and_the_rock_is_lit_from_
 }
 
 #[test]
+fn a_map_of_one_texel_is_even_light_from_everywhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for [width, height] in [[1, 1], [2, 1], [4, 2]] {
+        let file = hdr(folder.path(), width, height, |_| DVec3::ONE);
+        let limits = Limits { allow_paths: vec![folder.path().to_owned()], ..Limits::default() };
+        let file = format!("environment.file={file}");
+        let scene = lit_within(&["environment.kind=file", &file, "environment.lights=32"], &limits);
+        let environment = environment(&scene);
+        assert!(scene.environment_lights.len() > 4, "{width}×{height}: {}", scene.environment_lights.len());
+        assert!(environment.error() < 0.1, "{width}×{height}: {}", environment.error());
+        assert!(
+            environment.irradiance_error() < 0.01,
+            "{width}×{height}: {}",
+            environment.irradiance_error()
+        );
+    }
+}
+
+#[test]
 fn intensity_is_a_factor_on_everything() {
     let of = |more: &str| lit(&["environment.kind=sky", more]);
     let (one, three) = (of("environment.intensity=1"), of("environment.intensity=3"));
