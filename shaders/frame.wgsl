@@ -27,8 +27,9 @@ struct Frame {
     // log₂e · α/65535 · (σ in 1/m, or τ): optical depth in bits per unit of ρ code (and metre).
     extinction: f32,
     texture_frame: u32,
-    exposure: f32,
-    filmic: u32,
+    // Haze at the eye, 1/m, and how it thins upwards, 1/m. src/haze.rs.
+    haze_density: f32,
+    haze_falloff: f32,
     // The part of the image in the targets: its first pixel and its size.
     window_x: u32,
     window_y: u32,
@@ -38,6 +39,9 @@ struct Frame {
     flow_cells: f32,
     // Layers of the quad ids: most sheets one ray goes through.
     layers: u32,
+    haze_color: vec3<f32>,
+    // Metres of haze before the background.
+    haze_far: f32,
 }
 
 struct Light {

@@ -60,7 +60,8 @@ fn shade_opaque(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>) -> OpaqueTa
         irradiance += light.intensity * (arrives.w * max(dot3(n, arrives.xyz), 0.0));
     }
     var out: OpaqueTargets;
-    out.radiance = vec4<f32>(in.albedo * irradiance, distance);
+    let d_y = -to_eye.y / max(distance, 1e-20);
+    out.radiance = vec4<f32>(haze_over(frame, in.albedo * irradiance, d_y, distance), distance);
     out.normal = vec4<f32>(n, 1.0);
     return out;
 }
@@ -138,7 +139,8 @@ fn background_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) v
 fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
     var out: OpaqueTargets;
-    out.radiance = vec4<f32>(frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0), 0.0);
+    let radiance = frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
+    out.radiance = vec4<f32>(haze_over(frame, radiance, d.y, frame.haze_far), 0.0);
     out.normal = vec4<f32>(0.0);
     return out;
 }
@@ -148,7 +150,8 @@ fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
 fn background_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
     var out: OpaqueTargets;
-    out.radiance = vec4<f32>(environment_radiance(environment, environment_map, d), 0.0);
+    let radiance = environment_radiance(environment, environment_map, d);
+    out.radiance = vec4<f32>(haze_over(frame, radiance, d.y, frame.haze_far), 0.0);
     out.normal = vec4<f32>(0.0);
     return out;
 }

@@ -60,6 +60,11 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
     var count = vec2<u32>(0u);
     if quad_number != 0u {
         result = sheets(quad_number, pixel, behind, &count);
+        if frame.haze_density != 0.0 {
+            let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+            let t = textureLoad(surface, pixel, 0).z;
+            result = haze_over_water(frame, result, behind, d_world.y, t);
+        }
     }
     if frame.sample_index != 0u {
         result += radiance[index];

@@ -1,9 +1,11 @@
 //! The pinhole camera: rays through pixels, and the matrix that puts geometry under them.
 
+use std::sync::LazyLock;
+
 use glam::{DMat4, DVec4, Mat4, Vec3, Vec4};
 
 use crate::frame::Window;
-use crate::scene::Camera;
+use crate::scene::{Camera, Filter, Image};
 
 impl Camera {
     /// Half the image plane at distance 1: (right, up), scaled by the field of view.
@@ -54,13 +56,66 @@ pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: 
     (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
 }
 
-/// Where sample `sample` of `samples` lies inside a pixel: the centre for one sample, else the R2
-/// sequence (Roberts 2018), which fills the pixel evenly for any number and needs no random numbers.
-pub fn sample_offset(sample: u32, samples: u32) -> [f32; 2] {
-    if samples == 1 {
+/// Where sample `sample` of an image's lies from the top left corner of a pixel: in the centre for one sample, else
+/// by the R2 sequence (Roberts 2018), which fills a square evenly for any number and needs no random numbers. A
+/// filter other than the box bends the square, so that samples lie as densely as it weighs (Ernst, Stamminger and
+/// Greiner, "Filter Importance Sampling", 2006): every pixel has its own samples, and their mean stays plain.
+pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
+    if image.samples == 1 {
         return [0.5, 0.5];
     }
     // Powers of the inverse of the plastic number.
     const A: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
-    A.map(|a| (0.5 + a * sample as f64).fract() as f32)
+    let even = A.map(|a| (0.5 + a * sample as f64).fract());
+    match image.filter {
+        Filter::Box => even.map(|x| x as f32),
+        Filter::Gaussian => even.map(|x| (0.5 + GAUSSIAN.quantile(x)) as f32),
+        Filter::BlackmanHarris => even.map(|x| (0.5 + BLACKMAN_HARRIS.quantile(x)) as f32),
+    }
+}
+
+/// Half the width of the filters but the box, pixels.
+pub const FILTER_RADIUS: f64 = 1.5;
+/// Steps of the table on either side: with them a sample lies within 10⁻⁵ pixels of its place.
+const STEPS: usize = 1024;
+
+static GAUSSIAN: LazyLock<Quantiles> = LazyLock::new(|| {
+    const SIGMA: f64 = 0.5;
+    Quantiles::new(|x| (-x * x / (2.0 * SIGMA * SIGMA)).exp())
+});
+
+/// Harris, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform", 1978.
+static BLACKMAN_HARRIS: LazyLock<Quantiles> = LazyLock::new(|| {
+    Quantiles::new(|x| {
+        let a = std::f64::consts::PI * x / FILTER_RADIUS;
+        0.35875 + 0.48829 * a.cos() + 0.14128 * (2.0 * a).cos() + 0.01168 * (3.0 * a).cos()
+    })
+});
+
+/// The share of a symmetric filter between 0 and each step of its radius.
+struct Quantiles(Vec<f64>);
+
+impl Quantiles {
+    /// Of a filter that is above 0 inside its radius.
+    fn new(weight: impl Fn(f64) -> f64) -> Self {
+        let step = FILTER_RADIUS / STEPS as f64;
+        let mut sum = 0.0;
+        let mut shares = vec![0.0];
+        for i in 0..STEPS {
+            // Simpson's rule.
+            let [a, m, b] = [0.0, 0.5, 1.0].map(|part| weight((i as f64 + part) * step));
+            sum += a + 4.0 * m + b;
+            shares.push(sum);
+        }
+        Quantiles(shares.into_iter().map(|share| share / sum).collect())
+    }
+
+    /// Pixels from the middle that the share `p` of the filter lies before.
+    fn quantile(&self, p: f64) -> f64 {
+        let wanted = (2.0 * p - 1.0).abs();
+        let above = self.0.partition_point(|&share| share <= wanted).clamp(1, STEPS);
+        let (a, b) = (self.0[above - 1], self.0[above]);
+        let place = (above - 1) as f64 + ((wanted - a) / (b - a)).min(1.0);
+        (place * FILTER_RADIUS / STEPS as f64).copysign(p - 0.5)
+    }
 }

@@ -13,8 +13,9 @@
 //! 5. [`shading`] is the light of one cell (§5), or [`strand`], a model made for water; [`visibility`] keeps what is
 //!    left of the lights in every cell, [`environment`] makes lights of sun, sky and maps; the compute pass
 //!    (`integrate`) walks the cells under each pixel (§4) and adds them up; [`scatter`] is the light that is
-//!    scattered more than once.
-//! 6. `resolve` makes the picture from the linear [`frame`], which becomes PNG or EXR; many frames become
+//!    scattered more than once, [`haze`] what lies before all of it.
+//! 6. `resolve` makes the picture from the linear [`frame`], with its bloom, [`white_balance`], [`exposure`] and tone; that becomes
+//!    PNG or EXR; many frames become
 //!    a [`movie`] or a labelled [`sheet`].
 //!
 //! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
@@ -30,9 +31,11 @@ pub mod cpu;
 pub mod curve;
 pub mod environment;
 pub mod error;
+pub mod exposure;
 pub mod farm;
 pub mod frame;
 pub mod gpu;
+pub mod haze;
 pub mod job;
 pub mod mapping;
 pub mod movie;
@@ -48,5 +51,6 @@ pub mod viewer;
 pub mod visibility;
 pub mod volume;
 pub mod walk;
+pub mod white_balance;
 
 pub use error::{Error, Result};

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, seconds, size, window};
+use super::{EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
 use crate::error::Result;
 use crate::frame::Layer;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
@@ -170,7 +170,7 @@ impl BatchArgs {
             given => given.to_vec(),
         };
         let size = ["image.width", "image.height"].map(|side| animation.values().count(side));
-        let crop = self.crop.map(|crop| window(Some(crop), size)).transpose()?;
+        let crop = self.crop.map(|crop| window("--crop", Some(crop), size)).transpose()?;
         Ok(Request {
             frames: self.frames.clone().map(|f| f.0),
             sweeps: self.sweeps.clone(),
@@ -205,6 +205,9 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     terminal.close();
     if args.dry_run {
         return dry_run(args, &batch);
+    }
+    if let Some(stops) = batch.measured() {
+        terminal.note(&measured_words(stops));
     }
     let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
     terminal.note(&format!("taki: {line}"));

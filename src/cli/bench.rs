@@ -61,7 +61,7 @@ use serde::Serialize;
 
 use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
-use crate::cpu;
+use crate::cpu::{self, resolve::develop};
 use crate::error::{Error, Result};
 use crate::frame::Window;
 use crate::gpu::GpuBench;
@@ -167,6 +167,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     }
     if args.volume.is_none() {
         steps(args, terminal, &mut gpu, &mut rows)?;
+        pictures(args, terminal, &mut rows)?;
         builds(args, terminal, &mut rows)?;
         processes(args, terminal, &mut rows)?;
     }
@@ -293,6 +294,29 @@ fn row(
     let ns_per_cell = if cells == 0 { 0.0 } else { seconds * cores / cells as f64 * 1e9 };
     let size = format!("{}×{}", of.image.width, of.image.height);
     Row { scene, volume, size, engine, pass, seconds, fastest, cells, ns_per_cell }
+}
+
+/// Rows for making a picture of its radiance on the host: pixel by pixel, and with bloom.
+fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
+    let sets = |bloom: f32| [front([1280, 720]), vec![format!("image.bloom={bloom}")]].concat();
+    let scenes = [("resolve", load("front", &sets(0.0))?), ("resolve bloom", load("front", &sets(0.1))?)];
+    let volume = scenes[0].1.volume(direct_limits().memory, terminal)?;
+    let mut frame = cpu::render(&scenes[0].1, &volume, &scenes[0].1.mesh(), false, &Unwatched)?;
+    let mut times = [Vec::new(), Vec::new()];
+    for round in 0..=args.runs {
+        terminal.progress("pictures", round as u64, args.runs as u64)?;
+        for ((_, scene), times) in scenes.iter().zip(&mut times) {
+            let clock = Instant::now();
+            develop(&mut frame, &scene.image.look, true);
+            if round > 0 {
+                times.push(clock.elapsed().as_secs_f64());
+            }
+        }
+    }
+    for ((pass, scene), times) in scenes.iter().zip(times) {
+        rows.push(row("front", "–".into(), scene, "cpu", pass, summary(times), 0));
+    }
+    Ok(())
 }
 
 /// Rows for building volumes; cells are those of the volume.

@@ -159,13 +159,18 @@ fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
         .ok_or_else(|| "column, row, width and height in pixels, such as 0,0,640,360".into())
 }
 
-/// The part of the image that is asked for.
-fn window(crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
+/// What an automatic exposure has chosen.
+fn measured_words(stops: f32) -> String {
+    format!("taki: automatic exposure: {stops:+.2} stops")
+}
+
+/// The part of the image that is asked for by `option`.
+fn window(option: &str, crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
     let Some(crop) = crop else { return Ok(Window::whole(size)) };
     let [x, y, width, height] = crop;
     if !Window::fits(size, crop) {
         return Err(Error::Usage(format!(
-            "--crop {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, rows 0 to {}, and \
+            "{option} {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, rows 0 to {}, and \
              at least one of each",
             size[0] - 1,
             size[1] - 1

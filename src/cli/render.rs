@@ -7,11 +7,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, default_output, size, window};
+use super::{EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
 use crate::error::{Error, Result};
 use crate::frame::{Figures, Layer, Window};
 use crate::gpu::RenderOptions;
-use crate::job::{Engine, Monitor, Still, strips};
+use crate::job::{Engine, Monitor, Still, check_bloom, strips};
 use crate::scene::Scene;
 
 #[derive(Args)]
@@ -52,8 +52,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
-    let scene = args.scene.animation(&more)?.at(args.frame)?;
-    let window = window(args.crop, [scene.image.width, scene.image.height])?;
+    let (animation, measured) = args.scene.animation(&more)?.exposed(terminal)?;
+    let scene = animation.at(args.frame)?;
+    let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {
         [] => vec![default_output(&scene, "png")],
         given => given.to_vec(),
@@ -73,6 +74,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     if let Some(environment) = &scene.environment {
         terminal.note(&format!("taki: {}", environment.words()));
     }
+    if let Some(stops) = measured {
+        terminal.note(&measured_words(stops));
+    }
     let clock = Instant::now();
     let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
     terminal.note(&format!("taki: {line}"));
@@ -80,6 +84,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let mesh = scene.mesh();
     let options = RenderOptions { surface, ..Default::default() };
     let strips = strips(&scene, window, surface, args.scene.limits().memory)?;
+    if still.has_png() {
+        check_bloom(&scene, window, strips.len())?;
+    }
     let mut writer = still.begin(&scene, &volume, window, &layers)?;
     let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
         engine.render(&scene, &volume, &mesh, options, monitor)
@@ -99,6 +106,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     if args.json {
         let layers = if has_exr { layers.as_slice() } else { &[] };
         let mut report = report(&scene, &engine, window, &figures, layers, &outputs);
+        report["auto_exposure"] = json!(measured);
         report["seconds"] = json!(seconds);
         report["seconds_total"] = json!(total);
         say(&report.to_string());
@@ -128,6 +136,7 @@ fn report(
         "height": window.height,
         "crop": crop,
         "samples": image.samples,
+        "exposure": image.look.exposure,
         "rays": figures.pixels * u64::from(image.samples),
         "covered_pixels": figures.covered_pixels,
         "cells_walked": figures.cells_walked,

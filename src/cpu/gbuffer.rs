@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::camera::sample_offset;
 use crate::frame::Window;
+use crate::haze::EyeHaze;
 use crate::overlap;
 use crate::scene::{Image, Light, Mesh, Quad, Scene};
 
@@ -58,7 +59,7 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
 pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gbuffer {
     let image = &scene.image;
     let (width, height) = (window.width as usize, window.height as usize);
-    let offset = sample_offset(sample, image.samples);
+    let offset = sample_offset(image, sample);
     let clip_from_world = scene.camera.clip_from_world(image.width, image.height, offset);
     let near = scene.camera.near as f64;
     let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {
@@ -93,6 +94,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
         project([a, c, d], i as u32, &mut water);
     }
     let layers = overlap::sheets(scene) as usize;
+    let haze = scene.haze.seen_from(scene.camera.eye);
     let rows = 16.min(height);
     let rock_bins = bins(&rock, window, rows);
     let water_bins = bins(&water, window, rows);
@@ -126,7 +128,8 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                         None => scene.background.radiance(ray(k)),
                         Some(environment) => environment.radiance(ray(k)),
                     };
-                    opaque[k] = radiance.extend(0.0).to_array();
+                    let d_y = ray(k).y;
+                    opaque[k] = hazed(&haze, radiance, d_y, haze.far).extend(0.0).to_array();
                 } else {
                     let triangle = &rock[id as usize - 1];
                     let centre = pixel(k).map(|p| p as f64 + 0.5);
@@ -139,7 +142,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                         (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
                     };
                     let (radiance, n) =
-                        shade_opaque(scene, mix(|v| v.position), mix(|v| v.normal), mix(|v| v.albedo));
+                        shade_opaque(scene, &haze, mix(|v| v.position), mix(|v| v.normal), mix(|v| v.albedo));
                     opaque[k] = radiance;
                     normal[k] = n;
                 }
@@ -179,7 +182,13 @@ pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
 }
 
 /// Lambert, two-sided: (radiance and metres from the eye, normal). Twin: `shade_opaque`.
-fn shade_opaque(scene: &Scene, position: Vec3, normal: Vec3, albedo: Vec3) -> ([f32; 4], Vec3) {
+fn shade_opaque(
+    scene: &Scene,
+    haze: &EyeHaze,
+    position: Vec3,
+    normal: Vec3,
+    albedo: Vec3,
+) -> ([f32; 4], Vec3) {
     let to_eye = scene.camera.eye - position;
     let distance = to_eye.dot(to_eye).sqrt();
     let mut n = normal / normal.dot(normal).max(1e-30).sqrt();
@@ -194,7 +203,16 @@ fn shade_opaque(scene: &Scene, position: Vec3, normal: Vec3, albedo: Vec3) -> ([
         let (to_light, intensity) = light.at(position);
         irradiance += intensity * n.dot(to_light).max(0.0);
     }
-    ((albedo * irradiance).extend(distance).to_array(), n)
+    let d_y = -to_eye.y / distance.max(1e-20);
+    (hazed(haze, albedo * irradiance, d_y, distance).extend(distance).to_array(), n)
+}
+
+/// Twin: `haze_over`.
+fn hazed(haze: &EyeHaze, radiance: Vec3, d_y: f32, t: f32) -> Vec3 {
+    if haze.density == 0.0 {
+        return radiance;
+    }
+    haze.over(radiance, haze.transmittance(d_y, t))
 }
 
 impl Light {

@@ -8,6 +8,7 @@ use super::visibility::{Filled, KeptVolumes, number, optical_depth};
 use crate::camera::sample_offset;
 use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
+use crate::haze::EyeHaze;
 use crate::job::Monitor;
 use crate::mapping::CellFrame;
 use crate::scatter::media::{Media, thicknesses};
@@ -37,6 +38,7 @@ pub struct Integrator<'a> {
     media: Option<Media>,
     /// Number of each quad's profile.
     profile_of_quad: Vec<u32>,
+    haze: EyeHaze,
 }
 
 /// What one ray brings home.
@@ -135,6 +137,7 @@ impl<'a> Integrator<'a> {
             },
             media: (scene.scattering == Scattering::Multiple).then(|| Media::new(scene, volume)),
             profile_of_quad: thicknesses(scene).1,
+            haze: scene.haze.seen_from(scene.camera.eye),
         }
     }
 
@@ -153,7 +156,7 @@ impl<'a> Integrator<'a> {
         if faces.peek().is_none() {
             return Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] };
         }
-        let offset = sample_offset(sample, image.samples);
+        let offset = sample_offset(image, sample);
         let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
         let mut all = Traced { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
         while let Some((quad, hit)) = faces.next() {
@@ -166,6 +169,12 @@ impl<'a> Integrator<'a> {
             if all.transmittance < self.scene.trace.early_end {
                 break;
             }
+        }
+        if self.haze.density != 0.0
+            && let Some((_, [.., t])) = gbuffer.faces(i).next()
+        {
+            let haze = self.haze.transmittance(d.y, t);
+            all.radiance = self.haze.over_water(all.radiance, behind, all.transmittance, haze);
         }
         all
     }

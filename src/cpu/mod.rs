@@ -1,6 +1,7 @@
 //! The whole frame on the CPU, on all cores: the reference of the GPU engine, and the engine where
 //! there is no GPU.
 
+pub mod bloom;
 pub mod gbuffer;
 pub mod integrate;
 mod matter;
@@ -101,10 +102,8 @@ pub fn render_samples(
     }
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;
-    frame.radiance.par_iter_mut().zip(frame.picture.par_iter_mut()).for_each(|(sum, picture)| {
-        *sum = sum.map(|x| x * inverse);
-        *picture = resolve::resolve(image, *sum);
-    });
+    frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));
+    resolve::develop(&mut frame, &image.look, window == Window::whole([image.width, image.height]));
     seconds.resolve = clock.elapsed().as_secs_f64();
     frame.seconds = seconds;
     Ok(frame)

@@ -19,13 +19,13 @@ pub struct RayReport {
     /// Where the ray meets water, in order of depth: `trace.layers` quads at most. Where it ends early no
     /// step belongs to the last of them.
     pub faces: Vec<RayFace>,
-    /// Radiance of the opaque scene or background behind the water.
+    /// Radiance of the opaque scene or background behind the water, with its haze.
     pub behind: Vec3,
     /// Where the ray meets the opaque scene, metres; none where it leaves to the background.
     pub opaque: Option<Vec3>,
-    /// The cells in the order the ray meets them; none without water.
+    /// The cells in the order the ray meets them; none without water. What they send is told without haze.
     pub steps: Vec<RayStep>,
-    /// Linear radiance of the pixel: the steps' sum and what is left of `behind`.
+    /// Linear radiance of the pixel: the steps' sum and what is left of `behind`, through the scene's haze.
     pub radiance: Vec3,
     /// T at the end of the walk; 1 without water.
     pub transmittance: f32,
@@ -101,7 +101,7 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let pixel = [pixel[0].min(image.width - 1), pixel[1].min(image.height - 1)];
     let window = Window { x: pixel[0], y: pixel[1], width: 1, height: 1 };
     let gbuffer = gbuffer::run_window(scene, mesh, window, SAMPLE);
-    let offset = sample_offset(SAMPLE, image.samples);
+    let offset = sample_offset(image, SAMPLE);
     let d_world = scene.camera.view_ray(image.width, image.height, pixel, offset);
     let at = |metres: f32| scene.camera.eye + d_world * metres;
     let opaque_m = gbuffer.opaque[0][3];

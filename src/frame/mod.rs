@@ -2,6 +2,7 @@
 
 mod difference;
 mod exr_file;
+pub mod eye;
 mod figures;
 mod output;
 mod owner;

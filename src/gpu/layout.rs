@@ -10,9 +10,10 @@ use crate::camera::{clip_to_window, sample_offset};
 use crate::environment;
 use crate::frame::Window;
 use crate::scatter;
-use crate::scene::{self, AngleFrame, Attenuation, Scene, Tone};
+use crate::scene::{self, AngleFrame, Attenuation, Look, Scene, Tone};
 use crate::strand::table::StrandShading;
 use crate::volume::VolumeTexture;
+use crate::white_balance;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
 pub const WORKGROUP: u32 = 8;
@@ -43,14 +44,16 @@ pub struct Frame {
     pub image_height: f32,
     pub extinction: f32,
     pub texture_frame: u32,
-    pub exposure: f32,
-    pub filmic: u32,
+    pub haze_density: f32,
+    pub haze_falloff: f32,
     pub window_x: u32,
     pub window_y: u32,
     pub window_width: u32,
     pub window_height: u32,
     pub flow_cells: f32,
     pub layers: u32,
+    pub haze_color: [f32; 3],
+    pub haze_far: f32,
 }
 
 /// One light.
@@ -160,6 +163,42 @@ pub struct Tile {
     pub height: u32,
 }
 
+/// `tone` of [`Develop`]: Narkowicz's curve.
+pub const TONE_FILMIC: u32 = 1;
+/// `tone` of [`Develop`]: AgX.
+pub const TONE_AGX: u32 = 2;
+
+/// How the resolve pass makes the picture; `shaders/resolve.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Develop {
+    pub balance: [[f32; 4]; 3],
+    pub exposure: f32,
+    pub tone: u32,
+    pub balanced: u32,
+    pub pad_a: u32,
+}
+
+impl Develop {
+    /// Of pictures that look so.
+    pub fn new(look: &Look) -> Self {
+        let balanced = (look.temperature, look.tint) != (white_balance::NEUTRAL_K, 0.0);
+        let rows = white_balance::matrix(look.temperature, look.tint).transpose().to_cols_array_2d();
+        Develop {
+            balance: rows.map(|row| [row[0] as f32, row[1] as f32, row[2] as f32, 0.0]),
+            exposure: look.exposure.exp2(),
+            tone: match look.tone {
+                Tone::None => 0,
+                Tone::Filmic => TONE_FILMIC,
+                Tone::Agx => TONE_AGX,
+            },
+            balanced: u32::from(balanced),
+            pad_a: 0,
+        }
+    }
+}
+
 /// Constants of multiple scattering.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -227,7 +266,8 @@ impl Frame {
     ) -> Self {
         let camera = &scene.camera;
         let image = &scene.image;
-        let [jitter_x, jitter_y] = sample_offset(sample, image.samples);
+        let haze = scene.haze.seen_from(camera.eye);
+        let [jitter_x, jitter_y] = sample_offset(image, sample);
         let (right, up) = camera.image_plane(image.width, image.height);
         let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
         Frame {
@@ -252,14 +292,16 @@ impl Frame {
             image_height: image.height as f32,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             texture_frame: u32::from(scene.frame == AngleFrame::Texture),
-            exposure: image.exposure.exp2(),
-            filmic: u32::from(image.tone == Tone::Filmic),
+            haze_density: haze.density,
+            haze_falloff: haze.falloff,
             window_x: window.x,
             window_y: window.y,
             window_width: window.width,
             window_height: window.height,
             flow_cells: flow_cells(scene.flow, volume.size[1]),
             layers,
+            haze_color: haze.color.to_array(),
+            haze_far: haze.far,
         }
     }
 }

@@ -30,6 +30,7 @@ pub use visibility::{FilledVolumes, Visibility, source as visibility_source};
 use std::ops::Range;
 use std::time::Instant;
 
+use crate::cpu::resolve::develop;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Seconds, Surface, Window};
 use crate::job::Monitor;
@@ -74,6 +75,7 @@ pub fn shader_source(stage: &str) -> String {
         include_str!("../../shaders/walk.wgsl"),
         include_str!("../../shaders/shading.wgsl"),
         include_str!("../../shaders/environment.wgsl"),
+        include_str!("../../shaders/haze.wgsl"),
         include_str!("../../shaders/scatter.wgsl"),
         include_str!("../../shaders/strand.wgsl"),
         stage,
@@ -258,6 +260,7 @@ impl GpuRenderer {
                 found.0
             }
         };
+        let look = layout::Develop::new(&image.look);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
         let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
@@ -310,8 +313,8 @@ impl GpuRenderer {
                 })?;
                 done += wanted.pixels();
             }
-            seconds.resolve +=
-                self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms(samples.start))?;
+            let uniforms = uniforms(samples.start);
+            seconds.resolve += self.resolve.run(gpu, &self.timer, sums, picture, area, &uniforms, &look)?;
             let clock = Instant::now();
             let inverse = 1.0 / samples.len() as f32;
             let range = |row: u32| {
@@ -343,6 +346,12 @@ impl GpuRenderer {
                 bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);
             })?;
             seconds.readback += clock.elapsed().as_secs_f64();
+        }
+        // Bloom needs the whole image, which may be drawn in several windows.
+        if image.look.bloom > 0.0 && part == Window::whole(whole) {
+            let clock = Instant::now();
+            develop(&mut frame, &image.look, true);
+            seconds.resolve += clock.elapsed().as_secs_f64();
         }
         self.learned = tiler.learned().map(|pixels| (like, pixels));
         frame.seconds = seconds;

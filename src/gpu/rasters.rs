@@ -51,8 +51,6 @@ impl Key {
             max_cells: 0,
             extinction: 0.0,
             texture_frame: 0,
-            exposure: 0.0,
-            filmic: 0,
             flow_cells: 0.0,
             ..*frame
         };

@@ -2,7 +2,7 @@
 
 use super::device::Gpu;
 use super::integrate::Sums;
-use super::layout::{Frame, Tile, WORKGROUP};
+use super::layout::{Develop, Frame, Tile, WORKGROUP};
 use super::shader;
 use super::timing::Timer;
 use crate::error::Result;
@@ -31,6 +31,7 @@ impl Resolve {
     pub const PICTURE_BYTES: u64 = 4;
 
     /// Turns the sums of an area of a window into `picture`; seconds on the device.
+    #[expect(clippy::too_many_arguments, reason = "where from, where to, and how")]
     pub fn run(
         &self,
         gpu: &Gpu,
@@ -39,8 +40,10 @@ impl Resolve {
         picture: &wgpu::Buffer,
         area: Tile,
         frame: &Frame,
+        develop: &Develop,
     ) -> Result<f64> {
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let develop = gpu.buffer_with("develop", bytemuck::bytes_of(develop), wgpu::BufferUsages::UNIFORM);
         let tile = gpu.buffer_with("tile", bytemuck::bytes_of(&area), wgpu::BufferUsages::UNIFORM);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("resolve"),
@@ -50,6 +53,7 @@ impl Resolve {
                 wgpu::BindGroupEntry { binding: 1, resource: sums.radiance.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 2, resource: picture.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 3, resource: tile.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 4, resource: develop.as_entire_binding() },
             ],
         });
         timer.run(gpu, "resolve", |encoder, span| {

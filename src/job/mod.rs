@@ -14,7 +14,7 @@ pub(crate) use still::{About, Sink};
 pub use still::{Still, StillWriter};
 pub use stitch::stitch;
 pub use stock::VolumeStock;
-pub use strips::{check_image, memory_of, spare_for_rasters, strips};
+pub use strips::{check_bloom, check_image, memory_of, spare_for_rasters, strips};
 
 use crate::error::Result;
 

@@ -48,6 +48,11 @@ impl Still {
         self.0.iter().any(|(kind, _)| *kind == Kind::Exr)
     }
 
+    /// Whether one of them is a picture as it is seen.
+    pub fn has_png(&self) -> bool {
+        self.0.iter().any(|(kind, _)| *kind == Kind::Png)
+    }
+
     /// Starts the files of the part `window` of a scene's image; EXR files get `layers`.
     pub fn begin(
         self,

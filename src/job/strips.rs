@@ -12,6 +12,9 @@ use crate::volume::Cell;
 const PIXEL_BYTES: u64 = 28 + 6;
 /// More with the raster pass's layers: depth 4, uv 8, quad 4, normal 12.
 const SURFACE_BYTES: u64 = 28;
+/// More on the host for the pyramid of bloom: a third of 12 bytes, of a picture that may be widened to whole multiples
+/// of the largest level.
+const BLOOM_BYTES: u64 = 12;
 /// What both engines and the encoders need besides, whatever the size: staging for read-back (at most 2 × 16
 /// MiB), lines of an EXR before and after compression (3 × 8 MiB), and small buffers.
 const WORK_BYTES: u64 = 64 << 20;
@@ -54,7 +57,7 @@ pub fn check_image(image: &Image, memory: u64) -> Result<()> {
 /// `memory` bytes together with the device's targets, the scene's volume and its rocks: whole rows of the
 /// windows that are drawn (see [`Grid`]) where they fit, else even parts of one.
 ///
-/// A pixel of a strip takes 34 bytes, with `surface_layers` 62; a pixel of the window that is drawn 84, or
+/// A pixel of a strip takes 34 bytes, with `surface_layers` 62, 12 more with bloom, which wants one strip; a pixel of the window that is drawn 84, or
 /// where n quads lie over one another 88 + 4·n, and there are at most 2²¹ of those. 64 MiB more are for read-back and encoders, and a quarter of `memory`,
 /// at most 256 MiB, for the program and the driver. These make strips smaller, down to an eighth of
 /// `memory`; only a single row and window that do not fit are an [`Error::Memory`].
@@ -87,9 +90,13 @@ pub fn memory_of(
         .saturating_add(rocks)
         .saturating_add(environment);
     let left = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
-    let row = u64::from(window.width) * (PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 });
+    let blooms = image.look.bloom > 0.0;
+    let pixel =
+        PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 } + if blooms { BLOOM_BYTES } else { 0 };
+    let row = u64::from(window.width) * pixel;
     let [_, drawn] = Grid::default().size([image.width, image.height]);
     let wanted = (STRIP_PIXELS / u64::from(window.width)).max(u64::from(drawn));
+    let wanted = if blooms { u64::from(window.height) } else { wanted };
     let least = LEAST_ROWS.min(u64::from(window.height));
     let need = parts.saturating_add(WORK_BYTES + least * row);
     if need > memory {
@@ -101,6 +108,32 @@ pub fn memory_of(
     let strips = cut(window, drawn, most);
     let tallest = strips.iter().map(|s| u64::from(s.height)).max().unwrap_or(0);
     Ok((parts.saturating_add(WORK_BYTES + tallest * row), strips))
+}
+
+/// Refuses to make the picture of a part of an image, or of one in several `strips`, where bloom would need all of it at
+/// once. An EXR has no bloom, and needs no check.
+pub fn check_bloom(scene: &Scene, window: Window, strips: usize) -> Result<()> {
+    let image = &scene.image;
+    let bloom = image.look.bloom;
+    if bloom == 0.0 {
+        return Ok(());
+    }
+    let fix = |first: &str| format!("{first}, set image.bloom = 0, or write only .exr, which has no bloom");
+    if window != Window::whole([image.width, image.height]) {
+        let what = format!(
+            "image.bloom = {bloom} spreads light over the whole picture, and {window} is a part of it"
+        );
+        return Err(Error::input(what, fix("render the whole")));
+    }
+    if strips > 1 {
+        let what = format!(
+            "image.bloom = {bloom} needs the whole picture at once, and the memory only holds {}×{} pixels in {strips} \
+             strips",
+            image.width, image.height
+        );
+        return Err(Error::input(what, fix("raise --memory, lower the size")));
+    }
+    Ok(())
 }
 
 /// Bytes for results of the raster pass that later frames may use again (`RenderOptions::keep_rasters`), where

@@ -11,8 +11,10 @@ use super::keyframes::{CameraPath, Interpolation, Keyframes};
 use super::param::{Kind, Param};
 use super::read::{Source, apply_sets, check_names};
 use super::value::{Place, Raw, Value, Values};
-use super::{Limits, Scene};
+use super::{AutoExposure, Limits, Scene, expose};
 use crate::error::{Error, Result};
+use crate::exposure;
+use crate::job::Monitor;
 
 /// A scene, and how it moves.
 #[derive(Clone, Debug)]
@@ -35,6 +37,8 @@ pub struct Animation {
     turn: i64,
     tracks: Vec<(String, Keyframes)>,
     path: Option<CameraPath>,
+    /// Stops in place of an automatic exposure, once they are measured.
+    measured: Option<f32>,
 }
 
 impl Animation {
@@ -117,6 +121,7 @@ impl Animation {
             turn,
             tracks,
             path,
+            measured: None,
         })
     }
 
@@ -139,7 +144,20 @@ impl Animation {
     pub fn with(&self, changes: &[(String, Raw, Place)]) -> Result<Animation> {
         let mut values = self.values.clone();
         changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
-        Animation::new(&self.name, values, self.folder.clone(), &self.limits)
+        let animation = Animation::new(&self.name, values, self.folder.clone(), &self.limits)?;
+        Ok(Animation { measured: self.measured, ..animation })
+    }
+
+    /// The same animation with its automatic exposure, if it has one, measured on frame 0 and the same for every
+    /// frame from now on; the stops that it chose.
+    pub fn exposed(self, monitor: &dyn Monitor) -> Result<(Animation, Option<f32>)> {
+        let scene = self.at(0)?;
+        if scene.image.look.auto_exposure == AutoExposure::None {
+            return Ok((self, None));
+        }
+        let volume = scene.volume(self.limits.memory, monitor)?;
+        let measured = Some(exposure::measure(&scene, &volume, &scene.mesh(), monitor)?);
+        Ok((Animation { measured, ..self }, measured))
     }
 
     /// The scene of a frame. It holds no trace of the animation: as a scene file of its own it gives the
@@ -175,6 +193,9 @@ impl Animation {
             let turned =
                 target + DQuat::from_axis_angle(axis, share * std::f64::consts::TAU) * (eye - target);
             values.set("camera.eye", &list(&turned.to_array()), &place("camera.eye"))?;
+        }
+        if let Some(stops) = self.measured {
+            expose(&mut values, stops);
         }
         Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
             .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })

@@ -24,14 +24,15 @@ pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Mesh, Rock, Vertex};
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
-    AngleFrame, Attenuation, Background, Camera, Cone, Image, Light, Quad, Reflection, Scattering, Tone,
-    Trace, Visibility,
+    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Quad,
+    Reflection, Scattering, Tone, Trace, Visibility,
 };
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::curve::{CurveShape, levels_for};
 use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
+use crate::haze::Haze;
 use crate::volume::{VolumeTexture, WaterSpec, read_npz};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
@@ -81,6 +82,8 @@ pub struct Scene {
     pub camera: Camera,
     /// What is seen where nothing is.
     pub background: Background,
+    /// What lies between the eye and everything.
+    pub haze: Haze,
     /// Size, samples and tone.
     pub image: Image,
 }
@@ -100,6 +103,18 @@ impl Default for Limits {
     fn default() -> Self {
         Limits { allow_paths: Vec::new(), memory: 4 << 30, environments: EnvironmentStock::default() }
     }
+}
+
+/// Puts `stops` more in place of an automatic exposure; the exposure that comes of it.
+fn expose(values: &mut Values, stops: f32) -> f32 {
+    let exposure = (values.float("image.exposure") + stops).clamp(-32.0, 32.0);
+    let place = Place("image.auto_exposure".into());
+    for (key, raw) in
+        [("image.exposure", Raw::Float(exposure.into())), ("image.auto_exposure", Raw::Text("none".into()))]
+    {
+        values.set(key, &raw, &place).expect("inside the table's range");
+    }
+    exposure
 }
 
 impl Scene {
@@ -155,8 +170,8 @@ impl Scene {
             width: v.count("image.width"),
             height: v.count("image.height"),
             samples: v.count("image.samples"),
-            exposure: v.float("image.exposure"),
-            tone: if v.text("image.tone") == "none" { Tone::None } else { Tone::Filmic },
+            filter: parts::filter(v),
+            look: parts::look(v),
         };
         image.check_budget(limits.memory)?;
         let camera = parts::camera(v)?;
@@ -202,9 +217,18 @@ impl Scene {
                 zenith: v.triple("background.zenith"),
                 horizon: v.triple("background.horizon"),
             },
+            haze: parts::haze(v),
             image,
             values,
         })
+    }
+
+    /// The same scene with `stops` more in place of an automatic exposure.
+    pub fn exposed(mut self, stops: f32) -> Scene {
+        let look = &mut self.image.look;
+        look.exposure = expose(&mut self.values, stops);
+        look.auto_exposure = AutoExposure::None;
+        self
     }
 
     /// Builds the volume texture, or reads it from the scene's file.

@@ -7,9 +7,13 @@ use glam::{DVec3, Vec2, Vec3};
 use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
 use super::sheet::{Ends, Sheet, SheetFault};
-use super::{Camera, Cone, Light, Limits, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Values, Vertex};
+use super::{
+    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering,
+    Tone, Values, Vertex,
+};
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
+use crate::haze::Haze;
 use crate::mapping::Material;
 use crate::strand::StrandParams;
 use crate::volume::Structure;
@@ -297,6 +301,44 @@ pub(super) fn camera(v: &Values) -> Result<Camera> {
         tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
         near: v.float("camera.near"),
     })
+}
+
+pub(super) fn haze(v: &Values) -> Haze {
+    Haze {
+        density: v.float("haze.density"),
+        color: v.triple("haze.color"),
+        height: v.float("haze.scale_height"),
+        level: v.float("haze.level"),
+        far: v.float("haze.far"),
+    }
+}
+
+pub(super) fn filter(v: &Values) -> Filter {
+    match v.text("image.filter").as_str() {
+        "gaussian" => Filter::Gaussian,
+        "blackman-harris" => Filter::BlackmanHarris,
+        _ => Filter::Box,
+    }
+}
+
+pub(super) fn look(v: &Values) -> Look {
+    Look {
+        exposure: v.float("image.exposure"),
+        auto_exposure: match v.text("image.auto_exposure").as_str() {
+            "average" => AutoExposure::Average,
+            "highlights" => AutoExposure::Highlights,
+            _ => AutoExposure::None,
+        },
+        bloom: v.float("image.bloom"),
+        bloom_radius: v.float("image.bloom_radius"),
+        temperature: v.float("image.temperature"),
+        tint: v.float("image.tint"),
+        tone: match v.text("image.tone").as_str() {
+            "none" => Tone::None,
+            "agx" => Tone::Agx,
+            _ => Tone::Filmic,
+        },
+    }
 }
 
 pub(super) fn strand(v: &Values) -> StrandParams {

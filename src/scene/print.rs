@@ -147,7 +147,7 @@ impl Scene {
                     "tan_half_fov": camera.tan_half_fov,
                     "near": camera.near,
                     "sample_offsets": (0..self.image.samples)
-                        .map(|s| crate::camera::sample_offset(s, self.image.samples))
+                        .map(|s| crate::camera::sample_offset(&self.image, s))
                         .collect::<Vec<_>>(),
                 },
                 "lights": lights(&self.lights),

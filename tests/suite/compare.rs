@@ -2,6 +2,8 @@
 
 use taki::frame::{Difference, Tolerance};
 
+mod eye;
+
 const TIGHT: Tolerance = Tolerance { relative: 1e-3, absolute: 1e-4 };
 
 fn picture() -> Vec<[f32; 3]> {

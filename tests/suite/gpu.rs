@@ -186,11 +186,17 @@ fn the_engines_agree_at_odd_sizes_and_with_several_samples() {
 #[test]
 fn the_picture_is_the_tone_curve_of_the_radiance_on_both_engines() {
     let Some(mut renderer) = renderer("resolve") else { return };
-    for sets in [["image.tone=filmic", "image.exposure=1.5"], ["image.tone=none", "image.exposure=-2"]] {
+    for sets in [
+        ["image.tone=filmic", "image.exposure=1.5"],
+        ["image.tone=none", "image.exposure=-2"],
+        ["image.tone=agx", "image.exposure=1"],
+        ["image.temperature=3200", "image.tint=8"],
+    ] {
         let scene = scene("front", &["image.width=64", "image.height=64", sets[0], sets[1]]);
+        let resolver = cpu::resolve::Resolver::new(&scene.image.look);
         for frame in both(&mut renderer, &scene) {
             for (linear, picture) in frame.radiance.iter().zip(&frame.picture) {
-                let want = cpu::resolve::resolve(&scene.image, *linear);
+                let want = resolver.pixel(*linear);
                 let near = (0..4).all(|c| picture[c].abs_diff(want[c]) <= 1);
                 assert!(near, "{linear:?} became {picture:?}, not {want:?}");
             }

@@ -119,7 +119,7 @@ fn on_cpu(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh) -> Frame {
 fn view_ray(scene: &Scene, i: usize) -> Vec3 {
     let image = &scene.image;
     let pixel = [i as u32 % image.width, i as u32 / image.width];
-    scene.camera.view_ray(image.width, image.height, pixel, sample_offset(0, image.samples))
+    scene.camera.view_ray(image.width, image.height, pixel, sample_offset(image, 0))
 }
 
 /// Metres along the ray and numbers of the quads that pixel i's ray meets, sorted; none where an edge, or

@@ -6,7 +6,7 @@ use taki::cpu::gbuffer;
 use taki::cpu::ray::{RayReport, inspect};
 use taki::frame::Window;
 use taki::job::Unwatched;
-use taki::scene::{Light, Scene};
+use taki::scene::{Image, Light, Scene};
 
 use crate::gpu::scene;
 
@@ -136,7 +136,8 @@ fn a_pixel_outside_the_image_is_the_nearest_inside_and_the_first_sample_its_cent
     let mesh = scene.mesh();
     let corner = inspect(scene, &volume, &mesh, [32, 40]);
     assert_eq!(inspect(scene, &volume, &mesh, [33, u32::MAX]), corner);
-    assert!((1..9).all(|samples| sample_offset(0, samples) == [0.5, 0.5]));
+    let with = |samples| Image { samples, ..scene.image };
+    assert!((1..9).all(|samples| sample_offset(&with(samples), 0) == [0.5, 0.5]));
 }
 
 #[cfg(feature = "viewer")]

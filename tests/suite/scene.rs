@@ -213,7 +213,7 @@ fn a_wrong_value_is_refused_with_its_file_line_and_range() {
         ("volume.nx", "99999999999999999999", "1 to 1000000"),
         ("volume.seed", "-1", "0 to 2^63−1"),
         ("light.frame", "\"word\"", "world, texture"),
-        ("image.tone", "true", "filmic, none"),
+        ("image.tone", "true", "filmic, agx, none"),
         ("camera.eye", "[0.0, nan, 0.0]", "three numbers, ±1e7"),
         ("light.ambient", "[0.1, -0.1, 0.1]", "three numbers, 0 to 10000"),
         ("light.p", "1979-05-27", "1 to 10000"),

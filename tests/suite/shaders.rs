@@ -3,14 +3,17 @@
 
 use std::mem::offset_of;
 
-use taki::gpu::layout::{Environment, Frame, Light, LightVolume, Quad, Strand, Tile, WORKGROUP};
+use taki::gpu::layout::{
+    Develop, Environment, Frame, Light, LightVolume, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile, WORKGROUP,
+};
 use taki::gpu::{integrate_source, shader_source, visibility_source};
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
-const SHARED: [&str; 7] = [
+const SHARED: [&str; 8] = [
     "environment.wgsl",
     "frame.wgsl",
+    "haze.wgsl",
     "mapping.wgsl",
     "scatter.wgsl",
     "shading.wgsl",
@@ -102,7 +105,8 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("integrate.wgsl")).expect("valid");
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
-        texture_frame exposure filmic window_x window_y window_width window_height flow_cells layers);
+        texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
+        haze_color haze_far);
     assert_eq!(members(&module, "Frame"), frame);
     assert_eq!(
         members(&module, "Light"),
@@ -115,6 +119,8 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Environment"), environment);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
+    let module = validate(&stage("resolve.wgsl")).expect("valid");
+    assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
     let module = validate(&stage("visibility.wgsl")).expect("valid");
     // Padded on the host to what a uniform takes.
     let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
@@ -124,8 +130,9 @@ fn host_structs_have_the_layout_the_shaders_read() {
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
-    let module = validate(&stage("integrate.wgsl")).expect("valid");
-    let constant = |name: &str| {
+    let [integrate, resolve] =
+        ["integrate.wgsl", "resolve.wgsl"].map(|name| validate(&stage(name)).expect("valid"));
+    let of = |module: &naga::Module, name: &str| {
         let found = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name));
         let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
         match module.global_expressions[constant.init] {
@@ -135,6 +142,9 @@ fn constants_are_the_same_on_both_sides() {
             ref other => panic!("{name} is {other:?}"),
         }
     };
+    let constant = |name: &str| of(&integrate, name);
+    assert_eq!(of(&resolve, "TONE_FILMIC"), TONE_FILMIC as f64);
+    assert_eq!(of(&resolve, "TONE_AGX"), TONE_AGX as f64);
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
     assert_eq!(constant("CUT"), taki::gpu::CUT as f64);
     assert_eq!(constant("CELLS_A_WORD"), taki::visibility::CELLS_A_WORD as f64);

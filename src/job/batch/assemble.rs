@@ -8,12 +8,12 @@ use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
 use super::{Batch, Pattern, Sweep, existing};
-use crate::cpu::resolve::resolve;
+use crate::cpu::resolve::develop;
 use crate::error::{Error, Result};
-use crate::frame::{Layer, Output, figures_of, read_exr, read_png};
+use crate::frame::{Frame, Layer, Output, Window, figures_of, read_exr, read_png, rgb_rows};
 use crate::job::still::{SOFTWARE, scene_text};
 use crate::movie::{Movie, MovieKind, MovieOptions, mark_of};
-use crate::scene::{Image, Scene};
+use crate::scene::{Look, Scene};
 use crate::sheet::{Axis, Sheet, draw};
 
 /// A file of all frames of a point of the sweep.
@@ -195,7 +195,12 @@ impl Batch {
         let png = self.pictures.iter().position(|p| !p.is_exr());
         match png {
             Some(i) => picture_of_png(&files[i]),
-            None => picture_of_exr(&files[0], &self.scene(number)?.image),
+            None => {
+                let scene = self.scene(number)?;
+                let image = &scene.image;
+                let whole = self.window(&scene) == Window::whole([image.width, image.height]);
+                picture_of_exr(&files[0], &image.look, whole)
+            }
         }
     }
 
@@ -330,7 +335,7 @@ fn picture_of_png(path: &Path) -> Result<RgbImage> {
 }
 
 /// Tone and 8 bits as the PNG would have them.
-fn picture_of_exr(path: &Path, image: &Image) -> Result<RgbImage> {
+fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
         let found = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
@@ -342,9 +347,9 @@ fn picture_of_exr(path: &Path, image: &Image) -> Result<RgbImage> {
         })
     };
     let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-    let mut bytes = Vec::with_capacity(r.len() * 3);
-    for ((r, g), b) in r.iter().zip(g).zip(b) {
-        bytes.extend_from_slice(&resolve(image, [*r, *g, *b, 1.0])[..3]);
-    }
-    RgbImage::from_raw(width, height, bytes).ok_or_else(|| Error::read(path, "its size is not its pixels'"))
+    let mut frame = Frame::new(width, height, false);
+    frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
+    develop(&mut frame, look, whole);
+    RgbImage::from_raw(width, height, rgb_rows(&frame))
+        .ok_or_else(|| Error::read(path, "its size is not its pixels'"))
 }

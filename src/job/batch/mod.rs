@@ -74,6 +74,8 @@ pub struct Request {
 /// A batch that has been checked.
 pub struct Batch {
     base: Animation,
+    /// Stops of an automatic exposure, the same for all pictures.
+    measured: Option<f32>,
     request: Request,
     sweeps: Vec<Sweep>,
     frames: Vec<u32>,
@@ -102,6 +104,7 @@ fn stamp(path: &Path) -> Option<Stamp> {
 impl Batch {
     /// Checks what is asked for and what is there.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
+        let (base, measured) = base.exposed(monitor)?;
         let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
         let keys = first.keys();
         let sweeps = request
@@ -109,6 +112,13 @@ impl Batch {
             .iter()
             .map(|text| Sweep::parse(text, &keys, base.values()))
             .collect::<Result<Vec<Sweep>>>()?;
+        if sweeps.iter().any(|sweep| sweep.key == "image.auto_exposure") {
+            return Err(Error::Usage(
+                "--sweep image.auto_exposure: a batch has one exposure, measured on its first frame; sweep \
+                 image.exposure"
+                    .into(),
+            ));
+        }
         for (i, sweep) in sweeps.iter().enumerate() {
             if sweeps[..i].iter().any(|other| other.key == sweep.key) {
                 return Err(Error::Usage(format!(
@@ -150,6 +160,7 @@ impl Batch {
         let (sheet, manifests) = about_all(&request, &base, &sweeps, &pictures)?;
         let mut batch = Batch {
             base,
+            measured,
             request,
             sweeps,
             frames,
@@ -165,9 +176,15 @@ impl Batch {
         batch.check_names()?;
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
+        batch.check_bloom()?;
         batch.look(monitor)?;
         batch.check_movies()?;
         Ok(batch)
+    }
+
+    /// Stops that the automatic exposure has chosen, where there is one.
+    pub fn measured(&self) -> Option<f32> {
+        self.measured
     }
 
     /// How many pictures there are, of all shards.

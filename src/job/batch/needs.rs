@@ -6,7 +6,7 @@ use super::Batch;
 use super::report::word;
 use crate::error::{Result, human_bytes};
 use crate::gpu::canvas_bytes;
-use crate::job::{memory_of, spare_for_rasters};
+use crate::job::{check_bloom, memory_of, spare_for_rasters};
 use crate::overlap;
 
 /// What a run would render, and what it needs for it.
@@ -24,6 +24,8 @@ pub struct Needs {
     pub size: [u32; 2],
     /// Samples a pixel.
     pub samples: u32,
+    /// Stops of the automatic exposure, where there is one.
+    pub auto_exposure: Option<f32>,
     /// Parts that a picture is rendered in.
     pub strips: u64,
     /// Memory of the work on host and device, bytes, beside the program's own.
@@ -66,10 +68,21 @@ impl Batch {
             last: files(own.last()),
             size: [window.width, window.height],
             samples: scene.image.samples,
+            auto_exposure: self.measured,
             strips: strips.len() as u64,
             memory_bytes,
             disk_bytes: window.pixels() * pixel * to_render + movie_bytes,
         })
+    }
+
+    /// Pictures that are seen as they are have their bloom whole.
+    pub(super) fn check_bloom(&self) -> Result<()> {
+        let seen = self.pictures.iter().any(|p| !p.is_exr()) || !self.movies.is_empty();
+        let Some(number) = self.own().next().filter(|_| seen) else { return Ok(()) };
+        let scene = self.scene(number)?;
+        let window = self.window(&scene);
+        let (_, strips) = memory_of(&scene, window, self.has_exr(), self.base.limits().memory)?;
+        check_bloom(&scene, window, strips.len())
     }
 
     /// Whether pictures are written with layers.

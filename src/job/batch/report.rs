@@ -120,6 +120,8 @@ pub struct Summary {
     pub failed: u64,
     /// Neither: the run ended before.
     pub left: u64,
+    /// Stops of the automatic exposure, where there is one.
+    pub auto_exposure: Option<f32>,
     /// Whole run, seconds.
     pub elapsed: f64,
     /// Sum over the rendered pictures of their stages' seconds.

@@ -58,7 +58,7 @@ impl Batch {
             mesh: None,
             watcher,
             warned: false,
-            summary: Summary { pictures, kept, ..Default::default() },
+            summary: Summary { pictures, kept, auto_exposure: self.measured, ..Default::default() },
             failure: None,
         };
         let ended = std::thread::scope(|scope| {

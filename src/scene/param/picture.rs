@@ -19,6 +19,14 @@ pub(super) const TABLE: &[Param] = &[
     )
     .slider(1.0, 256.0),
     p(
+        "image.filter",
+        "",
+        "",
+        Choice(&["box", "gaussian", "blackman-harris"]),
+        Uniform,
+        "How several samples are spread about a pixel: evenly over it, or three pixels wide and denser in the middle.",
+    ),
+    p(
         "image.exposure",
         "",
         "stops",
@@ -28,12 +36,54 @@ pub(super) const TABLE: &[Param] = &[
     )
     .slider(-8.0, 8.0),
     p(
+        "image.auto_exposure",
+        "",
+        "",
+        Choice(&["none", "average", "highlights"]),
+        Uniform,
+        "Adds stops measured on frame 0: the logarithmic mean becomes middle grey, or the brightest hundredth begins at 1.",
+    ),
+    p(
+        "image.bloom",
+        "",
+        "",
+        Float(0.0, 1.0, 0.0),
+        Uniform,
+        "Share of the light that is spread around bright things, in the PNG only; of whole pictures only.",
+    )
+    .slider(0.0, 0.5),
+    p(
+        "image.bloom_radius",
+        "",
+        "heights",
+        Float(0.0, 0.25, 0.04),
+        Uniform,
+        "How far it is spread: standard deviation of the widest of its six octaves, in heights of the image.",
+    ),
+    p(
+        "image.temperature",
+        "",
+        "K",
+        Float(1500.0, 15000.0, 6500.0),
+        Uniform,
+        "White balance of the PNG: light of this colour temperature is shown as that of 6500 K; lower turns the picture blue.",
+    )
+    .slider(2500.0, 12000.0),
+    p(
+        "image.tint",
+        "",
+        "Duv/1000",
+        Float(-50.0, 50.0, 0.0),
+        Uniform,
+        "How much greener than a black body that light is; above 0 turns the picture magenta.",
+    ),
+    p(
         "image.tone",
         "",
         "",
-        Choice(&["filmic", "none"]),
+        Choice(&["filmic", "agx", "none"]),
         Uniform,
-        "Tone curve of the PNG: Narkowicz's fit of ACES, or none.",
+        "Tone curve of the PNG: Narkowicz's fit of ACES, Sobotka's AgX, or none.",
     ),
     p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform, "Frames of the animation; --frames chooses others.")
         .slider(1.0, 1000.0),

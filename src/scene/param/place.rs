@@ -90,6 +90,43 @@ pub(super) const TABLE: &[Param] = &[
         "Radiance of the background at and below the horizon.",
     ),
     p(
+        "haze.density",
+        "β₀",
+        "1/m",
+        Float(0.0, 1000.0, 0.0),
+        Uniform,
+        "Extinction of the haze between the eye and rock and water; 0: there is none.",
+    )
+    .slider(0.0, 0.2),
+    p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform, "Radiance of endless haze."),
+    p(
+        "haze.scale_height",
+        "H",
+        "m",
+        Float(0.0, 1e5, 0.0),
+        Uniform,
+        "The haze thins upwards by e in so many metres; 0: it is the same at every height.",
+    )
+    .slider(0.0, 20.0),
+    p(
+        "haze.level",
+        "y₀",
+        "m",
+        Float(-1e7, 1e7, 0.0),
+        Uniform,
+        "Height at which haze that thins has its density.",
+    )
+    .slider(-20.0, 20.0),
+    p(
+        "haze.far",
+        "",
+        "m",
+        Float(0.0, 1e7, 0.0),
+        Uniform,
+        "Metres of haze before the background or environment; 0: it is seen as it is.",
+    )
+    .slider(0.0, 200.0),
+    p(
         "environment.kind",
         "",
         "",

@@ -9,6 +9,7 @@ use super::input::LightCommand;
 use super::{Inspector, Viewer};
 use crate::error::human_bytes;
 use crate::frame::Layer;
+use crate::scene::AutoExposure;
 use crate::viewer::parameters::lights::add_menu;
 use crate::viewer::parameters::{cost_color, name};
 use crate::viewer::ray_panel;
@@ -249,6 +250,11 @@ impl Viewer {
                     frame.height,
                     if picture.scale > 1 { format!(" (1/{})", picture.scale) } else { String::new() }
                 ));
+                if self.document.scene().image.look.auto_exposure != AutoExposure::None {
+                    let exposure = picture.scene.image.look.exposure;
+                    ui.label(format!("exposure {exposure:+.2}"))
+                        .on_hover_text("Stops: image.exposure and what the automatic exposure adds");
+                }
                 let passes = format!("gbuffer {} · integrate {} ms", ms(s.gbuffer), ms(s.integrate));
                 let all = format!(
                     "Of one sample: gbuffer {}, integrate {}, resolve {} ms on the device; pipelines {}, \

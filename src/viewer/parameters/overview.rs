@@ -6,9 +6,9 @@ use eframe::egui;
 use egui::{Color32, ColorImage, Pos2, Sense, Stroke, TextureHandle, TextureOptions, Ui, Vec2};
 
 use super::name;
-use crate::cpu::resolve::resolve;
+use crate::cpu::resolve::Resolver;
 use crate::environment::{Environment, Map};
-use crate::scene::{Image, Tone};
+use crate::scene::{Image, Look};
 
 /// Columns and rows.
 const SIZE: [usize; 2] = [256, 128];
@@ -29,20 +29,20 @@ struct Made {
 struct Of {
     /// Weak: a large map that is no longer used is to go.
     map: Weak<Map>,
-    numbers: [f32; 3],
+    numbers: [f32; 2],
     lights: usize,
     sun: Option<[f32; 3]>,
-    tone: Tone,
+    look: Look,
 }
 
 impl Of {
     fn new(environment: &Environment, image: &Image) -> Of {
         Of {
             map: Arc::downgrade(&environment.map),
-            numbers: [environment.intensity, environment.turn, image.exposure],
+            numbers: [environment.intensity, environment.turn],
             lights: environment.volume_lights().len(),
             sun: environment.sun.map(|sun| sun.to_sun.to_array()),
-            tone: image.tone,
+            look: image.look,
         }
     }
 }
@@ -50,8 +50,8 @@ impl Of {
 impl PartialEq for Of {
     fn eq(&self, other: &Of) -> bool {
         self.map.ptr_eq(&other.map)
-            && (self.numbers, self.lights, self.sun, self.tone)
-                == (other.numbers, other.lights, other.sun, other.tone)
+            && (self.numbers, self.lights, self.sun, self.look)
+                == (other.numbers, other.lights, other.sun, other.look)
     }
 }
 
@@ -60,9 +60,10 @@ impl Overview {
     pub fn show(&mut self, ui: &mut Ui, environment: &Environment, image: &Image) {
         let of = Of::new(environment, image);
         if self.made.as_ref().is_none_or(|made| made.of != of) {
+            let resolver = Resolver::new(&image.look);
             let pixels = environment.overview(SIZE[0], SIZE[1]);
             let pixels = pixels.iter().map(|radiance| {
-                let [r, g, b, _] = resolve(image, radiance.extend(1.0).to_array());
+                let [r, g, b, _] = resolver.pixel(radiance.extend(1.0).to_array());
                 Color32::from_rgb(r, g, b)
             });
             let picture = ColorImage::new(SIZE, pixels.collect());

@@ -9,12 +9,13 @@ use eframe::egui;
 use rayon::prelude::*;
 
 use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
-use crate::cpu::resolve::resolve;
+use crate::cpu::resolve::develop;
 use crate::error::{Error, Result};
+use crate::exposure;
 use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
-use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, strips};
-use crate::scene::{Cost, Image, Mesh, Rock, Scene};
+use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, check_bloom, strips};
+use crate::scene::{AutoExposure, Cost, Look, Mesh, Rock, Scene, Values};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
@@ -45,6 +46,7 @@ const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 /// The picture that refinement goes on from.
 struct Rendered {
     scene: Arc<Scene>,
+    look: Look,
     size: [u32; 2],
     frame: Arc<Frame>,
     samples: u32,
@@ -77,6 +79,8 @@ pub struct Renderer {
     volume: VolumeStock,
     mesh: Option<(Vec<Rock>, Meshes)>,
     rendered: Option<Rendered>,
+    /// The values that the last automatic exposure was measured for, and its stops.
+    exposed: Option<(Values, f32)>,
     speed: Speed,
     /// When devices were lost.
     losses: VecDeque<Instant>,
@@ -101,6 +105,7 @@ impl Renderer {
             volume: VolumeStock::default(),
             mesh: None,
             rendered: None,
+            exposed: None,
             speed: Speed::default(),
             losses: VecDeque::new(),
         }
@@ -279,9 +284,10 @@ impl Renderer {
             None if mesh_made => Cost::Upload,
             None => Cost::Uniform,
         };
-        let job = Job { request: &request, volume, meshes, cost };
+        let look = self.exposed(&request.scene, &volume, &meshes.full, request.serial)?.image.look;
+        let job = Job { request: &request, volume, meshes, cost, look };
         let mut first = true;
-        if let Some(rendered) = self.goes_on(&request, &job.volume) {
+        if let Some(rendered) = self.goes_on(&job) {
             let samples = rendered.samples;
             self.keep(&job, rendered, first);
             if samples >= request.samples {
@@ -313,7 +319,7 @@ impl Renderer {
             let part = self.render(&job, 1, samples..samples + more, "refining")?;
             if let Some(rendered) = self.rendered.take() {
                 let mut frame = rendered.frame;
-                add(Arc::make_mut(&mut frame), samples, &part, more, &request.scene.image);
+                add(Arc::make_mut(&mut frame), samples, &part, more, &job.look);
                 self.keep(&job, Rendered { frame, samples: samples + more, ..rendered }, first);
             }
         }
@@ -321,11 +327,13 @@ impl Renderer {
     }
 
     /// The finished part of the same picture, if that is what is asked for again.
-    fn goes_on(&mut self, request: &Request, volume: &Arc<VolumeTexture>) -> Option<Rendered> {
+    fn goes_on(&mut self, job: &Job) -> Option<Rendered> {
+        let Job { request, volume, look, .. } = job;
         let old = self.rendered.take()?;
         let same = old.size == request.size
             && Arc::ptr_eq(&old.volume, volume)
             && (!request.layer.of_surface() || old.frame.surface.is_some())
+            && old.scene.image.filter == request.scene.image.filter
             && old.samples <= request.samples.max(1)
             && changed_keys(&old.scene.values, &request.scene.values)
                 .iter()
@@ -335,11 +343,10 @@ impl Renderer {
             return None;
         }
         let mut frame = old.frame;
-        let image = &request.scene.image;
-        if (old.scene.image.exposure, old.scene.image.tone) != (image.exposure, image.tone) {
-            develop(Arc::make_mut(&mut frame), image);
+        if old.look != *look {
+            develop(Arc::make_mut(&mut frame), look, true);
         }
-        Some(Rendered { scene: request.scene.clone(), frame, ..old })
+        Some(Rendered { scene: request.scene.clone(), look: *look, frame, ..old })
     }
 
     /// Renders and shows sample 0 at 1/scale of the size.
@@ -349,6 +356,7 @@ impl Renderer {
         if scale == 1 {
             let rendered = Rendered {
                 scene: job.request.scene.clone(),
+                look: job.look,
                 size: job.request.size,
                 frame,
                 samples: 1,
@@ -369,6 +377,7 @@ impl Renderer {
     fn show(&self, job: &Job, frame: Arc<Frame>, scale: u32, samples: u32, first: bool) {
         let mut scene = (*job.request.scene).clone();
         (scene.image.width, scene.image.height) = (frame.width, frame.height);
+        scene.image.look = job.look;
         let layer = job.request.layer;
         let drawn = layer_image(&frame, layer, samples);
         let size = [frame.width as usize, frame.height as usize];
@@ -405,6 +414,7 @@ impl Renderer {
         scene.image.width = width;
         scene.image.height = height;
         scene.image.samples = job.request.samples.max(1);
+        scene.image.look = job.look;
         let patience = if what == "preview" { PATIENCE } else { Duration::ZERO };
         let watch = self.watch(what, job.request.serial, patience);
         let options = RenderOptions {
@@ -484,6 +494,26 @@ impl Renderer {
         (meshes, true)
     }
 
+    /// The scene with its automatic exposure, if it has one: measured anew where something has changed that it
+    /// depends on. The flow is not among it, so that nothing flickers while the water plays.
+    fn exposed(&mut self, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, serial: u64) -> Result<Scene> {
+        if scene.image.look.auto_exposure == AutoExposure::None {
+            return Ok(scene.clone());
+        }
+        const OF_SIZE_AND_WAY: [&str; 3] = ["image.width", "image.height", "image.auto_exposure"];
+        let same = |key: &String| {
+            let of_image = key.starts_with("image.") && !OF_SIZE_AND_WAY.contains(&key.as_str());
+            of_image || key.starts_with("animate.") || key == "volume.flow"
+        };
+        let known = self.exposed.as_ref().filter(|(of, _)| changed_keys(of, &scene.values).iter().all(same));
+        let stops = match known {
+            Some((_, stops)) => *stops,
+            None => exposure::measure(scene, volume, mesh, &self.watch("exposure", serial, PATIENCE))?,
+        };
+        self.exposed = Some((scene.values.clone(), stops));
+        Ok(scene.clone().exposed(stops))
+    }
+
     fn export(&mut self, export: &Export) -> Result<()> {
         let clock = Instant::now();
         let result = self.export_files(export);
@@ -518,9 +548,13 @@ impl Renderer {
         let (meshes, _) = self.meshes(&export.scene);
         let watch = self.watch("export", u64::MAX, Duration::MAX);
         let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let (scene, image) = (&export.scene, &export.scene.image);
+        let scene = &self.exposed(&export.scene, &volume, &meshes.full, u64::MAX)?;
+        let image = &scene.image;
         let window = Window::whole([image.width, image.height]);
         let strips = strips(scene, window, options.surface, self.memory)?;
+        if still.has_png() {
+            check_bloom(scene, window, strips.len())?;
+        }
         let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
         writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
             self.run_engine(scene, &volume, &meshes.full, options, watch)
@@ -536,10 +570,12 @@ struct Job<'a> {
     volume: Arc<VolumeTexture>,
     meshes: Meshes,
     cost: Cost,
+    /// With the automatic exposure, if there is one.
+    look: Look,
 }
 
 /// Adds the mean of `more` samples to the mean of `samples`.
-fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, image: &Image) {
+fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
     let share = more as f32 / (samples + more) as f32;
     sum.radiance
         .par_iter_mut()
@@ -547,16 +583,7 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, image: &Image) {
         .for_each(|(a, b)| *a = [0, 1, 2, 3].map(|c| a[c] + (b[c] - a[c]) * share));
     sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
     sum.seconds = part.seconds;
-    develop(sum, image);
-}
-
-/// Makes the picture from the radiance.
-fn develop(frame: &mut Frame, image: &Image) {
-    frame
-        .picture
-        .par_iter_mut()
-        .zip(&frame.radiance)
-        .for_each(|(picture, linear)| *picture = resolve(image, *linear));
+    develop(sum, look, true);
 }
 
 /// Watches one piece of work for the render thread: ends it when something newer is wanted.

@@ -87,12 +87,38 @@ fn the_picture_is_what_the_library_renders_of_the_same_values() {
 fn tone_and_exposure_change_the_bytes_and_not_the_radiance() {
     let mut window = Setup::bare().open();
     let first = shown(&window);
-    for (key, raw) in [("image.exposure", Raw::Float(2.0)), ("image.tone", Raw::Text("none".into()))] {
+    let changes = [
+        ("image.exposure", Raw::Float(2.0)),
+        ("image.auto_exposure", Raw::Text("highlights".into())),
+        ("image.bloom", Raw::Float(0.3)),
+        ("image.temperature", Raw::Float(4000.0)),
+        ("image.tone", Raw::Text("agx".into())),
+        ("image.tone", Raw::Text("none".into())),
+    ];
+    for (key, raw) in changes {
+        let before = shown(&window);
         window.set(key, raw);
         window.settle();
         let now = shown(&window);
-        assert!(now.0 == first.0 && now.1 != first.1, "{key}");
+        assert!(now.0 == first.0 && now.1 != before.1, "{key}");
     }
+}
+
+#[test]
+fn an_automatic_exposure_follows_the_light_and_stays_while_the_water_flows() {
+    let mut window = Setup::bare().open();
+    let mut chosen = |key: &str, raw: Raw| {
+        window.set(key, raw);
+        window.settle();
+        window.picture().scene.image.look.exposure
+    };
+    let first = chosen("image.auto_exposure", Raw::Text("highlights".into()));
+    assert!(first != 0.0);
+    for flow in [0.1, 0.2, 0.37, 0.5, 0.7] {
+        assert_eq!(chosen("volume.flow", Raw::Float(flow)), first);
+    }
+    assert_eq!(chosen("image.exposure", Raw::Float(1.0)), first + 1.0);
+    assert!(chosen("lights.sun.intensity", Raw::Float(9.0)) < first + 1.0);
 }
 
 #[test]

@@ -28,7 +28,9 @@ fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
     Some(match param.kind {
         Kind::Float(min, max, _) => {
             let (low, high) = param.slider.unwrap_or((min, max));
-            Raw::Float(rng.random_range(low.max(-1e3)..=high.min(1e3)))
+            // Some begin above what is otherwise large enough: kelvins.
+            let most = if low < 1e3 { high.min(1e3) } else { high };
+            Raw::Float(rng.random_range(low.max(-1e3)..=most))
         }
         Kind::Int(_, i64::MAX, _) => Raw::Int(rng.random_range(0..1_000_000)),
         Kind::Int(min, max, _) => Raw::Int(rng.random_range(min..=max.min(12))),
