@@ -13,6 +13,7 @@ struct LightWalk {
     done: bool,
 }
 
+// Ends early where the depth is `enough`.
 fn optical_depth(
     volume: texture_storage_3d<rg32uint, read>,
     size: vec3<i32>,
@@ -20,14 +21,15 @@ fn optical_depth(
     cell: vec3<i32>,
     direction: vec3<f32>,
     max_cells: u32,
+    enough: f32,
 ) -> LightWalk {
     var ray: LightWalk;
     var walk = walk_new(size, vec3<f32>(cell) + 0.5, direction);
     while !ray.done {
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
     }
     return ray;
 }
@@ -39,6 +41,7 @@ fn pass_cell(
     ray: ptr<function, LightWalk>,
     layers: i32,
     max_cells: u32,
+    enough: f32,
 ) {
     let t_exit = walk_exit(*walk);
     let rho = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, matter);
@@ -52,11 +55,14 @@ fn pass_cell(
     (*ray).t = t_exit;
     walk_step(walk, true);
     let z = (*walk).cell.z;
-    (*ray).done |= (z < 0) | (z >= layers) | ((*ray).cells >= max_cells);
+    (*ray).done |= (z < 0) | (z >= layers) | ((*ray).cells >= max_cells) | ((*ray).depth > enough);
 }
 
 // Codes of transmittances that one word of a light volume holds, of cells that follow one another along z.
 const CELLS_A_WORD: i32 = 4;
+
+// −log₂ of a T whose code is 0.
+const DARK_BITS: f32 = 18.0;
 
 // √T in 255ths, from −log₂ T: steps are finest where it is dark.
 fn transmittance_code(depth_bits: f32) -> u32 {

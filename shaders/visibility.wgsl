@@ -38,13 +38,14 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     let column = i32(index / of_slice);
     // Sheets of one volume share a light volume, whatever they make of it.
     let whole = Matter(1.0, 0.0, 0.0, 0.0, 1.0);
+    let enough = select(NEVER, DARK_BITS / max(light_volume.bits, 1e-20), CODES);
     var word = 0u;
     for (var i = 0; i < CELLS_A_WORD; i++) {
         let cell = vec3<i32>(x, y, column * CELLS_A_WORD + i);
         if cell.z >= size.z || (textureLoad(volume, cell).x & 0xffffu) == 0u {
             continue;
         }
-        let depth = optical_depth(volume, size, whole, cell, direction, max_cells).depth;
+        let depth = optical_depth(volume, size, whole, cell, direction, max_cells, enough).depth;
         if CODES {
             word |= transmittance_code(depth * light_volume.bits) << u32(8 * i);
         } else {

@@ -30,6 +30,9 @@ pub const CELLS_A_WORD: u32 = 4;
 /// size of single cells.
 const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 
+/// The same of lights that stand for a part of the environment, which comes from many directions: 14°.
+const ENVIRONMENT_SAME_DIRECTION: f32 = 1.0 / 4.0;
+
 /// Most cells of a walk that is kept: one invocation makes four of them, four cells a turn, and software Vulkan grants
 /// all its loops 65535 turns.
 const MOST_CELLS: u32 = 65_000;
@@ -84,6 +87,9 @@ pub enum Form {
     /// Optical depth: Σ ρ code × length, in depths of a cell; or Σ ρ code.
     Depths,
 }
+
+/// −log₂ of a T whose code is 0: 255·2^(−9) is less than a half.
+pub const DARK_BITS: f32 = 18.0;
 
 /// √T in 255ths, from −log₂ T: steps are finest where it is dark.
 pub fn transmittance_code(depth_bits: f32) -> u8 {
@@ -179,7 +185,7 @@ impl LightVolumes {
         };
         let mut volumes: Vec<LightVolume> = Vec::new();
         let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
-        let mut number = |direction: Vec3, bits: f32| {
+        let mut number = |direction: Vec3, bits: f32, same: f32| {
             let step = same * direction.length().max(1e-30);
             // The step is a power of two, so that equal directions fall into equal squares.
             let step = step.log2().floor().exp2();
@@ -198,7 +204,8 @@ impl LightVolumes {
                 Form::Depths => 1.0,
             };
             let side_seen = if quad_seen_from_behind(quad, scene.camera.eye) { -1.0 } else { 1.0 };
-            for light in &lights {
+            for (i, light) in lights.iter().enumerate() {
+                let same = if i < scene.lights.len() { same } else { same.max(ENVIRONMENT_SAME_DIRECTION) };
                 if quad.mist > 0.0 {
                     // Its light is not asked for.
                     patches.push(Patches { first: numbers.len() as u32, count: [1, 1], cornered: false });
@@ -212,7 +219,7 @@ impl LightVolumes {
                 let offset = if cornered { 0.0 } else { 0.5 };
                 for (j, i) in (0..nv).flat_map(|j| (0..nu).map(move |i| (j, i))) {
                     let place = |i: u32, n: u32| (i as f32 + offset) / n as f32;
-                    numbers.push(number(at(place(i, count[0]), place(j, count[1])), bits));
+                    numbers.push(number(at(place(i, count[0]), place(j, count[1])), bits, same));
                 }
             }
         }

@@ -18,7 +18,7 @@ use crate::shading::{Metric, fibre_angles, specular_power};
 use crate::strand::table::StrandShading;
 use crate::visibility::{Form, LightVolumes, Medium};
 use crate::volume::{Cell, VolumeTexture};
-use crate::walk::{Crossing, Walk};
+use crate::walk::{Crossing, NEVER, Walk};
 
 /// What all pixels of a frame share.
 pub struct Integrator<'a> {
@@ -360,7 +360,8 @@ impl<'a> Integrator<'a> {
                 matter.depth(cell.z, light.l_cell, self.size.z, self.per_cell) * self.extinction
             }
             Visibility::March => {
-                optical_depth(self.volume, matter, cell, light.l_cell, self.medium, walked) * self.extinction
+                optical_depth(self.volume, matter, cell, light.l_cell, self.medium, NEVER, walked)
+                    * self.extinction
             }
             Visibility::Cached => {
                 let kept = self.kept_of(cell, &light.places);

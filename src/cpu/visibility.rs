@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use super::matter::Matter;
 use crate::error::Result;
 use crate::job::Monitor;
-use crate::visibility::{Form, LightVolume, LightVolumes, Medium, transmittance_code};
+use crate::visibility::{DARK_BITS, Form, LightVolume, LightVolumes, Medium, transmittance_code};
 use crate::volume::{Cell, VolumeTexture};
-use crate::walk::Walk;
+use crate::walk::{NEVER, Walk};
 
 /// Light volumes that are kept from frame to frame.
 #[derive(Default)]
@@ -72,7 +72,15 @@ impl KeptVolumes {
                     Numbers::Codes(filled(volume, |cell| code(volume, cell, light_volume, plan.medium)))
                 }
                 Form::Depths => Numbers::Depths(filled(volume, |cell| {
-                    optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, plan.medium, &mut 0)
+                    optical_depth(
+                        volume,
+                        &Matter::WHOLE,
+                        cell,
+                        light_volume.direction,
+                        plan.medium,
+                        NEVER,
+                        &mut 0,
+                    )
                 })),
             });
         }
@@ -97,7 +105,15 @@ fn filled<T: Copy + Default + Send>(volume: &VolumeTexture, of: impl Fn(IVec3) -
 }
 
 fn code(volume: &VolumeTexture, cell: IVec3, light_volume: &LightVolume, medium: Medium) -> u8 {
-    let depth = optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, &mut 0);
+    let depth = optical_depth(
+        volume,
+        &Matter::WHOLE,
+        cell,
+        light_volume.direction,
+        medium,
+        DARK_BITS / light_volume.bits.max(1e-20),
+        &mut 0,
+    );
     transmittance_code(depth * light_volume.bits)
 }
 
@@ -111,18 +127,21 @@ pub fn number(
 ) -> f32 {
     match form {
         Form::Codes => code(volume, cell, light_volume, medium).into(),
-        Form::Depths => optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, &mut 0),
+        Form::Depths => {
+            optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, NEVER, &mut 0)
+        }
     }
 }
 
 /// From the middle of `start` to where the light ray leaves the slab: Σ ρ code × length, in units of
-/// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. `walked` grows by the cells of the way.
+/// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. Ends early where the depth is `enough`. `walked` grows by the cells of the way.
 pub fn optical_depth(
     volume: &VolumeTexture,
     matter: &Matter,
     start: IVec3,
     direction: Vec3,
     medium: Medium,
+    enough: f32,
     walked: &mut u32,
 ) -> f32 {
     let size = glam::UVec3::from(volume.size).as_ivec3();
@@ -140,6 +159,9 @@ pub fn optical_depth(
             depth += if n == 0 { 0.0 } else { rho };
         } else {
             depth += rho * (crossing.t_exit - crossing.t_enter);
+        }
+        if depth > enough {
+            break;
         }
     }
     depth

@@ -123,6 +123,8 @@ pub fn luminance(rgb: DVec3) -> f64 {
 pub struct Cells {
     /// Columns and rows.
     pub size: [usize; 2],
+    /// Columns and rows of the map.
+    pub texels: [usize; 2],
     /// Columns × rows.
     pub beams: Vec<Beam>,
 }
@@ -147,6 +149,6 @@ impl Cells {
                 }
             }
         });
-        Cells { size, beams }
+        Cells { size, texels: [width, height], beams }
     }
 }

@@ -18,11 +18,9 @@ impl Environment {
         let [across, down] = cells.size;
         let factor = f64::from(self.intensity);
         let turn = (f64::from(self.turn) * across as f64).round() as usize;
-        let heights: Vec<f64> = (0..down).map(|y| height(self.map.height as usize, down, y)).collect();
+        let heights: Vec<f64> = (0..down).map(|y| height(cells.texels[1], down, y)).collect();
         let widths: Vec<f64> = (0..across)
-            .map(|x| {
-                TAU * texels(self.map.width as usize, across, x).len() as f64 / f64::from(self.map.width)
-            })
+            .map(|x| TAU * texels(cells.texels[0], across, x).len() as f64 / cells.texels[0] as f64)
             .collect();
         let texel = |i: usize| {
             let (mut power, mut solid_angle) = (DVec3::ZERO, 0.0);

@@ -149,6 +149,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("CUT"), taki::gpu::CUT as f64);
     assert_eq!(constant("CELLS_A_WORD"), taki::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
+    assert_eq!(constant("DARK_BITS"), f64::from(taki::visibility::DARK_BITS));
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::cpu::MIST_OF_CELLS));

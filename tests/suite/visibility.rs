@@ -7,6 +7,7 @@ use taki::job::Unwatched;
 use taki::scene::{Light, Limits, Scene};
 use taki::visibility::{LightVolumes, Medium};
 use taki::volume::VolumeTexture;
+use taki::walk::NEVER;
 
 use crate::gpu::renderer;
 
@@ -127,6 +128,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
                 cell,
                 volumes.volumes[0].direction,
                 volumes.medium,
+                NEVER,
                 &mut 0,
             ) / 65535.0;
             let above = if towards.z > 0.0 { z as f32 + 0.5 } else { 39.5 - z as f32 };
@@ -137,7 +139,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     let medium = Medium { per_cell: true, max_cells: 512 };
     let mut walked = 0;
     let depth =
-        optical_depth(&uniform, &Matter::WHOLE, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, &mut walked);
+        optical_depth(&uniform, &Matter::WHOLE, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, NEVER, &mut walked);
     assert_eq!((depth, walked), (7.0 * 65535.0, 8));
 }
 
@@ -242,4 +244,25 @@ fn bad_values_of_light_in_the_volume_have_their_line() {
             Scene::load("front".as_ref(), &[set.into()], &Limits::default()).expect_err(set).to_string();
         assert!(error.contains(words), "{set}: {error}");
     }
+}
+
+#[test]
+fn a_kept_walk_that_ends_in_the_dark_has_the_code_of_the_whole_one() {
+    use taki::visibility::{DARK_BITS, transmittance_code};
+    assert_eq!([DARK_BITS, DARK_BITS - 0.01].map(transmittance_code), [0, 0]);
+    assert!(transmittance_code(DARK_BITS - 0.1) > 0, "no later than need be");
+    let volume = volume(&scene("front", &[]));
+    let medium = Medium { per_cell: false, max_cells: 512 };
+    let direction = Vec3::new(3.0, 0.7, -0.1);
+    let bits = 1e-5;
+    let (mut whole, mut early) = (0, 0);
+    for x in 0..40 {
+        let cell = IVec3::new(x, 9, 30);
+        let depth = |enough, walked: &mut u32| {
+            optical_depth(&volume, &Matter::WHOLE, cell, direction, medium, enough, walked) * bits
+        };
+        let codes = [depth(NEVER, &mut whole), depth(DARK_BITS / bits, &mut early)].map(transmittance_code);
+        assert_eq!(codes[0], codes[1], "{x}");
+    }
+    assert!(early < whole, "{early} of {whole} cells");
 }
