@@ -177,7 +177,8 @@ fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
         if CODES {
             let transmittance = code * code * (1.0 / 65025.0);
             if ERODED {
-                return vec2<f32>(exp2(view.matter.left * log2(max(transmittance, 1e-9))), 0.0);
+                let thinner = exp2(view.matter.left * log2(max(transmittance, 1e-9)));
+                return vec2<f32>(select(transmittance, thinner, view.matter.left < 1.0), 0.0);
             }
             return vec2<f32>(transmittance, 0.0);
         }
