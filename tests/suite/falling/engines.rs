@@ -84,7 +84,7 @@ fn a_flat_even_sheet_is_one_quad() {
 }
 
 #[test]
-fn what_is_not_eroded_keeps_every_bit_beside_what_is() {
+fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
     let plain = small(plumb("segments = 2"));
     let volume = volume(&plain);
     let mut with = plain.clone();
@@ -98,7 +98,11 @@ fn what_is_not_eroded_keeps_every_bit_beside_what_is() {
                 frame(engine, &scene, &volume)
             });
             let [a, b] = &mut frames;
-            assert!(a.radiance == b.radiance && a.counts == b.counts);
+            // Another shader is compiled, which may order products otherwise: two units in the last place.
+            let near = |a: f32, b: f32| (a - b).abs() <= 2.4e-7 * a.abs();
+            let same = |i: usize| (0..4).all(|c| near(a.radiance[i][c], b.radiance[i][c]));
+            let others: Vec<usize> = (0..a.counts.len()).filter(|&i| !same(i)).collect();
+            assert!(others.is_empty() && a.counts == b.counts, "{visibility:?}: {others:?}");
         }
     }
 }
