@@ -37,6 +37,7 @@ pub mod job;
 pub mod mapping;
 pub mod movie;
 pub mod overlap;
+pub mod pool;
 pub mod random;
 pub mod scatter;
 pub mod scene;

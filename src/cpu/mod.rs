@@ -4,6 +4,8 @@
 pub mod gbuffer;
 pub mod integrate;
 mod matter;
+pub mod opaque;
+pub mod pool;
 pub mod ray;
 pub mod resolve;
 pub mod visibility;

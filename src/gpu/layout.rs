@@ -51,6 +51,10 @@ pub struct Frame {
     pub window_height: u32,
     pub flow_cells: f32,
     pub layers: u32,
+    pub shadow_light: u32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
 }
 
 /// One light.
@@ -258,6 +262,10 @@ impl Frame {
             window_height: window.height,
             flow_cells: flow_cells(scene.flow, volume.size[1]),
             layers,
+            shadow_light: scene.shadow_light().map_or(u32::MAX, |i| i as u32),
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
         }
     }
 }

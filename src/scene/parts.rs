@@ -7,10 +7,13 @@ use glam::{DVec3, Vec2, Vec3};
 use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
 use super::sheet::{Ends, Sheet, SheetFault};
-use super::{Camera, Cone, Light, Limits, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering, Values, Vertex};
+use super::{
+    Camera, Cone, Light, Limits, MAX_LIGHTS, MAX_POOLS, Place, Pool, Quad, Raw, Rock, Scattering, Values,
+    Vertex,
+};
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
-use crate::mapping::Material;
+use crate::mapping::{Material, QuadMap};
 use crate::strand::StrandParams;
 use crate::volume::Structure;
 
@@ -248,6 +251,16 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
             color: v.triple(&key("color")),
             color_noise: v.float(&key("color_noise")),
             cavity: v.float(&key("cavity")),
+            ridges: v.float(&key("ridges")),
+            strata: v.float(&key("strata")),
+            strata_height: v.float(&key("strata_height")),
+            strata_tilt: v.float(&key("strata_tilt")),
+            strata_color: v.float(&key("strata_color")),
+            border: v.float(&key("border")),
+            wet: v.float(&key("wet")),
+            wet_reach: v.float(&key("wet_reach")),
+            occlusion: v.float(&key("occlusion")),
+            shadow: v.float(&key("shadow")),
             name,
         });
     }
@@ -263,6 +276,66 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
         ));
     }
     Ok(rocks)
+}
+
+pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
+    let mut pools = Vec::new();
+    for name in v.names("pools") {
+        let key = |what: &str| format!("pools.{name}.{what}");
+        if !v.is_set(&key("corners")) {
+            return Err(Error::input(
+                format!("pool {name} has no corners"),
+                format!("give {} four points at one height", key("corners")),
+            ));
+        }
+        let corners = v.corners(&key("corners"));
+        let fault = |fault: &str| {
+            Error::input(
+                format!("pool {name} ({}) {fault}", key("corners")),
+                "a pool needs four corners of one height, convex, counter-clockwise seen from above",
+            )
+        };
+        let map = QuadMap::new(corners).map_err(|found| fault(found.words()))?;
+        let size = corners.iter().map(|c| c.distance(corners[0])).fold(0.0, f32::max);
+        if corners.iter().any(|c| (c.y - corners[0].y).abs() > 1e-4 * size) {
+            return Err(fault("is not level"));
+        }
+        if map.n_world.y < 0.0 {
+            return Err(fault("faces down"));
+        }
+        let (color, bottom) = (v.triple(&key("color")), v.triple(&key("bottom")));
+        for (what, albedo) in [("color", color), ("bottom", bottom)] {
+            if albedo.max_element() > 1.0 {
+                return Err(Error::input(
+                    format!("{} = {albedo} sends back more light than it gets", key(what)),
+                    "an albedo is at most 1 in each component",
+                ));
+            }
+        }
+        let float = |what: &str| v.float(&key(what));
+        pools.push(Pool {
+            corners,
+            depth: float("depth"),
+            color,
+            bottom,
+            absorption: v.triple(&key("absorption")),
+            height: float("height"),
+            wavelength: float("wavelength"),
+            rings: float("rings"),
+            period: float("period"),
+            foam: float("foam"),
+            foam_reach: float("foam_reach"),
+            seed: v.int(&key("seed")) as u64,
+            name,
+        });
+    }
+    if pools.len() > MAX_POOLS {
+        return Err(Error::input(
+            format!("the scene has {} pools", pools.len()),
+            format!("at most {MAX_POOLS}"),
+        ));
+    }
+    Ok(pools)
 }
 
 /// Lengths are fractions of the volume, so that a look survives a change of resolution.

@@ -26,8 +26,8 @@ const GROUPS: [(&str, &str, &[&str]); 9] = [
     ("Lights", "", LIGHTS),
     (
         "Surroundings",
-        "Rock, background and the light of the environment",
-        &["rocks", "background", "environment", "sky"],
+        "Rock, pools, background and the light of the environment",
+        &["rocks", "pools", "background", "environment", "sky"],
     ),
     ("Camera", "Where the picture is seen from", &["camera"]),
     ("Image", "Size, samples and tone of the picture", &["image"]),

@@ -20,6 +20,7 @@ mod lights;
 mod looking;
 mod mapping;
 mod movie;
+mod place;
 mod presets;
 mod ray;
 mod readme;

@@ -4,7 +4,8 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{Environment, Frame, Light, Quad, Strand, Tile, WORKGROUP};
-use taki::gpu::{LIGHTS_A_WALK, integrate_source, shader_source};
+use taki::gpu::{LIGHTS_A_WALK, gbuffer_source, integrate_source, shader_source};
+use taki::pool::{AROUND, Surface, WAVES, Wave};
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
@@ -20,13 +21,15 @@ const SHARED: [&str; 7] = [
 /// The stages.
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
-/// What is put after integrate.wgsl.
-const PARTS: [&str; 4] = ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl", "matter.wgsl"];
+/// What is put after integrate.wgsl and gbuffer.wgsl.
+const PARTS: [&str; 5] =
+    ["integrate_light.wgsl", "integrate_many.wgsl", "integrate_one.wgsl", "matter.wgsl", "pool.wgsl"];
 
 /// All of a stage's shader.
 fn stage(name: &str) -> String {
     match name {
         "integrate.wgsl" => shader_source(&integrate_source(true)),
+        "gbuffer.wgsl" => shader_source(&gbuffer_source()),
         _ => shader_source(&file(name)),
     }
 }
@@ -95,7 +98,8 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("integrate.wgsl")).expect("valid");
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
-        texture_frame exposure filmic window_x window_y window_width window_height flow_cells layers);
+        texture_frame exposure filmic window_x window_y window_width window_height flow_cells layers shadow_light
+        pad_a pad_b pad_c);
     assert_eq!(members(&module, "Frame"), frame);
     assert_eq!(
         members(&module, "Light"),
@@ -108,12 +112,16 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Environment"), environment);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
+    let module = validate(&stage("gbuffer.wgsl")).expect("valid");
+    let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
+    assert_eq!(members(&module, "Surface"), surface);
+    assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 
 #[test]
 fn constants_are_the_same_on_both_sides() {
     let module = validate(&stage("integrate.wgsl")).expect("valid");
-    let constant = |name: &str| {
+    let constant_of = |module: &naga::Module, name: &str| {
         let found = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name));
         let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
         match module.global_expressions[constant.init] {
@@ -122,6 +130,7 @@ fn constants_are_the_same_on_both_sides() {
             ref other => panic!("{name} is {other:?}"),
         }
     };
+    let constant = |name: &str| constant_of(&module, name);
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
     assert_eq!(constant("LIGHTS_A_WALK"), LIGHTS_A_WALK as f64);
     assert_eq!(constant("COSINES"), taki::scatter::COSINES as f64);
@@ -130,6 +139,10 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("SINE_SHARE"), taki::strand::table::SINE_SHARE as f64);
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::cpu::MIST_OF_CELLS));
     assert_eq!(constant("MIST_RHO"), f64::from(taki::cpu::MIST_RHO));
+    let gbuffer = validate(&stage("gbuffer.wgsl")).expect("valid");
+    let wide = |name: &str| constant_of(&gbuffer, name) as usize;
+    assert_eq!(wide("WAVES"), WAVES);
+    assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::strand::table::SIZE);
 }

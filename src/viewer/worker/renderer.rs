@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
 use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, strips};
-use crate::scene::{Cost, Image, Mesh, Rock, Scene};
+use crate::scene::{Cost, Ground, Image, Mesh, Scene};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
@@ -75,7 +75,7 @@ pub struct Renderer {
     memory: u64,
     engine: Option<Engine>,
     volume: VolumeStock,
-    mesh: Option<(Vec<Rock>, Meshes)>,
+    mesh: Option<(Ground, Meshes)>,
     rendered: Option<Rendered>,
     speed: Speed,
     /// When devices were lost.
@@ -473,14 +473,15 @@ impl Renderer {
 
     /// The request's geometry, and whether it was made anew.
     fn meshes(&mut self, scene: &Scene) -> (Meshes, bool) {
-        if let Some((rocks, meshes)) = &self.mesh
-            && *rocks == scene.rocks
+        let ground = scene.ground();
+        if let Some((known, meshes)) = &self.mesh
+            && *known == ground
         {
             return (meshes.clone(), false);
         }
-        let full = scene.mesh();
-        let meshes = Meshes { coarse: full.coarse(&scene.rocks), full };
-        self.mesh = Some((scene.rocks.clone(), meshes.clone()));
+        let full = ground.mesh();
+        let meshes = Meshes { coarse: full.coarse(&ground), full };
+        self.mesh = Some((ground, meshes.clone()));
         (meshes, true)
     }
 

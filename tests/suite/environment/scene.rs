@@ -17,7 +17,7 @@ use crate::gpu::{assert_parity, both, renderer, scene};
 
 /// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much
 /// inside a pixel that the two engines' interpolations differ by more than their shading may.
-const SMALL: [&str; 9] = [
+const SMALL: [&str; 13] = [
     "image.width=80",
     "image.height=60",
     "image.samples=2",
@@ -25,7 +25,11 @@ const SMALL: [&str; 9] = [
     "rocks.left.levels=3",
     "rocks.right.levels=3",
     "rocks.far_right.levels=3",
-    "rocks.foot.levels=3",
+    "rocks.bed.levels=3",
+    "rocks.boulder_a.levels=3",
+    "rocks.boulder_b.levels=3",
+    "rocks.boulder_c.levels=3",
+    "rocks.hills.levels=3",
     "environment.lights=5",
 ];
 
@@ -119,6 +123,7 @@ fn a_white_surface_under_even_light_is_as_bright_as_the_light_and_the_background
     sets.extend(white);
     let mut scene = scene("fig5", &sets);
     scene.rocks.retain(|rock| rock.name == "wall");
+    scene.pools.clear();
     scene.quads.clear();
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let frame = cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame");
