@@ -114,8 +114,9 @@ fn background_radiance(d: vec3<f32>) -> vec3<f32> {
 @fragment
 fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
     if in.pool > 0u {
-        let n = pool_normal(in);
-        return shade_pool(in, n, frame.ambient, background_radiance(pool_mirrored(in, n)));
+        let at = on_pool(in);
+        let n = pool_normal(at);
+        return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
     }
     let n = seen_normal(in);
     return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
@@ -125,9 +126,10 @@ fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
 @fragment
 fn opaque_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
     if in.pool > 0u {
-        let n = pool_normal(in);
+        let at = on_pool(in);
+        let n = pool_normal(at);
         let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
-        return shade_pool(in, n, ambient, environment_irradiance(environment, pool_mirrored(in, n)));
+        return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));
     }
     let n = seen_normal(in);
     let sky = environment_irradiance(environment, mirrored(in, n));

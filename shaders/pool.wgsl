@@ -68,6 +68,16 @@ fn value_noise(p: vec2<f32>) -> f32 {
     return near + (far - near) * s.y;
 }
 
+fn on_pool(in: OpaqueVarying) -> OpaqueVarying {
+    let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
+    let t = (pools[in.pool - 1u].middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
+    var at = in;
+    if t > 0.0 && t < 1e6 {
+        at.position_world = frame.eye_world + d * t;
+    }
+    return at;
+}
+
 fn to_eye_unit(in: OpaqueVarying) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     return to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);

@@ -152,7 +152,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                     };
                     let (radiance, n) = match point.pool {
                         0 => shade_opaque(scene, shadow_light, &point),
-                        pool => shade_pool(scene, shadow_light, &pools[pool as usize - 1], &point),
+                        pool => shade_pool(scene, shadow_light, &pools[pool as usize - 1], &point, ray(k)),
                     };
                     opaque[k] = radiance;
                     normal[k] = n;

@@ -40,6 +40,13 @@ fn value_noise(p: Vec2) -> f32 {
     near + (far - near) * s.y
 }
 
+/// Where the ray `d` meets the pool, not where its triangles' corners mix: waves are finer than the difference.
+fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, d: Vec3) -> Vec3 {
+    let eye = scene.camera.eye;
+    let t = (surface.middle[1] - eye.y) / if d.y == 0.0 { 1e-20 } else { d.y };
+    if t > 0.0 && t < 1e6 { eye + d * t } else { position }
+}
+
 /// The waves' normal. Waves of which a pixel sees half a length or more fade away, for it sees their mean.
 pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
     let to_eye = scene.camera.eye - point.position;
@@ -103,14 +110,16 @@ fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
     low * (1.0 - g) + high * g
 }
 
-/// Radiance and metres from the eye, and normal: what the surface mirrors, with the glint of lights (Blinn 1977, the
+/// Radiance and metres from the eye, and normal, where the view ray `d` meets it: what the surface mirrors, with the glint of lights (Blinn 1977, the
 /// exponent 256), what comes from below through the depth, and foam over both.
 pub fn shade_pool(
     scene: &Scene,
     shadow_light: Option<usize>,
     surface: &Surface,
     point: &Opaque,
+    d: Vec3,
 ) -> ([f32; 4], Vec3) {
+    let point = &Opaque { position: on_pool(scene, surface, point.position, d), ..*point };
     let n = pool_normal(scene, surface, point);
     let to_eye = scene.camera.eye - point.position;
     let distance = to_eye.dot(to_eye).sqrt();

@@ -180,7 +180,7 @@ fn pixels(scene: &Scene) -> Vec<([f32; 4], [u32; 2])> {
 
 #[test]
 fn a_still_pool_without_light_mirrors_the_background_by_fresnels_share() {
-    let scene = of(&format!("{POOL}height = 0.0\n{VIEW}"));
+    let scene = of(&format!("{POOL}height = 0.0\n{VIEW}[light]\nambient = [0,0,0]\n"));
     let pixels = pixels(&scene);
     assert!(pixels.len() > 500);
     for (seen, pixel) in pixels {
@@ -299,7 +299,12 @@ fn the_lobe_of_a_film_sends_back_no_more_than_fresnel_allows() {
             }
         }
         let share = 2.0 * sum / f64::from(count * count);
-        assert!(share > 0.015 && share < 1.6 * f64::from(opaque::fresnel(cos)), "{degrees}: {share}");
+        // (s + 8)/8π for the exact (s + 2)(s + 4)/8π(s + 2^(−s/2)).
+        let normalised = 40.0 / 38.25;
+        assert!(share < normalised * f64::from(opaque::fresnel(cos)), "{degrees}: {share}");
+        if degrees == 0.0 {
+            assert!(close(share, 0.02 * normalised, 0.02, 0.0), "{share}");
+        }
     }
 }
 
@@ -331,8 +336,6 @@ fn the_engines_agree_on_pools_and_on_wet_and_shaded_rock() {
 fn parity_can_fail_where_a_pool_is_another_on_one_engine() {
     let Some(mut renderer) = renderer("place") else { return };
     let [a, _] = both(&mut renderer, &small(""));
-    let [_, b] = both(&mut renderer, &small("\n[volume2]\n".replace("[volume2]", "").as_str()));
-    assert_parity("the same", &[a.clone(), b]);
     let mut other = small("");
     other.pools[0].seed = 2;
     let [_, b] = both(&mut renderer, &other);
@@ -352,7 +355,7 @@ fn what_is_no_pool_is_refused_with_what_to_do() {
         ),
         (corners("[[-9,0,-9],[9,0,-9],[9,0,9],[-9,0,9]]"), ["faces down", "counter-clockwise"]),
         (corners("[[0,0,0],[0,0,0],[9,0,-9],[-9,0,-9]]"), ["has no area", "four corners"]),
-        (corners("[[-9,0,9],[9,0,-9],[9,0,9],[-9,0,-9]]"), ["is not convex", "convex"]),
+        (corners("[[-9,0,9],[9,0,9],[-5,0,5],[-9,0,-9]]"), ["is not convex", "convex"]),
         (format!("{}color = [2,0,0]\n", corners(level)), ["pools.p.color", "at most 1"]),
         (format!("{}bottom = [0,2,0]\n", corners(level)), ["pools.p.bottom", "at most 1"]),
         (many, ["9 pools", "at most 8"]),
