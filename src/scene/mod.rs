@@ -1,6 +1,7 @@
 //! What is asked for: the scene, read strictly, checked whole before any work.
 
 mod animation;
+mod ground;
 mod keyframes;
 mod mesh;
 mod param;
@@ -188,8 +189,8 @@ impl Scene {
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
-            rocks: parts::rocks(v, limits.memory)?,
-            pools: parts::pools(v)?,
+            rocks: ground::rocks(v, limits.memory)?,
+            pools: ground::pools(v)?,
             trace,
             frame: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
             visibility: match v.text("light.visibility").as_str() {
