@@ -42,6 +42,11 @@ struct Frame {
     haze_color: vec3<f32>,
     // Metres of haze before the background.
     haze_far: f32,
+    // The light that rock keeps from rock.
+    shadow_light: u32,
+    pad_a: f32,
+    pad_b: f32,
+    pad_c: f32,
 }
 
 struct Light {
@@ -117,6 +122,13 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
         falloff *= s * s * (3.0 - 2.0 * s);
     }
     return vec4<f32>(to_light, falloff);
+}
+
+// Fresnel's reflection of water for light at an angle to the normal (Schlick 1994).
+fn fresnel(cos_angle: f32) -> f32 {
+    let m = 1.0 - clamp(cos_angle, 0.0, 1.0);
+    let m2 = m * m;
+    return 0.02 + 0.98 * (m2 * m2 * m);
 }
 
 // Camera::view_ray: unit direction through a pixel of the whole image.

@@ -18,6 +18,10 @@ struct OpaqueVertex {
     @location(0) position_world: vec3<f32>,
     @location(1) normal_world: vec3<f32>,
     @location(2) albedo: vec3<f32>,
+    // Occlusion, shadow, film of water.
+    @location(3) shade: vec3<f32>,
+    // Number of the pool plus 1; 0: rock.
+    @location(4) pool: u32,
 }
 
 struct OpaqueVarying {
@@ -25,6 +29,9 @@ struct OpaqueVarying {
     @location(0) position_world: vec3<f32>,
     @location(1) normal_world: vec3<f32>,
     @location(2) albedo: vec3<f32>,
+    // Occlusion, shadow, film of water.
+    @location(3) shade: vec3<f32>,
+    @location(4) @interpolate(flat) pool: u32,
 }
 
 struct OpaqueTargets {
@@ -40,6 +47,8 @@ fn opaque_vertex(in: OpaqueVertex) -> OpaqueVarying {
     out.position_world = in.position_world;
     out.normal_world = in.normal_world;
     out.albedo = in.albedo;
+    out.shade = in.shade;
+    out.pool = in.pool;
     return out;
 }
 
@@ -49,33 +58,83 @@ fn seen_normal(in: OpaqueVarying) -> vec3<f32> {
     return select(n, -n, dot3(n, to_eye) < 0.0);
 }
 
-// Lambert, two-sided.
-fn shade_opaque(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>) -> OpaqueTargets {
+// Lambert, two-sided, with the gloss of a film of water: `sky` is what the surroundings send along the mirrored
+// view.
+fn shade_opaque(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let distance = sqrt(dot3(to_eye, to_eye));
-    var irradiance = ambient;
+    let e = to_eye / max(distance, 1e-6);
+    let open = 1.0 - in.shade.x;
+    var irradiance = ambient * open;
+    var gloss = vec3<f32>(0.0);
     for (var i = 0u; i < frame.light_count; i++) {
         let light = lights[i];
         let arrives = light_from(light, in.position_world);
-        irradiance += light.intensity * (arrives.w * max(dot3(n, arrives.xyz), 0.0));
+        let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
+        let cos_light = max(dot3(n, arrives.xyz), 0.0);
+        irradiance += light.intensity * (arrives.w * lit * cos_light);
+        if in.shade.z > 0.0 {
+            gloss += light.intensity * (arrives.w * lit * cos_light * film_lobe(n, arrives.xyz, e));
+        }
+    }
+    var radiance = in.albedo * irradiance;
+    if in.shade.z > 0.0 {
+        radiance += (gloss + sky * (open * fresnel(dot3(n, e)))) * in.shade.z;
     }
     var out: OpaqueTargets;
     let d_y = -to_eye.y / max(distance, 1e-20);
-    out.radiance = vec4<f32>(haze_over(frame, in.albedo * irradiance, d_y, distance), distance);
+    out.radiance = vec4<f32>(haze_over(frame, radiance, d_y, distance), distance);
     out.normal = vec4<f32>(n, 1.0);
     return out;
 }
 
-@fragment
-fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
-    return shade_opaque(in, seen_normal(in), frame.ambient);
+// π times the reflection of a film on rough rock: Blinn 1977 with the exponent 32, which (s + 8)/8π normalises.
+fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
+    let sum = l + e;
+    let h = sum / sqrt(max(dot3(sum, sum), 1e-12));
+    let c = max(dot3(n, h), 0.0);
+    let c2 = c * c;
+    let c4 = c2 * c2;
+    let c8 = c4 * c4;
+    let c16 = c8 * c8;
+    return 5.0 * fresnel(dot3(l, h)) * (c16 * c16);
 }
 
-// Under an environment.
+// The view against the normal, mirrored.
+fn mirrored(in: OpaqueVarying, n: vec3<f32>) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    let e = to_eye / sqrt(max(dot3(to_eye, to_eye), 1e-12));
+    return n * (2.0 * dot3(n, e)) - e;
+}
+
+// Background::radiance.
+fn background_radiance(d: vec3<f32>) -> vec3<f32> {
+    return frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
+}
+
+@fragment
+fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    if in.pool > 0u {
+        let at = on_pool(in);
+        let n = pool_normal(at);
+        return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
+    }
+    let n = seen_normal(in);
+    return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
+}
+
+// Under an environment: on rough rock its film sends back what comes from all around the mirrored view.
 @fragment
 fn opaque_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    if in.pool > 0u {
+        let at = on_pool(in);
+        let n = pool_normal(at);
+        let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
+        return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));
+    }
     let n = seen_normal(in);
-    return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n));
+    let sky = environment_irradiance(environment, mirrored(in, n));
+    return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n), sky);
 }
 
 struct VolumeVarying {
@@ -134,13 +193,12 @@ fn background_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) v
     return vec4<f32>(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Background::radiance; distance and normal 0 mark that nothing is there.
+// Distance and normal 0 mark that nothing is there.
 @fragment
 fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
     var out: OpaqueTargets;
-    let radiance = frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
-    out.radiance = vec4<f32>(haze_over(frame, radiance, d.y, frame.haze_far), 0.0);
+    out.radiance = vec4<f32>(haze_over(frame, background_radiance(d), d.y, frame.haze_far), 0.0);
     out.normal = vec4<f32>(0.0);
     return out;
 }

@@ -9,7 +9,7 @@
 //!    to 64 bits.
 //! 4. [`mapping`] is the one-to-one map between a quad and the volume's face (§3): the raster pass
 //!    (`gbuffer`) finds the quads under each pixel, as many as [`overlap`] tells, in order of depth, and the
-//!    texture coordinates there.
+//!    texture coordinates there; behind them rock, and [`pool`]s that mirror it.
 //! 5. [`shading`] is the light of one cell (§5), or [`strand`], a model made for water; [`visibility`] keeps what is
 //!    left of the lights in every cell, [`environment`] makes lights of sun, sky and maps; the compute pass
 //!    (`integrate`) walks the cells under each pixel (§4) and adds them up; [`scatter`] is the light that is
@@ -40,6 +40,7 @@ pub mod job;
 pub mod mapping;
 pub mod movie;
 pub mod overlap;
+pub mod pool;
 pub mod random;
 pub mod scatter;
 pub mod scene;

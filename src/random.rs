@@ -22,6 +22,12 @@ pub enum Stream {
     Child = 5,
     /// Density along one curve; index: as of [`Stream::Curve`].
     Strand = 6,
+    /// Ridges, borders and patches of one vertex of a rock mesh; index: its place in the finest grid.
+    RockForm = 7,
+    /// One block of a layer of rock; index: layer and place in it.
+    Stratum = 8,
+    /// One wave of a pool; index: its number.
+    Wave = 9,
 }
 
 /// A family of generators: one seed and one stream.

@@ -4,11 +4,14 @@
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::opaque::{Opaque, shade_opaque};
+use super::pool::shade_pool;
 use crate::camera::sample_offset;
 use crate::frame::Window;
 use crate::haze::EyeHaze;
 use crate::overlap;
-use crate::scene::{Image, Light, Mesh, Quad, Scene};
+use crate::pool;
+use crate::scene::{Image, Mesh, Quad, Scene};
 
 /// The targets of one sample of a part of the image, row by row.
 pub struct Gbuffer {
@@ -93,6 +96,8 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
         project([a, b, c], i as u32, &mut water);
         project([a, c, d], i as u32, &mut water);
     }
+    let shadow_light = scene.shadow_light();
+    let pools = pool::surfaces(scene, mesh);
     let layers = overlap::sheets(scene) as usize;
     let haze = scene.haze.seen_from(scene.camera.eye);
     let rows = 16.min(height);
@@ -141,8 +146,21 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                     let mix = |get: fn(&crate::scene::Vertex) -> [f32; 3]| {
                         (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
                     };
-                    let (radiance, n) =
-                        shade_opaque(scene, &haze, mix(|v| v.position), mix(|v| v.normal), mix(|v| v.albedo));
+                    let point = Opaque {
+                        position: mix(|v| v.position),
+                        normal: mix(|v| v.normal),
+                        albedo: mix(|v| v.albedo),
+                        shade: mix(|v| [v.occlusion, v.shadow, v.wet]),
+                        pool: corner[0].pool,
+                    };
+                    let (radiance, n) = match point.pool {
+                        0 => shade_opaque(scene, shadow_light, &point),
+                        pool => shade_pool(scene, shadow_light, &pools[pool as usize - 1], &point, ray(k)),
+                    };
+                    let distance = radiance[3];
+                    let d_y = (point.position.y - scene.camera.eye.y) / distance.max(1e-20);
+                    let radiance = hazed(&haze, Vec3::from_slice(&radiance), d_y, distance);
+                    let radiance = radiance.extend(distance).to_array();
                     opaque[k] = radiance;
                     normal[k] = n;
                 }
@@ -181,63 +199,12 @@ pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
     [uv.x, uv.y, t]
 }
 
-/// Lambert, two-sided: (radiance and metres from the eye, normal). Twin: `shade_opaque`.
-fn shade_opaque(
-    scene: &Scene,
-    haze: &EyeHaze,
-    position: Vec3,
-    normal: Vec3,
-    albedo: Vec3,
-) -> ([f32; 4], Vec3) {
-    let to_eye = scene.camera.eye - position;
-    let distance = to_eye.dot(to_eye).sqrt();
-    let mut n = normal / normal.dot(normal).max(1e-30).sqrt();
-    if n.dot(to_eye) < 0.0 {
-        n = -n;
-    }
-    let mut irradiance = scene.ambient;
-    if let Some(environment) = &scene.environment {
-        irradiance += environment.irradiance.at(n);
-    }
-    for light in &scene.lights {
-        let (to_light, intensity) = light.at(position);
-        irradiance += intensity * n.dot(to_light).max(0.0);
-    }
-    let d_y = -to_eye.y / distance.max(1e-20);
-    (hazed(haze, albedo * irradiance, d_y, distance).extend(distance).to_array(), n)
-}
-
 /// Twin: `haze_over`.
 fn hazed(haze: &EyeHaze, radiance: Vec3, d_y: f32, t: f32) -> Vec3 {
     if haze.density == 0.0 {
         return radiance;
     }
     haze.over(radiance, haze.transmittance(d_y, t))
-}
-
-impl Light {
-    /// Unit direction from a point to the light, and I there.
-    pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {
-        match *self {
-            Light::Directional { to_light, intensity } => (to_light, intensity),
-            Light::Point { position, intensity } => {
-                let (to_light, falloff) = from_point(position, point);
-                (to_light, intensity * falloff)
-            }
-            Light::Spot { position, intensity, cone } => {
-                let (to_light, falloff) = from_point(position, point);
-                let s = ((cone.axis.dot(to_light) - cone.cos_edge) * cone.inverse_soft).clamp(0.0, 1.0);
-                (to_light, intensity * (falloff * (s * s * (3.0 - 2.0 * s))))
-            }
-        }
-    }
-}
-
-/// Unit direction from `point` to a light at `position`, and its falloff there.
-fn from_point(position: Vec3, point: Vec3) -> (Vec3, f32) {
-    let away = position - point;
-    let d2 = away.dot(away).max(1e-12);
-    (away / d2.sqrt(), 1.0 / d2)
 }
 
 /// Cuts a triangle at w = near and gives each part as corners with weights of the original three.

@@ -5,6 +5,8 @@ pub mod bloom;
 pub mod gbuffer;
 pub mod integrate;
 mod matter;
+pub mod opaque;
+pub mod pool;
 pub mod ray;
 pub mod resolve;
 pub mod visibility;

@@ -14,6 +14,11 @@ const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 /// Indices drawn in one submission: 32,768 triangles take software Vulkan 10 to 40 ms.
 const PART_INDICES: u32 = 3 << 15;
 
+/// The pass's shader.
+pub fn gbuffer_source() -> String {
+    [include_str!("../../shaders/gbuffer.wgsl"), include_str!("../../shaders/pool.wgsl")].join("\n")
+}
+
 /// The targets of one window.
 pub struct Targets {
     /// Radiance of the opaque scene or the background; metres from the eye (0: background).
@@ -93,7 +98,7 @@ pub struct Gbuffer {
 impl Gbuffer {
     /// Compiles the pipelines.
     pub fn new(gpu: &Gpu) -> Self {
-        let module = shader(gpu, "gbuffer", include_str!("../../shaders/gbuffer.wgsl"));
+        let module = shader(gpu, "gbuffer", &gbuffer_source());
         let [background, opaque] = behind(gpu, &module, "");
         let ids = wgpu::TextureFormat::R32Uint;
         let water = |fragment, targets: &[wgpu::TextureFormat]| {
@@ -125,11 +130,12 @@ impl Gbuffer {
                 entries: &entries,
             })
         };
-        let [frame, lights, quads] = [&uniform, &up.lights, &up.quads].map(|b| b.as_entire_binding());
+        let [frame, lights, quads, pools] =
+            [&uniform, &up.lights, &up.quads, &up.pools].map(|b| b.as_entire_binding());
         let (background, opaque, sky, rock) = match &up.environment {
             None => {
                 let sky = bind(&self.background, &[(0, frame.clone())]);
-                let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights)]);
+                let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights), (7, pools)]);
                 (&self.background, &self.opaque, sky, rock)
             }
             Some(UploadedEnvironment { uniform, map }) => {
@@ -138,7 +144,7 @@ impl Gbuffer {
                 let uniform = uniform.as_entire_binding();
                 let map = wgpu::BindingResource::TextureView(map);
                 let sky = bind(background, &[(0, frame.clone()), (5, uniform.clone()), (6, map)]);
-                let rock = bind(opaque, &[(0, frame.clone()), (1, lights), (5, uniform)]);
+                let rock = bind(opaque, &[(0, frame.clone()), (1, lights), (5, uniform), (7, pools)]);
                 (background, opaque, sky, rock)
             }
         };
@@ -264,7 +270,9 @@ fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Tex
 
 /// Background and opaque scene, with the fragment shaders of this `kind`.
 fn behind(gpu: &Gpu, module: &wgpu::ShaderModule, kind: &str) -> [wgpu::RenderPipeline; 2] {
-    let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
+    let attributes = wgpu::vertex_attr_array![
+        0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Uint32
+    ];
     let vertices = wgpu::VertexBufferLayout {
         array_stride: size_of::<Vertex>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,

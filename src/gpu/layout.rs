@@ -54,6 +54,10 @@ pub struct Frame {
     pub layers: u32,
     pub haze_color: [f32; 3],
     pub haze_far: f32,
+    pub shadow_light: u32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
 }
 
 /// One light.
@@ -302,6 +306,10 @@ impl Frame {
             layers,
             haze_color: haze.color.to_array(),
             haze_far: haze.far,
+            shadow_light: scene.shadow_light().map_or(u32::MAX, |i| i as u32),
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
         }
     }
 }

@@ -17,7 +17,7 @@ mod visibility;
 
 pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
-pub use gbuffer::{Gbuffer, Targets};
+pub use gbuffer::{Gbuffer, Targets, gbuffer_source};
 pub use grid::Grid;
 pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};

@@ -7,6 +7,7 @@ use super::layout::{self, Quad};
 use super::rasters::hash_twice;
 use crate::environment::Map;
 use crate::error::{Error, Result};
+use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene, Vertex};
 use crate::volume::{Cell, VolumeTexture};
@@ -38,6 +39,8 @@ pub struct Uploaded {
     pub quad_count: u32,
     /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
+    /// `array<Surface>`, at least one.
+    pub pools: wgpu::Buffer,
     /// Vertices of the opaque mesh.
     pub vertices: wgpu::Buffer,
     /// Its indices.
@@ -46,7 +49,7 @@ pub struct Uploaded {
     pub index_count: u32,
     /// The environment, where the scene has one.
     pub environment: Option<UploadedEnvironment>,
-    /// Hash of quads, lights, mesh and environment: all that is drawn.
+    /// Hash of quads, lights, pools, mesh and environment: all that is drawn.
     pub geometry: [u64; 2],
 }
 
@@ -76,6 +79,9 @@ impl Uploaded {
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
+        let mut pools = pool::surfaces(scene, mesh);
+        pools.resize(pools.len().max(1), pool::Surface::default());
+        let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
         let mesh_bytes = [size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
         let largest = [quad_bytes.len(), light_bytes.len(), mesh_bytes[0], mesh_bytes[1]];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
@@ -90,7 +96,7 @@ impl Uploaded {
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
         let number = map.as_ref().map(|(_, number)| *number);
         Ok(Uploaded {
-            geometry: hash_twice(&(quad_bytes, light_bytes, upload, environment_bytes, number)),
+            geometry: hash_twice(&(quad_bytes, light_bytes, pool_bytes, upload, environment_bytes, number)),
             environment: map.map(|(map, _)| UploadedEnvironment {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
                 map,
@@ -104,6 +110,7 @@ impl Uploaded {
             ),
             quad_count: quads.len() as u32,
             lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
+            pools: gpu.buffer_with("pools", pool_bytes, wgpu::BufferUsages::STORAGE),
             vertices,
             indices,
             index_count: mesh.indices.len() as u32,

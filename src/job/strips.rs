@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::frame::Window;
 use crate::gpu::{Grid, canvas_bytes};
 use crate::overlap;
-use crate::scene::{Image, Scene, Vertex};
+use crate::scene::{Image, Pool, Scene, Vertex};
 use crate::volume::Cell;
 
 /// Bytes of a strip's pixel on the host: radiance 16, counts 8, picture 4; and as R, G, B bytes 3 for the
@@ -83,6 +83,7 @@ pub fn memory_of(
     // On the host and on the device.
     let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
+    let vertices = vertices + (scene.pools.len() * Pool::VERTICES) as u64;
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
     let environment = scene.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
     let parts = canvas(image, overlap::sheets(scene))

@@ -1,9 +1,12 @@
 //! What is asked for: the scene, read strictly, checked whole before any work.
 
 mod animation;
+mod ground;
 mod keyframes;
+mod mesh;
 mod param;
 mod parts;
+mod pool;
 mod preset;
 mod print;
 mod read;
@@ -17,11 +20,13 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 pub use animation::Animation;
+pub use mesh::{Ground, Mesh, Vertex};
 pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
 pub use parts::resolve;
+pub use pool::{MAX_POOLS, Pool};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
-pub use rock::{Mesh, Rock, Vertex};
+pub use rock::{Rock, wet::wet_albedo, wet::wetness};
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
     AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Quad,
@@ -64,6 +69,8 @@ pub struct Scene {
     pub ambient: Vec3,
     /// Opaque geometry.
     pub rocks: Vec<Rock>,
+    /// Level water, opaque too.
+    pub pools: Vec<Pool>,
     /// The walk through the volume.
     pub trace: Trace,
     /// Where angles are measured.
@@ -197,7 +204,8 @@ impl Scene {
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
-            rocks: parts::rocks(v, limits.memory)?,
+            rocks: ground::rocks(v, limits.memory)?,
+            pools: ground::pools(v)?,
             trace,
             frame: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
             visibility: match v.text("light.visibility").as_str() {
@@ -254,11 +262,38 @@ impl Scene {
         self.lights.iter().chain(&self.environment_lights).copied().collect()
     }
 
-    /// All rocks as one mesh.
+    /// What the opaque mesh follows from.
+    pub fn ground(&self) -> Ground {
+        let wet = !self.pools.is_empty() || self.rocks.iter().any(|rock| rock.wet > 0.0);
+        let shaded = self.rocks.iter().any(|rock| rock.shadow > 0.0);
+        let sun = self.shadow_light().filter(|_| shaded).map(|i| self.lights[i].at(Vec3::ZERO).0);
+        Ground {
+            rocks: self.rocks.clone(),
+            pools: self.pools.clone(),
+            water: if wet { self.falls() } else { Vec::new() },
+            sun,
+        }
+    }
+
+    /// The quads that are no mist.
+    pub fn falls(&self) -> Vec<[Vec3; 4]> {
+        self.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| quad.corners).collect()
+    }
+
+    /// All opaque geometry as one mesh.
     pub fn mesh(&self) -> Mesh {
-        let mut mesh = Mesh::default();
-        self.rocks.iter().for_each(|rock| rock.add_to(&mut mesh));
-        mesh
+        self.ground().mesh()
+    }
+
+    /// Which of `lights` rock keeps from rock: the brightest directional one.
+    pub fn shadow_light(&self) -> Option<usize> {
+        let bright = |light: &Light| match light {
+            Light::Directional { intensity, .. } => Some(intensity.element_sum()),
+            _ => None,
+        };
+        let lights = self.lights.iter().enumerate();
+        let directional = lights.filter_map(|(i, light)| Some((i, bright(light)?)));
+        directional.rev().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
     }
 
     /// What is valid but surely not meant.
@@ -266,7 +301,7 @@ impl Scene {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
         let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
-        if self.quads.is_empty() && self.rocks.is_empty() {
+        if self.quads.is_empty() && self.rocks.is_empty() && self.pools.is_empty() {
             warnings
                 .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
         } else if unlit {

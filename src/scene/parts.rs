@@ -8,8 +8,8 @@ use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
 use super::sheet::{Ends, Sheet, SheetFault};
 use super::{
-    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Rock, Scattering,
-    Tone, Values, Vertex,
+    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Scattering, Tone,
+    Values,
 };
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
@@ -230,43 +230,6 @@ pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Ve
         ));
     }
     Ok(lights)
-}
-
-pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
-    let mut rocks = Vec::new();
-    for name in v.names("rocks") {
-        let key = |what: &str| format!("rocks.{name}.{what}");
-        if !v.is_set(&key("corners")) {
-            return Err(Error::input(
-                format!("rock {name} has no corners"),
-                format!("give {} four points", key("corners")),
-            ));
-        }
-        rocks.push(Rock {
-            corners: v.corners(&key("corners")),
-            levels: v.count(&key("levels")),
-            h: v.float(&key("h")),
-            amplitude: v.float(&key("amplitude")),
-            bulge: v.float(&key("bulge")),
-            seed: v.int(&key("seed")) as u64,
-            color: v.triple(&key("color")),
-            color_noise: v.float(&key("color_noise")),
-            cavity: v.float(&key("cavity")),
-            name,
-        });
-    }
-    // Vertex and six indices, on the CPU and on the device.
-    let need: u128 =
-        rocks.iter().map(|r| r.vertex_count() as u128 * 2 * (size_of::<Vertex>() as u128 + 24)).sum();
-    if need > memory as u128 {
-        return Err(Error::memory(
-            format!("{} rocks", rocks.len()),
-            need,
-            memory,
-            "lower rocks.*.levels or raise --memory",
-        ));
-    }
-    Ok(rocks)
 }
 
 /// Lengths are fractions of the volume, so that a look survives a change of resolution.

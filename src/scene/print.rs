@@ -156,6 +156,10 @@ impl Scene {
                     "positions": column(|v| v.position),
                     "normals": column(|v| v.normal),
                     "albedos": column(|v| v.albedo),
+                    // Occlusion, shadow and film of water of each.
+                    "shades": column(|v| [v.occlusion, v.shadow, v.wet]),
+                    // Number of the pool that it belongs to, plus 1; 0: rock.
+                    "pools": mesh.vertices.iter().map(|v| v.pool).collect::<Vec<_>>(),
                     "triangles": mesh.indices.chunks_exact(3).collect::<Vec<_>>(),
                 },
             }),

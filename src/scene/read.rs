@@ -22,7 +22,7 @@ pub const VERSION: i64 = 1;
 const TRACKS: &str = "animate.tracks";
 
 /// The sections whose second key part is a name the scene chooses.
-const NAMED: [&str; 4] = ["lights", "materials", "rocks", "sheets"];
+const NAMED: [&str; 5] = ["lights", "materials", "pools", "rocks", "sheets"];
 
 /// A scene as text, with its name and the folder its references resolve in.
 pub struct Source {

@@ -26,8 +26,8 @@ const GROUPS: [(&str, &str, &[&str]); 9] = [
     ("Lights", "", LIGHTS),
     (
         "Surroundings",
-        "Rock, background, haze and the light of the environment",
-        &["rocks", "background", "haze", "environment", "sky"],
+        "Rock, pools, background, haze and the light of the environment",
+        &["rocks", "pools", "background", "haze", "environment", "sky"],
     ),
     ("Camera", "Where the picture is seen from", &["camera"]),
     ("Image", "Size, samples and tone of the picture", &["image"]),

@@ -392,16 +392,17 @@ fn kept_results_of_the_raster_pass_change_no_bit_and_are_never_stale() {
     ];
     let options = RenderOptions { keep_rasters: 64 << 20, ..SURFACE };
     let mut spared = 0;
-    let mut meshes: Vec<(Vec<taki::scene::Rock>, taki::scene::Mesh)> = Vec::new();
+    let mut meshes: Vec<(taki::scene::Ground, taki::scene::Mesh)> = Vec::new();
     let volume = scene("fig5", &base).volume(1 << 30, &Unwatched).expect("a volume");
     // Each three times over: drawn, kept, and used again; and back to what was first.
     for change in changes.iter().flat_map(|c| [Some(c), Some(c), Some(c), None, None]) {
         let sets: Vec<&str> = base.iter().chain(change).copied().collect();
         let scene = scene("fig5", &sets);
-        let mesh = match meshes.iter().find(|(rocks, _)| *rocks == scene.rocks) {
+        let ground = scene.ground();
+        let mesh = match meshes.iter().find(|(known, _)| *known == ground) {
             Some((_, mesh)) => mesh.clone(),
             None => {
-                meshes.push((scene.rocks.clone(), scene.mesh()));
+                meshes.push((ground, scene.mesh()));
                 meshes[meshes.len() - 1].1.clone()
             }
         };

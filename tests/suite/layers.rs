@@ -91,7 +91,12 @@ fn folded() -> Scene {
 
 /// Rock: a rectangle at z.
 fn rock([x0, y0]: [f32; 2], [x1, y1]: [f32; 2], z: f32) -> Mesh {
-    let corner = |x, y| Vertex { position: [x, y, z], normal: [0.0, 0.0, 1.0], albedo: [0.4, 0.3, 0.2] };
+    let corner = |x, y| Vertex {
+        position: [x, y, z],
+        normal: [0.0, 0.0, 1.0],
+        albedo: [0.4, 0.3, 0.2],
+        ..Vertex::default()
+    };
     Mesh {
         vertices: vec![corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)].into(),
         indices: vec![0, 1, 2, 0, 2, 3].into(),

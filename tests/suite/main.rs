@@ -22,6 +22,7 @@ mod look;
 mod looking;
 mod mapping;
 mod movie;
+mod place;
 mod presets;
 mod ray;
 mod readme;

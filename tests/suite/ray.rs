@@ -13,12 +13,16 @@ use crate::gpu::scene;
 /// Rough rocks: each report projects them anew.
 const FIG5_ROCKS: [&str; 4] =
     ["rocks.wall.levels=4", "rocks.left.levels=4", "rocks.right.levels=4", "rocks.foot.levels=4"];
-const WATERFALL_ROCKS: [&str; 6] = [
+const WATERFALL_ROCKS: [&str; 10] = [
     "rocks.wall.levels=4",
     "rocks.left.levels=4",
     "rocks.right.levels=4",
     "rocks.far_right.levels=4",
-    "rocks.foot.levels=4",
+    "rocks.bed.levels=4",
+    "rocks.boulder_a.levels=4",
+    "rocks.boulder_b.levels=4",
+    "rocks.boulder_c.levels=4",
+    "rocks.hills.levels=4",
     "volume.flow=0.4",
 ];
 

@@ -19,6 +19,8 @@ const ONE_OF_EACH: &str = "version = 1
 kind = \"directional\"
 [rocks.a]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+[pools.a]
+corners = [[0, 0, 0], [1, 0, 0], [1, 0, -1], [0, 0, -1]]
 [materials.a]
 repeat_u = 2.0
 [sheets.a]
@@ -76,10 +78,15 @@ fn another(param: &Param) -> String {
         Kind::Float(min, max, d) => Value::Float(if d == min { 0.5 * max } else { min }).to_toml(),
         Kind::Int(min, max, d) => (if d == min { max.min(min + 1) } else { min }).to_string(),
         Kind::Choice(words) => words[1].into(),
+        // Albedos.
+        Kind::Color(_) if param.key.starts_with("pools") => "[0.25, 0.5, 1.0]".into(),
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),
         Kind::Text(_) => "some file.npz".into(),
+        Kind::Corners if param.key.starts_with("pools") => {
+            "[[0, 1, 0], [2, 1, 0], [2, 1, -2], [0, 1, -2]]".into()
+        }
         Kind::Corners => "[[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]".into(),
         Kind::Frames => "[0, 7, 999999999]".into(),
         Kind::Series if param.key.ends_with("widths") => "[0.25, 3.0]".into(),

@@ -6,7 +6,8 @@ use std::mem::offset_of;
 use taki::gpu::layout::{
     Develop, Environment, Frame, Light, LightVolume, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile, WORKGROUP,
 };
-use taki::gpu::{integrate_source, shader_source, visibility_source};
+use taki::gpu::{gbuffer_source, integrate_source, shader_source, visibility_source};
+use taki::pool::{AROUND, Surface, WAVES, Wave};
 use wgpu::naga;
 
 /// Files that are put in front of every stage.
@@ -24,12 +25,13 @@ const SHARED: [&str; 8] = [
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 /// What some stages are put together from besides.
-const PARTS: [&str; 5] = [
+const PARTS: [&str; 6] = [
     "integrate_light.wgsl",
     "integrate_many.wgsl",
     "integrate_one.wgsl",
     "matter.wgsl",
     "optical_depth.wgsl",
+    "pool.wgsl",
 ];
 
 /// All of a stage's shader.
@@ -37,6 +39,7 @@ fn stage(name: &str) -> String {
     match name {
         "integrate.wgsl" => shader_source(&integrate_source(true)),
         "visibility.wgsl" => shader_source(&visibility_source()),
+        "gbuffer.wgsl" => shader_source(&gbuffer_source()),
         _ => shader_source(&file(name)),
     }
 }
@@ -106,7 +109,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
         texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
-        haze_color haze_far);
+        haze_color haze_far shadow_light pad_a pad_b pad_c);
     assert_eq!(members(&module, "Frame"), frame);
     assert_eq!(
         members(&module, "Light"),
@@ -126,6 +129,10 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
     light_volume.pop();
     assert_eq!(members(&module, "LightVolume"), (light_volume, size));
+    let module = validate(&stage("gbuffer.wgsl")).expect("valid");
+    let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
+    assert_eq!(members(&module, "Surface"), surface);
+    assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 
 #[test]
@@ -155,6 +162,10 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::cpu::MIST_OF_CELLS));
     assert_eq!(constant("MIST_RHO"), f64::from(taki::cpu::MIST_RHO));
     assert_eq!(constant("SINE_SHARE"), taki::strand::table::SINE_SHARE as f64);
+    let gbuffer = validate(&stage("gbuffer.wgsl")).expect("valid");
+    let wide = |name: &str| of(&gbuffer, name) as usize;
+    assert_eq!(wide("WAVES"), WAVES);
+    assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::strand::table::SIZE);
 }

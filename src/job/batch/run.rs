@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Window, remove_left_by};
 use crate::gpu::RenderOptions;
 use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, memory_of, spare_for_rasters};
-use crate::scene::{Mesh, Rock, Scene};
+use crate::scene::{Ground, Mesh, Scene};
 
 /// Between two looks at what others have claimed.
 const WAIT: Duration = Duration::from_millis(200);
@@ -20,7 +20,7 @@ struct Work<'a> {
     engine: &'a mut Engine,
     claims: Claims,
     volumes: VolumeStock,
-    mesh: Option<(Vec<Rock>, Mesh)>,
+    mesh: Option<(Ground, Mesh)>,
     watcher: &'a dyn Watcher,
     /// Whether the scene's warnings were told.
     warned: bool,
@@ -229,11 +229,12 @@ impl Work<'_> {
     }
 
     fn mesh(&mut self, scene: &Scene) -> Mesh {
+        let ground = scene.ground();
         match &self.mesh {
-            Some((rocks, mesh)) if *rocks == scene.rocks => mesh.clone(),
+            Some((known, mesh)) if *known == ground => mesh.clone(),
             _ => {
-                let mesh = scene.mesh();
-                self.mesh = Some((scene.rocks.clone(), mesh.clone()));
+                let mesh = ground.mesh();
+                self.mesh = Some((ground, mesh.clone()));
                 mesh
             }
         }

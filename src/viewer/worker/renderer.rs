@@ -15,7 +15,7 @@ use crate::exposure;
 use crate::frame::{Frame, Layer, Window};
 use crate::gpu::{DeviceOptions, RenderOptions};
 use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, check_bloom, strips};
-use crate::scene::{AutoExposure, Cost, Look, Mesh, Rock, Scene, Values};
+use crate::scene::{AutoExposure, Cost, Ground, Look, Mesh, Scene, Values};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
@@ -77,7 +77,7 @@ pub struct Renderer {
     memory: u64,
     engine: Option<Engine>,
     volume: VolumeStock,
-    mesh: Option<(Vec<Rock>, Meshes)>,
+    mesh: Option<(Ground, Meshes)>,
     rendered: Option<Rendered>,
     /// The values that the last automatic exposure was measured for, and its stops.
     exposed: Option<(Values, f32)>,
@@ -483,14 +483,15 @@ impl Renderer {
 
     /// The request's geometry, and whether it was made anew.
     fn meshes(&mut self, scene: &Scene) -> (Meshes, bool) {
-        if let Some((rocks, meshes)) = &self.mesh
-            && *rocks == scene.rocks
+        let ground = scene.ground();
+        if let Some((known, meshes)) = &self.mesh
+            && *known == ground
         {
             return (meshes.clone(), false);
         }
-        let full = scene.mesh();
-        let meshes = Meshes { coarse: full.coarse(&scene.rocks), full };
-        self.mesh = Some((scene.rocks.clone(), meshes.clone()));
+        let full = ground.mesh();
+        let meshes = Meshes { coarse: full.coarse(&ground), full };
+        self.mesh = Some((ground, meshes.clone()));
         (meshes, true)
     }
 

@@ -1,0 +1,112 @@
+//! Rocks and pools of a scene, made from values that passed the table and checked against one another.
+
+use super::{MAX_POOLS, Pool, Rock, Values, Vertex};
+use crate::error::{Error, Result};
+use crate::mapping::QuadMap;
+
+pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
+    let mut rocks = Vec::new();
+    for name in v.names("rocks") {
+        let key = |what: &str| format!("rocks.{name}.{what}");
+        if !v.is_set(&key("corners")) {
+            return Err(Error::input(
+                format!("rock {name} has no corners"),
+                format!("give {} four points", key("corners")),
+            ));
+        }
+        rocks.push(Rock {
+            corners: v.corners(&key("corners")),
+            levels: v.count(&key("levels")),
+            h: v.float(&key("h")),
+            amplitude: v.float(&key("amplitude")),
+            bulge: v.float(&key("bulge")),
+            seed: v.int(&key("seed")) as u64,
+            color: v.triple(&key("color")),
+            color_noise: v.float(&key("color_noise")),
+            cavity: v.float(&key("cavity")),
+            ridges: v.float(&key("ridges")),
+            strata: v.float(&key("strata")),
+            strata_height: v.float(&key("strata_height")),
+            strata_tilt: v.float(&key("strata_tilt")),
+            strata_color: v.float(&key("strata_color")),
+            border: v.float(&key("border")),
+            wet: v.float(&key("wet")),
+            wet_reach: v.float(&key("wet_reach")),
+            occlusion: v.float(&key("occlusion")),
+            shadow: v.float(&key("shadow")),
+            name,
+        });
+    }
+    // Vertex and six indices, on the CPU and on the device.
+    let need: u128 =
+        rocks.iter().map(|r| r.vertex_count() as u128 * 2 * (size_of::<Vertex>() as u128 + 24)).sum();
+    if need > memory as u128 {
+        return Err(Error::memory(
+            format!("{} rocks", rocks.len()),
+            need,
+            memory,
+            "lower rocks.*.levels or raise --memory",
+        ));
+    }
+    Ok(rocks)
+}
+
+pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
+    let mut pools = Vec::new();
+    for name in v.names("pools") {
+        let key = |what: &str| format!("pools.{name}.{what}");
+        if !v.is_set(&key("corners")) {
+            return Err(Error::input(
+                format!("pool {name} has no corners"),
+                format!("give {} four points at one height", key("corners")),
+            ));
+        }
+        let corners = v.corners(&key("corners"));
+        let fault = |fault: &str| {
+            Error::input(
+                format!("pool {name} ({}) {fault}", key("corners")),
+                "a pool needs four corners of one height, convex, counter-clockwise seen from above",
+            )
+        };
+        let map = QuadMap::new(corners).map_err(|found| fault(found.words()))?;
+        let size = corners.iter().map(|c| c.distance(corners[0])).fold(0.0, f32::max);
+        if corners.iter().any(|c| (c.y - corners[0].y).abs() > 1e-4 * size) {
+            return Err(fault("is not level"));
+        }
+        if map.n_world.y < 0.0 {
+            return Err(fault("faces down"));
+        }
+        let (color, bottom) = (v.triple(&key("color")), v.triple(&key("bottom")));
+        for (what, albedo) in [("color", color), ("bottom", bottom)] {
+            if albedo.max_element() > 1.0 {
+                return Err(Error::input(
+                    format!("{} = {albedo} sends back more light than it gets", key(what)),
+                    "an albedo is at most 1 in each component",
+                ));
+            }
+        }
+        let float = |what: &str| v.float(&key(what));
+        pools.push(Pool {
+            corners,
+            depth: float("depth"),
+            color,
+            bottom,
+            absorption: v.triple(&key("absorption")),
+            height: float("height"),
+            wavelength: float("wavelength"),
+            rings: float("rings"),
+            period: float("period"),
+            foam: float("foam"),
+            foam_reach: float("foam_reach"),
+            seed: v.int(&key("seed")) as u64,
+            name,
+        });
+    }
+    if pools.len() > MAX_POOLS {
+        return Err(Error::input(
+            format!("the scene has {} pools", pools.len()),
+            format!("at most {MAX_POOLS}"),
+        ));
+    }
+    Ok(pools)
+}

@@ -1,0 +1,118 @@
+//! Opaque geometry as triangles: rocks and pools, and the light that they take from one another.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::pool::Pool;
+use super::rock::{Rock, shade, wet};
+
+/// A vertex of opaque geometry, as the raster pass reads it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Vertex {
+    /// World position, metres.
+    pub position: [f32; 3],
+    /// Unit normal.
+    pub normal: [f32; 3],
+    /// Linear albedo; of a pool its depth in metres and how dense its foam is, 0 to 1.
+    pub albedo: [f32; 3],
+    /// Share of the surroundings' light that does not arrive, 0 to 1.
+    pub occlusion: f32,
+    /// Share of the light of [`Scene::shadow_light`](super::Scene::shadow_light) that does not arrive, 0 to 1.
+    pub shadow: f32,
+    /// How much of a film of water there is, 0 to 1.
+    pub wet: f32,
+    /// Number of the pool plus 1; 0: rock.
+    pub pool: u32,
+}
+
+/// Triangles of opaque geometry.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices, shared: who keeps them on a device knows them again.
+    pub vertices: Arc<Vec<Vertex>>,
+    /// Three indices a triangle.
+    pub indices: Arc<Vec<u32>>,
+}
+
+impl Mesh {
+    /// The rocks' mesh with the same vertices and a sixteenth of the triangles, for previews.
+    pub fn coarse(&self, ground: &Ground) -> Mesh {
+        let mut indices = Vec::new();
+        for (rock, own) in ground.rocks.iter().zip(ground.ranges()) {
+            rock.add_triangles(own.start as u32, 1 << rock.levels.min(2), &mut indices);
+        }
+        let mut first = ground.rock_vertices() as u32;
+        for pool in &ground.pools {
+            pool.add_triangles(first, &mut indices);
+            first += Pool::VERTICES as u32;
+        }
+        Mesh { vertices: self.vertices.clone(), indices: Arc::new(indices) }
+    }
+}
+
+/// All that the opaque mesh of a scene follows from: equal grounds have equal meshes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// The rocks, in the order of their vertices.
+    pub rocks: Vec<Rock>,
+    /// The pools, whose vertices follow.
+    pub pools: Vec<Pool>,
+    /// Corners of the quads that make rock wet and fall into pools; none where nothing can be wet.
+    pub water: Vec<[Vec3; 4]>,
+    /// Unit vector to the light that rock shades rock from; none where no rock is shaded.
+    pub sun: Option<Vec3>,
+}
+
+impl Ground {
+    /// The mesh of all.
+    pub fn mesh(&self) -> Mesh {
+        let mut mesh = Mesh::default();
+        let (vertices, indices) = (Arc::make_mut(&mut mesh.vertices), Arc::make_mut(&mut mesh.indices));
+        let made: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
+        for (rock, own) in self.rocks.iter().zip(made) {
+            rock.add_triangles(vertices.len() as u32, 1, indices);
+            vertices.extend(own);
+        }
+        let rocks: Vec<(&Rock, Range<usize>)> = self.rocks.iter().zip(self.ranges()).collect();
+        let mut pools = Vec::new();
+        for (i, pool) in self.pools.iter().enumerate() {
+            let first = vertices.len();
+            pool.add_vertices(i as u32 + 1, vertices);
+            pool.add_triangles(first as u32, indices);
+            let own = first..vertices.len();
+            let ground = shade::heights(&rocks, vertices, own.clone());
+            pool.fill(&mut vertices[own.clone()], &ground, &self.water);
+            pools.push(own);
+        }
+        let shaded = |amount: fn(&Rock) -> f32| {
+            let rocks = rocks.iter().map(|(rock, own)| (amount(rock), own.clone()));
+            let most = self.rocks.iter().map(amount).fold(0.0, f32::max);
+            rocks.chain(pools.iter().map(|own| (most, own.clone()))).collect::<Vec<_>>()
+        };
+        shade::occlude(&rocks, &shaded(|rock| rock.occlusion), vertices);
+        if let Some(to_sun) = self.sun {
+            shade::shadow(&rocks, &shaded(|rock| rock.shadow), vertices, to_sun);
+        }
+        wet::wet(&rocks, vertices, &self.water, &self.pools);
+        mesh
+    }
+
+    fn rock_vertices(&self) -> u64 {
+        self.rocks.iter().map(Rock::vertex_count).sum()
+    }
+
+    /// Where each rock's vertices are.
+    fn ranges(&self) -> Vec<Range<usize>> {
+        let mut first = 0;
+        let range = |rock: &Rock| {
+            let start = first;
+            first += rock.vertex_count() as usize;
+            start..first
+        };
+        self.rocks.iter().map(range).collect()
+    }
+}
