@@ -43,7 +43,7 @@
 //!
 //! Light volumes of float optical depths cost 1.27 times `none` on `front` and 1.6 times on `fig5`, whose 60 patches
 //! (15 MB) are read about once a frame, so past the caches. √T in a byte, four cells a word, saves the `exp2` and three
-//! quarters of the lines: predicted 1.2 and 1.3, measured 1.10 and 1.27. Filling them costs half as much again, for lanes wait for
+//! quarters of the lines: predicted 1.2 and 1.3; three runs of the bench gave 1.10, 1.20 and 1.12, and 1.27, 1.17 and 1.32. Filling them costs half as much again, for lanes wait for
 //! one another over the four cells of a word.
 //!
 //! Several lights: what a ray knows of each stood in private arrays indexed in a loop, 30 floats a light. llvmpipe makes trees
