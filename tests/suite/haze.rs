@@ -6,7 +6,7 @@ use taki::frame::Frame;
 use taki::haze::Haze;
 use taki::job::Unwatched;
 
-use crate::gpu::{assert_parity, both, renderer, scene};
+use crate::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 
 fn haze(density: f32, height: f32, level: f32) -> Haze {
@@ -120,21 +120,12 @@ fn haze_of_the_colour_of_all_it_hides_is_not_seen() {
     }
 }
 
-/// Triangles larger than a pixel: of smaller ones the engines' normals differ, haze or not.
-const ROCKS: [&str; 5] = [
-    "rocks.wall.levels=3",
-    "rocks.left.levels=3",
-    "rocks.right.levels=3",
-    "rocks.far_right.levels=3",
-    "rocks.foot.levels=3",
-];
-
 #[test]
 fn the_engines_agree_in_haze() {
     let Some(mut renderer) = renderer("haze") else { return };
     let haze = ["haze.density=0.05", "haze.scale_height=3", "haze.level=-5", "haze.far=60"];
     for preset in ["waterfall", "evening"] {
-        let sets = [&SMALL[..], &haze[..], &ROCKS[..], &["environment.lights=2"]].concat();
+        let sets = [&SMALL[..], &haze[..], &COARSE_PLACE[..], &["environment.lights=2"]].concat();
         assert_parity(preset, &both(&mut renderer, &scene(preset, &sets)));
     }
 }

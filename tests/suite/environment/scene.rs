@@ -13,27 +13,10 @@ use tempfile::{TempDir, tempdir};
 
 use super::uneven;
 use crate::faults::{run, taki};
-use crate::gpu::{assert_parity, both, renderer, scene};
+use crate::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 
-/// A scene of rock, water and open background. Its rocks are coarse: the normals of a fine mesh turn so much
-/// inside a pixel, and the foam changes so much, that the two engines' interpolations differ by more than their
-/// shading may.
-const SMALL: [&str; 14] = [
-    "image.width=80",
-    "image.height=60",
-    "image.samples=2",
-    "rocks.wall.levels=1",
-    "rocks.left.levels=1",
-    "rocks.right.levels=1",
-    "rocks.far_right.levels=1",
-    "rocks.bed.levels=1",
-    "rocks.boulder_a.levels=1",
-    "rocks.boulder_b.levels=1",
-    "rocks.boulder_c.levels=1",
-    "rocks.hills.levels=1",
-    "pools.plunge.foam=0",
-    "environment.lights=5",
-];
+/// A scene of rock, water and open background, small.
+const SMALL: [&str; 4] = ["image.width=80", "image.height=60", "image.samples=2", "environment.lights=5"];
 
 fn hdr(folder: &Path, width: u32, height: u32, radiance: impl Fn(DVec3) -> DVec3) -> String {
     let map = super::map(width, height, radiance);
@@ -50,7 +33,7 @@ fn lit(more: &[&str]) -> Scene {
 }
 
 fn lit_within(more: &[&str], limits: &Limits) -> Scene {
-    let sets: Vec<String> = SMALL.iter().chain(more).map(|s| s.to_string()).collect();
+    let sets: Vec<String> = SMALL.iter().chain(&COARSE_PLACE).chain(more).map(|s| s.to_string()).collect();
     Scene::load(Path::new("waterfall"), &sets, limits).expect("a valid scene")
 }
 
