@@ -44,8 +44,10 @@ struct Frame {
     haze_far: f32,
     // The light that rock keeps from rock.
     shadow_light: u32,
-    pad_a: f32,
-    pad_b: f32,
+    // Levels of the volume.
+    levels: u32,
+    // Solid angle of the pixel in the middle of the image, over its number of samples.
+    footprint: f32,
     pad_c: f32,
 }
 

@@ -100,7 +100,10 @@ struct View {
     early_end: f32,
     p: f32,
     max_cells: u32,
-    size: vec3<i32>,
+    // The level that is walked, and where on its face and along which way.
+    level: Level,
+    origin: vec3<f32>,
+    d_cell: vec3<f32>,
     // The model's constants, where they are asked for.
     strand: Strand,
     similarity: Similarity,
@@ -139,13 +142,9 @@ fn trace(
     let d_cell = cell_from_plane(jacobian, d);
 
     var view: View;
-    view.extinction = frame.extinction;
-    view.matter = matter_at(quad, hit.xy);
-    view.depth_bits = frame.extinction * view.matter.left * select(jacobian.depth, 1.0, PER_CELL);
     view.early_end = frame.early_end;
     view.p = frame.p;
     view.max_cells = frame.max_cells;
-    view.size = frame.cells;
     view.profile = quad.profile;
     let cx = jacobian.cx;
     let cy = jacobian.cy;
@@ -161,16 +160,71 @@ fn trace(
         view.similarity = reflection.similarity;
     }
     view.place = Place(jacobian, quad.e1, quad.e2, quad.n, side, d_world, frame.eye_world + d_world * hit.z,
-        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g);
+        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z);
     view.lights = arrayLength(&lights);
-    if LIGHTS == 1u {
-        view.light = ray_light(0u, view.place, view.size, view.lights);
+
+    // The level whose cells are as large as the sample's footprint lies between two; both are walked.
+    var finer = 0.0;
+    if PYRAMID {
+        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), 0.0, f32(frame.levels - 1u));
+    }
+    let share = fract(finer);
+    let ways = select(1u, 2u, share > 0.0);
+    var end = 0.0;
+    var light = vec3<f32>(0.0);
+    for (var way = 0u; way < ways; way++) {
+        let weight = select(share, 1.0 - share, way == 0u);
+        view.level = level_new(frame.cells, u32(finer) + way);
+        view.origin = face_point(quad, hit.xy, frame.cells, frame.flow_cells);
+        view.d_cell = d_cell;
+        view.extinction = frame.extinction;
+        view.matter = matter_at(quad, hit.xy, view.level.number > 0u);
+        if PYRAMID {
+            view.origin *= view.level.scale;
+            view.d_cell *= view.level.scale;
+            view.extinction *= select(1.0, view.level.deep, PER_CELL);
+        }
+        view.depth_bits = view.extinction * view.matter.left * select(jacobian.depth, 1.0, PER_CELL);
+        if LIGHTS == 1u {
+            view.light = ray_light(0u, view.place, view.level, view.lights);
+        }
+        let ray = walk_level(view, before.w);
+        end += ray.transmittance * weight;
+        light += ray.light * weight;
+        *count += vec2<u32>(ray.cells, ray.light_cells);
+        if ray.cut | !ray.done {
+            *count = vec2<u32>(CUT);
+        }
     }
 
+    // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
+    let ends = is_last | (end < view.early_end);
+    let passed = select(vec3<f32>(0.0), behind * end, ends);
+    var color = frame.ambient * (before.w - end) + passed;
+    if LIGHTS == 1u && in_colour() {
+        color += view.light.intensity * light;
+    } else if LIGHTS == 1u {
+        color += view.light.intensity * (light.x * (1.0 / 255.0));
+    } else {
+        color += light;
+    }
+    return vec4<f32>(before.rgb + color, end);
+}
+
+// 4^level cells lie across the ray in a sample's footprint, `t` metres away.
+fn level_at(jacobian: CellFrame, d_world: vec3<f32>, d_cell: vec3<f32>, t: f32) -> f32 {
+    let c = dot3(d_world, frame.forward);
+    let area = frame.footprint * (c * c * c) * (t * t);
+    let across = area / (abs(jacobian.det) * jacobian.depth * sqrt(dot3(d_cell, d_cell)));
+    return 0.5 * log2(max(across, 1e-30));
+}
+
+// Through one level of the volume, to its end.
+fn walk_level(view: View, before: f32) -> Ray {
     var ray: Ray;
-    var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
-    ray.depth = -log2(max(before.w, 1e-30));
-    ray.transmittance = before.w;
+    var walk = walk_new(view.level.size, view.origin, view.d_cell);
+    ray.depth = -log2(max(before, 1e-30));
+    ray.transmittance = before;
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
     while !ray.done {
         if MARCH {
@@ -194,41 +248,48 @@ fn trace(
             visit(&walk, &ray, view);
         }
     }
-
-    // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
-    let ends = is_last | (ray.transmittance < view.early_end);
-    let passed = select(vec3<f32>(0.0), behind * ray.transmittance, ends);
-    var color = frame.ambient * (before.w - ray.transmittance) + passed;
-    if LIGHTS == 1u && in_colour() {
-        color += view.light.intensity * ray.light;
-    } else if LIGHTS == 1u {
-        color += view.light.intensity * (ray.light.x * (1.0 / 255.0));
-    } else {
-        color += ray.light;
-    }
-    *count += vec2<u32>(ray.cells, ray.light_cells);
-    if ray.cut | !ray.done {
-        *count = vec2<u32>(CUT);
-    }
-    return vec4<f32>(before.rgb + color, ray.transmittance);
+    return ray;
 }
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
-    let empty = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, view.matter) == 0.0;
+    var rho = 0.0;
+    if TRILINEAR {
+        rho = found_between(*walk, *ray, view).rho;
+    } else {
+        rho = matter_rho(f32(textureLoad(volume, in_level((*walk).cell, view.level)).x & 0xffffu), view.matter);
+    }
+    let empty = rho == 0.0;
     let on = *seeking & empty & !(*ray).done;
     (*ray).cells += select(0u, 1u, on);
     (*ray).t = select((*ray).t, walk_exit(*walk), on);
     walk_step(walk, on);
-    (*ray).done |= ((*walk).cell.z >= view.size.z) | ((*ray).cells >= view.max_cells);
+    (*ray).done |= ((*walk).cell.z >= view.level.size.z) | ((*ray).cells >= view.max_cells);
     *seeking = on & !(*ray).done;
+}
+
+// Half way through the cell the ray is in.
+fn found_between(walk: Walk, ray: Ray, view: View) -> Found {
+    let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
+    return between(volume, view.level, view.matter, walk.cell, middle);
 }
 
 // The light of one cell, and the step to the next. Past the end of the walk nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let texel = textureLoad(volume, (*walk).cell);
+    let texel = textureLoad(volume, in_level((*walk).cell, view.level));
     let t_exit = walk_exit(*walk);
-    let rho = select(matter_rho(texel.x & 0xffffu, view.matter), 0.0, (*ray).done);
+    var found: Found;
+    if TRILINEAR {
+        found = found_between(*walk, *ray, view);
+    } else {
+        found.rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
+        found.k_d = f32((texel.x >> 16u) & 0xffu);
+        found.k_s = f32(texel.x >> 24u);
+        if PYRAMID {
+            found.moments = moments_of(texel.y, view.level);
+        }
+    }
+    let rho = select(found.rho, 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
     if !PER_CELL {
         tau_bits *= t_exit - (*ray).t;
@@ -240,8 +301,11 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     seen.occupied = rho > 0.0;
     seen.tau_bits = tau_bits;
     seen.weight = (*ray).transmittance - passed;
-    seen.k_d = f32((texel.x >> 16u) & 0xffu);
-    seen.k_s = f32(texel.x >> 24u);
+    seen.k_d = found.k_d;
+    seen.k_s = found.k_s;
+    if many_directions() {
+        seen.spread = spread_new(view.metric, found.moments, view.e_v);
+    }
     let v = v_code(texel.y);
     let m = view.metric;
     let q = (m.x * v.x + m.y * v.y) * v.x + m.z * v.y * v.y + m.w * v.z * v.z;
@@ -259,7 +323,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         // selects on software Vulkan, which take seconds to compile.
         if seen.occupied {
             for (var i = 0u; i < view.lights; i++) {
-                let light = ray_light(i, view.place, view.size, view.lights);
+                let light = ray_light(i, view.place, view.level, view.lights);
                 if in_colour() {
                     (*ray).light += light.intensity * lit_in_colour(seen, light, view, ray);
                 } else {
@@ -276,6 +340,6 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     (*ray).transmittance = passed;
     (*ray).t = t_exit;
     walk_step(walk, true);
-    (*ray).done |= ((*walk).cell.z >= view.size.z) | (passed < view.early_end)
+    (*ray).done |= ((*walk).cell.z >= view.level.size.z) | (passed < view.early_end)
         | ((*ray).cells >= view.max_cells);
 }

@@ -39,6 +39,8 @@ struct Place {
     quad_number: u32,
     texture_frame: bool,
     g: f32,
+    // Of the volume itself.
+    layers: i32,
 }
 
 // What a cell is to every light.
@@ -54,10 +56,12 @@ struct Seen {
     t_dot_e: f32,
     sin2_e: f32,
     inverse_q: f32,
+    // In place of v, where cells have more than one direction.
+    spread: Spread,
 }
 
 // Light `i` of `count` (the paper maps the light vectors at the point, not in every cell).
-fn ray_light(i: u32, place: Place, size: vec3<i32>, count: u32) -> RayLight {
+fn ray_light(i: u32, place: Place, level: Level, count: u32) -> RayLight {
     let light = lights[i];
     let found = light_from(light, place.point);
     let to_light = found.xyz;
@@ -83,11 +87,14 @@ fn ray_light(i: u32, place: Place, size: vec3<i32>, count: u32) -> RayLight {
                 let c = abs(out.l_cell);
                 slab = -out.l_cell.z / (c.x + c.y + c.z);
             }
-            out.row = scatter_row(slab, u32(size.z));
+            out.row = scatter_row(slab, u32(place.layers));
         }
         if place.texture_frame {
             out.l_dot_e = dot3(out.l_v, place.e_v);
         }
+    }
+    if PYRAMID {
+        out.l_cell *= level.scale;
     }
     return out;
 }
@@ -118,6 +125,9 @@ fn is_mist(view: View) -> bool {
 
 // 255·Ψ of strands, or of mist.
 fn psi_of(seen: Seen, l_v: vec3<f32>, view: View) -> f32 {
+    if many_directions() {
+        return select(spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, l_v), view.matter.mist, is_mist(view));
+    }
     let strands = psi(view.p, seen.k_d, seen.k_s, seen.v, l_v, seen.t_dot_e, seen.sin2_e, seen.inverse_q);
     return select(strands, view.matter.mist, is_mist(view));
 }
@@ -135,16 +145,18 @@ fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
     var lit: vec3<f32>;
     if STRAND && !is_mist(view) {
         let root = sqrt(seen.inverse_q);
-        let t_dot_l = dot3(seen.v, light.l_v) * root;
-        let t_dot_e = seen.t_dot_e * root;
+        var t_dot = vec2<f32>(dot3(seen.v, light.l_v), seen.t_dot_e) * root;
+        if many_directions() {
+            t_dot = spread_of_one(seen.spread, light.l_v);
+        }
         let k_d = seen.k_d;
-        lit = weight * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot_l, t_dot_e, light.l_dot_e);
+        lit = weight * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot.x, t_dot.y, light.l_dot_e);
     } else {
         let fibre = psi_of(seen, light.l_v, view);
         lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
     }
     if MULTIPLE {
-        let z = u32(seen.cell.z) + view.profile;
+        let z = layer_in(view, seen.cell.z) + view.profile;
         let diffuse = scatter_diffuse(profiles[light.row.near + z].rgb, profiles[light.row.far + z].rgb, light.row);
         lit += scatter_multiple(view.similarity, light.peak, diffuse, (*ray).depth, seen.tau_bits, visibility.y);
     }
@@ -160,7 +172,7 @@ fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
     }
     if MARCH {
         if seen.occupied {
-            let walked = optical_depth(volume, view.size, view.matter, seen.cell, light.l_cell, view.max_cells, NEVER);
+            let walked = optical_depth(volume, view.level, view.matter, seen.cell, light.l_cell, view.max_cells, NEVER);
             (*ray).light_cells += walked.cells;
             (*ray).cut |= !walked.done;
             depth = walked.depth * view.extinction;
@@ -170,7 +182,7 @@ fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
         var code = 0.0;
         // Light volumes of many patches are larger than caches: empty cells need not ask for theirs.
         if seen.occupied {
-            let kept = kept_of(seen.cell, light.places);
+            let kept = kept_of(in_level(seen.cell, view.level), light.places);
             code = kept;
             depth = kept * view.depth_bits;
         }
@@ -186,7 +198,15 @@ fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
     return vec2<f32>(exp2(-depth), depth);
 }
 
-// From the light volumes of the ray's patch.
+// The volume's own layer in the middle of layer `z` of the level.
+fn layer_in(view: View, z: i32) -> u32 {
+    if PYRAMID && view.level.number > 0u {
+        return u32(min(i32((f32(z) + 0.5) * view.level.deep), view.place.layers - 1));
+    }
+    return u32(z);
+}
+
+// From the light volumes of the ray's patch, at a place of the volume's texture.
 fn kept_of(cell: vec3<i32>, places: LightPlaces) -> f32 {
     let kept = kept_at(cell, places.p00);
     if !CORNERED | !places.cornered {
@@ -207,7 +227,7 @@ fn kept_at(cell: vec3<i32>, place: vec3<i32>) -> f32 {
 // From the middle of a cell in layer `layer` to where the light ray leaves the slab, as through even mist.
 fn mist_depth(layer: i32, direction: vec3<f32>, view: View) -> f32 {
     let z = f32(layer) + 0.5;
-    let way = select(f32(view.size.z) - z, z, direction.z < 0.0);
+    let way = select(f32(view.level.size.z) - z, z, direction.z < 0.0);
     let t = way / max(abs(direction.z), 1e-6);
     let c = abs(direction);
     let length = select(t, t * (c.x + c.y + c.z), PER_CELL);

@@ -19,7 +19,8 @@ struct Matter {
     left: f32,
 }
 
-fn matter_at(quad: Quad, uv: vec2<f32>) -> Matter {
+// Of cells that stand for many (`coarse`) e is taken in the mean.
+fn matter_at(quad: Quad, uv: vec2<f32>, coarse: bool) -> Matter {
     if !ERODED {
         return Matter(1.0, 0.0, 0.0, 0.0, 1.0);
     }
@@ -31,12 +32,16 @@ fn matter_at(quad: Quad, uv: vec2<f32>) -> Matter {
         let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;
         return Matter(MIST_OF_CELLS * left, shift, quad.mist * 255.0, MIST_RHO * left, left);
     }
-    return Matter(1.0, e * -65535.0, 0.0, 0.0, (1.0 - e) * (1.0 - 0.383 * e));
+    let left = (1.0 - e) * (1.0 - 0.383 * e);
+    if coarse {
+        return Matter(left, 0.0, 0.0, 0.0, left);
+    }
+    return Matter(1.0, e * -65535.0, 0.0, 0.0, left);
 }
 
-fn matter_rho(code: u32, matter: Matter) -> f32 {
+fn matter_rho(code: f32, matter: Matter) -> f32 {
     if ERODED {
-        return max(f32(code) * matter.scale + matter.shift, 0.0);
+        return max(code * matter.scale + matter.shift, 0.0);
     }
-    return f32(code);
+    return code;
 }

@@ -13,10 +13,10 @@ struct LightWalk {
     done: bool,
 }
 
-// Ends early where the depth is `enough`.
+// In cells of a level, along a direction in those. Ends early where the depth is `enough`.
 fn optical_depth(
     volume: texture_storage_3d<rg32uint, read>,
-    size: vec3<i32>,
+    level: Level,
     matter: Matter,
     cell: vec3<i32>,
     direction: vec3<f32>,
@@ -24,12 +24,12 @@ fn optical_depth(
     enough: f32,
 ) -> LightWalk {
     var ray: LightWalk;
-    var walk = walk_new(size, vec3<f32>(cell) + 0.5, direction);
+    var walk = walk_new(level.size, vec3<f32>(cell) + 0.5, direction);
     while !ray.done {
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, size.z, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
     }
     return ray;
 }
@@ -39,12 +39,12 @@ fn pass_cell(
     matter: Matter,
     walk: ptr<function, Walk>,
     ray: ptr<function, LightWalk>,
-    layers: i32,
+    level: Level,
     max_cells: u32,
     enough: f32,
 ) {
     let t_exit = walk_exit(*walk);
-    let rho = matter_rho(textureLoad(volume, (*walk).cell).x & 0xffffu, matter);
+    let rho = matter_rho(f32(textureLoad(volume, in_level((*walk).cell, level)).x & 0xffffu), matter);
     if PER_CELL {
         // The cell itself does not hide its own light.
         (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));
@@ -55,7 +55,7 @@ fn pass_cell(
     (*ray).t = t_exit;
     walk_step(walk, true);
     let z = (*walk).cell.z;
-    (*ray).done |= (z < 0) | (z >= layers) | ((*ray).cells >= max_cells) | ((*ray).depth > enough);
+    (*ray).done |= (z < 0) | (z >= level.size.z) | ((*ray).cells >= max_cells) | ((*ray).depth > enough);
 }
 
 // Codes of transmittances that one word of a light volume holds, of cells that follow one another along z.

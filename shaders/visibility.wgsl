@@ -3,6 +3,8 @@
 
 // Whether codes of transmittances are kept, or optical depths.
 override CODES: bool = false;
+// Of empty cells too, for rays that look between cells.
+override EVERYWHERE: bool = false;
 
 // One light volume, or a part of it.
 struct LightVolume {
@@ -23,33 +25,48 @@ struct LightVolume {
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
 
+// The level that has cells at (y, z) of the texture.
+fn level_with(size: vec3<i32>, y: i32, z: i32) -> Level {
+    var level = level_new(size, 0u);
+    if PYRAMID && z >= ((size.z + 3) & ~3) {
+        level = level_new(size, 1u);
+        while y >= level.offset.y + level.size.y && level.number < 32u {
+            level = level_new(size, level.number + 1u);
+        }
+    }
+    return level;
+}
+
 @compute @workgroup_size(64)
 fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= light_volume.column_count {
         return;
     }
-    let size = frame.cells;
+    let extent = vec3<i32>(textureDimensions(volume));
     let max_cells = frame.max_cells;
-    let direction = light_volume.direction;
     let index = columns[light_volume.first_column + id.x];
-    let of_slice = u32(size.x * size.y);
-    let x = i32(index % u32(size.x));
-    let y = i32((index % of_slice) / u32(size.x));
+    let of_slice = u32(extent.x * extent.y);
+    let x = i32(index % u32(extent.x));
+    let y = i32((index % of_slice) / u32(extent.x));
     let column = i32(index / of_slice);
     // Sheets of one volume share a light volume, whatever they make of it.
     let whole = Matter(1.0, 0.0, 0.0, 0.0, 1.0);
-    let enough = select(NEVER, DARK_BITS / max(light_volume.bits, 1e-20), CODES);
+    let level = level_with(frame.cells, y, column * CELLS_A_WORD);
+    let direction = light_volume.direction * level.scale;
+    let bits = light_volume.bits * select(1.0, level.deep, PER_CELL);
+    let enough = select(NEVER, DARK_BITS / max(bits, 1e-20), CODES);
     var word = 0u;
     for (var i = 0; i < CELLS_A_WORD; i++) {
-        let cell = vec3<i32>(x, y, column * CELLS_A_WORD + i);
-        if cell.z >= size.z || (textureLoad(volume, cell).x & 0xffffu) == 0u {
+        let place = vec3<i32>(x, y, column * CELLS_A_WORD + i);
+        let cell = place - level.offset;
+        if any(cell >= level.size) || (!EVERYWHERE && (textureLoad(volume, place).x & 0xffffu) == 0u) {
             continue;
         }
-        let depth = optical_depth(volume, size, whole, cell, direction, max_cells, enough).depth;
+        let depth = optical_depth(volume, level, whole, cell, direction, max_cells, enough).depth;
         if CODES {
-            word |= transmittance_code(depth * light_volume.bits) << u32(8 * i);
+            word |= transmittance_code(depth * bits) << u32(8 * i);
         } else {
-            textureStore(light_volumes, cell + light_volume.offset, vec4<u32>(bitcast<u32>(depth)));
+            textureStore(light_volumes, place + light_volume.offset, vec4<u32>(bitcast<u32>(depth)));
         }
     }
     if CODES {

@@ -20,6 +20,7 @@ use crate::error::{Error, Result};
 use crate::gpu::layout::extinction;
 use crate::mapping::CellFrame;
 use crate::scene::{Attenuation, Light, Quad, Scattering, Scene};
+use crate::volume::Stack;
 
 /// Codes in one word of a light volume, of cells that follow one another along z.
 pub const CELLS_A_WORD: u32 = 4;
@@ -138,7 +139,7 @@ impl LightVolumes {
                 let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
                 let same = if shared { angles[0] as f32 } else { SAME_DIRECTION };
                 let volumes = LightVolumes::at_angles(scene, size, alpha, angles, same);
-                need = volumes.bytes(size);
+                need = volumes.bytes(Stack::of(scene, size).extent());
                 if need <= u128::from(budget) {
                     return Ok(volumes);
                 }
@@ -156,7 +157,7 @@ impl LightVolumes {
         ))
     }
 
-    /// Bytes of all light volumes.
+    /// Bytes of all light volumes, of textures of `size` cells.
     pub fn bytes(&self, size: [u32; 3]) -> u128 {
         let [nx, ny, nz] = self.words(size).map(u128::from);
         nx * ny * nz * 4 * self.volumes.len() as u128

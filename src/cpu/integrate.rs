@@ -1,34 +1,38 @@
 //! §4 and §5 on the CPU. Twin: `shaders/integrate.wgsl`, the same operations in the same order.
 
-use glam::{IVec3, UVec2, Vec2, Vec3};
+mod light;
+
+use glam::{Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
+use super::lookup::{Found, Level, footprint, level_at};
 use super::matter::Matter;
-use super::visibility::{Filled, KeptVolumes, number, optical_depth};
+use super::visibility::{Filled, KeptVolumes};
 use crate::camera::sample_offset;
 use crate::error::Result;
 use crate::gpu::layout::{extinction, flow_cells};
 use crate::haze::EyeHaze;
 use crate::job::Monitor;
-use crate::mapping::CellFrame;
+use crate::mapping::{CellFrame, QuadMap};
 use crate::scatter::media::{Media, thicknesses};
-use crate::scatter::{ORDERS, Row, forward_peak, multiple};
-use crate::scene::{AngleFrame, Attenuation, Light, Reflection, Scattering, Scene, Visibility};
-use crate::shading::{Metric, fibre_angles, specular_power};
+use crate::scatter::multiple;
+use crate::scene::{AngleFrame, Attenuation, Light, Lookup, Prefilter, Quad, Reflection, Scattering, Scene, Visibility};
+use crate::shading::{Metric, Spread, fibre_angles, specular_power};
 use crate::strand::table::StrandShading;
-use crate::visibility::{Form, LightVolumes, Medium};
-use crate::volume::{Cell, VolumeTexture};
-use crate::walk::{Crossing, NEVER, Walk};
+use crate::visibility::{LightVolumes, Medium};
+use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
+use crate::walk::{Crossing, Walk};
+use light::RayLight;
 
 /// What all pixels of a frame share.
 pub struct Integrator<'a> {
     scene: &'a Scene,
-    volume: &'a VolumeTexture,
-    cells: &'a [Cell],
-    size: IVec3,
+    levels: Levels,
     extinction: f32,
     flow_cells: f32,
     per_cell: bool,
+    /// Of a sample, see [`footprint`].
+    footprint: f32,
     lights: Vec<Light>,
     light_volumes: Option<LightVolumes>,
     /// None: what they hold is walked when it is asked for.
@@ -68,30 +72,50 @@ pub trait Observer {
 
 impl Observer for () {}
 
-/// One light as a ray sees it.
-#[derive(Clone, Copy)]
-struct RayLight {
-    /// Jᵀl, or J⁻¹l normalised.
-    l_v: Vec3,
-    /// J⁻¹l.
-    l_cell: Vec3,
-    places: LightPlaces,
-    intensity: Vec3,
-    sum: f32,
-    /// Where light has a colour of its own in every cell.
-    colour: Vec3,
-    /// Cosine between light and eye, in the frame where angles are measured.
-    l_dot_e: f32,
-    row: Row,
-    peak: [f32; ORDERS - 1],
+/// Where a ray meets a sheet: what is constant along it.
+struct Passage<'a> {
+    quad: usize,
+    map: &'a QuadMap,
+    uv: Vec2,
+    frame: CellFrame,
+    side: f32,
+    d_world: Vec3,
+    /// In cells per metre.
+    d_cell: Vec3,
+    /// On the face, in cells.
+    origin: Vec3,
+    point: Vec3,
+    metric: Metric,
+    e_v: Vec3,
+    /// What the sheet makes of the volume's own cells, and of coarser ones.
+    matter: [Matter; 2],
 }
 
-/// A light's volumes at the corners of a patch, and where in the patch a ray is.
-#[derive(Clone, Copy, Default)]
-struct LightPlaces {
-    /// At (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all alike where it has one.
-    numbers: [u32; 4],
-    at: Vec2,
+impl Passage<'_> {
+    fn matter(&self, level: &Level) -> &Matter {
+        &self.matter[usize::from(!level.is_whole)]
+    }
+}
+
+/// What a walk brings home.
+struct Walked {
+    transmittance: f32,
+    lights: Vec<RayLight>,
+    cells: [u32; 2],
+}
+
+impl Walked {
+    /// Between two levels.
+    fn mixed(mut self, other: Walked, share: f32) -> Walked {
+        let own = 1.0 - share;
+        self.transmittance = self.transmittance * own + other.transmittance * share;
+        for (light, next) in self.lights.iter_mut().zip(other.lights) {
+            light.sum = light.sum * own + next.sum * share;
+            light.colour = light.colour * own + next.colour * share;
+        }
+        self.cells = [0, 1].map(|c| self.cells[c] + other.cells[c]);
+        self
+    }
 }
 
 impl<'a> Integrator<'a> {
@@ -99,32 +123,35 @@ impl<'a> Integrator<'a> {
     /// has not got them; if there are to be none it lets go of the old ones.
     pub fn prepared(
         scene: &'a Scene,
-        volume: &'a VolumeTexture,
+        volume: &VolumeTexture,
         kept: &mut KeptVolumes,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
-        let mut integrator = Integrator::new(scene, volume);
+        let mut integrator = Integrator::with_levels(scene, kept.levels.get(scene, volume));
         if scene.visibility == Visibility::Cached {
             let light_volumes = LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?;
-            integrator.filled = Some(kept.get(&light_volumes, volume, monitor)?);
+            integrator.filled = Some(kept.get(&light_volumes, &integrator.levels, scene.trace.lookup, monitor)?);
             integrator.light_volumes = Some(light_volumes);
         } else {
-            *kept = KeptVolumes::default();
+            kept.forget();
         }
         Ok(integrator)
     }
 
     /// For a scene and its volume, and few rays: with cached visibility they walk to the lights as those would
     /// from whom the light volumes are made.
-    pub fn new(scene: &'a Scene, volume: &'a VolumeTexture) -> Self {
+    pub fn new(scene: &'a Scene, volume: &VolumeTexture) -> Self {
+        Integrator::with_levels(scene, levels_of(scene, volume))
+    }
+
+    fn with_levels(scene: &'a Scene, levels: Levels) -> Self {
+        let volume = &levels[0];
         Integrator {
             scene,
-            volume,
-            cells: &volume.cells,
-            size: IVec3::from_array(volume.size.map(|n| n as i32)),
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             flow_cells: flow_cells(scene.flow, volume.size[1]),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
+            footprint: footprint(&scene.camera, &scene.image),
             lights: scene.volume_lights(),
             light_volumes: (scene.visibility == Visibility::Cached).then(|| {
                 LightVolumes::new(scene, volume.size, volume.alpha, u64::MAX).expect("what is not kept fits")
@@ -138,6 +165,7 @@ impl<'a> Integrator<'a> {
             media: (scene.scattering == Scattering::Multiple).then(|| Media::new(scene, volume)),
             profile_of_quad: thicknesses(scene).1,
             haze: scene.haze.seen_from(scene.camera.eye),
+            levels,
         }
     }
 
@@ -206,20 +234,46 @@ impl<'a> Integrator<'a> {
         is_last: bool,
         observer: &mut O,
     ) -> Traced {
+        let ray = self.passage(quad, d_world, hit);
+        let (level, share) = self.level_of(&ray, hit[2]);
+        let mut home = self.walk(&ray, &Level::new(&self.levels, level), before, observer);
+        if share > 0.0 {
+            let next = self.walk(&ray, &Level::new(&self.levels, level + 1), before, observer);
+            home = home.mixed(next, share);
+        }
+        let Walked { transmittance, lights, cells } = home;
+        let ends = is_last || transmittance < self.scene.trace.early_end;
+        let passed = if ends { behind * transmittance } else { Vec3::ZERO };
+        let mut radiance = self.scene.ambient * (before - transmittance) + passed;
+        for light in &lights {
+            let sum = if self.in_colour() { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
+            radiance += light.intensity * sum;
+        }
+        Traced { radiance, transmittance, cells }
+    }
+
+    fn in_colour(&self) -> bool {
+        self.strand.is_some() || self.media.is_some()
+    }
+
+    fn extinction_in(&self, level: &Level) -> f32 {
+        if self.per_cell { self.extinction * level.deep() } else { self.extinction }
+    }
+
+    /// `hit` = (u, v, metres).
+    fn passage(&self, number: usize, d_world: Vec3, hit: [f32; 3]) -> Passage<'_> {
         let scene = self.scene;
-        let quad_number = quad;
-        let quad = &scene.quads[quad];
+        let quad = &scene.quads[number];
         let map = &quad.map;
-        let cells = self.size.as_vec3();
-        let frame = CellFrame::new(map, &quad.material, self.volume.size, Vec2::new(hit[0], hit[1]));
+        let uv = Vec2::new(hit[0], hit[1]);
+        let size = self.levels[0].size;
+        let frame = CellFrame::new(map, &quad.material, size, uv);
 
         let d_n = d_world.dot(map.n_world);
         let side = if d_n > 0.0 { -1.0 } else { 1.0 };
-        let plane = |w: Vec3, n: f32| Vec3::new(w.dot(map.e1_world), w.dot(map.e2_world), n);
-        let d = plane(d_world, (d_n * side).min(-1e-6));
+        let d = Vec3::new(d_world.dot(map.e1_world), d_world.dot(map.e2_world), (d_n * side).min(-1e-6));
         let d_cell = frame.cell_from_plane(d);
 
-        let texture_frame = scene.frame == AngleFrame::Texture;
         let mut metric = Metric {
             m: [
                 frame.cx.dot(frame.cx),
@@ -229,64 +283,75 @@ impl<'a> Integrator<'a> {
             ],
         };
         let mut e_v = -frame.transposed(d);
-        if texture_frame {
+        if scene.frame == AngleFrame::Texture {
             metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
-        let point = scene.camera.eye + d_world * hit[2];
-        let matter = Matter::new(quad, Vec2::new(hit[0], hit[1]));
-        // What is left of light volumes' ρ, in the mean over the cells that count.
-        let depth_bits = self.extinction * matter.left * if self.per_cell { 1.0 } else { frame.depth };
-        let mut lights: Vec<RayLight> = self
-            .lights
-            .iter()
-            .enumerate()
-            .map(|(i, light)| {
-                let (to_light, intensity) = light.at(point);
-                let l = plane(to_light, to_light.dot(map.n_world) * side);
-                let l_cell = frame.cell_from_plane(l);
-                let l_v =
-                    if texture_frame { l_cell / l_cell.dot(l_cell).sqrt() } else { frame.transposed(l) };
-                let places = match &self.light_volumes {
-                    Some(volumes) => light_places_of(volumes, quad_number, i, Vec2::new(hit[0], hit[1])),
-                    None => LightPlaces::default(),
-                };
-                let cosine = to_light.dot(d_world);
-                let l_dot_e = if texture_frame { l_v.dot(e_v) } else { -cosine };
-                let mut l_n = to_light.dot(map.n_world) * side;
-                if self.per_cell {
-                    let c = l_cell.abs();
-                    l_n = -l_cell.z / (c.x + c.y + c.z);
-                }
-                let row = Row::new(l_n, self.volume.size[2]);
-                let peak = forward_peak(self.media.as_ref().map_or(0.0, |m| m.similarity.g), cosine);
-                let (sum, colour) = (0.0, Vec3::ZERO);
-                RayLight { l_v, l_cell, places, intensity, sum, colour, l_dot_e, row, peak }
-            })
-            .collect();
+        Passage {
+            quad: number,
+            map,
+            uv,
+            frame,
+            side,
+            d_world,
+            d_cell,
+            origin: self.face_point(quad, uv),
+            point: scene.camera.eye + d_world * hit[2],
+            metric,
+            e_v,
+            matter: [Matter::new(quad, uv), Matter::of_coarse(quad, uv)],
+        }
+    }
 
-        let x = (hit[0] * quad.material.repeat_u + quad.offset.x) * cells.x;
+    /// Where on the face z = 0 the walk begins, inside the tile.
+    fn face_point(&self, quad: &Quad, uv: Vec2) -> Vec3 {
+        let [nx, ny, _] = self.levels[0].size.map(|n| n as f32);
+        let x = (uv.x * quad.material.repeat_u + quad.offset.x) * nx;
         // Where the volume has moved down, what is met lies further up in it.
-        let y = (hit[1] * quad.material.repeat_v + quad.offset.y) * cells.y - self.flow_cells;
-        let origin = Vec3::new(x - cells.x * (x / cells.x).floor(), y - cells.y * (y / cells.y).floor(), 0.0);
+        let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - self.flow_cells;
+        Vec3::new(x - nx * (x / nx).floor(), y - ny * (y / ny).floor(), 0.0)
+    }
+
+    /// The finer of the two levels that suit the ray `t` metres away, and the share of the coarser.
+    fn level_of(&self, ray: &Passage, t: f32) -> (u32, f32) {
+        if self.scene.trace.filter == Prefilter::None {
+            return (0, 0.0);
+        }
+        let forward = self.scene.camera.forward;
+        let level = level_at(self.footprint, forward, ray.d_world, t, &ray.frame, ray.d_cell);
+        let level = level.clamp(0.0, (self.levels.len() - 1) as f32);
+        (level as u32, level - level.floor())
+    }
+
+    /// Through one level of the volume.
+    fn walk<O: Observer>(&self, ray: &Passage, level: &Level, before: f32, observer: &mut O) -> Walked {
+        let scene = self.scene;
+        let mut lights = self.ray_lights(ray, level);
+        let matter = ray.matter(level);
+        let extinction = self.extinction_in(level);
+        let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
+        let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
         let mut transmittance = before;
         let mut depth = -before.max(1e-30).log2();
         let mut walked = [0u32; 2];
-        let in_colour = self.strand.is_some() || self.media.is_some();
         for crossing in
-            Walk::new(self.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
+            Walk::new(level.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
         {
-            if crossing.cell.z >= self.size.z || transmittance < scene.trace.early_end {
+            if crossing.cell.z >= level.size.z || transmittance < scene.trace.early_end {
                 break;
             }
             walked[0] += 1;
-            let cell = self.cell(crossing.cell);
-            let rho = matter.rho(cell.rho_code());
+            let cell = level.cell(crossing.cell);
+            let found = match scene.trace.lookup {
+                Lookup::Trilinear => level.between(&crossing, origin, d_cell, matter),
+                Lookup::Nearest => level.found(cell, matter),
+            };
+            let Found { rho, k: [k_d, k_s], moments } = found;
             observer.enter(&crossing, cell, rho / 65535.0, transmittance);
             if rho <= 0.0 {
                 continue;
             }
-            let mut tau_bits = rho * self.extinction;
+            let mut tau_bits = rho * extinction;
             if !self.per_cell {
                 tau_bits *= crossing.t_exit - crossing.t_enter;
             }
@@ -294,23 +359,25 @@ impl<'a> Integrator<'a> {
             let weight = transmittance - passed;
             observer.ambient(scene.ambient * weight);
 
-            let (k_d, k_s) = cell.k_codes();
             let v = cell.v_code();
-            let inverse_q = 1.0 / metric.squared(v).max(1e-30);
-            let t_dot_e = v.dot(e_v);
+            let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
+            let t_dot_e = v.dot(ray.e_v);
             let root = inverse_q.sqrt();
+            let spread = filtered.then(|| Spread::new(&ray.metric, moments, ray.e_v));
             for light in &mut lights {
-                let t_dot_l = v.dot(light.l_v);
                 let (seen, light_depth) =
-                    self.visibility_of(crossing.cell, light, &matter, depth_bits, &mut walked[1]);
+                    self.visibility_of(ray, level, crossing.cell, light, &mut walked[1]);
                 let fibre = || {
                     if matter.mist > 0.0 {
                         return matter.mist;
                     }
-                    let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
-                    k_d as f32 * sin_l + k_s as f32 * specular_power(base.max(0.0), scene.p)
+                    if let Some(spread) = &spread {
+                        return spread.psi(k_d, k_s, scene.p, light.l_v);
+                    }
+                    let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
+                    k_d * sin_l + k_s * specular_power(base.max(0.0), scene.p)
                 };
-                if !in_colour {
+                if !self.in_colour() {
                     let lit = weight * fibre() * seen;
                     light.sum += lit;
                     observer.light(seen, light.intensity * (lit * (1.0 / 255.0)));
@@ -318,14 +385,17 @@ impl<'a> Integrator<'a> {
                 }
                 let mut lit = match &self.strand {
                     Some(strand) if matter.mist == 0.0 => {
-                        let [k_d, k_s] = [k_d, k_s].map(|k| k as f32);
-                        strand.psi(k_d, k_s, t_dot_l * root, t_dot_e * root, light.l_dot_e) * (weight * seen)
+                        let [t_dot_l, t_dot_e] = match &spread {
+                            Some(spread) => spread.of_one(light.l_v),
+                            None => [v.dot(light.l_v) * root, t_dot_e * root],
+                        };
+                        strand.psi(k_d, k_s, t_dot_l, t_dot_e, light.l_dot_e) * (weight * seen)
                     }
                     _ => Vec3::splat(weight * seen * fibre() * (1.0 / 255.0)),
                 };
                 if let Some(media) = &self.media {
-                    let profile = &media.profiles[self.profile_of_quad[quad_number] as usize];
-                    let diffuse = profile.at(&light.row, crossing.cell.z as u32);
+                    let profile = &media.profiles[self.profile_of_quad[ray.quad] as usize];
+                    let diffuse = profile.at(&light.row, self.layer_in(level, crossing.cell.z));
                     lit += multiple(&media.similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
                 }
                 light.colour += lit;
@@ -334,87 +404,14 @@ impl<'a> Integrator<'a> {
             transmittance = passed;
             depth += tau_bits;
         }
+        Walked { transmittance, lights, cells: walked }
+    }
 
-        let ends = is_last || transmittance < scene.trace.early_end;
-        let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let mut radiance = scene.ambient * (before - transmittance) + passed;
-        for light in &lights {
-            let sum = if in_colour { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
-            radiance += light.intensity * sum;
+    /// The volume's own layer in the middle of layer `z` of a level.
+    fn layer_in(&self, level: &Level, z: i32) -> u32 {
+        if level.is_whole {
+            return z as u32;
         }
-        Traced { radiance, transmittance, cells: walked }
+        (((z as f32 + 0.5) * level.deep()) as u32).min(self.levels[0].size[2] - 1)
     }
-
-    /// V_i(k); and −log₂ of it, which is 0 where codes are kept.
-    fn visibility_of(
-        &self,
-        cell: IVec3,
-        light: &RayLight,
-        matter: &Matter,
-        depth_bits: f32,
-        walked: &mut u32,
-    ) -> (f32, f32) {
-        let depth = match self.scene.visibility {
-            Visibility::None => 0.0,
-            _ if matter.mist > 0.0 => {
-                matter.depth(cell.z, light.l_cell, self.size.z, self.per_cell) * self.extinction
-            }
-            Visibility::March => {
-                optical_depth(self.volume, matter, cell, light.l_cell, self.medium, NEVER, walked)
-                    * self.extinction
-            }
-            Visibility::Cached => {
-                let kept = self.kept_of(cell, &light.places);
-                if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
-                    let transmittance = kept * kept * (1.0 / 65025.0);
-                    if matter.left < 1.0 {
-                        return ((matter.left * transmittance.max(1e-9).log2()).exp2(), 0.0);
-                    }
-                    return (transmittance, 0.0);
-                }
-                kept * depth_bits
-            }
-        };
-        ((-depth).exp2(), depth)
-    }
-
-    /// From the light volumes at the corners of the ray's patch.
-    fn kept_of(&self, cell: IVec3, places: &LightPlaces) -> f32 {
-        let kept = |number: u32| self.kept_at(number as usize, cell);
-        let [p00, p10, p01, p11] = places.numbers;
-        if places.numbers == [p00; 4] {
-            return kept(p00);
-        }
-        let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
-        let near = mix(kept(p00), kept(p10), places.at.x);
-        let far = mix(kept(p01), kept(p11), places.at.x);
-        mix(near, far, places.at.y)
-    }
-
-    fn kept_at(&self, i: usize, cell: IVec3) -> f32 {
-        let plan = self.light_volumes.as_ref().expect("visibility is cached");
-        match &self.filled {
-            Some(filled) => filled[i].at(self.volume.index(cell.x as u32, cell.y as u32, cell.z as u32)),
-            None => number(self.volume, cell, &plan.volumes[i], plan.medium, plan.form),
-        }
-    }
-
-    #[inline]
-    fn cell(&self, c: IVec3) -> Cell {
-        self.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
-    }
-}
-
-fn light_places_of(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> LightPlaces {
-    let patches = volumes.patches[quad * volumes.lights + light];
-    let [nu, nv] = patches.count;
-    let at = uv * Vec2::new(nu as f32, nv as f32);
-    let patch = at.as_uvec2().min(UVec2::new(nu - 1, nv - 1));
-    let number = |x: u32, y: u32, row: u32| volumes.numbers[(patches.first + y * row + x) as usize];
-    if !patches.cornered {
-        return LightPlaces { numbers: [number(patch.x, patch.y, nu); 4], at: Vec2::ZERO };
-    }
-    let [x, y] = patch.to_array();
-    let numbers = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| number(x, y, nu + 1));
-    LightPlaces { numbers, at: at - patch.as_vec2() }
 }

@@ -14,6 +14,7 @@ pub const MIST_RHO: f32 = 32768.0;
 /// Erosion takes e away from every cell. It does not scale what is left up again: 30.85 % of the paper's cells
 /// have ρ = 1, and would stay whole up to e = 1. Light rays lose as much as the view ray: they end near it, and thin
 /// water is thin in every direction. What was walked before, for light volumes, is lessened in the mean. Mist is even, but for what it has of the cells.
+#[derive(Clone, Copy)]
 pub struct Matter {
     scale: f32,
     shift: f32,
@@ -43,13 +44,22 @@ impl Matter {
         matter
     }
 
+    /// The same of cells that stand for many: taken away in the mean, for ρ of a coarse cell is not that of any in it.
+    pub fn of_coarse(quad: &Quad, uv: Vec2) -> Self {
+        let matter = Matter::new(quad, uv);
+        match quad.mist > 0.0 {
+            true => matter,
+            false => Matter { scale: matter.left, shift: 0.0, ..matter },
+        }
+    }
+
     /// That leaves the cells as they are.
     pub const WHOLE: Matter = Matter { scale: 1.0, shift: 0.0, mist: 0.0, even: 0.0, left: 1.0 };
 
-    /// ρ of a cell with this code.
+    /// ρ of a cell with this code, or of what lies between several.
     #[inline]
-    pub fn rho(&self, code: u32) -> f32 {
-        (code as f32 * self.scale + self.shift).max(0.0)
+    pub fn rho(&self, code: f32) -> f32 {
+        (code * self.scale + self.shift).max(0.0)
     }
 
     /// From the middle of a cell of mist in layer `z` of `layers` to where the light ray leaves the slab, as

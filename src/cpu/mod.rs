@@ -4,6 +4,7 @@
 pub mod bloom;
 pub mod gbuffer;
 pub mod integrate;
+pub mod lookup;
 mod matter;
 pub mod opaque;
 pub mod pool;

@@ -7,7 +7,7 @@ use super::gbuffer;
 use super::integrate::{Integrator, Observer};
 use crate::camera::sample_offset;
 use crate::frame::Window;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Lookup, Mesh, Prefilter, Scene};
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::Crossing;
 
@@ -92,7 +92,7 @@ pub struct RayStep {
 }
 
 /// Traces the ray through the centre of a pixel (column, row; outside the image the nearest inside).
-/// Where the scene has one sample a pixel, radiance, transmittance and cells are the bits of
+/// Where the scene has one sample a pixel, no filter and looks up the nearest cell, radiance, transmittance and cells are the bits of
 /// [`super::render`]'s frame.
 pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 2]) -> RayReport {
     // The first sample is the centre for any number of samples.
@@ -113,7 +113,11 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     };
     let faces = gbuffer.faces(0).map(face).collect();
     let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
-    let traced = Integrator::new(scene, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
+    // Its cells are the volume's own.
+    let mut plain = scene.clone();
+    plain.trace.filter = Prefilter::None;
+    plain.trace.lookup = Lookup::Nearest;
+    let traced = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
     RayReport {
         pixel,
         faces,

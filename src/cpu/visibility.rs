@@ -6,26 +6,32 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
+use super::lookup::Level;
 use super::matter::Matter;
 use crate::error::Result;
 use crate::job::Monitor;
+use crate::scene::Lookup;
 use crate::visibility::{DARK_BITS, Form, LightVolume, LightVolumes, Medium, transmittance_code};
-use crate::volume::{Cell, VolumeTexture};
+use crate::volume::{KeptLevels, Levels, VolumeTexture};
 use crate::walk::{NEVER, Walk};
 
 /// Light volumes that are kept from frame to frame.
 #[derive(Default)]
-pub struct KeptVolumes(Option<Kept>);
+pub struct KeptVolumes {
+    /// What they are of.
+    pub levels: KeptLevels,
+    kept: Option<Kept>,
+}
 
 struct Kept {
-    cells: Arc<Vec<Cell>>,
-    size: [u32; 3],
+    levels: Levels,
+    lookup: Lookup,
     plan: LightVolumes,
     filled: Filled,
 }
 
-/// All light volumes: number by number, each in the volume's order of cells.
-pub type Filled = Arc<Vec<Numbers>>;
+/// All light volumes, number by number: of every level, in its order of cells.
+pub type Filled = Arc<Vec<Vec<Numbers>>>;
 
 /// What one light volume holds.
 pub enum Numbers {
@@ -46,57 +52,58 @@ impl Numbers {
 }
 
 impl KeptVolumes {
+    /// Lets go of the light volumes.
+    pub fn forget(&mut self) {
+        self.kept = None;
+    }
+
     /// The light volumes that are planned, walked unless they are those of the last call.
     pub fn get(
         &mut self,
         plan: &LightVolumes,
-        volume: &VolumeTexture,
+        levels: &Levels,
+        lookup: Lookup,
         monitor: &dyn Monitor,
     ) -> Result<Filled> {
-        if let Some(kept) = &self.0
-            && Arc::ptr_eq(&kept.cells, &volume.cells)
-            && kept.size == volume.size
+        if let Some(kept) = &self.kept
+            && Arc::ptr_eq(&kept.levels, levels)
+            && kept.lookup == lookup
             && kept.plan.volumes == plan.volumes
             && (kept.plan.medium, kept.plan.form) == (plan.medium, plan.form)
         {
             return Ok(kept.filled.clone());
         }
         // The old ones go first: both might not fit.
-        self.0 = None;
+        self.kept = None;
         let total = plan.volumes.len() as u64;
         let mut all = Vec::with_capacity(plan.volumes.len());
         for (number, light_volume) in plan.volumes.iter().enumerate() {
             monitor.progress("light volumes", number as u64, total)?;
-            all.push(match plan.form {
-                Form::Codes => {
-                    Numbers::Codes(filled(volume, |cell| code(volume, cell, light_volume, plan.medium)))
+            let of_level = |number| {
+                let level = Level::new(levels, number);
+                let of = |cell| self::number(&level, cell, light_volume, plan.medium, plan.form);
+                match plan.form {
+                    Form::Codes => Numbers::Codes(filled(&level, lookup, |cell| of(cell) as u8)),
+                    Form::Depths => Numbers::Depths(filled(&level, lookup, of)),
                 }
-                Form::Depths => Numbers::Depths(filled(volume, |cell| {
-                    optical_depth(
-                        volume,
-                        &Matter::WHOLE,
-                        cell,
-                        light_volume.direction,
-                        plan.medium,
-                        NEVER,
-                        &mut 0,
-                    )
-                })),
-            });
+            };
+            all.push((0..levels.len() as u32).map(of_level).collect());
         }
-        let (cells, size, filled) = (volume.cells.clone(), volume.size, Arc::new(all));
-        self.0 = Some(Kept { cells, size, plan: plan.clone(), filled: filled.clone() });
+        let filled = Arc::new(all);
+        let (levels, plan) = (levels.clone(), plan.clone());
+        self.kept = Some(Kept { levels, lookup, plan, filled: filled.clone() });
         Ok(filled)
     }
 }
 
-/// A number for every cell; for those without density the default.
-fn filled<T: Copy + Default + Send>(volume: &VolumeTexture, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
-    let [nx, ny, nz] = volume.size.map(|n| n as usize);
+/// A number for every cell. Those without density, which no view ray asks, have the default, but for rays that look
+/// between cells.
+fn filled<T: Copy + Default + Send>(level: &Level, lookup: Lookup, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
+    let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
     let mut numbers = vec![T::default(); nx * ny * nz];
     numbers.par_chunks_mut(nx).enumerate().for_each(|(row, numbers)| {
         for (x, number) in numbers.iter_mut().enumerate() {
-            if volume.cells[row * nx + x].rho_code() > 0 {
+            if lookup == Lookup::Trilinear || level.volume.cells[row * nx + x].rho_code() > 0 {
                 *number = of(IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32));
             }
         }
@@ -104,32 +111,16 @@ fn filled<T: Copy + Default + Send>(volume: &VolumeTexture, of: impl Fn(IVec3) -
     numbers
 }
 
-fn code(volume: &VolumeTexture, cell: IVec3, light_volume: &LightVolume, medium: Medium) -> u8 {
-    let depth = optical_depth(
-        volume,
-        &Matter::WHOLE,
-        cell,
-        light_volume.direction,
-        medium,
-        DARK_BITS / light_volume.bits.max(1e-20),
-        &mut 0,
-    );
-    transmittance_code(depth * light_volume.bits)
-}
-
-/// What a light volume of a form holds for an occupied cell.
-pub fn number(
-    volume: &VolumeTexture,
-    cell: IVec3,
-    light_volume: &LightVolume,
-    medium: Medium,
-    form: Form,
-) -> f32 {
+/// What a light volume of a form holds for a cell.
+pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Medium, form: Form) -> f32 {
+    let depth = |enough: f32| {
+        let direction = light_volume.direction * level.scale;
+        optical_depth(level.volume, &Matter::WHOLE, cell, direction, medium, enough, &mut 0)
+    };
+    let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
     match form {
-        Form::Codes => code(volume, cell, light_volume, medium).into(),
-        Form::Depths => {
-            optical_depth(volume, &Matter::WHOLE, cell, light_volume.direction, medium, NEVER, &mut 0)
-        }
+        Form::Codes => transmittance_code(depth(DARK_BITS / bits.max(1e-20)) * bits).into(),
+        Form::Depths => depth(NEVER),
     }
 }
 
@@ -153,7 +144,7 @@ pub fn optical_depth(
         }
         *walked += 1;
         let c = crossing.cell.as_uvec3();
-        let rho = matter.rho(volume.cells[volume.index(c.x, c.y, c.z)].rho_code());
+        let rho = matter.rho(volume.cells[volume.index(c.x, c.y, c.z)].rho_code() as f32);
         if medium.per_cell {
             // The cell itself does not hide its own light.
             depth += if n == 0 { 0.0 } else { rho };

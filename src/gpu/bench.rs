@@ -19,7 +19,6 @@ pub struct GpuBench {
 }
 
 struct Prepared {
-    volume: VolumeTexture,
     targets: Targets,
     sums: Sums,
     window: Window,
@@ -38,7 +37,7 @@ struct Pass {
 enum Work {
     Gbuffer,
     /// Light volumes, walked anew.
-    Visibility(LightVolumes),
+    Visibility(LightVolumes, scene::Lookup),
     /// The walk, with the cells that it once took.
     Integrate(Box<Integrate>, Tiler, Option<u64>),
 }
@@ -86,9 +85,9 @@ impl GpuBench {
             if let Some(light_volumes) = light_volumes {
                 let up = up()?;
                 let volumes = light_volumes.clone();
-                filled = visibility.get(gpu, timer, &up, &frame, volumes, volume, |_, _| Ok(()))?.0;
+                filled = visibility.get(gpu, timer, &up, &frame, volumes, scene.trace.lookup, |_, _| Ok(()))?.0;
                 if !passes.iter().any(|(name, _)| *name == "light volumes") {
-                    work.push(("light volumes", Work::Visibility(light_volumes)));
+                    work.push(("light volumes", Work::Visibility(light_volumes, scene.trace.lookup)));
                 }
             }
             work.push((name, integrate(Integrate::new(gpu, variant))));
@@ -99,7 +98,6 @@ impl GpuBench {
             }
         }
         self.prepared = Some(Prepared {
-            volume: volume.clone(),
             targets: Targets::new(gpu, window.width, window.height, layers),
             sums: Sums::new(gpu, window.pixels()),
             window,
@@ -125,9 +123,9 @@ impl GpuBench {
         let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, filled, reflection };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
-            Work::Visibility(volumes) => {
+            Work::Visibility(volumes, lookup) => {
                 let mut pass = Visibility::new(gpu);
-                let found = pass.get(gpu, timer, up, frame, volumes.clone(), &p.volume, |_, _| Ok(()))?;
+                let found = pass.get(gpu, timer, up, frame, volumes.clone(), *lookup, |_, _| Ok(()))?;
                 Ok((found.1, 0))
             }
             Work::Integrate(integrate, tiler, cells) => {

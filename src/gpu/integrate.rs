@@ -4,7 +4,7 @@ use super::device::Gpu;
 use super::layout::Tile;
 use super::{Inputs, shader};
 use crate::error::Result;
-use crate::scene::{Attenuation, Reflection, Scattering, Scene, Visibility};
+use crate::scene::{Attenuation, Lookup, Prefilter, Reflection, Scattering, Scene, Visibility};
 use crate::shading::whole_exponent;
 use crate::visibility::{Form, LightVolumes};
 
@@ -24,7 +24,9 @@ pub fn source(many: bool) -> String {
         true => include_str!("../../shaders/integrate_many.wgsl"),
     };
     [
+        include_str!("../../shaders/levels.wgsl"),
         include_str!("../../shaders/matter.wgsl"),
+        include_str!("../../shaders/lookup.wgsl"),
         include_str!("../../shaders/optical_depth.wgsl"),
         include_str!("../../shaders/integrate.wgsl"),
         include_str!("../../shaders/integrate_light.wgsl"),
@@ -46,6 +48,8 @@ pub struct Variant {
     strand: bool,
     multiple: bool,
     eroded: bool,
+    pyramid: bool,
+    trilinear: bool,
     many: bool,
     exponent: u32,
 }
@@ -64,6 +68,8 @@ impl Variant {
             strand: matches!(scene.reflection, Reflection::Strand(_)),
             multiple: scene.scattering == Scattering::Multiple,
             eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
+            pyramid: scene.trace.filter == Prefilter::Pyramid,
+            trilinear: scene.trace.lookup == Lookup::Trilinear,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -166,6 +172,8 @@ impl Integrate {
             ("STRAND", number(variant.strand)),
             ("MULTIPLE", number(variant.multiple)),
             ("ERODED", number(variant.eroded)),
+            ("PYRAMID", number(variant.pyramid)),
+            ("TRILINEAR", number(variant.trilinear)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants)

@@ -7,12 +7,13 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use crate::camera::{clip_to_window, sample_offset};
+use crate::cpu::lookup::footprint;
 use crate::environment;
 use crate::frame::Window;
 use crate::scatter;
 use crate::scene::{self, AngleFrame, Attenuation, Look, Scene, Tone};
 use crate::strand::table::StrandShading;
-use crate::volume::VolumeTexture;
+use crate::volume::{Stack, VolumeTexture};
 use crate::white_balance;
 
 /// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
@@ -55,8 +56,8 @@ pub struct Frame {
     pub haze_color: [f32; 3],
     pub haze_far: f32,
     pub shadow_light: u32,
-    pub pad_a: f32,
-    pub pad_b: f32,
+    pub levels: u32,
+    pub footprint: f32,
     pub pad_c: f32,
 }
 
@@ -307,8 +308,8 @@ impl Frame {
             haze_color: haze.color.to_array(),
             haze_far: haze.far,
             shadow_light: scene.shadow_light().map_or(u32::MAX, |i| i as u32),
-            pad_a: 0.0,
-            pad_b: 0.0,
+            levels: Stack::of(scene, volume.size).count,
+            footprint: footprint(camera, image),
             pad_c: 0.0,
         }
     }

@@ -255,7 +255,7 @@ impl GpuRenderer {
                 frame.max_cells = light_volumes.medium.max_cells;
                 let watch = |done, all| monitor.progress("light volumes", done, all);
                 let found =
-                    self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, volume, watch)?;
+                    self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, scene.trace.lookup, watch)?;
                 seconds.visibility = found.1;
                 found.0
             }

@@ -52,6 +52,8 @@ impl Key {
             extinction: 0.0,
             texture_frame: 0,
             flow_cells: 0.0,
+            levels: 0,
+            footprint: 0.0,
             ..*frame
         };
         Key(hash_twice(&(bytemuck::bytes_of(&frame), geometry)))

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene, Vertex};
-use crate::volume::{Cell, VolumeTexture};
+use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
 const SLAB_BYTES: usize = 64 << 20;
@@ -19,7 +19,8 @@ const SLAB_BYTES: usize = 64 << 20;
 /// memory they came from.
 #[derive(Default)]
 pub struct Resident {
-    volume: Option<(Arc<Vec<Cell>>, [u32; 3], wgpu::TextureView)>,
+    levels: KeptLevels,
+    volume: Option<(Levels, wgpu::TextureView)>,
     vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
     /// Of these vertices; previews have fewer triangles than pictures. Each upload has a number of its own.
     indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer, u64)>,
@@ -31,7 +32,9 @@ pub struct Resident {
 
 /// Everything of a scene that does not change from sample to sample.
 pub struct Uploaded {
-    /// The volume as a 3-D storage texture, `rg32uint`.
+    /// The volume's levels.
+    pub levels: Levels,
+    /// They as a 3-D storage texture, `rg32uint`; [`Stack`].
     pub volume: wgpu::TextureView,
     /// `array<Quad>`.
     pub quads: wgpu::Buffer,
@@ -91,6 +94,7 @@ impl Uploaded {
             ));
         }
         let (vertices, indices, upload) = resident.mesh(gpu, mesh);
+        let levels = resident.levels.get(scene, volume);
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
@@ -101,7 +105,8 @@ impl Uploaded {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
                 map,
             }),
-            volume: resident.volume(gpu, volume)?,
+            volume: resident.volume(gpu, &levels)?,
+            levels,
             // A buffer without any would be too small to bind.
             quads: gpu.buffer_with(
                 "quads",
@@ -119,17 +124,16 @@ impl Uploaded {
 }
 
 impl Resident {
-    fn volume(&mut self, gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView> {
-        if let Some((cells, size, view)) = &self.volume
-            && Arc::ptr_eq(cells, &volume.cells)
-            && *size == volume.size
+    fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
+        if let Some((old, view)) = &self.volume
+            && Arc::ptr_eq(old, levels)
         {
             return Ok(view.clone());
         }
         // The old volume goes first: two large ones might not fit.
         self.volume = None;
-        let view = upload_volume(gpu, volume)?;
-        self.volume = Some((volume.cells.clone(), volume.size, view.clone()));
+        let view = upload_volume(gpu, levels)?;
+        self.volume = Some((levels.clone(), view.clone()));
         Ok(view)
     }
 
@@ -173,10 +177,11 @@ impl Resident {
     }
 }
 
-fn upload_volume(gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView> {
-    let [nx, ny, nz] = volume.size;
+fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
+    let stack = Stack::new(levels);
+    let [nx, ny, nz] = stack.extent();
     let most = gpu.device.limits().max_texture_dimension_3d;
-    if volume.size.iter().any(|&n| n > most) {
+    if [nx, ny, nz].iter().any(|&n| n > most) {
         return Err(Error::input(
             format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
             format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
@@ -192,14 +197,22 @@ fn upload_volume(gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView>
         usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
+    for (number, level) in levels.iter().enumerate() {
+        upload_level(gpu, &texture, stack.place(number as u32), level)?;
+    }
+    Ok(texture.create_view(&Default::default()))
+}
+
+fn upload_level(gpu: &Gpu, texture: &wgpu::Texture, [x, y, z]: [u32; 3], volume: &VolumeTexture) -> Result<()> {
+    let [nx, ny, _] = volume.size;
     let layer = nx as usize * ny as usize;
     let layers = (SLAB_BYTES / (layer * size_of::<Cell>())).max(1);
     for (slab, cells) in volume.cells.chunks(layers * layer).enumerate() {
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
-                texture: &texture,
+                texture,
                 mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: 0, z: (slab * layers) as u32 },
+                origin: wgpu::Origin3d { x, y, z: z + (slab * layers) as u32 },
                 aspect: wgpu::TextureAspect::All,
             },
             bytemuck::cast_slice(cells),
@@ -212,7 +225,7 @@ fn upload_volume(gpu: &Gpu, volume: &VolumeTexture) -> Result<wgpu::TextureView>
         );
         gpu.run(gpu.encoder("upload volume"))?;
     }
-    Ok(texture.create_view(&Default::default()))
+    Ok(())
 }
 
 fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {

@@ -9,12 +9,14 @@ use super::shader;
 use super::timing::Timer;
 use super::upload::Uploaded;
 use crate::error::{Error, Result};
+use crate::scene::Lookup;
 use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
-use crate::volume::{Cell, VolumeTexture};
+use crate::volume::{Levels, Stack};
 
 /// The text of the stage's own shader.
 pub fn source() -> String {
     [
+        include_str!("../../shaders/levels.wgsl"),
         include_str!("../../shaders/matter.wgsl"),
         include_str!("../../shaders/optical_depth.wgsl"),
         include_str!("../../shaders/visibility.wgsl"),
@@ -32,17 +34,24 @@ const SECONDS: f64 = 0.03;
 /// The pass, and the light volumes of the last frame that had any.
 pub struct Visibility {
     pipelines: Vec<(Kind, wgpu::ComputePipeline)>,
-    occupied: Option<(Arc<Vec<Cell>>, wgpu::Buffer, u32)>,
+    occupied: Option<(Levels, bool, wgpu::Buffer, u32)>,
     kept: Option<Kept>,
     none: FilledVolumes,
 }
 
-/// What the pipeline is specialised to: attenuation per cell, and what is kept.
-type Kind = (bool, Form);
+/// What the pipeline is specialised to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Kind {
+    per_cell: bool,
+    form: Form,
+    pyramid: bool,
+    /// Of empty cells too.
+    everywhere: bool,
+}
 
 struct Kept {
-    cells: Arc<Vec<Cell>>,
-    size: [u32; 3],
+    levels: Levels,
+    everywhere: bool,
     plan: LightVolumes,
     filled: FilledVolumes,
 }
@@ -124,24 +133,33 @@ impl Visibility {
         up: &Uploaded,
         frame: &Frame,
         plan: LightVolumes,
-        volume: &VolumeTexture,
+        lookup: Lookup,
         mut between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<(FilledVolumes, f64)> {
+        let everywhere = lookup == Lookup::Trilinear;
         if let Some(kept) = &self.kept
-            && Arc::ptr_eq(&kept.cells, &volume.cells)
-            && kept.size == volume.size
+            && Arc::ptr_eq(&kept.levels, &up.levels)
+            && kept.everywhere == everywhere
             && kept.plan == plan
         {
             return Ok((kept.filled.clone(), 0.0));
         }
         // The old ones go first: both might not fit.
         self.kept = None;
-        let shelf = Shelf::new(gpu, plan.words(volume.size), plan.volumes.len() as u32)?;
+        let shelf = Shelf::new(gpu, plan.words(Stack::new(&up.levels).extent()), plan.volumes.len() as u32)?;
         let filled =
             FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
-        let (occupied, count) = self.occupied(gpu, volume);
-        let pipeline = self.pipeline(gpu, (plan.medium.per_cell, plan.form));
+        let (occupied, count) = self.occupied(gpu, &up.levels, everywhere);
+        let pipeline = self.pipeline(
+            gpu,
+            Kind {
+                per_cell: plan.medium.per_cell,
+                form: plan.form,
+                pyramid: up.levels.len() > 1,
+                everywhere,
+            },
+        );
         let frame = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let part = gpu.buffer(
             "light volume",
@@ -192,29 +210,38 @@ impl Visibility {
                 columns = wanted.clamp(64.0, f64::from(columns.saturating_mul(4).min(MOST_COLUMNS))) as u32;
             }
         }
-        let kept = Kept { cells: volume.cells.clone(), size: volume.size, plan, filled: filled.clone() };
+        let kept = Kept { levels: up.levels.clone(), everywhere, plan, filled: filled.clone() };
         self.kept = Some(kept);
         Ok((filled, seconds))
     }
 
     /// Linear indices of the columns of cells with density, and their number.
-    fn occupied(&mut self, gpu: &Gpu, volume: &VolumeTexture) -> (wgpu::Buffer, u32) {
-        if let Some((cells, buffer, count)) = &self.occupied
-            && Arc::ptr_eq(cells, &volume.cells)
+    fn occupied(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
+        if let Some((old, all, buffer, count)) = &self.occupied
+            && Arc::ptr_eq(old, levels)
+            && *all == everywhere
         {
             return (buffer.clone(), *count);
         }
-        let [nx, ny, nz] = volume.size;
-        let of_slice = nx * ny;
-        let occupied = |column: u32| {
-            let (z, xy) = (column / of_slice * CELLS_A_WORD, column % of_slice);
-            (z..(z + CELLS_A_WORD).min(nz)).any(|z| volume.cells[(z * of_slice + xy) as usize].rho_code() > 0)
-        };
-        let columns = of_slice * nz.div_ceil(CELLS_A_WORD);
-        let indices: Vec<u32> = (0..columns).filter(|&column| occupied(column)).collect();
+        let stack = Stack::new(levels);
+        let [width, height, _] = stack.extent();
+        let mut indices: Vec<u32> = Vec::new();
+        for (level, number) in levels.iter().zip(0..) {
+            let [nx, ny, nz] = level.size;
+            let [_, y0, z0] = stack.place(number);
+            let occupied = |x: u32, y: u32, z: u32| {
+                everywhere
+                    || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cells[level.index(x, y, z)].rho_code() > 0)
+            };
+            for z in (0..nz).step_by(CELLS_A_WORD as usize) {
+                let column = |x, y| ((z0 + z) / CELLS_A_WORD * height + y0 + y) * width + x;
+                let row = |y| (0..nx).filter(move |&x| occupied(x, y, z)).map(move |x| column(x, y));
+                indices.extend((0..ny).flat_map(row));
+            }
+        }
         let buffer =
             gpu.buffer_with("occupied columns", bytemuck::cast_slice(&indices), wgpu::BufferUsages::STORAGE);
-        self.occupied = Some((volume.cells.clone(), buffer.clone(), indices.len() as u32));
+        self.occupied = Some((levels.clone(), everywhere, buffer.clone(), indices.len() as u32));
         (buffer, indices.len() as u32)
     }
 
@@ -223,9 +250,13 @@ impl Visibility {
             return pipeline.clone();
         }
         let module = shader(gpu, "visibility", &source());
-        let (per_cell, form) = kind;
         let number = |on: bool| f64::from(u8::from(on));
-        let constants = [("PER_CELL", number(per_cell)), ("CODES", number(form == Form::Codes))];
+        let constants = [
+            ("PER_CELL", number(kind.per_cell)),
+            ("CODES", number(kind.form == Form::Codes)),
+            ("PYRAMID", number(kind.pyramid)),
+            ("EVERYWHERE", number(kind.everywhere)),
+        ];
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("visibility"),
             layout: None,

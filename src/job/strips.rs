@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::frame::Window;
 use crate::gpu::{Grid, canvas_bytes};
 use crate::overlap;
-use crate::scene::{Image, Pool, Scene, Vertex};
+use crate::scene::{Image, Pool, Prefilter, Scene, Vertex};
 use crate::volume::Cell;
 
 /// Bytes of a strip's pixel on the host: radiance 16, counts 8, picture 4; and as R, G, B bytes 3 for the
@@ -81,7 +81,12 @@ pub fn memory_of(
         None => scene.water.size.iter().map(|&n| u64::from(n)).product(),
     };
     // On the host and on the device.
-    let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64);
+    let coarse = match scene.trace.filter {
+        // Of the volume's cells a seventh on the host, and up to three quarters on the device.
+        Prefilter::Pyramid => cells.saturating_mul(size_of::<Cell>() as u64),
+        Prefilter::None => 0,
+    };
+    let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64).saturating_add(coarse);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
     let vertices = vertices + (scene.pools.len() * Pool::VERTICES) as u64;
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));

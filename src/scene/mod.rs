@@ -29,7 +29,7 @@ pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Rock, wet::wet_albedo, wet::wetness};
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
-    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Quad,
+    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Lookup, Prefilter, Quad,
     Reflection, Scattering, Tone, Trace, Visibility,
 };
 pub use value::{Key, Place, Raw, Value, Values};
@@ -190,6 +190,14 @@ impl Scene {
             max_cells: v.count("trace.max_cells"),
             early_end: v.float("trace.early_end"),
             layers: v.count("trace.layers"),
+            filter: match v.text("trace.filter").as_str() {
+                "pyramid" => Prefilter::Pyramid,
+                _ => Prefilter::None,
+            },
+            lookup: match v.text("trace.lookup").as_str() {
+                "trilinear" => Lookup::Trilinear,
+                _ => Lookup::Nearest,
+            },
         };
         let environment = parts::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);

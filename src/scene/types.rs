@@ -97,6 +97,28 @@ pub struct Trace {
     pub early_end: f32,
     /// Most sheets one ray goes through.
     pub layers: u32,
+    /// Whether far away coarser levels of the volume are walked.
+    pub filter: Prefilter,
+    /// What a ray finds in a cell.
+    pub lookup: Lookup,
+}
+
+/// How views that see many cells in one pixel are kept from aliasing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Prefilter {
+    /// They are not.
+    None,
+    /// By levels of fewer cells, the two that suit the pixel's footprint.
+    Pyramid,
+}
+
+/// What a ray finds in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lookup {
+    /// The cell's own.
+    Nearest,
+    /// At the middle of its way through the cell, what lies between the centres of eight cells.
+    Trilinear,
 }
 
 /// τ_k of a cell with density ρ.

@@ -109,7 +109,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
         texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
-        haze_color haze_far shadow_light pad_a pad_b pad_c);
+        haze_color haze_far shadow_light levels footprint pad_c);
     assert_eq!(members(&module, "Frame"), frame);
     assert_eq!(
         members(&module, "Light"),

@@ -100,4 +100,20 @@ pub(super) const TABLE: &[Param] = &[
         Uniform,
         "Most quads one view ray goes through, the nearest first; those behind are left out.",
     ),
+    p(
+        "trace.filter",
+        "",
+        "",
+        Choice(&["none", "pyramid"]),
+        Upload,
+        "pyramid: where a pixel sees many cells, coarser levels of the volume are walked, so that nothing aliases.",
+    ),
+    p(
+        "trace.lookup",
+        "",
+        "",
+        Choice(&["nearest", "trilinear"]),
+        Uniform,
+        "nearest: cells are blocks; trilinear: ρ, k and v are interpolated between eight cells, for close views.",
+    ),
 ];

@@ -1,0 +1,42 @@
+// Where the levels of the volume lie in its texture: the volume itself first, behind it along z the coarse levels, one
+// after the other along y. Shared by the stages visibility and integrate. Twin: src/volume/pyramid.rs, Stack.
+
+// Whether there are coarse levels.
+override PYRAMID: bool = false;
+
+struct Level {
+    // 0: the volume itself.
+    number: u32,
+    offset: vec3<i32>,
+    size: vec3<i32>,
+    // Its cells per cell of the volume.
+    scale: vec3<f32>,
+    // Cells of the volume in the depth of one of its.
+    deep: f32,
+}
+
+fn level_size(size: vec3<i32>, number: u32) -> vec3<i32> {
+    return ((size - 1) >> vec3<u32>(number)) + 1;
+}
+
+fn level_new(size: vec3<i32>, number: u32) -> Level {
+    var level = Level(number, vec3<i32>(0), size, vec3<f32>(1.0), 1.0);
+    if PYRAMID && number > 0u {
+        level.size = level_size(size, number);
+        level.offset.z = (size.z + 3) & ~3;
+        for (var l = 1u; l < number; l++) {
+            level.offset.y += level_size(size, l).y;
+        }
+        level.scale = vec3<f32>(level.size) / vec3<f32>(size);
+        level.deep = 1.0 / level.scale.z;
+    }
+    return level;
+}
+
+// Place in the texture of a cell of a level.
+fn in_level(cell: vec3<i32>, level: Level) -> vec3<i32> {
+    if PYRAMID {
+        return cell + level.offset;
+    }
+    return cell;
+}

@@ -1,0 +1,302 @@
+//! The volume texture prefiltered: levels of half as many cells along each axis, for views that see many cells in
+//! one pixel.
+//!
+//! A coarse cell stands for all cells in its part of the volume (where a number of cells is odd, for parts of them: the
+//! copies of the volume still join without a seam):
+//!
+//! - **ρ covers as much.** Light goes straight through between strands, so that the mean density would hide too
+//!   much of what is behind. With T the mean transmittance of the finer cells' columns along z, the coarse cell has
+//!   the ρ that lets T pass: −log₂ T over the column's length in [`bits`].
+//! - **Directions stay a distribution.** The second moments Σ w·v·vᵀ/Σ w of the unit directions v, w = ρ, are kept as in
+//!   SGGX (Heitz, Dupuy, Crassin and Dachsbacher 2015), so that strands that cross do not become one between them.
+//! - k_d and k_s are means weighted by ρ.
+//!
+//! A level is a volume texture of fewer cells, whose second word holds moments in place of v:
+//!
+//! | bits | what |
+//! |---|---|
+//! | 0–6, 7–13 | √xx and √zz in 127ths; yy = 1 − xx − zz |
+//! | 14–19, 20–25, 26–31 | xy, xz and yz over the product of the two roots, in 31sts, signed |
+//!
+//! One direction has correlations of ±1, which have codes of their own: it stays one.
+
+use std::sync::Arc;
+
+use glam::{DVec3, UVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{Cell, VolumeTexture};
+use crate::gpu::layout::extinction;
+use crate::scene::{Attenuation, Prefilter, Scene};
+
+/// Levels of a volume, the volume itself first; shared as its cells are.
+pub type Levels = Arc<Vec<VolumeTexture>>;
+
+/// Second moments of directions: xx, yy, zz and xy, xz, yz. Their scale cancels in the fibre model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// xx, yy, zz.
+    pub diagonal: Vec3,
+    /// xy, xz, yz.
+    pub mixed: Vec3,
+}
+
+impl Moments {
+    /// v·vᵀ.
+    pub fn of(v: Vec3) -> Self {
+        Moments { diagonal: v * v, mixed: Vec3::new(v.x * v.y, v.x * v.z, v.y * v.z) }
+    }
+
+    /// S·v.
+    pub fn times(&self, v: Vec3) -> Vec3 {
+        let (d, m) = (self.diagonal, self.mixed);
+        Vec3::new(
+            d.x * v.x + m.x * v.y + m.y * v.z,
+            m.x * v.x + d.y * v.y + m.z * v.z,
+            m.y * v.x + m.z * v.y + d.z * v.z,
+        )
+    }
+
+    /// The word of a coarse cell; of moments whose trace is 1.
+    pub fn packed(&self) -> u32 {
+        let root = self.diagonal.max(Vec3::ZERO).map(f32::sqrt);
+        let over = |product: f32, a: f32, b: f32| (product / (a * b).max(1e-12)).clamp(-1.0, 1.0);
+        let r = [
+            over(self.mixed.x, root.x, root.y),
+            over(self.mixed.y, root.x, root.z),
+            over(self.mixed.z, root.y, root.z),
+        ];
+        let [xy, xz, yz] = r.map(|r| (r * 31.0).round() as i32 as u32 & 63);
+        let share = |x: f32| (x.min(1.0) * 127.0).round() as u32;
+        share(root.x) | share(root.z) << 7 | xy << 14 | xz << 20 | yz << 26
+    }
+
+    /// Of the word of a coarse cell.
+    #[inline]
+    pub fn unpacked(word: u32) -> Self {
+        let share = |shift: u32| (word >> shift & 127) as f32 * (1.0 / 127.0);
+        let (x, z) = (share(0), share(7));
+        let yy = (1.0 - x * x - z * z).max(0.0);
+        let y = yy.sqrt();
+        let r = |shift: u32| ((word << shift) as i32 >> 26) as f32 * (1.0 / 31.0);
+        Moments {
+            diagonal: Vec3::new(x * x, yy, z * z),
+            mixed: Vec3::new(r(12) * (x * y), r(6) * (x * z), r(0) * (y * z)),
+        }
+    }
+}
+
+/// Cells of level `level` of a volume of `size`.
+pub fn level_size(size: [u32; 3], level: u32) -> [u32; 3] {
+    size.map(|n| ((n - 1) >> level) + 1)
+}
+
+/// Levels of a volume of `size` cells, itself included: down to one cell across the face, as far as they fit beside one
+/// another in [`Stack`].
+pub fn level_count(size: [u32; 3]) -> u32 {
+    let coarse = size[0].max(size[1]).next_power_of_two().trailing_zeros();
+    let mut height = 0;
+    let fits = |level: &u32| {
+        height += level_size(size, *level)[1];
+        height <= size[1]
+    };
+    1 + (1..=coarse).take_while(fits).count() as u32
+}
+
+/// Bytes of all coarse levels.
+pub fn pyramid_bytes(size: [u32; 3]) -> u128 {
+    let cells = |level| level_size(size, level).iter().map(|&n| u128::from(n)).product::<u128>();
+    (1..level_count(size)).map(cells).sum::<u128>() * size_of::<Cell>() as u128
+}
+
+/// Where levels lie in one texture: the volume itself first, behind it along z the coarse levels, one after the other
+/// along y. Twin: `shaders/levels.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stack {
+    /// Of the volume itself.
+    pub size: [u32; 3],
+    /// Number of levels, 1: the volume alone.
+    pub count: u32,
+}
+
+impl Stack {
+    /// Of the levels that a scene looks into, of a volume of `size` cells.
+    pub fn of(scene: &Scene, size: [u32; 3]) -> Self {
+        let count = match scene.trace.filter {
+            Prefilter::None => 1,
+            Prefilter::Pyramid => level_count(size),
+        };
+        Stack { size, count }
+    }
+
+    /// Of levels.
+    pub fn new(levels: &[VolumeTexture]) -> Self {
+        Stack { size: levels[0].size, count: levels.len() as u32 }
+    }
+
+    /// The first cell of a level.
+    pub fn place(&self, level: u32) -> [u32; 3] {
+        match level {
+            0 => [0; 3],
+            // Words of four codes along z, of light volumes, belong to one level.
+            _ => [0, (1..level).map(|l| level_size(self.size, l)[1]).sum(), self.size[2].next_multiple_of(4)],
+        }
+    }
+
+    /// Cells of the texture.
+    pub fn extent(&self) -> [u32; 3] {
+        let [nx, ny, nz] = self.size;
+        if self.count == 1 { self.size } else { [nx, ny, nz.next_multiple_of(4) + level_size([nx, ny, nz], 1)[2]] }
+    }
+}
+
+/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with. Of
+/// several materials of strands the mean thickness counts, quad by quad.
+pub fn bits(scene: &Scene, volume: &VolumeTexture) -> f32 {
+    let extinction = extinction(&scene.trace.attenuation, volume.alpha);
+    if matches!(scene.trace.attenuation, Attenuation::PerCell { .. }) {
+        return extinction;
+    }
+    let strands = scene.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
+    let (count, sum) = strands.fold((0.0, 0.0), |(count, sum), thickness| (count + 1.0, sum + thickness));
+    extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
+}
+
+/// The levels that a scene looks into.
+pub fn levels_of(scene: &Scene, volume: &VolumeTexture) -> Levels {
+    KeptLevels::default().get(scene, volume)
+}
+
+/// Levels that are kept from frame to frame.
+#[derive(Default)]
+pub struct KeptLevels(Option<(Option<f32>, Levels)>);
+
+impl KeptLevels {
+    /// The levels that a scene looks into, made unless they are those of the last call.
+    pub fn get(&mut self, scene: &Scene, volume: &VolumeTexture) -> Levels {
+        let bits = (scene.trace.filter == Prefilter::Pyramid).then(|| bits(scene, volume));
+        if let Some((of, levels)) = &self.0
+            && *of == bits
+            && Arc::ptr_eq(&levels[0].cells, &volume.cells)
+            && levels[0].size == volume.size
+        {
+            return levels.clone();
+        }
+        // The old ones go first: both might not fit.
+        self.0 = None;
+        let mut levels = vec![volume.clone()];
+        if let Some(bits) = bits {
+            levels.extend(coarse_levels(volume, bits));
+        }
+        let levels = Arc::new(levels);
+        self.0 = Some((bits, levels.clone()));
+        levels
+    }
+}
+
+/// Level 1 and on; `bits` as in the function of that name.
+pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
+    let mut levels = Vec::new();
+    let mut means: Vec<Mean> = Vec::new();
+    for level in 1..level_count(volume.size) {
+        let (fine, coarse) = (level_size(volume.size, level - 1), level_size(volume.size, level));
+        let depth = f64::from(bits) * f64::from(volume.size[2]) / f64::from(fine[2]);
+        means = match level {
+            1 => halved(fine, coarse, depth, |i| Mean::of(volume.cells[i])),
+            _ => halved(fine, coarse, depth, |i| means[i]),
+        };
+        let cells = Arc::new(means.iter().map(Mean::packed).collect());
+        levels.push(VolumeTexture { size: coarse, alpha: volume.alpha, cells });
+    }
+    levels
+}
+
+/// A cell of any level, before it is packed.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    /// In codes of the volume's cells.
+    rho: f64,
+    k: [f64; 2],
+    diagonal: DVec3,
+    mixed: DVec3,
+}
+
+impl Mean {
+    fn of(cell: Cell) -> Self {
+        let (k_d, k_s) = cell.k_codes();
+        let moments = Moments::of(cell.v());
+        Mean {
+            rho: cell.rho_code().into(),
+            k: [k_d.into(), k_s.into()],
+            diagonal: moments.diagonal.as_dvec3(),
+            mixed: moments.mixed.as_dvec3(),
+        }
+    }
+
+    fn packed(&self) -> Cell {
+        let [k_d, k_s] = self.k.map(|k| (k + 0.5) as u32);
+        let rho = ((self.rho + 0.5) as u32).min(0xffff);
+        let trace = self.diagonal.element_sum();
+        if rho == 0 || trace <= 0.0 {
+            return Cell { x: rho | k_d << 16 | k_s << 24, y: 0 };
+        }
+        let moments =
+            Moments { diagonal: (self.diagonal / trace).as_vec3(), mixed: (self.mixed / trace).as_vec3() };
+        Cell { x: rho | k_d << 16 | k_s << 24, y: moments.packed() }
+    }
+}
+
+/// The part that cell `i` of `coarse` along an axis takes of which cells of `fine`: first one, and its and the following
+/// ones' shares in it.
+fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
+    let step = f64::from(fine) / f64::from(coarse);
+    let (from, to) = (f64::from(i) * step, f64::from(i + 1) * step);
+    let first = from.floor();
+    let share = |n: f64| (to.min(first + n + 1.0) - from.max(first + n)).max(0.0);
+    (first as u32, [share(0.0), share(1.0), share(2.0)])
+}
+
+/// `depth`: bits along a fine cell's depth per unit of ρ.
+fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, of: impl Fn(usize) -> Mean + Sync) -> Vec<Mean> {
+    let [nx, ny, nz] = coarse.map(|n| n as usize);
+    (0..nx * ny * nz)
+        .into_par_iter()
+        .map(|i| {
+            let at = UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32).to_array();
+            let [(x0, xs), (y0, ys), (z0, zs)] =
+                [0, 1, 2].map(|axis| parts(fine[axis], coarse[axis], at[axis]));
+            let (mut sum, mut passed, mut area) = (Mean::default(), 0.0, 0.0);
+            for (y, wy) in (y0..).zip(ys).filter(|part| part.1 > 1e-9) {
+                for (x, wx) in (x0..).zip(xs).filter(|part| part.1 > 1e-9) {
+                    let mut column = 0.0;
+                    for (z, wz) in (z0..).zip(zs).filter(|part| part.1 > 1e-9) {
+                        let index = (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
+                        let cell = of(index);
+                        let weight = cell.rho * wx * wy * wz;
+                        column += cell.rho * wz;
+                        sum.rho += weight;
+                        sum.k = [0, 1].map(|c| sum.k[c] + weight * cell.k[c]);
+                        sum.diagonal += cell.diagonal * weight;
+                        sum.mixed += cell.mixed * weight;
+                    }
+                    passed += wx * wy * (-column * depth).exp2();
+                    area += wx * wy;
+                }
+            }
+            if sum.rho == 0.0 {
+                return Mean::default();
+            }
+            let length = zs.iter().sum::<f64>();
+            let mean = sum.rho / (area * length);
+            // Without extinction nothing is hidden, whatever the density.
+            let rho =
+                if depth > 0.0 { -(passed / area).max(1e-300).log2() / (depth * length) } else { mean };
+            Mean {
+                rho: rho.min(mean),
+                k: sum.k.map(|k| k / sum.rho),
+                diagonal: sum.diagonal / sum.rho,
+                mixed: sum.mixed / sum.rho,
+            }
+        })
+        .collect()
+}
