@@ -77,7 +77,7 @@ fn ray_light(i: u32, place: Place, level: Level, count: u32) -> RayLight {
     if CACHED {
         out.places = light_places_of(place.quad_number * count + i, place.uv);
     }
-    if in_colour() {
+    if in_colour() || many_directions() {
         let cosine = dot3(to_light, place.d_world);
         out.l_dot_e = -cosine;
         if MULTIPLE {
@@ -124,17 +124,18 @@ fn is_mist(view: View) -> bool {
 }
 
 // 255·Ψ of strands, or of mist.
-fn psi_of(seen: Seen, l_v: vec3<f32>, view: View) -> f32 {
+fn psi_of(seen: Seen, light: RayLight, view: View) -> f32 {
     if many_directions() {
-        return select(spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, l_v), view.matter.mist, is_mist(view));
+        let psi = spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
+        return select(psi, view.matter.mist, is_mist(view));
     }
-    let strands = psi(view.p, seen.k_d, seen.k_s, seen.v, l_v, seen.t_dot_e, seen.sin2_e, seen.inverse_q);
+    let strands = psi(view.p, seen.k_d, seen.k_s, seen.v, light.l_v, seen.t_dot_e, seen.sin2_e, seen.inverse_q);
     return select(strands, view.matter.mist, is_mist(view));
 }
 
 // What a cell sends to the eye of a light of intensity 1, in 255ths.
 fn lit(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
-    let fibre = psi_of(seen, light.l_v, view);
+    let fibre = psi_of(seen, light, view);
     return seen.weight * fibre * visibility_of(seen, light, view, ray).x;
 }
 
@@ -152,7 +153,7 @@ fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
         let k_d = seen.k_d;
         lit = weight * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot.x, t_dot.y, light.l_dot_e);
     } else {
-        let fibre = psi_of(seen, light.l_v, view);
+        let fibre = psi_of(seen, light, view);
         lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
     }
     if MULTIPLE {

@@ -133,11 +133,14 @@ fn spread_of_one(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
 }
 
 // Ψ of many directions.
-fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>) -> f32 {
+fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>, l_dot_e: f32) -> f32 {
     let cosines = spread_cosines(spread, l_v);
     let sin2_l = max(1.0 - cosines.x, 0.0);
     let sin2_e = max(1.0 - spread.cos2_e, 0.0);
-    let base = clamp(sqrt(sin2_l * sin2_e) - cosines.y + 0.5 * spread.variance, 0.0, 1.0);
-    let wide = 1.0 + p * spread.variance;
+    let root = sqrt(sin2_l * sin2_e);
+    let cos_phi = clamp((l_dot_e - cosines.y) / max(root, 1e-6), -1.0, 1.0);
+    let variance = spread.variance * (1.0 + cos_phi);
+    let base = clamp(root - cosines.y + 0.5 * variance, 0.0, 1.0);
+    let wide = 1.0 + p * variance;
     return k_d * sqrt(sin2_l) + k_s * pow(base, p / wide) / sqrt(wide);
 }

@@ -46,8 +46,9 @@ fn pass_cell(
     let t_exit = walk_exit(*walk);
     let rho = matter_rho(f32(textureLoad(volume, in_level((*walk).cell, level)).x & 0xffffu), matter);
     if PER_CELL {
-        // The cell itself does not hide its own light.
-        (*ray).depth += select(rho, 0.0, (*ray).done | ((*ray).cells == 0u));
+        // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+        let own = 0.5 - 0.5 * level.scale.z;
+        (*ray).depth += select(rho * select(1.0, own, (*ray).cells == 0u), 0.0, (*ray).done);
     } else {
         (*ray).depth += select(rho * (t_exit - (*ray).t), 0.0, (*ray).done);
     }

@@ -72,8 +72,6 @@ pub struct Spread {
     inverse_q: f32,
     /// Mean of (t·e)².
     cos2_e: f32,
-    /// How far directions t part in the world: 1 − Σ λ² over the eigenvalues of Σ w·t·tᵀ, halved; for a narrow bundle the
-    /// variance of their angle from its axis, in radians squared.
     variance: f32,
 }
 
@@ -101,6 +99,12 @@ impl Spread {
         }
     }
 
+    /// How far directions part in the world: (1 − Σ λ²)/2 over the eigenvalues λ of Σ w·t·tᵀ; for a narrow bundle the
+    /// variance of their angle from its axis, in radians squared.
+    pub fn variance(&self) -> f32 {
+        self.variance
+    }
+
     /// Mean of (t·l)², and of (t·l)(t·e).
     pub fn cosines(&self, l_v: Vec3) -> [f32; 2] {
         [self.moments.times(l_v).dot(l_v) * self.inverse_q, self.s_e.dot(l_v)]
@@ -113,15 +117,21 @@ impl Spread {
         [cos2_l.clamp(0.0, 1.0).sqrt(), if product < 0.0 { -e } else { e }]
     }
 
-    /// Ψ: the highlight is folded with the directions' spread. Where the base x of x^p is the cosine of an angle δ,
-    /// x^p is about e^(−pδ²/2); folded with a Gaussian of variance s² it is that of p/(1 + p·s²), lower by the root.
-    pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3) -> f32 {
+    /// Ψ: the highlight is folded with the directions' spread. `l_dot_e` is the cosine between light and eye.
+    ///
+    /// x^p, with x the cosine of an angle δ, is about e^(−pδ²/2); folded with a Gaussian of variance s² it is that of
+    /// p/(1 + p·s²), lower by the root. δ is the sum of the angles that light and eye make with the flow; it turns
+    /// with the direction by the sum of their unit vectors across the flow, whose square is 2 + 2 cos φ.
+    pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
         let [cos2_l, product] = self.cosines(l_v);
         let sin2_l = (1.0 - cos2_l).max(0.0);
         let sin2_e = (1.0 - self.cos2_e).max(0.0);
+        let root = (sin2_l * sin2_e).sqrt();
+        let cos_phi = ((l_dot_e - product) / root.max(1e-6)).clamp(-1.0, 1.0);
+        let variance = self.variance * (1.0 + cos_phi);
         // The means have lost about half the variance at the highlight's middle, which the folding counts.
-        let base = ((sin2_l * sin2_e).sqrt() - product + 0.5 * self.variance).clamp(0.0, 1.0);
-        let wide = 1.0 + p * self.variance;
+        let base = (root - product + 0.5 * variance).clamp(0.0, 1.0);
+        let wide = 1.0 + p * variance;
         k_d * sin2_l.sqrt() + k_s * base.powf(p / wide) / wide.sqrt()
     }
 }

@@ -16,7 +16,9 @@ use crate::job::Monitor;
 use crate::mapping::{CellFrame, QuadMap};
 use crate::scatter::media::{Media, thicknesses};
 use crate::scatter::multiple;
-use crate::scene::{AngleFrame, Attenuation, Light, Lookup, Prefilter, Quad, Reflection, Scattering, Scene, Visibility};
+use crate::scene::{
+    AngleFrame, Attenuation, Light, Lookup, Prefilter, Quad, Reflection, Scattering, Scene, Visibility,
+};
 use crate::shading::{Metric, Spread, fibre_angles, specular_power};
 use crate::strand::table::StrandShading;
 use crate::visibility::{LightVolumes, Medium};
@@ -130,7 +132,8 @@ impl<'a> Integrator<'a> {
         let mut integrator = Integrator::with_levels(scene, kept.levels.get(scene, volume));
         if scene.visibility == Visibility::Cached {
             let light_volumes = LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?;
-            integrator.filled = Some(kept.get(&light_volumes, &integrator.levels, scene.trace.lookup, monitor)?);
+            integrator.filled =
+                Some(kept.get(&light_volumes, &integrator.levels, scene.trace.lookup, monitor)?);
             integrator.light_volumes = Some(light_volumes);
         } else {
             kept.forget();
@@ -372,7 +375,7 @@ impl<'a> Integrator<'a> {
                         return matter.mist;
                     }
                     if let Some(spread) = &spread {
-                        return spread.psi(k_d, k_s, scene.p, light.l_v);
+                        return spread.psi(k_d, k_s, scene.p, light.l_v, light.l_dot_e);
                     }
                     let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
                     k_d * sin_l + k_s * specular_power(base.max(0.0), scene.p)

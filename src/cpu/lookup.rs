@@ -126,7 +126,14 @@ pub fn footprint(camera: &Camera, image: &Image) -> f32 {
 
 /// Which level's cells are as large as a sample's footprint, and the share of the next: 4^level cells lie
 /// across the ray in it. The ray goes along the unit vector `d_world` for `t` metres.
-pub fn level_at(footprint: f32, forward: Vec3, d_world: Vec3, t: f32, frame: &CellFrame, d_cell: Vec3) -> f32 {
+pub fn level_at(
+    footprint: f32,
+    forward: Vec3,
+    d_world: Vec3,
+    t: f32,
+    frame: &CellFrame,
+    d_cell: Vec3,
+) -> f32 {
     let c = d_world.dot(forward);
     let area = footprint * (c * c * c) * (t * t);
     let across = area / (frame.det.abs() * frame.depth * d_cell.length());

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::Lookup;
 use crate::visibility::{DARK_BITS, Form, LightVolume, LightVolumes, Medium, transmittance_code};
-use crate::volume::{KeptLevels, Levels, VolumeTexture};
+use crate::volume::{KeptLevels, Levels};
 use crate::walk::{NEVER, Walk};
 
 /// Light volumes that are kept from frame to frame.
@@ -115,7 +115,7 @@ fn filled<T: Copy + Default + Send>(level: &Level, lookup: Lookup, of: impl Fn(I
 pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Medium, form: Form) -> f32 {
     let depth = |enough: f32| {
         let direction = light_volume.direction * level.scale;
-        optical_depth(level.volume, &Matter::WHOLE, cell, direction, medium, enough, &mut 0)
+        optical_depth(level, &Matter::WHOLE, cell, direction, medium, enough, &mut 0)
     };
     let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
     match form {
@@ -124,10 +124,10 @@ pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Me
     }
 }
 
-/// From the middle of `start` to where the light ray leaves the slab: Σ ρ code × length, in units of
+/// From the middle of the cell `start` of a level to where the light ray leaves the slab: Σ ρ code × length, in units of
 /// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. Ends early where the depth is `enough`. `walked` grows by the cells of the way.
 pub fn optical_depth(
-    volume: &VolumeTexture,
+    level: &Level,
     matter: &Matter,
     start: IVec3,
     direction: Vec3,
@@ -135,19 +135,18 @@ pub fn optical_depth(
     enough: f32,
     walked: &mut u32,
 ) -> f32 {
-    let size = glam::UVec3::from(volume.size).as_ivec3();
     let mut depth = 0.0f32;
-    let walk = Walk::new(size, start.as_vec3() + 0.5, direction, f32::INFINITY);
+    let walk = Walk::new(level.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
     for (n, crossing) in walk.take(medium.max_cells as usize).enumerate() {
-        if crossing.cell.z < 0 || crossing.cell.z >= size.z {
+        if crossing.cell.z < 0 || crossing.cell.z >= level.size.z {
             break;
         }
         *walked += 1;
-        let c = crossing.cell.as_uvec3();
-        let rho = matter.rho(volume.cells[volume.index(c.x, c.y, c.z)].rho_code() as f32);
+        let rho = matter.rho(level.cell(crossing.cell).rho_code() as f32);
         if medium.per_cell {
-            // The cell itself does not hide its own light.
-            depth += if n == 0 { 0.0 } else { rho };
+            // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+            let own = 0.5 - 0.5 * level.scale.z;
+            depth += rho * if n == 0 { own } else { 1.0 };
         } else {
             depth += rho * (crossing.t_exit - crossing.t_enter);
         }

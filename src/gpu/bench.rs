@@ -85,7 +85,8 @@ impl GpuBench {
             if let Some(light_volumes) = light_volumes {
                 let up = up()?;
                 let volumes = light_volumes.clone();
-                filled = visibility.get(gpu, timer, &up, &frame, volumes, scene.trace.lookup, |_, _| Ok(()))?.0;
+                filled =
+                    visibility.get(gpu, timer, &up, &frame, volumes, scene.trace.lookup, |_, _| Ok(()))?.0;
                 if !passes.iter().any(|(name, _)| *name == "light volumes") {
                     work.push(("light volumes", Work::Visibility(light_volumes, scene.trace.lookup)));
                 }

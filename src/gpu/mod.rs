@@ -254,8 +254,15 @@ impl GpuRenderer {
                 let mut frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
                 frame.max_cells = light_volumes.medium.max_cells;
                 let watch = |done, all| monitor.progress("light volumes", done, all);
-                let found =
-                    self.visibility.get(gpu, &self.timer, &up, &frame, light_volumes, scene.trace.lookup, watch)?;
+                let found = self.visibility.get(
+                    gpu,
+                    &self.timer,
+                    &up,
+                    &frame,
+                    light_volumes,
+                    scene.trace.lookup,
+                    watch,
+                )?;
                 seconds.visibility = found.1;
                 found.0
             }

@@ -203,7 +203,12 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
     Ok(texture.create_view(&Default::default()))
 }
 
-fn upload_level(gpu: &Gpu, texture: &wgpu::Texture, [x, y, z]: [u32; 3], volume: &VolumeTexture) -> Result<()> {
+fn upload_level(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    [x, y, z]: [u32; 3],
+    volume: &VolumeTexture,
+) -> Result<()> {
     let [nx, ny, _] = volume.size;
     let layer = nx as usize * ny as usize;
     let layers = (SLAB_BYTES / (layer * size_of::<Cell>())).max(1);

@@ -231,7 +231,8 @@ impl Visibility {
             let [_, y0, z0] = stack.place(number);
             let occupied = |x: u32, y: u32, z: u32| {
                 everywhere
-                    || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cells[level.index(x, y, z)].rho_code() > 0)
+                    || (z..(z + CELLS_A_WORD).min(nz))
+                        .any(|z| level.cells[level.index(x, y, z)].rho_code() > 0)
             };
             for z in (0..nz).step_by(CELLS_A_WORD as usize) {
                 let column = |x, y| ((z0 + z) / CELLS_A_WORD * height + y0 + y) * width + x;

@@ -29,8 +29,8 @@ pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Rock, wet::wet_albedo, wet::wetness};
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use types::{
-    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Lookup, Prefilter, Quad,
-    Reflection, Scattering, Tone, Trace, Visibility,
+    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Lookup,
+    Prefilter, Quad, Reflection, Scattering, Tone, Trace, Visibility,
 };
 pub use value::{Key, Place, Raw, Value, Values};
 

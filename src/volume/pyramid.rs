@@ -146,7 +146,11 @@ impl Stack {
     /// Cells of the texture.
     pub fn extent(&self) -> [u32; 3] {
         let [nx, ny, nz] = self.size;
-        if self.count == 1 { self.size } else { [nx, ny, nz.next_multiple_of(4) + level_size([nx, ny, nz], 1)[2]] }
+        if self.count == 1 {
+            self.size
+        } else {
+            [nx, ny, nz.next_multiple_of(4) + level_size([nx, ny, nz], 1)[2]]
+        }
     }
 }
 
@@ -157,7 +161,8 @@ pub fn bits(scene: &Scene, volume: &VolumeTexture) -> f32 {
     if matches!(scene.trace.attenuation, Attenuation::PerCell { .. }) {
         return extinction;
     }
-    let strands = scene.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
+    let strands =
+        scene.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
     let (count, sum) = strands.fold((0.0, 0.0), |(count, sum), thickness| (count + 1.0, sum + thickness));
     extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
 }
@@ -270,7 +275,8 @@ fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, of: impl Fn(usize) -> Me
                 for (x, wx) in (x0..).zip(xs).filter(|part| part.1 > 1e-9) {
                     let mut column = 0.0;
                     for (z, wz) in (z0..).zip(zs).filter(|part| part.1 > 1e-9) {
-                        let index = (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
+                        let index =
+                            (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
                         let cell = of(index);
                         let weight = cell.rho * wx * wy * wz;
                         column += cell.rho * wz;
@@ -289,8 +295,7 @@ fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, of: impl Fn(usize) -> Me
             let length = zs.iter().sum::<f64>();
             let mean = sum.rho / (area * length);
             // Without extinction nothing is hidden, whatever the density.
-            let rho =
-                if depth > 0.0 { -(passed / area).max(1e-300).log2() / (depth * length) } else { mean };
+            let rho = if depth > 0.0 { -(passed / area).max(1e-300).log2() / (depth * length) } else { mean };
             Mean {
                 rho: rho.min(mean),
                 k: sum.k.map(|k| k / sum.rho),

@@ -24,6 +24,7 @@ mod mapping;
 mod movie;
 mod place;
 mod presets;
+mod pyramid;
 mod ray;
 mod readme;
 mod scatter;

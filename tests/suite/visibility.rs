@@ -1,6 +1,7 @@
 //! Cached visibility: light volumes say what an exact walk from every cell would.
 
 use glam::{IVec3, Vec3};
+use taki::cpu::lookup::Level;
 use taki::cpu::{self, Matter, visibility::optical_depth};
 use taki::frame::Frame;
 use taki::job::Unwatched;
@@ -123,7 +124,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
         for z in [0, 7, 39] {
             let cell = IVec3::new(3, 5, z);
             let depth = optical_depth(
-                &uniform,
+                &Level::new(std::slice::from_ref(&uniform), 0),
                 &Matter::WHOLE,
                 cell,
                 volumes.volumes[0].direction,
@@ -138,8 +139,15 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     // Per cell the cell itself does not hide its own light.
     let medium = Medium { per_cell: true, max_cells: 512 };
     let mut walked = 0;
-    let depth =
-        optical_depth(&uniform, &Matter::WHOLE, IVec3::new(3, 5, 7), Vec3::NEG_Z, medium, NEVER, &mut walked);
+    let depth = optical_depth(
+        &Level::new(&[uniform], 0),
+        &Matter::WHOLE,
+        IVec3::new(3, 5, 7),
+        Vec3::NEG_Z,
+        medium,
+        NEVER,
+        &mut walked,
+    );
     assert_eq!((depth, walked), (7.0 * 65535.0, 8));
 }
 
@@ -256,10 +264,11 @@ fn a_kept_walk_that_ends_in_the_dark_has_the_code_of_the_whole_one() {
     let direction = Vec3::new(3.0, 0.7, -0.1);
     let bits = 1e-5;
     let (mut whole, mut early) = (0, 0);
+    let level = Level::new(std::slice::from_ref(&volume), 0);
     for x in 0..40 {
         let cell = IVec3::new(x, 9, 30);
         let depth = |enough, walked: &mut u32| {
-            optical_depth(&volume, &Matter::WHOLE, cell, direction, medium, enough, walked) * bits
+            optical_depth(&level, &Matter::WHOLE, cell, direction, medium, enough, walked) * bits
         };
         let codes = [depth(NEVER, &mut whole), depth(DARK_BITS / bits, &mut early)].map(transmittance_code);
         assert_eq!(codes[0], codes[1], "{x}");

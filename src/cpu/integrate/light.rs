@@ -82,8 +82,7 @@ impl Integrator<'_> {
                 matter.depth(cell.z, light.l_cell, level.size.z, self.per_cell) * extinction
             }
             Visibility::March => {
-                optical_depth(level.volume, matter, cell, light.l_cell, self.medium, NEVER, walked)
-                    * extinction
+                optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked) * extinction
             }
             Visibility::Cached => {
                 let kept = self.kept_of(level, cell, &light.places);
