@@ -117,6 +117,8 @@ const PASSES: &[Step] = &[
     ("integrate", &[]),
     ("integrate march", &["light.visibility=march"]),
     ("integrate cached", &["light.visibility=cached"]),
+    ("integrate pyramid", &["trace.filter=pyramid"]),
+    ("integrate trilinear", &["trace.lookup=trilinear"]),
 ];
 
 /// The steps of light in water, on `fig5` with ten times its density: each is the one before and more. The README
