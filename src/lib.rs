@@ -27,6 +27,7 @@
 
 pub mod camera;
 pub mod cli;
+pub mod contact_sheet;
 pub mod cpu;
 pub mod curve;
 pub mod environment;
@@ -45,7 +46,6 @@ pub mod random;
 pub mod scatter;
 pub mod scene;
 pub mod shading;
-pub mod sheet;
 pub mod strand;
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -8,6 +8,7 @@ mod batch;
 mod big;
 mod closed_forms;
 mod compare;
+mod contact_sheet;
 mod curve;
 mod environment;
 mod falling;
@@ -31,7 +32,6 @@ mod scatter;
 mod scene;
 mod shaders;
 mod shading;
-mod sheet;
 mod strand;
 mod tolerance;
 #[cfg(feature = "viewer")]

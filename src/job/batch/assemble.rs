@@ -8,13 +8,13 @@ use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
 use super::{Batch, Pattern, Sweep, existing};
+use crate::contact_sheet::{Axis, Sheet, draw};
 use crate::cpu::resolve::develop;
 use crate::error::{Error, Result};
 use crate::frame::{Frame, Layer, Output, Window, figures_of, read_exr, read_png, rgb_rows};
 use crate::job::still::{SOFTWARE, scene_text};
 use crate::movie::{Movie, MovieKind, MovieOptions, mark_of};
 use crate::scene::{Look, Scene};
-use crate::sheet::{Axis, Sheet, draw};
 
 /// A file of all frames of a point of the sweep.
 #[derive(Clone, Debug)]

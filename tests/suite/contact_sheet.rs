@@ -2,8 +2,8 @@
 
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
+use taki::contact_sheet::{Axis, LONGEST_SIDE, Layout, Rect, Sheet, draw};
 use taki::error::Error;
-use taki::sheet::{Axis, LONGEST_SIDE, Layout, Rect, Sheet, draw};
 
 fn axis(name: &str, values: impl IntoIterator<Item = impl ToString>) -> Axis {
     Axis { name: name.into(), values: values.into_iter().map(|v| v.to_string()).collect() }
