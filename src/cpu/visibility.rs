@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::Lookup;
 use crate::visibility::{DARK_BITS, Form, LightVolume, LightVolumes, Medium, transmittance_code};
-use crate::volume::{KeptLevels, Levels};
+use crate::volume::{KeptLevels, Levels, same_cells};
 use crate::walk::{NEVER, Walk};
 
 /// Light volumes that are kept from frame to frame.
@@ -66,7 +66,7 @@ impl KeptVolumes {
         monitor: &dyn Monitor,
     ) -> Result<Filled> {
         if let Some(kept) = &self.kept
-            && Arc::ptr_eq(&kept.levels, levels)
+            && same_cells(&kept.levels, levels)
             && kept.lookup == lookup
             && kept.plan.volumes == plan.volumes
             && (kept.plan.medium, kept.plan.form) == (plan.medium, plan.form)

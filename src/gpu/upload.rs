@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene, Vertex};
-use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
+use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture, same_cells};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
 const SLAB_BYTES: usize = 64 << 20;
@@ -126,7 +126,7 @@ impl Uploaded {
 impl Resident {
     fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
         if let Some((old, view)) = &self.volume
-            && Arc::ptr_eq(old, levels)
+            && same_cells(old, levels)
         {
             return Ok(view.clone());
         }

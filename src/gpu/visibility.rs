@@ -1,8 +1,6 @@
 //! §5 Light volumes: the compute pass that fills them, and what is kept of them. CPU twin:
 //! `src/cpu/visibility.rs`; why and in which units: `src/visibility.rs`.
 
-use std::sync::Arc;
-
 use super::device::Gpu;
 use super::layout::{Frame, LightVolume};
 use super::shader;
@@ -11,7 +9,7 @@ use super::upload::Uploaded;
 use crate::error::{Error, Result};
 use crate::scene::Lookup;
 use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
-use crate::volume::{Levels, Stack};
+use crate::volume::{Levels, Stack, same_cells};
 
 /// The text of the stage's own shader.
 pub fn source() -> String {
@@ -138,7 +136,7 @@ impl Visibility {
     ) -> Result<(FilledVolumes, f64)> {
         let everywhere = lookup == Lookup::Trilinear;
         if let Some(kept) = &self.kept
-            && Arc::ptr_eq(&kept.levels, &up.levels)
+            && same_cells(&kept.levels, &up.levels)
             && kept.everywhere == everywhere
             && kept.plan == plan
         {
@@ -218,7 +216,7 @@ impl Visibility {
     /// Linear indices of the columns of cells with density, and their number.
     fn occupied(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
         if let Some((old, all, buffer, count)) = &self.occupied
-            && Arc::ptr_eq(old, levels)
+            && same_cells(old, levels)
             && *all == everywhere
         {
             return (buffer.clone(), *count);

@@ -12,7 +12,7 @@ pub use bundle::{Structure, curve_points};
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
 pub use pyramid::{
-    KeptLevels, Levels, Moments, Stack, coarse_levels, level_count, level_size, levels_of, pyramid_bytes,
+    KeptLevels, Levels, Moments, Stack, coarse_levels, level_count, level_size, levels_of, same_cells,
 };
 pub use ripple::Ripple;
 pub use water::{WaterSpec, build_water, set_density_and_reflection};

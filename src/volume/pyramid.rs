@@ -103,12 +103,6 @@ pub fn level_count(size: [u32; 3]) -> u32 {
     1 + (1..=coarse).take_while(fits).count() as u32
 }
 
-/// Bytes of all coarse levels.
-pub fn pyramid_bytes(size: [u32; 3]) -> u128 {
-    let cells = |level| level_size(size, level).iter().map(|&n| u128::from(n)).product::<u128>();
-    (1..level_count(size)).map(cells).sum::<u128>() * size_of::<Cell>() as u128
-}
-
 /// Where levels lie in one texture: the volume itself first, behind it along z the coarse levels, one after the other
 /// along y. Twin: `shaders/levels.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,6 +161,12 @@ pub fn bits(scene: &Scene, volume: &VolumeTexture) -> f32 {
     extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
 }
 
+/// Whether two have the same cells in memory, whatever their α.
+pub fn same_cells(a: &Levels, b: &Levels) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b.iter()).all(|(a, b)| Arc::ptr_eq(&a.cells, &b.cells) && a.size == b.size)
+}
+
 /// The levels that a scene looks into.
 pub fn levels_of(scene: &Scene, volume: &VolumeTexture) -> Levels {
     KeptLevels::default().get(scene, volume)
@@ -183,7 +183,7 @@ impl KeptLevels {
         if let Some((of, levels)) = &self.0
             && *of == bits
             && Arc::ptr_eq(&levels[0].cells, &volume.cells)
-            && levels[0].size == volume.size
+            && (levels[0].size, levels[0].alpha) == (volume.size, volume.alpha)
         {
             return levels.clone();
         }

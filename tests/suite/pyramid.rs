@@ -7,6 +7,7 @@ use taki::cpu::Matter;
 use taki::cpu::integrate::Integrator;
 use taki::cpu::lookup::Level;
 use taki::frame::Frame;
+use taki::frame::Window;
 use taki::frame::eye::{Flicker, luminance};
 use taki::job::Unwatched;
 use taki::scene::{Lookup, Prefilter, Scene};
@@ -372,9 +373,11 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
     let small =
         ["image.width=40", "image.height=60", "volume.nx=64", "volume.ny=64", "light.visibility=cached"];
     let base = scene("front", &small);
-    let volume = base.volume(1 << 30, &Unwatched).expect("a volume");
-    let steps: [&[&str]; 6] = [
+    let mut volume = base.volume(1 << 30, &Unwatched).expect("a volume");
+    let mut kept = cpu::KeptVolumes::default();
+    let steps: [&[&str]; 7] = [
         &["trace.filter=pyramid"],
+        &["trace.filter=pyramid", "volume.alpha=0.5"],
         &["trace.filter=pyramid", "trace.sigma=40"],
         &["trace.filter=pyramid", "trace.sigma=40", "trace.lookup=trilinear"],
         &["trace.filter=none", "trace.sigma=40"],
@@ -384,10 +387,19 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
     let options = Default::default();
     for step in steps {
         let scene = scene("front", &[&small[..], step].concat());
+        // Copies with another α share their cells.
+        volume.alpha = scene.water.alpha;
         let mesh = scene.mesh();
         let used = renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
         let mut fresh = crate::gpu::renderer("levels anew").expect("as before");
         let fresh = fresh.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
         assert!(used.radiance == fresh.radiance, "{step:?}");
+        let window = Window::whole([scene.image.width, scene.image.height]);
+        let on_cpu = |kept: &mut cpu::KeptVolumes| {
+            cpu::render_samples(&scene, &volume, &mesh, window, 0..1, false, kept, &Unwatched)
+                .expect("a frame")
+        };
+        let used = on_cpu(&mut kept);
+        assert!(used.radiance == on_cpu(&mut Default::default()).radiance, "{step:?}, CPU");
     }
 }
