@@ -11,7 +11,7 @@ pub use bundle::{Structure, curve_points};
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
 pub use ripple::Ripple;
-pub use water::{WaterSpec, build_water, set_density_and_reflection};
+pub use water::{WaterSpec, build_water, kept_water, set_density_and_reflection};
 
 use std::sync::Arc;
 
