@@ -13,25 +13,32 @@
 @group(0) @binding(4) var known_ids: texture_2d_array<u32>;
 @group(0) @binding(5) var<uniform> environment: Environment;
 @group(0) @binding(6) var environment_map: texture_2d<f32>;
+@group(0) @binding(8) var<storage, read> vertices: array<OpaqueVertex>;
 
 struct OpaqueVertex {
-    @location(0) position_world: vec3<f32>,
-    @location(1) normal_world: vec3<f32>,
-    @location(2) albedo: vec3<f32>,
-    // Occlusion, shadow, film of water.
-    @location(3) shade: vec3<f32>,
-    // Number of the pool plus 1; 0: rock.
-    @location(4) pool: u32,
+    position_world: vec3<f32>,
+    occlusion: f32,
+    normal_world: vec3<f32>,
+    shadow: f32,
+    albedo: vec3<f32>,
+    wet: f32,
 }
 
+// In full vectors, for software Vulkan mixes those.
 struct OpaqueVarying {
     @builtin(position) clip: vec4<f32>,
-    @location(0) position_world: vec3<f32>,
-    @location(1) normal_world: vec3<f32>,
-    @location(2) albedo: vec3<f32>,
+    @location(0) position_world_occlusion: vec4<f32>,
+    @location(1) normal_world_shadow: vec4<f32>,
+    @location(2) albedo_wet: vec4<f32>,
+}
+
+struct OpaquePoint {
+    pixel: vec2<u32>,
+    position_world: vec3<f32>,
+    normal_world: vec3<f32>,
+    albedo: vec3<f32>,
     // Occlusion, shadow, film of water.
-    @location(3) shade: vec3<f32>,
-    @location(4) @interpolate(flat) pool: u32,
+    shade: vec3<f32>,
 }
 
 struct OpaqueTargets {
@@ -41,18 +48,27 @@ struct OpaqueTargets {
 }
 
 @vertex
-fn opaque_vertex(in: OpaqueVertex) -> OpaqueVarying {
+fn opaque_vertex(@builtin(vertex_index) number: u32) -> OpaqueVarying {
+    let vertex = vertices[number];
     var out: OpaqueVarying;
-    out.clip = frame.clip_from_world * vec4<f32>(in.position_world, 1.0);
-    out.position_world = in.position_world;
-    out.normal_world = in.normal_world;
-    out.albedo = in.albedo;
-    out.shade = in.shade;
-    out.pool = in.pool;
+    out.clip = frame.clip_from_world * vec4<f32>(vertex.position_world, 1.0);
+    out.position_world_occlusion = vec4<f32>(vertex.position_world, vertex.occlusion);
+    out.normal_world_shadow = vec4<f32>(vertex.normal_world, vertex.shadow);
+    out.albedo_wet = vec4<f32>(vertex.albedo, vertex.wet);
     return out;
 }
 
-fn seen_normal(in: OpaqueVarying) -> vec3<f32> {
+fn opaque_point(in: OpaqueVarying) -> OpaquePoint {
+    var out: OpaquePoint;
+    out.pixel = vec2<u32>(in.clip.xy);
+    out.position_world = in.position_world_occlusion.xyz;
+    out.normal_world = in.normal_world_shadow.xyz;
+    out.albedo = in.albedo_wet.xyz;
+    out.shade = vec3<f32>(in.position_world_occlusion.w, in.normal_world_shadow.w, in.albedo_wet.w);
+    return out;
+}
+
+fn seen_normal(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
     return select(n, -n, dot3(n, to_eye) < 0.0);
@@ -60,7 +76,7 @@ fn seen_normal(in: OpaqueVarying) -> vec3<f32> {
 
 // Lambert, two-sided, with the gloss of a film of water: `sky` is what the surroundings send along the mirrored
 // view.
-fn shade_opaque(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
+fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let distance = sqrt(dot3(to_eye, to_eye));
     let e = to_eye / max(distance, 1e-6);
@@ -101,7 +117,7 @@ fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
 }
 
 // The view against the normal, mirrored.
-fn mirrored(in: OpaqueVarying, n: vec3<f32>) -> vec3<f32> {
+fn mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye / sqrt(max(dot3(to_eye, to_eye), 1e-12));
     return n * (2.0 * dot3(n, e)) - e;
@@ -113,25 +129,16 @@ fn background_radiance(d: vec3<f32>) -> vec3<f32> {
 }
 
 @fragment
-fn opaque_fragment(in: OpaqueVarying) -> OpaqueTargets {
-    if in.pool > 0u {
-        let at = on_pool(in);
-        let n = pool_normal(at);
-        return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
-    }
+fn opaque_fragment(mixed: OpaqueVarying) -> OpaqueTargets {
+    let in = opaque_point(mixed);
     let n = seen_normal(in);
     return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
 }
 
 // Under an environment: on rough rock its film sends back what comes from all around the mirrored view.
 @fragment
-fn opaque_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
-    if in.pool > 0u {
-        let at = on_pool(in);
-        let n = pool_normal(at);
-        let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
-        return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));
-    }
+fn opaque_environment_fragment(mixed: OpaqueVarying) -> OpaqueTargets {
+    let in = opaque_point(mixed);
     let n = seen_normal(in);
     let sky = environment_irradiance(environment, mirrored(in, n));
     return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n), sky);

@@ -34,7 +34,7 @@ struct Surface {
     around: array<vec4<f32>, 768>,
 }
 
-@group(0) @binding(7) var<storage, read> pools: array<Surface>;
+@group(0) @binding(7) var<uniform> pool: Surface;
 
 // sin(2πt), to 3e-5: WGSL leaves the error of its own open.
 fn sin_turns(t: f32) -> f32 {
@@ -68,9 +68,9 @@ fn value_noise(p: vec2<f32>) -> f32 {
     return near + (far - near) * s.y;
 }
 
-fn on_pool(in: OpaqueVarying) -> OpaqueVarying {
-    let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
-    let t = (pools[in.pool - 1u].middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
+fn on_pool(in: OpaquePoint) -> OpaquePoint {
+    let d = view_ray(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
+    let t = (pool.middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
     var at = in;
     if t > 0.0 && t < 1e6 {
         at.position_world = frame.eye_world + d * t;
@@ -78,44 +78,44 @@ fn on_pool(in: OpaqueVarying) -> OpaqueVarying {
     return at;
 }
 
-fn to_eye_unit(in: OpaqueVarying) -> vec3<f32> {
+fn to_eye_unit(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     return to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);
 }
 
-fn pool_normal(in: OpaqueVarying) -> vec3<f32> {
+// Slopes and lift of one wave; `waves`, put after this, adds up those of all.
+fn rise(wave: Wave, toward: vec2<f32>, along: f32, steepest: f32, footprint: f32) -> vec3<f32> {
+    let wide = 3.0 * wave.k * footprint;
+    let blur = 1.0 + wide * wide;
+    let steep = steepest / (blur * blur);
+    let t = wave.k * along + wave.phase;
+    return vec3<f32>(toward * (steep * sin_turns(t + 0.25)), steep * sin_turns(t));
+}
+
+fn straight_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
+    return rise(wave, wave.toward, dot2(wave.toward, p), wave.slope * churn, footprint);
+}
+
+fn ring_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
+    let away = p - wave.toward;
+    let along = max(sqrt(dot2(away, away)), 1e-3);
+    let fall = 1.0 + along * wave.decay;
+    return rise(wave, away / along, along, wave.slope * churn / (fall * fall), footprint);
+}
+
+fn pool_normal(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye_unit(in);
     let pixel = 2.0 * sqrt(dot3(frame.up, frame.up)) / frame.image_height;
     let footprint = sqrt(dot3(to_eye, to_eye)) * pixel / max(e.y, 0.05);
     let p = in.position_world.xz;
     let churn = 1.0 + 1.5 * in.albedo.y;
-    var slope = vec2<f32>(0.0);
-    var lift = 0.0;
-    for (var i = 0u; i < WAVES; i++) {
-        let wave = pools[in.pool - 1u].waves[i];
-        var toward = wave.toward;
-        var along = dot2(toward, p);
-        var steep = wave.slope * churn;
-        if wave.ring > 0.5 {
-            let away = p - wave.toward;
-            along = max(sqrt(dot2(away, away)), 1e-3);
-            toward = away / along;
-            let fall = 1.0 + along * wave.decay;
-            steep /= fall * fall;
-        }
-        let wide = 3.0 * wave.k * footprint;
-        let blur = 1.0 + wide * wide;
-        steep /= blur * blur;
-        let t = wave.k * along + wave.phase;
-        slope += toward * (steep * sin_turns(t + 0.25));
-        lift += steep * sin_turns(t);
-    }
-    let n = vec3<f32>(-slope.x, max(1.0 - lift, 0.3), -slope.y);
+    let sum = waves(p, churn, footprint);
+    let n = vec3<f32>(-sum.x, max(1.0 - sum.z, 0.3), -sum.y);
     return n / sqrt(dot3(n, n));
 }
 
-fn pool_mirrored(in: OpaqueVarying, n: vec3<f32>) -> vec3<f32> {
+fn pool_mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     let e = to_eye_unit(in);
     let r = n * (2.0 * dot3(n, e)) - e;
     let up = vec3<f32>(r.x, max(abs(r.y), 0.01), r.z);
@@ -127,10 +127,10 @@ fn turn(d: vec3<f32>) -> f32 {
     return select(0.25 * (3.0 + p), 0.25 * (1.0 - p), d.z >= 0.0);
 }
 
-fn around(number: u32, position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
-    let o = position - pools[number].middle;
+fn around(position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
+    let o = position - pool.middle;
     let b = dot3(o, r);
-    let radius = pools[number].radius;
+    let radius = pool.radius;
     let c = dot3(o, o) - radius * radius;
     let far = o + r * max(sqrt(max(b * b - c, 0.0)) - b, 0.0);
     let d = far / sqrt(max(dot3(far, far), 1e-12));
@@ -142,15 +142,14 @@ fn around(number: u32, position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
     let x1 = (x0 + 1u) % AROUND_COLUMNS;
     let y0 = u32(floor(t)) * AROUND_COLUMNS;
     let y1 = min(u32(floor(t)) + 1u, AROUND_ROWS - 1u) * AROUND_COLUMNS;
-    let low = pools[number].around[y0 + x0] * (1.0 - f) + pools[number].around[y0 + x1] * f;
-    let high = pools[number].around[y1 + x0] * (1.0 - f) + pools[number].around[y1 + x1] * f;
+    let low = pool.around[y0 + x0] * (1.0 - f) + pool.around[y0 + x1] * f;
+    let high = pool.around[y1 + x0] * (1.0 - f) + pool.around[y1 + x1] * f;
     return low * (1.0 - g) + high * g;
 }
 
-fn shade_pool(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
+fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye_unit(in);
-    let number = in.pool - 1u;
     var irradiance = ambient * (1.0 - in.shade.x);
     var glint = vec3<f32>(0.0);
     for (var i = 0u; i < frame.light_count; i++) {
@@ -167,10 +166,10 @@ fn shade_pool(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32
         let lobe = 33.0 * fresnel(dot3(arrives.xyz, h)) * c * max(dot3(n, arrives.xyz), 0.0);
         glint += light.intensity * (arrives.w * lit * lobe);
     }
-    let mirrors = around(number, in.position_world, pool_mirrored(in, n));
+    let mirrors = around(in.position_world, pool_mirrored(in, n));
     let mirror = mirrors.rgb + sky * (1.0 - mirrors.a);
-    let through = exp2(pools[number].absorption * (-3.174 * in.albedo.x));
-    let body = pools[number].color * (1.0 - through) + pools[number].bottom * through;
+    let through = exp2(pool.absorption * (-3.174 * in.albedo.x));
+    let body = pool.color * (1.0 - through) + pool.bottom * through;
     let back = fresnel(max(dot3(n, e), 0.02));
     let clear = mirror * back + glint + body * irradiance * (1.0 - back);
 
@@ -185,4 +184,19 @@ fn shade_pool(in: OpaqueVarying, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32
     out.radiance = vec4<f32>(haze_over(frame, clear * (1.0 - cover) + foam, d_y, distance), distance);
     out.normal = vec4<f32>(n, 1.0);
     return out;
+}
+
+@fragment
+fn pool_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    let at = on_pool(opaque_point(in));
+    let n = pool_normal(at);
+    return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
+}
+
+@fragment
+fn pool_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
+    let at = on_pool(opaque_point(in));
+    let n = pool_normal(at);
+    let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
+    return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));
 }

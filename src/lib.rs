@@ -18,13 +18,14 @@
 //!    PNG or EXR; many frames become
 //!    a [`movie`] or a labelled [`sheet`].
 //!
-//! [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
+//! [`cache`] keeps volumes and meshes for the next process. [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
 //! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
 //! machines. The command line and the viewer are clients of all this.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod cache;
 pub mod camera;
 pub mod cli;
 pub mod contact_sheet;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
+use super::{CacheOptions, EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
 use crate::error::Result;
 use crate::frame::Layer;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
@@ -33,6 +33,8 @@ Run the same command again to go on: pictures that are there are decoded, and ke
 pub struct BatchArgs {
     #[command(flatten)]
     scene: SceneOptions,
+    #[command(flatten)]
+    cache: CacheOptions,
     /// Pattern of the pictures' names, .png or .exr: #### is the frame's number, {NAME} a sweep's value; or a
     /// movie, .gif, .apng (or .png without ####), .mp4 or .webm. May be given often. Default: PNG files with
     /// the scene's name in the current folder.
@@ -199,7 +201,7 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 }
 
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
-    let animation = args.scene.animation(&args.settings())?;
+    let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
     let request = args.request(&animation)?;
     let batch = Batch::plan(animation, request, terminal)?;
     terminal.close();

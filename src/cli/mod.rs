@@ -19,6 +19,7 @@ use std::time::Duration;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
+use crate::cache::Cache;
 use crate::error::{Error, Result};
 use crate::frame::Window;
 use crate::gpu::DeviceOptions;
@@ -106,8 +107,8 @@ impl SceneOptions {
     }
 
     /// Loads the scene as it moves.
-    fn animation(&self, more: &[String]) -> Result<Animation> {
-        Animation::load(&self.scene, &self.all_sets(more), &self.limits())
+    fn animation(&self, more: &[String], limits: &Limits) -> Result<Animation> {
+        Animation::load(&self.scene, &self.all_sets(more), limits)
     }
 
     fn all_sets(&self, more: &[String]) -> Vec<String> {
@@ -115,6 +116,21 @@ impl SceneOptions {
         sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
         sets.extend_from_slice(more);
         sets
+    }
+}
+
+/// What commands take that render.
+#[derive(Args, Clone)]
+struct CacheOptions {
+    /// Neither takes volumes and meshes from the cache of earlier runs nor leaves them there.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl CacheOptions {
+    fn add_to(&self, limits: Limits) -> Limits {
+        let cache = (!self.no_cache).then(Cache::of_user).flatten();
+        Limits { cache, ..limits }
     }
 }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
+use super::{CacheOptions, EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
 use crate::error::{Error, Result};
 use crate::frame::{Figures, Layer, Window};
 use crate::gpu::RenderOptions;
@@ -37,6 +37,8 @@ pub struct RenderArgs {
     frame: u32,
     #[command(flatten)]
     engine: EngineOptions,
+    #[command(flatten)]
+    cache: CacheOptions,
     /// Layers of the EXR file.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "A,B,…")]
     layers: Option<Vec<Layer>>,
@@ -47,12 +49,13 @@ pub struct RenderArgs {
 
 pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let start = Instant::now();
+    let limits = args.cache.add_to(args.scene.limits());
     let mut more = Vec::new();
     if let Some([w, h]) = args.size {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
-    let (animation, measured) = args.scene.animation(&more)?.exposed(terminal)?;
+    let (animation, measured) = args.scene.animation(&more, &limits)?.exposed(terminal)?;
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {
@@ -67,9 +70,24 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let layers = args.layers.clone().unwrap_or(Layer::ALL.to_vec());
     let surface = has_exr && layers.iter().any(|l| l.of_surface());
 
-    let clock = Instant::now();
-    let volume = scene.volume(args.scene.limits().memory, terminal)?;
-    let volume_seconds = clock.elapsed().as_secs_f64();
+    // What the processor makes, beside the device, which is slow to open.
+    let cache = limits.cache.as_ref();
+    let (made, (opened, device_seconds)) = std::thread::scope(|scope| {
+        let made = scope.spawn(|| {
+            let clock = Instant::now();
+            let volume = scene.kept_volume(cache, limits.memory, terminal)?;
+            let seconds = clock.elapsed().as_secs_f64();
+            Ok((volume, seconds, scene.kept_mesh(cache)))
+        });
+        let clock = Instant::now();
+        let mut opened = Engine::open(args.engine.engine, &args.engine.device());
+        if let Ok((engine, _)) = &mut opened {
+            engine.prepare(&scene);
+        }
+        let opened = (opened, clock.elapsed().as_secs_f64());
+        (made.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), opened)
+    });
+    let (volume, volume_seconds, mesh) = made?;
     scene.warnings(&volume).iter().for_each(|w| terminal.warn(w));
     if let Some(environment) = &scene.environment {
         terminal.note(&format!("taki: {}", environment.words()));
@@ -77,13 +95,10 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     if let Some(stops) = measured {
         terminal.note(&measured_words(stops));
     }
-    let clock = Instant::now();
-    let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
+    let (mut engine, line) = opened?;
     terminal.note(&format!("taki: {line}"));
-    let device_seconds = clock.elapsed().as_secs_f64();
-    let mesh = scene.mesh();
     let options = RenderOptions { surface, ..Default::default() };
-    let strips = strips(&scene, window, surface, args.scene.limits().memory)?;
+    let strips = strips(&scene, window, surface, limits.memory)?;
     if still.has_png() {
         check_bloom(&scene, window, strips.len())?;
     }

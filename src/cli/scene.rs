@@ -20,7 +20,7 @@ pub struct SceneArgs {
 
 pub fn run(args: &SceneArgs) -> Result<()> {
     // The animation is checked even where the scene is printed with it.
-    let animation = args.scene.animation(&[])?;
+    let animation = args.scene.animation(&[], &args.scene.limits())?;
     let scene = match args.frame {
         Some(frame) => animation.at(frame)?,
         None => args.scene.load(&[])?,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{EngineOptions, SceneOptions, seconds};
+use super::{CacheOptions, EngineOptions, SceneOptions, seconds};
 use crate::error::Result;
 use crate::viewer::{self, Options, WindowChoice, settings::Settings};
 
@@ -14,6 +14,8 @@ use crate::viewer::{self, Options, WindowChoice, settings::Settings};
 pub struct ViewArgs {
     #[command(flatten)]
     scene: SceneOptions,
+    #[command(flatten)]
+    cache: CacheOptions,
     #[command(flatten)]
     engine: EngineOptions,
     /// What draws the window: auto takes Vulkan, Metal or Direct3D on a GPU, else OpenGL.
@@ -43,7 +45,7 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
     let report = viewer::run(Options {
         scene: args.scene.scene.clone(),
         sets,
-        limits: args.scene.limits(),
+        limits: args.cache.add_to(args.scene.limits()),
         window: args.window,
         engine: args.engine.engine,
         device: args.engine.device(),

@@ -138,10 +138,8 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                 } else {
                     let triangle = &rock[id as usize - 1];
                     let centre = pixel(k).map(|p| p as f64 + 0.5);
-                    let corner = mesh.indices[3 * triangle.id as usize..][..3]
-                        .iter()
-                        .map(|&v| mesh.vertices[v as usize]);
-                    let corner: Vec<_> = corner.collect();
+                    let first = 3 * triangle.id as usize;
+                    let corner = [0, 1, 2].map(|c| mesh.vertices[mesh.indices[first + c] as usize]);
                     let weights = triangle.weights_at(centre).to_array();
                     let mix = |get: fn(&crate::scene::Vertex) -> [f32; 3]| {
                         (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
@@ -210,6 +208,10 @@ fn hazed(haze: &EyeHaze, radiance: Vec3, d_y: f32, t: f32) -> Vec3 {
 /// Cuts a triangle at w = near and gives each part as corners with weights of the original three.
 fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3); 3])) {
     let corners = [(clip[0], Vec3::X), (clip[1], Vec3::Y), (clip[2], Vec3::Z)];
+    // Almost all are whole.
+    if clip.iter().all(|corner| corner.w >= near) {
+        return part(corners);
+    }
     let mut polygon: Vec<(Vec4, Vec3)> = Vec::with_capacity(4);
     for i in 0..3 {
         let (a, b) = (corners[i], corners[(i + 1) % 3]);

@@ -1,10 +1,10 @@
 //! Single passes on a prepared frame, for `taki bench`.
 
-use super::gbuffer::Targets;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
+use super::targets::Targets;
 use super::visibility::{FilledVolumes, Visibility};
-use super::{BoundReflection, GpuRenderer, Inputs, Reflections, Resident, Uploaded, readback};
+use super::{BoundReflection, GpuRenderer, Inputs, Redraw, Reflections, Resident, Uploaded, readback};
 use crate::error::Result;
 use crate::frame::Window;
 use crate::overlap;
@@ -99,7 +99,7 @@ impl GpuBench {
             }
         }
         self.prepared = Some(Prepared {
-            targets: Targets::new(gpu, window.width, window.height, layers),
+            targets: Targets::new(gpu, window.width, window.height, layers, !first.pools.is_empty()),
             sums: Sums::new(gpu, window.pixels()),
             window,
             passes,
@@ -123,7 +123,7 @@ impl GpuBench {
         let (window, area) = (p.window, Tile::whole(p.window));
         let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, filled, reflection };
         match work {
-            Work::Gbuffer => Ok((gbuffer.run(&inputs, || Ok(()))?, 0)),
+            Work::Gbuffer => Ok((gbuffer.run(&inputs, Redraw::All, || Ok(()))?, 0)),
             Work::Visibility(volumes, lookup) => {
                 let mut pass = Visibility::new(gpu);
                 let found = pass.get(gpu, timer, up, frame, volumes.clone(), *lookup, |_, _| Ok(()))?;

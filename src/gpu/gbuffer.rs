@@ -1,265 +1,373 @@
 //! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
 
-use std::cell::OnceCell;
+use std::ops::Range;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use glam::{Mat4, Vec3};
 
 use super::device::Gpu;
-use super::upload::UploadedEnvironment;
+use super::meshlets::in_view;
+use super::targets::{DEPTH, FLOATS};
+use super::timing::Span;
 use super::{Inputs, shader};
 use crate::error::Result;
-use crate::scene::Vertex;
+use crate::pool::{STRAIGHT, WAVES};
+use crate::scene::Scene;
 
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+const CLEAR: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+const KEEP: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Load;
 
-/// Indices drawn in one submission: 32,768 triangles take software Vulkan 10 to 40 ms.
-const PART_INDICES: u32 = 3 << 15;
+/// Parts of the mesh drawn in one submission: 32,736 triangles take software Vulkan 10 to 30 ms.
+const PARTS: usize = 96;
 
-/// The pass's shader.
+/// The pass's shader. A pool's waves are added up one by one: software Vulkan reads what stands at a constant
+/// place once for eight pixels, and lane by lane in a loop.
 pub fn gbuffer_source() -> String {
-    [include_str!("../../shaders/gbuffer.wgsl"), include_str!("../../shaders/pool.wgsl")].join("\n")
-}
-
-/// The targets of one window.
-pub struct Targets {
-    /// Radiance of the opaque scene or the background; metres from the eye (0: background).
-    pub opaque: wgpu::Texture,
-    /// Normal of the opaque scene (0: background).
-    pub normal: wgpu::Texture,
-    /// u, v and metres from the eye of the nearest volume quad.
-    pub surface: wgpu::Texture,
-    /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no more.
-    pub quad_id: wgpu::Texture,
-    /// The z-buffer; with several layers it and the second hold that of the even and of the odd ones in turn,
-    /// and the third that of the opaque scene.
-    depth: Vec<wgpu::Texture>,
-}
-
-impl Targets {
-    /// Bytes a pixel: three of four floats, the quads' numbers, depths. The points of the sheets behind the
-    /// nearest are not kept: what finds them again costs less than a cell of the walk.
-    pub const fn bytes(layers: u32) -> u64 {
-        3 * 16 + 4 * layers as u64 + if layers > 1 { 3 * 4 } else { 4 }
-    }
-
-    /// Targets for a window of `width` × `height` pixels under which `layers` quads may lie.
-    pub fn new(gpu: &Gpu, width: u32, height: u32, layers: u32) -> Self {
-        let texture = |label, format, usage, layers| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let (depths, depth_usage) = match layers {
-            1 => (1, wgpu::TextureUsages::empty()),
-            _ => (3, read | wgpu::TextureUsages::COPY_DST),
-        };
-        Targets {
-            opaque: texture("opaque radiance", FLOATS, read, 1),
-            normal: texture("opaque normal", FLOATS, wgpu::TextureUsages::COPY_SRC, 1),
-            surface: texture("surface", FLOATS, read, 1),
-            quad_id: texture("quad id", wgpu::TextureFormat::R32Uint, read, layers),
-            depth: (0..depths).map(|_| texture("depth", DEPTH, depth_usage, 1)).collect(),
-        }
-    }
-
-    /// The quads' numbers in some of the layers.
-    pub fn ids(&self, layers: std::ops::Range<u32>) -> wgpu::TextureView {
-        self.quad_id.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            base_array_layer: layers.start,
-            array_layer_count: Some(layers.len() as u32),
-            ..Default::default()
+    let waves: String = (0..WAVES)
+        .map(|i| {
+            let kind = if i < STRAIGHT { "straight" } else { "ring" };
+            format!("    sum += {kind}_wave(pool.waves[{i}u], p, churn, footprint);\n")
         })
-    }
-
-    fn depth_view(&self, number: usize) -> wgpu::TextureView {
-        self.depth[number].create_view(&Default::default())
-    }
+        .collect();
+    let sum = format!(
+        "fn waves(p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {{\n    \
+         var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
+    );
+    [include_str!("../../shaders/gbuffer.wgsl"), include_str!("../../shaders/pool.wgsl"), &sum].join("\n")
 }
 
-/// The pass: its pipelines.
+/// What of the targets has to be drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Redraw {
+    /// All.
+    All,
+    /// The pools: the targets hold the same picture with other waves.
+    Pools,
+}
+
+/// The pass: its pipelines, compiled for the first scene that has use for them.
 pub struct Gbuffer {
-    background: wgpu::RenderPipeline,
-    opaque: wgpu::RenderPipeline,
-    volume: wgpu::RenderPipeline,
-    peel: wgpu::RenderPipeline,
     module: wgpu::ShaderModule,
-    /// Background and opaque scene under an environment; compiled for the first scene that has one.
-    environment: OnceCell<[wgpu::RenderPipeline; 2]>,
+    // Without and with an environment.
+    background: [OnceLock<wgpu::RenderPipeline>; 2],
+    rock: [OnceLock<wgpu::RenderPipeline>; 2],
+    pool: [OnceLock<wgpu::RenderPipeline>; 2],
+    volume: OnceLock<wgpu::RenderPipeline>,
+    peel: OnceLock<wgpu::RenderPipeline>,
 }
 
 impl Gbuffer {
-    /// Compiles the pipelines.
+    /// Reads the shader.
     pub fn new(gpu: &Gpu) -> Self {
-        let module = shader(gpu, "gbuffer", &gbuffer_source());
-        let [background, opaque] = behind(gpu, &module, "");
-        let ids = wgpu::TextureFormat::R32Uint;
-        let water = |fragment, targets: &[wgpu::TextureFormat]| {
-            let nearer = wgpu::CompareFunction::Greater;
-            pipeline(gpu, &module, ["volume_vertex", fragment], &[], targets, nearer)
-        };
-        let (volume, peel) = (water("volume_fragment", &[FLOATS, ids]), water("peel_fragment", &[ids]));
-        Gbuffer { background, opaque, volume, peel, module, environment: OnceCell::new() }
+        Gbuffer {
+            module: shader(gpu, "gbuffer", &gbuffer_source()),
+            background: Default::default(),
+            rock: Default::default(),
+            pool: Default::default(),
+            volume: OnceLock::new(),
+            peel: OnceLock::new(),
+        }
     }
 
-    /// Fills the targets with one sample of a window; seconds on the device. A large mesh is drawn in
-    /// parts, and each layer behind the nearest in one of its own; `between` is called before each but the
-    /// first, and may stop the work.
-    pub fn run(&self, inputs: &Inputs, mut between: impl FnMut() -> Result<()>) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, window, frame, .. } = *inputs;
-        let layers = frame.layers;
-        let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
-        let bind = |pipeline: &wgpu::RenderPipeline, entries: &[(u32, wgpu::BindingResource)]| {
-            let entries: Vec<_> = entries
-                .iter()
-                .map(|(binding, resource)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: resource.clone(),
-                })
-                .collect();
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("gbuffer"),
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            })
-        };
-        let [frame, lights, quads, pools] =
-            [&uniform, &up.lights, &up.quads, &up.pools].map(|b| b.as_entire_binding());
-        let (background, opaque, sky, rock) = match &up.environment {
-            None => {
-                let sky = bind(&self.background, &[(0, frame.clone())]);
-                let rock = bind(&self.opaque, &[(0, frame.clone()), (1, lights), (7, pools)]);
-                (&self.background, &self.opaque, sky, rock)
-            }
-            Some(UploadedEnvironment { uniform, map }) => {
-                let [background, opaque] =
-                    self.environment.get_or_init(|| behind(gpu, &self.module, "_environment"));
-                let uniform = uniform.as_entire_binding();
-                let map = wgpu::BindingResource::TextureView(map);
-                let sky = bind(background, &[(0, frame.clone()), (5, uniform.clone()), (6, map)]);
-                let rock = bind(opaque, &[(0, frame.clone()), (1, lights), (5, uniform), (7, pools)]);
-                (background, opaque, sky, rock)
-            }
-        };
-        let water = bind(&self.volume, &[(0, frame.clone()), (2, quads.clone())]);
-        let [radiance, normal, surface] =
-            [&targets.opaque, &targets.normal, &targets.surface].map(|t| t.create_view(&Default::default()));
-        let depth_views: Vec<_> = (0..targets.depth.len()).map(|i| targets.depth_view(i)).collect();
-        let id_view = |layer| {
-            targets.quad_id.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: layer,
-                array_layer_count: Some(1),
-                ..Default::default()
-            })
-        };
-        let id_views: Vec<_> = (0..layers).map(id_view).collect();
-        let colour = |view, load| {
-            let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
-            Some(wgpu::RenderPassColorAttachment { view, resolve_target: None, depth_slice: None, ops })
-        };
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-        let depth = |number: usize, load| wgpu::RenderPassDepthStencilAttachment {
-            view: &depth_views[number],
-            depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
-        };
-        // The targets may be larger than a window at the image's edge.
-        let place = |pass: &mut wgpu::RenderPass| {
-            pass.set_viewport(0.0, 0.0, window.width as f32, window.height as f32, 0.0, 1.0);
-        };
-        let parts = up.index_count.div_ceil(PART_INDICES).max(1);
-        let mut seconds = 0.0;
-        for part in 0..parts {
-            let last = part + 1 == parts;
-            if part > 0 {
+    /// Compiles what a scene under whose pixels `layers` quads may lie has use for.
+    pub fn compile(&self, gpu: &Gpu, scene: &Scene, layers: u32) {
+        let under = scene.environment.is_some();
+        self.background(gpu, under);
+        if !scene.rocks.is_empty() {
+            self.rock(gpu, under);
+        }
+        if !scene.pools.is_empty() {
+            self.pool(gpu, under);
+        }
+        if !scene.quads.is_empty() {
+            self.volume(gpu);
+        }
+        if layers > 1 {
+            self.peel(gpu);
+        }
+    }
+
+    fn background(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
+        self.behind(gpu, &self.background, environment, "background", wgpu::CompareFunction::Always)
+    }
+
+    fn rock(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
+        self.behind(gpu, &self.rock, environment, "opaque", wgpu::CompareFunction::Greater)
+    }
+
+    /// Drawn again where it was drawn before.
+    fn pool(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
+        self.behind(gpu, &self.pool, environment, "pool", wgpu::CompareFunction::GreaterEqual)
+    }
+
+    fn behind<'a>(
+        &self,
+        gpu: &Gpu,
+        of: &'a [OnceLock<wgpu::RenderPipeline>; 2],
+        environment: bool,
+        name: &str,
+        compare: wgpu::CompareFunction,
+    ) -> &'a wgpu::RenderPipeline {
+        of[usize::from(environment)].get_or_init(|| {
+            let vertex = if name == "background" { "background_vertex" } else { "opaque_vertex" };
+            let fragment = format!("{name}{}_fragment", if environment { "_environment" } else { "" });
+            pipeline(gpu, &self.module, [vertex, &fragment], &[FLOATS; 2], compare)
+        })
+    }
+
+    fn volume(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+        self.volume.get_or_init(|| self.water(gpu, "volume_fragment", &[FLOATS, IDS]))
+    }
+
+    fn peel(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+        self.peel.get_or_init(|| self.water(gpu, "peel_fragment", &[IDS]))
+    }
+
+    fn water(&self, gpu: &Gpu, fragment: &str, targets: &[wgpu::TextureFormat]) -> wgpu::RenderPipeline {
+        let nearer = wgpu::CompareFunction::Greater;
+        pipeline(gpu, &self.module, ["volume_vertex", fragment], targets, nearer)
+    }
+
+    /// Fills the targets with one sample of a window; seconds on the device, and where several submissions go
+    /// on side by side on the host. A large mesh is drawn in parts, and each layer behind the nearest in one of
+    /// its own; `between` is called between them, and may stop the work.
+    pub fn run(&self, inputs: &Inputs, what: Redraw, between: impl FnMut() -> Result<()>) -> Result<f64> {
+        let uniform =
+            inputs.gpu.buffer_with("frame", bytemuck::bytes_of(inputs.frame), wgpu::BufferUsages::UNIFORM);
+        let depths = inputs.targets.depth.iter().map(view).collect();
+        let run = Run { pass: self, inputs, uniform, depths };
+        match what {
+            Redraw::All => run.all(between),
+            Redraw::Pools => inputs.timer.run(inputs.gpu, "gbuffer", |encoder, span| {
+                let behind = run.depths.last().expect("one at least");
+                run.pools(encoder, behind, span.render(true, true));
+            }),
+        }
+    }
+}
+
+/// One run of the pass.
+struct Run<'a> {
+    pass: &'a Gbuffer,
+    inputs: &'a Inputs<'a>,
+    uniform: wgpu::Buffer,
+    depths: Vec<wgpu::TextureView>,
+}
+
+impl Run<'_> {
+    fn all(&self, mut between: impl FnMut() -> Result<()>) -> Result<f64> {
+        let Inputs { gpu, timer, up, targets, frame, .. } = *self.inputs;
+        let clock = Instant::now();
+        let clip_from_world = Mat4::from_cols_array_2d(&frame.clip_from_world);
+        let parts = in_view(&up.rock, clip_from_world, Vec3::from(frame.eye_world).as_dvec3());
+        // While one submission is rasterised, software Vulkan makes the triangles of the next.
+        let mut before: Option<wgpu::SubmissionIndex> = None;
+        for (number, parts) in parts.chunks(PARTS).enumerate() {
+            let mut encoder = gpu.encoder("gbuffer");
+            self.rock(&mut encoder, number == 0, parts, None);
+            let submitted = gpu.queue.submit([encoder.finish()]);
+            if let Some(before) = before.replace(submitted) {
+                gpu.wait(before)?;
                 between()?;
             }
-            seconds += timer.run(gpu, "gbuffer", |encoder, span| {
-                let (load, load_depth) = match part {
-                    0 => (clear, wgpu::LoadOp::Clear(0.0)),
-                    _ => (wgpu::LoadOp::Load, wgpu::LoadOp::Load),
-                };
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("gbuffer opaque"),
-                    color_attachments: &[colour(&radiance, load), colour(&normal, load)],
-                    depth_stencil_attachment: Some(depth(0, load_depth)),
-                    timestamp_writes: span.render(true, !last),
-                    ..Default::default()
-                });
-                place(&mut pass);
-                if part == 0 {
-                    pass.set_pipeline(background);
-                    pass.set_bind_group(0, &sky, &[]);
-                    pass.draw(0..3, 0..1);
-                }
-                if up.index_count > 0 {
-                    let first = part * PART_INDICES;
-                    pass.set_pipeline(opaque);
-                    pass.set_bind_group(0, &rock, &[]);
-                    pass.set_vertex_buffer(0, up.vertices.slice(..));
-                    pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
-                    pass.draw_indexed(first..up.index_count.min(first + PART_INDICES), 0, 0..1);
-                }
-                drop(pass);
-                if !last {
-                    return;
-                }
-                if layers > 1 {
-                    copy(encoder, &targets.depth[0], &targets.depth[2]);
-                }
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("gbuffer volume"),
-                    color_attachments: &[colour(&surface, clear), colour(&id_views[0], clear)],
-                    depth_stencil_attachment: Some(depth(0, wgpu::LoadOp::Load)),
-                    timestamp_writes: span.render(false, true),
-                    ..Default::default()
-                });
-                place(&mut pass);
-                if up.quad_count > 0 {
-                    pass.set_pipeline(&self.volume);
-                    pass.set_bind_group(0, &water, &[]);
-                    pass.draw(0..6, 0..up.quad_count);
-                }
-            })?;
         }
-        for layer in 1..layers {
+        let mut seconds = clock.elapsed().as_secs_f64();
+        seconds += timer.run(gpu, "gbuffer", |encoder, span| {
+            if parts.is_empty() {
+                self.rock(encoder, true, &[], None);
+            }
+            if !up.pools.is_empty() {
+                self.pools(encoder, &self.depths[0], None);
+            }
+            if let [nearest, .., opaque] = targets.depth.as_slice() {
+                copy(encoder, nearest, opaque);
+            }
+            self.sheets(encoder, span);
+        })?;
+        for layer in 1..frame.layers {
             between()?;
-            let (known, own) = ((layer as usize - 1) % 2, layer as usize % 2);
-            let ids = targets.ids(0..layer);
-            let group = bind(
-                &self.peel,
-                &[
-                    (0, frame.clone()),
-                    (2, quads.clone()),
-                    (3, wgpu::BindingResource::TextureView(&depth_views[known])),
-                    (4, wgpu::BindingResource::TextureView(&ids)),
-                ],
-            );
-            seconds += timer.run(gpu, "gbuffer", |encoder, span| {
-                // What lies behind the opaque scene is not there.
-                copy(encoder, &targets.depth[2], &targets.depth[own]);
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("gbuffer peel"),
-                    color_attachments: &[colour(&id_views[layer as usize], clear)],
-                    depth_stencil_attachment: Some(depth(own, wgpu::LoadOp::Load)),
-                    timestamp_writes: span.render(true, true),
-                    ..Default::default()
-                });
-                place(&mut pass);
-                pass.set_pipeline(&self.peel);
-                pass.set_bind_group(0, &group, &[]);
-                pass.draw(0..6, 0..up.quad_count);
-            })?;
+            seconds += timer.run(gpu, "gbuffer", |encoder, span| self.peel(encoder, layer, span))?;
         }
         Ok(seconds)
+    }
+
+    /// Part of the rock, with the first one the background.
+    fn rock(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        first: bool,
+        parts: &[Range<u32>],
+        span: Option<wgpu::RenderPassTimestampWrites>,
+    ) {
+        let Inputs { gpu, up, .. } = *self.inputs;
+        let load = if first { (CLEAR, wgpu::LoadOp::Clear(0.0)) } else { (KEEP, wgpu::LoadOp::Load) };
+        self.draw_opaque(encoder, "gbuffer opaque", &self.depths[0], load, span, |pass| {
+            if first {
+                let pipeline = self.pass.background(gpu, up.environment.is_some());
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &self.bind(pipeline, &[(0, &self.uniform)], true), &[]);
+                pass.draw(0..3, 0..1);
+            }
+            if !parts.is_empty() {
+                let pipeline = self.pass.rock(gpu, up.environment.is_some());
+                pass.set_pipeline(pipeline);
+                let group =
+                    self.bind(pipeline, &[(0, &self.uniform), (1, &up.lights), (8, &up.vertices)], false);
+                pass.set_bind_group(0, &group, &[]);
+                pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
+                parts.iter().for_each(|part| pass.draw_indexed(part.clone(), 0, 0..1));
+            }
+        });
+    }
+
+    /// The pools, where nothing of the opaque scene with this z-buffer is before them.
+    fn pools(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: &wgpu::TextureView,
+        span: Option<wgpu::RenderPassTimestampWrites>,
+    ) {
+        let Inputs { gpu, up, .. } = *self.inputs;
+        let load = (KEEP, wgpu::LoadOp::Load);
+        self.draw_opaque(encoder, "gbuffer pools", depth, load, span, |pass| {
+            let pipeline = self.pass.pool(gpu, up.environment.is_some());
+            pass.set_pipeline(pipeline);
+            pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
+            for (surface, indices) in &up.pools {
+                let buffers = [(0, &self.uniform), (1, &up.lights), (7, surface), (8, &up.vertices)];
+                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false), &[]);
+                pass.draw_indexed(indices.clone(), 0, 0..1);
+            }
+        });
+    }
+
+    fn draw_opaque(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        label: &str,
+        depth_view: &wgpu::TextureView,
+        load: (wgpu::LoadOp<wgpu::Color>, wgpu::LoadOp<f32>),
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites>,
+        draw: impl FnOnce(&mut wgpu::RenderPass),
+    ) {
+        let [radiance, normal] = [&self.inputs.targets.opaque, &self.inputs.targets.normal].map(view);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(label),
+            color_attachments: &[colour(&radiance, load.0), colour(&normal, load.0)],
+            depth_stencil_attachment: Some(depth(depth_view, load.1)),
+            timestamp_writes,
+            ..Default::default()
+        });
+        self.place(&mut pass);
+        draw(&mut pass);
+    }
+
+    /// The nearest sheets.
+    fn sheets(&self, encoder: &mut wgpu::CommandEncoder, span: &Span) {
+        let Inputs { gpu, up, targets, .. } = *self.inputs;
+        let (surface, ids) = (view(&targets.surface), targets.layer(0));
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("gbuffer volume"),
+            color_attachments: &[colour(&surface, CLEAR), colour(&ids, CLEAR)],
+            depth_stencil_attachment: Some(depth(&self.depths[0], wgpu::LoadOp::Load)),
+            timestamp_writes: span.render(true, true),
+            ..Default::default()
+        });
+        self.place(&mut pass);
+        if up.quad_count > 0 {
+            let pipeline = self.pass.volume(gpu);
+            let group = self.bind(pipeline, &[(0, &self.uniform), (2, &up.quads)], false);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..6, 0..up.quad_count);
+        }
+    }
+
+    /// The sheets behind them; what lies behind the opaque scene is not there.
+    fn peel(&self, encoder: &mut wgpu::CommandEncoder, layer: u32, span: &Span) {
+        let Inputs { gpu, up, targets, .. } = *self.inputs;
+        let (known, own) = ((layer as usize - 1) % 2, layer as usize % 2);
+        let known_ids = targets.ids(0..layer);
+        let pipeline = self.pass.peel(gpu);
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("gbuffer"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[
+                entry(0, self.uniform.as_entire_binding()),
+                entry(2, up.quads.as_entire_binding()),
+                entry(3, wgpu::BindingResource::TextureView(&self.depths[known])),
+                entry(4, wgpu::BindingResource::TextureView(&known_ids)),
+            ],
+        });
+        copy(encoder, &targets.depth[2], &targets.depth[own]);
+        let ids = targets.layer(layer);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("gbuffer peel"),
+            color_attachments: &[colour(&ids, CLEAR)],
+            depth_stencil_attachment: Some(depth(&self.depths[own], wgpu::LoadOp::Load)),
+            timestamp_writes: span.render(true, true),
+            ..Default::default()
+        });
+        self.place(&mut pass);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..6, 0..up.quad_count);
+    }
+
+    /// Buffers, and those of the environment, with its map for who looks `at_map`.
+    fn bind(
+        &self,
+        pipeline: &wgpu::RenderPipeline,
+        buffers: &[(u32, &wgpu::Buffer)],
+        at_map: bool,
+    ) -> wgpu::BindGroup {
+        let Inputs { gpu, up, .. } = *self.inputs;
+        let mut entries: Vec<_> =
+            buffers.iter().map(|(binding, buffer)| entry(*binding, buffer.as_entire_binding())).collect();
+        let sees = buffers.iter().all(|(binding, _)| *binding != 2);
+        if let (true, Some(environment)) = (sees, &up.environment) {
+            entries.push(entry(5, environment.uniform.as_entire_binding()));
+            if at_map {
+                entries.push(entry(6, wgpu::BindingResource::TextureView(&environment.map)));
+            }
+        }
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("gbuffer"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    }
+
+    /// The targets may be larger than a window at the image's edge.
+    fn place(&self, pass: &mut wgpu::RenderPass) {
+        let window = self.inputs.window;
+        pass.set_viewport(0.0, 0.0, window.width as f32, window.height as f32, 0.0, 1.0);
+    }
+}
+
+fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&Default::default())
+}
+
+fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {
+    wgpu::BindGroupEntry { binding, resource }
+}
+
+fn colour(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+    Some(wgpu::RenderPassColorAttachment { view, resolve_target: None, depth_slice: None, ops })
+}
+
+fn depth(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
     }
 }
 
@@ -268,31 +376,10 @@ fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Tex
     encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
 }
 
-/// Background and opaque scene, with the fragment shaders of this `kind`.
-fn behind(gpu: &Gpu, module: &wgpu::ShaderModule, kind: &str) -> [wgpu::RenderPipeline; 2] {
-    let attributes = wgpu::vertex_attr_array![
-        0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x3, 4 => Uint32
-    ];
-    let vertices = wgpu::VertexBufferLayout {
-        array_stride: size_of::<Vertex>() as u64,
-        step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &attributes,
-    };
-    let behind = |name: &str, buffers: &[Option<wgpu::VertexBufferLayout>], compare| {
-        let [vertex, fragment] = [format!("{name}_vertex"), format!("{name}{kind}_fragment")];
-        pipeline(gpu, module, [&vertex, &fragment], buffers, &[FLOATS; 2], compare)
-    };
-    [
-        behind("background", &[], wgpu::CompareFunction::Always),
-        behind("opaque", &[Some(vertices)], wgpu::CompareFunction::Greater),
-    ]
-}
-
 fn pipeline(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     [vertex, fragment]: [&str; 2],
-    buffers: &[Option<wgpu::VertexBufferLayout>],
     targets: &[wgpu::TextureFormat],
     compare: wgpu::CompareFunction,
 ) -> wgpu::RenderPipeline {
@@ -306,7 +393,7 @@ fn pipeline(
             module,
             entry_point: Some(vertex),
             compilation_options: Default::default(),
-            buffers,
+            buffers: &[],
         },
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: Some(wgpu::DepthStencilState {

@@ -61,6 +61,32 @@ pub struct Frame {
     pub pad_c: f32,
 }
 
+/// A vertex of the opaque mesh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct OpaqueVertex {
+    pub position_world: [f32; 3],
+    pub occlusion: f32,
+    pub normal_world: [f32; 3],
+    pub shadow: f32,
+    pub albedo: [f32; 3],
+    pub wet: f32,
+}
+
+impl From<&scene::Vertex> for OpaqueVertex {
+    fn from(vertex: &scene::Vertex) -> Self {
+        OpaqueVertex {
+            position_world: vertex.position,
+            occlusion: vertex.occlusion,
+            normal_world: vertex.normal,
+            shadow: vertex.shadow,
+            albedo: vertex.albedo,
+            wet: vertex.wet,
+        }
+    }
+}
+
 /// One light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

@@ -6,23 +6,26 @@ mod gbuffer;
 mod grid;
 mod integrate;
 pub mod layout;
+mod meshlets;
 mod rasters;
 mod readback;
 mod reflection;
 mod resolve;
 mod strand;
+mod targets;
 mod timing;
 mod upload;
 mod visibility;
 
 pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
-pub use gbuffer::{Gbuffer, Targets, gbuffer_source};
+pub use gbuffer::{Gbuffer, Redraw, gbuffer_source};
 pub use grid::Grid;
 pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
 pub use strand::StrandTexture;
+pub use targets::Targets;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
 pub use visibility::{FilledVolumes, Visibility, source as visibility_source};
@@ -144,19 +147,21 @@ const KEPT_CANVASES: usize = 5;
 struct Canvas {
     size: [u32; 2],
     layers: u32,
+    pools: bool,
     targets: Targets,
     sums: Sums,
     picture: wgpu::Buffer,
 }
 
 impl Canvas {
-    fn new(gpu: &Gpu, [width, height]: [u32; 2], layers: u32) -> Self {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2], layers: u32, pools: bool) -> Self {
         let pixels = width as u64 * height as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         Canvas {
             size: [width, height],
             layers,
-            targets: Targets::new(gpu, width, height, layers),
+            pools,
+            targets: Targets::new(gpu, width, height, layers, pools),
             sums: Sums::new(gpu, pixels),
             picture: gpu.buffer("picture", pixels * Resolve::PICTURE_BYTES, usage),
         }
@@ -197,6 +202,20 @@ impl GpuRenderer {
         }
     }
 
+    /// Compiles the passes that a scene needs, as far as that can be told without its volume.
+    pub fn prepare(&mut self, scene: &Scene) {
+        let layers = overlap::sheets(scene);
+        let GpuRenderer { gpu, gbuffer, integrate, .. } = self;
+        std::thread::scope(|scope| {
+            scope.spawn(|| gbuffer.compile(gpu, scene, layers));
+            if scene.visibility != scene::Visibility::Cached {
+                let variant = Variant::of(scene, layers, None);
+                let known = |pass: &Integrate| pass.variant == variant;
+                recent(integrate, KEPT_PIPELINES, known, || Integrate::new(gpu, variant));
+            }
+        });
+    }
+
     /// Renders a scene, or the part of it that `options.window` names.
     pub fn render(
         &mut self,
@@ -224,6 +243,7 @@ impl GpuRenderer {
             |pass| pass.variant == variant,
             || Integrate::new(gpu, variant),
         );
+        self.gbuffer.compile(gpu, scene, layers);
         seconds.pipelines = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
@@ -234,11 +254,12 @@ impl GpuRenderer {
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut frame = Frame::new(part.width, part.height, options.surface);
         let size = options.grid.size(whole);
+        let pools = !scene.pools.is_empty();
         let canvas = recent(
             &mut self.canvases,
             KEPT_CANVASES,
-            |c| c.size == size && c.layers == layers,
-            || Canvas::new(gpu, size, layers),
+            |c| c.size == size && c.layers == layers && c.pools == pools,
+            || Canvas::new(gpu, size, layers, pools),
         );
         let Canvas { targets: own, sums, picture, .. } = canvas;
         gpu.check()?;
@@ -288,7 +309,7 @@ impl GpuRenderer {
                 let key = Key::new(&frame_uniforms, &up.geometry);
                 let kept = match options.keep_rasters {
                     0 => None,
-                    most => self.rasters.place(gpu, key, size, layers, most),
+                    most => self.rasters.place(gpu, key, size, layers, pools, most),
                 };
                 let targets = kept.map_or(own, |kept| &kept.targets);
                 let inputs = Inputs {
@@ -302,12 +323,18 @@ impl GpuRenderer {
                     filled: &filled,
                     reflection: &reflection,
                 };
-                if kept.is_none_or(|kept| !kept.ready.get()) {
-                    seconds.gbuffer +=
-                        self.gbuffer.run(&inputs, || monitor.progress("pixels", done, total))?;
-                    if let Some(kept) = kept {
-                        kept.ready.set(true);
-                    }
+                let waves = Some(up.waves);
+                let redraw = match kept.map(|kept| kept.waves.replace(None)) {
+                    Some(of) if of == waves => None,
+                    Some(Some(_)) => Some(Redraw::Pools),
+                    _ => Some(Redraw::All),
+                };
+                if let Some(redraw) = redraw {
+                    let between = || monitor.progress("pixels", done, total);
+                    seconds.gbuffer += self.gbuffer.run(&inputs, redraw, between)?;
+                }
+                if let Some(kept) = kept {
+                    kept.waves.set(waves);
                 }
                 if sample == samples.start
                     && let Some(surface) = &mut frame.surface

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::device::Gpu;
-use super::gbuffer::Targets;
 use super::layout::Frame;
+use super::targets::Targets;
 
 /// Keys of passes that are remembered: what was drawn twice is kept the second time.
 const REMEMBERED: usize = 1024;
@@ -22,7 +22,7 @@ pub struct Rasters {
     turn: u64,
 }
 
-/// All that the raster pass of one sample of one window depends on, as two hashes of 64 bits.
+/// All that the raster pass of one sample of one window depends on but the pools' waves, as two hashes of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key([u64; 2]);
 
@@ -31,8 +31,8 @@ pub struct Kept {
     key: Key,
     /// The targets.
     pub targets: Targets,
-    /// Set once the pass has filled them.
-    pub ready: Cell<bool>,
+    /// Set once the pass has filled them: hash of the pools' waves.
+    pub waves: Cell<Option<[u64; 2]>>,
     bytes: u64,
     /// The last frame that used them.
     used: u64,
@@ -78,7 +78,15 @@ impl Rasters {
 
     /// The place for a pass of `size` pixels and `layers` layers: kept targets, filled or to be filled; none if the pass is new, or
     /// there is no room in `most` bytes. Targets that neither this frame nor the last has used make room.
-    pub fn place(&mut self, gpu: &Gpu, key: Key, size: [u32; 2], layers: u32, most: u64) -> Option<&Kept> {
+    pub fn place(
+        &mut self,
+        gpu: &Gpu,
+        key: Key,
+        size: [u32; 2],
+        layers: u32,
+        pools: bool,
+        most: u64,
+    ) -> Option<&Kept> {
         if let Some(i) = self.kept.iter().position(|kept| kept.key == key) {
             self.kept[i].used = self.turn;
             return Some(&self.kept[i]);
@@ -97,8 +105,8 @@ impl Rasters {
         if total(&self.kept) + bytes > most {
             return None;
         }
-        let targets = Targets::new(gpu, size[0], size[1], layers);
-        self.kept.push(Kept { key, targets, ready: Cell::new(false), bytes, used: self.turn });
+        let targets = Targets::new(gpu, size[0], size[1], layers, pools);
+        self.kept.push(Kept { key, targets, waves: Cell::new(None), bytes, used: self.turn });
         self.kept.last()
     }
 }

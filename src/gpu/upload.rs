@@ -1,15 +1,17 @@
 //! The scene on the device: volume texture, quads, lights, mesh.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::device::Gpu;
 use super::layout::{self, Quad};
+use super::meshlets::{Meshlet, Meshlets};
 use super::rasters::hash_twice;
 use crate::environment::Map;
 use crate::error::{Error, Result};
 use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
-use crate::scene::{Mesh, Scene, Vertex};
+use crate::scene::{Mesh, Scene};
 use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture, same_cells};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
@@ -21,13 +23,24 @@ const SLAB_BYTES: usize = 64 << 20;
 pub struct Resident {
     levels: KeptLevels,
     volume: Option<(Levels, wgpu::TextureView)>,
-    vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
-    /// Of these vertices; previews have fewer triangles than pictures. Each upload has a number of its own.
-    indices: Vec<(Arc<Vec<u32>>, wgpu::Buffer, u64)>,
+    /// Of these vertices; previews have fewer triangles than pictures.
+    meshes: Vec<ResidentMesh>,
     /// The environment's map, and its number.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
-    /// Uploads of indices and maps so far.
+    /// Uploads of meshes and maps so far.
     uploads: u64,
+}
+
+/// A mesh on the device.
+#[derive(Clone)]
+struct ResidentMesh {
+    of: Mesh,
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    rock: Arc<Vec<Meshlet>>,
+    pools: Vec<Range<u32>>,
+    /// Each upload has a number of its own.
+    upload: u64,
 }
 
 /// Everything of a scene that does not change from sample to sample.
@@ -42,18 +55,20 @@ pub struct Uploaded {
     pub quad_count: u32,
     /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
-    /// `array<Surface>`, at least one.
-    pub pools: wgpu::Buffer,
     /// Vertices of the opaque mesh.
     pub vertices: wgpu::Buffer,
     /// Its indices.
     pub indices: wgpu::Buffer,
-    /// Number of indices.
-    pub index_count: u32,
+    /// The rock among them, in parts.
+    pub rock: Arc<Vec<Meshlet>>,
+    /// `Surface` of each pool, and its indices.
+    pub pools: Vec<(wgpu::Buffer, Range<u32>)>,
     /// The environment, where the scene has one.
     pub environment: Option<UploadedEnvironment>,
-    /// Hash of quads, lights, pools, mesh and environment: all that is drawn.
+    /// Hash of quads, lights, mesh and environment: all that is drawn but the pools' waves.
     pub geometry: [u64; 2],
+    /// Hash of the pools' surfaces.
+    pub waves: [u64; 2],
 }
 
 /// An environment on the device.
@@ -82,8 +97,7 @@ impl Uploaded {
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
-        let mut pools = pool::surfaces(scene, mesh);
-        pools.resize(pools.len().max(1), pool::Surface::default());
+        let pools = pool::surfaces(scene, mesh);
         let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
         let mesh_bytes = [size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
         let largest = [quad_bytes.len(), light_bytes.len(), mesh_bytes[0], mesh_bytes[1]];
@@ -93,14 +107,16 @@ impl Uploaded {
                 "lower their number or use --engine cpu",
             ));
         }
-        let (vertices, indices, upload) = resident.mesh(gpu, mesh);
+        let ResidentMesh { vertices, indices, rock, pools: places, upload, .. } =
+            resident.mesh(gpu, mesh).clone();
         let levels = resident.levels.get(scene, volume);
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
         let number = map.as_ref().map(|(_, number)| *number);
         Ok(Uploaded {
-            geometry: hash_twice(&(quad_bytes, light_bytes, pool_bytes, upload, environment_bytes, number)),
+            geometry: hash_twice(&(quad_bytes, light_bytes, upload, environment_bytes, number)),
+            waves: hash_twice(&pool_bytes),
             environment: map.map(|(map, _)| UploadedEnvironment {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
                 map,
@@ -115,10 +131,14 @@ impl Uploaded {
             ),
             quad_count: quads.len() as u32,
             lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
-            pools: gpu.buffer_with("pools", pool_bytes, wgpu::BufferUsages::STORAGE),
             vertices,
             indices,
-            index_count: mesh.indices.len() as u32,
+            rock,
+            pools: pools
+                .iter()
+                .map(|pool| gpu.buffer_with("pool", bytemuck::bytes_of(pool), wgpu::BufferUsages::UNIFORM))
+                .zip(places)
+                .collect(),
         })
     }
 }
@@ -151,29 +171,29 @@ impl Resident {
         Ok((view, self.uploads))
     }
 
-    /// Vertices, indices, and the number of this pair.
-    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> (wgpu::Buffer, wgpu::Buffer, u64) {
-        let vertices = match &self.vertices {
-            Some((old, buffer)) if Arc::ptr_eq(old, &mesh.vertices) => buffer.clone(),
-            _ => {
-                self.indices.clear();
-                let bytes = bytemuck::cast_slice(&mesh.vertices);
-                let buffer = gpu.buffer_with("vertices", bytes, wgpu::BufferUsages::VERTEX);
-                self.vertices = Some((mesh.vertices.clone(), buffer.clone()));
-                buffer
-            }
-        };
-        if let Some((_, buffer, upload)) =
-            self.indices.iter().find(|(old, ..)| Arc::ptr_eq(old, &mesh.indices))
-        {
-            return (vertices, buffer.clone(), *upload);
-        }
-        let bytes = bytemuck::cast_slice(&mesh.indices);
-        let buffer = gpu.buffer_with("indices", bytes, wgpu::BufferUsages::INDEX);
-        self.indices.truncate(1);
-        self.uploads += 1;
-        self.indices.push((mesh.indices.clone(), buffer.clone(), self.uploads));
-        (vertices, buffer, self.uploads)
+    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> &ResidentMesh {
+        self.meshes.retain(|known| Arc::ptr_eq(&known.of.vertices, &mesh.vertices));
+        let known = self.meshes.iter().position(|known| Arc::ptr_eq(&known.of.indices, &mesh.indices));
+        let number = known.unwrap_or_else(|| {
+            let parts = Meshlets::new(mesh);
+            let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
+            self.meshes.truncate(1);
+            self.uploads += 1;
+            self.meshes.push(ResidentMesh {
+                of: mesh.clone(),
+                vertices: buffer(
+                    "vertices",
+                    bytemuck::cast_slice(&parts.vertices),
+                    wgpu::BufferUsages::STORAGE,
+                ),
+                indices: buffer("indices", bytemuck::cast_slice(&parts.indices), wgpu::BufferUsages::INDEX),
+                rock: Arc::new(parts.rock),
+                pools: parts.pools,
+                upload: self.uploads,
+            });
+            self.meshes.len() - 1
+        });
+        &self.meshes[number]
     }
 }
 

@@ -64,6 +64,13 @@ impl Engine {
         Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
     }
 
+    /// Compiles what a scene will need, as far as that can be told without its volume.
+    pub fn prepare(&mut self, scene: &Scene) {
+        if let Engine::Gpu(renderer, _) = self {
+            renderer.prepare(scene);
+        }
+    }
+
     /// Opens the device anew, after it was lost.
     pub fn renew(&mut self) -> Result<()> {
         if let Engine::Gpu(renderer, device) = self {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use crate::cache::Cache;
 use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::{Cost, Scene};
@@ -11,7 +12,10 @@ use crate::volume::{Structure, VolumeTexture, WaterSpec, set_density_and_reflect
 
 /// Keeps one volume texture.
 #[derive(Default)]
-pub struct VolumeStock(Option<(Source, Arc<VolumeTexture>)>);
+pub struct VolumeStock {
+    last: Option<(Source, Arc<VolumeTexture>)>,
+    cache: Option<Cache>,
+}
 
 /// What a volume was made from.
 #[derive(Clone, PartialEq)]
@@ -22,6 +26,16 @@ enum Source {
 }
 
 impl VolumeStock {
+    /// Takes what it has not from a cache, and leaves it there.
+    pub fn with(cache: Option<Cache>) -> VolumeStock {
+        VolumeStock { last: None, cache }
+    }
+
+    /// No more from now on: values that a hand tries out are not asked for again.
+    pub fn forget_cache(&mut self) {
+        self.cache = None;
+    }
+
     /// The scene's volume, and what making it cost; no cost where it is the one in stock. If making it
     /// fails or is given up, the old one stays.
     pub fn volume(
@@ -38,9 +52,9 @@ impl VolumeStock {
                 Source::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
             }
         };
-        let (volume, cost) = match (self.0.take(), &source) {
+        let (volume, cost) = match (self.last.take(), &source) {
             (Some((old, volume)), new) if old == *new => {
-                self.0 = Some((old, volume.clone()));
+                self.last = Some((old, volume.clone()));
                 return Ok((volume, None));
             }
             (Some((Source::Water(old), volume)), Source::Water(new)) if same_curves(&old, new) => {
@@ -54,12 +68,12 @@ impl VolumeStock {
                 }
             }
             (old, _) => {
-                self.0 = old;
-                (scene.volume(memory, monitor)?, Cost::Volume)
+                self.last = old;
+                (scene.kept_volume(self.cache.as_ref(), memory, monitor)?, Cost::Volume)
             }
         };
         let volume = Arc::new(volume);
-        self.0 = Some((source, volume.clone()));
+        self.last = Some((source, volume.clone()));
         Ok((volume, Some(cost)))
     }
 }

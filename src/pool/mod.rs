@@ -17,7 +17,7 @@ use crate::random::{Family, Stream};
 use crate::scene::{GRAVITY, Mesh, Pool, Scene};
 
 /// Waves along straight lines.
-const STRAIGHT: usize = 20;
+pub const STRAIGHT: usize = 20;
 /// Rings: each place where water falls in has two of them.
 const RINGS: usize = 12;
 /// Waves of a pool.

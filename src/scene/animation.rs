@@ -155,8 +155,9 @@ impl Animation {
         if scene.image.look.auto_exposure == AutoExposure::None {
             return Ok((self, None));
         }
-        let volume = scene.volume(self.limits.memory, monitor)?;
-        let measured = Some(exposure::measure(&scene, &volume, &scene.mesh(), monitor)?);
+        let cache = self.limits.cache.as_ref();
+        let volume = scene.kept_volume(cache, self.limits.memory, monitor)?;
+        let measured = Some(exposure::measure(&scene, &volume, &scene.kept_mesh(cache), monitor)?);
         Ok((Animation { measured, ..self }, measured))
     }
 

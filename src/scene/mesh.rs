@@ -1,13 +1,16 @@
 //! Opaque geometry as triangles: rocks and pools, and the light that they take from one another.
 
+use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use xxhash_rust::const_xxh3::xxh3_64;
 
 use super::pool::Pool;
 use super::rock::{Rock, shade, wet};
+use crate::cache::{Cache, key};
 
 /// A vertex of opaque geometry, as the raster pass reads it.
 #[repr(C)]
@@ -41,18 +44,22 @@ pub struct Mesh {
 impl Mesh {
     /// The rocks' mesh with the same vertices and a sixteenth of the triangles, for previews.
     pub fn coarse(&self, ground: &Ground) -> Mesh {
-        let mut indices = Vec::new();
-        for (rock, own) in ground.rocks.iter().zip(ground.ranges()) {
-            rock.add_triangles(own.start as u32, 1 << rock.levels.min(2), &mut indices);
-        }
-        let mut first = ground.rock_vertices() as u32;
-        for pool in &ground.pools {
-            pool.add_triangles(first, &mut indices);
-            first += Pool::VERTICES as u32;
-        }
-        Mesh { vertices: self.vertices.clone(), indices: Arc::new(indices) }
+        Mesh { vertices: self.vertices.clone(), indices: Arc::new(ground.indices(2)) }
     }
 }
+
+/// What vertices follow from besides their ground: those of another builder are others.
+const BUILDER: [u64; 9] = [
+    xxh3_64(include_bytes!("mesh.rs")),
+    xxh3_64(include_bytes!("pool.rs")),
+    xxh3_64(include_bytes!("rock/mod.rs")),
+    xxh3_64(include_bytes!("rock/field.rs")),
+    xxh3_64(include_bytes!("rock/shade.rs")),
+    xxh3_64(include_bytes!("rock/strata.rs")),
+    xxh3_64(include_bytes!("rock/wet.rs")),
+    xxh3_64(include_bytes!("../random.rs")),
+    size_of::<Vertex>() as u64,
+];
 
 /// All that the opaque mesh of a scene follows from: equal grounds have equal meshes.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,19 +77,39 @@ pub struct Ground {
 impl Ground {
     /// The mesh of all.
     pub fn mesh(&self) -> Mesh {
-        let mut mesh = Mesh::default();
-        let (vertices, indices) = (Arc::make_mut(&mut mesh.vertices), Arc::make_mut(&mut mesh.indices));
-        let made: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
-        for (rock, own) in self.rocks.iter().zip(made) {
-            rock.add_triangles(vertices.len() as u32, 1, indices);
-            vertices.extend(own);
+        Mesh { vertices: Arc::new(self.vertices()), indices: Arc::new(self.indices(0)) }
+    }
+
+    /// As [`Ground::mesh`], or from `cache`.
+    pub fn kept_mesh(&self, cache: &Cache) -> Mesh {
+        let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
+        let make = || Ok::<_, Infallible>(self.vertices());
+        let Ok(vertices) = cache.get("meshes", &key("mesh", &BUILDER, self), count, make);
+        Mesh { vertices: Arc::new(vertices), indices: Arc::new(self.indices(0)) }
+    }
+
+    /// Triangles between every 2^`coarser`-th vertex of the rocks, and those of the pools.
+    fn indices(&self, coarser: u32) -> Vec<u32> {
+        let mut indices = Vec::new();
+        for (rock, own) in self.rocks.iter().zip(self.ranges()) {
+            rock.add_triangles(own.start as u32, 1 << rock.levels.min(coarser), &mut indices);
         }
+        let mut first = self.rock_vertices() as u32;
+        for pool in &self.pools {
+            pool.add_triangles(first, &mut indices);
+            first += Pool::VERTICES as u32;
+        }
+        indices
+    }
+
+    fn vertices(&self) -> Vec<Vertex> {
+        let made: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
+        let vertices = &mut made.concat();
         let rocks: Vec<(&Rock, Range<usize>)> = self.rocks.iter().zip(self.ranges()).collect();
         let mut pools = Vec::new();
         for (i, pool) in self.pools.iter().enumerate() {
             let first = vertices.len();
             pool.add_vertices(i as u32 + 1, vertices);
-            pool.add_triangles(first as u32, indices);
             let own = first..vertices.len();
             let ground = shade::heights(&rocks, vertices, own.clone());
             pool.fill(&mut vertices[own.clone()], &ground, &self.water);
@@ -98,7 +125,7 @@ impl Ground {
             shade::shadow(&rocks, &shaded(|rock| rock.shadow), vertices, to_sun);
         }
         wet::wet(&rocks, vertices, &self.water, &self.pools);
-        mesh
+        std::mem::take(vertices)
     }
 
     fn rock_vertices(&self) -> u64 {

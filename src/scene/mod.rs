@@ -34,11 +34,12 @@ pub use types::{
 };
 pub use value::{Key, Place, Raw, Value, Values};
 
+use crate::cache::Cache;
 use crate::curve::{CurveShape, levels_for};
 use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
 use crate::haze::Haze;
-use crate::volume::{VolumeTexture, WaterSpec, read_npz};
+use crate::volume::{VolumeTexture, WaterSpec, kept_water, read_npz};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
 /// tile of a picture would take longer than drivers wait.
@@ -104,11 +105,18 @@ pub struct Limits {
     pub memory: u64,
     /// Environments that its scenes share.
     pub environments: EnvironmentStock,
+    /// Where volumes and meshes are kept for the next process.
+    pub cache: Option<Cache>,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { allow_paths: Vec::new(), memory: 4 << 30, environments: EnvironmentStock::default() }
+        Limits {
+            allow_paths: Vec::new(),
+            memory: 4 << 30,
+            environments: EnvironmentStock::default(),
+            cache: None,
+        }
     }
 }
 
@@ -253,6 +261,24 @@ impl Scene {
             Some(path) => read_npz(path, memory),
             None => crate::volume::build_water(&self.water, monitor),
         }
+    }
+
+    /// As [`Scene::volume`], from the cache where there is one.
+    pub fn kept_volume(
+        &self,
+        cache: Option<&Cache>,
+        memory: u64,
+        monitor: &dyn crate::job::Monitor,
+    ) -> Result<VolumeTexture> {
+        match cache {
+            Some(cache) if self.volume_file.is_none() => kept_water(&self.water, cache, monitor),
+            _ => self.volume(memory, monitor),
+        }
+    }
+
+    /// As [`Scene::mesh`], from the cache where there is one.
+    pub fn kept_mesh(&self, cache: Option<&Cache>) -> Mesh {
+        cache.map_or_else(|| self.mesh(), |cache| self.ground().kept_mesh(cache))
     }
 
     /// The files it is made from besides its own, resolved, and the keys that name them.

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::mesh::Vertex;
+use super::rock::add_squares;
 use super::rock::wet::nearest_on_triangle;
 
 /// Most pools of a scene.
@@ -100,12 +101,7 @@ impl Pool {
 
     pub(super) fn add_triangles(&self, first: u32, indices: &mut Vec<u32>) {
         let side = SQUARES as u32 + 1;
-        for y in 0..SQUARES as u32 {
-            for x in 0..SQUARES as u32 {
-                let i = first + y * side + x;
-                indices.extend([i, i + 1, i + side + 1, i, i + side + 1, i + side]);
-            }
-        }
+        add_squares([SQUARES as u32; 2], |x, y| first + y * side + x, indices);
     }
 
     /// Sets depth and foam of its vertices, over ground of these heights.

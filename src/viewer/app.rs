@@ -140,9 +140,15 @@ impl Viewer {
             settings.remember(path);
         }
         let wake = ctx.clone();
-        let worker = Worker::new(options.engine, options.device.clone(), options.limits.memory, move || {
-            wake.request_repaint();
-        });
+        let worker = Worker::new(
+            options.engine,
+            options.device.clone(),
+            options.limits.memory,
+            options.limits.cache.clone(),
+            move || {
+                wake.request_repaint();
+            },
+        );
         ctx.set_theme(preference(settings.theme));
         ctx.set_zoom_factor(settings.zoom);
         // Weak text is to be read too.

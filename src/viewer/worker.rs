@@ -16,6 +16,7 @@ use std::time::Instant;
 use eframe::egui;
 
 use super::layer_image::Legend;
+use crate::cache::Cache;
 use crate::frame::{Frame, Layer};
 use crate::gpu::DeviceOptions;
 use crate::job::EngineChoice;
@@ -165,11 +166,12 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; it opens the engine. `wake` is called when there is something new to show.
+    /// Starts the thread; it opens the engine, and takes the first scene from `cache`. `wake` is called when there is something new to show.
     pub fn new(
         choice: EngineChoice,
         device: DeviceOptions,
         memory: u64,
+        cache: Option<Cache>,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Worker {
         let shared = Arc::new(Shared {
@@ -182,7 +184,7 @@ impl Worker {
             state: Mutex::default(),
             wake: Box::new(wake),
         });
-        let renderer = Renderer::new(shared.clone(), choice, device, memory);
+        let renderer = Renderer::new(shared.clone(), choice, device, memory, cache);
         let thread = std::thread::Builder::new().name("render".into()).spawn(move || renderer.run());
         if let Err(e) = &thread {
             lock(&shared.state).fault = Some(format!("the render thread did not start: {e}"));

@@ -15,7 +15,7 @@ pub use pyramid::{
     KeptLevels, Levels, Moments, Stack, coarse_levels, level_count, level_size, levels_of, same_cells,
 };
 pub use ripple::Ripple;
-pub use water::{WaterSpec, build_water, set_density_and_reflection};
+pub use water::{WaterSpec, build_water, kept_water, set_density_and_reflection};
 
 use std::sync::Arc;
 

@@ -1,13 +1,17 @@
 //! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to their twins on
 //! y = ny give every cell they pass its direction; ρ and k are random per cell, or follow the strands.
 
+use std::sync::Arc;
+
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
+use xxhash_rust::const_xxh3::xxh3_64;
 
 use super::bundle::Structure;
 use super::flow::Flow;
 use super::{Cell, VolumeTexture};
+use crate::cache::{Cache, key};
 use crate::curve::CurveShape;
 use crate::error::Result;
 use crate::job::Monitor;
@@ -59,6 +63,28 @@ pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeText
     set(spec, &mut cells, (!of_cells).then_some(&flow));
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
+
+/// As [`build_water`], or from `cache`.
+pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+    let count = spec.size.iter().map(|&n| n as usize).product();
+    // α is not in the cells.
+    let key = key("volume", &BUILDER, &WaterSpec { alpha: 0.0, ..*spec });
+    let build = || build_water(spec, monitor).map(|volume| Arc::unwrap_or_clone(volume.cells));
+    let cells = cache.get("volumes", &key, count, build)?;
+    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
+}
+
+/// What the cells follow from besides the spec: a volume of another builder is another volume.
+const BUILDER: [u64; 8] = [
+    xxh3_64(include_bytes!("water.rs")),
+    xxh3_64(include_bytes!("bundle.rs")),
+    xxh3_64(include_bytes!("flow.rs")),
+    xxh3_64(include_bytes!("cell.rs")),
+    xxh3_64(include_bytes!("ripple.rs")),
+    xxh3_64(include_bytes!("../curve.rs")),
+    xxh3_64(include_bytes!("../walk.rs")),
+    xxh3_64(include_bytes!("../random.rs")),
+];
 
 /// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
 /// every cell with a direction. Needs no curves, where [`WaterSpec::density_is_of_cells`].

@@ -212,6 +212,7 @@ fn on_the_engine(test: &str, interpreter: &Path) {
     // It waits with bounds of its own; this is for what it did not think of.
     let mut command = Command::new("timeout");
     command.args(["--kill-after=20", "400"]).arg(interpreter).arg(script).arg(env!("CARGO_BIN_EXE_taki"));
+    command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     let out = command.output().expect("timeout, of coreutils");
     let text = String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned();
     match out.status.code() {

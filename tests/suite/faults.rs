@@ -100,6 +100,7 @@ pub fn wait(child: &mut Child) -> Option<i32> {
 /// The program with arguments.
 pub fn taki<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_taki"));
+    command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     command.args(arguments);
     command
 }

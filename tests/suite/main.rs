@@ -6,6 +6,7 @@
 mod animation;
 mod batch;
 mod big;
+mod cache;
 mod closed_forms;
 mod compare;
 mod contact_sheet;

@@ -107,6 +107,7 @@ fn a_scene_that_takes_its_volume_from_a_file_gives_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let taki = |args: &[&str]| {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_taki"));
+        command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
         let out = command.current_dir(folder.path()).args(args).output().expect("it runs");
         assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
     };

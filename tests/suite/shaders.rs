@@ -4,7 +4,8 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{
-    Develop, Environment, Frame, Light, LightVolume, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile, WORKGROUP,
+    Develop, Environment, Frame, Light, LightVolume, OpaqueVertex, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile,
+    WORKGROUP,
 };
 use taki::gpu::{gbuffer_source, integrate_source, shader_source, visibility_source};
 use taki::pool::{AROUND, Surface, WAVES, Wave};
@@ -134,6 +135,8 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("gbuffer.wgsl")).expect("valid");
     let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
     assert_eq!(members(&module, "Surface"), surface);
+    let vertex = fields!(OpaqueVertex: position_world occlusion normal_world shadow albedo wet);
+    assert_eq!(members(&module, "OpaqueVertex"), vertex);
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 

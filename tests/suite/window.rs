@@ -87,6 +87,7 @@ impl Desk {
             .current_dir(folder.path())
             .env("DISPLAY", &name)
             .env("XDG_CONFIG_HOME", folder.path())
+            .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .env_remove("WAYLAND_DISPLAY")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

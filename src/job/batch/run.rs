@@ -54,7 +54,7 @@ impl Batch {
             batch: self,
             engine,
             claims: Claims::new(self.request.stale),
-            volumes: VolumeStock::default(),
+            volumes: VolumeStock::with(self.base.limits().cache.clone()),
             mesh: None,
             watcher,
             warned: false,
@@ -233,7 +233,8 @@ impl Work<'_> {
         match &self.mesh {
             Some((known, mesh)) if *known == ground => mesh.clone(),
             _ => {
-                let mesh = ground.mesh();
+                let cache = self.batch.base.limits().cache.as_ref();
+                let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(cache));
                 self.mesh = Some((ground, mesh.clone()));
                 mesh
             }

@@ -9,6 +9,7 @@ use eframe::egui;
 use rayon::prelude::*;
 
 use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
+use crate::cache::Cache;
 use crate::cpu::resolve::develop;
 use crate::error::{Error, Result};
 use crate::exposure;
@@ -77,6 +78,8 @@ pub struct Renderer {
     memory: u64,
     engine: Option<Engine>,
     volume: VolumeStock,
+    /// Of the first scene.
+    cache: Option<Cache>,
     mesh: Option<(Ground, Meshes)>,
     rendered: Option<Rendered>,
     /// The values that the last automatic exposure was measured for, and its stops.
@@ -95,14 +98,21 @@ enum Task {
 
 impl Renderer {
     /// Opens nothing yet.
-    pub fn new(shared: Arc<Shared>, choice: EngineChoice, device: DeviceOptions, memory: u64) -> Self {
+    pub fn new(
+        shared: Arc<Shared>,
+        choice: EngineChoice,
+        device: DeviceOptions,
+        memory: u64,
+        cache: Option<Cache>,
+    ) -> Self {
         Renderer {
             shared,
             choice,
             device,
             memory,
             engine: None,
-            volume: VolumeStock::default(),
+            volume: VolumeStock::with(cache.clone()),
+            cache,
             mesh: None,
             rendered: None,
             exposed: None,
@@ -475,6 +485,7 @@ impl Renderer {
         let watch = self.watch("curves", request.serial, BUILD_PATIENCE);
         let (volume, cost) = self.volume.volume(scene, self.memory, &watch)?;
         if cost == Some(Cost::Volume) {
+            self.volume.forget_cache();
             lock(&self.shared.state).volume_seconds = clock.elapsed().as_secs_f64();
             scene.warnings(&volume).into_iter().for_each(|w| self.say(MessageKind::Warning, w));
         }
@@ -489,7 +500,7 @@ impl Renderer {
         {
             return (meshes.clone(), false);
         }
-        let full = ground.mesh();
+        let full = self.cache.take().map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(&cache));
         let meshes = Meshes { coarse: full.coarse(&ground), full };
         self.mesh = Some((ground, meshes.clone()));
         (meshes, true)

@@ -132,6 +132,7 @@ fn the_command_line_tells_them_of_the_region_and_refuses_what_has_none() {
     std::fs::write(folder.path().join("a.exr"), []).expect("written");
     let run = |args: &[&str]| {
         let mut taki = Command::new(env!("CARGO_BIN_EXE_taki"));
+        taki.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
         let out = taki.arg("compare").args(args).current_dir(folder.path()).output().expect("it runs");
         (out.status.code(), String::from_utf8(out.stdout).expect("UTF-8"))
     };

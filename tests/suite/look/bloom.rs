@@ -149,6 +149,7 @@ fn parts_of_a_picture_with_bloom_are_refused_and_of_an_exr_are_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |command: &str, name: &str, sets: &[&str]| {
         let mut taki = Command::new(env!("CARGO_BIN_EXE_taki"));
+        taki.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
         taki.args([command, "front", "--engine", "cpu", "--size", "64x48", "-o", name]).args(sets);
         let out = taki.current_dir(folder.path()).output().expect("it runs");
         (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())

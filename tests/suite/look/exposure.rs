@@ -103,6 +103,7 @@ fn the_command_line_tells_what_was_chosen_and_parts_agree_with_the_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |args: &[&str]| {
         let mut taki = Command::new(env!("CARGO_BIN_EXE_taki"));
+        taki.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
         let out = taki.args(args).current_dir(folder.path()).output().expect("it runs");
         (
             out.status.code(),

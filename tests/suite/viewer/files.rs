@@ -14,7 +14,11 @@ fn wide() -> Setup {
 }
 
 fn taki(arguments: &[&str]) -> Vec<u8> {
-    let out = Command::new(env!("CARGO_BIN_EXE_taki")).args(arguments).output().expect("it runs");
+    let out = Command::new(env!("CARGO_BIN_EXE_taki"))
+        .args(arguments)
+        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
+        .output()
+        .expect("it runs");
     assert!(out.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
     out.stdout
 }
