@@ -31,6 +31,7 @@ mod scene;
 mod shaders;
 mod shading;
 mod sheet;
+mod splash;
 mod strand;
 mod tolerance;
 #[cfg(feature = "viewer")]
