@@ -27,7 +27,7 @@ repeat_u = 2.0
 points = [[0, 1, 0], [0, 0, 1]]
 material = \"a\"
 [splashes.a]
-count = 2
+material = \"a\"
 [[quads]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 material = \"a\"
