@@ -13,8 +13,8 @@ pub const GRAVITY: f64 = 9.81;
 /// Straight pieces that each span of the spline is measured by: at a right angle's turn their length is short of
 /// the arc's by 1e-4.
 const PIECES: usize = 64;
-/// Least speed, as a share of that at the first point: a jet thrown up at 80° keeps 0.17 of it across.
-const SLOWEST: f64 = 0.1;
+/// Least speed, as a share of that at the first point: the steepest arc of a splash, 87°, keeps 0.052 of it across.
+const SLOWEST: f64 = 0.05;
 
 /// What a sheet is made from.
 #[derive(Clone, Debug)]

@@ -83,7 +83,7 @@ fn water_runs_at_the_speed_of_its_fall() {
 
 #[test]
 fn water_that_rises_slows_down_by_gravity() {
-    // Thrown up at 8 m/s to 2 m: t = (v0 − √(v0² − 2 g h))/g. Higher than v0²/2g = 3.26 m it keeps a tenth of v0.
+    // Thrown up at 8 m/s to 2 m: t = (v0 − √(v0² − 2 g h))/g. Higher than v0²/2g = 3.26 m it keeps a twentieth of v0.
     let up = |height: f64| {
         let text = format!(
             "[sheets.a]\npoints = [[0, 0, 0], [0, {}, 0], [0, {height}, 0]]\nsegments = 12\nv0 = 8.0",
@@ -99,7 +99,7 @@ fn water_that_rises_slows_down_by_gravity() {
             assert!((f64::from(place.y) - want).abs() < 2e-6, "{corner}: {place}, {want}");
         }
     }
-    // 5 m above where it would stop, at 0.8 m/s all along: as much texture as way.
+    // 5 m above where it would stop, at 0.4 m/s all along: as much texture as way.
     let high = up(9.0);
     let last: Vec<f32> = high
         .quads
