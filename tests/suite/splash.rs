@@ -44,7 +44,7 @@ fn read(text: &str) -> Result<Scene, String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn drops_fly_parabolas_with_the_share_of_the_speed_of_impact_that_is_left(
