@@ -93,7 +93,9 @@ const PLACES: [&str; 4] = ["cascade", "curtain", "spout", "night"];
 /// A preset whose place is coarse, as `COARSE_PLACE` is the default's and for its reason.
 fn coarse(name: &str, more: &[&str]) -> Scene {
     let values = &scene(name, &[]).values;
-    let rocks = values.names("rocks").into_iter().map(|rock| format!("rocks.{rock}.levels=0"));
+    // The film's lobe is a 32nd power: it magnifies what is left.
+    let rock = |rock: String| [format!("rocks.{rock}.levels=1"), format!("rocks.{rock}.wet=0")];
+    let rocks = values.names("rocks").into_iter().flat_map(rock);
     let pools = values.names("pools").into_iter().map(|pool| format!("pools.{pool}.foam=0"));
     let sets: Vec<String> = rocks.chain(pools).chain(more.iter().map(|s| s.to_string())).collect();
     scene(name, &sets.iter().map(String::as_str).collect::<Vec<_>>())
