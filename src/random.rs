@@ -28,6 +28,8 @@ pub enum Stream {
     Stratum = 8,
     /// One wave of a pool; index: its number.
     Wave = 9,
+    /// One arc of a splash; index: its number.
+    Splash = 10,
 }
 
 /// A family of generators: one seed and one stream.

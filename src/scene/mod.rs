@@ -9,9 +9,11 @@ mod parts;
 mod pool;
 mod preset;
 mod print;
+mod quads;
 mod read;
 mod rock;
 mod sheet;
+mod splash;
 mod types;
 mod value;
 
@@ -28,6 +30,7 @@ pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use rock::{Rock, wet::wet_albedo, wet::wetness};
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
+pub use splash::Splash;
 pub use types::{
     AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Lookup,
     Prefilter, Quad, Reflection, Scattering, Tone, Trace, Visibility,
@@ -215,7 +218,7 @@ impl Scene {
             water,
             volume_file,
             flow: v.float("volume.flow"),
-            quads: parts::quads(v)?,
+            quads: quads::quads(v)?,
             lights: parts::lights(v, sun, environment_lights.len())?,
             environment_lights,
             environment,

@@ -2,154 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::Vec3;
 
-use super::param::POINT_MAX;
-use super::read::MAX_QUADS;
-use super::sheet::{Ends, Sheet, SheetFault};
 use super::{
-    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Quad, Raw, Scattering, Tone,
-    Values,
+    AutoExposure, Camera, Cone, Filter, Light, Limits, Look, MAX_LIGHTS, Place, Raw, Scattering, Tone, Values,
 };
 use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
 use crate::haze::Haze;
-use crate::mapping::Material;
 use crate::strand::StrandParams;
 use crate::volume::Structure;
-
-pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
-    let mut quads = Vec::new();
-    let materials = v.names("materials");
-    for i in v.names("quads") {
-        let key = format!("quads.{i}.corners");
-        if !v.is_set(&key) {
-            return Err(Error::input(
-                format!("quad {i} has no corners"),
-                format!("give {key} four points A, B, C, D"),
-            ));
-        }
-        let (material, mist) = material(v, &materials, &format!("quad {i}"), &format!("quads.{i}.material"))?;
-        let quad = Quad::new(v.corners(&key), material).map_err(|fault| {
-            Error::input(
-                format!("quad {i} ({key}) {}", fault.words()),
-                "a quad needs four corners A, B, C, D in one plane, convex, in order around it",
-            )
-        })?;
-        quads.push(Quad { mist, ..quad });
-    }
-    for name in v.names("sheets") {
-        sheet_quads(v, &materials, &name, &mut quads)?;
-    }
-    Ok(quads)
-}
-
-/// The material that `key` of `what` names, and its mist.
-fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(Material, f32)> {
-    let name = v.text(key);
-    if name != "water" && !materials.contains(&name) {
-        let known = materials.join(", ");
-        return Err(Error::input(
-            format!("{what} ({key}) has the unknown material {name:?}"),
-            format!("add [materials.{name}] or use one of: water {known}"),
-        ));
-    }
-    let of = |what: &str| v.float(&format!("materials.{name}.{what}"));
-    let material =
-        Material { thickness_m: of("thickness"), repeat_u: of("repeat_u"), repeat_v: of("repeat_v") };
-    Ok((material, of("mist")))
-}
-
-/// Adds the quads of a sheet.
-fn sheet_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Quad>) -> Result<()> {
-    let sheet = sheet(v, materials, name)?;
-    let count = sheet.segments as usize * (sheet.borders().len() - 1);
-    if quads.len() + count > MAX_QUADS {
-        return Err(Error::input(
-            format!("sheet {name} makes {count} quads, with the others {}", quads.len() + count),
-            format!("lower sheets.{name}.segments or columns: a scene has at most {MAX_QUADS} quads"),
-        ));
-    }
-    let made = sheet.quads().map_err(|SheetFault { segment, column, fault }| {
-        Error::input(
-            format!("sheet {name}: quad {segment} along, {column} across {}", fault.words()),
-            format!(
-                "sheets.{name}.points must go across sheets.{name}.across, and the more it is round, the less they \
-                 may bend"
-            ),
-        )
-    })?;
-    quads.extend(made);
-    Ok(())
-}
-
-fn sheet(v: &Values, materials: &[String], name: &str) -> Result<Sheet> {
-    let key = |what: &str| format!("sheets.{name}.{what}");
-    let bad = |what: String, fix: String| Err(Error::input(format!("sheet {name}: {what}"), fix));
-    let points = v.series(&key("points"));
-    let far = |x: &f64| x.abs() > POINT_MAX;
-    if points.len() < 2 || points.iter().any(|p| p.len() != 3 || p.iter().any(far)) {
-        return bad(
-            "it has no profile".into(),
-            format!("give {} at least two points of three numbers, ±{POINT_MAX:e}", key("points")),
-        );
-    }
-    let points: Vec<Vec3> = points.iter().map(|p| DVec3::new(p[0], p[1], p[2]).as_vec3()).collect();
-    let size = points.iter().map(|p| p.distance(points[0])).fold(0.0, f32::max);
-    if let Some(i) = points.windows(2).position(|p| p[0].distance(p[1]) <= 1e-5 * size) {
-        return bad(
-            format!("points {i} and {} are the same", i + 1),
-            format!("remove one from {}", key("points")),
-        );
-    }
-    let mut widths: Vec<f32> = Vec::new();
-    for width in v.series(&key("widths")) {
-        match width[..] {
-            [width] if width > 0.0 && width <= POINT_MAX => widths.push(width as f32),
-            _ => return bad("a width is no number above 0".into(), format!("correct {}", key("widths"))),
-        }
-    }
-    if widths.len() < 2 {
-        widths = vec![widths.first().copied().unwrap_or(1.0); points.len()];
-    }
-    if widths.len() != points.len() {
-        return bad(
-            format!("{} widths and {} points", widths.len(), points.len()),
-            format!("give {} one for each point, or one for all", key("widths")),
-        );
-    }
-    let Some(across) = unit(v.triple(&key("across"))) else {
-        return bad(format!("{} has no direction", key("across")), "give a vector across the flow".into());
-    };
-    let (material, mist) = material(v, materials, &format!("sheet {name}"), &key("material"))?;
-    let (round, columns) = (v.float(&key("round")), v.count(&key("columns")));
-    if round == 1.0 && (columns < 3 || material.repeat_u.fract() != 0.0) {
-        return bad(
-            format!("a tube of {columns} columns with {} copies of the volume around it", material.repeat_u),
-            "a tube needs 3 columns or more, and a whole number for repeat_u of its material".into(),
-        );
-    }
-    let float = |what: &str| v.float(&key(what));
-    Ok(Sheet {
-        points,
-        widths,
-        across,
-        segments: v.count(&key("segments")),
-        columns,
-        round,
-        v0: float("v0"),
-        stretch: float("stretch"),
-        offset: Vec2::new(float("offset_u"), float("offset_v")),
-        ends: Ends {
-            edge: float("edge"),
-            breakup: float("breakup"),
-            fade: float("fade"),
-            head: float("head"),
-        },
-        material,
-        mist,
-    })
-}
 
 pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<Environment>> {
     let source = match v.text("environment.kind").as_str() {
@@ -329,7 +191,7 @@ pub(super) fn scattering(v: &Values) -> Result<Scattering> {
 }
 
 /// Normalised in float64, so that neither tiny nor huge vectors lose their direction.
-fn unit(v: Vec3) -> Option<Vec3> {
+pub(super) fn unit(v: Vec3) -> Option<Vec3> {
     let d = v.as_dvec3();
     (d.length() > 1e-12).then(|| d.normalize().as_vec3())
 }

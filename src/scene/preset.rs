@@ -16,6 +16,22 @@ const PRESETS: &[Preset] = &[
         include_str!("../../assets/scenes/evening.toml"),
     ),
     (
+        "cascade",
+        "a stairway of rock: water from ledge to ledge, with splashes",
+        include_str!("../../assets/scenes/cascade.toml"),
+    ),
+    (
+        "curtain",
+        "a thin veil before the mouth of a grotto, against the low sun",
+        include_str!("../../assets/scenes/curtain.toml"),
+    ),
+    ("spout", "a jet from a bamboo spout into a basin", include_str!("../../assets/scenes/spout.toml")),
+    (
+        "night",
+        "a fall lit by lamps behind it and at its foot",
+        include_str!("../../assets/scenes/night.toml"),
+    ),
+    (
         "fig5",
         "the paper's figure 5: a 40×40×40 volume on 8 quads",
         include_str!("../../assets/scenes/fig5.toml"),

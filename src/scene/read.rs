@@ -22,7 +22,7 @@ pub const VERSION: i64 = 1;
 const TRACKS: &str = "animate.tracks";
 
 /// The sections whose second key part is a name the scene chooses.
-const NAMED: [&str; 5] = ["lights", "materials", "pools", "rocks", "sheets"];
+const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
 
 /// A scene as text, with its name and the folder its references resolve in.
 pub struct Source {
@@ -229,6 +229,7 @@ impl File<'_> {
             "lights" => format!("{path}.kind"),
             "materials" => format!("{path}.thickness"),
             "sheets" => format!("{path}.points"),
+            "splashes" => format!("{path}.from"),
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
@@ -319,7 +320,7 @@ pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (Strin
     }
     let mut names = values.names(section);
     if section == "materials" {
-        for user in ["quads", "sheets"] {
+        for user in ["quads", "sheets", "splashes"] {
             names.extend(values.names(user).iter().map(|n| values.text(&format!("{user}.{n}.material"))));
         }
     }

@@ -9,10 +9,11 @@ use eframe::egui;
 use super::parameters::name;
 use crate::cpu;
 use crate::job::Unwatched;
-use crate::scene::{Limits, Scene, presets};
+use crate::scene::{Limits, Scene, Visibility, presets};
 
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 108;
+const COLUMNS: usize = 3;
 
 /// The gallery window.
 #[derive(Default)]
@@ -35,29 +36,32 @@ impl Gallery {
         let window = egui::Window::new("Scenes").open(&mut open).resizable(false).collapsible(false);
         let middle = ctx.content_rect().center();
         window.pivot(egui::Align2::CENTER_CENTER).default_pos(middle).show(ctx, |ui| {
-            egui::Grid::new("gallery").num_columns(2).spacing([12.0, 12.0]).show(ui, |ui| {
-                for (i, (preset, what)) in presets().enumerate() {
-                    ui.vertical(|ui| {
-                        ui.set_width(WIDTH as f32);
-                        let size = egui::vec2(WIDTH as f32, HEIGHT as f32);
-                        let response = match self.pictures.get(preset) {
-                            Some(texture) => {
-                                ui.add_sized(size, egui::Button::image((texture.id(), size)).frame(false))
+            let height = (ctx.content_rect().height() - 80.0).max(160.0);
+            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                egui::Grid::new("gallery").num_columns(COLUMNS).spacing([12.0, 12.0]).show(ui, |ui| {
+                    for (i, (preset, what)) in presets().enumerate() {
+                        ui.vertical(|ui| {
+                            ui.set_width(WIDTH as f32);
+                            let size = egui::vec2(WIDTH as f32, HEIGHT as f32);
+                            let response = match self.pictures.get(preset) {
+                                Some(texture) => {
+                                    ui.add_sized(size, egui::Button::image((texture.id(), size)).frame(false))
+                                }
+                                None => ui.add_sized(size, egui::Button::new("…")),
+                            };
+                            name(&response, &format!("Open {preset}"));
+                            let response = response.on_hover_cursor(egui::CursorIcon::PointingHand);
+                            if response.on_hover_text(format!("Open {preset}")).clicked() {
+                                chosen = Some(preset);
                             }
-                            None => ui.add_sized(size, egui::Button::new("…")),
-                        };
-                        name(&response, &format!("Open {preset}"));
-                        let response = response.on_hover_cursor(egui::CursorIcon::PointingHand);
-                        if response.on_hover_text(format!("Open {preset}")).clicked() {
-                            chosen = Some(preset);
+                            ui.strong(preset);
+                            ui.weak(what);
+                        });
+                        if i % COLUMNS == COLUMNS - 1 {
+                            ui.end_row();
                         }
-                        ui.strong(preset);
-                        ui.weak(what);
-                    });
-                    if i % 2 == 1 {
-                        ui.end_row();
                     }
-                }
+                });
             });
         });
         self.open = open && chosen.is_none();
@@ -87,11 +91,16 @@ impl Gallery {
 }
 
 /// The middle of a preset's picture in the gallery's aspect, rendered on the CPU: small, and beside the
-/// renderer's own work.
+/// renderer's own work. Light volumes for so few pixels would take longer than the walks they spare.
 fn thumbnail(preset: &str) -> Option<egui::ColorImage> {
-    let size = [format!("image.width={WIDTH}"), format!("image.height={HEIGHT}"), "image.samples=4".into()];
+    let mut sets =
+        vec![format!("image.width={WIDTH}"), format!("image.height={HEIGHT}"), "image.samples=3".into()];
     let limits = Limits::default();
-    let scene = Scene::load(Path::new(preset), &size, &limits).ok()?;
+    let mut scene = Scene::load(Path::new(preset), &sets, &limits).ok()?;
+    if scene.visibility == Visibility::Cached {
+        sets.push("light.visibility=march".into());
+        scene = Scene::load(Path::new(preset), &sets, &limits).ok()?;
+    }
     let volume = scene.volume(limits.memory, &Unwatched).ok()?;
     let frame = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).ok()?;
     Some(egui::ColorImage::from_rgba_unmultiplied(

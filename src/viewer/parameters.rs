@@ -21,7 +21,7 @@ use crate::scene::{Cost, Kind, Param, Raw, Value};
 const GROUPS: [(&str, &str, &[&str]); 9] = [
     ("Curves", "The spatial fractal curves that give every cell its flow direction", &["curves"]),
     ("Volume", "The volume texture: cells, density, reflection", &["volume"]),
-    ("Mapping", "How the volume lies on the quads", &["materials", "sheets", "quads"]),
+    ("Mapping", "How the volume lies on the quads", &["materials", "sheets", "splashes", "quads"]),
     ("Light", "Walk, attenuation and reflection", &["trace", "light", "strand"]),
     ("Lights", "", LIGHTS),
     (

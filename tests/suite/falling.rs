@@ -82,6 +82,36 @@ fn water_runs_at_the_speed_of_its_fall() {
 }
 
 #[test]
+fn water_that_rises_slows_down_by_gravity() {
+    // Thrown up at 8 m/s to 2 m: t = (v0 − √(v0² − 2 g h))/g. Higher than v0²/2g = 3.26 m it keeps a twentieth of v0.
+    let up = |height: f64| {
+        let text = format!(
+            "[sheets.a]\npoints = [[0, 0, 0], [0, {}, 0], [0, {height}, 0]]\nsegments = 12\nv0 = 8.0",
+            height / 2.0
+        );
+        scene(&text)
+    };
+    let time = |h: f64| (8.0 - (64.0 - 2.0 * GRAVITY * h).sqrt()) / GRAVITY;
+    for quad in &up(2.0).quads {
+        for (corner, place, _) in corners(quad) {
+            // The root of the speed is taken at float32 corners: 1e-7 of 2 m over the least speed, 5 m/s.
+            let want = time(f64::from(corner.y)) / time(2.0);
+            assert!((f64::from(place.y) - want).abs() < 2e-6, "{corner}: {place}, {want}");
+        }
+    }
+    // 5 m above where it would stop, at 0.4 m/s all along: as much texture as way.
+    let high = up(9.0);
+    let last: Vec<f32> = high
+        .quads
+        .iter()
+        .filter(|q| q.corners[0].y > 4.0)
+        .map(|q| q.material.repeat_v / (q.corners[3].y - q.corners[0].y))
+        .collect();
+    assert!(last.len() > 3);
+    assert!(last.iter().all(|x| (x / last[0] - 1.0).abs() < 1e-4), "{last:?}");
+}
+
+#[test]
 fn without_stretch_the_texture_is_even() {
     let scene = plumb("segments = 5\nstretch = 0.0");
     for quad in &scene.quads {

@@ -75,7 +75,10 @@ fn rock_and_water_too_dense_to_look_through_dim_by_their_distance_and_the_backgr
     let of = |more: &[&str]| {
         frame("waterfall", &[&SMALL[..], &["trace.sigma=1e5", "volume.alpha=1"], more].concat())
     };
-    let (clear, hazy) = (of(&[]), of(&["haze.density=0.06", "haze.color=[0.5,0.6,0.9]"]));
+    let (clear, hazy) = (
+        of(&["haze.density=0"]),
+        of(&["haze.density=0.06", "haze.color=[0.5,0.6,0.9]", "haze.scale_height=0"]),
+    );
     let surface = clear.surface.as_ref().expect("asked for");
     let mut seen = [0; 3];
     for (i, (a, b)) in clear.radiance.iter().zip(&hazy.radiance).enumerate() {

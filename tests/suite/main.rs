@@ -33,6 +33,7 @@ mod scatter;
 mod scene;
 mod shaders;
 mod shading;
+mod splash;
 mod strand;
 mod tolerance;
 #[cfg(feature = "viewer")]

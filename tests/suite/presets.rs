@@ -10,7 +10,7 @@ use taki::gpu::RenderOptions;
 use taki::job::Unwatched;
 use taki::scene::{Scene, presets};
 
-use crate::gpu::{renderer, scene};
+use crate::gpu::{assert_parity, both, renderer, scene};
 
 /// Small enough that a snapshot stays under 64 KiB.
 const SMALL: [&str; 3] = ["image.width=96", "image.height=154", "image.samples=2"];
@@ -84,6 +84,42 @@ fn every_preset_renders_light_and_no_pixel_that_is_not_finite() {
         assert!(frame.covered_pixels() > 40 * 48 / 20, "{name}: the water covers hardly anything");
         let brightest = encoded(&frame).into_iter().flatten().fold(0.0, f32::max);
         assert!(brightest > 0.5, "{name} is dark");
+    }
+}
+
+/// The scenes of falling water besides the default one.
+const PLACES: [&str; 4] = ["cascade", "curtain", "spout", "night"];
+
+/// A preset whose place is coarse, as `COARSE_PLACE` is the default's and for its reason.
+fn coarse(name: &str, more: &[&str]) -> Scene {
+    let values = &scene(name, &[]).values;
+    // The film's lobe is a 32nd power: it magnifies what is left.
+    let rock = |rock: String| [format!("rocks.{rock}.levels=1"), format!("rocks.{rock}.wet=0")];
+    let rocks = values.names("rocks").into_iter().flat_map(rock);
+    let pools = values.names("pools").into_iter().map(|pool| format!("pools.{pool}.foam=0"));
+    let sets: Vec<String> = rocks.chain(pools).chain(more.iter().map(|s| s.to_string())).collect();
+    scene(name, &sets.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn the_engines_agree_on_every_scene_of_falling_water() {
+    let Some(mut renderer) = renderer("scenes of falling water") else { return };
+    for name in PLACES {
+        let scene = coarse(name, &["image.width=96", "image.height=54", "image.samples=1"]);
+        assert_parity(name, &both(&mut renderer, &scene));
+    }
+}
+
+#[test]
+fn every_scene_of_falling_water_flows_and_comes_round() {
+    for name in PLACES {
+        let at = |flow: &str| {
+            on_cpu(&coarse(name, &["image.width=64", "image.height=36", "image.samples=1", flow])).picture
+        };
+        let start = at("volume.flow=0");
+        assert!(start == at("volume.flow=1"), "{name} comes round");
+        let moved = start.iter().zip(&at("volume.flow=0.37")).filter(|(a, b)| a != b).count();
+        assert!(moved > 64 * 36 / 50, "{name}: only {moved} pixels change while it flows");
     }
 }
 

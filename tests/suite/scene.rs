@@ -26,6 +26,8 @@ repeat_u = 2.0
 [sheets.a]
 points = [[0, 1, 0], [0, 0, 1]]
 material = \"a\"
+[splashes.a]
+material = \"a\"
 [[quads]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 material = \"a\"

@@ -7,6 +7,7 @@ mod light;
 mod picture;
 mod place;
 mod sheet;
+mod splash;
 mod trace;
 mod water;
 
@@ -100,8 +101,8 @@ const fn p(
 /// The table, in the order of the method.
 pub const PARAMS: &[Param] = &joined();
 
-const SECTIONS: [&[Param]; 6] =
-    [water::TABLE, sheet::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
+const SECTIONS: [&[Param]; 7] =
+    [water::TABLE, sheet::TABLE, splash::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
 
 const fn count() -> usize {
     let (mut sum, mut section) = (0, 0);
