@@ -103,7 +103,7 @@ pub struct SheetFault {
 
 impl Sheet {
     /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that rises
-    /// higher than its speed allows is taken to keep [`SLOWEST`] of v0. Along a straight piece of constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
+    /// higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
     pub fn stations(&self) -> Vec<Station> {
         let mut stations: Vec<Station> = Vec::new();
         for (point, width) in spline(&self.points, &self.widths) {
