@@ -80,7 +80,7 @@ use crate::job::{Engine, EngineChoice, Monitor, Unwatched};
 use crate::scene::{Limits, Scene};
 use crate::volume::VolumeTexture;
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct BenchArgs {
     /// Measures the `front` scene with this volume file only.
     #[arg(long, value_name = "V.npz")]
@@ -144,6 +144,9 @@ const STEPS: &[Step] = &[
     ("sky", &["environment.kind=sky", "light.ambient=[0,0,0]", "lights.sun.intensity=0"]),
 ];
 
+/// The scenes whose frames are measured.
+const SCENES: [&str; 6] = ["waterfall", "cascade", "curtain", "spout", "night", "evening"];
+
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -180,6 +183,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     }
     if args.volume.is_none() {
         steps(args, terminal, &mut gpu, &mut rows)?;
+        scenes(args, terminal, &mut gpu, &mut rows)?;
         pictures(args, terminal, &mut rows)?;
         builds(args, terminal, &mut rows)?;
         processes(args, terminal, &mut rows)?;
@@ -233,6 +237,23 @@ fn steps(
     }
     let volume = scenes[0].1.volume(direct_limits().memory, terminal)?;
     passes(args, terminal, gpu, "fig5", &scenes, &volume, rows)
+}
+
+/// Rows of the scenes with a place of their own, with one sample.
+fn scenes(
+    args: &BenchArgs,
+    terminal: &Terminal,
+    gpu: &mut Option<GpuBench>,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let size = ["image.width=1280", "image.height=720", "image.samples=1"].map(String::from);
+    for name in SCENES {
+        let scene = load(name, &size)?;
+        let volume = scene.volume(direct_limits().memory, terminal)?;
+        let few = BenchArgs { runs: args.runs.min(3), ..args.clone() };
+        passes(&few, terminal, gpu, name, &[("integrate", scene)], &volume, rows)?;
+    }
+    Ok(())
 }
 
 /// Rows of scenes that differ in their light: all passes in turn, `runs` times.

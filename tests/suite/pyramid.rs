@@ -139,15 +139,25 @@ fn levels_of_odd_volumes_join_without_a_seam_and_lose_no_water() {
     let noise: Vec<f32> = (0..13 * 9 * 5).map(|_| rng.random::<f32>()).collect();
     let odd = volume([13, 9, 5], |c| {
         let i = (c.z * 9 + c.y) * 13 + c.x;
-        Cell::from_direction(Vec3::Y).with_density(noise[i as usize], 0.5, 0.5)
+        Cell::from_direction(Vec3::Y).with_density(
+            noise[i as usize],
+            if c.x % 2 == 0 { 1.0 } else { 0.0 },
+            0.5,
+        )
     });
     let mean = |v: &VolumeTexture| {
         v.cells.iter().map(|c| f64::from(c.rho_code())).sum::<f64>() / v.cells.len() as f64
+    };
+    let k_d = |v: &VolumeTexture| {
+        let weight = |c: &Cell| f64::from(c.rho_code());
+        let sum = v.cells.iter().map(|c| weight(c) * f64::from(c.k_codes().0)).sum::<f64>();
+        sum / v.cells.iter().map(weight).sum::<f64>()
     };
     for (number, level) in coarse_levels(&odd, 1e-9).iter().zip(1..).map(|(l, n)| (n, l)) {
         assert_eq!(level.size, level_size(odd.size, number));
         // A code's rounding.
         assert!((mean(level) - mean(&odd)).abs() < 1.0, "level {number}");
+        assert!((k_d(level) - k_d(&odd)).abs() < 0.5, "level {number}: {} and {}", k_d(level), k_d(&odd));
     }
 }
 
