@@ -1,21 +1,25 @@
-//! The thread itself: what it does with a request, and how it goes on after a fault.
+//! The thread itself: what it does with a request.
+
+mod export;
+mod faults;
+mod watch;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use eframe::egui;
 use rayon::prelude::*;
 
-use super::{Busy, Export, Message, MessageKind, Picture, Request, Shared, lock};
+use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::cache::Cache;
 use crate::cpu::resolve::develop;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::exposure;
-use crate::frame::{Frame, Layer, Window};
+use crate::frame::Frame;
 use crate::gpu::{DeviceOptions, RenderOptions};
-use crate::job::{Engine, EngineChoice, Monitor, Still, VolumeStock, check_bloom, strips};
+use crate::job::{Engine, EngineChoice, Monitor, VolumeStock};
 use crate::scene::{AutoExposure, Cost, Ground, Look, Mesh, Scene, Values};
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
@@ -37,11 +41,9 @@ const BUILD_PATIENCE: Duration = Duration::from_secs(2);
 /// Bytes for results of the raster pass: while the water plays or one slider of the walk moves, previews are
 /// spared it. Those of several previews, or of one picture of 1.2 times 720p.
 const KEPT_RASTERS: u64 = 48 << 20;
-/// More than this many lost devices a minute, and the CPU takes over.
-const MAX_REBUILDS: usize = 3;
-/// Preview pixels per side of a full pixel that are tried.
 /// From this scale on the rocks are drawn coarsely.
 const COARSE_SCALE: u32 = 3;
+/// Preview pixels per side of a full pixel that are tried.
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
 /// The picture that refinement goes on from.
@@ -178,85 +180,6 @@ impl Renderer {
         }
     }
 
-    /// Works and deals with how it ends; true: try it again.
-    fn attempt(&mut self, work: impl FnOnce(&mut Self) -> Result<()>) -> bool {
-        // A panic under the renderer is a bug of this program, but no reason to lose the user's work.
-        match std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(self))) {
-            Ok(Ok(())) => lock(&self.shared.state).fault = None,
-            Ok(Err(Error::Interrupted { .. })) => {}
-            Ok(Err(e @ (Error::DeviceLost(_) | Error::Watchdog { .. }))) => {
-                self.lost(&e);
-                return true;
-            }
-            Ok(Err(e)) => lock(&self.shared.state).fault = Some(e.to_string()),
-            Err(panic) => {
-                let text = panic.downcast_ref::<String>().map(String::as_str);
-                let why = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no word why");
-                let bug = format!("a bug ended the renderer ({why}); please report this");
-                if matches!(self.engine, Some(Engine::Gpu(..))) {
-                    self.say(MessageKind::Error, format!("{bug}. The CPU engine goes on"));
-                    self.take_cpu();
-                    return true;
-                }
-                lock(&self.shared.state).fault = Some(bug);
-            }
-        }
-        false
-    }
-
-    /// Opens a new device after one was lost; past a few a minute the CPU takes over.
-    fn lost(&mut self, e: &Error) {
-        let now = Instant::now();
-        self.losses.retain(|at| now - *at < Duration::from_secs(60));
-        self.losses.push_back(now);
-        lock(&self.shared.state).devices_lost += 1;
-        if self.losses.len() > MAX_REBUILDS || matches!(e, Error::Watchdog { .. }) {
-            self.say(MessageKind::Error, format!("{e}. The CPU engine goes on; save your work"));
-            self.take_cpu();
-        } else {
-            self.say(
-                MessageKind::Warning,
-                format!("the GPU device was lost ({e}); a new one was opened, nothing of the scene is lost"),
-            );
-            self.engine = None;
-            self.open_engine();
-        }
-    }
-
-    fn take_cpu(&mut self) {
-        self.choice = EngineChoice::Cpu;
-        self.engine = None;
-        self.speed = Speed::default();
-        self.open_engine();
-    }
-
-    fn open_engine(&mut self) {
-        let opened = Engine::open(self.choice, &self.device);
-        let (engine, line) = match opened {
-            Ok(opened) => opened,
-            Err(e) => {
-                self.say(MessageKind::Error, format!("{e}. The CPU engine goes on"));
-                (Engine::cpu(), "engine cpu".into())
-            }
-        };
-        if matches!(engine, Engine::Cpu(_)) && self.choice != EngineChoice::Cpu {
-            self.say(MessageKind::Warning, line.clone());
-        }
-        self.engine = Some(engine);
-        lock(&self.shared.state).engine = line;
-        (self.shared.wake)();
-    }
-
-    fn say(&self, kind: MessageKind, text: String) {
-        let mut state = lock(&self.shared.state);
-        let message = Message { kind, text };
-        if state.messages.last() != Some(&message) {
-            state.messages.push(message);
-        }
-        drop(state);
-        (self.shared.wake)();
-    }
-
     /// Whether there is something newer to do than `serial`; waits for it up to `time`.
     fn superseded(&self, serial: u64, time: Duration) -> bool {
         let until = Instant::now() + time;
@@ -272,17 +195,6 @@ impl Renderer {
             }
             queue =
                 self.shared.news.wait_timeout(queue, left).map_or_else(|e| e.into_inner().0, |woken| woken.0);
-        }
-    }
-
-    fn watch(&self, what: &'static str, serial: u64, patience: Duration) -> Watch {
-        Watch {
-            shared: self.shared.clone(),
-            what,
-            serial,
-            patience,
-            start: Instant::now(),
-            shown: Mutex::new(None),
         }
     }
 
@@ -525,55 +437,6 @@ impl Renderer {
         self.exposed = Some((scene.values.clone(), stops));
         Ok(scene.clone().exposed(stops))
     }
-
-    fn export(&mut self, export: &Export) -> Result<()> {
-        let clock = Instant::now();
-        let result = self.export_files(export);
-        let names: Vec<String> = export.paths.iter().map(|p| p.display().to_string()).collect();
-        let names = names.join(", ");
-        match &result {
-            Ok(()) => {
-                let seconds = clock.elapsed().as_secs_f64();
-                self.say(MessageKind::Note, format!("wrote {names} in {seconds:.1} s"));
-            }
-            Err(Error::Interrupted { .. }) => {
-                self.say(MessageKind::Note, format!("export cancelled; {names} was not written"));
-            }
-            Err(Error::DeviceLost(_) | Error::Watchdog { .. }) => return result,
-            Err(e) => self.say(MessageKind::Error, format!("export failed: {e}")),
-        }
-        Ok(())
-    }
-
-    fn export_files(&mut self, export: &Export) -> Result<()> {
-        let still = Still::create(&export.paths)?;
-        let request = Request {
-            // No view request is ever older: a volume that is being built for the export is not given up.
-            serial: u64::MAX,
-            asked: Instant::now(),
-            scene: Arc::new(export.scene.clone()),
-            size: [export.scene.image.width, export.scene.image.height],
-            samples: export.scene.image.samples,
-            layer: Layer::Rgb,
-        };
-        let (volume, _) = self.volume(&request)?;
-        let (meshes, _) = self.meshes(&export.scene);
-        let watch = self.watch("export", u64::MAX, Duration::MAX);
-        let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let scene = &self.exposed(&export.scene, &volume, &meshes.full, u64::MAX)?;
-        let image = &scene.image;
-        let window = Window::whole([image.width, image.height]);
-        let strips = strips(scene, window, options.surface, self.memory)?;
-        if still.has_png() {
-            check_bloom(scene, window, strips.len())?;
-        }
-        let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
-        writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
-            self.run_engine(scene, &volume, &meshes.full, options, watch)
-        })?;
-        watch.progress("saving", 1, 1)?;
-        writer.finish().map(drop)
-    }
 }
 
 /// What all pictures of a request share.
@@ -596,43 +459,4 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
     sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
     sum.seconds = part.seconds;
     develop(sum, look, true);
-}
-
-/// Watches one piece of work for the render thread: ends it when something newer is wanted.
-struct Watch {
-    shared: Arc<Shared>,
-    what: &'static str,
-    serial: u64,
-    /// How long the work goes on though something newer is wanted.
-    patience: Duration,
-    start: Instant,
-    /// When the window was last told.
-    shown: Mutex<Option<Instant>>,
-}
-
-impl Monitor for Watch {
-    fn progress(&self, _: &'static str, done: u64, total: u64) -> Result<()> {
-        let export = self.serial == u64::MAX;
-        let newer = self.shared.newest.load(Ordering::Relaxed) > self.serial;
-        let stopped = !export && self.shared.stopped.load(Ordering::Relaxed) >= self.serial;
-        let cancelled = export && self.shared.cancel_export.load(Ordering::Relaxed);
-        let quit = self.shared.quit.load(Ordering::Relaxed);
-        if quit || stopped || cancelled || (newer && self.start.elapsed() >= self.patience) {
-            return Err(Error::Interrupted { code: 130 });
-        }
-        let mut shown = lock(&self.shown);
-        if shown.is_none_or(|at| at.elapsed() > Duration::from_millis(100)) {
-            *shown = Some(Instant::now());
-            let share = done as f32 / total.max(1) as f32;
-            lock(&self.shared.state).busy = Some(Busy { what: self.what, share });
-            (self.shared.wake)();
-        }
-        Ok(())
-    }
-
-    fn warn(&self, text: &str) {
-        let message = Message { kind: MessageKind::Warning, text: text.into() };
-        lock(&self.shared.state).messages.push(message);
-        (self.shared.wake)();
-    }
 }

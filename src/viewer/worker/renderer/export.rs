@@ -1,0 +1,62 @@
+//! Export of stills, at any size.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::Renderer;
+use crate::error::{Error, Result};
+use crate::frame::{Layer, Window};
+use crate::gpu::RenderOptions;
+use crate::job::{Monitor, Still, check_bloom, strips};
+use crate::viewer::worker::{Export, MessageKind, Request};
+
+impl Renderer {
+    pub(super) fn export(&mut self, export: &Export) -> Result<()> {
+        let clock = Instant::now();
+        let result = self.export_files(export);
+        let names: Vec<String> = export.paths.iter().map(|p| p.display().to_string()).collect();
+        let names = names.join(", ");
+        match &result {
+            Ok(()) => {
+                let seconds = clock.elapsed().as_secs_f64();
+                self.say(MessageKind::Note, format!("wrote {names} in {seconds:.1} s"));
+            }
+            Err(Error::Interrupted { .. }) => {
+                self.say(MessageKind::Note, format!("export cancelled; {names} was not written"));
+            }
+            Err(Error::DeviceLost(_) | Error::Watchdog { .. }) => return result,
+            Err(e) => self.say(MessageKind::Error, format!("export failed: {e}")),
+        }
+        Ok(())
+    }
+
+    fn export_files(&mut self, export: &Export) -> Result<()> {
+        let still = Still::create(&export.paths)?;
+        let request = Request {
+            // No view request is ever older: a volume that is being built for the export is not given up.
+            serial: u64::MAX,
+            asked: Instant::now(),
+            scene: Arc::new(export.scene.clone()),
+            size: [export.scene.image.width, export.scene.image.height],
+            samples: export.scene.image.samples,
+            layer: Layer::Rgb,
+        };
+        let (volume, _) = self.volume(&request)?;
+        let (meshes, _) = self.meshes(&export.scene);
+        let watch = self.watch("export", u64::MAX, Duration::MAX);
+        let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
+        let scene = &self.exposed(&export.scene, &volume, &meshes.full, u64::MAX)?;
+        let image = &scene.image;
+        let window = Window::whole([image.width, image.height]);
+        let strips = strips(scene, window, options.surface, self.memory)?;
+        if still.has_png() {
+            check_bloom(scene, window, strips.len())?;
+        }
+        let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
+        writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
+            self.run_engine(scene, &volume, &meshes.full, options, watch)
+        })?;
+        watch.progress("saving", 1, 1)?;
+        writer.finish().map(drop)
+    }
+}
