@@ -31,6 +31,8 @@ pub struct RayReport {
     pub transmittance: f32,
     /// Cells of the view ray and of its light rays.
     pub cells: [u32; 2],
+    /// Whether the picture's pixel comes from coarser levels, or from between cells; the report's own is then another.
+    pub filtered: bool,
 }
 
 impl RayReport {
@@ -127,6 +129,7 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
         radiance: traced.radiance,
         transmittance: traced.transmittance,
         cells: traced.cells,
+        filtered: scene.trace.filter != Prefilter::None || scene.trace.lookup != Lookup::Nearest,
     }
 }
 

@@ -109,6 +109,9 @@ fn headline(ui: &mut Ui, report: &RayReport) {
             ui.end_row();
         }
     });
+    if report.filtered {
+        ui.label(RichText::new("of the volume's own cells: without trace.filter and trace.lookup").weak());
+    }
 }
 
 /// Density, transmittance and radiance over the depth; the depth under the pointer.

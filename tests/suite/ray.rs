@@ -6,14 +6,15 @@ use taki::cpu::gbuffer;
 use taki::cpu::ray::{RayReport, inspect};
 use taki::frame::Window;
 use taki::job::Unwatched;
-use taki::scene::{Image, Light, Scene};
+use taki::scene::{Image, Light, Prefilter, Scene};
 
 use crate::gpu::scene;
 
 /// Rough rocks: each report projects them anew.
 const FIG5_ROCKS: [&str; 4] =
     ["rocks.wall.levels=4", "rocks.left.levels=4", "rocks.right.levels=4", "rocks.foot.levels=4"];
-const WATERFALL_ROCKS: [&str; 10] = [
+const WATERFALL_ROCKS: [&str; 11] = [
+    "trace.filter=none",
     "rocks.wall.levels=4",
     "rocks.left.levels=4",
     "rocks.right.levels=4",
@@ -57,6 +58,19 @@ pub fn assert_whole(what: &str, report: &RayReport) {
     if let Some(first) = report.steps.first() {
         assert_eq!((first.enter_m, first.transmittance), (0.0, 1.0), "{what}");
     }
+}
+
+#[test]
+fn a_filtered_pictures_report_is_of_the_volumes_own_cells_and_says_so() {
+    let [_, (_, mut scene), _] = scenes();
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mesh = scene.mesh();
+    let report = |scene: &Scene| inspect(scene, &volume, &mesh, [40, 30]);
+    let plain = report(&scene);
+    scene.trace.filter = Prefilter::Pyramid;
+    let filtered = report(&scene);
+    assert!(!plain.filtered && filtered.filtered && !plain.steps.is_empty());
+    assert_eq!((filtered.radiance, &filtered.steps), (plain.radiance, &plain.steps));
 }
 
 #[test]
