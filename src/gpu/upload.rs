@@ -19,7 +19,8 @@ const SLAB_BYTES: usize = 64 << 20;
 /// memory they came from.
 #[derive(Default)]
 pub struct Resident {
-    levels: KeptLevels,
+    /// The volume's levels, and whether they are made for leaps.
+    pub levels: KeptLevels,
     volume: Option<(Levels, wgpu::TextureView)>,
     vertices: Option<(Arc<Vec<Vertex>>, wgpu::Buffer)>,
     /// Of these vertices; previews have fewer triangles than pictures. Each upload has a number of its own.

@@ -45,6 +45,7 @@ struct Kind {
     per_cell: bool,
     form: Form,
     pyramid: bool,
+    leaps: bool,
     /// Of empty cells too.
     everywhere: bool,
 }
@@ -157,6 +158,7 @@ impl Visibility {
                 per_cell: plan.medium.per_cell,
                 form: plan.form,
                 pyramid: up.levels.len() > 1,
+                leaps: up.levels.leaps,
                 everywhere,
             },
         );
@@ -256,6 +258,7 @@ impl Visibility {
             ("PER_CELL", number(kind.per_cell)),
             ("CODES", number(kind.form == Form::Codes)),
             ("PYRAMID", number(kind.pyramid)),
+            ("LEAPS", number(kind.leaps)),
             ("EVERYWHERE", number(kind.everywhere)),
         ];
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

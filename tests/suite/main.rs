@@ -17,6 +17,7 @@ mod flow;
 mod gpu;
 mod haze;
 mod layers;
+mod leaps;
 mod lights;
 mod look;
 mod looking;
