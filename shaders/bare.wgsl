@@ -1,5 +1,5 @@
 // The bare walk, for `taki bench` only: the rays and cells of `integrate`, one fetch and one addition a
-// cell, no light. The floor under the integrate pass.
+// cell, no light; with LEAPS the bare leaping walk. The floor under the integrate pass.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
@@ -69,7 +69,14 @@ fn visit(
 ) {
     let texel = textureLoad(volume, (*walk).cell);
     *sum += select(texel.x + texel.y, 0u, *done);
-    *n += select(1u, 0u, *done);
+    var passed_by = 0u;
+    if LEAPS {
+        passed_by = walk_leap(walk, texel.xy, true);
+    }
+    *n += select(1u + passed_by, 0u, *done);
+    if LEAPS {
+        *n = min(*n, max_cells);
+    }
     walk_step(walk, true);
     *done |= ((*walk).cell.z >= layers) | (*n >= max_cells);
 }

@@ -109,6 +109,8 @@ struct View {
     similarity: Similarity,
     // What the sheet makes of the cells.
     matter: Matter,
+    // Whether it leaves empty cells empty; mist does not.
+    leaps: bool,
     // Where the quad's profile begins.
     profile: u32,
     // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
@@ -179,6 +181,7 @@ fn trace(
         view.d_cell = d_cell;
         view.extinction = frame.extinction;
         view.matter = matter_at(quad, hit.xy, view.level.number > 0u);
+        view.leaps = view.matter.shift <= 0.0;
         if PYRAMID {
             view.origin *= view.level.scale;
             view.d_cell *= view.level.scale;
@@ -254,14 +257,21 @@ fn walk_level(view: View, before: f32) -> Ray {
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
     var rho = 0.0;
+    var texel = vec2<u32>(0u);
+    if !TRILINEAR || LEAPS {
+        texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+    }
     if TRILINEAR {
         rho = found_between(*walk, *ray, view).rho;
     } else {
-        rho = matter_rho(f32(textureLoad(volume, in_level((*walk).cell, view.level)).x & 0xffffu), view.matter);
+        rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
     }
     let empty = rho == 0.0;
     let on = *seeking & empty & !(*ray).done;
     (*ray).cells += select(0u, 1u, on);
+    if LEAPS {
+        (*ray).cells = min((*ray).cells + walk_leap(walk, texel, on & view.leaps), view.max_cells);
+    }
     (*ray).t = select((*ray).t, walk_exit(*walk), on);
     walk_step(walk, on);
     (*ray).done |= ((*walk).cell.z >= view.level.size.z) | ((*ray).cells >= view.max_cells);
@@ -276,7 +286,11 @@ fn found_between(walk: Walk, ray: Ray, view: View) -> Found {
 
 // The light of one cell, and the step to the next. Past the end of the walk nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let texel = textureLoad(volume, in_level((*walk).cell, view.level));
+    let texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+    var passed_by = 0u;
+    if LEAPS {
+        passed_by = walk_leap(walk, texel, view.leaps);
+    }
     let t_exit = walk_exit(*walk);
     var found: Found;
     if TRILINEAR {
@@ -286,7 +300,8 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         found.k_d = f32((texel.x >> 16u) & 0xffu);
         found.k_s = f32(texel.x >> 24u);
         if PYRAMID {
-            found.moments = moments_of(texel.y, view.level);
+            // Boxes are no moments: their means need not be finite.
+            found.moments = moments_of(select(texel.y, 0u, LEAPS & ((texel.x & 0xffffu) == 0u)), view.level);
         }
     }
     let rho = select(found.rho, 0.0, (*ray).done);
@@ -336,7 +351,10 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         (*ray).depth += tau_bits;
     }
 
-    (*ray).cells += select(1u, 0u, (*ray).done);
+    (*ray).cells += select(1u + passed_by, 0u, (*ray).done);
+    if LEAPS {
+        (*ray).cells = min((*ray).cells, view.max_cells);
+    }
     (*ray).transmittance = passed;
     (*ray).t = t_exit;
     walk_step(walk, true);

@@ -43,8 +43,13 @@ fn pass_cell(
     max_cells: u32,
     enough: f32,
 ) {
+    let texel = textureLoad(volume, in_level((*walk).cell, level)).xy;
+    var passed_by = 0u;
+    if LEAPS {
+        passed_by = walk_leap(walk, texel, matter.shift <= 0.0);
+    }
     let t_exit = walk_exit(*walk);
-    let rho = matter_rho(f32(textureLoad(volume, in_level((*walk).cell, level)).x & 0xffffu), matter);
+    let rho = matter_rho(f32(texel.x & 0xffffu), matter);
     if PER_CELL {
         // The cell itself does not hide its own light; half the others that a coarse one stands for do.
         let own = 0.5 - 0.5 * level.scale.z;
@@ -52,7 +57,10 @@ fn pass_cell(
     } else {
         (*ray).depth += select(rho * (t_exit - (*ray).t), 0.0, (*ray).done);
     }
-    (*ray).cells += select(1u, 0u, (*ray).done);
+    (*ray).cells += select(1u + passed_by, 0u, (*ray).done);
+    if LEAPS {
+        (*ray).cells = min((*ray).cells, max_cells);
+    }
     (*ray).t = t_exit;
     walk_step(walk, true);
     let z = (*walk).cell.z;

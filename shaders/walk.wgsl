@@ -2,6 +2,11 @@
 
 const NEVER: f32 = 1.0e30;
 const PARALLEL: f32 = 1.0e-20;
+// Of where a ray leaves a box: 1 − 2^−20.
+const SHY: f32 = 0.99999905;
+
+// Whether empty cells hold boxes to leap over (src/volume/leaps.rs).
+override LEAPS: bool = false;
 
 struct Walk {
     cell: vec3<i32>,
@@ -14,6 +19,13 @@ struct Walk {
     inverse: vec3<f32>,
     boundary: vec3<f32>,
     t_next: vec3<f32>,
+    // Of leaps: cells along each axis in one unit of t and the inverse, where the ray leaves the slab, where the words of an
+    // empty cell have what is of the ray's octant, and the tile.
+    speed: vec3<f32>,
+    reach: vec3<f32>,
+    t_slab: f32,
+    octant: vec3<u32>,
+    tile: vec2<i32>,
 }
 
 fn walk_new(size: vec3<i32>, origin: vec3<f32>, direction: vec3<f32>) -> Walk {
@@ -35,6 +47,15 @@ fn walk_new(size: vec3<i32>, origin: vec3<f32>, direction: vec3<f32>) -> Walk {
     walk.cell.y = select(walk.cell.y, size.y - 1, walk.cell.y < 0);
     walk.cell.x = select(walk.cell.x, 0, walk.cell.x >= size.x);
     walk.cell.y = select(walk.cell.y, 0, walk.cell.y >= size.y);
+    if LEAPS {
+        walk.speed = select(vec3<f32>(0.0), abs(direction), moves);
+        walk.reach = abs(walk.inverse);
+        let last = select(0.0, f32(size.z), forward.z);
+        walk.t_slab = select(NEVER, (last - walk.origin.z) * walk.inverse.z, moves.z);
+        let down = select(vec3<u32>(0u), vec3<u32>(2u, 4u, 8u), walk.step < vec3<i32>(0));
+        walk.octant = vec3<u32>(down.x + down.y + down.z) + vec3<u32>(0u, 16u, 16u);
+        walk.tile = size.xy;
+    }
     return walk;
 }
 
@@ -45,6 +66,28 @@ fn walk_exit(walk: Walk) -> f32 {
     let x = (t_next.x <= t_next.y) & (t_next.x <= t_next.z);
     let y = !x & (t_next.y <= t_next.z);
     return select(select(t_next.z, t_next.y, y), t_next.x, x);
+}
+
+// Goes on to the last cell inside the box of the ray's cell, if `on` and the cell, whose words are `texel`, is empty. How
+// many cells are left behind.
+fn walk_leap(walk: ptr<function, Walk>, texel: vec2<u32>, on: bool) -> u32 {
+    let empty = on & ((texel.x & 0xffffu) == 0u);
+    let exponents = (vec3<u32>(texel.y, texel.y, texel.x) >> (*walk).octant) & vec3<u32>(3u);
+    let more = vec3<f32>((vec3<u32>(1u) << exponents) - 1u);
+    let far = (*walk).t_next + more * (*walk).reach;
+    let xy = select(far.y, far.x, far.x < far.y);
+    let end = select((*walk).t_slab, far.z, far.z < (*walk).t_slab);
+    let t = select(end, xy, xy < end) * SHY;
+    let ahead = ceil((t - (*walk).t_next) * (*walk).speed);
+    let passed = select(vec3<f32>(0.0), ahead, (ahead > vec3<f32>(0.0)) & vec3<bool>(empty));
+    let way = passed * (*walk).step_f32;
+    (*walk).boundary += way;
+    (*walk).t_next = ((*walk).boundary - (*walk).origin) * (*walk).inverse;
+    let cell = (*walk).cell + vec3<i32>(way);
+    let wraps = vec2<u32>(cell.xy) >= vec2<u32>((*walk).tile);
+    let xy_in = cell.xy - select(vec2<i32>(0), (*walk).tile * (*walk).step.xy, wraps);
+    (*walk).cell = vec3<i32>(xy_in, cell.z);
+    return u32(passed.x + passed.y + passed.z);
 }
 
 // Goes to the next cell if `on`: one axis steps, x before y before z where several boundaries coincide.

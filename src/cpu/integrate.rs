@@ -22,7 +22,7 @@ use crate::scene::{
 use crate::shading::{Metric, Spread, fibre_angles, specular_power};
 use crate::strand::table::StrandShading;
 use crate::visibility::{LightVolumes, Medium};
-use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
+use crate::volume::{Cell, Levels, VolumeTexture, large_box, levels_of};
 use crate::walk::{Crossing, Walk};
 use light::RayLight;
 
@@ -129,7 +129,7 @@ impl<'a> Integrator<'a> {
         kept: &mut KeptVolumes,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
-        let mut integrator = Integrator::with_levels(scene, kept.levels.get(scene, volume));
+        let mut integrator = Integrator::with_levels(scene, volume, kept.levels.get(scene, volume));
         if scene.visibility == Visibility::Cached {
             let light_volumes = LightVolumes::new(scene, volume.size, volume.alpha, scene.light_cache)?;
             integrator.filled =
@@ -144,11 +144,10 @@ impl<'a> Integrator<'a> {
     /// For a scene and its volume, and few rays: with cached visibility they walk to the lights as those would
     /// from whom the light volumes are made.
     pub fn new(scene: &'a Scene, volume: &VolumeTexture) -> Self {
-        Integrator::with_levels(scene, levels_of(scene, volume))
+        Integrator::with_levels(scene, volume, levels_of(scene, volume))
     }
 
-    fn with_levels(scene: &'a Scene, levels: Levels) -> Self {
-        let volume = &levels[0];
+    fn with_levels(scene: &'a Scene, volume: &VolumeTexture, levels: Levels) -> Self {
         Integrator {
             scene,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
@@ -239,9 +238,9 @@ impl<'a> Integrator<'a> {
     ) -> Traced {
         let ray = self.passage(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
-        let mut home = self.walk(&ray, &Level::new(&self.levels, level), before, observer);
+        let mut home = self.walk(&ray, &Level::of(&self.levels, level), before, observer);
         if share > 0.0 {
-            let next = self.walk(&ray, &Level::new(&self.levels, level + 1), before, observer);
+            let next = self.walk(&ray, &Level::of(&self.levels, level + 1), before, observer);
             home = home.mixed(next, share);
         }
         let Walked { transmittance, lights, cells } = home;
@@ -337,14 +336,22 @@ impl<'a> Integrator<'a> {
         let mut transmittance = before;
         let mut depth = -before.max(1e-30).log2();
         let mut walked = [0u32; 2];
-        for crossing in
-            Walk::new(level.size, origin, d_cell, f32::INFINITY).take(scene.trace.max_cells as usize)
-        {
-            if crossing.cell.z >= level.size.z || transmittance < scene.trace.early_end {
-                break;
+        let mut walk = Walk::new(level.size, origin, d_cell, f32::INFINITY);
+        let octant = walk.octant();
+        let leaps = level.leaps && matter.keeps_empty();
+        let most = scene.trace.max_cells;
+        while walked[0] < most && walk.cell().z < level.size.z && transmittance >= scene.trace.early_end {
+            let cell = level.cell(walk.cell());
+            if leaps
+                && cell.rho_code() == 0
+                && let Some(exponents) = large_box(cell, octant)
+            {
+                walked[0] = (walked[0] + walk.leap(exponents) + 1).min(most);
+                walk.next();
+                continue;
             }
+            let Some(crossing) = walk.next() else { break };
             walked[0] += 1;
-            let cell = level.cell(crossing.cell);
             let found = match scene.trace.lookup {
                 Lookup::Trilinear => level.between(&crossing, origin, d_cell, matter),
                 Lookup::Nearest => level.found(cell, matter),

@@ -6,7 +6,7 @@ use glam::{IVec3, UVec3, Vec3};
 use super::matter::Matter;
 use crate::mapping::CellFrame;
 use crate::scene::{Camera, Image};
-use crate::volume::{Cell, Moments, VolumeTexture};
+use crate::volume::{Cell, Moments, Pyramid, VolumeTexture};
 use crate::walk::Crossing;
 
 /// One level as walks see it.
@@ -22,6 +22,8 @@ pub struct Level<'a> {
     pub scale: Vec3,
     /// Its number of cells.
     pub size: IVec3,
+    /// Whether its empty cells hold boxes to leap over.
+    pub leaps: bool,
 }
 
 impl<'a> Level<'a> {
@@ -35,7 +37,13 @@ impl<'a> Level<'a> {
             is_whole: number == 0,
             scale: size.as_vec3() / whole.as_vec3(),
             size: size.as_ivec3(),
+            leaps: false,
         }
+    }
+
+    /// Level `number` of levels that are made for walks.
+    pub fn of(levels: &'a Pyramid, number: u32) -> Self {
+        Level { leaps: levels.leaps, ..Level::new(levels, number) }
     }
 
     /// Cells of the volume in the depth of one of its.

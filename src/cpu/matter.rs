@@ -53,6 +53,11 @@ impl Matter {
         }
     }
 
+    /// Whether it leaves empty cells empty; mist does not.
+    pub fn keeps_empty(&self) -> bool {
+        self.shift <= 0.0
+    }
+
     /// That leaves the cells as they are.
     pub const WHOLE: Matter = Matter { scale: 1.0, shift: 0.0, mist: 0.0, even: 0.0, left: 1.0 };
 

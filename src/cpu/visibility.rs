@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::Lookup;
 use crate::visibility::{DARK_BITS, Form, LightVolume, LightVolumes, Medium, transmittance_code};
-use crate::volume::{KeptLevels, Levels, same_cells};
+use crate::volume::{KeptLevels, Levels, large_box};
 use crate::walk::{NEVER, Walk};
 
 /// Light volumes that are kept from frame to frame.
@@ -66,7 +66,7 @@ impl KeptVolumes {
         monitor: &dyn Monitor,
     ) -> Result<Filled> {
         if let Some(kept) = &self.kept
-            && same_cells(&kept.levels, levels)
+            && Arc::ptr_eq(&kept.levels, levels)
             && kept.lookup == lookup
             && kept.plan.volumes == plan.volumes
             && (kept.plan.medium, kept.plan.form) == (plan.medium, plan.form)
@@ -80,7 +80,7 @@ impl KeptVolumes {
         for (number, light_volume) in plan.volumes.iter().enumerate() {
             monitor.progress("light volumes", number as u64, total)?;
             let of_level = |number| {
-                let level = Level::new(levels, number);
+                let level = Level::of(levels, number);
                 let of = |cell| self::number(&level, cell, light_volume, plan.medium, plan.form);
                 match plan.form {
                     Form::Codes => Numbers::Codes(filled(&level, lookup, |cell| of(cell) as u8)),
@@ -136,13 +136,22 @@ pub fn optical_depth(
     walked: &mut u32,
 ) -> f32 {
     let mut depth = 0.0f32;
-    let walk = Walk::new(level.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
-    for (n, crossing) in walk.take(medium.max_cells as usize).enumerate() {
-        if crossing.cell.z < 0 || crossing.cell.z >= level.size.z {
-            break;
+    let mut n = 0;
+    let mut walk = Walk::new(level.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
+    let octant = walk.octant();
+    let leaps = level.leaps && matter.keeps_empty();
+    while n < medium.max_cells && (0..level.size.z).contains(&walk.cell().z) {
+        let cell = level.cell(walk.cell());
+        if leaps
+            && cell.rho_code() == 0
+            && let Some(exponents) = large_box(cell, octant)
+        {
+            n += 1 + walk.leap(exponents);
+            walk.next();
+            continue;
         }
-        *walked += 1;
-        let rho = matter.rho(level.cell(crossing.cell).rho_code() as f32);
+        let Some(crossing) = walk.next() else { break };
+        let rho = matter.rho(cell.rho_code() as f32);
         if medium.per_cell {
             // The cell itself does not hide its own light; half the others that a coarse one stands for do.
             let own = 0.5 - 0.5 * level.scale.z;
@@ -150,9 +159,11 @@ pub fn optical_depth(
         } else {
             depth += rho * (crossing.t_exit - crossing.t_enter);
         }
+        n += 1;
         if depth > enough {
             break;
         }
     }
+    *walked += n.min(medium.max_cells);
     depth
 }

@@ -10,7 +10,7 @@ use crate::frame::Window;
 use crate::overlap;
 use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
-use crate::volume::VolumeTexture;
+use crate::volume::{Leaps, VolumeTexture};
 
 /// A renderer with scenes on its device that differ in their light alone.
 pub struct GpuBench {
@@ -48,8 +48,8 @@ impl GpuBench {
         GpuBench { renderer, prepared: None }
     }
 
-    /// Uploads scenes with the names of their integrate passes, and compiles these. The raster pass and the walk
-    /// without light (`shaders/bare.wgsl`) are the first scene's.
+    /// Uploads scenes with the names of their integrate passes, and compiles these. The raster pass and the walks
+    /// without light (`shaders/bare.wgsl`), cell by cell and leaping, are the first scene's.
     pub fn prepare(
         &mut self,
         scenes: &[(&'static str, &Scene)],
@@ -71,15 +71,24 @@ impl GpuBench {
                 }
                 _ => None,
             };
-            let variant = Variant::of(scene, layers, light_volumes.as_ref());
+            let variant = Variant::of(scene, layers, light_volumes.as_ref(), up()?.levels.leaps);
             let integrate = |pass| {
                 Work::Integrate(Box::new(pass), Tiler::new(None, None, scene.volume_lights().len()), None)
             };
             let mut visibility = Visibility::new(gpu);
-            let mut work = Vec::new();
+            let (mut work, mut bare) = (Vec::new(), Vec::new());
             if number == 0 {
                 work.push(("gbuffer", Work::Gbuffer));
-                work.push(("bare walk", integrate(Integrate::bare(gpu, variant))));
+                for (name, leaps) in [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)] {
+                    let mut resident = Resident::default();
+                    resident.levels.leaps = leaps;
+                    let up = Uploaded::new(gpu, &mut resident, scene, volume, mesh)?;
+                    let variant = Variant::of(scene, layers, None, up.levels.leaps);
+                    let work = integrate(Integrate::bare(gpu, variant));
+                    let (filled, reflection) =
+                        (visibility.none(), Reflections::default().bind(gpu, scene, volume));
+                    bare.push((name, Pass { work, up, frame, filled, reflection }));
+                }
             }
             let mut filled = visibility.none();
             if let Some(light_volumes) = light_volumes {
@@ -96,6 +105,7 @@ impl GpuBench {
                 let reflection = Reflections::default().bind(gpu, scene, volume);
                 let filled = filled.clone();
                 passes.push((name, Pass { work, up: up()?, frame, filled, reflection }));
+                passes.append(&mut bare);
             }
         }
         self.prepared = Some(Prepared {

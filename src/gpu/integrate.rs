@@ -50,14 +50,15 @@ pub struct Variant {
     eroded: bool,
     pyramid: bool,
     trilinear: bool,
+    leaps: bool,
     many: bool,
     exponent: u32,
 }
 
 impl Variant {
-    /// For a scene of which at most `layers` sheets lie under a pixel, and the light volumes it has if its
-    /// visibility is cached.
-    pub fn of(scene: &Scene, layers: u32, light_volumes: Option<&LightVolumes>) -> Self {
+    /// For a scene of which at most `layers` sheets lie under a pixel, the light volumes it has if its
+    /// visibility is cached, and whether the levels are made for leaps.
+    pub fn of(scene: &Scene, layers: u32, light_volumes: Option<&LightVolumes>, leaps: bool) -> Self {
         Variant {
             lights: scene.volume_lights().len().min(2) as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
@@ -70,6 +71,7 @@ impl Variant {
             eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
             pyramid: scene.trace.filter == Prefilter::Pyramid,
             trilinear: scene.trace.lookup == Lookup::Trilinear,
+            leaps,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -174,6 +176,7 @@ impl Integrate {
             ("ERODED", number(variant.eroded)),
             ("PYRAMID", number(variant.pyramid)),
             ("TRILINEAR", number(variant.trilinear)),
+            ("LEAPS", number(variant.leaps)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants)
@@ -181,7 +184,8 @@ impl Integrate {
 
     /// The bench's bare walk: the same bindings, no light.
     pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
-        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &[])
+        let constants = [("LEAPS", f64::from(u8::from(variant.leaps)))];
+        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &constants)
     }
 
     fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)]) -> Self {

@@ -40,7 +40,7 @@ use crate::job::Monitor;
 use crate::overlap;
 use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
-use crate::volume::VolumeTexture;
+use crate::volume::{Leaps, VolumeTexture};
 use layout::Tile;
 use rasters::{Key, Rasters};
 
@@ -66,6 +66,8 @@ pub struct RenderOptions {
     pub window: Option<Window>,
     /// Bytes on the device for results of the raster pass that later frames may use again.
     pub keep_rasters: u64,
+    /// Whether rays leap over empty cells.
+    pub leaps: Leaps,
     /// How the GPU engine cuts the image; another grid rounds the rock's radiance otherwise.
     pub grid: Grid,
 }
@@ -209,7 +211,8 @@ impl GpuRenderer {
         std::thread::scope(|scope| {
             scope.spawn(|| gbuffer.compile(gpu, scene, layers));
             if scene.visibility != scene::Visibility::Cached {
-                let variant = Variant::of(scene, layers, None);
+                // Most volumes are too full for leaps.
+                let variant = Variant::of(scene, layers, None, false);
                 let known = |pass: &Integrate| pass.variant == variant;
                 recent(integrate, KEPT_PIPELINES, known, || Integrate::new(gpu, variant));
             }
@@ -236,7 +239,12 @@ impl GpuRenderer {
             }
             _ => None,
         };
-        let variant = Variant::of(scene, layers, light_volumes.as_ref());
+        self.resident.levels.leaps = options.leaps;
+        let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
+        let reflection = self.reflections.bind(gpu, scene, volume);
+        seconds.upload = clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        let variant = Variant::of(scene, layers, light_volumes.as_ref(), up.levels.leaps);
         let integrate = recent(
             &mut self.integrate,
             KEPT_PIPELINES,
@@ -245,10 +253,6 @@ impl GpuRenderer {
         );
         self.gbuffer.compile(gpu, scene, layers);
         seconds.pipelines = clock.elapsed().as_secs_f64();
-        let clock = Instant::now();
-        let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
-        let reflection = self.reflections.bind(gpu, scene, volume);
-        seconds.upload = clock.elapsed().as_secs_f64();
 
         let whole = [image.width, image.height];
         let part = options.window.unwrap_or(Window::whole(whole));

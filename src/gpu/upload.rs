@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
 use crate::scene::{Mesh, Scene};
-use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture, same_cells};
+use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
 const SLAB_BYTES: usize = 64 << 20;
@@ -21,7 +21,8 @@ const SLAB_BYTES: usize = 64 << 20;
 /// memory they came from.
 #[derive(Default)]
 pub struct Resident {
-    levels: KeptLevels,
+    /// The volume's levels, and whether they are made for leaps.
+    pub levels: KeptLevels,
     volume: Option<(Levels, wgpu::TextureView)>,
     /// Of these vertices; previews have fewer triangles than pictures.
     meshes: Vec<ResidentMesh>,
@@ -146,7 +147,7 @@ impl Uploaded {
 impl Resident {
     fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
         if let Some((old, view)) = &self.volume
-            && same_cells(old, levels)
+            && Arc::ptr_eq(old, levels)
         {
             return Ok(view.clone());
         }

@@ -1,6 +1,8 @@
 //! §5 Light volumes: the compute pass that fills them, and what is kept of them. CPU twin:
 //! `src/cpu/visibility.rs`; why and in which units: `src/visibility.rs`.
 
+use std::sync::Arc;
+
 use super::device::Gpu;
 use super::layout::{Frame, LightVolume};
 use super::shader;
@@ -9,7 +11,7 @@ use super::upload::Uploaded;
 use crate::error::{Error, Result};
 use crate::scene::Lookup;
 use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
-use crate::volume::{Levels, Stack, same_cells};
+use crate::volume::{Levels, Stack};
 
 /// The text of the stage's own shader.
 pub fn source() -> String {
@@ -43,6 +45,7 @@ struct Kind {
     per_cell: bool,
     form: Form,
     pyramid: bool,
+    leaps: bool,
     /// Of empty cells too.
     everywhere: bool,
 }
@@ -136,7 +139,7 @@ impl Visibility {
     ) -> Result<(FilledVolumes, f64)> {
         let everywhere = lookup == Lookup::Trilinear;
         if let Some(kept) = &self.kept
-            && same_cells(&kept.levels, &up.levels)
+            && Arc::ptr_eq(&kept.levels, &up.levels)
             && kept.everywhere == everywhere
             && kept.plan == plan
         {
@@ -155,6 +158,7 @@ impl Visibility {
                 per_cell: plan.medium.per_cell,
                 form: plan.form,
                 pyramid: up.levels.len() > 1,
+                leaps: up.levels.leaps,
                 everywhere,
             },
         );
@@ -216,7 +220,7 @@ impl Visibility {
     /// Linear indices of the columns of cells with density, and their number.
     fn occupied(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
         if let Some((old, all, buffer, count)) = &self.occupied
-            && same_cells(old, levels)
+            && Arc::ptr_eq(old, levels)
             && *all == everywhere
         {
             return (buffer.clone(), *count);
@@ -254,6 +258,7 @@ impl Visibility {
             ("PER_CELL", number(kind.per_cell)),
             ("CODES", number(kind.form == Form::Codes)),
             ("PYRAMID", number(kind.pyramid)),
+            ("LEAPS", number(kind.leaps)),
             ("EVERYWHERE", number(kind.everywhere)),
         ];
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

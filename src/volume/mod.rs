@@ -4,6 +4,7 @@ mod bundle;
 mod cell;
 mod file;
 mod flow;
+mod leaps;
 mod pyramid;
 mod ripple;
 mod water;
@@ -11,8 +12,9 @@ mod water;
 pub use bundle::{Structure, curve_points};
 pub use cell::{Cell, V_SCALE};
 pub use file::{read_npz, write_npz};
+pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
-    KeptLevels, Levels, Moments, Stack, coarse_levels, level_count, level_size, levels_of, same_cells,
+    KeptLevels, Leaps, Levels, Moments, Pyramid, Stack, coarse_levels, level_count, level_size, levels_of,
 };
 pub use ripple::Ripple;
 pub use water::{WaterSpec, build_water, kept_water, set_density_and_reflection};

@@ -25,12 +25,39 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Cell, VolumeTexture};
+use super::{Cell, VolumeTexture, with_boxes, worth_leaping};
 use crate::gpu::layout::extinction;
-use crate::scene::{Attenuation, Prefilter, Scene};
+use crate::scene::{Attenuation, Lookup, Prefilter, Scene};
 
-/// Levels of a volume, the volume itself first; shared as its cells are.
-pub type Levels = Arc<Vec<VolumeTexture>>;
+/// Levels as walks read them; shared as a volume's cells are.
+pub type Levels = Arc<Pyramid>;
+
+/// Levels of a volume, the volume itself first.
+pub struct Pyramid {
+    levels: Vec<VolumeTexture>,
+    /// Whether empty cells hold boxes of empty cells ([`with_boxes`]) in place of k and v.
+    pub leaps: bool,
+}
+
+impl std::ops::Deref for Pyramid {
+    type Target = [VolumeTexture];
+
+    fn deref(&self) -> &[VolumeTexture] {
+        &self.levels
+    }
+}
+
+/// Whether rays leap over empty cells. Pictures and numbers of cells do not depend on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Leaps {
+    /// Where it is worth it.
+    #[default]
+    Auto,
+    /// In any volume.
+    Always,
+    /// Every cell is walked.
+    Never,
+}
 
 /// Second moments of directions: xx, yy, zz and xy, xz, yz. Their scale cancels in the fibre model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -161,40 +188,67 @@ pub fn bits(scene: &Scene, volume: &VolumeTexture) -> f32 {
     extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
 }
 
-/// Whether two have the same cells in memory, whatever their α.
-pub fn same_cells(a: &Levels, b: &Levels) -> bool {
-    a.len() == b.len()
-        && a.iter().zip(b.iter()).all(|(a, b)| Arc::ptr_eq(&a.cells, &b.cells) && a.size == b.size)
-}
-
-/// The levels that a scene looks into.
+/// The levels that a scene looks into, for few rays.
 pub fn levels_of(scene: &Scene, volume: &VolumeTexture) -> Levels {
-    KeptLevels::default().get(scene, volume)
+    KeptLevels { leaps: Leaps::Never, kept: None }.get(scene, volume)
 }
 
 /// Levels that are kept from frame to frame.
 #[derive(Default)]
-pub struct KeptLevels(Option<(Option<f32>, Levels)>);
+pub struct KeptLevels {
+    /// Whether they are made for leaps.
+    pub leaps: Leaps,
+    kept: Option<(Key, Levels)>,
+}
+
+/// What levels depend on.
+struct Key {
+    cells: Arc<Vec<Cell>>,
+    size: [u32; 3],
+    bits: Option<f32>,
+    between: bool,
+    leaps: Leaps,
+}
+
+impl PartialEq for Key {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.cells, &other.cells)
+            && (self.size, self.bits, self.between, self.leaps)
+                == (other.size, other.bits, other.between, other.leaps)
+    }
+}
 
 impl KeptLevels {
     /// The levels that a scene looks into, made unless they are those of the last call.
     pub fn get(&mut self, scene: &Scene, volume: &VolumeTexture) -> Levels {
-        let bits = (scene.trace.filter == Prefilter::Pyramid).then(|| bits(scene, volume));
-        if let Some((of, levels)) = &self.0
-            && *of == bits
-            && Arc::ptr_eq(&levels[0].cells, &volume.cells)
-            && (levels[0].size, levels[0].alpha) == (volume.size, volume.alpha)
+        let key = Key {
+            cells: volume.cells.clone(),
+            size: volume.size,
+            bits: (scene.trace.filter == Prefilter::Pyramid).then(|| bits(scene, volume)),
+            between: scene.trace.lookup == Lookup::Trilinear,
+            leaps: self.leaps,
+        };
+        if let Some((of, levels)) = &self.kept
+            && *of == key
         {
             return levels.clone();
         }
         // The old ones go first: both might not fit.
-        self.0 = None;
+        self.kept = None;
         let mut levels = vec![volume.clone()];
-        if let Some(bits) = bits {
+        if let Some(bits) = key.bits {
             levels.extend(coarse_levels(volume, bits));
         }
-        let levels = Arc::new(levels);
-        self.0 = Some((bits, levels.clone()));
+        let leaps = match key.leaps {
+            Leaps::Auto => worth_leaping(volume),
+            Leaps::Always => true,
+            Leaps::Never => false,
+        };
+        if leaps {
+            levels = levels.iter().map(|level| with_boxes(level, key.between)).collect();
+        }
+        let levels = Arc::new(Pyramid { levels, leaps });
+        self.kept = Some((key, levels.clone()));
         levels
     }
 }

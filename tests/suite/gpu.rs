@@ -8,6 +8,7 @@ use taki::frame::{Difference, Frame, Tolerance};
 use taki::gpu::{DeviceOptions, Gpu, GpuRenderer, Grid, RenderOptions, adapters};
 use taki::job::Unwatched;
 use taki::scene::{Limits, Scene};
+use taki::volume::Leaps;
 
 use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};
 
@@ -51,6 +52,7 @@ pub const SURFACE: RenderOptions = RenderOptions {
     tile_pixels: None,
     window: None,
     grid: Grid { side: 4096, pixels: 1 << 21 },
+    leaps: Leaps::Auto,
 };
 
 pub fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {

@@ -19,6 +19,7 @@ mod flow;
 mod gpu;
 mod haze;
 mod layers;
+mod leaps;
 mod lights;
 mod look;
 mod looking;

@@ -164,6 +164,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("DARK_BITS"), f64::from(taki::visibility::DARK_BITS));
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
+    assert_eq!(constant("SHY"), taki::walk::SHY as f64);
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::cpu::MIST_OF_CELLS));
     assert_eq!(constant("MIST_RHO"), f64::from(taki::cpu::MIST_RHO));
     assert_eq!(constant("SINE_SHARE"), taki::strand::table::SINE_SHARE as f64);
