@@ -80,13 +80,13 @@ pub fn memory_of(
         Some(_) => 0,
         None => scene.water.size.iter().map(|&n| u64::from(n)).product(),
     };
-    // On the host and on the device.
     let coarse = match scene.trace.filter {
         // Of the volume's cells a seventh on the host, and up to three quarters on the device.
         Prefilter::Pyramid => cells.saturating_mul(size_of::<Cell>() as u64),
         Prefilter::None => 0,
     };
-    let volume = cells.saturating_mul(2 * size_of::<Cell>() as u64).saturating_add(coarse);
+    // On the host, there again where its empty cells hold boxes, and on the device.
+    let volume = cells.saturating_mul(3 * size_of::<Cell>() as u64).saturating_add(coarse);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
     let vertices = vertices + (scene.pools.len() * Pool::VERTICES) as u64;
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
