@@ -13,7 +13,8 @@ use crate::gpu::scene;
 /// Rough rocks: each report projects them anew.
 const FIG5_ROCKS: [&str; 4] =
     ["rocks.wall.levels=4", "rocks.left.levels=4", "rocks.right.levels=4", "rocks.foot.levels=4"];
-const WATERFALL_ROCKS: [&str; 11] = [
+const WATERFALL_ROCKS: [&str; 12] = [
+    "haze.density=0",
     "trace.filter=none",
     "rocks.wall.levels=4",
     "rocks.left.levels=4",
