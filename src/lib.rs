@@ -16,7 +16,7 @@
 //!    scattered more than once, [`haze`] what lies before all of it.
 //! 6. `resolve` makes the picture from the linear [`frame`], with its bloom, [`white_balance`], [`exposure`] and tone; that becomes
 //!    PNG or EXR; many frames become
-//!    a [`movie`] or a labelled [`sheet`].
+//!    a [`movie`] or a labelled [contact sheet](contact_sheet).
 //!
 //! [`cache`] keeps volumes and meshes for the next process. [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
 //! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
