@@ -3,19 +3,23 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
-@group(0) @binding(3) var<uniform> tile: Tile;
+@group(0) @binding(3) var<uniform> groups: Groups;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
 @group(0) @binding(5) var surface: texture_2d<f32>;
 @group(0) @binding(6) var quad_id: texture_2d_array<u32>;
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
 
+@group(0) @binding(16) var<storage, read> group_list: array<u32>;
+
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
-fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= tile.width || id.y >= tile.height {
+fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let place = group_list[listed(groups, group.x)];
+    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    if id.x >= groups.area.width || id.y >= groups.area.height {
         return;
     }
-    let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
+    let pixel = vec2<u32>(groups.area.x, groups.area.y) + id;
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     var sum = 0u;
     var n = 0u;

@@ -90,12 +90,28 @@ struct Quad {
     pad_c: f32,
 }
 
-// The part of the window that one submission works on.
+// The part of the window that is looked at.
 struct Tile {
     x: u32,
     y: u32,
     width: u32,
     height: u32,
+}
+
+// The workgroups that one submission works on: of a list, in which x is in the lower half of a word and y in the upper.
+struct Groups {
+    area: Tile,
+    first: u32,
+    count: u32,
+    pad_a: u32,
+    pad_b: u32,
+}
+
+// Which of the list workgroup `group` takes: even ones first. Software Vulkan deals workgroups out to its threads in fixed
+// parts of a dispatch, and water is not everywhere alike.
+fn listed(groups: Groups, group: u32) -> u32 {
+    let half = (groups.count + 1u) / 2u;
+    return groups.first + select(2u * group, 2u * (group - half) + 1u, group >= half);
 }
 
 fn cross2(a: vec2<f32>, b: vec2<f32>) -> f32 {

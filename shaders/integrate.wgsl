@@ -19,7 +19,7 @@ override MULTIPLE: bool = false;
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
-@group(0) @binding(3) var<uniform> tile: Tile;
+@group(0) @binding(3) var<uniform> groups: Groups;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;
 @group(0) @binding(5) var surface: texture_2d<f32>;
 @group(0) @binding(6) var quad_id: texture_2d_array<u32>;
@@ -37,6 +37,8 @@ override MULTIPLE: bool = false;
 @group(0) @binding(14) var linear: sampler;
 // P of every material, one profile after the other.
 @group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
+// Places of workgroups, src/gpu/groups.rs.
+@group(0) @binding(16) var<storage, read> group_list: array<u32>;
 
 // Instead of a number of cells, where the device ended a walk before it was done: software Vulkan grants all loops of a
 // pixel 65535 turns.
@@ -48,12 +50,13 @@ struct Reflection {
 }
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
-fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= tile.width || id.y >= tile.height {
+fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let place = group_list[listed(groups, group.x)];
+    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    if id.x >= groups.area.width || id.y >= groups.area.height {
         return;
     }
-    let pixel = vec2<u32>(tile.x + id.x, tile.y + id.y);
-    let index = pixel.y * frame.window_width + pixel.x;
+    let pixel = vec2<u32>(groups.area.x, groups.area.y) + id;
     let quad_number = textureLoad(quad_id, pixel, 0u, 0).x;
     let behind = textureLoad(opaque_radiance, pixel, 0).rgb;
     var result = vec4<f32>(behind, 1.0);
@@ -66,6 +69,25 @@ fn integrate(@builtin(global_invocation_id) id: vec3<u32>) {
             result = haze_over_water(frame, result, behind, d_world.y, t);
         }
     }
+    add_sample(pixel, result, count);
+}
+
+// Where no water lies.
+@compute @workgroup_size(WORKGROUP, WORKGROUP)
+fn dry(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let place = group_list[groups.first + group.x];
+    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    if id.x >= groups.area.width || id.y >= groups.area.height {
+        return;
+    }
+    let pixel = vec2<u32>(groups.area.x, groups.area.y) + id;
+    add_sample(pixel, vec4<f32>(textureLoad(opaque_radiance, pixel, 0).rgb, 1.0), vec2<u32>(0u));
+}
+
+fn add_sample(pixel: vec2<u32>, sample: vec4<f32>, cells: vec2<u32>) {
+    let index = pixel.y * frame.window_width + pixel.x;
+    var result = sample;
+    var count = cells;
     if frame.sample_index != 0u {
         result += radiance[index];
         let before = counts[index];

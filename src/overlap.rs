@@ -80,20 +80,27 @@ impl Search<'_> {
 
 /// The quads' images, cut at the near plane and at the edge of the image.
 fn images(scene: &Scene) -> Vec<Polygon> {
+    let size = DVec2::new(scene.image.width.into(), scene.image.height.into());
+    // A pixel more on every side: samples lie anywhere in the pixels.
+    let [a, d] = [DVec2::splat(-1.0), size + 1.0];
+    let Some(frame) = Polygon::new(vec![a, DVec2::new(d.x, a.y), d, DVec2::new(a.x, d.y)]) else {
+        return Vec::new();
+    };
+    // Corners may leave the plane by 1e-4: seen from its edge such a quad is not convex.
+    outlines(scene).filter_map(|points| Polygon::new(hull(points))?.cut(&frame)).collect()
+}
+
+/// Corners of the quads' images in pixels, cut at the near plane: as many as are left in front of it.
+fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
     let camera = &scene.camera;
     let [width, height] = [scene.image.width, scene.image.height];
     let size = DVec2::new(width.into(), height.into());
     let (right, up) = camera.image_plane(width, height);
     let [eye, right, up, forward] = [camera.eye, right, up, camera.forward].map(|v| v.as_dvec3());
     let near = f64::from(camera.near);
-    // A pixel more on every side: samples lie anywhere in the pixels.
-    let [a, d] = [DVec2::splat(-1.0), size + 1.0];
-    let Some(frame) = Polygon::new(vec![a, DVec2::new(d.x, a.y), d, DVec2::new(a.x, d.y)]) else {
-        return Vec::new();
-    };
-    let image = |corners: [glam::Vec3; 4]| {
+    scene.quads.iter().map(move |quad| {
         // x and y in units of the image plane, and the distance along the view axis.
-        let seen = corners.map(|corner| {
+        let seen = quad.corners.map(|corner| {
             let away = corner.as_dvec3() - eye;
             let along = |axis: DVec3| away.dot(axis) / axis.length_squared();
             DVec3::new(along(right), along(up), along(forward))
@@ -113,10 +120,48 @@ fn images(scene: &Scene) -> Vec<Polygon> {
                 add(cut);
             }
         }
-        // Corners may leave the plane by 1e-4: seen from its edge such a quad is not convex.
-        Polygon::new(hull(points))?.cut(&frame)
-    };
-    scene.quads.iter().filter_map(|quad| image(quad.corners)).collect()
+        points
+    })
+}
+
+/// Pixels by which a quad's image may be drawn larger than it is: samples lie within a pixel and a half of where it is
+/// reckoned, and float32 rounds.
+const MARGIN: f64 = 3.0;
+
+/// Which of `count` squares, `side` pixels wide, row by row from pixel `corner` of the image, a volume quad may be seen in. None
+/// that one is seen in is left out.
+pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> Vec<bool> {
+    let [across, down] = count.map(|n| n as usize);
+    let corner = DVec2::new(corner[0].into(), corner[1].into());
+    let side = f64::from(side);
+    let mut squares = vec![false; across * down];
+    for points in outlines(scene) {
+        let points: Vec<DVec2> = points.iter().map(|p| *p - corner).collect();
+        for row in 0..down {
+            let [top, bottom] = [row as f64 * side - MARGIN, (row + 1) as f64 * side + MARGIN];
+            let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+            for (i, &p) in points.iter().enumerate() {
+                let q = points[(i + 1) % points.len()];
+                let (p, q) = if p.y <= q.y { (p, q) } else { (q, p) };
+                if q.y < top || p.y > bottom {
+                    continue;
+                }
+                // Where the edge is level it lies in the row whole.
+                let at = |y: f64| {
+                    if q.y > p.y { p.lerp(q, ((y - p.y) / (q.y - p.y)).clamp(0.0, 1.0)).x } else { p.x }
+                };
+                let ends = if q.y > p.y { [at(top), at(bottom)] } else { [p.x, q.x] };
+                low = low.min(ends[0]).min(ends[1]);
+                high = high.max(ends[0]).max(ends[1]);
+            }
+            let first = ((low - MARGIN) / side).floor().max(0.0);
+            let end = ((high + MARGIN) / side).ceil().min(across as f64);
+            if first < end {
+                squares[row * across..][first as usize..end as usize].fill(true);
+            }
+        }
+    }
+    squares
 }
 
 impl Polygon {

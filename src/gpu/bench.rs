@@ -1,5 +1,6 @@
 //! Single passes on a prepared frame, for `taki bench`.
 
+use super::groups::GroupList;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
 use super::targets::Targets;
@@ -21,6 +22,7 @@ pub struct GpuBench {
 struct Prepared {
     targets: Targets,
     sums: Sums,
+    groups: GroupList,
     window: Window,
     passes: Vec<(&'static str, Pass)>,
 }
@@ -111,6 +113,7 @@ impl GpuBench {
         self.prepared = Some(Prepared {
             targets: Targets::new(gpu, window.width, window.height, layers, !first.pools.is_empty()),
             sums: Sums::new(gpu, window.pixels()),
+            groups: GroupList::new(gpu, first, window, Tile::whole(window)),
             window,
             passes,
         });
@@ -131,7 +134,8 @@ impl GpuBench {
         let p = self.prepared.as_mut().expect("prepare comes first");
         let Pass { work, up, frame, filled, reflection } = &mut p.passes[number].1;
         let (window, area) = (p.window, Tile::whole(p.window));
-        let inputs = Inputs { gpu, timer, up, targets: &p.targets, window, area, frame, filled, reflection };
+        let (targets, groups) = (&p.targets, &p.groups);
+        let inputs = Inputs { gpu, timer, up, targets, window, area, frame, groups, filled, reflection };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, Redraw::All, || Ok(()))?, 0)),
             Work::Visibility(volumes, lookup) => {

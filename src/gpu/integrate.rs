@@ -1,7 +1,7 @@
 //! §4 and §5: the compute pass that walks the volume under each pixel.
 
 use super::device::Gpu;
-use super::layout::Tile;
+use super::layout::{Groups, WORKGROUP};
 use super::{Inputs, shader};
 use crate::error::Result;
 use crate::scene::{Attenuation, Lookup, Prefilter, Reflection, Scattering, Scene, Visibility};
@@ -16,6 +16,11 @@ const TILE_SECONDS: f64 = 0.03;
 const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
+
+/// Pixels of a workgroup.
+const GROUP_PIXELS: u64 = WORKGROUP as u64 * WORKGROUP as u64;
+/// Workgroups along one dimension of a dispatch.
+const MOST_GROUPS: u32 = 65535;
 
 /// The parts of the stage's shader: what sheets make of the cells, walks, lights, and a pixel's sheets, where there may be `many` or one.
 pub fn source(many: bool) -> String {
@@ -106,6 +111,8 @@ impl Sums {
 /// The pass: one specialised pipeline.
 pub struct Integrate {
     pipeline: wgpu::ComputePipeline,
+    /// For workgroups without water.
+    dry: Option<wgpu::ComputePipeline>,
     group_layout: wgpu::BindGroupLayout,
     /// What it is specialised to.
     pub variant: Variant,
@@ -133,26 +140,16 @@ impl Tiler {
         self.smallest.is_finite().then_some(self.smallest)
     }
 
-    /// Rows at full width when there are enough pixels for several, else a part of one band; `x` and `y`
-    /// count from the corner of `area`.
-    fn next(&self, area: Tile, x: u32, y: u32) -> Tile {
-        let pixels = self.pixels.max(1.0) as u64;
-        let rows = (pixels / area.width as u64).min((area.height - y) as u64) as u32;
-        if x == 0 && rows >= super::layout::WORKGROUP {
-            // Tiles alike, not large ones and a rest: every submission waits for its last workgroup.
-            let left = area.height - y;
-            let rows = left.div_ceil(left.div_ceil(rows));
-            let rows = rows.next_multiple_of(super::layout::WORKGROUP).min(left);
-            return Tile { x: area.x, y: area.y + y, width: area.width, height: rows };
-        }
-        let height = super::layout::WORKGROUP.min(area.height - y);
-        let width = (pixels / height as u64).clamp(1, (area.width - x) as u64) as u32;
-        Tile { x: area.x + x, y: area.y + y, width, height }
+    /// How many of `left` workgroups the next submission takes.
+    fn next(&self, left: u32) -> u32 {
+        let count = (self.pixels.max(1.0) as u64).div_ceil(GROUP_PIXELS).clamp(1, MOST_GROUPS.into()) as u32;
+        // Submissions alike, not large ones and a rest: every one waits for its last workgroup.
+        left.div_ceil(left.div_ceil(count))
     }
 
-    fn learn(&mut self, tile: Tile, seconds: f64) {
+    fn learn(&mut self, groups: u32, seconds: f64) {
         if !self.fixed {
-            let pixels = tile.width as f64 * tile.height as f64;
+            let pixels = f64::from(groups) * GROUP_PIXELS as f64;
             let wanted = pixels * TILE_SECONDS / seconds.max(1e-6);
             self.pixels = wanted.clamp(64.0, pixels.max(self.pixels) * TILE_GROWTH);
             self.smallest = self.smallest.min(self.pixels);
@@ -179,16 +176,16 @@ impl Integrate {
             ("LEAPS", number(variant.leaps)),
             ("EXPONENT", variant.exponent as f64),
         ];
-        Self::compile(gpu, variant, &source(variant.many), &constants)
+        Self::compile(gpu, variant, &source(variant.many), &constants, true)
     }
 
     /// The bench's bare walk: the same bindings, no light.
     pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
         let constants = [("LEAPS", f64::from(u8::from(variant.leaps)))];
-        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &constants)
+        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &constants, false)
     }
 
-    fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)]) -> Self {
+    fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)], dry: bool) -> Self {
         let module = shader(gpu, "integrate", source);
         let group_layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("integrate"),
@@ -199,19 +196,22 @@ impl Integrate {
             bind_group_layouts: &[Some(&group_layout)],
             immediate_size: 0,
         });
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("integrate"),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: Some("integrate"),
-            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
-            cache: None,
-        });
-        Integrate { pipeline, group_layout, variant }
+        let pipeline = |entry_point| {
+            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
+                cache: None,
+            })
+        };
+        let dry = dry.then(|| pipeline("dry"));
+        Integrate { pipeline: pipeline("integrate"), dry, group_layout, variant }
     }
 
-    /// Adds one sample of a window's area to `sums`, tile by tile; seconds on the device. `between` is called
-    /// after each tile with the pixels done so far, and may stop the work.
+    /// Adds one sample of a window's area to `sums`, some workgroups at a time; seconds on the device. `between` is called
+    /// after each submission with the pixels done so far, and may stop the work.
     pub fn run(
         &self,
         inputs: &Inputs,
@@ -219,9 +219,13 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, filled, reflection, .. } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, groups, filled, reflection, .. } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
-        let tile_buffer = gpu.buffer("tile", 16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+        let part = gpu.buffer(
+            "part of the workgroups",
+            size_of::<Groups>() as u64,
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        );
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let (surface, opaque) = (view(&targets.surface), view(&targets.opaque));
         let quad_id = targets.ids(0..frame.layers);
@@ -229,7 +233,7 @@ impl Integrate {
             entry(0, uniform.as_entire_binding()),
             entry(1, up.lights.as_entire_binding()),
             entry(2, up.quads.as_entire_binding()),
-            entry(3, tile_buffer.as_entire_binding()),
+            entry(3, part.as_entire_binding()),
             entry(4, wgpu::BindingResource::TextureView(&up.volume)),
             entry(5, wgpu::BindingResource::TextureView(&surface)),
             entry(6, wgpu::BindingResource::TextureView(&quad_id)),
@@ -242,42 +246,52 @@ impl Integrate {
             entry(13, wgpu::BindingResource::TextureView(&reflection.table)),
             entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
             entry(15, reflection.profiles.as_entire_binding()),
+            entry(16, groups.buffer.as_entire_binding()),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
             layout: &self.group_layout,
             entries: &entries,
         });
-        let (mut x, mut y, mut seconds, mut done) = (0, 0, 0.0, 0);
-        while y < area.height {
-            let tile = tiler.next(area, x, y);
-            gpu.queue.write_buffer(&tile_buffer, 0, bytemuck::bytes_of(&tile));
-            let took = timer.run(gpu, "integrate", |encoder, span| {
+        let submit = |pipeline: &wgpu::ComputePipeline, first: u32, count: u32| {
+            let uniform = Groups { area, first, count, pad_a: 0, pad_b: 0 };
+            gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
+            timer.run(gpu, "integrate", |encoder, span| {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("integrate"),
                     timestamp_writes: span.compute(),
                 });
-                pass.set_pipeline(&self.pipeline);
+                pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &group, &[]);
-                let groups = |n: u32| n.div_ceil(super::layout::WORKGROUP);
-                pass.dispatch_workgroups(groups(tile.width), groups(tile.height), 1);
-            })?;
+                pass.dispatch_workgroups(count, 1, 1);
+            })
+        };
+        let pixels =
+            |groups: u32| (u64::from(groups) * GROUP_PIXELS).min(area.width as u64 * area.height as u64);
+        let (mut seconds, mut done) = (0.0, 0);
+        while let Some(dry) = &self.dry
+            && done < groups.dry
+        {
+            let count = (groups.dry - done).min(MOST_GROUPS);
+            seconds += submit(dry, groups.wet + done, count)?;
+            done += count;
+            between(pixels(done))?;
+        }
+        let mut first = 0;
+        while first < groups.wet {
+            let count = tiler.next(groups.wet - first);
+            let took = submit(&self.pipeline, first, count)?;
             seconds += took;
-            tiler.learn(tile, took);
-            done += tile.width as u64 * tile.height as u64;
-            between(done)?;
-            x += tile.width;
-            if x >= area.width {
-                x = 0;
-                y += tile.height;
-            }
+            tiler.learn(count, took);
+            first += count;
+            between(pixels(done + first))?;
         }
         Ok(seconds)
     }
 }
 
 /// The bindings of `shaders/integrate.wgsl`, in order.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 16] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 17] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
         TextureSampleType, TextureViewDimension,
@@ -303,7 +317,7 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 16] {
     let linear = BindingType::Sampler(SamplerBindingType::Filtering);
     let types = [
         uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list, uniform, table,
-        linear, list,
+        linear, list, list,
     ];
     let mut binding = 0;
     types.map(|ty| {

@@ -183,7 +183,7 @@ impl Environment {
     }
 }
 
-/// The part of a window that one submission works on, pixels.
+/// The part of a window that is looked at, pixels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -192,6 +192,18 @@ pub struct Tile {
     pub y: u32,
     pub width: u32,
     pub height: u32,
+}
+
+/// The workgroups that one submission of the integrate pass works on.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Groups {
+    pub area: Tile,
+    pub first: u32,
+    pub count: u32,
+    pub pad_a: u32,
+    pub pad_b: u32,
 }
 
 /// `tone` of [`Develop`]: Narkowicz's curve.

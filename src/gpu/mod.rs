@@ -4,6 +4,7 @@ mod bench;
 mod device;
 mod gbuffer;
 mod grid;
+mod groups;
 mod integrate;
 pub mod layout;
 mod meshlets;
@@ -21,6 +22,7 @@ pub use bench::GpuBench;
 pub use device::{DeviceOptions, Gpu, adapters};
 pub use gbuffer::{Gbuffer, Redraw, gbuffer_source};
 pub use grid::Grid;
+pub use groups::GroupList;
 pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
@@ -112,6 +114,8 @@ pub struct Inputs<'a> {
     pub area: Tile,
     /// The window's uniforms.
     pub frame: &'a layout::Frame,
+    /// Its workgroups.
+    pub groups: &'a GroupList,
     /// The light volumes.
     pub filled: &'a FilledVolumes,
     /// The reflection model and multiple scattering.
@@ -308,6 +312,7 @@ impl GpuRenderer {
                 height: wanted.height,
             };
             let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample, layers);
+            let groups = GroupList::new(gpu, scene, window, area);
             for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);
                 let key = Key::new(&frame_uniforms, &up.geometry);
@@ -324,6 +329,7 @@ impl GpuRenderer {
                     window,
                     area,
                     frame: &frame_uniforms,
+                    groups: &groups,
                     filled: &filled,
                     reflection: &reflection,
                 };

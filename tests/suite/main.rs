@@ -10,6 +10,7 @@ mod cache;
 mod closed_forms;
 mod compare;
 mod contact_sheet;
+mod covered;
 mod curve;
 mod environment;
 mod falling;

@@ -4,8 +4,8 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{
-    Develop, Environment, Frame, Light, LightVolume, OpaqueVertex, Quad, Strand, TONE_AGX, TONE_FILMIC, Tile,
-    WORKGROUP,
+    Develop, Environment, Frame, Groups, Light, LightVolume, OpaqueVertex, Quad, Strand, TONE_AGX,
+    TONE_FILMIC, Tile, WORKGROUP,
 };
 use taki::gpu::{gbuffer_source, integrate_source, shader_source, visibility_source};
 use taki::pool::{AROUND, Surface, WAVES, Wave};
@@ -124,6 +124,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
     assert_eq!(members(&module, "Environment"), environment);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
+    assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
     let module = validate(&stage("resolve.wgsl")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
