@@ -373,7 +373,10 @@ impl<'a> Integrator<'a> {
             let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
             let t_dot_e = v.dot(ray.e_v);
             let root = inverse_q.sqrt();
-            let spread = filtered.then(|| Spread::new(&ray.metric, moments, ray.e_v));
+            let spread = filtered.then(|| {
+                let moments = moments.unwrap_or_else(|| level.moments(cell));
+                Spread::new(&ray.metric, moments, ray.e_v)
+            });
             for light in &mut lights {
                 let (seen, light_depth) =
                     self.visibility_of(ray, level, crossing.cell, light, &mut walked[1]);

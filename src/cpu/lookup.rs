@@ -57,21 +57,18 @@ impl<'a> Level<'a> {
         self.volume.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
     }
 
-    fn moments(&self, cell: Cell) -> Moments {
+    /// Of a cell's directions.
+    pub fn moments(&self, cell: Cell) -> Moments {
         match self.is_whole {
             true => Moments::of(cell.v_code()),
             false => Moments::unpacked(cell.y),
         }
     }
 
-    /// What all directions of a cell are.
+    /// The cell's own.
     pub fn found(&self, cell: Cell, matter: &Matter) -> Found {
         let (k_d, k_s) = cell.k_codes();
-        Found {
-            rho: matter.rho(cell.rho_code() as f32),
-            k: [k_d as f32, k_s as f32],
-            moments: self.moments(cell),
-        }
+        Found { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
     }
 
     /// Between the centres of the eight cells around the point in the middle of a ray's way through a cell; the ray starts at
@@ -110,7 +107,7 @@ impl<'a> Level<'a> {
         Found {
             rho: matter.rho(rho),
             k: k.map(|k| k * inverse),
-            moments: Moments { diagonal: moments.diagonal * inverse, mixed: moments.mixed * inverse },
+            moments: Some(Moments { diagonal: moments.diagonal * inverse, mixed: moments.mixed * inverse }),
         }
     }
 }
@@ -121,8 +118,9 @@ pub struct Found {
     pub rho: f32,
     /// k_d and k_s, in codes.
     pub k: [f32; 2],
-    /// Of the directions, in any unit.
-    pub moments: Moments,
+    /// Of the directions, in any unit, where they are of several cells. Those of one are worked out where they are asked
+    /// for: it would be a third of the walk.
+    pub moments: Option<Moments>,
 }
 
 /// Solid angle of the pixel in the middle of the image, over its number of samples.

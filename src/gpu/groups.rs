@@ -26,7 +26,7 @@ impl GroupList {
         let under = overlap::covered(scene, corner, [across, down], WORKGROUP);
         let places = |wet: bool| {
             let chosen = under.iter().enumerate().filter(move |(_, under)| **under == wet);
-            chosen.map(move |(i, _)| i as u32 % across | (i as u32 / across) << 16)
+            chosen.map(move |(i, _)| (i as u32 % across) | ((i as u32 / across) << 16))
         };
         let mut list: Vec<u32> = places(true).collect();
         let wet = list.len() as u32;
