@@ -13,8 +13,8 @@ use taki::volume::{Cell, VolumeTexture};
 
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 
-/// The preset `front` with the text's sheets in place of its quads.
-fn read(text: &str) -> Result<Scene, String> {
+/// The preset `front` with the text's sheets or splashes in place of its quads.
+pub fn read(text: &str) -> Result<Scene, String> {
     let text = format!("version = 1\nbase = \"front\"\nquads = []\n{text}");
     let source = Source { name: "s".into(), origin: "s.toml".into(), folder: PathBuf::from("."), text };
     let checked =

@@ -1,11 +1,11 @@
 //! Splashes: where their drops fly, against the parabolas of mechanics, and which are refused.
 
-use std::path::{Path, PathBuf};
-
 use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 use taki::mapping::Material;
-use taki::scene::{GRAVITY, Limits, Scene, Source, Splash, Station};
+use taki::scene::{GRAVITY, Splash, Station};
+
+use crate::falling::read;
 
 fn splash() -> Splash {
     Splash {
@@ -29,18 +29,6 @@ fn splash() -> Splash {
 fn launch(stations: &[Station]) -> DVec3 {
     let (first, last) = (stations[0], stations[stations.len() - 1]);
     (last.point - first.point) / last.time + DVec3::Y * (0.5 * GRAVITY * last.time)
-}
-
-/// The preset `front` without its quads, and a splash.
-fn read(text: &str) -> Result<Scene, String> {
-    let text = format!("version = 1\nbase = \"front\"\nquads = []\n{text}");
-    let source = Source { name: "s".into(), origin: "s.toml".into(), folder: PathBuf::from("."), text };
-    let checked =
-        source.values().and_then(|v| Scene::from_values("s", v, Some(Path::new(".")), &Limits::default()));
-    checked.map_err(|e| {
-        assert_eq!(e.exit_code(), 65, "{e}");
-        e.to_string()
-    })
 }
 
 proptest! {
