@@ -15,6 +15,8 @@ override CORNERED: bool = false;
 override STRAND: bool = false;
 // Light that is scattered more than once.
 override MULTIPLE: bool = false;
+// A cell's light has a colour of its own.
+override IN_COLOUR: bool = STRAND || MULTIPLE;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -144,10 +146,6 @@ struct View {
     place: Place,
 }
 
-fn in_colour() -> bool {
-    return STRAND || MULTIPLE;
-}
-
 // One sheet: `before` is the radiance of those in front of it, and what they let through.
 fn trace(
     quad_number: u32,
@@ -179,7 +177,7 @@ fn trace(
         view.metric = vec4<f32>(1.0, 0.0, 1.0, 1.0);
         view.e_v = -d_cell / sqrt(dot3(d_cell, d_cell));
     }
-    if in_colour() {
+    if IN_COLOUR {
         view.strand = reflection.strand;
         view.similarity = reflection.similarity;
     }
@@ -226,7 +224,7 @@ fn trace(
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
     var color = frame.ambient * (before.w - end) + passed;
-    if LIGHTS == 1u && in_colour() {
+    if (LIGHTS == 1u) & IN_COLOUR {
         color += view.light.intensity * light;
     } else if LIGHTS == 1u {
         color += view.light.intensity * (light.x * (1.0 / 255.0));
@@ -280,7 +278,7 @@ fn walk_level(view: View, before: f32) -> Ray {
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
     var rho = 0.0;
     var texel = vec2<u32>(0u);
-    if !TRILINEAR || LEAPS {
+    if !TRILINEAR | LEAPS {
         texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
     }
     if TRILINEAR {
@@ -340,7 +338,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     seen.weight = (*ray).transmittance - passed;
     seen.k_d = found.k_d;
     seen.k_s = found.k_s;
-    if many_directions() {
+    if MANY_DIRECTIONS {
         seen.spread = spread_new(view.metric, found.moments, view.e_v);
     }
     let v = v_code(texel.y);
@@ -351,7 +349,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     seen.t_dot_e = dot3(v, view.e_v);
     seen.sin2_e = max(1.0 - seen.t_dot_e * seen.t_dot_e * inverse_q, 0.0);
     seen.inverse_q = inverse_q;
-    if LIGHTS == 1u && in_colour() {
+    if (LIGHTS == 1u) & IN_COLOUR {
         (*ray).light += lit_in_colour(seen, view.light, view, ray);
     } else if LIGHTS == 1u {
         (*ray).light.x += lit(seen, view.light, view, ray);
@@ -361,7 +359,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         if seen.occupied {
             for (var i = 0u; i < view.lights; i++) {
                 let light = ray_light(i, view.place, view.level, view.lights);
-                if in_colour() {
+                if IN_COLOUR {
                     (*ray).light += light.intensity * lit_in_colour(seen, light, view, ray);
                 } else {
                     (*ray).light += light.intensity * (lit(seen, light, view, ray) * (1.0 / 255.0));

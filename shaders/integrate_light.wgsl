@@ -77,7 +77,7 @@ fn ray_light(i: u32, place: Place, level: Level, count: u32) -> RayLight {
     if CACHED {
         out.places = light_places_of(place.quad_number * count + i, place.uv);
     }
-    if in_colour() || many_directions() {
+    if IN_COLOUR | MANY_DIRECTIONS {
         let cosine = dot3(to_light, place.d_world);
         out.l_dot_e = -cosine;
         if MULTIPLE {
@@ -104,18 +104,19 @@ fn light_places_of(entry: u32, uv: vec2<f32>) -> LightPlaces {
     let patches = light_places[entry];
     let at = uv * vec2<f32>(patches.yz);
     let patch_at = min(vec2<i32>(at), patches.yz - 1);
-    if !CORNERED | (patches.w == 0) {
-        out.p00 = light_places[patches.x + patch_at.y * patches.y + patch_at.x].xyz;
-        return out;
+    out.p00 = light_places[patches.x + patch_at.y * patches.y + patch_at.x].xyz;
+    if CORNERED {
+        if patches.w != 0 {
+            let row = patches.y + 1;
+            let first = patches.x + patch_at.y * row + patch_at.x;
+            out.cornered = true;
+            out.at = at - vec2<f32>(patch_at);
+            out.p00 = light_places[first].xyz;
+            out.p10 = light_places[first + 1].xyz;
+            out.p01 = light_places[first + row].xyz;
+            out.p11 = light_places[first + row + 1].xyz;
+        }
     }
-    let row = patches.y + 1;
-    let first = patches.x + patch_at.y * row + patch_at.x;
-    out.cornered = true;
-    out.at = at - vec2<f32>(patch_at);
-    out.p00 = light_places[first].xyz;
-    out.p10 = light_places[first + 1].xyz;
-    out.p01 = light_places[first + row].xyz;
-    out.p11 = light_places[first + row + 1].xyz;
     return out;
 }
 
@@ -125,7 +126,7 @@ fn is_mist(view: View) -> bool {
 
 // 255·Ψ of strands, or of mist.
 fn psi_of(seen: Seen, light: RayLight, view: View) -> f32 {
-    if many_directions() {
+    if MANY_DIRECTIONS {
         let psi = spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
         return select(psi, view.matter.mist, is_mist(view));
     }
@@ -143,18 +144,19 @@ fn lit(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 
 fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
     let visibility = visibility_of(seen, light, view, ray);
     let weight = seen.weight * visibility.x;
-    var lit: vec3<f32>;
-    if STRAND && !is_mist(view) {
+    let fibre = psi_of(seen, light, view);
+    var lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
+    if STRAND {
         let root = sqrt(seen.inverse_q);
         var t_dot = vec2<f32>(dot3(seen.v, light.l_v), seen.t_dot_e) * root;
-        if many_directions() {
+        if MANY_DIRECTIONS {
             t_dot = spread_of_one(seen.spread, light.l_v);
         }
-        let k_d = seen.k_d;
-        lit = weight * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot.x, t_dot.y, light.l_dot_e);
-    } else {
-        let fibre = psi_of(seen, light, view);
-        lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
+        if !is_mist(view) {
+            let k_d = seen.k_d;
+            lit = weight
+                * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot.x, t_dot.y, light.l_dot_e);
+        }
     }
     if MULTIPLE {
         let z = layer_in(view, seen.cell.z) + view.profile;
@@ -167,9 +169,11 @@ fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
 // V_i(k); and −log₂ of it, which is 0 where codes are kept.
 fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
     var depth = 0.0;
-    if (MARCH | CACHED) && is_mist(view) {
-        depth = select(0.0, mist_depth(seen.cell.z, light.l_cell, view), seen.occupied);
-        return vec2<f32>(exp2(-depth), depth);
+    if (MARCH | CACHED) & ERODED {
+        if is_mist(view) {
+            depth = select(0.0, mist_depth(seen.cell.z, light.l_cell, view), seen.occupied);
+            return vec2<f32>(exp2(-depth), depth);
+        }
     }
     if MARCH {
         if seen.occupied {
@@ -210,12 +214,14 @@ fn layer_in(view: View, z: i32) -> u32 {
 // From the light volumes of the ray's patch, at a place of the volume's texture.
 fn kept_of(cell: vec3<i32>, places: LightPlaces) -> f32 {
     let kept = kept_at(cell, places.p00);
-    if !CORNERED | !places.cornered {
-        return kept;
+    if CORNERED {
+        if places.cornered {
+            let near = mix(kept, kept_at(cell, places.p10), places.at.x);
+            let far = mix(kept_at(cell, places.p01), kept_at(cell, places.p11), places.at.x);
+            return mix(near, far, places.at.y);
+        }
     }
-    let near = mix(kept, kept_at(cell, places.p10), places.at.x);
-    let far = mix(kept_at(cell, places.p01), kept_at(cell, places.p11), places.at.x);
-    return mix(near, far, places.at.y);
+    return kept;
 }
 
 fn kept_at(cell: vec3<i32>, place: vec3<i32>) -> f32 {

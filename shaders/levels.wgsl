@@ -21,14 +21,16 @@ fn level_size(size: vec3<i32>, number: u32) -> vec3<i32> {
 
 fn level_new(size: vec3<i32>, number: u32) -> Level {
     var level = Level(number, vec3<i32>(0), size, vec3<f32>(1.0), 1.0);
-    if PYRAMID && number > 0u {
-        level.size = level_size(size, number);
-        level.offset.z = (size.z + 3) & ~3;
-        for (var l = 1u; l < number; l++) {
-            level.offset.y += level_size(size, l).y;
+    if PYRAMID {
+        if number > 0u {
+            level.size = level_size(size, number);
+            level.offset.z = (size.z + 3) & ~3;
+            for (var l = 1u; l < number; l++) {
+                level.offset.y += level_size(size, l).y;
+            }
+            level.scale = vec3<f32>(level.size) / vec3<f32>(size);
+            level.deep = 1.0 / level.scale.z;
         }
-        level.scale = vec3<f32>(level.size) / vec3<f32>(size);
-        level.deep = 1.0 / level.scale.z;
     }
     return level;
 }

@@ -3,6 +3,8 @@
 
 // Interpolates between cells.
 override TRILINEAR: bool = false;
+// Cells have more than one direction.
+override MANY_DIRECTIONS: bool = PYRAMID || TRILINEAR;
 
 // Second moments of directions: xx, yy, zz and xy, xz, yz.
 struct Moments {
@@ -16,11 +18,6 @@ struct Found {
     k_d: f32,
     k_s: f32,
     moments: Moments,
-}
-
-// Whether cells have more than one direction.
-fn many_directions() -> bool {
-    return PYRAMID || TRILINEAR;
 }
 
 fn moments_times(m: Moments, v: vec3<f32>) -> vec3<f32> {

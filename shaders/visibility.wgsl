@@ -28,10 +28,12 @@ struct LightVolume {
 // The level that has cells at (y, z) of the texture.
 fn level_with(size: vec3<i32>, y: i32, z: i32) -> Level {
     var level = level_new(size, 0u);
-    if PYRAMID && z >= ((size.z + 3) & ~3) {
-        level = level_new(size, 1u);
-        while y >= level.offset.y + level.size.y && level.number < 32u {
-            level = level_new(size, level.number + 1u);
+    if PYRAMID {
+        if z >= ((size.z + 3) & ~3) {
+            level = level_new(size, 1u);
+            while y >= level.offset.y + level.size.y && level.number < 32u {
+                level = level_new(size, level.number + 1u);
+            }
         }
     }
     return level;

@@ -2,7 +2,8 @@
 
 use super::device::Gpu;
 use super::layout::{Groups, WORKGROUP};
-use super::{Inputs, shader};
+use super::specialise::Source;
+use super::{Inputs, compute_pipeline, shader_source};
 use crate::error::Result;
 use crate::scene::{Attenuation, Lookup, Prefilter, Reflection, Scattering, Scene, Visibility};
 use crate::shading::whole_exponent;
@@ -185,8 +186,8 @@ impl Integrate {
         Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &constants, false)
     }
 
-    fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)], dry: bool) -> Self {
-        let module = shader(gpu, "integrate", source);
+    fn compile(gpu: &Gpu, variant: Variant, stage: &str, constants: &[(&str, f64)], dry: bool) -> Self {
+        let source = Source::read("integrate", &shader_source(stage));
         let group_layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("integrate"),
             entries: &bindings(),
@@ -196,16 +197,7 @@ impl Integrate {
             bind_group_layouts: &[Some(&group_layout)],
             immediate_size: 0,
         });
-        let pipeline = |entry_point| {
-            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry_point),
-                layout: Some(&layout),
-                module: &module,
-                entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
-                cache: None,
-            })
-        };
+        let pipeline = |entry_point| compute_pipeline(gpu, Some(&layout), &source, entry_point, constants);
         let dry = dry.then(|| pipeline("dry"));
         Integrate { pipeline: pipeline("integrate"), dry, group_layout, variant }
     }

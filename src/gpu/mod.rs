@@ -12,6 +12,7 @@ mod rasters;
 mod readback;
 mod reflection;
 mod resolve;
+mod specialise;
 mod strand;
 mod targets;
 mod timing;
@@ -26,12 +27,14 @@ pub use groups::GroupList;
 pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};
 pub use reflection::{BoundReflection, Reflections};
 pub use resolve::Resolve;
+pub use specialise::Source;
 pub use strand::StrandTexture;
 pub use targets::Targets;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
 pub use visibility::{FilledVolumes, Visibility, source as visibility_source};
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -94,6 +97,28 @@ fn shader(gpu: &Gpu, name: &str, stage: &str) -> wgpu::ShaderModule {
     gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(name),
         source: wgpu::ShaderSource::Wgsl(shader_source(stage).into()),
+    })
+}
+
+/// A compute pipeline of a stage's shader, specialised to `constants`.
+fn compute_pipeline(
+    gpu: &Gpu,
+    layout: Option<&wgpu::PipelineLayout>,
+    source: &Source,
+    entry_point: &str,
+    constants: &[(&str, f64)],
+) -> wgpu::ComputePipeline {
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(entry_point),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(source.compute(entry_point, constants))),
+    });
+    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry_point),
+        layout,
+        module: &module,
+        entry_point: Some(entry_point),
+        compilation_options: Default::default(),
+        cache: None,
     })
 }
 

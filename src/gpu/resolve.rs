@@ -3,8 +3,9 @@
 use super::device::Gpu;
 use super::integrate::Sums;
 use super::layout::{Develop, Frame, Tile, WORKGROUP};
-use super::shader;
+use super::specialise::Source;
 use super::timing::Timer;
+use super::{compute_pipeline, shader_source};
 use crate::error::Result;
 
 /// The pass.
@@ -15,15 +16,8 @@ pub struct Resolve {
 impl Resolve {
     /// Compiles the pipeline.
     pub fn new(gpu: &Gpu) -> Self {
-        let module = shader(gpu, "resolve", include_str!("../../shaders/resolve.wgsl"));
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("resolve"),
-            layout: None,
-            module: &module,
-            entry_point: Some("resolve"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        let source = Source::read("resolve", &shader_source(include_str!("../../shaders/resolve.wgsl")));
+        let pipeline = compute_pipeline(gpu, None, &source, "resolve", &[]);
         Resolve { pipeline }
     }
 

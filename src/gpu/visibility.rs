@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use super::device::Gpu;
 use super::layout::{Frame, LightVolume};
-use super::shader;
+use super::specialise::Source;
 use super::timing::Timer;
 use super::upload::Uploaded;
+use super::{compute_pipeline, shader_source};
 use crate::error::{Error, Result};
 use crate::scene::Lookup;
 use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
@@ -252,7 +253,6 @@ impl Visibility {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == kind) {
             return pipeline.clone();
         }
-        let module = shader(gpu, "visibility", &source());
         let number = |on: bool| f64::from(u8::from(on));
         let constants = [
             ("PER_CELL", number(kind.per_cell)),
@@ -261,17 +261,8 @@ impl Visibility {
             ("LEAPS", number(kind.leaps)),
             ("EVERYWHERE", number(kind.everywhere)),
         ];
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("visibility"),
-            layout: None,
-            module: &module,
-            entry_point: Some("visibility"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                ..Default::default()
-            },
-            cache: None,
-        });
+        let source = Source::read("visibility", &shader_source(&source()));
+        let pipeline = compute_pipeline(gpu, None, &source, "visibility", &constants);
         self.pipelines.push((kind, pipeline.clone()));
         pipeline
     }
