@@ -17,6 +17,8 @@ override STRAND: bool = false;
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
 override IN_COLOUR: bool = STRAND || MULTIPLE;
+// Mist has a walk of its own, in which no cell is empty and all shine alike.
+override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -211,7 +213,16 @@ fn trace(
         if LIGHTS == 1u {
             view.light = ray_light(0u, view.place, view.level, view.lights);
         }
-        let ray = walk_level(view, before.w);
+        var ray = ray_new(before.w);
+        if MIST_APART {
+            if is_mist(view) {
+                walk_mist(view, &ray);
+            } else {
+                walk_level(view, &ray);
+            }
+        } else {
+            walk_level(view, &ray);
+        }
         end += ray.transmittance * weight;
         light += ray.light * weight;
         *count += vec2<u32>(ray.cells, ray.light_cells);
@@ -242,36 +253,39 @@ fn level_at(jacobian: CellFrame, d_world: vec3<f32>, d_cell: vec3<f32>, t: f32) 
     return 0.5 * log2(max(across, 1e-30));
 }
 
-// Through one level of the volume, to its end.
-fn walk_level(view: View, before: f32) -> Ray {
+fn ray_new(before: f32) -> Ray {
     var ray: Ray;
-    var walk = walk_new(view.level.size, view.origin, view.d_cell);
     ray.depth = -log2(max(before, 1e-30));
     ray.transmittance = before;
+    return ray;
+}
+
+// Through one level of the volume, to its end.
+fn walk_level(view: View, ray: ptr<function, Ray>) {
+    var walk = walk_new(view.level.size, view.origin, view.d_cell);
     // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
-    while !ray.done {
+    while !(*ray).done {
         if MARCH {
             // Rays of one SIMD group meet occupied cells at different steps; those that found one wait
             // for the others, so that all walk to the light at once.
             var seeking = true;
             while seeking {
-                seek(&walk, &ray, &seeking, view);
-                seek(&walk, &ray, &seeking, view);
-                seek(&walk, &ray, &seeking, view);
-                seek(&walk, &ray, &seeking, view);
+                seek(&walk, ray, &seeking, view);
+                seek(&walk, ray, &seeking, view);
+                seek(&walk, ray, &seeking, view);
+                seek(&walk, ray, &seeking, view);
             }
-            visit(&walk, &ray, view);
+            visit(&walk, ray, view);
         } else if LIGHTS > 1u {
             // With a loop in it, once: there is little left to gain, and each would be compiled anew.
-            visit(&walk, &ray, view);
+            visit(&walk, ray, view);
         } else {
-            visit(&walk, &ray, view);
-            visit(&walk, &ray, view);
-            visit(&walk, &ray, view);
-            visit(&walk, &ray, view);
+            visit(&walk, ray, view);
+            visit(&walk, ray, view);
+            visit(&walk, ray, view);
+            visit(&walk, ray, view);
         }
     }
-    return ray;
 }
 
 // Goes on by one cell if the one it is in is empty; ends the seeking if not.
@@ -296,6 +310,45 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     walk_step(walk, on);
     (*ray).done |= ((*walk).cell.z >= view.level.size.z) | ((*ray).cells >= view.max_cells);
     *seeking = on & !(*ray).done;
+}
+
+// Through mist, to its end.
+fn walk_mist(view: View, ray: ptr<function, Ray>) {
+    var walk = walk_new(view.level.size, view.origin, view.d_cell);
+    while !(*ray).done {
+        visit_mist(&walk, ray, view);
+        visit_mist(&walk, ray, view);
+        visit_mist(&walk, ray, view);
+        visit_mist(&walk, ray, view);
+    }
+}
+
+// What `visit` is to a cell of mist.
+fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
+    let code = textureLoad(volume, in_level((*walk).cell, view.level)).x & 0xffffu;
+    let t_exit = walk_exit(*walk);
+    let rho = select(matter_rho(f32(code), view.matter), 0.0, (*ray).done);
+    var tau_bits = rho * view.extinction;
+    if !PER_CELL {
+        tau_bits *= t_exit - (*ray).t;
+    }
+    let passed = (*ray).transmittance * exp2(-tau_bits);
+    let weight = (*ray).transmittance - passed;
+    var visible = 1.0;
+    if MARCH | CACHED {
+        visible = exp2(-select(0.0, mist_depth((*walk).cell.z, view.light.l_cell, view), rho > 0.0));
+    }
+    if IN_COLOUR {
+        (*ray).light += weight * visible * view.matter.mist * (1.0 / 255.0);
+    } else {
+        (*ray).light.x += weight * view.matter.mist * visible;
+    }
+    (*ray).cells += select(1u, 0u, (*ray).done);
+    (*ray).transmittance = passed;
+    (*ray).t = t_exit;
+    walk_step(walk, true);
+    (*ray).done |= ((*walk).cell.z >= view.level.size.z) | (passed < view.early_end)
+        | ((*ray).cells >= view.max_cells);
 }
 
 // Half way through the cell the ray is in.
