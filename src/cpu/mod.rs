@@ -2,6 +2,7 @@
 //! there is no GPU.
 
 pub mod bloom;
+pub mod fill;
 pub mod gbuffer;
 pub mod integrate;
 pub mod lookup;

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use glam::{IVec3, Vec3};
-use rayon::prelude::*;
 
+use super::fill::{Numbers, Rows};
 use super::lookup::Level;
 use super::matter::Matter;
 use crate::error::Result;
@@ -33,24 +33,6 @@ struct Kept {
 /// All light volumes, number by number: of every level, in its order of cells.
 pub type Filled = Arc<Vec<Vec<Numbers>>>;
 
-/// What one light volume holds.
-pub enum Numbers {
-    /// √T in 255ths.
-    Codes(Vec<u8>),
-    /// Optical depths.
-    Depths(Vec<f32>),
-}
-
-impl Numbers {
-    /// Of the cell with this index, as a number.
-    pub fn at(&self, index: usize) -> f32 {
-        match self {
-            Numbers::Codes(codes) => codes[index].into(),
-            Numbers::Depths(depths) => depths[index],
-        }
-    }
-}
-
 impl KeptVolumes {
     /// Lets go of the light volumes.
     pub fn forget(&mut self) {
@@ -77,38 +59,16 @@ impl KeptVolumes {
         self.kept = None;
         let total = plan.volumes.len() as u64;
         let mut all = Vec::with_capacity(plan.volumes.len());
+        let rows = Rows::new(levels, lookup);
         for (number, light_volume) in plan.volumes.iter().enumerate() {
             monitor.progress("light volumes", number as u64, total)?;
-            let of_level = |number| {
-                let level = Level::of(levels, number);
-                let of = |cell| self::number(&level, cell, light_volume, plan.medium, plan.form);
-                match plan.form {
-                    Form::Codes => Numbers::Codes(filled(&level, lookup, |cell| of(cell) as u8)),
-                    Form::Depths => Numbers::Depths(filled(&level, lookup, of)),
-                }
-            };
-            all.push((0..levels.len() as u32).map(of_level).collect());
+            all.push(rows.fill(light_volume, plan.medium, plan.form));
         }
         let filled = Arc::new(all);
         let (levels, plan) = (levels.clone(), plan.clone());
         self.kept = Some(Kept { levels, lookup, plan, filled: filled.clone() });
         Ok(filled)
     }
-}
-
-/// A number for every cell. Those without density, which no view ray asks, have the default, but for rays that look
-/// between cells.
-fn filled<T: Copy + Default + Send>(level: &Level, lookup: Lookup, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
-    let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
-    let mut numbers = vec![T::default(); nx * ny * nz];
-    numbers.par_chunks_mut(nx).enumerate().for_each(|(row, numbers)| {
-        for (x, number) in numbers.iter_mut().enumerate() {
-            if lookup == Lookup::Trilinear || level.volume.cells[row * nx + x].rho_code() > 0 {
-                *number = of(IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32));
-            }
-        }
-    });
-    numbers
 }
 
 /// What a light volume of a form holds for a cell.

@@ -42,6 +42,10 @@ enum Fault {
     Bug(String),
 }
 
+fn is_software(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu
+}
+
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::PRIMARY;
@@ -83,7 +87,7 @@ impl Gpu {
         };
         // Software Vulkan writes the first time stamp of a compute pass when it gets round to it: after a
         // submission that drew nothing lavapipe tells 0.03 ms of 40. The host's clock is right to 0.4 ms there.
-        let software = info.device_type == wgpu::DeviceType::Cpu;
+        let software = is_software(&info);
         let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) && !software;
         let required_features =
             if timestamps { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() };
@@ -123,6 +127,11 @@ impl Gpu {
     /// Name and kind of the adapter for people.
     pub fn name(&self) -> String {
         format!("{} ({:?}, {:?})", self.info.name, self.info.device_type, self.info.backend)
+    }
+
+    /// Whether the device is the host's processor.
+    pub fn is_software(&self) -> bool {
+        is_software(&self.info)
     }
 
     /// The first fault the device reported, if any.

@@ -32,7 +32,7 @@ pub use strand::StrandTexture;
 pub use targets::Targets;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
-pub use visibility::{FilledVolumes, Visibility, source as visibility_source};
+pub use visibility::{FilledVolumes, Filling, Visibility, source as visibility_source};
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -73,6 +73,8 @@ pub struct RenderOptions {
     pub keep_rasters: u64,
     /// Whether rays leap over empty cells.
     pub leaps: Leaps,
+    /// Where light volumes are filled.
+    pub filling: Filling,
     /// How the GPU engine cuts the image; another grid rounds the rock's radiance otherwise.
     pub grid: Grid,
 }
@@ -248,6 +250,11 @@ impl GpuRenderer {
         });
     }
 
+    /// Lets go of the light volumes of the last frame: the next one fills its own.
+    pub fn forget_light_volumes(&mut self) {
+        self.visibility.forget();
+    }
+
     /// Renders a scene, or the part of it that `options.window` names.
     pub fn render(
         &mut self,
@@ -269,6 +276,7 @@ impl GpuRenderer {
             _ => None,
         };
         self.resident.levels.leaps = options.leaps;
+        self.visibility.filling = options.filling;
         let up = Uploaded::new(gpu, &mut self.resident, scene, volume, mesh)?;
         let reflection = self.reflections.bind(gpu, scene, volume);
         seconds.upload = clock.elapsed().as_secs_f64();

@@ -2,6 +2,7 @@
 //! `src/cpu/visibility.rs`; why and in which units: `src/visibility.rs`.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::device::Gpu;
 use super::layout::{Frame, LightVolume};
@@ -9,6 +10,7 @@ use super::specialise::Source;
 use super::timing::Timer;
 use super::upload::Uploaded;
 use super::{compute_pipeline, shader_source};
+use crate::cpu::fill::{Numbers, Rows};
 use crate::error::{Error, Result};
 use crate::scene::Lookup;
 use crate::visibility::{CELLS_A_WORD, Form, LightVolumes};
@@ -32,8 +34,23 @@ const MOST_COLUMNS: u32 = 65535 * 64;
 /// A submission aims at this many seconds, as tiles of the integrate pass.
 const SECONDS: f64 = 0.03;
 
+/// Where light volumes are filled. They are the same but for the rounding of codes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filling {
+    /// On the device, but on the host where the device is the host: shaders cannot add up rows of cells side by side
+    /// ([`crate::cpu::fill`]).
+    #[default]
+    Auto,
+    /// By the pass.
+    Device,
+    /// By the CPU engine.
+    Host,
+}
+
 /// The pass, and the light volumes of the last frame that had any.
 pub struct Visibility {
+    /// Where they are filled.
+    pub filling: Filling,
     pipelines: Vec<(Kind, wgpu::ComputePipeline)>,
     occupied: Option<(Levels, bool, wgpu::Buffer, u32)>,
     kept: Option<Kept>,
@@ -112,7 +129,7 @@ impl Visibility {
             texture: texture(gpu, [1; 3]),
             places: gpu.buffer_with("light places", &[], wgpu::BufferUsages::STORAGE),
         };
-        Visibility { pipelines: Vec::new(), occupied: None, kept: None, none }
+        Visibility { filling: Filling::Auto, pipelines: Vec::new(), occupied: None, kept: None, none }
     }
 
     /// What the integrate pass binds where no light volumes are asked for.
@@ -136,7 +153,7 @@ impl Visibility {
         frame: &Frame,
         plan: LightVolumes,
         lookup: Lookup,
-        mut between: impl FnMut(u64, u64) -> Result<()>,
+        between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<(FilledVolumes, f64)> {
         let everywhere = lookup == Lookup::Trilinear;
         if let Some(kept) = &self.kept
@@ -152,6 +169,35 @@ impl Visibility {
         let filled =
             FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
+        let on_host = match self.filling {
+            Filling::Auto => gpu.is_software(),
+            Filling::Device => false,
+            Filling::Host => true,
+        };
+        let seconds = if on_host {
+            fill_on_host(gpu, &up.levels, &plan, lookup, &shelf, &filled, between)?
+        } else {
+            self.fill(gpu, timer, up, frame, &plan, everywhere, &shelf, &filled, between)?
+        };
+        let kept = Kept { levels: up.levels.clone(), everywhere, plan, filled: filled.clone() };
+        self.kept = Some(kept);
+        Ok((filled, seconds))
+    }
+
+    /// Runs the pass; the device's seconds.
+    #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
+    fn fill(
+        &mut self,
+        gpu: &Gpu,
+        timer: &Timer,
+        up: &Uploaded,
+        frame: &Frame,
+        plan: &LightVolumes,
+        everywhere: bool,
+        shelf: &Shelf,
+        filled: &FilledVolumes,
+        mut between: impl FnMut(u64, u64) -> Result<()>,
+    ) -> Result<f64> {
         let (occupied, count) = self.occupied(gpu, &up.levels, everywhere);
         let pipeline = self.pipeline(
             gpu,
@@ -213,9 +259,7 @@ impl Visibility {
                 columns = wanted.clamp(64.0, f64::from(columns.saturating_mul(4).min(MOST_COLUMNS))) as u32;
             }
         }
-        let kept = Kept { levels: up.levels.clone(), everywhere, plan, filled: filled.clone() };
-        self.kept = Some(kept);
-        Ok((filled, seconds))
+        Ok(seconds)
     }
 
     /// Linear indices of the columns of cells with density, and their number.
@@ -268,6 +312,80 @@ impl Visibility {
     }
 }
 
+/// Fills them on the host and uploads them one by one; seconds.
+fn fill_on_host(
+    gpu: &Gpu,
+    levels: &Levels,
+    plan: &LightVolumes,
+    lookup: Lookup,
+    shelf: &Shelf,
+    filled: &FilledVolumes,
+    mut between: impl FnMut(u64, u64) -> Result<()>,
+) -> Result<f64> {
+    let clock = Instant::now();
+    let (rows, stack) = (Rows::new(levels, lookup), Stack::new(levels));
+    let texture = filled.texture.texture();
+    for (number, light_volume) in plan.volumes.iter().enumerate() {
+        between(number as u64, plan.volumes.len() as u64)?;
+        let [x, y, z] = shelf.place(number as u32).map(|c| c as u32);
+        let of_levels = rows.fill(light_volume, plan.medium, plan.form);
+        for ((level, numbers), at) in levels.iter().zip(of_levels).zip(0..) {
+            let [_, y_level, z_level] = stack.place(at);
+            let z_level = match plan.form {
+                Form::Codes => z_level / CELLS_A_WORD,
+                Form::Depths => z_level,
+            };
+            upload_words(
+                gpu,
+                texture,
+                [x, y + y_level, z + z_level],
+                plan.words(level.size),
+                &words(level.size, &numbers),
+            );
+        }
+        gpu.run(gpu.encoder("upload light volume"))?;
+    }
+    Ok(clock.elapsed().as_secs_f64())
+}
+
+/// As the shader reads them: codes of cells that follow one another along z are in one word.
+fn words([nx, ny, nz]: [u32; 3], numbers: &Numbers) -> Vec<u32> {
+    match numbers {
+        Numbers::Depths(depths) => depths.iter().map(|depth| depth.to_bits()).collect(),
+        Numbers::Codes(codes) => {
+            let slice = nx as usize * ny as usize;
+            let mut words = vec![0; slice * nz.div_ceil(CELLS_A_WORD) as usize];
+            for (z, codes) in codes.chunks(slice).enumerate() {
+                let (first, shift) = (z / CELLS_A_WORD as usize * slice, 8 * (z as u32 % CELLS_A_WORD));
+                for (word, &code) in words[first..].iter_mut().zip(codes) {
+                    *word |= u32::from(code) << shift;
+                }
+            }
+            words
+        }
+    }
+}
+
+fn upload_words(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    [x, y, z]: [u32; 3],
+    [nx, ny, nz]: [u32; 3],
+    words: &[u32],
+) {
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: 0,
+            origin: wgpu::Origin3d { x, y, z },
+            aspect: wgpu::TextureAspect::All,
+        },
+        bytemuck::cast_slice(words),
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(nx * 4), rows_per_image: Some(ny) },
+        wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: nz },
+    );
+}
+
 fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("light volumes"),
@@ -276,7 +394,7 @@ fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
         sample_count: 1,
         dimension: wgpu::TextureDimension::D3,
         format: wgpu::TextureFormat::R32Uint,
-        usage: wgpu::TextureUsages::STORAGE_BINDING,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
     texture.create_view(&Default::default())

@@ -5,7 +5,7 @@ use std::path::Path;
 use taki::cpu;
 use taki::error::Error;
 use taki::frame::{Difference, Frame, Tolerance};
-use taki::gpu::{DeviceOptions, Gpu, GpuRenderer, Grid, RenderOptions, adapters};
+use taki::gpu::{DeviceOptions, Filling, Gpu, GpuRenderer, Grid, RenderOptions, adapters};
 use taki::job::Unwatched;
 use taki::scene::{Limits, Scene};
 use taki::volume::Leaps;
@@ -51,6 +51,7 @@ pub const SURFACE: RenderOptions = RenderOptions {
     samples: None,
     tile_pixels: None,
     window: None,
+    filling: Filling::Auto,
     grid: Grid { side: 4096, pixels: 1 << 21 },
     leaps: Leaps::Auto,
 };

@@ -1,13 +1,18 @@
 //! Cached visibility: light volumes say what an exact walk from every cell would.
 
 use glam::{IVec3, Vec3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use taki::cpu::fill::Rows;
 use taki::cpu::lookup::Level;
-use taki::cpu::{self, Matter, visibility::optical_depth};
+use taki::cpu::visibility::{number, optical_depth};
+use taki::cpu::{self, Matter};
 use taki::frame::Frame;
+use taki::gpu::{Filling, RenderOptions};
 use taki::job::Unwatched;
-use taki::scene::{Light, Limits, Scene};
-use taki::visibility::{LightVolumes, Medium};
-use taki::volume::VolumeTexture;
+use taki::scene::{Light, Limits, Lookup, Scene};
+use taki::visibility::{Form, LightVolume, LightVolumes, Medium};
+use taki::volume::{VolumeTexture, levels_of};
 use taki::walk::NEVER;
 
 use crate::gpu::renderer;
@@ -197,8 +202,67 @@ fn the_engines_agree_on_light_volumes() {
     {
         let sets: Vec<&str> = small.iter().chain(more).copied().collect();
         let scene = scene(preset, &sets);
-        crate::gpu::assert_parity(&format!("{preset} {more:?}"), &crate::gpu::both(&mut renderer, &scene));
+        let (volume, mesh) = (volume(&scene), scene.mesh());
+        let on_cpu = cpu::render(&scene, &volume, &mesh, true, &Unwatched).expect("a frame");
+        for filling in [Filling::Device, Filling::Host] {
+            renderer.forget_light_volumes();
+            let options = RenderOptions { surface: true, filling, ..Default::default() };
+            let on_gpu = renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
+            assert!(on_gpu.seconds.visibility > 0.0, "{preset} {more:?} {filling:?}: filled anew");
+            let both = [on_gpu, on_cpu.clone()];
+            crate::gpu::assert_parity(&format!("{preset} {more:?} {filling:?}"), &both);
+        }
     }
+}
+
+#[test]
+fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
+    let of = |sets: &[&str]| {
+        let scene = scene("fig5", sets);
+        let volume = volume(&scene);
+        (levels_of(&scene, &volume), volume)
+    };
+    let odd = ["volume.nx=13", "volume.ny=9", "volume.nz=7", "curves.across=4", "curves.deep=4"];
+    let (plain, whole) = of(&odd);
+    let (pyramid, _) = of(&[&odd[..], &["trace.filter=pyramid"]].concat());
+    let most = whole.cells.iter().filter(|cell| cell.rho_code() > 0).count();
+    assert!((100..whole.cells.len() - 100).contains(&most), "{most} cells: some are empty");
+    let mut rng = Pcg64Mcg::seed_from_u64(11);
+    let mut compared = 0;
+    for round in 0..60 {
+        let levels = [&plain, &pyramid][round % 2];
+        let mut direction = Vec3::from_array([0; 3].map(|_| rng.random_range(-4.0..4.0)));
+        match round % 5 {
+            // Along the slab, which it never leaves; along axes; through corners.
+            0 => direction.z = 0.0,
+            1 => direction = Vec3::new(0.0, -0.0, -1.0),
+            2 => direction = Vec3::new(-1.0, 1.0, 1.0),
+            _ => {}
+        }
+        let light_volume = LightVolume { direction, bits: [1e-5, 1e-4][round % 2] };
+        for (per_cell, max_cells) in [(false, 512), (true, 512), (false, 5)] {
+            let medium = Medium { per_cell, max_cells };
+            for (form, lookup) in [(Form::Depths, Lookup::Nearest), (Form::Codes, Lookup::Trilinear)] {
+                let filled = Rows::new(levels, lookup).fill(&light_volume, medium, form);
+                assert_eq!(filled.len(), levels.len());
+                for (at, numbers) in filled.iter().enumerate() {
+                    let level = Level::of(levels, at as u32);
+                    let [nx, ny, _] = level.volume.size.map(|n| n as usize);
+                    for (index, cell) in level.volume.cells.iter().enumerate() {
+                        let place = [index % nx, index / nx % ny, index / nx / ny].map(|c| c as i32);
+                        let asked = cell.rho_code() > 0 || lookup == Lookup::Trilinear;
+                        let expected = match asked {
+                            true => number(&level, place.into(), &light_volume, medium, form),
+                            false => 0.0,
+                        };
+                        assert_eq!(numbers.at(index), expected, "{direction} {medium:?} {form:?} {place:?}");
+                        compared += usize::from(expected > 0.0);
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 100_000, "{compared} were above 0");
 }
 
 #[test]
