@@ -272,8 +272,6 @@ fn walk_level(view: View, ray: ptr<function, Ray>) {
             while seeking {
                 seek(&walk, ray, &seeking, view);
                 seek(&walk, ray, &seeking, view);
-                seek(&walk, ray, &seeking, view);
-                seek(&walk, ray, &seeking, view);
             }
             visit(&walk, ray, view);
         } else if LIGHTS > 1u {
