@@ -37,6 +37,7 @@ mod shaders;
 mod shading;
 mod splash;
 mod strand;
+mod tiles;
 mod tolerance;
 #[cfg(feature = "viewer")]
 mod viewer;
