@@ -1,4 +1,4 @@
-//! §3 What the raster pass makes of a point of opaque geometry. Twin: `shade_opaque` of `shaders/gbuffer.wgsl`.
+//! §3 What the raster pass makes of a point of opaque geometry. Twin: `shaders/opaque.wgsl`.
 
 use glam::{Vec2, Vec3};
 

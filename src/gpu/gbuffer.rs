@@ -1,12 +1,15 @@
 //! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
 
+mod pipeline;
+
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use glam::{Mat4, Vec3};
 
+use self::pipeline::{Kind, NEARER, Under, pipeline};
 use super::device::Gpu;
-use super::targets::{DEPTH, FLOATS};
+use super::targets::FLOATS;
 use super::tiles::{Part, in_view};
 use super::timing::Span;
 use super::{Inputs, Uploaded, shader};
@@ -34,7 +37,12 @@ pub fn gbuffer_source() -> String {
         "fn waves(p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {{\n    \
          var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
     );
-    [include_str!("../../shaders/gbuffer.wgsl"), include_str!("../../shaders/pool.wgsl"), &sum].join("\n")
+    let [places, rock, pool] = [
+        include_str!("../../shaders/gbuffer.wgsl"),
+        include_str!("../../shaders/opaque.wgsl"),
+        include_str!("../../shaders/pool.wgsl"),
+    ];
+    [places, rock, pool, &sum].join("\n")
 }
 
 /// What of the targets has to be drawn.
@@ -164,29 +172,6 @@ impl Gbuffer {
         }
     }
 }
-
-/// What a scene is lit by, as far as shaders differ.
-#[derive(Clone, Copy)]
-struct Under {
-    environment: bool,
-    one_light: bool,
-}
-
-impl Under {
-    fn new(environment: bool, lights: usize) -> Under {
-        Under { environment, one_light: lights == 1 }
-    }
-}
-
-/// How pipelines differ besides their shaders.
-struct Kind {
-    compare: wgpu::CompareFunction,
-    writes_depth: bool,
-    one_light: bool,
-}
-
-/// Draws what is nearer.
-const NEARER: Kind = Kind { compare: wgpu::CompareFunction::Greater, writes_depth: true, one_light: false };
 
 /// One run of the pass.
 struct Run<'a> {
@@ -466,46 +451,4 @@ fn depth(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassD
 /// Copies a whole texture to one of its size: of a depth texture a part cannot be copied.
 fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Texture) {
     encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
-}
-
-fn pipeline(
-    gpu: &Gpu,
-    module: &wgpu::ShaderModule,
-    [vertex, fragment]: [&str; 2],
-    targets: &[wgpu::TextureFormat],
-    kind: Kind,
-) -> wgpu::RenderPipeline {
-    let target =
-        |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
-    let targets: Vec<_> = targets.iter().map(target).collect();
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(fragment),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some(vertex),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(kind.writes_depth),
-            depth_compare: Some(kind.compare),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some(fragment),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: if kind.one_light { &[("ONE_LIGHT", 1.0)] } else { &[] },
-                ..Default::default()
-            },
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

@@ -191,7 +191,9 @@ impl Resident {
             let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
             let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
             let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
-            let coats: Vec<Coat> = mesh.vertices.iter().map(Coat::from).collect();
+            let mut coats: Vec<Coat> = mesh.vertices.iter().map(Coat::from).collect();
+            // Bound even where there is none.
+            coats.resize(coats.len().max(1), Coat::from(&Vertex::default()));
             let (indices, lists) = tiles::lists();
             let storage = wgpu::BufferUsages::STORAGE;
             ResidentMesh {

@@ -26,13 +26,14 @@ const SHARED: [&str; 8] = [
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 /// What some stages are put together from besides.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 9] = [
     "integrate_light.wgsl",
     "integrate_many.wgsl",
     "integrate_one.wgsl",
     "levels.wgsl",
     "lookup.wgsl",
     "matter.wgsl",
+    "opaque.wgsl",
     "optical_depth.wgsl",
     "pool.wgsl",
 ];

