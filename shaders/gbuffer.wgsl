@@ -1,7 +1,7 @@
 // §3 Raster pass: z-buffer, opaque radiance, texture coordinates and quad id.
 //
-// Pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `opaque` shades the
-// rock; `volume` finds the point of its quad under the pixel's own ray and maps it by the exact
+// Pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `place` finds out where on which tile of
+// the mesh a sample is, and `opaque` shades what rock is seen, once a sample; `volume` finds the point of its quad under the pixel's own ray and maps it by the exact
 // inverse bilinear map (src/mapping.rs, QuadMap::uv), so nothing depends on how a quad is cut into
 // triangles; `peel` finds the sheets behind the nearest, in a pass each. CPU twin: src/cpu/gbuffer.rs.
 
@@ -13,23 +13,44 @@
 @group(0) @binding(4) var known_ids: texture_2d_array<u32>;
 @group(0) @binding(5) var<uniform> environment: Environment;
 @group(0) @binding(6) var environment_map: texture_2d<f32>;
-@group(0) @binding(8) var<storage, read> vertices: array<OpaqueVertex>;
+@group(0) @binding(8) var<storage, read> positions: array<vec4<f32>>;
+@group(0) @binding(9) var<storage, read> tiles: array<MeshTile>;
+@group(0) @binding(11) var<storage, read> coats: array<Coat>;
+// Of the sample in its tile, in squares; number of the tile; depth.
+@group(0) @binding(10) var places: texture_2d<f32>;
 
-struct OpaqueVertex {
-    position_world: vec3<f32>,
-    occlusion: f32,
-    normal_world: vec3<f32>,
-    shadow: f32,
-    albedo: vec3<f32>,
-    wet: f32,
+// What is shaded at a vertex. Numbers to 1 are halves of words: the normal (signed), film of water, occlusion and shadow.
+struct Coat {
+    albedo_r: f32,
+    albedo_g: f32,
+    albedo_b: f32,
+    normal_xy: u32,
+    normal_z_wet: u32,
+    occlusion_shadow: u32,
 }
 
-// In full vectors, for software Vulkan mixes those.
-struct OpaqueVarying {
+// Twin: src/scene/tiles.rs, Tile.
+struct MeshTile {
+    // Number of its first vertex.
+    first: u32,
+    // Vertices in a row of its grid.
+    pitch: u32,
+    // Squares on a side.
+    side: u32,
+    pad: u32,
+}
+
+// Corners of the largest tile in a row.
+const TILE_ROW: u32 = 17u;
+
+// One light stands at a constant place, which software Vulkan reads once for eight samples, and lane by lane in a loop.
+override ONE_LIGHT: bool = false;
+
+struct PlaceVarying {
     @builtin(position) clip: vec4<f32>,
-    @location(0) position_world_occlusion: vec4<f32>,
-    @location(1) normal_world_shadow: vec4<f32>,
-    @location(2) albedo_wet: vec4<f32>,
+    // In the tile, in squares.
+    @location(0) place: vec2<f32>,
+    @location(1) @interpolate(flat) tile: u32,
 }
 
 struct OpaquePoint {
@@ -48,100 +69,51 @@ struct OpaqueTargets {
 }
 
 @vertex
-fn opaque_vertex(@builtin(vertex_index) number: u32) -> OpaqueVarying {
-    let vertex = vertices[number];
-    var out: OpaqueVarying;
-    out.clip = frame.clip_from_world * vec4<f32>(vertex.position_world, 1.0);
-    out.position_world_occlusion = vec4<f32>(vertex.position_world, vertex.occlusion);
-    out.normal_world_shadow = vec4<f32>(vertex.normal_world, vertex.shadow);
-    out.albedo_wet = vec4<f32>(vertex.albedo, vertex.wet);
+fn place_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> PlaceVarying {
+    let row = corner / TILE_ROW;
+    let column = corner - row * TILE_ROW;
+    let vertex = tiles[number].first + row * tiles[number].pitch + column;
+    var out: PlaceVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(positions[vertex].xyz, 1.0);
+    out.place = vec2<f32>(f32(column), f32(row));
+    out.tile = number;
     return out;
 }
 
-fn opaque_point(in: OpaqueVarying) -> OpaquePoint {
+@fragment
+fn place_fragment(in: PlaceVarying) -> @location(0) vec4<f32> {
+    return vec4<f32>(in.place, f32(in.tile), in.clip.z);
+}
+
+// A vertex's share of a point.
+fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
+    let coat = coats[number];
+    let normal_z = unpack2x16snorm(coat.normal_z_wet).x;
+    let wet = unpack2x16unorm(coat.normal_z_wet).y;
+    var out = in;
+    out.normal_world += vec3<f32>(unpack2x16snorm(coat.normal_xy), normal_z) * weight;
+    out.albedo += vec3<f32>(coat.albedo_r, coat.albedo_g, coat.albedo_b) * weight;
+    out.shade += vec3<f32>(unpack2x16unorm(coat.occlusion_shadow), wet) * weight;
+    return out;
+}
+
+// Opaque::at; where the ray of the pixel is at the depth that is drawn.
+fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
+    let found = textureLoad(places, pixel, 0);
+    let tile = tiles[u32(found.z)];
+    let cell = clamp(floor(found.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
+    let f = clamp(found.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
+    let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
+    let low = min(f.x, f.y);
+    let high = max(f.x, f.y);
+    let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let near = frame.clip_from_world[3].z;
     var out: OpaquePoint;
-    out.pixel = vec2<u32>(in.clip.xy);
-    out.position_world = in.position_world_occlusion.xyz;
-    out.normal_world = in.normal_world_shadow.xyz;
-    out.albedo = in.albedo_wet.xyz;
-    out.shade = vec3<f32>(in.position_world_occlusion.w, in.normal_world_shadow.w, in.albedo_wet.w);
-    return out;
-}
-
-fn seen_normal(in: OpaquePoint) -> vec3<f32> {
-    let to_eye = frame.eye_world - in.position_world;
-    let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
-    return select(n, -n, dot3(n, to_eye) < 0.0);
-}
-
-// Lambert, two-sided, with the gloss of a film of water: `sky` is what the surroundings send along the mirrored
-// view.
-fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
-    let to_eye = frame.eye_world - in.position_world;
-    let distance = sqrt(dot3(to_eye, to_eye));
-    let e = to_eye / max(distance, 1e-6);
-    let open = 1.0 - in.shade.x;
-    var irradiance = ambient * open;
-    var gloss = vec3<f32>(0.0);
-    for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights[i];
-        let arrives = light_from(light, in.position_world);
-        let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
-        let cos_light = max(dot3(n, arrives.xyz), 0.0);
-        irradiance += light.intensity * (arrives.w * lit * cos_light);
-        if in.shade.z > 0.0 {
-            gloss += light.intensity * (arrives.w * lit * cos_light * film_lobe(n, arrives.xyz, e));
-        }
-    }
-    var radiance = in.albedo * irradiance;
-    if in.shade.z > 0.0 {
-        radiance += (gloss + sky * (open * fresnel(dot3(n, e)))) * in.shade.z;
-    }
-    var out: OpaqueTargets;
-    let d_y = -to_eye.y / max(distance, 1e-20);
-    out.radiance = vec4<f32>(haze_over(frame, radiance, d_y, distance), distance);
-    out.normal = vec4<f32>(n, 1.0);
-    return out;
-}
-
-// π times the reflection of a film on rough rock: Blinn 1977 with the exponent 32, which (s + 8)/8π normalises.
-fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
-    let sum = l + e;
-    let h = sum / sqrt(max(dot3(sum, sum), 1e-12));
-    let c = max(dot3(n, h), 0.0);
-    let c2 = c * c;
-    let c4 = c2 * c2;
-    let c8 = c4 * c4;
-    let c16 = c8 * c8;
-    return 5.0 * fresnel(dot3(l, h)) * (c16 * c16);
-}
-
-// The view against the normal, mirrored.
-fn mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
-    let to_eye = frame.eye_world - in.position_world;
-    let e = to_eye / sqrt(max(dot3(to_eye, to_eye), 1e-12));
-    return n * (2.0 * dot3(n, e)) - e;
-}
-
-// Background::radiance.
-fn background_radiance(d: vec3<f32>) -> vec3<f32> {
-    return frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
-}
-
-@fragment
-fn opaque_fragment(mixed: OpaqueVarying) -> OpaqueTargets {
-    let in = opaque_point(mixed);
-    let n = seen_normal(in);
-    return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
-}
-
-// Under an environment: on rough rock its film sends back what comes from all around the mirrored view.
-@fragment
-fn opaque_environment_fragment(mixed: OpaqueVarying) -> OpaqueTargets {
-    let in = opaque_point(mixed);
-    let n = seen_normal(in);
-    let sky = environment_irradiance(environment, mirrored(in, n));
-    return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n), sky);
+    out.pixel = pixel;
+    out.position_world = frame.eye_world + d * (near / (found.w * dot3(d, frame.forward)));
+    out = add_coat(out, first, 1.0 - high);
+    out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
+    return add_coat(out, first + tile.pitch + 1u, low);
 }
 
 struct VolumeVarying {
@@ -196,7 +168,7 @@ fn peel_fragment(in: VolumeVarying) -> @location(0) u32 {
 
 // One triangle over the whole image, at infinity.
 @vertex
-fn background_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
+fn behind_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
     return vec4<f32>(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 

@@ -147,38 +147,51 @@ fn around(position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
     return low * (1.0 - g) + high * g;
 }
 
+fn pool_lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit {
+    let light = lights[i];
+    let arrives = light_from(light, in.position_world);
+    let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
+    let both = arrives.xyz + e;
+    let h = both / sqrt(max(dot3(both, both), 1e-12));
+    let c = max(dot3(n, h), 0.0);
+    let c2 = c * c;
+    let c4 = c2 * c2;
+    let c8 = c4 * c4;
+    let c16 = c8 * c8;
+    let c32 = c16 * c16;
+    let c64 = c32 * c32;
+    let c128 = c64 * c64;
+    let lobe = 33.0 * fresnel(dot3(arrives.xyz, h)) * (c128 * c128) * max(dot3(n, arrives.xyz), 0.0);
+    var out = sum;
+    out.irradiance += light.intensity * (arrives.w * lit * max(arrives.y, 0.0));
+    out.gloss += light.intensity * (arrives.w * lit * lobe);
+    return out;
+}
+
 fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye_unit(in);
-    var irradiance = ambient * (1.0 - in.shade.x);
-    var glint = vec3<f32>(0.0);
-    for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights[i];
-        let arrives = light_from(light, in.position_world);
-        let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
-        irradiance += light.intensity * (arrives.w * lit * max(arrives.y, 0.0));
-        let sum = arrives.xyz + e;
-        let h = sum / sqrt(max(dot3(sum, sum), 1e-12));
-        var c = max(dot3(n, h), 0.0);
-        for (var square = 0u; square < 8u; square++) {
-            c *= c;
+    var sum = Lit(ambient * (1.0 - in.shade.x), vec3<f32>(0.0));
+    if ONE_LIGHT {
+        sum = pool_lit_by(sum, in, n, e, 0u);
+    } else {
+        for (var i = 0u; i < frame.light_count; i++) {
+            sum = pool_lit_by(sum, in, n, e, i);
         }
-        let lobe = 33.0 * fresnel(dot3(arrives.xyz, h)) * c * max(dot3(n, arrives.xyz), 0.0);
-        glint += light.intensity * (arrives.w * lit * lobe);
     }
     let mirrors = around(in.position_world, pool_mirrored(in, n));
     let mirror = mirrors.rgb + sky * (1.0 - mirrors.a);
     let through = exp2(pool.absorption * (-3.174 * in.albedo.x));
     let body = pool.color * (1.0 - through) + pool.bottom * through;
     let back = fresnel(max(dot3(n, e), 0.02));
-    let clear = mirror * back + glint + body * irradiance * (1.0 - back);
+    let clear = mirror * back + sum.gloss + body * sum.irradiance * (1.0 - back);
 
     let p = in.position_world.xz + vec2<f32>(n.x, n.z) * 0.3;
     let noise = 0.45 * value_noise(p * 2.3) + 0.27 * value_noise(p * 5.1) + 0.17 * value_noise(p * 11.0)
         + 0.11 * value_noise(p * 23.0);
     let cover = clamp((1.6 * in.albedo.y + noise - 1.05) * 2.2, 0.0, 1.0);
     var out: OpaqueTargets;
-    let foam = irradiance * ((0.25 + 0.5 * noise) * cover);
+    let foam = sum.irradiance * ((0.25 + 0.5 * noise) * cover);
     let distance = sqrt(dot3(to_eye, to_eye));
     let d_y = -to_eye.y / max(distance, 1e-20);
     out.radiance = vec4<f32>(haze_over(frame, clear * (1.0 - cover) + foam, d_y, distance), distance);
@@ -186,16 +199,47 @@ fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>)
     return out;
 }
 
+// In full vectors, for software Vulkan mixes those.
+struct PoolVarying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position_world_occlusion: vec4<f32>,
+    @location(1) shadow_depth_foam: vec4<f32>,
+}
+
+@vertex
+fn pool_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> PoolVarying {
+    let row = corner / TILE_ROW;
+    let column = corner - row * TILE_ROW;
+    let vertex = tiles[number].first + row * tiles[number].pitch + column;
+    let coat = coats[vertex];
+    let shade = unpack2x16unorm(coat.occlusion_shadow);
+    let position = positions[vertex].xyz;
+    var out: PoolVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(position, 1.0);
+    out.position_world_occlusion = vec4<f32>(position, shade.x);
+    out.shadow_depth_foam = vec4<f32>(shade.y, coat.albedo_r, coat.albedo_g, 0.0);
+    return out;
+}
+
+fn pool_point(in: PoolVarying) -> OpaquePoint {
+    var out: OpaquePoint;
+    out.pixel = vec2<u32>(in.clip.xy);
+    out.position_world = in.position_world_occlusion.xyz;
+    out.albedo = vec3<f32>(in.shadow_depth_foam.yz, 0.0);
+    out.shade = vec3<f32>(in.position_world_occlusion.w, in.shadow_depth_foam.x, 0.0);
+    return out;
+}
+
 @fragment
-fn pool_fragment(in: OpaqueVarying) -> OpaqueTargets {
-    let at = on_pool(opaque_point(in));
+fn pool_fragment(in: PoolVarying) -> OpaqueTargets {
+    let at = on_pool(pool_point(in));
     let n = pool_normal(at);
     return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
 }
 
 @fragment
-fn pool_environment_fragment(in: OpaqueVarying) -> OpaqueTargets {
-    let at = on_pool(opaque_point(in));
+fn pool_environment_fragment(in: PoolVarying) -> OpaqueTargets {
+    let at = on_pool(pool_point(in));
     let n = pool_normal(at);
     let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
     return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));

@@ -53,6 +53,18 @@
 //! of rock pay for a pool, and each of a pool for rock: there are no branches between lanes. Where only the
 //! waves move, the pool alone takes a tenth of the whole pass.
 //!
+//! Rock is shaded after it is drawn: the pass writes where on which tile of the mesh a sample lies, and one more over the picture
+//! shades each sample once. A triangle of three pixels fills a fifth of the block of 4×4 that is shaded for it, and some are
+//! covered again. Seconds of all cores a run, for the machine was too busy for its clock: 0.455 before, 0.33 with vertices of 48
+//! bytes, 0.30 with 24 and without the loop over a single light. Of those 0.135 are the mesh (0.09 of that the
+//! triangles themselves, the same at 320×180), 0.045 the shading, 0.04 the pool, 0.03 three layers of peeling, 0.03 clearing and background.
+//!
+//! Drawing every 2nd, 4th … vertex of tiles was expected to halve the triangles at one sample. Counted, triangles of the default scene (rock and pool) by
+//! `image.rock_error`: 0: 720,896, 0.5: 717,616, 1: 653,756, 2: 559,625, 4: 397,268 at 1280×720. The rock is rough down to its last
+//! level: half of its vertices leave a line between their neighbours by more than a pixel. RMSE of the linear picture against 0:
+//! 0.0002, 0.0017, 0.008, 0.021; at 2 a ledge here and there shows a pale rim, at 4 the far hills have dark dashes: places of the full mesh that face away. So the gain is
+//! in small pictures, previews and far rock; edges no longer than a pixel would have been no criterion, for they are 2 to 6 pixels.
+//!
 //! What did not help: leaving out, on the host, the third of the triangles that no pixel's centre lies in: 25 ms of 550 for 25 ms of work.
 //!
 //! # Notes on light in water

@@ -11,7 +11,7 @@ use crate::frame::Window;
 use crate::haze::EyeHaze;
 use crate::overlap;
 use crate::pool;
-use crate::scene::{Image, Mesh, Quad, Scene};
+use crate::scene::{Image, Mesh, Quad, Scene, tiles};
 
 /// The targets of one sample of a part of the image, row by row.
 pub struct Gbuffer {
@@ -45,7 +45,10 @@ struct ScreenTriangle {
     inverse_w: [f64; 3],
     /// Each corner as weights of the corners before clipping.
     weights: [Vec3; 3],
+    /// Number of the tile or the quad.
     id: u32,
+    /// Corners of the tile.
+    corners: [u16; 3],
 }
 
 /// What covers a pixel: depth (reversed, 0 is far), and the triangle's place in the list plus 1.
@@ -65,27 +68,28 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
     let offset = sample_offset(image, sample);
     let clip_from_world = scene.camera.clip_from_world(image.width, image.height, offset);
     let near = scene.camera.near as f64;
-    let project = |corners: [Vec3; 3], id: u32, out: &mut Vec<ScreenTriangle>| {
-        let clip = corners.map(|p| clip_from_world * p.extend(1.0));
+    let project = |points: [Vec3; 3], id: u32, corners: [u16; 3], out: &mut Vec<ScreenTriangle>| {
+        let clip = points.map(|p| clip_from_world * p.extend(1.0));
         clip_near(clip, scene.camera.near, |part| {
-            let triangle = to_screen(part, image.width as usize, image.height as usize, id);
+            let triangle = to_screen(part, image.width as usize, image.height as usize, id, corners);
             // Most triangles of a fine mesh lie between the pixels' centres.
             if triangle.covers_centres(window) {
                 out.push(triangle);
             }
         });
     };
-    const CHUNK: usize = 4096;
+    let steps = tiles::steps(&mesh.tiles, &scene.camera, image);
     let rock: Vec<ScreenTriangle> = mesh
-        .indices
-        .par_chunks(3 * CHUNK)
+        .tiles
+        .par_iter()
         .enumerate()
-        .flat_map_iter(|(chunk, indices)| {
+        .flat_map_iter(|(i, tile)| {
             let mut out = Vec::new();
-            for (i, t) in indices.chunks_exact(3).enumerate() {
-                let corners =
-                    [t[0], t[1], t[2]].map(|v| Vec3::from_array(mesh.vertices[v as usize].position));
-                project(corners, (chunk * CHUNK + i) as u32, &mut out);
+            let point =
+                |corner| Vec3::from(mesh.vertices[tile.vertex(tiles::place(corner)) as usize].position);
+            let drawn = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
+            for &corners in drawn.as_chunks::<3>().0 {
+                project(corners.map(point), i as u32, corners, &mut out);
             }
             out
         })
@@ -93,8 +97,8 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
     let mut water = Vec::new();
     for (i, quad) in scene.quads.iter().enumerate() {
         let [a, b, c, d] = quad.corners;
-        project([a, b, c], i as u32, &mut water);
-        project([a, c, d], i as u32, &mut water);
+        project([a, b, c], i as u32, [0; 3], &mut water);
+        project([a, c, d], i as u32, [0; 3], &mut water);
     }
     let shadow_light = scene.shadow_light();
     let pools = pool::surfaces(scene, mesh);
@@ -127,7 +131,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
             let ray = |k: usize| scene.camera.view_ray(image.width, image.height, pixel(k), offset);
             let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
             rasterise(&rock, &rock_bins[i], near, band, &mut covered, 1);
-            for (k, &(_, id)) in covered.iter().enumerate() {
+            for (k, &(depth, id)) in covered.iter().enumerate() {
                 if id == 0 {
                     let radiance = match &scene.environment {
                         None => scene.background.radiance(ray(k)),
@@ -138,19 +142,12 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
                 } else {
                     let triangle = &rock[id as usize - 1];
                     let centre = pixel(k).map(|p| p as f64 + 0.5);
-                    let first = 3 * triangle.id as usize;
-                    let corner = [0, 1, 2].map(|c| mesh.vertices[mesh.indices[first + c] as usize]);
                     let weights = triangle.weights_at(centre).to_array();
-                    let mix = |get: fn(&crate::scene::Vertex) -> [f32; 3]| {
-                        (0..3).map(|c| Vec3::from_array(get(&corner[c])) * weights[c]).sum::<Vec3>()
-                    };
-                    let point = Opaque {
-                        position: mix(|v| v.position),
-                        normal: mix(|v| v.normal),
-                        albedo: mix(|v| v.albedo),
-                        shade: mix(|v| [v.occlusion, v.shadow, v.wet]),
-                        pool: corner[0].pool,
-                    };
+                    let place = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
+                    let d = ray(k);
+                    let metres = scene.camera.near / (depth * d.dot(scene.camera.forward));
+                    let position = scene.camera.eye + d * metres;
+                    let point = Opaque::at(mesh, &mesh.tiles[triangle.id as usize], place, position);
                     let (radiance, n) = match point.pool {
                         0 => shade_opaque(scene, shadow_light, &point),
                         pool => shade_pool(scene, shadow_light, &pools[pool as usize - 1], &point, ray(k)),
@@ -231,7 +228,13 @@ fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3); 3])
     }
 }
 
-fn to_screen(part: [(Vec4, Vec3); 3], width: usize, height: usize, id: u32) -> ScreenTriangle {
+fn to_screen(
+    part: [(Vec4, Vec3); 3],
+    width: usize,
+    height: usize,
+    id: u32,
+    corners: [u16; 3],
+) -> ScreenTriangle {
     // Far outside the image snapping has no meaning and would lose the fraction's bits.
     let snap = |x: f64| (x.clamp(-1e9, 1e9) * 256.0).round() / 256.0;
     let mut t = ScreenTriangle {
@@ -240,6 +243,7 @@ fn to_screen(part: [(Vec4, Vec3); 3], width: usize, height: usize, id: u32) -> S
         inverse_w: part.map(|(c, _)| 1.0 / c.w as f64),
         weights: part.map(|(_, w)| w),
         id,
+        corners,
     };
     if t.area() < 0.0 {
         t.x.swap(1, 2);

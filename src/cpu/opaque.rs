@@ -1,8 +1,8 @@
-//! §3 What the raster pass makes of a point of opaque geometry. Twin: `shade_opaque` of `shaders/gbuffer.wgsl`.
+//! §3 What the raster pass makes of a point of opaque geometry. Twin: `shaders/opaque.wgsl`.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Mesh, Scene, Vertex, tiles::Tile};
 
 /// A point of the mesh: its vertices' values, mixed.
 pub struct Opaque {
@@ -16,6 +16,24 @@ pub struct Opaque {
     pub shade: Vec3,
     /// Number of the pool plus 1; 0: rock.
     pub pool: u32,
+}
+
+impl Opaque {
+    /// A place in a tile of the mesh, in squares, that is drawn at `position`. Twin: `opaque_point`.
+    pub fn at(mesh: &Mesh, tile: &Tile, place: Vec2, position: Vec3) -> Opaque {
+        let (corners, weights) = tile.around(place);
+        let corners = corners.map(|number| &mesh.vertices[number as usize]);
+        let mix = |get: fn(&Vertex) -> [f32; 3]| {
+            (0..3).map(|c| Vec3::from(get(corners[c])) * weights[c]).sum::<Vec3>()
+        };
+        Opaque {
+            position,
+            normal: mix(|v| v.normal),
+            albedo: mix(|v| v.albedo),
+            shade: mix(|v| [v.occlusion, v.shadow, v.wet]),
+            pool: tile.pool,
+        }
+    }
 }
 
 /// Lambert, two-sided, with the gloss of a film of water: (radiance and metres from the eye, normal).

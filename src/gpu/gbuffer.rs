@@ -1,16 +1,18 @@
 //! §3 The raster pass: opaque geometry, then the volume's quads, in one z-buffer.
 
-use std::ops::Range;
+mod pipeline;
+
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use glam::{Mat4, Vec3};
 
+use self::pipeline::{Kind, NEARER, Under, pipeline};
 use super::device::Gpu;
-use super::meshlets::in_view;
-use super::targets::{DEPTH, FLOATS};
+use super::targets::FLOATS;
+use super::tiles::{Part, in_view};
 use super::timing::Span;
-use super::{Inputs, shader};
+use super::{Inputs, Uploaded, shader};
 use crate::error::Result;
 use crate::pool::{STRAIGHT, WAVES};
 use crate::scene::Scene;
@@ -19,8 +21,8 @@ const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 const CLEAR: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
 const KEEP: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Load;
 
-/// Parts of the mesh drawn in one submission: 32,736 triangles take software Vulkan 10 to 30 ms.
-const PARTS: usize = 96;
+/// Indices of the mesh drawn in one submission: 32,768 triangles take software Vulkan 5 to 20 ms.
+const INDICES: usize = 3 << 15;
 
 /// The pass's shader. A pool's waves are added up one by one: software Vulkan reads what stands at a constant
 /// place once for eight pixels, and lane by lane in a loop.
@@ -35,7 +37,12 @@ pub fn gbuffer_source() -> String {
         "fn waves(p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {{\n    \
          var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
     );
-    [include_str!("../../shaders/gbuffer.wgsl"), include_str!("../../shaders/pool.wgsl"), &sum].join("\n")
+    let [places, rock, pool] = [
+        include_str!("../../shaders/gbuffer.wgsl"),
+        include_str!("../../shaders/opaque.wgsl"),
+        include_str!("../../shaders/pool.wgsl"),
+    ];
+    [places, rock, pool, &sum].join("\n")
 }
 
 /// What of the targets has to be drawn.
@@ -52,8 +59,10 @@ pub struct Gbuffer {
     module: wgpu::ShaderModule,
     // Without and with an environment.
     background: [OnceLock<wgpu::RenderPipeline>; 2],
-    rock: [OnceLock<wgpu::RenderPipeline>; 2],
-    pool: [OnceLock<wgpu::RenderPipeline>; 2],
+    place: OnceLock<wgpu::RenderPipeline>,
+    // And without and with one light alone.
+    rock: [OnceLock<wgpu::RenderPipeline>; 4],
+    pool: [OnceLock<wgpu::RenderPipeline>; 4],
     volume: OnceLock<wgpu::RenderPipeline>,
     peel: OnceLock<wgpu::RenderPipeline>,
 }
@@ -64,6 +73,7 @@ impl Gbuffer {
         Gbuffer {
             module: shader(gpu, "gbuffer", &gbuffer_source()),
             background: Default::default(),
+            place: OnceLock::new(),
             rock: Default::default(),
             pool: Default::default(),
             volume: OnceLock::new(),
@@ -73,9 +83,10 @@ impl Gbuffer {
 
     /// Compiles what a scene under whose pixels `layers` quads may lie has use for.
     pub fn compile(&self, gpu: &Gpu, scene: &Scene, layers: u32) {
-        let under = scene.environment.is_some();
+        let under = Under::new(scene.environment.is_some(), scene.lights.len());
         self.background(gpu, under);
         if !scene.rocks.is_empty() {
+            self.place(gpu);
             self.rock(gpu, under);
         }
         if !scene.pools.is_empty() {
@@ -89,31 +100,46 @@ impl Gbuffer {
         }
     }
 
-    fn background(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
-        self.behind(gpu, &self.background, environment, "background", wgpu::CompareFunction::Always)
+    /// Where nothing has been drawn.
+    fn background(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+        self.behind(
+            gpu,
+            &self.background,
+            Under { one_light: false, ..under },
+            "background",
+            wgpu::CompareFunction::GreaterEqual,
+        )
     }
 
-    fn rock(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
-        self.behind(gpu, &self.rock, environment, "opaque", wgpu::CompareFunction::Greater)
+    fn place(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+        self.place.get_or_init(|| {
+            pipeline(gpu, &self.module, ["place_vertex", "place_fragment"], &[FLOATS], NEARER)
+        })
+    }
+
+    /// Where rock has been drawn.
+    fn rock(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+        self.behind(gpu, &self.rock, under, "opaque", wgpu::CompareFunction::Less)
     }
 
     /// Drawn again where it was drawn before.
-    fn pool(&self, gpu: &Gpu, environment: bool) -> &wgpu::RenderPipeline {
-        self.behind(gpu, &self.pool, environment, "pool", wgpu::CompareFunction::GreaterEqual)
+    fn pool(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+        self.behind(gpu, &self.pool, under, "pool", wgpu::CompareFunction::GreaterEqual)
     }
 
     fn behind<'a>(
         &self,
         gpu: &Gpu,
-        of: &'a [OnceLock<wgpu::RenderPipeline>; 2],
-        environment: bool,
+        of: &'a [OnceLock<wgpu::RenderPipeline>],
+        under: Under,
         name: &str,
         compare: wgpu::CompareFunction,
     ) -> &'a wgpu::RenderPipeline {
-        of[usize::from(environment)].get_or_init(|| {
-            let vertex = if name == "background" { "background_vertex" } else { "opaque_vertex" };
-            let fragment = format!("{name}{}_fragment", if environment { "_environment" } else { "" });
-            pipeline(gpu, &self.module, [vertex, &fragment], &[FLOATS; 2], compare)
+        of[usize::from(under.environment) + 2 * usize::from(under.one_light)].get_or_init(|| {
+            let vertex = if name == "pool" { "pool_vertex" } else { "behind_vertex" };
+            let fragment = format!("{name}{}_fragment", if under.environment { "_environment" } else { "" });
+            let kind = Kind { compare, writes_depth: name == "pool", one_light: under.one_light };
+            pipeline(gpu, &self.module, [vertex, &fragment], &[FLOATS; 2], kind)
         })
     }
 
@@ -126,8 +152,7 @@ impl Gbuffer {
     }
 
     fn water(&self, gpu: &Gpu, fragment: &str, targets: &[wgpu::TextureFormat]) -> wgpu::RenderPipeline {
-        let nearer = wgpu::CompareFunction::Greater;
-        pipeline(gpu, &self.module, ["volume_vertex", fragment], targets, nearer)
+        pipeline(gpu, &self.module, ["volume_vertex", fragment], targets, NEARER)
     }
 
     /// Fills the targets with one sample of a window; seconds on the device, and where several submissions go
@@ -164,9 +189,9 @@ impl Run<'_> {
         let parts = in_view(&up.rock, clip_from_world, Vec3::from(frame.eye_world).as_dvec3());
         // While one submission is rasterised, software Vulkan makes the triangles of the next.
         let mut before: Option<wgpu::SubmissionIndex> = None;
-        for (number, parts) in parts.chunks(PARTS).enumerate() {
+        for (number, parts) in runs(&parts).enumerate() {
             let mut encoder = gpu.encoder("gbuffer");
-            self.rock(&mut encoder, number == 0, parts, None);
+            self.places(&mut encoder, number == 0, parts);
             let submitted = gpu.queue.submit([encoder.finish()]);
             if let Some(before) = before.replace(submitted) {
                 gpu.wait(before)?;
@@ -176,8 +201,9 @@ impl Run<'_> {
         let mut seconds = clock.elapsed().as_secs_f64();
         seconds += timer.run(gpu, "gbuffer", |encoder, span| {
             if parts.is_empty() {
-                self.rock(encoder, true, &[], None);
+                self.places(encoder, true, &[]);
             }
+            self.behind(encoder, !parts.is_empty());
             if !up.pools.is_empty() {
                 self.pools(encoder, &self.depths[0], None);
             }
@@ -193,31 +219,45 @@ impl Run<'_> {
         Ok(seconds)
     }
 
-    /// Part of the rock, with the first one the background.
-    fn rock(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        first: bool,
-        parts: &[Range<u32>],
-        span: Option<wgpu::RenderPassTimestampWrites>,
-    ) {
-        let Inputs { gpu, up, .. } = *self.inputs;
-        let load = if first { (CLEAR, wgpu::LoadOp::Clear(0.0)) } else { (KEEP, wgpu::LoadOp::Load) };
-        self.draw_opaque(encoder, "gbuffer opaque", &self.depths[0], load, span, |pass| {
-            if first {
-                let pipeline = self.pass.background(gpu, up.environment.is_some());
+    /// Where part of the rock is seen. The points of the sheets come after it, in the same target.
+    fn places(&self, encoder: &mut wgpu::CommandEncoder, first: bool, parts: &[&Part]) {
+        let Inputs { gpu, up, targets, .. } = *self.inputs;
+        let places = view(&targets.surface);
+        let depth_load = if first { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("gbuffer places"),
+            // What is not drawn on is not read.
+            color_attachments: &[colour(&places, KEEP)],
+            depth_stencil_attachment: Some(depth(&self.depths[0], depth_load)),
+            ..Default::default()
+        });
+        self.place(&mut pass);
+        if !parts.is_empty() {
+            let pipeline = self.pass.place(gpu);
+            pass.set_pipeline(pipeline);
+            let buffers = [(0, &self.uniform), (8, &up.positions), (9, &up.tiles)];
+            let entries = buffers.map(|(binding, buffer)| entry(binding, buffer.as_entire_binding()));
+            pass.set_bind_group(0, &group(gpu, pipeline, &entries), &[]);
+            draw(&mut pass, up, parts.iter().copied());
+        }
+    }
+
+    /// The rock that is seen, and the background where there is none.
+    fn behind(&self, encoder: &mut wgpu::CommandEncoder, rock: bool) {
+        let Inputs { gpu, up, targets, .. } = *self.inputs;
+        let places = view(&targets.surface);
+        self.draw_opaque(encoder, "gbuffer opaque", (&self.depths[0], None), KEEP, None, |pass| {
+            let under = self.under();
+            let pipeline = self.pass.background(gpu, under);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &self.bind(pipeline, &[(0, &self.uniform)], true, None), &[]);
+            pass.draw(0..3, 0..1);
+            if rock {
+                let pipeline = self.pass.rock(gpu, under);
                 pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &self.bind(pipeline, &[(0, &self.uniform)], true), &[]);
+                let buffers = [(0, &self.uniform), (1, &up.lights), (9, &up.tiles), (11, &up.coats)];
+                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, Some(&places)), &[]);
                 pass.draw(0..3, 0..1);
-            }
-            if !parts.is_empty() {
-                let pipeline = self.pass.rock(gpu, up.environment.is_some());
-                pass.set_pipeline(pipeline);
-                let group =
-                    self.bind(pipeline, &[(0, &self.uniform), (1, &up.lights), (8, &up.vertices)], false);
-                pass.set_bind_group(0, &group, &[]);
-                pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
-                parts.iter().for_each(|part| pass.draw_indexed(part.clone(), 0, 0..1));
             }
         });
     }
@@ -230,15 +270,16 @@ impl Run<'_> {
         span: Option<wgpu::RenderPassTimestampWrites>,
     ) {
         let Inputs { gpu, up, .. } = *self.inputs;
-        let load = (KEEP, wgpu::LoadOp::Load);
-        self.draw_opaque(encoder, "gbuffer pools", depth, load, span, |pass| {
-            let pipeline = self.pass.pool(gpu, up.environment.is_some());
+        let load = Some(wgpu::LoadOp::Load);
+        self.draw_opaque(encoder, "gbuffer pools", (depth, load), KEEP, span, |pass| {
+            let pipeline = self.pass.pool(gpu, self.under());
             pass.set_pipeline(pipeline);
-            pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
-            for (surface, indices) in &up.pools {
-                let buffers = [(0, &self.uniform), (1, &up.lights), (7, surface), (8, &up.vertices)];
-                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false), &[]);
-                pass.draw_indexed(indices.clone(), 0, 0..1);
+            for (surface, parts) in &up.pools {
+                let lit = [(0, &self.uniform), (1, &up.lights), (7, surface)];
+                let mesh = [(8, &up.positions), (9, &up.tiles), (11, &up.coats)];
+                let buffers = [lit, mesh].concat();
+                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, None), &[]);
+                draw(pass, up, parts.iter());
             }
         });
     }
@@ -247,16 +288,24 @@ impl Run<'_> {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         label: &str,
-        depth_view: &wgpu::TextureView,
-        load: (wgpu::LoadOp<wgpu::Color>, wgpu::LoadOp<f32>),
+        (depth_view, depth_load): (&wgpu::TextureView, Option<wgpu::LoadOp<f32>>),
+        load: wgpu::LoadOp<wgpu::Color>,
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites>,
         draw: impl FnOnce(&mut wgpu::RenderPass),
     ) {
         let [radiance, normal] = [&self.inputs.targets.opaque, &self.inputs.targets.normal].map(view);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(label),
-            color_attachments: &[colour(&radiance, load.0), colour(&normal, load.0)],
-            depth_stencil_attachment: Some(depth(depth_view, load.1)),
+            color_attachments: &[colour(&radiance, load), colour(&normal, load)],
+            depth_stencil_attachment: Some(match depth_load {
+                Some(load) => depth(depth_view, load),
+                // Read alone.
+                None => wgpu::RenderPassDepthStencilAttachment {
+                    view: depth_view,
+                    depth_ops: None,
+                    stencil_ops: None,
+                },
+            }),
             timestamp_writes,
             ..Default::default()
         });
@@ -278,7 +327,7 @@ impl Run<'_> {
         self.place(&mut pass);
         if up.quad_count > 0 {
             let pipeline = self.pass.volume(gpu);
-            let group = self.bind(pipeline, &[(0, &self.uniform), (2, &up.quads)], false);
+            let group = self.bind(pipeline, &[(0, &self.uniform), (2, &up.quads)], false, None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..6, 0..up.quad_count);
@@ -291,16 +340,13 @@ impl Run<'_> {
         let (known, own) = ((layer as usize - 1) % 2, layer as usize % 2);
         let known_ids = targets.ids(0..layer);
         let pipeline = self.pass.peel(gpu);
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gbuffer"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, self.uniform.as_entire_binding()),
-                entry(2, up.quads.as_entire_binding()),
-                entry(3, wgpu::BindingResource::TextureView(&self.depths[known])),
-                entry(4, wgpu::BindingResource::TextureView(&known_ids)),
-            ],
-        });
+        let entries = [
+            entry(0, self.uniform.as_entire_binding()),
+            entry(2, up.quads.as_entire_binding()),
+            entry(3, wgpu::BindingResource::TextureView(&self.depths[known])),
+            entry(4, wgpu::BindingResource::TextureView(&known_ids)),
+        ];
+        let group = group(gpu, pipeline, &entries);
         copy(encoder, &targets.depth[2], &targets.depth[own]);
         let ids = targets.layer(layer);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -316,12 +362,13 @@ impl Run<'_> {
         pass.draw(0..6, 0..up.quad_count);
     }
 
-    /// Buffers, and those of the environment, with its map for who looks `at_map`.
+    /// Buffers, and those of the environment, with its map for who looks `at_map`; and the places on the mesh.
     fn bind(
         &self,
         pipeline: &wgpu::RenderPipeline,
         buffers: &[(u32, &wgpu::Buffer)],
         at_map: bool,
+        places: Option<&wgpu::TextureView>,
     ) -> wgpu::BindGroup {
         let Inputs { gpu, up, .. } = *self.inputs;
         let mut entries: Vec<_> =
@@ -333,11 +380,12 @@ impl Run<'_> {
                 entries.push(entry(6, wgpu::BindingResource::TextureView(&environment.map)));
             }
         }
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gbuffer"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
+        entries.extend(places.map(|view| entry(10, wgpu::BindingResource::TextureView(view))));
+        group(gpu, pipeline, &entries)
+    }
+
+    fn under(&self) -> Under {
+        Under::new(self.inputs.up.environment.is_some(), self.inputs.frame.light_count as usize)
     }
 
     /// The targets may be larger than a window at the image's edge.
@@ -345,6 +393,35 @@ impl Run<'_> {
         let window = self.inputs.window;
         pass.set_viewport(0.0, 0.0, window.width as f32, window.height as f32, 0.0, 1.0);
     }
+}
+
+/// Parts in runs of about as many triangles as a submission may have.
+fn runs<'a>(parts: &'a [&'a Part]) -> impl Iterator<Item = &'a [&'a Part]> {
+    let mut rest = parts;
+    std::iter::from_fn(move || {
+        let mut indices = 0;
+        let fit = rest.iter().take_while(|part| {
+            indices += part.indices.len();
+            indices <= INDICES
+        });
+        let (run, after) = rest.split_at(fit.count());
+        rest = after;
+        (!run.is_empty()).then_some(run)
+    })
+}
+
+/// Draws parts of the mesh.
+fn draw<'a>(pass: &mut wgpu::RenderPass, up: &Uploaded, parts: impl Iterator<Item = &'a Part>) {
+    pass.set_index_buffer(up.indices.slice(..), wgpu::IndexFormat::Uint32);
+    parts.for_each(|part| pass.draw_indexed(part.indices.clone(), 0, part.tile..part.tile + 1));
+}
+
+fn group(gpu: &Gpu, pipeline: &wgpu::RenderPipeline, entries: &[wgpu::BindGroupEntry]) -> wgpu::BindGroup {
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("gbuffer"),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries,
+    })
 }
 
 fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
@@ -374,43 +451,4 @@ fn depth(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassD
 /// Copies a whole texture to one of its size: of a depth texture a part cannot be copied.
 fn copy(encoder: &mut wgpu::CommandEncoder, from: &wgpu::Texture, to: &wgpu::Texture) {
     encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
-}
-
-fn pipeline(
-    gpu: &Gpu,
-    module: &wgpu::ShaderModule,
-    [vertex, fragment]: [&str; 2],
-    targets: &[wgpu::TextureFormat],
-    compare: wgpu::CompareFunction,
-) -> wgpu::RenderPipeline {
-    let target =
-        |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
-    let targets: Vec<_> = targets.iter().map(target).collect();
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(fragment),
-        layout: None,
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some(vertex),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(compare),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some(fragment),
-            compilation_options: Default::default(),
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

@@ -61,30 +61,46 @@ pub struct Frame {
     pub pad_c: f32,
 }
 
-/// A vertex of the opaque mesh.
+/// What is shaded at a vertex of the opaque mesh; numbers to 1 are halves of words.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
-pub struct OpaqueVertex {
-    pub position_world: [f32; 3],
-    pub occlusion: f32,
-    pub normal_world: [f32; 3],
-    pub shadow: f32,
-    pub albedo: [f32; 3],
-    pub wet: f32,
+pub struct Coat {
+    pub albedo_r: f32,
+    pub albedo_g: f32,
+    pub albedo_b: f32,
+    pub normal_xy: u32,
+    pub normal_z_wet: u32,
+    pub occlusion_shadow: u32,
 }
 
-impl From<&scene::Vertex> for OpaqueVertex {
+impl From<&scene::Vertex> for Coat {
     fn from(vertex: &scene::Vertex) -> Self {
-        OpaqueVertex {
-            position_world: vertex.position,
-            occlusion: vertex.occlusion,
-            normal_world: vertex.normal,
-            shadow: vertex.shadow,
-            albedo: vertex.albedo,
-            wet: vertex.wet,
+        let both = |low: u16, high: u16| u32::from(low) | u32::from(high) << 16;
+        let unit = |x: f32| (x.clamp(0.0, 1.0) * 65535.0).round() as u16;
+        let signed = |x: f32| (x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16;
+        let [albedo_r, albedo_g, albedo_b] = vertex.albedo;
+        let [x, y, z] = vertex.normal.map(signed);
+        Coat {
+            albedo_r,
+            albedo_g,
+            albedo_b,
+            normal_xy: both(x, y),
+            normal_z_wet: both(z, unit(vertex.wet)),
+            occlusion_shadow: both(unit(vertex.occlusion), unit(vertex.shadow)),
         }
     }
+}
+
+/// A tile of the opaque mesh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct MeshTile {
+    pub first: u32,
+    pub pitch: u32,
+    pub side: u32,
+    pub pad: u32,
 }
 
 /// One light.

@@ -13,7 +13,7 @@ pub struct Targets {
     pub opaque: wgpu::Texture,
     /// Normal of the opaque scene (0: background).
     pub normal: wgpu::Texture,
-    /// u, v and metres from the eye of the nearest volume quad.
+    /// u, v and metres from the eye of the nearest volume quad; before it is drawn, where on the mesh the rock is that is seen.
     pub surface: wgpu::Texture,
     /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no more.
     pub quad_id: wgpu::Texture,

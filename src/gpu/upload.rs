@@ -3,15 +3,17 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use glam::Vec3;
+
 use super::device::Gpu;
-use super::layout::{self, Quad};
-use super::meshlets::{Meshlet, Meshlets};
+use super::layout::{self, Coat, Quad};
 use super::rasters::hash_twice;
+use super::tiles::{self, Part};
 use crate::environment::Map;
 use crate::error::{Error, Result};
 use crate::pool;
 use crate::scatter::media::{profile_length, thicknesses};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, Vertex, tiles::steps};
 use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
@@ -24,8 +26,7 @@ pub struct Resident {
     /// The volume's levels, and whether they are made for leaps.
     pub levels: KeptLevels,
     volume: Option<(Levels, wgpu::TextureView)>,
-    /// Of these vertices; previews have fewer triangles than pictures.
-    meshes: Vec<ResidentMesh>,
+    mesh: Option<ResidentMesh>,
     /// The environment's map, and its number.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
     /// Uploads of meshes and maps so far.
@@ -36,10 +37,12 @@ pub struct Resident {
 #[derive(Clone)]
 struct ResidentMesh {
     of: Mesh,
-    vertices: wgpu::Buffer,
+    positions: wgpu::Buffer,
+    coats: wgpu::Buffer,
+    tiles: wgpu::Buffer,
+    /// Of all kinds of tiles, and where each is.
     indices: wgpu::Buffer,
-    rock: Arc<Vec<Meshlet>>,
-    pools: Vec<Range<u32>>,
+    lists: Arc<Vec<Range<u32>>>,
     /// Each upload has a number of its own.
     upload: u64,
 }
@@ -56,14 +59,18 @@ pub struct Uploaded {
     pub quad_count: u32,
     /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
-    /// Vertices of the opaque mesh.
-    pub vertices: wgpu::Buffer,
-    /// Its indices.
+    /// Positions of the opaque mesh's vertices, four floats each.
+    pub positions: wgpu::Buffer,
+    /// What is shaded there, `array<Coat>`.
+    pub coats: wgpu::Buffer,
+    /// Its tiles, `array<MeshTile>`.
+    pub tiles: wgpu::Buffer,
+    /// The triangles of a tile.
     pub indices: wgpu::Buffer,
-    /// The rock among them, in parts.
-    pub rock: Arc<Vec<Meshlet>>,
-    /// `Surface` of each pool, and its indices.
-    pub pools: Vec<(wgpu::Buffer, Range<u32>)>,
+    /// What of the rock is drawn.
+    pub rock: Vec<Part>,
+    /// `Surface` of each pool, and what of it is drawn.
+    pub pools: Vec<(wgpu::Buffer, Vec<Part>)>,
     /// The environment, where the scene has one.
     pub environment: Option<UploadedEnvironment>,
     /// Hash of quads, lights, mesh and environment: all that is drawn but the pools' waves.
@@ -100,23 +107,25 @@ impl Uploaded {
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
         let pools = pool::surfaces(scene, mesh);
         let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
-        let mesh_bytes = [size_of_val(mesh.vertices.as_slice()), size_of_val(mesh.indices.as_slice())];
-        let largest = [quad_bytes.len(), light_bytes.len(), mesh_bytes[0], mesh_bytes[1]];
+        let largest = [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<Coat>()];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
             return Err(Error::input(
                 format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
                 "lower their number or use --engine cpu",
             ));
         }
-        let ResidentMesh { vertices, indices, rock, pools: places, upload, .. } =
+        let ResidentMesh { positions, coats, tiles, indices, lists, upload, .. } =
             resident.mesh(gpu, mesh).clone();
+        let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
+        let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
+        pool_parts.resize_with(pools.len(), Vec::new);
         let levels = resident.levels.get(scene, volume);
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
         let number = map.as_ref().map(|(_, number)| *number);
         Ok(Uploaded {
-            geometry: hash_twice(&(quad_bytes, light_bytes, upload, environment_bytes, number)),
+            geometry: hash_twice(&(quad_bytes, light_bytes, upload, &steps, environment_bytes, number)),
             waves: hash_twice(&pool_bytes),
             environment: map.map(|(map, _)| UploadedEnvironment {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
@@ -132,13 +141,15 @@ impl Uploaded {
             ),
             quad_count: quads.len() as u32,
             lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
-            vertices,
+            positions,
+            coats,
+            tiles,
             indices,
             rock,
             pools: pools
                 .iter()
                 .map(|pool| gpu.buffer_with("pool", bytemuck::bytes_of(pool), wgpu::BufferUsages::UNIFORM))
-                .zip(places)
+                .zip(pool_parts)
                 .collect(),
         })
     }
@@ -173,28 +184,28 @@ impl Resident {
     }
 
     fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> &ResidentMesh {
-        self.meshes.retain(|known| Arc::ptr_eq(&known.of.vertices, &mesh.vertices));
-        let known = self.meshes.iter().position(|known| Arc::ptr_eq(&known.of.indices, &mesh.indices));
-        let number = known.unwrap_or_else(|| {
-            let parts = Meshlets::new(mesh);
+        self.mesh.take_if(|known| !Arc::ptr_eq(&known.of.vertices, &mesh.vertices));
+        let uploads = &mut self.uploads;
+        self.mesh.get_or_insert_with(|| {
+            *uploads += 1;
             let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
-            self.meshes.truncate(1);
-            self.uploads += 1;
-            self.meshes.push(ResidentMesh {
+            let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
+            let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
+            let mut coats: Vec<Coat> = mesh.vertices.iter().map(Coat::from).collect();
+            // Bound even where there is none.
+            coats.resize(coats.len().max(1), Coat::from(&Vertex::default()));
+            let (indices, lists) = tiles::lists();
+            let storage = wgpu::BufferUsages::STORAGE;
+            ResidentMesh {
                 of: mesh.clone(),
-                vertices: buffer(
-                    "vertices",
-                    bytemuck::cast_slice(&parts.vertices),
-                    wgpu::BufferUsages::STORAGE,
-                ),
-                indices: buffer("indices", bytemuck::cast_slice(&parts.indices), wgpu::BufferUsages::INDEX),
-                rock: Arc::new(parts.rock),
-                pools: parts.pools,
-                upload: self.uploads,
-            });
-            self.meshes.len() - 1
-        });
-        &self.meshes[number]
+                positions: buffer("positions", bytemuck::cast_slice(&positions), storage),
+                coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
+                tiles: buffer("tiles", bytemuck::cast_slice(&tiles::packed(&mesh.tiles)), storage),
+                indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+                lists: Arc::new(lists),
+                upload: *uploads,
+            }
+        })
     }
 }
 

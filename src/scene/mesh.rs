@@ -10,6 +10,7 @@ use xxhash_rust::const_xxh3::xxh3_64;
 
 use super::pool::Pool;
 use super::rock::{Rock, shade, wet};
+use super::tiles::{self, Tile};
 use crate::cache::{Cache, key};
 
 /// A vertex of opaque geometry, as the raster pass reads it.
@@ -32,19 +33,31 @@ pub struct Vertex {
     pub pool: u32,
 }
 
-/// Triangles of opaque geometry.
+/// Opaque geometry: square grids of vertices, those of rocks and then those of pools.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertices, shared: who keeps them on a device knows them again.
+    /// Vertices row by row, shared: who keeps them on a device knows them again.
     pub vertices: Arc<Vec<Vertex>>,
-    /// Three indices a triangle.
-    pub indices: Arc<Vec<u32>>,
+    /// The grids' tiles.
+    pub tiles: Arc<Vec<Tile>>,
 }
 
 impl Mesh {
-    /// The rocks' mesh with the same vertices and a sixteenth of the triangles, for previews.
-    pub fn coarse(&self, ground: &Ground) -> Mesh {
-        Mesh { vertices: self.vertices.clone(), indices: Arc::new(ground.indices(2)) }
+    /// Grids one after the other with so many squares a side, powers of two.
+    pub fn new(vertices: Vec<Vertex>, squares: impl IntoIterator<Item = u32>) -> Mesh {
+        let tiles = tiles::cut(&vertices, squares.into_iter());
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
+    }
+
+    /// All triangles, as three numbers of vertices each; with these steps of the tiles.
+    pub fn triangles(&self, steps: &[u32]) -> Vec<[u32; 3]> {
+        let mut out = Vec::new();
+        for (i, tile) in self.tiles.iter().enumerate() {
+            let corners = tiles::triangles(tile.side, steps[i], tiles::coarser(&self.tiles, steps, i));
+            let (triangles, _) = corners.as_chunks::<3>();
+            out.extend(triangles.iter().map(|t| t.map(|corner| tile.vertex(tiles::place(corner)))));
+        }
+        out
     }
 }
 
@@ -77,7 +90,7 @@ pub struct Ground {
 impl Ground {
     /// The mesh of all.
     pub fn mesh(&self) -> Mesh {
-        Mesh { vertices: Arc::new(self.vertices()), indices: Arc::new(self.indices(0)) }
+        Mesh::new(self.vertices(), self.squares())
     }
 
     /// As [`Ground::mesh`], or from `cache`.
@@ -85,21 +98,13 @@ impl Ground {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
         let make = || Ok::<_, Infallible>(self.vertices());
         let Ok(vertices) = cache.get("meshes", &key("mesh", &BUILDER, self), count, make);
-        Mesh { vertices: Arc::new(vertices), indices: Arc::new(self.indices(0)) }
+        Mesh::new(vertices, self.squares())
     }
 
-    /// Triangles between every 2^`coarser`-th vertex of the rocks, and those of the pools.
-    fn indices(&self, coarser: u32) -> Vec<u32> {
-        let mut indices = Vec::new();
-        for (rock, own) in self.rocks.iter().zip(self.ranges()) {
-            rock.add_triangles(own.start as u32, 1 << rock.levels.min(coarser), &mut indices);
-        }
-        let mut first = self.rock_vertices() as u32;
-        for pool in &self.pools {
-            pool.add_triangles(first, &mut indices);
-            first += Pool::VERTICES as u32;
-        }
-        indices
+    /// On a side of each grid.
+    fn squares(&self) -> impl Iterator<Item = u32> {
+        let pools = self.pools.iter().map(|_| Pool::SQUARES as u32);
+        self.rocks.iter().map(|rock| 1 << rock.levels).chain(pools)
     }
 
     fn vertices(&self) -> Vec<Vertex> {

@@ -14,6 +14,7 @@ mod read;
 mod rock;
 mod sheet;
 mod splash;
+pub mod tiles;
 mod types;
 mod value;
 
@@ -189,6 +190,7 @@ impl Scene {
             height: v.count("image.height"),
             samples: v.count("image.samples"),
             filter: parts::filter(v),
+            rock_error: v.float("image.rock_error"),
             look: parts::look(v),
         };
         image.check_budget(limits.memory)?;

@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::mesh::Vertex;
-use super::rock::add_squares;
 use super::rock::wet::nearest_on_triangle;
 
 /// Most pools of a scene.
@@ -45,7 +44,9 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Vertices of a pool's mesh.
+    /// Squares on a side of its mesh.
+    pub const SQUARES: usize = SQUARES;
+    /// Vertices of its mesh.
     pub const VERTICES: usize = (SQUARES + 1) * (SQUARES + 1);
 
     /// Height of the surface.
@@ -97,11 +98,6 @@ impl Pool {
                 });
             }
         }
-    }
-
-    pub(super) fn add_triangles(&self, first: u32, indices: &mut Vec<u32>) {
-        let side = SQUARES as u32 + 1;
-        add_squares([SQUARES as u32; 2], |x, y| first + y * side + x, indices);
     }
 
     /// Sets depth and foam of its vertices, over ground of these heights.

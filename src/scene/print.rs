@@ -160,7 +160,7 @@ impl Scene {
                     "shades": column(|v| [v.occlusion, v.shadow, v.wet]),
                     // Number of the pool that it belongs to, plus 1; 0: rock.
                     "pools": mesh.vertices.iter().map(|v| v.pool).collect::<Vec<_>>(),
-                    "triangles": mesh.indices.chunks_exact(3).collect::<Vec<_>>(),
+                    "triangles": mesh.triangles(&vec![1; mesh.tiles.len()]),
                 },
             }),
         );

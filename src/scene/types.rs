@@ -211,6 +211,8 @@ pub struct Image {
     pub samples: u32,
     /// Where they lie about the pixel.
     pub filter: Filter,
+    /// How far rock may be off for the sake of fewer triangles, in distances between samples.
+    pub rock_error: f32,
     /// How the PNG is made from the radiance.
     pub look: Look,
 }

@@ -97,14 +97,11 @@ fn rock([x0, y0]: [f32; 2], [x1, y1]: [f32; 2], z: f32) -> Mesh {
         albedo: [0.4, 0.3, 0.2],
         ..Vertex::default()
     };
-    Mesh {
-        vertices: vec![corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)].into(),
-        indices: vec![0, 1, 2, 0, 2, 3].into(),
-    }
+    Mesh::new(vec![corner(x0, y0), corner(x1, y0), corner(x0, y1), corner(x1, y1)], [1])
 }
 
 pub fn no_rock() -> Mesh {
-    Mesh { vertices: Vec::new().into(), indices: Vec::new().into() }
+    Mesh::default()
 }
 
 fn curves(scene: &Scene) -> VolumeTexture {

@@ -38,6 +38,7 @@ mod shading;
 mod specialise;
 mod splash;
 mod strand;
+mod tiles;
 mod tolerance;
 #[cfg(feature = "viewer")]
 mod viewer;

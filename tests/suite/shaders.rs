@@ -4,7 +4,7 @@
 use std::mem::offset_of;
 
 use taki::gpu::layout::{
-    Develop, Environment, Frame, Groups, Light, LightVolume, OpaqueVertex, Quad, Strand, TONE_AGX,
+    Coat, Develop, Environment, Frame, Groups, Light, LightVolume, MeshTile, Quad, Strand, TONE_AGX,
     TONE_FILMIC, Tile, WORKGROUP,
 };
 use taki::gpu::{gbuffer_source, integrate_source, shader_source, visibility_source};
@@ -26,13 +26,14 @@ const SHARED: [&str; 8] = [
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 /// What some stages are put together from besides.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 9] = [
     "integrate_light.wgsl",
     "integrate_many.wgsl",
     "integrate_one.wgsl",
     "levels.wgsl",
     "lookup.wgsl",
     "matter.wgsl",
+    "opaque.wgsl",
     "optical_depth.wgsl",
     "pool.wgsl",
 ];
@@ -136,8 +137,9 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("gbuffer.wgsl")).expect("valid");
     let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
     assert_eq!(members(&module, "Surface"), surface);
-    let vertex = fields!(OpaqueVertex: position_world occlusion normal_world shadow albedo wet);
-    assert_eq!(members(&module, "OpaqueVertex"), vertex);
+    let coat = fields!(Coat: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
+    assert_eq!(members(&module, "Coat"), coat);
+    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side pad));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 

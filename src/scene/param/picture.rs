@@ -27,6 +27,15 @@ pub(super) const TABLE: &[Param] = &[
         "How several samples are spread about a pixel: evenly over it, or three pixels wide and denser in the middle.",
     ),
     p(
+        "image.rock_error",
+        "",
+        "samples",
+        Float(0.0, 16.0, 0.5),
+        Uniform,
+        "How far outlines of rock may be off, in distances between samples: where less is lost, fewer triangles are drawn; 0: all are.",
+    )
+    .slider(0.0, 4.0),
+    p(
         "image.exposure",
         "",
         "stops",

@@ -131,29 +131,13 @@ impl Rock {
         (0..side * side).map(vertex).collect()
     }
 
-    /// Adds the triangles between every `step`-th of this rock's vertices, which begin at `first`: in strips, so that
-    /// triangles of about the same number lie near one another.
+    /// Adds the triangles between every `step`-th of this rock's vertices, which begin at `first`.
     pub(super) fn add_triangles(&self, first: u32, step: u32, indices: &mut Vec<u32>) {
         let n = 1u32 << self.levels;
-        add_squares([n / step; 2], |x, y| first + (y * (n + 1) + x) * step, indices);
-    }
-}
-
-/// Squares across a strip: with 12, the 170 squares that software Vulkan draws at once are about as high as wide.
-const STRIP: u32 = 12;
-
-/// Adds two triangles for each square of a grid whose corners are at `index(x, y)`.
-pub(super) fn add_squares(
-    [columns, rows]: [u32; 2],
-    index: impl Fn(u32, u32) -> u32,
-    indices: &mut Vec<u32>,
-) {
-    for left in (0..columns).step_by(STRIP as usize) {
-        for y in 0..rows {
-            for x in left..columns.min(left + STRIP) {
-                let [a, b, c, d] = [index(x, y), index(x + 1, y), index(x + 1, y + 1), index(x, y + 1)];
-                indices.extend([a, b, c, a, c, d]);
-            }
+        let index = |x: u32, y: u32| first + (y * (n + 1) + x) * step;
+        for (x, y) in (0..n / step).flat_map(|y| (0..n / step).map(move |x| (x, y))) {
+            let [a, b, c, d] = [index(x, y), index(x + 1, y), index(x + 1, y + 1), index(x, y + 1)];
+            indices.extend([a, b, c, a, c, d]);
         }
     }
 }

@@ -41,8 +41,10 @@ const BUILD_PATIENCE: Duration = Duration::from_secs(2);
 /// Bytes for results of the raster pass: while the water plays or one slider of the walk moves, previews are
 /// spared it. Those of several previews, or of one picture of 1.2 times 720p.
 const KEPT_RASTERS: u64 = 48 << 20;
-/// From this scale on the rocks are drawn coarsely.
+/// From this scale on the rocks are drawn coarsely,
 const COARSE_SCALE: u32 = 3;
+/// and may be off by so many of a preview's pixels, [`Image::rock_error`](crate::scene::Image).
+const COARSE_ROCK: f32 = 6.0;
 /// Preview pixels per side of a full pixel that are tried.
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
@@ -56,19 +58,12 @@ struct Rendered {
     volume: Arc<VolumeTexture>,
 }
 
-/// The opaque geometry for pictures and for previews.
-#[derive(Clone)]
-struct Meshes {
-    full: Mesh,
-    coarse: Mesh,
-}
-
 /// What the last pictures took, seconds a sample.
 #[derive(Default)]
 struct Speed {
     /// Of walk, tone and read-back.
     per_pixel: Option<f64>,
-    /// Of the rest, mostly the raster pass: with the full mesh, and with the coarse one.
+    /// Of the rest, mostly the raster pass: with fine rocks, and with coarse ones.
     once: [f64; 2],
 }
 
@@ -82,7 +77,7 @@ pub struct Renderer {
     volume: VolumeStock,
     /// Of the first scene.
     cache: Option<Cache>,
-    mesh: Option<(Ground, Meshes)>,
+    mesh: Option<(Ground, Mesh)>,
     rendered: Option<Rendered>,
     /// The values that the last automatic exposure was measured for, and its stops.
     exposed: Option<(Values, f32)>,
@@ -200,14 +195,14 @@ impl Renderer {
 
     fn view(&mut self, request: Request) -> Result<()> {
         let (volume, made) = self.volume(&request)?;
-        let (meshes, mesh_made) = self.meshes(&request.scene);
+        let (mesh, mesh_made) = self.mesh(&request.scene);
         let cost = match made {
             Some(cost) => cost,
             None if mesh_made => Cost::Upload,
             None => Cost::Uniform,
         };
-        let look = self.exposed(&request.scene, &volume, &meshes.full, request.serial)?.image.look;
-        let job = Job { request: &request, volume, meshes, cost, look };
+        let look = self.exposed(&request.scene, &volume, &mesh, request.serial)?.image.look;
+        let job = Job { request: &request, volume, mesh, cost, look };
         let mut first = true;
         if let Some(rendered) = self.goes_on(&job) {
             let samples = rendered.samples;
@@ -256,6 +251,7 @@ impl Renderer {
             && Arc::ptr_eq(&old.volume, volume)
             && (!request.layer.of_surface() || old.frame.surface.is_some())
             && old.scene.image.filter == request.scene.image.filter
+            && old.scene.image.rock_error == request.scene.image.rock_error
             && old.samples <= request.samples.max(1)
             && changed_keys(&old.scene.values, &request.scene.values)
                 .iter()
@@ -310,7 +306,7 @@ impl Renderer {
             of: job.request.scene.clone(),
             scene: Arc::new(scene),
             volume: job.volume.clone(),
-            mesh: job.meshes.full.clone(),
+            mesh: job.mesh.clone(),
             frame,
             image: Arc::new(image),
             layer,
@@ -337,6 +333,10 @@ impl Renderer {
         scene.image.height = height;
         scene.image.samples = job.request.samples.max(1);
         scene.image.look = job.look;
+        let coarse = scale >= COARSE_SCALE;
+        if coarse {
+            scene.image.rock_error = scene.image.rock_error.max(COARSE_ROCK);
+        }
         let patience = if what == "preview" { PATIENCE } else { Duration::ZERO };
         let watch = self.watch(what, job.request.serial, patience);
         let options = RenderOptions {
@@ -346,9 +346,7 @@ impl Renderer {
             ..Default::default()
         };
         let clock = Instant::now();
-        let coarse = scale >= COARSE_SCALE;
-        let mesh = if coarse { &job.meshes.coarse } else { &job.meshes.full };
-        let mut frame = self.run_engine(&scene, &job.volume, mesh, &options, &watch)?;
+        let mut frame = self.run_engine(&scene, &job.volume, &job.mesh, &options, &watch)?;
         let s = &mut frame.seconds;
         let of_pixels = s.integrate + s.resolve + s.readback;
         let once = clock.elapsed().as_secs_f64() - of_pixels - s.pipelines - s.upload;
@@ -405,17 +403,16 @@ impl Renderer {
     }
 
     /// The request's geometry, and whether it was made anew.
-    fn meshes(&mut self, scene: &Scene) -> (Meshes, bool) {
+    fn mesh(&mut self, scene: &Scene) -> (Mesh, bool) {
         let ground = scene.ground();
-        if let Some((known, meshes)) = &self.mesh
+        if let Some((known, mesh)) = &self.mesh
             && *known == ground
         {
-            return (meshes.clone(), false);
+            return (mesh.clone(), false);
         }
-        let full = self.cache.take().map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(&cache));
-        let meshes = Meshes { coarse: full.coarse(&ground), full };
-        self.mesh = Some((ground, meshes.clone()));
-        (meshes, true)
+        let mesh = self.cache.take().map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(&cache));
+        self.mesh = Some((ground, mesh.clone()));
+        (mesh, true)
     }
 
     /// The scene with its automatic exposure, if it has one: measured anew where something has changed that it
@@ -443,7 +440,7 @@ impl Renderer {
 struct Job<'a> {
     request: &'a Request,
     volume: Arc<VolumeTexture>,
-    meshes: Meshes,
+    mesh: Mesh,
     cost: Cost,
     /// With the automatic exposure, if there is one.
     look: Look,

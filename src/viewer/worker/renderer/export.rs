@@ -42,10 +42,10 @@ impl Renderer {
             layer: Layer::Rgb,
         };
         let (volume, _) = self.volume(&request)?;
-        let (meshes, _) = self.meshes(&export.scene);
+        let (mesh, _) = self.mesh(&export.scene);
         let watch = self.watch("export", u64::MAX, Duration::MAX);
         let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let scene = &self.exposed(&export.scene, &volume, &meshes.full, u64::MAX)?;
+        let scene = &self.exposed(&export.scene, &volume, &mesh, u64::MAX)?;
         let image = &scene.image;
         let window = Window::whole([image.width, image.height]);
         let strips = strips(scene, window, options.surface, self.memory)?;
@@ -54,7 +54,7 @@ impl Renderer {
         }
         let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
         writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
-            self.run_engine(scene, &volume, &meshes.full, options, watch)
+            self.run_engine(scene, &volume, &mesh, options, watch)
         })?;
         watch.progress("saving", 1, 1)?;
         writer.finish().map(drop)
