@@ -39,6 +39,8 @@ override MULTIPLE: bool = false;
 @group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
 // Places of workgroups, src/gpu/groups.rs.
 @group(0) @binding(16) var<storage, read> group_list: array<u32>;
+// Of sparse storage, shaders/cells.wgsl.
+@group(0) @binding(17) var bricks: texture_storage_3d<rgba32uint, read>;
 
 // Instead of a number of cells, where the device ended a walk before it was done: software Vulkan grants all loops of a
 // pixel 65535 turns.
@@ -281,7 +283,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     var rho = 0.0;
     var texel = vec2<u32>(0u);
     if !TRILINEAR || LEAPS {
-        texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+        texel = cell_words(in_level((*walk).cell, view.level));
     }
     if TRILINEAR {
         rho = found_between(*walk, *ray, view).rho;
@@ -303,12 +305,12 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
 // Half way through the cell the ray is in.
 fn found_between(walk: Walk, ray: Ray, view: View) -> Found {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
-    return between(volume, view.level, view.matter, walk.cell, middle);
+    return between(view.level, view.matter, walk.cell, middle);
 }
 
 // The light of one cell, and the step to the next. Past the end of the walk nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+    let texel = cell_words(in_level((*walk).cell, view.level));
     var passed_by = 0u;
     if LEAPS {
         passed_by = walk_leap(walk, texel, view.leaps);

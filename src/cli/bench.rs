@@ -109,6 +109,10 @@ pub struct BenchArgs {
     /// Measures the `front` scene with this volume file only.
     #[arg(long, value_name = "V.npz")]
     volume: Option<PathBuf>,
+    /// Measures the `front` scene with a cube of so many cells a side only. Beyond 256 it has the strands of 256,
+    /// and is stored sparse where the memory does not hold it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192), conflicts_with = "volume")]
+    cells: Option<u32>,
     /// Measures this image size only.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -171,6 +175,9 @@ const STEPS: &[Step] = &[
 /// The scenes whose frames are measured.
 const SCENES: [&str; 6] = ["waterfall", "cascade", "curtain", "spout", "night", "evening"];
 
+/// The largest cube that is measured unless asked for, at the larger size alone.
+const LARGE: u32 = 512;
+
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -187,10 +194,14 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             let file = file.to_str().ok_or_else(|| Error::Usage("--volume: the path is not UTF-8".into()))?;
             vec![vec![format!("volume.file={file:?}")]]
         }
-        None => [40, 256].map(cube).to_vec(),
+        None => args.cells.map_or([40, 256, LARGE].map(cube).to_vec(), |n| vec![cube(n)]),
     };
+    let alone = args.volume.is_some() || args.cells.is_some();
     for sets in &volumes {
         for &size in &sizes {
+            if !alone && args.size.is_none() && *sets == cube(LARGE) && size != SIZES[1] {
+                continue;
+            }
             let mut sets = sets.clone();
             sets.extend(front(size));
             let volume = load("front", &sets)?.volume(direct_limits().memory, terminal)?;
@@ -205,7 +216,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             passes(args, terminal, &mut gpu, "front", &scenes, &volume, &mut rows)?;
         }
     }
-    if args.volume.is_none() {
+    if !alone {
         steps(args, terminal, &mut gpu, &mut rows)?;
         scenes(args, terminal, &mut gpu, &mut rows)?;
         pictures(args, terminal, &mut rows)?;
@@ -225,9 +236,10 @@ fn load(preset: &'static str, sets: &[String]) -> Result<Scene> {
     Scene::load(preset.as_ref(), sets, &direct_limits())
 }
 
-/// A cubic volume with as many strands per face area as 32 × 32 at 40³.
+/// A cubic volume with as many strands per face area as 32 × 32 at 40³, up to 256³; a larger one has those of 256³: the same
+/// water, finer.
 fn cube(n: u32) -> Vec<String> {
-    let strands = (32.0 * n as f64 / 40.0).round();
+    let strands = (32.0 * n.min(256) as f64 / 40.0).round();
     let mut sets: Vec<String> = ["nx", "ny", "nz"].map(|axis| format!("volume.{axis}={n}")).to_vec();
     sets.extend(["across", "deep"].map(|axis| format!("curves.{axis}={strands}")));
     sets
@@ -457,6 +469,21 @@ fn print(json: bool, line: &str, rows: &[Row]) {
             r.seconds * 1e3,
             r.fastest * 1e3
         ));
+    }
+    let of_size = |n: u32| {
+        let volume = format!("{n}×{n}×{n}");
+        let is = move |r: &&Row| r.volume == volume && (r.engine, r.pass) == ("gpu", "integrate");
+        rows.iter().filter(is)
+    };
+    for large in of_size(LARGE) {
+        if let Some(row) = of_size(256).find(|r| r.size == large.size) {
+            say(&format!(
+                "\n{LARGE}³ and 256³ with the same strands, {}: {:.2} times the time for {:.2} times the cells",
+                large.size,
+                large.seconds / row.seconds,
+                large.cells as f64 / row.cells as f64
+            ));
+        }
     }
     for bare in rows.iter().filter(|r| ["bare walk", "bare leaping walk"].contains(&r.pass)) {
         let same = |r: &&Row| {

@@ -103,8 +103,9 @@ fn filled<T: Copy + Default + Send>(level: &Level, lookup: Lookup, of: impl Fn(I
     let mut numbers = vec![T::default(); nx * ny * nz];
     numbers.par_chunks_mut(nx).enumerate().for_each(|(row, numbers)| {
         for (x, number) in numbers.iter_mut().enumerate() {
-            if lookup == Lookup::Trilinear || level.volume.cells[row * nx + x].rho_code() > 0 {
-                *number = of(IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32));
+            let cell = IVec3::new(x as i32, (row % ny) as i32, (row / ny) as i32);
+            if lookup == Lookup::Trilinear || level.cell(cell).rho_code() > 0 {
+                *number = of(cell);
             }
         }
     });
