@@ -16,7 +16,7 @@ use taki::volume::{
     build_water, expected_cells, read_npz, sparse_bytes, write_npz,
 };
 
-use crate::gpu::{assert_parity, renderer, scene};
+use crate::gpu::{assert_parity, both, renderer, scene};
 
 const MEMORY: u64 = 1 << 30;
 
@@ -369,7 +369,7 @@ fn a_volume_of_several_uploads_and_planes_of_stored_cells_is_drawn_as_the_cpu_en
     let stored = volume.cells.stored().len();
     assert!(bricks * 16 > 64 << 20 && stored * 8 > 64 << 20, "{bricks} bricks, {stored} cells");
     assert!(!stored.is_multiple_of(1 << 20), "the last plane is not full");
-    let frames = [on_gpu(&mut renderer, &scene, &volume), on_cpu(&scene, &volume)];
+    let frames = both(&mut renderer, &scene);
     assert_parity("a large volume in bricks", &frames);
     // Cells of the last layers are met, and hide what is behind them.
     let mut thinner = volume.clone();
