@@ -103,11 +103,12 @@ pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Res
 }
 
 /// What the cells follow from besides the spec: a volume of another builder is another volume.
-const BUILDER: [u64; 8] = [
+const BUILDER: [u64; 9] = [
     xxh3_64(include_bytes!("water.rs")),
     xxh3_64(include_bytes!("bundle.rs")),
     xxh3_64(include_bytes!("flow.rs")),
     xxh3_64(include_bytes!("cell.rs")),
+    xxh3_64(include_bytes!("cells.rs")),
     xxh3_64(include_bytes!("ripple.rs")),
     xxh3_64(include_bytes!("../curve.rs")),
     xxh3_64(include_bytes!("../walk.rs")),
