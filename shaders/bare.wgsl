@@ -11,6 +11,7 @@
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
 
 @group(0) @binding(16) var<storage, read> group_list: array<u32>;
+@group(0) @binding(17) var bricks: texture_storage_3d<rgba32uint, read>;
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
@@ -71,11 +72,11 @@ fn visit(
     layers: i32,
     max_cells: u32,
 ) {
-    let texel = textureLoad(volume, (*walk).cell);
+    let texel = cell_words((*walk).cell);
     *sum += select(texel.x + texel.y, 0u, *done);
     var passed_by = 0u;
     if LEAPS {
-        passed_by = walk_leap(walk, texel.xy, true);
+        passed_by = walk_leap(walk, texel, true);
     }
     *n += select(1u + passed_by, 0u, *done);
     if LEAPS {

@@ -43,6 +43,8 @@ override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 @group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
 // Places of workgroups, src/gpu/groups.rs.
 @group(0) @binding(16) var<storage, read> group_list: array<u32>;
+// Of sparse storage, shaders/cells.wgsl.
+@group(0) @binding(17) var bricks: texture_storage_3d<rgba32uint, read>;
 
 // Instead of a number of cells, where the device ended a walk before it was done: software Vulkan grants all loops of a
 // pixel 65535 turns.
@@ -291,7 +293,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     var rho = 0.0;
     var texel = vec2<u32>(0u);
     if !TRILINEAR | LEAPS {
-        texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+        texel = cell_words(in_level((*walk).cell, view.level));
     }
     if TRILINEAR {
         rho = found_between(*walk, *ray, view).rho;
@@ -323,7 +325,7 @@ fn walk_mist(view: View, ray: ptr<function, Ray>) {
 
 // What `visit` is to a cell of mist.
 fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let code = textureLoad(volume, in_level((*walk).cell, view.level)).x & 0xffffu;
+    let code = cell_words(in_level((*walk).cell, view.level)).x & 0xffffu;
     let t_exit = walk_exit(*walk);
     let rho = select(matter_rho(f32(code), view.matter), 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
@@ -352,12 +354,12 @@ fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
 // Half way through the cell the ray is in.
 fn found_between(walk: Walk, ray: Ray, view: View) -> Found {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
-    return between(volume, view.level, view.matter, walk.cell, middle);
+    return between(view.level, view.matter, walk.cell, middle);
 }
 
 // The light of one cell, and the step to the next. Past the end of the walk nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let texel = textureLoad(volume, in_level((*walk).cell, view.level)).xy;
+    let texel = cell_words(in_level((*walk).cell, view.level));
     var passed_by = 0u;
     if LEAPS {
         passed_by = walk_leap(walk, texel, view.leaps);

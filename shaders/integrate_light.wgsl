@@ -177,7 +177,7 @@ fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
     }
     if MARCH {
         if seen.occupied {
-            let walked = optical_depth(volume, view.level, view.matter, seen.cell, light.l_cell, view.max_cells, NEVER);
+            let walked = optical_depth(view.level, view.matter, seen.cell, light.l_cell, view.max_cells, NEVER);
             (*ray).light_cells += walked.cells;
             (*ray).cut |= !walked.done;
             depth = walked.depth * view.extinction;

@@ -52,7 +52,6 @@ fn moments_of(word: u32, level: Level) -> Moments {
 
 // Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the level's cells.
 fn between(
-    volume: texture_storage_3d<rg32uint, read>,
     level: Level,
     matter: Matter,
     cell: vec3<i32>,
@@ -71,7 +70,7 @@ fn between(
         at = select(at, level.size - 1, at < vec3<i32>(0));
         at = select(at, vec3<i32>(0), at >= level.size);
         at.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
-        let texel = textureLoad(volume, in_level(at, level));
+        let texel = cell_words(in_level(at, level));
         let weight = shares.x * shares.y * shares.z * f32(texel.x & 0xffffu);
         rho += weight;
         k += vec2<f32>(f32((texel.x >> 16u) & 0xffu), f32(texel.x >> 24u)) * weight;

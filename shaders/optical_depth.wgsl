@@ -15,7 +15,6 @@ struct LightWalk {
 
 // In cells of a level, along a direction in those. Ends early where the depth is `enough`.
 fn optical_depth(
-    volume: texture_storage_3d<rg32uint, read>,
     level: Level,
     matter: Matter,
     cell: vec3<i32>,
@@ -26,16 +25,15 @@ fn optical_depth(
     var ray: LightWalk;
     var walk = walk_new(level.size, vec3<f32>(cell) + 0.5, direction);
     while !ray.done {
-        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
-        pass_cell(volume, matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(matter, &walk, &ray, level, max_cells, enough);
+        pass_cell(matter, &walk, &ray, level, max_cells, enough);
     }
     return ray;
 }
 
 fn pass_cell(
-    volume: texture_storage_3d<rg32uint, read>,
     matter: Matter,
     walk: ptr<function, Walk>,
     ray: ptr<function, LightWalk>,
@@ -43,7 +41,7 @@ fn pass_cell(
     max_cells: u32,
     enough: f32,
 ) {
-    let texel = textureLoad(volume, in_level((*walk).cell, level)).xy;
+    let texel = cell_words(in_level((*walk).cell, level));
     var passed_by = 0u;
     if LEAPS {
         passed_by = walk_leap(walk, texel, matter.shift <= 0.0);

@@ -24,6 +24,8 @@ struct LightVolume {
 // Linear indices of the columns in which any cell has density.
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
+// Of sparse storage, shaders/cells.wgsl.
+@group(0) @binding(5) var bricks: texture_storage_3d<rgba32uint, read>;
 
 // The level that has cells at (y, z) of the texture.
 fn level_with(size: vec3<i32>, y: i32, z: i32) -> Level {
@@ -44,7 +46,10 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= light_volume.column_count {
         return;
     }
-    let extent = vec3<i32>(textureDimensions(volume));
+    var extent = frame.cells;
+    if !SPARSE {
+        extent = vec3<i32>(textureDimensions(volume));
+    }
     let max_cells = frame.max_cells;
     let index = columns[light_volume.first_column + id.x];
     let of_slice = u32(extent.x * extent.y);
@@ -61,10 +66,10 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0; i < CELLS_A_WORD; i++) {
         let place = vec3<i32>(x, y, column * CELLS_A_WORD + i);
         let cell = place - level.offset;
-        if any(cell >= level.size) || (!EVERYWHERE && (textureLoad(volume, place).x & 0xffffu) == 0u) {
+        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(place).x & 0xffffu) == 0u) {
             continue;
         }
-        let depth = optical_depth(volume, level, whole, cell, direction, max_cells, enough).depth;
+        let depth = optical_depth(level, whole, cell, direction, max_cells, enough).depth;
         if CODES {
             word |= transmittance_code(depth * bits) << u32(8 * i);
         } else {

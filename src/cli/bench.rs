@@ -97,6 +97,20 @@
 //! On the CPU the same chain takes as long as five steps, so there only boxes whose exponents add up to 6 are leapt over: 0.74 (`march`) and
 //! 0.84 (`none`) of the time at 128³, 0.73 and 0.76 with 4×4 curves. Four lanes of SSE in place of three floats took twice as long as those.
 //!
+//! # Notes on storage
+//!
+//! Summed first, for strands in 2 % of 1024³ cells: a column of 8×8 cells has 1.3 strands, so that bricks of 8³ kept whole would store most
+//! of 8 GiB; with a mask and a base for 4³ cells, and the stored cells alone, 0.20 + 0.25 GB on the host and 0.27 + 0.25 on the device. Measured
+//! (`/usr/bin/time -v`, 31.1 million stored, software Vulkan's own 0.15 GB and the picture included): 1.32 GiB. Predicted for a fetch of four words and a popcount
+//! in front of every cell's own: 345 instructions a step for 222. Measured at 256³, where nothing is gained by it, user seconds of four samples
+//! less those of one: 1.25 times the dense pass. At 512³ with the same strands it is 0.7 to 0.8 times the dense one's: the dense bare walk takes 17 ns a cell
+//! there for 8 at 256³, for layers are 2 MiB apart and every step along z meets another page. Predicted from instructions was 1.71, the ratio of cells, and
+//! without other work on the machine that was measured (1.04 to 1.74 s).
+//!
+//! What was not done, by sums: leaping over empty bricks. At 2 % seven in ten bricks are empty, and turns would fall to 0.46 of the walk's; leaps
+//! gain nothing at that share (above: 0.37 of the turns took 0.9 to 1.1 of the time). Keeping the last brick in registers saves no fetch where all
+//! lanes fetch.
+//!
 //! The walk goes on through the tiled copies where other programs' rays leave the box: 46.7 cells a ray in
 //! `front` at 40³ against their 34.5. Compare nanoseconds per cell as well as times.
 
@@ -121,6 +135,10 @@ pub struct BenchArgs {
     /// Measures the `front` scene with this volume file only.
     #[arg(long, value_name = "V.npz")]
     volume: Option<PathBuf>,
+    /// Measures the `front` scene with a cube of so many cells a side only. Beyond 256 it has the strands of 256,
+    /// and is stored sparse where the memory does not hold it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192), conflicts_with = "volume")]
+    cells: Option<u32>,
     /// Measures this image size only.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -183,6 +201,9 @@ const STEPS: &[Step] = &[
 /// The scenes whose frames are measured.
 const SCENES: [&str; 6] = ["waterfall", "cascade", "curtain", "spout", "night", "evening"];
 
+/// The largest cube that is measured unless asked for, at the larger size alone.
+const LARGE: u32 = 512;
+
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -199,10 +220,14 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             let file = file.to_str().ok_or_else(|| Error::Usage("--volume: the path is not UTF-8".into()))?;
             vec![vec![format!("volume.file={file:?}")]]
         }
-        None => [40, 256].map(cube).to_vec(),
+        None => args.cells.map_or([40, 256, LARGE].map(cube).to_vec(), |n| vec![cube(n)]),
     };
+    let alone = args.volume.is_some() || args.cells.is_some();
     for sets in &volumes {
         for &size in &sizes {
+            if !alone && args.size.is_none() && *sets == cube(LARGE) && size != SIZES[1] {
+                continue;
+            }
             let mut sets = sets.clone();
             sets.extend(front(size));
             let volume = load("front", &sets)?.volume(direct_limits().memory, terminal)?;
@@ -217,7 +242,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             passes(args, terminal, &mut gpu, "front", &scenes, &volume, &mut rows)?;
         }
     }
-    if args.volume.is_none() {
+    if !alone {
         steps(args, terminal, &mut gpu, &mut rows)?;
         scenes(args, terminal, &mut gpu, &mut rows)?;
         pictures(args, terminal, &mut rows)?;
@@ -237,9 +262,10 @@ fn load(preset: &'static str, sets: &[String]) -> Result<Scene> {
     Scene::load(preset.as_ref(), sets, &direct_limits())
 }
 
-/// A cubic volume with as many strands per face area as 32 × 32 at 40³.
+/// A cubic volume with as many strands per face area as 32 × 32 at 40³, up to 256³; a larger one has those of 256³: the same
+/// water, finer.
 fn cube(n: u32) -> Vec<String> {
-    let strands = (32.0 * n as f64 / 40.0).round();
+    let strands = (32.0 * n.min(256) as f64 / 40.0).round();
     let mut sets: Vec<String> = ["nx", "ny", "nz"].map(|axis| format!("volume.{axis}={n}")).to_vec();
     sets.extend(["across", "deep"].map(|axis| format!("curves.{axis}={strands}")));
     sets
@@ -469,6 +495,21 @@ fn print(json: bool, line: &str, rows: &[Row]) {
             r.seconds * 1e3,
             r.fastest * 1e3
         ));
+    }
+    let of_size = |n: u32| {
+        let volume = format!("{n}×{n}×{n}");
+        let is = move |r: &&Row| r.volume == volume && (r.engine, r.pass) == ("gpu", "integrate");
+        rows.iter().filter(is)
+    };
+    for large in of_size(LARGE) {
+        if let Some(row) = of_size(256).find(|r| r.size == large.size) {
+            say(&format!(
+                "\n{LARGE}³ and 256³ with the same strands, {}: {:.2} times the time for {:.2} times the cells",
+                large.size,
+                large.seconds / row.seconds,
+                large.cells as f64 / row.cells as f64
+            ));
+        }
     }
     for bare in rows.iter().filter(|r| ["bare walk", "bare leaping walk"].contains(&r.pass)) {
         let same = |r: &&Row| {

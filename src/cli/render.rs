@@ -89,9 +89,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     });
     let (volume, volume_seconds, mesh) = made?;
     scene.warnings(&volume).iter().for_each(|w| terminal.warn(w));
-    if let Some(environment) = &scene.environment {
-        terminal.note(&format!("taki: {}", environment.words()));
-    }
+    scene.notes(&volume).iter().for_each(|n| terminal.note(&format!("taki: {n}")));
     if let Some(stops) = measured {
         terminal.note(&measured_words(stops));
     }

@@ -9,7 +9,7 @@ use super::{SceneOptions, default_output};
 use crate::error::{Error, Result};
 use crate::frame::Output;
 use crate::job::Monitor;
-use crate::volume::{Statistics, read_npz, write_npz};
+use crate::volume::{Statistics, StorageChoice, read_npz, write_npz};
 
 #[derive(Args)]
 pub struct VolumeArgs {
@@ -47,6 +47,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             let mut out = Output::create(&path)?;
             let volume = scene.volume(options.limits().memory, terminal)?;
+            scene.notes(&volume).iter().for_each(|n| terminal.note(&format!("taki: {n}")));
             terminal.progress("saving", 0, 1)?;
             let writer = std::io::BufWriter::with_capacity(1 << 20, out.file());
             write_npz(&volume, writer).map_err(|e| Error::write(&path, e))?;
@@ -57,7 +58,8 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
         VolumeCommand::Info { file, json, memory } => {
-            let statistics = read_npz(file, memory.saturating_mul(1 << 20))?.statistics();
+            let statistics =
+                read_npz(file, StorageChoice::Auto, memory.saturating_mul(1 << 20))?.statistics();
             say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
             Ok(())
         }

@@ -5,13 +5,16 @@
 //! row of cells are summed side by side, cell of the way by cell of the way: the bits of [`optical_depth`](super::visibility::optical_depth) for a
 //! twentieth of the work.
 
+use std::sync::Arc;
+
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
 use super::lookup::Level;
+use super::visibility::number;
 use crate::scene::Lookup;
 use crate::visibility::{Form, LightVolume, Medium, transmittance_code};
-use crate::volume::Pyramid;
+use crate::volume::{Cell, Pyramid};
 use crate::walk::Walk;
 
 /// What one light volume holds of a level, in the order of its cells.
@@ -34,7 +37,8 @@ impl Numbers {
 
 /// The levels that light volumes are of, as rows of ρ codes.
 pub struct Rows<'a> {
-    levels: Vec<(Level<'a>, Vec<f32>)>,
+    /// Rows of sparse volumes would not fit.
+    levels: Vec<(Level<'a>, Option<Vec<f32>>)>,
     lookup: Lookup,
 }
 
@@ -50,8 +54,9 @@ impl<'a> Rows<'a> {
     /// Of all levels.
     pub fn new(levels: &'a Pyramid, lookup: Lookup) -> Self {
         let rows = |level: Level<'a>| {
-            let codes = level.volume.cells.par_iter().map(|cell| cell.rho_code() as f32).collect();
-            (level, codes)
+            let codes =
+                |cells: &Arc<Vec<Cell>>| cells.par_iter().map(|cell| cell.rho_code() as f32).collect();
+            (level, level.volume.cells.dense().map(codes))
         };
         let levels = (0..levels.len() as u32).map(|number| rows(Level::of(levels, number))).collect();
         Rows { levels, lookup }
@@ -60,7 +65,8 @@ impl<'a> Rows<'a> {
     /// A light volume, level by level. Cells without density, which no view ray asks, have 0, but for rays that look
     /// between cells.
     pub fn fill(&self, light_volume: &LightVolume, medium: Medium, form: Form) -> Vec<Numbers> {
-        let of_level = |(level, rho): &(Level, Vec<f32>)| {
+        let of_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
+            let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };
             let taps = taps(level, light_volume.direction, medium);
             let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
             match form {
@@ -72,6 +78,18 @@ impl<'a> Rows<'a> {
             }
         };
         self.levels.iter().map(of_level).collect()
+    }
+
+    /// Walked from cell to cell.
+    fn walked(&self, level: &Level, light_volume: &LightVolume, medium: Medium, form: Form) -> Numbers {
+        let of = |cell: IVec3| {
+            let asked = self.lookup == Lookup::Trilinear || level.cell(cell).rho_code() > 0;
+            if asked { number(level, cell, light_volume, medium, form) } else { 0.0 }
+        };
+        match form {
+            Form::Codes => Numbers::Codes(in_order(level, |cell| of(cell) as u8)),
+            Form::Depths => Numbers::Depths(in_order(level, of)),
+        }
     }
 
     fn sums<T: Copy + Default + Send>(
@@ -113,6 +131,13 @@ impl<'a> Rows<'a> {
         );
         numbers
     }
+}
+
+fn in_order<T: Send>(level: &Level, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
+    let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
+    let place =
+        |index: usize| IVec3::new((index % nx) as i32, (index / nx % ny) as i32, (index / nx / ny) as i32);
+    (0..nx * ny * nz).into_par_iter().map(|index| of(place(index))).collect()
 }
 
 /// Adds `rho` × `weight` to the depths.

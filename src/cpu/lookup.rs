@@ -54,7 +54,7 @@ impl<'a> Level<'a> {
     /// The cell of the level.
     #[inline]
     pub fn cell(&self, c: IVec3) -> Cell {
-        self.volume.cells[self.volume.index(c.x as u32, c.y as u32, c.z as u32)]
+        self.volume.cell(c.x as u32, c.y as u32, c.z as u32)
     }
 
     /// Of a cell's directions.

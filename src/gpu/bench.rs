@@ -13,6 +13,9 @@ use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
 use crate::volume::{Leaps, VolumeTexture};
 
+/// Volumes of more than that are not measured in more than one form: 320³.
+const LARGE_BYTES: u64 = 8 * 320 * 320 * 320;
+
 /// A renderer with scenes on its device that differ in their light alone.
 pub struct GpuBench {
     renderer: GpuRenderer,
@@ -73,7 +76,8 @@ impl GpuBench {
                 }
                 _ => None,
             };
-            let variant = Variant::of(scene, layers, light_volumes.as_ref(), up()?.levels.leaps);
+            let variant =
+                Variant::of(scene, layers, light_volumes.as_ref(), [up()?.levels.leaps, volume.is_sparse()]);
             let integrate = |pass| {
                 Work::Integrate(Box::new(pass), Tiler::new(None, None, scene.volume_lights().len()), None)
             };
@@ -81,11 +85,18 @@ impl GpuBench {
             let (mut work, mut bare) = (Vec::new(), Vec::new());
             if number == 0 {
                 work.push(("gbuffer", Work::Gbuffer));
-                for (name, leaps) in [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)] {
-                    let mut resident = Resident::default();
-                    resident.levels.leaps = leaps;
-                    let up = Uploaded::new(gpu, &mut resident, scene, volume, mesh)?;
-                    let variant = Variant::of(scene, layers, None, up.levels.leaps);
+                // A large volume is on the device once.
+                let is_large = volume.cells.bytes() > LARGE_BYTES || volume.is_sparse();
+                let walks = [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)];
+                for (name, leaps) in walks.into_iter().take(if is_large { 1 } else { 2 }) {
+                    let mut own = Resident::default();
+                    own.levels.leaps = leaps;
+                    let up = match is_large {
+                        true => up()?,
+                        false => Uploaded::new(gpu, &mut own, scene, volume, mesh)?,
+                    };
+                    let variant =
+                        Variant::of(scene, layers, None, [leaps == Leaps::Always, volume.is_sparse()]);
                     let work = integrate(Integrate::bare(gpu, variant));
                     let (filled, reflection) =
                         (visibility.none(), Reflections::default().bind(gpu, scene, volume));

@@ -31,6 +31,7 @@ pub fn source(many: bool) -> String {
     };
     [
         include_str!("../../shaders/levels.wgsl"),
+        include_str!("../../shaders/cells.wgsl"),
         include_str!("../../shaders/matter.wgsl"),
         include_str!("../../shaders/lookup.wgsl"),
         include_str!("../../shaders/optical_depth.wgsl"),
@@ -57,14 +58,20 @@ pub struct Variant {
     pyramid: bool,
     trilinear: bool,
     leaps: bool,
+    sparse: bool,
     many: bool,
     exponent: u32,
 }
 
 impl Variant {
     /// For a scene of which at most `layers` sheets lie under a pixel, the light volumes it has if its
-    /// visibility is cached, and whether the levels are made for leaps.
-    pub fn of(scene: &Scene, layers: u32, light_volumes: Option<&LightVolumes>, leaps: bool) -> Self {
+    /// visibility is cached, whether the levels are made for leaps, and whether cells are stored in bricks.
+    pub fn of(
+        scene: &Scene,
+        layers: u32,
+        light_volumes: Option<&LightVolumes>,
+        [leaps, sparse]: [bool; 2],
+    ) -> Self {
         Variant {
             lights: scene.volume_lights().len().min(2) as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
@@ -78,6 +85,7 @@ impl Variant {
             pyramid: scene.trace.filter == Prefilter::Pyramid,
             trilinear: scene.trace.lookup == Lookup::Trilinear,
             leaps,
+            sparse,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -175,6 +183,7 @@ impl Integrate {
             ("PYRAMID", number(variant.pyramid)),
             ("TRILINEAR", number(variant.trilinear)),
             ("LEAPS", number(variant.leaps)),
+            ("SPARSE", number(variant.sparse)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
@@ -182,8 +191,10 @@ impl Integrate {
 
     /// The bench's bare walk: the same bindings, no light.
     pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
-        let constants = [("LEAPS", f64::from(u8::from(variant.leaps)))];
-        Self::compile(gpu, variant, include_str!("../../shaders/bare.wgsl"), &constants, false)
+        let number = |on: bool| f64::from(u8::from(on));
+        let constants = [("LEAPS", number(variant.leaps)), ("SPARSE", number(variant.sparse))];
+        let source = [include_str!("../../shaders/cells.wgsl"), include_str!("../../shaders/bare.wgsl")];
+        Self::compile(gpu, variant, &source.join("\n"), &constants, false)
     }
 
     fn compile(gpu: &Gpu, variant: Variant, stage: &str, constants: &[(&str, f64)], dry: bool) -> Self {
@@ -239,6 +250,7 @@ impl Integrate {
             entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
             entry(15, reflection.profiles.as_entire_binding()),
             entry(16, groups.buffer.as_entire_binding()),
+            entry(17, wgpu::BindingResource::TextureView(&up.bricks)),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -283,7 +295,7 @@ impl Integrate {
 }
 
 /// The bindings of `shaders/integrate.wgsl`, in order.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 17] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
         TextureSampleType, TextureViewDimension,
@@ -303,13 +315,14 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 17] {
         view_dimension: TextureViewDimension::D3,
     };
     let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Uint));
+    let bricks = cells(TextureFormat::Rgba32Uint);
     let list = buffer(BufferBindingType::Storage { read_only: true });
     let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
     let table = texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3);
     let linear = BindingType::Sampler(SamplerBindingType::Filtering);
     let types = [
         uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list, uniform, table,
-        linear, list, list,
+        linear, list, list, bricks,
     ];
     let mut binding = 0;
     types.map(|ty| {

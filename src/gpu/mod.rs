@@ -1,6 +1,7 @@
 //! The frame on the GPU: upload, gbuffer, integrate, resolve, read back.
 
 mod bench;
+mod bricks;
 mod device;
 mod gbuffer;
 mod grid;
@@ -45,7 +46,7 @@ use crate::job::Monitor;
 use crate::overlap;
 use crate::scene::{self, Mesh, Scene};
 use crate::visibility::LightVolumes;
-use crate::volume::{Leaps, VolumeTexture};
+use crate::volume::{Leaps, Storage, VolumeTexture};
 use layout::Tile;
 use rasters::{Key, Rasters};
 
@@ -243,7 +244,7 @@ impl GpuRenderer {
             scope.spawn(|| gbuffer.compile(gpu, scene, layers));
             if scene.visibility != scene::Visibility::Cached {
                 // Most volumes are too full for leaps.
-                let variant = Variant::of(scene, layers, None, false);
+                let variant = Variant::of(scene, layers, None, [false, scene.storage == Storage::Sparse]);
                 let known = |pass: &Integrate| pass.variant == variant;
                 recent(integrate, KEPT_PIPELINES, known, || Integrate::new(gpu, variant));
             }
@@ -281,7 +282,8 @@ impl GpuRenderer {
         let reflection = self.reflections.bind(gpu, scene, volume);
         seconds.upload = clock.elapsed().as_secs_f64();
         let clock = Instant::now();
-        let variant = Variant::of(scene, layers, light_volumes.as_ref(), up.levels.leaps);
+        let variant =
+            Variant::of(scene, layers, light_volumes.as_ref(), [up.levels.leaps, volume.is_sparse()]);
         let integrate = recent(
             &mut self.integrate,
             KEPT_PIPELINES,
@@ -332,7 +334,7 @@ impl GpuRenderer {
         let look = layout::Develop::new(&image.look);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
-        let like: Like = (variant, std::sync::Arc::as_ptr(&volume.cells).addr(), whole);
+        let like: Like = (variant, volume.cells.address(), whole);
         let known = self.learned.filter(|(of, _)| *of == like).map(|(_, pixels)| pixels);
         let mut tiler = Tiler::new(options.tile_pixels, known, scene.volume_lights().len());
         for window in options.grid.windows(whole, part) {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::bricks;
 use super::device::Gpu;
 use super::layout::{self, Coat, Quad};
 use super::rasters::hash_twice;
@@ -17,7 +18,7 @@ use crate::scene::{Mesh, Scene, Vertex, tiles::steps};
 use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
-const SLAB_BYTES: usize = 64 << 20;
+pub(super) const SLAB_BYTES: usize = 64 << 20;
 
 /// What stays on the device from frame to frame: the volume's cells and the mesh, known again by the
 /// memory they came from.
@@ -25,7 +26,7 @@ const SLAB_BYTES: usize = 64 << 20;
 pub struct Resident {
     /// The volume's levels, and whether they are made for leaps.
     pub levels: KeptLevels,
-    volume: Option<(Levels, wgpu::TextureView)>,
+    volume: Option<(Levels, [wgpu::TextureView; 2])>,
     mesh: Option<ResidentMesh>,
     /// The environment's map, and its number.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
@@ -51,8 +52,10 @@ struct ResidentMesh {
 pub struct Uploaded {
     /// The volume's levels.
     pub levels: Levels,
-    /// They as a 3-D storage texture, `rg32uint`; [`Stack`].
+    /// They as a 3-D storage texture, `rg32uint`; [`Stack`]. Of sparse storage the stored cells.
     pub volume: wgpu::TextureView,
+    /// Bricks of sparse storage, `rgba32uint`.
+    pub bricks: wgpu::TextureView,
     /// `array<Quad>`.
     pub quads: wgpu::Buffer,
     /// Number of quads.
@@ -120,6 +123,7 @@ impl Uploaded {
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
         pool_parts.resize_with(pools.len(), Vec::new);
         let levels = resident.levels.get(scene, volume);
+        let [cells, bricks] = resident.volume(gpu, &levels)?;
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
@@ -131,7 +135,8 @@ impl Uploaded {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
                 map,
             }),
-            volume: resident.volume(gpu, &levels)?,
+            volume: cells,
+            bricks,
             levels,
             // A buffer without any would be too small to bind.
             quads: gpu.buffer_with(
@@ -156,17 +161,21 @@ impl Uploaded {
 }
 
 impl Resident {
-    fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
-        if let Some((old, view)) = &self.volume
+    /// Cells and bricks.
+    fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<[wgpu::TextureView; 2]> {
+        if let Some((old, views)) = &self.volume
             && Arc::ptr_eq(old, levels)
         {
-            return Ok(view.clone());
+            return Ok(views.clone());
         }
         // The old volume goes first: two large ones might not fit.
         self.volume = None;
-        let view = upload_volume(gpu, levels)?;
-        self.volume = Some((levels.clone(), view.clone()));
-        Ok(view)
+        let views = match levels[0].cells.bricks() {
+            Some(stored) => bricks::upload(gpu, stored)?,
+            None => [upload_volume(gpu, levels)?, bricks::none(gpu)],
+        };
+        self.volume = Some((levels.clone(), views.clone()));
+        Ok(views)
     }
 
     /// The map, and its number.
@@ -219,16 +228,7 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
             format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
         ));
     }
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("volume"),
-        size: wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: nz },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D3,
-        format: wgpu::TextureFormat::Rg32Uint,
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
+    let texture = bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
     for (number, level) in levels.iter().enumerate() {
         upload_level(gpu, &texture, stack.place(number as u32), level)?;
     }
@@ -244,25 +244,41 @@ fn upload_level(
     let [nx, ny, _] = volume.size;
     let layer = nx as usize * ny as usize;
     let layers = (SLAB_BYTES / (layer * size_of::<Cell>())).max(1);
-    for (slab, cells) in volume.cells.chunks(layers * layer).enumerate() {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x, y, z: z + (slab * layers) as u32 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            bytemuck::cast_slice(cells),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(nx * size_of::<Cell>() as u32),
-                rows_per_image: Some(ny),
-            },
-            wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: (cells.len() / layer) as u32 },
-        );
-        gpu.run(gpu.encoder("upload volume"))?;
+    let cells = volume.cells.dense().expect("levels are stored whole");
+    for (slab, cells) in cells.chunks(layers * layer).enumerate() {
+        write_layers(gpu, texture, [x, y, z + (slab * layers) as u32], [nx, ny], cells)?;
     }
     Ok(())
+}
+
+/// Puts whole layers of `width` × `height` texels into a 3-D texture, and waits for it.
+pub(super) fn write_layers<T: bytemuck::Pod>(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    [x, y, z]: [u32; 3],
+    [width, height]: [u32; 2],
+    texels: &[T],
+) -> Result<()> {
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: 0,
+            origin: wgpu::Origin3d { x, y, z },
+            aspect: wgpu::TextureAspect::All,
+        },
+        bytemuck::cast_slice(texels),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(width * size_of::<T>() as u32),
+            rows_per_image: Some(height),
+        },
+        wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: (texels.len() / (width as usize * height as usize)) as u32,
+        },
+    );
+    gpu.run(gpu.encoder("upload volume")).map(drop)
 }
 
 fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {

@@ -20,6 +20,7 @@ use crate::volume::{Levels, Stack};
 pub fn source() -> String {
     [
         include_str!("../../shaders/levels.wgsl"),
+        include_str!("../../shaders/cells.wgsl"),
         include_str!("../../shaders/matter.wgsl"),
         include_str!("../../shaders/optical_depth.wgsl"),
         include_str!("../../shaders/visibility.wgsl"),
@@ -64,6 +65,7 @@ struct Kind {
     form: Form,
     pyramid: bool,
     leaps: bool,
+    sparse: bool,
     /// Of empty cells too.
     everywhere: bool,
 }
@@ -170,7 +172,7 @@ impl Visibility {
             FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
         let on_host = match self.filling {
-            Filling::Auto => gpu.is_software(),
+            Filling::Auto => gpu.is_software() && up.levels[0].cells.dense().is_some(),
             Filling::Device => false,
             Filling::Host => true,
         };
@@ -206,6 +208,7 @@ impl Visibility {
                 form: plan.form,
                 pyramid: up.levels.len() > 1,
                 leaps: up.levels.leaps,
+                sparse: up.levels[0].is_sparse(),
                 everywhere,
             },
         );
@@ -225,6 +228,7 @@ impl Visibility {
                 entry(2, wgpu::BindingResource::TextureView(&up.volume)),
                 entry(3, occupied.as_entire_binding()),
                 entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
+                entry(5, wgpu::BindingResource::TextureView(&up.bricks)),
             ],
         });
         let total = u64::from(count) * plan.volumes.len() as u64;
@@ -277,9 +281,7 @@ impl Visibility {
             let [nx, ny, nz] = level.size;
             let [_, y0, z0] = stack.place(number);
             let occupied = |x: u32, y: u32, z: u32| {
-                everywhere
-                    || (z..(z + CELLS_A_WORD).min(nz))
-                        .any(|z| level.cells[level.index(x, y, z)].rho_code() > 0)
+                everywhere || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cell(x, y, z).rho_code() > 0)
             };
             for z in (0..nz).step_by(CELLS_A_WORD as usize) {
                 let column = |x, y| ((z0 + z) / CELLS_A_WORD * height + y0 + y) * width + x;
@@ -303,6 +305,7 @@ impl Visibility {
             ("CODES", number(kind.form == Form::Codes)),
             ("PYRAMID", number(kind.pyramid)),
             ("LEAPS", number(kind.leaps)),
+            ("SPARSE", number(kind.sparse)),
             ("EVERYWHERE", number(kind.everywhere)),
         ];
         let source = Source::read("visibility", &shader_source(&source()));

@@ -8,7 +8,9 @@ use crate::cache::Cache;
 use crate::error::Result;
 use crate::job::Monitor;
 use crate::scene::{Cost, Scene};
-use crate::volume::{Structure, VolumeTexture, WaterSpec, set_density_and_reflection};
+use crate::volume::{
+    Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, set_density_and_reflection,
+};
 
 /// Keeps one volume texture.
 #[derive(Default)]
@@ -20,9 +22,9 @@ pub struct VolumeStock {
 /// What a volume was made from.
 #[derive(Clone, PartialEq)]
 enum Source {
-    Water(WaterSpec),
-    /// Path, and what tells one version of the file from the next.
-    File(PathBuf, Option<SystemTime>, u64),
+    Water(WaterSpec, Storage),
+    /// Path, how it is to be stored, and what tells one version of the file from the next.
+    File(PathBuf, StorageChoice, Option<SystemTime>, u64),
 }
 
 impl VolumeStock {
@@ -45,11 +47,11 @@ impl VolumeStock {
         monitor: &dyn Monitor,
     ) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
         let source = match &scene.volume_file {
-            None => Source::Water(scene.water),
+            None => Source::Water(scene.water, scene.storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();
                 let changed = meta.as_ref().and_then(|m| m.modified().ok());
-                Source::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
+                Source::File(path.clone(), scene.asked_storage, changed, meta.map_or(0, |m| m.len()))
             }
         };
         let (volume, cost) = match (self.last.take(), &source) {
@@ -57,13 +59,14 @@ impl VolumeStock {
                 self.last = Some((old, volume.clone()));
                 return Ok((volume, None));
             }
-            (Some((Source::Water(old), volume)), Source::Water(new)) if same_curves(&old, new) => {
+            (Some((Source::Water(old, stored), volume)), Source::Water(new, wanted))
+                if stored == *wanted && same_curves(&old, new) =>
+            {
                 let mut changed = VolumeTexture { alpha: new.alpha, ..(*volume).clone() };
                 if (WaterSpec { alpha: new.alpha, ..old }) == *new {
                     (changed, Cost::Uniform)
                 } else {
-                    let cells: &mut Vec<_> = Arc::make_mut(&mut changed.cells);
-                    set_density_and_reflection(new, cells);
+                    set_density_and_reflection(new, &mut changed.cells);
                     (changed, Cost::Upload)
                 }
             }

@@ -5,7 +5,7 @@ use crate::frame::Window;
 use crate::gpu::{Grid, canvas_bytes};
 use crate::overlap;
 use crate::scene::{Image, Pool, Prefilter, Scene, Vertex};
-use crate::volume::Cell;
+use crate::volume::{Storage, dense_bytes, expected_cells, sparse_bytes};
 
 /// Bytes of a strip's pixel on the host: radiance 16, counts 8, picture 4; and as R, G, B bytes 3 for the
 /// strip that is being encoded and 3 for the one that waits.
@@ -75,18 +75,15 @@ pub fn memory_of(
 ) -> Result<(u64, Vec<Window>)> {
     let image = &scene.image;
     check_image(image, memory)?;
-    let cells = match scene.volume_file {
+    let water = &scene.water;
+    let volume = match (&scene.volume_file, scene.storage) {
         // Read by now, and checked against the whole budget.
-        Some(_) => 0,
-        None => scene.water.size.iter().map(|&n| u64::from(n)).product(),
+        (Some(_), _) => 0,
+        (None, Storage::Dense) => dense_bytes(water.size, scene.trace.filter == Prefilter::Pyramid),
+        // Building it, which takes more, has been checked by now.
+        (None, Storage::Sparse) => sparse_bytes(water.size, expected_cells(water), 0),
     };
-    let coarse = match scene.trace.filter {
-        // Of the volume's cells a seventh on the host, and up to three quarters on the device.
-        Prefilter::Pyramid => cells.saturating_mul(size_of::<Cell>() as u64),
-        Prefilter::None => 0,
-    };
-    // On the host, there again where its empty cells hold boxes, and on the device.
-    let volume = cells.saturating_mul(3 * size_of::<Cell>() as u64).saturating_add(coarse);
+    let volume = u64::try_from(volume).unwrap_or(u64::MAX);
     let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
     let vertices = vertices + (scene.pools.len() * Pool::VERTICES) as u64;
     let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));

@@ -114,14 +114,8 @@ pub fn layer_depths(volume: &VolumeTexture, attenuation: &Attenuation, depth_m: 
         Attenuation::PathLength { sigma } => sigma as f64 * depth_m as f64,
         Attenuation::PerCell { tau } => tau as f64,
     } * volume.alpha as f64;
-    volume
-        .cells
-        .par_chunks(nx * ny)
-        .map(|layer| {
-            let codes: u64 = layer.iter().map(|cell| cell.rho_code() as u64).sum();
-            whole * codes as f64 / (65535.0 * (nx * ny) as f64)
-        })
-        .collect()
+    let mean = |codes: u64| whole * codes as f64 / (65535.0 * (nx * ny) as f64);
+    volume.layer_codes().into_iter().map(mean).collect()
 }
 
 /// P: what the diffuse light of a slab gives to each layer, by the lit face, the light's cosine and the layer.

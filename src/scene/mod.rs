@@ -43,7 +43,10 @@ use crate::curve::{CurveShape, levels_for};
 use crate::environment::{self, Environment, EnvironmentStock};
 use crate::error::{Error, Result};
 use crate::haze::Haze;
-use crate::volume::{VolumeTexture, WaterSpec, kept_water, read_npz};
+use crate::volume::{
+    Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water, kept_water, read_npz,
+    storage_of,
+};
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
 /// tile of a picture would take longer than drivers wait.
@@ -60,6 +63,10 @@ pub struct Scene {
     pub water: WaterSpec,
     /// The `.npz` to take the volume from, resolved and inside the allowed folders.
     pub volume_file: Option<PathBuf>,
+    /// How the volume's cells are stored.
+    pub storage: Storage,
+    /// What the scene says of it.
+    pub asked_storage: StorageChoice,
     /// How far the volume has moved down the flow, in lengths of the volume.
     pub flow: f32,
     /// The volume's quads.
@@ -174,8 +181,10 @@ impl Scene {
             file if file.is_empty() => None,
             file => Some(parts::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
         };
+        let asked = parts::storage(v)?;
+        let mut storage = Storage::Dense;
         if volume_file.is_none() {
-            crate::volume::check_budget(size, water.strand_bytes(), limits.memory)?;
+            storage = storage_of(&water, asked, limits.memory)?;
             let curves = water.across as u128 * water.deep as u128;
             let points = curves << levels;
             if points > 1 << 36 {
@@ -219,6 +228,8 @@ impl Scene {
             name: name.into(),
             water,
             volume_file,
+            storage,
+            asked_storage: asked,
             flow: v.float("volume.flow"),
             quads: quads::quads(v)?,
             lights: parts::lights(v, sun, environment_lights.len())?,
@@ -262,9 +273,10 @@ impl Scene {
 
     /// Builds the volume texture, or reads it from the scene's file.
     pub fn volume(&self, memory: u64, monitor: &dyn crate::job::Monitor) -> Result<VolumeTexture> {
-        match &self.volume_file {
-            Some(path) => read_npz(path, memory),
-            None => crate::volume::build_water(&self.water, monitor),
+        match (&self.volume_file, self.storage) {
+            (Some(path), _) => read_npz(path, self.asked_storage, memory),
+            (None, Storage::Dense) => build_water(&self.water, monitor),
+            (None, Storage::Sparse) => build_sparse_water(&self.water, memory, monitor),
         }
     }
 
@@ -276,7 +288,10 @@ impl Scene {
         monitor: &dyn crate::job::Monitor,
     ) -> Result<VolumeTexture> {
         match cache {
-            Some(cache) if self.volume_file.is_none() => kept_water(&self.water, cache, monitor),
+            // A file of the size of those that are sparse would push all others out.
+            Some(cache) if self.volume_file.is_none() && self.storage == Storage::Dense => {
+                kept_water(&self.water, cache, monitor)
+            }
             _ => self.volume(memory, monitor),
         }
     }
@@ -335,6 +350,19 @@ impl Scene {
         directional.rev().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
     }
 
+    /// What the user may want to know about how it is rendered.
+    pub fn notes(&self, volume: &VolumeTexture) -> Vec<String> {
+        let mut notes = self.environment.iter().map(Environment::words).collect::<Vec<_>>();
+        if volume.is_sparse() && self.asked_storage == StorageChoice::Auto {
+            let [nx, ny, nz] = volume.size;
+            notes.push(format!(
+                "the volume of {nx}×{ny}×{nz} cells is stored sparse, {} of them: all would not fit the memory",
+                volume.cells.stored().len()
+            ));
+        }
+        notes
+    }
+
     /// What is valid but surely not meant.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
@@ -346,7 +374,7 @@ impl Scene {
         } else if unlit {
             warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
         } else if !self.quads.is_empty()
-            && (volume.alpha == 0.0 || !volume.cells.iter().any(|c| c.rho_code() > 0))
+            && (volume.alpha == 0.0 || !volume.cells.stored().iter().any(|c| c.rho_code() > 0))
         {
             warnings.push("the volume is empty: no cell has density".into());
         }

@@ -11,7 +11,7 @@ use crate::environment::{Environment, Settings, Sky, Source};
 use crate::error::{Error, Result};
 use crate::haze::Haze;
 use crate::strand::StrandParams;
-use crate::volume::Structure;
+use crate::volume::{StorageChoice, Structure};
 
 pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<Environment>> {
     let source = match v.text("environment.kind").as_str() {
@@ -108,6 +108,20 @@ pub(super) fn structure(v: &Values) -> Structure {
         strand_length: v.float("volume.strand_length"),
         coverage: v.float("volume.coverage"),
         crest: v.float("volume.crest"),
+    }
+}
+
+/// Coarse levels are made of all cells: with them sparse storage is refused, and not chosen.
+pub(super) fn storage(v: &Values) -> Result<StorageChoice> {
+    let pyramid = v.text("trace.filter") == "pyramid";
+    match v.text("volume.storage").as_str() {
+        "sparse" if pyramid => Err(Error::input(
+            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": coarse levels are made of all cells",
+            "set trace.filter=none, or volume.storage=dense",
+        )),
+        "sparse" => Ok(StorageChoice::Sparse),
+        "auto" if !pyramid => Ok(StorageChoice::Auto),
+        _ => Ok(StorageChoice::Dense),
     }
 }
 

@@ -44,8 +44,12 @@ impl Cell {
 
     /// The same cell with ρ before α, k_d and k_s, each from 0 to 1.
     pub fn with_density(self, rho: f32, k_d: f32, k_s: f32) -> Self {
-        let unorm = |x: f32, scale: f32| (x.clamp(0.0, 1.0) * scale + 0.5) as u32;
-        Cell { x: unorm(rho, 65535.0) | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }
+        Cell { x: unorm(rho, 65535.0), ..self }.with_reflection(k_d, k_s)
+    }
+
+    /// The same cell with k_d and k_s, each from 0 to 1.
+    pub fn with_reflection(self, k_d: f32, k_s: f32) -> Self {
+        Cell { x: self.rho_code() | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }
     }
 
     /// Whether v is set.
@@ -87,4 +91,9 @@ impl Cell {
     pub fn v(self) -> Vec3 {
         self.v_code().normalize_or_zero()
     }
+}
+
+#[inline]
+fn unorm(x: f32, scale: f32) -> u32 {
+    (x.clamp(0.0, 1.0) * scale + 0.5) as u32
 }

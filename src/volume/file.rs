@@ -12,7 +12,9 @@ use glam::Vec3;
 use npyz::WriterBuilder;
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-use super::{Cell, VolumeTexture, check_budget};
+use super::bricks::{BRICK, Bricks, Packer};
+use super::storage::{Storage, StorageChoice, check_stored, file_storage};
+use super::{Cell, Cells, VolumeTexture};
 use crate::error::{Error, Result};
 
 /// NumPy pads its headers to 128 bytes; a longer one than this is not an array of numbers, and a
@@ -101,7 +103,9 @@ fn write_array<W: Write + Seek>(
 
 /// Reads a volume of at most `budget` bytes. Every value is checked; nothing of the size the file
 /// claims is allocated before it was compared with the budget.
-pub fn read_npz(path: &Path, budget: u64) -> Result<VolumeTexture> {
+///
+/// It is stored as `asked`, or, where that is left open, sparse if all its cells would not fit.
+pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<VolumeTexture> {
     let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
     if !meta.is_file() {
         return Err(Error::input(
@@ -112,6 +116,7 @@ pub fn read_npz(path: &Path, budget: u64) -> Result<VolumeTexture> {
     let file = File::open(path).map_err(|e| Error::read(path, e))?;
     let mut reader = Reader {
         path,
+        asked,
         budget,
         zip: ZipArchive::new(BufReader::new(file)).map_err(|e| bad(path, e.to_string()))?,
     };
@@ -127,6 +132,7 @@ fn bad(path: &Path, what: String) -> Error {
 
 struct Reader<'a> {
     path: &'a Path,
+    asked: StorageChoice,
     budget: u64,
     zip: ZipArchive<BufReader<File>>,
 }
@@ -142,42 +148,93 @@ impl Reader<'_> {
         if size.contains(&0) {
             return Err(bad(self.path, format!("rho has shape {shape:?}: a volume has at least one cell")));
         }
-        check_budget(size, 0, self.budget)?;
-        let mut cells = vec![Cell::default(); (nx * ny * nz) as usize];
-        self.each("v", Some(&[nz, ny, nx, 3]), |i, v: [f32; 3]| {
-            let v = Vec3::from_array(v);
-            let length = v.length();
-            if v == Vec3::ZERO || (length - 1.0).abs() <= UNIT_TOLERANCE {
-                cells[i] = Cell::from_direction(v);
-                Ok(())
-            } else {
-                Err(format!("{v:?} has length {length}: v is unit or zero"))
-            }
-        })?;
-        let mut rho = vec![0.0f32; cells.len()];
-        self.each("rho", Some(&[nz, ny, nx]), |i, [value]: [f32; 1]| {
+        let mut cells = match file_storage(size, self.asked, self.budget)? {
+            Storage::Dense => self.directions(size)?,
+            Storage::Sparse => self.packed_directions(size)?,
+        };
+        let mut places = Places::new(size);
+        self.each("rho", Some(&[nz, ny, nx]), |_, [value]: [f32; 1]| {
+            let cell = places.next(&mut cells);
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{value} is outside 0..=1"));
             }
             if value > alpha * 1.000001 {
                 return Err(format!("{value} is more than the file's alpha {alpha}"));
             }
-            if value > 0.0 && !cells[i].has_direction() {
+            let cell = cell.filter(|cell| cell.has_direction());
+            if value > 0.0 && cell.is_none() {
                 return Err(format!("{value} where v is zero: a cell with density needs a direction"));
             }
-            rho[i] = if alpha > 0.0 { value / alpha } else { 0.0 };
+            if let Some(cell) = cell {
+                *cell = cell.with_density(if alpha > 0.0 { value / alpha } else { 0.0 }, 0.0, 0.0);
+            }
             Ok(())
         })?;
-        self.each("k", Some(&[nz, ny, nx, 2]), |i, [k_d, k_s]: [f32; 2]| {
+        let mut places = Places::new(size);
+        self.each("k", Some(&[nz, ny, nx, 2]), |_, [k_d, k_s]: [f32; 2]| {
+            let cell = places.next(&mut cells);
             if !(0.0..=1.0).contains(&k_d) || !(0.0..=1.0).contains(&k_s) {
                 return Err(format!("({k_d}, {k_s}) is outside 0..=1"));
             }
-            if cells[i].has_direction() {
-                cells[i] = cells[i].with_density(rho[i], k_d, k_s);
+            if let Some(cell) = cell.filter(|cell| cell.has_direction()) {
+                *cell = cell.with_reflection(k_d, k_s);
             }
             Ok(())
         })?;
         Ok(VolumeTexture { size, alpha, cells: cells.into() })
+    }
+
+    /// Cells with directions alone.
+    fn directions(&mut self, size: [u32; 3]) -> Result<Form> {
+        let count = size.iter().map(|&n| n as usize).product();
+        let mut cells = vec![Cell::default(); count];
+        self.each_direction(size, |i, cell| {
+            cells[i] = cell;
+            Ok(())
+        })?;
+        Ok(Form::Dense(cells))
+    }
+
+    /// The same, packed while they come: four layers at a time are held whole.
+    fn packed_directions(&mut self, size: [u32; 3]) -> Result<Form> {
+        let area = size[0] as usize * size[1] as usize;
+        let (all, slab) = (area * size[2] as usize, area * BRICK as usize);
+        let budget = self.budget;
+        let mut packer = Packer::new(size);
+        let mut layers: Vec<Cell> = Vec::with_capacity(slab.min(all));
+        let mut too_large = None;
+        let read = self.each_direction(size, |i, cell| {
+            layers.push(cell);
+            if layers.len() == slab || i + 1 == all {
+                packer.push(&layers);
+                layers.clear();
+                if let Err(e) = check_stored(size, packer.count(), 0, budget) {
+                    too_large = Some(e);
+                    return Err(String::new());
+                }
+            }
+            Ok(())
+        });
+        too_large.map_or(read, Err)?;
+        Ok(Form::Sparse(packer.finish()))
+    }
+
+    fn each_direction(
+        &mut self,
+        size: [u32; 3],
+        mut take: impl FnMut(usize, Cell) -> std::result::Result<(), String>,
+    ) -> Result<()> {
+        let [nx, ny, nz] = size.map(u64::from);
+        self.each("v", Some(&[nz, ny, nx, 3]), |i, v: [f32; 3]| {
+            let v = Vec3::from_array(v);
+            let length = v.length();
+            if v == Vec3::ZERO || (length - 1.0).abs() <= UNIT_TOLERANCE {
+                take(i, Cell::from_direction(v))
+            } else {
+                Err(format!("{v:?} has length {length}: v is unit or zero"))
+            }
+        })
+        .map(drop)
     }
 
     fn alpha(&mut self) -> Result<f32> {
@@ -238,6 +295,49 @@ impl Reader<'_> {
             return Err(fault(format!("has more than {rows} rows")));
         }
         Ok(shape)
+    }
+}
+
+/// Cells that are being read.
+enum Form {
+    Dense(Vec<Cell>),
+    Sparse(Bricks),
+}
+
+impl From<Form> for Cells {
+    fn from(form: Form) -> Cells {
+        match form {
+            Form::Dense(cells) => cells.into(),
+            Form::Sparse(bricks) => bricks.into(),
+        }
+    }
+}
+
+/// Goes through the places of a volume in the order of its cells.
+struct Places {
+    size: [u32; 3],
+    at: [u32; 3],
+    index: usize,
+}
+
+impl Places {
+    fn new(size: [u32; 3]) -> Places {
+        Places { size, at: [0; 3], index: 0 }
+    }
+
+    /// The next cell, if it is stored.
+    #[inline]
+    fn next<'a>(&mut self, cells: &'a mut Form) -> Option<&'a mut Cell> {
+        let ([x, y, z], index) = (self.at, self.index);
+        self.index += 1;
+        self.at[0] += 1;
+        if self.at[0] == self.size[0] {
+            self.at = if y + 1 == self.size[1] { [0, 0, z + 1] } else { [0, y + 1, z] };
+        }
+        match cells {
+            Form::Dense(cells) => cells.get_mut(index),
+            Form::Sparse(bricks) => bricks.at_mut(x, y, z),
+        }
     }
 }
 

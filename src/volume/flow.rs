@@ -3,6 +3,7 @@
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
+use super::bricks::{BRICK, Bricks, Marks, parted};
 use super::bundle::curve_points;
 use super::ripple::Ripple;
 use super::water::WaterSpec;
@@ -15,6 +16,8 @@ use crate::walk::{Walk, floor_cell};
 const CURVES_PER_TASK: usize = 64;
 /// Tasks whose contributions are held at once; with 600 cells a curve these are about 40 MB.
 const TASKS_PER_ROUND: usize = 64;
+/// Curves that tell how many cells all will pass.
+const SAMPLE_CURVES: usize = 32;
 
 /// Part of a curve inside one cell: index of the cell within its slab, length × direction in cells.
 type Contribution = (u32, Vec3);
@@ -41,23 +44,62 @@ impl Flow {
         self.strands.get(index).map_or(0.0, |[sum, squares]| sum / squares.max(1e-30).sqrt())
     }
 
-    /// Walks all curves.
-    ///
-    /// They are walked in parallel; their contributions are added slab by slab in z, within a slab in
-    /// the curves' order, so the sums do not depend on the number of threads.
+    /// Walks all curves, for every cell.
     pub fn new(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Flow> {
         let [nx, ny, nz] = spec.size.map(|n| n as usize);
+        let layers_per_slab = nz.div_ceil(16);
+        let slab = nx * ny * layers_per_slab;
+        let lengths: Vec<usize> =
+            (0..nz.div_ceil(layers_per_slab)).map(|i| slab.min(nx * ny * nz - i * slab)).collect();
+        let place = |cell: IVec3| {
+            let z = cell.z as usize;
+            let in_slab = ((z % layers_per_slab) * ny + cell.y as usize) * nx + cell.x as usize;
+            (z / layers_per_slab, in_slab as u32)
+        };
+        Flow::summed(spec, &lengths, place, [0, 1], monitor)
+    }
+
+    /// As [`Flow::new`], for the cells that `bricks` will store, in their order: the same sums.
+    pub fn packed(spec: &WaterSpec, bricks: &Bricks, monitor: &dyn Monitor) -> Result<Flow> {
+        let layers = bricks.layers();
+        let layers_per_slab = layers.len().div_ceil(16);
+        let lengths: Vec<usize> = layers.chunks(layers_per_slab).map(|part| part.iter().sum()).collect();
+        let sums = lengths.iter().scan(0, |sum, length| {
+            *sum += length;
+            Some(*sum - length)
+        });
+        let firsts: Vec<usize> = sums.collect();
+        let place = |cell: IVec3| {
+            let [x, y, z] = cell.to_array().map(|c| c as u32);
+            let slab = (z / BRICK) as usize / layers_per_slab;
+            let place = bricks.place(x, y, z).expect("it was marked by the same walk");
+            (slab, (place - firsts[slab]) as u32)
+        };
+        Flow::summed(spec, &lengths, place, [1, 2], monitor)
+    }
+
+    /// Walks all curves. `place` says in which slab a cell is, of those with these `lengths`, and where in it; this is round
+    /// `round` of `rounds`.
+    ///
+    /// They are walked in parallel; their contributions are added slab by slab in z, within a slab in
+    /// the curves' order, so the sums depend neither on the number of threads nor on the slabs.
+    fn summed(
+        spec: &WaterSpec,
+        lengths: &[usize],
+        place: impl Fn(IVec3) -> (usize, u32) + Sync,
+        [before, rounds]: [u64; 2],
+        monitor: &dyn Monitor,
+    ) -> Result<Flow> {
         let coherent = spec.structure.coherence > 0.0;
-        let cells = nx * ny * nz;
+        let cells = lengths.iter().sum();
         let mut directions = vec![Vec3::ZERO; cells];
         let mut strands = vec![[0.0; 2]; if coherent { cells } else { 0 }];
-        let layers_per_slab = nz.div_ceil(16);
-        let slab_cells = nx * ny * layers_per_slab;
-        let slabs = nz.div_ceil(layers_per_slab);
+        let slabs = lengths.len();
         let curves = spec.across as usize * spec.deep as usize;
         let starts: Vec<usize> = (0..curves).step_by(CURVES_PER_TASK).collect();
         for (round, tasks) in starts.chunks(TASKS_PER_ROUND).enumerate() {
-            monitor.progress("curves", (round * TASKS_PER_ROUND * CURVES_PER_TASK) as u64, curves as u64)?;
+            let done = (round * TASKS_PER_ROUND * CURVES_PER_TASK) as u64;
+            monitor.progress("curves", before * curves as u64 + done, rounds * curves as u64)?;
             let tasks: Vec<Vec<Bucket>> = tasks
                 .par_iter()
                 .map(|&first| {
@@ -69,11 +111,9 @@ impl Flow {
                             strand_noise(spec, curve, points.len() - 1, &mut noise);
                         }
                         walk_curve(spec, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
-                            let z = cell.z as usize;
-                            let in_slab =
-                                ((z % layers_per_slab) * ny + cell.y as usize) * nx + cell.x as usize;
-                            let bucket = &mut buckets[z / layers_per_slab];
-                            bucket.parts.push((in_slab as u32, part));
+                            let (slab, in_slab) = place(cell);
+                            let bucket = &mut buckets[slab];
+                            bucket.parts.push((in_slab, part));
                             if coherent {
                                 bucket.noises.push(noise[segment]);
                             }
@@ -82,12 +122,15 @@ impl Flow {
                     buckets
                 })
                 .collect();
-            directions.par_chunks_mut(slab_cells).enumerate().for_each(|(slab, cells)| {
+            parted(&mut directions, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
                 for &(index, v) in tasks.iter().flat_map(|buckets| &buckets[slab].parts) {
                     cells[index as usize] += v;
                 }
             });
-            strands.par_chunks_mut(slab_cells).enumerate().for_each(|(slab, cells)| {
+            if !coherent {
+                continue;
+            }
+            parted(&mut strands, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
                 for bucket in tasks.iter().map(|buckets| &buckets[slab]) {
                     for (&(index, v), w) in bucket.parts.iter().zip(&bucket.noises) {
                         let [sum, squares] = &mut cells[index as usize];
@@ -99,6 +142,43 @@ impl Flow {
         }
         Ok(Flow { directions, strands })
     }
+}
+
+/// Notes every cell that a curve passes.
+pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
+    let marks = Marks::new(spec.size);
+    let curves = spec.across as usize * spec.deep as usize;
+    let starts: Vec<usize> = (0..curves).step_by(CURVES_PER_TASK).collect();
+    for (round, tasks) in starts.chunks(TASKS_PER_ROUND).enumerate() {
+        let done = (round * TASKS_PER_ROUND * CURVES_PER_TASK) as u64;
+        monitor.progress("curves", done, 2 * curves as u64)?;
+        tasks.par_iter().for_each(|&first| {
+            let mut points = Vec::new();
+            for curve in first..(first + CURVES_PER_TASK).min(curves) {
+                curve_points(spec, curve, &mut points);
+                walk_curve(spec, &points, &mut |cell: IVec3, _: Vec3, _: usize| marks.add(cell));
+            }
+        });
+    }
+    Ok(marks)
+}
+
+/// About as many cells as the curves pass: what some of them pass, as if all were strewn independently.
+pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
+    let curves = spec.across as usize * spec.deep as usize;
+    let looked: Vec<usize> = (0..curves).step_by(curves.div_ceil(SAMPLE_CURVES)).collect();
+    let passed: u64 = looked
+        .par_iter()
+        .map(|&curve| {
+            let (mut points, mut passed) = (Vec::new(), 0);
+            curve_points(spec, curve, &mut points);
+            walk_curve(spec, &points, &mut |_: IVec3, _: Vec3, _: usize| passed += 1);
+            passed
+        })
+        .sum();
+    let all = spec.size.iter().map(|&n| f64::from(n)).product::<f64>();
+    let passed = passed as f64 / looked.len() as f64 * curves as f64;
+    (all * -(-passed / all).exp_m1()) as u64
 }
 
 /// The noise that a curve carries, at the start of each of its segments.

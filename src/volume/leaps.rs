@@ -19,8 +19,6 @@
 //! meet 0.66 and 0.83 of their cells, one for each octant 0.40 and 0.60, these boxes 0.29 and 0.46: behind a strand
 //! the nearest occupied cell is the strand itself, and gaps are long and thin.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::{Cell, VolumeTexture};
@@ -83,13 +81,17 @@ fn gcd(a: usize, b: usize) -> usize {
 
 /// The volume with boxes in its empty cells. `between`: for rays that look up what lies between cells, to whom a cell is
 /// empty if its neighbours are, too.
+///
+/// # Panics
+/// If not all cells are stored: there is no room for boxes in what is not.
 pub fn with_boxes(volume: &VolumeTexture, between: bool) -> VolumeTexture {
-    let mut full: Vec<bool> = volume.cells.par_iter().map(|cell| cell.rho_code() > 0).collect();
+    let cells = volume.cells.dense().expect("all cells are stored");
+    let mut full: Vec<bool> = cells.par_iter().map(|cell| cell.rho_code() > 0).collect();
     if between {
         full = widened(volume.size, full);
     }
     let [nx, ny, nz] = volume.size.map(|n| n as usize);
-    let mut cells = volume.cells.to_vec();
+    let mut cells = cells.to_vec();
     for first in (0..nz).step_by(SLAB) {
         let layers = SLAB.min(nz - first);
         let masks = Masks::new(volume.size, &full, first, layers);
@@ -100,7 +102,7 @@ pub fn with_boxes(volume: &VolumeTexture, between: bool) -> VolumeTexture {
             .enumerate()
             .for_each(|(row, (cells, full))| masks.row(row % ny, row / ny, cells, full));
     }
-    VolumeTexture { cells: Arc::new(cells), ..volume.clone() }
+    VolumeTexture { cells: cells.into(), ..volume.clone() }
 }
 
 /// Cells that are full or have a full neighbour, of 26.

@@ -1,27 +1,31 @@
 //! §2 The volume texture: density ρ, flow direction v and reflection coefficients k in every cell.
 
+mod bricks;
 mod bundle;
 mod cell;
+mod cells;
 mod file;
 mod flow;
 mod leaps;
 mod pyramid;
 mod ripple;
+mod storage;
 mod water;
 
+pub use bricks::{BRICK, Bricks, grid as brick_grid};
 pub use bundle::{Structure, curve_points};
 pub use cell::{Cell, V_SCALE};
+pub use cells::Cells;
 pub use file::{read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
     KeptLevels, Leaps, Levels, Moments, Pyramid, Stack, coarse_levels, level_count, level_size, levels_of,
 };
 pub use ripple::Ripple;
-pub use water::{WaterSpec, build_water, kept_water, set_density_and_reflection};
-
-use std::sync::Arc;
-
-use crate::error::{Error, Result};
+pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
+pub use water::{
+    WaterSpec, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,
+};
 
 /// A volume texture: nx × ny × nz packed cells, x fastest, then y, then z.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,9 +34,8 @@ pub struct VolumeTexture {
     pub size: [u32; 3],
     /// Scale of ρ, 0 to 1: the cells hold ρ/α.
     pub alpha: f32,
-    /// nx·ny·nz cells, shared: a copy with another α costs nothing, and who keeps cells on a device
-    /// knows them again.
-    pub cells: Arc<Vec<Cell>>,
+    /// nx·ny·nz cells, shared: a copy with another α costs nothing.
+    pub cells: Cells,
 }
 
 impl VolumeTexture {
@@ -42,12 +45,36 @@ impl VolumeTexture {
         (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
     }
 
+    /// The cell at x, y, z of the tile.
+    #[inline]
+    pub fn cell(&self, x: u32, y: u32, z: u32) -> Cell {
+        match &self.cells {
+            Cells::Dense(cells) => cells[self.index(x, y, z)],
+            Cells::Sparse(bricks) => *bricks.at(x, y, z),
+        }
+    }
+
+    /// The cells with a direction, in the order they are stored in.
+    pub fn flow_cells(&self) -> impl Iterator<Item = &Cell> {
+        self.cells.stored().iter().filter(|cell| cell.has_direction())
+    }
+
+    /// Whether its cells are stored in bricks.
+    pub fn is_sparse(&self) -> bool {
+        self.cells.bricks().is_some()
+    }
+
+    /// Layers z of the volume, each the sum of its cells' ρ codes.
+    pub fn layer_codes(&self) -> Vec<u64> {
+        self.cells.layer_codes(self.size[0] as usize * self.size[1] as usize)
+    }
+
     /// CRC-32 of size, α and cells: equal volumes have equal ones, built or read.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(bytemuck::bytes_of(&self.size));
         hasher.update(bytemuck::bytes_of(&self.alpha));
-        hasher.update(bytemuck::cast_slice(&self.cells));
+        hasher.combine(&self.cells.checksum());
         hasher.finalize()
     }
 
@@ -56,7 +83,7 @@ impl VolumeTexture {
     pub fn rho_histogram(&self, bins: usize) -> RhoHistogram {
         let bins = bins.max(1);
         let mut h = RhoHistogram { at_zero: 0, between: vec![0; bins], at_alpha: 0 };
-        for cell in self.cells.iter().filter(|c| c.has_direction()) {
+        for cell in self.flow_cells() {
             match cell.rho_code() as usize {
                 0 => h.at_zero += 1,
                 0xffff => h.at_alpha += 1,
@@ -72,7 +99,7 @@ impl VolumeTexture {
         let (mut rho, mut k_d, mut k_s) = (0.0f64, 0.0f64, 0.0f64);
         let (mut at_zero, mut at_alpha) = (0u64, 0u64);
         let mut v = glam::DVec3::ZERO;
-        for cell in self.cells.iter().filter(|c| c.has_direction()) {
+        for cell in self.flow_cells() {
             s.flow_cells += 1;
             s.occupied_cells += u64::from(cell.rho_code() > 0);
             at_zero += u64::from(cell.rho_code() == 0);
@@ -84,7 +111,8 @@ impl VolumeTexture {
             v += cell.v().as_dvec3();
         }
         s.cells = self.cells.len() as u64;
-        s.bytes = (self.cells.len() * size_of::<Cell>()) as u64;
+        s.bytes = self.cells.bytes();
+        s.stored_cells = self.cells.stored().len() as u64;
         if s.flow_cells > 0 {
             let n = s.flow_cells as f64;
             s.rho_mean = rho / n;
@@ -141,23 +169,8 @@ pub struct Statistics {
     pub k_s_mean: f64,
     /// Mean v (not a unit vector).
     pub v_mean: [f64; 3],
-    /// Size of the packed cells.
+    /// Cells that are stored; all but in sparse storage.
+    pub stored_cells: u64,
+    /// Size of the stored cells, and of what tells their places.
     pub bytes: u64,
-}
-
-/// Checks, before anything is allocated, that a volume of `size` cells fits into `budget` bytes.
-/// Building needs the packed cells and one vector per cell, and `extra` bytes more per cell.
-pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
-    let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>() + extra) as u128;
-    let need = size.iter().map(|&n| n as u128).product::<u128>() * per_cell;
-    if need > budget as u128 {
-        let [nx, ny, nz] = size;
-        return Err(Error::memory(
-            format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)"),
-            need,
-            budget,
-            "lower volume.nx, volume.ny or volume.nz, or raise --memory",
-        ));
-    }
-    Ok(())
 }

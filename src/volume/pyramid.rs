@@ -25,7 +25,7 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Cell, VolumeTexture, with_boxes, worth_leaping};
+use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
 use crate::gpu::layout::extinction;
 use crate::scene::{Attenuation, Lookup, Prefilter, Scene};
 
@@ -203,7 +203,7 @@ pub struct KeptLevels {
 
 /// What levels depend on.
 struct Key {
-    cells: Arc<Vec<Cell>>,
+    cells: Cells,
     size: [u32; 3],
     bits: Option<f32>,
     between: bool,
@@ -212,7 +212,7 @@ struct Key {
 
 impl PartialEq for Key {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.cells, &other.cells)
+        self.cells.same(&other.cells)
             && (self.size, self.bits, self.between, self.leaps)
                 == (other.size, other.bits, other.between, other.leaps)
     }
@@ -240,6 +240,8 @@ impl KeptLevels {
             levels.extend(coarse_levels(volume, bits));
         }
         let leaps = match key.leaps {
+            // There is no room for boxes in cells that are not stored.
+            _ if volume.is_sparse() => false,
             Leaps::Auto => worth_leaping(volume),
             Leaps::Always => true,
             Leaps::Never => false,
@@ -264,8 +266,8 @@ pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
             1 => halved(fine, coarse, depth, |i| Mean::of(volume.cells[i])),
             _ => halved(fine, coarse, depth, |i| means[i]),
         };
-        let cells = Arc::new(means.iter().map(Mean::packed).collect());
-        levels.push(VolumeTexture { size: coarse, alpha: volume.alpha, cells });
+        let cells: Vec<Cell> = means.iter().map(Mean::packed).collect();
+        levels.push(VolumeTexture { size: coarse, alpha: volume.alpha, cells: cells.into() });
     }
     levels
 }

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use xxhash_rust::const_xxh3::xxh3_64;
 
 use super::bundle::Structure;
-use super::flow::Flow;
-use super::{Cell, VolumeTexture};
+use super::flow::{self, Flow};
+use super::storage::check_sparse;
+use super::{Cell, Cells, VolumeTexture};
 use crate::cache::{Cache, key};
 use crate::curve::CurveShape;
 use crate::error::Result;
@@ -55,13 +56,37 @@ impl WaterSpec {
     }
 }
 
-/// Builds the volume texture.
+/// Builds the volume texture, all cells stored.
 pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let flow = Flow::new(spec, monitor)?;
-    let mut cells: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
+    let cells: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
+    let mut cells = cells.into();
     let of_cells = spec.density_is_of_cells();
     set(spec, &mut cells, (!of_cells).then_some(&flow));
-    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
+    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
+}
+
+/// The same cells, stored in bricks. Memory grows with the cells that curves pass: they are walked
+/// once to note which, once more to add up what they leave there.
+///
+/// # Errors
+/// Where the cells that are passed need more than `memory` bytes.
+pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+    check_sparse(spec, 0, memory)?;
+    let marks = flow::marked(spec, monitor)?;
+    check_sparse(spec, marks.count(), memory)?;
+    let mut bricks = marks.bricks();
+    let flow = Flow::packed(spec, &bricks, monitor)?;
+    bricks.fill(flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect());
+    let mut cells = bricks.into();
+    let of_cells = spec.density_is_of_cells();
+    set(spec, &mut cells, (!of_cells).then_some(&flow));
+    Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
+}
+
+/// About as many cells as a water volume stores in bricks.
+pub fn expected_cells(spec: &WaterSpec) -> u64 {
+    flow::expected_cells(spec)
 }
 
 /// As [`build_water`], or from `cache`.
@@ -69,17 +94,21 @@ pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Res
     let count = spec.size.iter().map(|&n| n as usize).product();
     // α is not in the cells.
     let key = key("volume", &BUILDER, &WaterSpec { alpha: 0.0, ..*spec });
-    let build = || build_water(spec, monitor).map(|volume| Arc::unwrap_or_clone(volume.cells));
+    let build = || {
+        let volume = build_water(spec, monitor)?;
+        Ok(Arc::unwrap_or_clone(volume.cells.dense().expect("all cells are stored").clone()))
+    };
     let cells = cache.get("volumes", &key, count, build)?;
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
 
 /// What the cells follow from besides the spec: a volume of another builder is another volume.
-const BUILDER: [u64; 8] = [
+const BUILDER: [u64; 9] = [
     xxh3_64(include_bytes!("water.rs")),
     xxh3_64(include_bytes!("bundle.rs")),
     xxh3_64(include_bytes!("flow.rs")),
     xxh3_64(include_bytes!("cell.rs")),
+    xxh3_64(include_bytes!("cells.rs")),
     xxh3_64(include_bytes!("ripple.rs")),
     xxh3_64(include_bytes!("../curve.rs")),
     xxh3_64(include_bytes!("../walk.rs")),
@@ -88,36 +117,38 @@ const BUILDER: [u64; 8] = [
 
 /// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
 /// every cell with a direction. Needs no curves, where [`WaterSpec::density_is_of_cells`].
-pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut [Cell]) {
+pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut Cells) {
     set(spec, cells, None);
 }
 
 /// With coherence c the normal number of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²), again one of
 /// variance 1, so that the distribution of ρ stays; coverage then multiplies ρ with
 /// 1 − coverage·e^(−length of the strands in the cell), so that strands end softly.
-fn set(spec: &WaterSpec, cells: &mut [Cell], flow: Option<&Flow>) {
+fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
     let family = Family::new(spec.seed, Stream::Cell);
     let structure = &spec.structure;
     let (c, d) = (structure.coherence, 1.0 - structure.coherence);
     let root = (c * c + d * d).sqrt();
-    cells.par_iter_mut().enumerate().with_min_len(4096).for_each(|(index, cell)| {
-        if cell.has_direction() {
-            let mut rng = family.member(index as u64);
-            let mut normal = || normal_rand(&mut rng);
-            let mut rho = normal();
-            if let Some(flow) = flow {
-                rho = (c * flow.noise(index) + d * rho) / root;
-            }
-            rho += 0.5;
-            let crest = structure.crest * (rho.clamp(0.0, 1.0) - 0.5);
-            let k_d = spec.k_d + normal() * spec.k_noise + crest;
-            let k_s = spec.k_s + normal() * spec.k_noise;
-            if let Some(flow) = flow {
-                let length = flow.directions[index].length();
-                rho = rho.clamp(0.0, 1.0) * (1.0 - structure.coverage * (-length).exp());
-            }
-            *cell = cell.with_density(rho, k_d, k_s);
+    // `place`: in the sums of `flow`. Random numbers are those of the cell's linear index, wherever it is stored.
+    cells.change(|index, place, cell| {
+        if !cell.has_direction() {
+            return cell;
         }
+        let mut rng = family.member(index);
+        let mut normal = || normal_rand(&mut rng);
+        let mut rho = normal();
+        if let Some(flow) = flow {
+            rho = (c * flow.noise(place) + d * rho) / root;
+        }
+        rho += 0.5;
+        let crest = structure.crest * (rho.clamp(0.0, 1.0) - 0.5);
+        let k_d = spec.k_d + normal() * spec.k_noise + crest;
+        let k_s = spec.k_s + normal() * spec.k_noise;
+        if let Some(flow) = flow {
+            let length = flow.directions[place].length();
+            rho = rho.clamp(0.0, 1.0) * (1.0 - structure.coverage * (-length).exp());
+        }
+        cell.with_density(rho, k_d, k_s)
     });
 }
 

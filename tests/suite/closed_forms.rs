@@ -52,8 +52,8 @@ fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
             false => Cell::from_direction(v).with_density(1.5 * x() - 0.25, x(), x()),
         }
     };
-    let cells = (0..size.iter().product::<u32>()).map(|_| cell()).collect();
-    VolumeTexture { size, alpha: 0.8, cells: std::sync::Arc::new(cells) }
+    let cells: Vec<Cell> = (0..size.iter().product::<u32>()).map(|_| cell()).collect();
+    VolumeTexture { size, alpha: 0.8, cells: cells.into() }
 }
 
 /// The direction at `degrees` from the normal of `rectangle`, turned by `around` about it.
@@ -149,12 +149,10 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
             // Fibres along the flow, light across them: Ψ is k_d = 1 in every cell, so that the light
             // adds the bare weights up one by one.
             let mut volume = noise([5, 7, 9], seed);
-            for cell in std::sync::Arc::make_mut(&mut volume.cells) {
-                *cell = match cell.has_direction() {
-                    true => Cell::from_direction(Vec3::Y).with_density(cell.rho(), 1.0, 0.0),
-                    false => Cell::default(),
-                };
-            }
+            volume.cells.change(|_, _, cell| match cell.has_direction() {
+                true => Cell::from_direction(Vec3::Y).with_density(cell.rho(), 1.0, 0.0),
+                false => Cell::default(),
+            });
             let d = slanted(seed as f64 * 0.4, seed as f64);
             let uv = [0.37, 0.005 * seed as f32];
             scene.ambient = Vec3::ZERO;

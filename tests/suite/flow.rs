@@ -38,7 +38,7 @@ fn frames(gpu: &mut Option<GpuRenderer>, scene: &Scene, volume: &VolumeTexture) 
 /// The volume with every layer `by` cells further down the flow.
 fn rolled(volume: &VolumeTexture, by: u32) -> VolumeTexture {
     let [nx, ny, nz] = volume.size;
-    let mut cells = volume.cells.to_vec();
+    let mut cells: Vec<Cell> = volume.cells.iter().copied().collect();
     for z in 0..nz {
         for y in 0..ny {
             for x in 0..nx {

@@ -3,8 +3,6 @@
 //!
 //! `TAKI_LOOK=FOLDER cargo test --release -- looking` writes pictures of all of them there, to look at.
 
-use std::sync::Arc;
-
 use glam::{IVec3, Vec3};
 use taki::curve::CurveShape;
 use taki::job::Unwatched;
@@ -92,7 +90,7 @@ fn the_histogram_counts_every_flow_cell_once() {
     let volume = VolumeTexture {
         size: [7, 1, 1],
         alpha: 0.5,
-        cells: Arc::new(cells.into_iter().chain([Cell::default()]).collect()),
+        cells: cells.into_iter().chain([Cell::default()]).collect::<Vec<_>>().into(),
     };
     let h = volume.rho_histogram(4);
     assert_eq!((h.at_zero, h.between, h.at_alpha), (1, vec![1, 0, 2, 1], 1));

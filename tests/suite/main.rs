@@ -35,6 +35,7 @@ mod scatter;
 mod scene;
 mod shaders;
 mod shading;
+mod sparse;
 mod specialise;
 mod splash;
 mod strand;

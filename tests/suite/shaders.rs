@@ -26,7 +26,8 @@ const SHARED: [&str; 8] = [
 const STAGES: [&str; 5] = ["bare.wgsl", "gbuffer.wgsl", "integrate.wgsl", "resolve.wgsl", "visibility.wgsl"];
 
 /// What some stages are put together from besides.
-const PARTS: [&str; 9] = [
+const PARTS: [&str; 10] = [
+    "cells.wgsl",
     "integrate_light.wgsl",
     "integrate_many.wgsl",
     "integrate_one.wgsl",
@@ -44,6 +45,7 @@ fn stage(name: &str) -> String {
         "integrate.wgsl" => shader_source(&integrate_source(true)),
         "visibility.wgsl" => shader_source(&visibility_source()),
         "gbuffer.wgsl" => shader_source(&gbuffer_source()),
+        "bare.wgsl" => shader_source(&[file("cells.wgsl"), file(name)].join("\n")),
         _ => shader_source(&file(name)),
     }
 }

@@ -82,6 +82,14 @@ pub(super) const TABLE: &[Param] = &[
     p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume, "Cells along the flow.").slider(1.0, 256.0),
     p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface.")
         .slider(1.0, 256.0),
+    p(
+        "volume.storage",
+        "",
+        "",
+        Choice(&["auto", "dense", "sparse"]),
+        Volume,
+        "How cells are stored: all (dense), those that strands pass (sparse), or sparse only where all would not fit --memory (auto). Pictures do not depend on it.",
+    ),
     p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
     p(
         "volume.coherence",

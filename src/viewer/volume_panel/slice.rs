@@ -127,7 +127,7 @@ fn picture(volume: &VolumeTexture, axis: usize, plane: u32, shown: Shown, empty:
         for x in 0..size[0] {
             at[right] = x;
             at[down] = y;
-            let cell = volume.cells[volume.index(at[0], at[1], at[2])];
+            let cell = volume.cell(at[0], at[1], at[2]);
             let [r, g, b] = if cell.has_direction() { colour(cell, shown, &table) } else { empty };
             pixels.push(Color32::from_rgb(r, g, b));
         }
@@ -146,7 +146,7 @@ fn colour(cell: Cell, shown: Shown, table: &[[u8; 3]]) -> [u8; 3] {
 
 /// A cell's values.
 pub(super) fn in_words(volume: &VolumeTexture, [x, y, z]: [u32; 3]) -> String {
-    let cell = volume.cells[volume.index(x, y, z)];
+    let cell = volume.cell(x, y, z);
     if !cell.has_direction() {
         return format!("cell ({x}, {y}, {z})\nno flow");
     }

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 use super::{build, spec};
-use taki::volume::{VolumeTexture, WaterSpec, read_npz, write_npz};
+use taki::volume::{StorageChoice, VolumeTexture, WaterSpec, read_npz, write_npz};
 
 const BUDGET: u64 = 1 << 30;
 /// [nz, ny, nx] of the hand-made files.
@@ -31,7 +31,7 @@ fn bytes_of(volume: &VolumeTexture) -> Vec<u8> {
 fn read_bytes(dir: &TempDir, bytes: &[u8]) -> taki::Result<VolumeTexture> {
     let path = dir.path().join("volume.npz");
     std::fs::write(&path, bytes).unwrap();
-    read_npz(&path, BUDGET)
+    read_npz(&path, StorageChoice::Auto, BUDGET)
 }
 
 /// The four arrays of a hand-made file; a valid one of 4×3×2 cells unless changed.
@@ -92,7 +92,7 @@ impl Arrays {
         let dir = folder();
         let path = dir.path().join("hand-made.npz");
         self.write(&path);
-        read_npz(&path, BUDGET)
+        read_npz(&path, StorageChoice::Auto, BUDGET)
     }
 }
 
@@ -241,14 +241,17 @@ fn a_claimed_size_over_the_budget_is_refused_before_it_is_allocated() {
     let dir = folder();
     let path = dir.path().join("small.npz");
     Arrays::default().write(&path);
-    assert_eq!(read_npz(&path, 479).expect_err("a budget too small").exit_code(), 33);
-    assert!(read_npz(&path, 480).is_ok());
+    assert_eq!(read_npz(&path, StorageChoice::Dense, 479).expect_err("a budget too small").exit_code(), 33);
+    assert!(read_npz(&path, StorageChoice::Dense, 480).is_ok());
 }
 
 #[test]
 fn what_is_no_file_is_refused() {
     let dir = folder();
-    assert_eq!(read_npz(&dir.path().join("none.npz"), BUDGET).unwrap_err().exit_code(), 74);
-    assert_eq!(read_npz(dir.path(), BUDGET).unwrap_err().exit_code(), 65);
+    assert_eq!(
+        read_npz(&dir.path().join("none.npz"), StorageChoice::Auto, BUDGET).unwrap_err().exit_code(),
+        74
+    );
+    assert_eq!(read_npz(dir.path(), StorageChoice::Auto, BUDGET).unwrap_err().exit_code(), 65);
     assert_eq!(read_bytes(&dir, b"PK\x03\x04 no archive").unwrap_err().exit_code(), 65);
 }

@@ -1,0 +1,175 @@
+//! How the cells of a volume are stored: every one of them, or in bricks those that hold anything.
+
+use std::ops::Index;
+use std::sync::Arc;
+
+use rayon::iter::Either;
+use rayon::prelude::*;
+
+use super::{Bricks, Cell};
+
+/// Cells of a volume, shared: a copy costs nothing, and who keeps cells on a device knows them again.
+///
+/// Both forms are indexed alike, x fastest, then y, then z, and equal cells are equal volumes in whichever form.
+#[derive(Clone, Debug)]
+pub enum Cells {
+    /// All of them.
+    Dense(Arc<Vec<Cell>>),
+    /// Those that are not empty.
+    Sparse(Arc<Bricks>),
+}
+
+impl Cells {
+    /// Their number, the empty ones included.
+    pub fn len(&self) -> usize {
+        match self {
+            Cells::Dense(cells) => cells.len(),
+            Cells::Sparse(bricks) => bricks.size().iter().map(|&n| n as usize).product(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Those that are stored, which all that hold anything are.
+    pub fn stored(&self) -> &[Cell] {
+        match self {
+            Cells::Dense(cells) => cells,
+            Cells::Sparse(bricks) => bricks.stored(),
+        }
+    }
+
+    /// All cells where all are stored.
+    pub fn dense(&self) -> Option<&Arc<Vec<Cell>>> {
+        match self {
+            Cells::Dense(cells) => Some(cells),
+            Cells::Sparse(_) => None,
+        }
+    }
+
+    /// The bricks where the cells are stored in those.
+    pub fn bricks(&self) -> Option<&Arc<Bricks>> {
+        match self {
+            Cells::Dense(_) => None,
+            Cells::Sparse(bricks) => Some(bricks),
+        }
+    }
+
+    /// Bytes they take.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Cells::Dense(cells) => size_of_val(cells.as_slice()) as u64,
+            Cells::Sparse(bricks) => bricks.bytes(),
+        }
+    }
+
+    /// All cells in their order, the empty ones included.
+    pub fn iter(&self) -> impl Iterator<Item = &Cell> {
+        match self {
+            Cells::Dense(cells) => Either::Left(cells.iter()),
+            Cells::Sparse(bricks) => {
+                let [nx, ny, nz] = bricks.size();
+                let row = move |y, z| (0..nx).map(move |x| bricks.at(x, y, z));
+                Either::Right((0..nz).flat_map(move |z| (0..ny).flat_map(move |y| row(y, z))))
+            }
+        }
+    }
+
+    /// Whether the two are one memory.
+    pub fn same(&self, other: &Cells) -> bool {
+        match (self, other) {
+            (Cells::Dense(a), Cells::Dense(b)) => Arc::ptr_eq(a, b),
+            (Cells::Sparse(a), Cells::Sparse(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    /// Where in memory they are.
+    pub fn address(&self) -> usize {
+        match self {
+            Cells::Dense(cells) => Arc::as_ptr(cells).addr(),
+            Cells::Sparse(bricks) => Arc::as_ptr(bricks).addr(),
+        }
+    }
+
+    /// Makes every stored cell anew, of its linear index, its place among the stored ones, and what it is.
+    pub fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
+        match self {
+            Cells::Dense(cells) => Arc::make_mut(cells)
+                .par_iter_mut()
+                .enumerate()
+                .with_min_len(4096)
+                .for_each(|(i, cell)| *cell = new(i as u64, i, *cell)),
+            Cells::Sparse(bricks) => Arc::make_mut(bricks).change(new),
+        }
+    }
+
+    /// Σ ρ code of each layer of `area` cells along z.
+    pub fn layer_codes(&self, area: usize) -> Vec<u64> {
+        match self {
+            Cells::Dense(cells) => cells
+                .par_chunks(area)
+                .map(|layer| layer.iter().map(|cell| u64::from(cell.rho_code())).sum())
+                .collect(),
+            Cells::Sparse(bricks) => bricks.layer_codes(),
+        }
+    }
+
+    /// CRC-32 of their bytes in their order.
+    pub(super) fn checksum(&self) -> crc32fast::Hasher {
+        match self {
+            Cells::Dense(cells) => {
+                let mut hasher = crc32fast::Hasher::new();
+                hasher.update(bytemuck::cast_slice(cells));
+                hasher
+            }
+            Cells::Sparse(bricks) => bricks.checksum(),
+        }
+    }
+}
+
+impl Default for Cells {
+    fn default() -> Self {
+        Vec::new().into()
+    }
+}
+
+impl From<Vec<Cell>> for Cells {
+    fn from(cells: Vec<Cell>) -> Self {
+        Cells::Dense(Arc::new(cells))
+    }
+}
+
+impl From<Bricks> for Cells {
+    fn from(bricks: Bricks) -> Self {
+        Cells::Sparse(Arc::new(bricks))
+    }
+}
+
+impl Index<usize> for Cells {
+    type Output = Cell;
+
+    /// By linear index; of bricks slower than by place ([`super::VolumeTexture::cell`]).
+    #[inline]
+    fn index(&self, index: usize) -> &Cell {
+        match self {
+            Cells::Dense(cells) => &cells[index],
+            Cells::Sparse(bricks) => {
+                let [nx, ny, _] = bricks.size().map(|n| n as usize);
+                bricks.at((index % nx) as u32, (index / nx % ny) as u32, (index / nx / ny) as u32)
+            }
+        }
+    }
+}
+
+impl PartialEq for Cells {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Cells::Dense(a), Cells::Dense(b)) => a == b,
+            (Cells::Sparse(a), Cells::Sparse(b)) if a == b => true,
+            _ => self.len() == other.len() && self.iter().eq(other.iter()),
+        }
+    }
+}
