@@ -152,6 +152,7 @@ struct View {
 
 // One sheet: `before` is the radiance of those in front of it, and what they let through.
 fn trace(
+    quad: Quad,
     quad_number: u32,
     pixel: vec2<u32>,
     hit: vec3<f32>,
@@ -160,7 +161,6 @@ fn trace(
     is_last: bool,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
-    let quad = quads[quad_number];
     let jacobian = cell_frame(quad, hit.xy, frame.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);

@@ -6,20 +6,21 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
     var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     var quad_number = nearest;
     var hit = textureLoad(surface, pixel, 0).xyz;
+    let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     for (var layer = 1u; quad_number != 0u; layer++) {
         var next = 0u;
         if layer < frame.layers {
             next = textureLoad(quad_id, pixel, layer, 0).x;
         }
-        result = trace(quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
+        let quad = quads[quad_number - 1u];
+        if layer > 1u {
+            hit = quad_hit(quad, d_world);
+        }
+        result = trace(quad, quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
         if result.w < frame.early_end || (*count).x == CUT {
             break;
         }
         quad_number = next;
-        if next != 0u {
-            let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-            hit = quad_hit(quads[next - 1u], d_world);
-        }
     }
     return result;
 }

@@ -3,5 +3,5 @@
 
 fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
     let hit = textureLoad(surface, pixel, 0).xyz;
-    return trace(nearest - 1u, pixel, hit, behind, vec4<f32>(0.0, 0.0, 0.0, 1.0), true, count);
+    return trace(quads[nearest - 1u], nearest - 1u, pixel, hit, behind, vec4<f32>(0.0, 0.0, 0.0, 1.0), true, count);
 }

@@ -172,7 +172,7 @@ impl Visibility {
             FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
         let on_host = match self.filling {
-            Filling::Auto => gpu.is_software() && up.levels[0].cells.dense().is_some(),
+            Filling::Auto => gpu.is_software() && !up.levels[0].is_sparse(),
             Filling::Device => false,
             Filling::Host => true,
         };
@@ -219,17 +219,21 @@ impl Visibility {
             wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         );
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let mut entries = vec![
+            entry(0, frame.as_entire_binding()),
+            entry(1, part.as_entire_binding()),
+            entry(2, wgpu::BindingResource::TextureView(&up.volume)),
+            entry(3, occupied.as_entire_binding()),
+            entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
+        ];
+        // The pipeline's layout has what is left in its shader.
+        if up.levels[0].is_sparse() {
+            entries.push(entry(5, wgpu::BindingResource::TextureView(&up.bricks)));
+        }
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("visibility"),
             layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                entry(0, frame.as_entire_binding()),
-                entry(1, part.as_entire_binding()),
-                entry(2, wgpu::BindingResource::TextureView(&up.volume)),
-                entry(3, occupied.as_entire_binding()),
-                entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
-                entry(5, wgpu::BindingResource::TextureView(&up.bricks)),
-            ],
+            entries: &entries,
         });
         let total = u64::from(count) * plan.volumes.len() as u64;
         let (mut seconds, mut done, mut columns) = (0.0, 0, FIRST_COLUMNS);
