@@ -8,7 +8,7 @@ use super::device::Gpu;
 use super::layout::{Frame, LightVolume};
 use super::specialise::Source;
 use super::timing::Timer;
-use super::upload::Uploaded;
+use super::upload::{SLAB_BYTES, Uploaded};
 use super::{compute_pipeline, shader_source};
 use crate::cpu::fill::{Numbers, Rows};
 use crate::error::{Error, Result};
@@ -332,6 +332,7 @@ fn fill_on_host(
     let clock = Instant::now();
     let (rows, stack) = (Rows::new(levels, lookup), Stack::new(levels));
     let texture = filled.texture.texture();
+    let mut staged = 0;
     for (number, light_volume) in plan.volumes.iter().enumerate() {
         between(number as u64, plan.volumes.len() as u64)?;
         let [x, y, z] = shelf.place(number as u32).map(|c| c as u32);
@@ -342,16 +343,17 @@ fn fill_on_host(
                 Form::Codes => z_level / CELLS_A_WORD,
                 Form::Depths => z_level,
             };
-            upload_words(
-                gpu,
-                texture,
-                [x, y + y_level, z + z_level],
-                plan.words(level.size),
-                &words(level.size, &numbers),
-            );
+            let words = words(level.size, &numbers);
+            upload_words(gpu, texture, [x, y + y_level, z + z_level], plan.words(level.size), &words);
+            staged += size_of_val(words.as_slice());
         }
-        gpu.run(gpu.encoder("upload light volume"))?;
+        // The queue stages what it is given.
+        if staged > SLAB_BYTES {
+            gpu.run(gpu.encoder("upload light volumes"))?;
+            staged = 0;
+        }
     }
+    gpu.run(gpu.encoder("upload light volumes"))?;
     Ok(clock.elapsed().as_secs_f64())
 }
 
