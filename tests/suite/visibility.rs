@@ -164,8 +164,8 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let keys = ["main.edge", "main.breakup", "main.fade", "leap.edge", "leap.breakup"];
     let more = ["thread.edge", "thread.breakup", "far.edge", "far.breakup"];
     let whole: Vec<String> = keys.iter().chain(&more).map(|key| format!("sheets.{key}=0")).collect();
-    let few: Vec<&str> = whole.iter().map(String::as_str).collect();
-    let whole = [&few[..], &["light.cache=512"]].concat();
+    let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
+    let few = [&whole[..], &["light.cache=160"]].concat();
     // A directional light on a parallelogram is exact but for the codes: √T in 255ths is T to 0.0039·√T at most and
     // 0.0023·√T in the mean, relative to T more where it is dark, less in the mean of a ray's cells. Under a point light half the quad's width
     // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
