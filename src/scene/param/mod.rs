@@ -9,7 +9,7 @@ mod place;
 mod sheet;
 mod splash;
 mod trace;
-mod water;
+mod volume;
 
 use Cost::*;
 use Kind::*;
@@ -102,7 +102,7 @@ const fn p(
 pub const PARAMS: &[Param] = &joined();
 
 const SECTIONS: [&[Param]; 7] =
-    [water::TABLE, sheet::TABLE, splash::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
+    [volume::TABLE, sheet::TABLE, splash::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
 
 const fn count() -> usize {
     let (mut sum, mut section) = (0, 0);
