@@ -24,7 +24,7 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use mesh::{Ground, Mesh, Vertex};
-pub use param::{Cost, Kind, PARAMS, Param, markdown_table};
+pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use parts::resolve;
 pub use pool::{MAX_POOLS, Pool};
 pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};

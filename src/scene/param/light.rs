@@ -2,151 +2,144 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "light.frame",
-        "",
-        "",
-        Choice(&["world", "texture"]),
-        Uniform,
-        "Where angles are measured: in the world, or in the volume's own space as in the paper.",
-    ),
-    p(
-        "light.visibility",
-        "V",
-        "",
-        Choice(&["march", "cached", "none"]),
-        Uniform,
-        "Attenuation between light and cell: an exact walk from the cell's centre, the same walked once for every cell and kept, or none.",
-    ),
-    p(
-        "light.cache",
-        "",
-        "MiB",
-        Int(1, 65536, 512),
-        Uniform,
-        "Most memory that visibility cached may take, in light volumes of a byte a cell, or four where light is scattered more than once.",
-    )
-    .slider(16.0, 4096.0),
-    p(
-        "light.reflection",
-        "Ψ",
-        "",
-        Choice(&["kajiya-kay", "strand"]),
-        Uniform,
-        "How a cell reflects: as the paper's fibres, with k_d, k_s and p; or as strands of water with air between them.",
-    ),
-    p(
-        "light.scattering",
-        "",
-        "",
-        Choice(&["single", "multiple"]),
-        Uniform,
-        "How often light is scattered in the volume: once, or as often as it is.",
-    ),
-    p(
-        "strand.radius",
-        "",
-        "m",
-        Float(1e-5, 1.0, 5e-4),
-        Uniform,
-        "Radius of a strand of water; the light that goes through it is absorbed on as long a way.",
-    )
-    .slider(1e-5, 0.1),
-    p(
-        "strand.roughness_m",
-        "β_m",
-        "",
-        Float(0.1, 1.0, 0.3),
-        Uniform,
-        "Roughness along the strands: small is a sharp cone of light.",
-    ),
-    p(
-        "strand.roughness_n",
-        "β_n",
-        "",
-        Float(0.1, 1.0, 0.2),
-        Uniform,
-        "Roughness around the strands: small shows the bow.",
-    ),
-    p(
-        "strand.absorption",
-        "",
-        "",
-        Float(0.0, 1e4, 1.0),
-        Uniform,
-        "Absorption in the strands, in units of pure water's.",
-    )
-    .slider(0.0, 100.0),
-    p(
-        "strand.aeration",
-        "",
-        "",
-        Float(0.0, 1.0, 0.5),
-        Uniform,
-        "Share of the light that meets air bubbles instead of strands, in a cell with k_d = k_s; it grows with k_d : k_s.",
-    ),
-    p(
-        "strand.g",
-        "g",
-        "",
-        Float(-0.99, 0.99, 0.8),
-        Uniform,
-        "Mean cosine of the scattering by bubbles: 0 sends light everywhere alike, towards 1 straight on.",
-    ),
-    p(
-        "light.p",
-        "p",
-        "",
-        Float(1.0, 1e4, 20.0),
-        Uniform,
-        "Exponent of the specular term; whole numbers up to 255 are fastest.",
-    )
-    .slider(1.0, 200.0),
-    p(
-        "light.ambient",
-        "",
-        "",
-        Color([0.1, 0.1, 0.1]),
-        Uniform,
-        "Light from everywhere, added in every cell.",
-    ),
-    p("lights.*.kind", "", "", Choice(&["directional", "point", "spot"]), Uniform, "Kind of light."),
-    p(
-        "lights.*.direction",
-        "l",
-        "",
-        Point([0.5, 0.8, 0.6]),
-        Uniform,
-        "Towards a directional light, or against the beam of a spot light; of any length but zero.",
-    ),
-    p("lights.*.position", "", "m", Point([0.0, 10.0, 10.0]), Uniform, "Where a point or spot light is."),
-    p(
-        "lights.*.angle",
-        "",
-        "°",
-        Float(0.01, 90.0, 30.0),
-        Uniform,
-        "Half angle of a spot light's cone, from the beam to where the light ends.",
-    ),
-    p(
-        "lights.*.softness",
-        "",
-        "",
-        Float(0.0, 1.0, 0.2),
-        Uniform,
-        "Outer share of a spot light's angle in which its light fades away.",
-    ),
-    p("lights.*.color", "", "", Color([1.0, 1.0, 1.0]), Uniform, "Colour of the light."),
-    p(
-        "lights.*.intensity",
-        "I",
-        "",
-        Float(0.0, 1e9, 1.0),
-        Uniform,
-        "Factor on the colour; of a point or spot light at a distance of 1 m, falling with its square.",
-    )
-    .slider(0.0, 100.0),
-];
+pub(super) const LIGHT: Group = Group {
+    title: "Light",
+    about: "Light reaches a cell from every light of the scene, attenuated by the water on its way, and the \
+            cell reflects a part of it to the eye. These parameters choose the models of both. The defaults \
+            are the paper's, except for `light.frame`.",
+    params: &[
+        p("light.frame", "", "", Choice(&["world", "texture"]), Uniform)
+            .doc(
+                "Space in which angles are measured: `world`, or `texture`, the volume's own space as in the \
+                 paper.",
+            )
+            .when(
+                "Choose `texture` only to reproduce the paper; `world` keeps highlights right where the \
+                 volume is stretched.",
+            ),
+        p("light.visibility", "V", "", Choice(&["march", "cached", "none"]), Uniform)
+            .doc(
+                "Attenuation between a light and a cell: `march` walks the way exactly, for every cell of \
+                 every ray; `cached` walks it once for every cell of the volume and keeps the result; `none` \
+                 leaves it out.",
+            )
+            .when(
+                "Choose `cached` for several lights or an environment; choose `none` for quick drafts, in \
+                 which the water is lit alike through and through.",
+            ),
+        p("light.cache", "", "MiB", Int(1, 65536, 512), Uniform)
+            .slider(16.0, 4096.0)
+            .doc(
+                "Most memory that the light volumes of `light.visibility=cached` may take. A cell takes 1 \
+                 byte in each of them, or 4 with `light.scattering=multiple`. At most half of `--memory` \
+                 counts.",
+            )
+            .when(
+                "Raise it when taki refuses a scene because of it, or when shadows look doubled; lower it to \
+                 save memory.",
+            ),
+        p("light.reflection", "Ψ", "", Choice(&["kajiya-kay", "strand"]), Uniform)
+            .doc(
+                "Reflection of a cell: `kajiya-kay` takes the paper's fibres, with k_d, k_s and p; `strand` \
+                 takes strands of water with air between them.",
+            )
+            .when(
+                "Choose `strand` when light should shine through the water, as that of a low sun behind a \
+                 fall.",
+            ),
+        p("light.scattering", "", "", Choice(&["single", "multiple"]), Uniform)
+            .doc(
+                "Scattering in the volume: `single` follows light that is scattered once, `multiple` any \
+                 number of times. `multiple` excludes `light.visibility=none`.",
+            )
+            .when("Choose `multiple` when thick water is too dark; shadows are filled and foam turns white."),
+        p("light.p", "p", "", Float(1.0, 1e4, 20.0), Uniform)
+            .slider(1.0, 200.0)
+            .doc("Exponent of the specular term of `kajiya-kay`. Whole numbers up to 255 are fastest.")
+            .when("Raise it for narrow, sharp highlights; lower it for a broad sheen."),
+        p("light.ambient", "", "", Color([0.1, 0.1, 0.1]), Uniform)
+            .doc("Light from everywhere, added in every cell and on rocks and pools.")
+            .when(
+                "Raise it when shadows are too black; lower it to 0 under an environment, which fills them \
+                 itself.",
+            ),
+    ],
+};
+
+pub(super) const STRAND: Group = Group {
+    title: "Strand",
+    about: "These parameters have an effect with `light.reflection=strand`. A cell then holds dielectric \
+            cylinders of water along its flow, and bubbles of air between them.",
+    params: &[
+        p("strand.radius", "", "m", Float(1e-5, 1.0, 5e-4), Uniform)
+            .slider(1e-5, 0.1)
+            .doc("Radius of a strand of water. Light that goes through is absorbed in proportion to it.")
+            .when("Raise it for bluer water; at half a millimetre the water has almost no colour."),
+        p("strand.roughness_m", "β_m", "", Float(0.1, 1.0, 0.3), Uniform)
+            .doc("Roughness along the strands. Small values reflect a sharp cone of light.")
+            .when("Lower it for sharp glints; raise it for a soft, even sheen."),
+        p("strand.roughness_n", "β_n", "", Float(0.1, 1.0, 0.2), Uniform)
+            .doc("Roughness around the strands. Small values show the bow at 42°.")
+            .when("Lower it to show the bow; raise it to spread light evenly around the strands."),
+        p("strand.absorption", "", "", Float(0.0, 1e4, 1.0), Uniform)
+            .slider(0.0, 100.0)
+            .doc("Absorption in the strands, as a multiple of pure water's.")
+            .when("Raise it to tint the water blue; lower it to 0 for strands without colour."),
+        p("strand.aeration", "", "", Float(0.0, 1.0, 0.5), Uniform)
+            .doc(
+                "Share of the light that meets bubbles of air instead of strands, in a cell with k_d = k_s. \
+                 It grows with k_d : k_s.",
+            )
+            .when("Raise it for white, foaming water; lower it for clear water that passes most light."),
+        p("strand.g", "g", "", Float(-0.99, 0.99, 0.8), Uniform)
+            .doc(
+                "Mean cosine of the scattering by bubbles: 0 sends light everywhere alike, values near 1 \
+                 send it straight on.",
+            )
+            .when(
+                "Raise it for foam that glows before the light; lower it for foam that is bright on its lit \
+                 side.",
+            ),
+    ],
+};
+
+pub(super) const LIGHTS: Group = Group {
+    title: "Lights",
+    about: "Each light has a name of your choice. A white surface that faces a directional light of colour 1 \
+            and intensity 1 has a radiance of 1.",
+    params: &[
+        p("lights.*.kind", "", "", Choice(&["directional", "point", "spot"]), Uniform)
+            .doc(
+                "Kind of light: `directional` comes from infinitely far, `point` from one place into all \
+                 directions, `spot` from one place into a cone.",
+            )
+            .when("Choose `directional` for sun and moon, `point` for lanterns, and `spot` for beams."),
+        p("lights.*.direction", "l", "", Point([0.5, 0.8, 0.6]), Uniform)
+            .doc(
+                "Direction towards a directional light, or against the beam of a spot light. Its length must \
+                 not be 0.",
+            )
+            .when("Turn it to the side of the view for relief, and behind the water to let the water glow."),
+        p("lights.*.position", "", "m", Point([0.0, 10.0, 10.0]), Uniform)
+            .doc("Position of a point or spot light.")
+            .when("Move it close to what it should light, or behind a fall that it should shine through."),
+        p("lights.*.angle", "", "°", Float(0.01, 90.0, 30.0), Uniform)
+            .doc("Half angle of a spot light's cone, from the beam to where the light ends.")
+            .when("Lower it for a narrow beam; raise it to light a larger part of the scene."),
+        p("lights.*.softness", "", "", Float(0.0, 1.0, 0.2), Uniform)
+            .doc("Outer share of a spot light's angle over which its light fades away.")
+            .when("Raise it for a beam with a soft edge; lower it for a sharp one."),
+        p("lights.*.color", "", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc("Colour of the light, linear RGB.")
+            .when("Choose it reddish for a low sun or a lamp, bluish for the moon."),
+        p("lights.*.intensity", "I", "", Float(0.0, 1e9, 1.0), Uniform)
+            .slider(0.0, 100.0)
+            .doc(
+                "Factor on the colour. A point or spot light has it at a distance of 1 m and falls with the \
+                 square of the distance.",
+            )
+            .when("Raise it when what the light shines on is too dark; 0 switches the light off."),
+    ],
+};

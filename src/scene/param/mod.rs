@@ -1,7 +1,7 @@
 //! The parameter table: every number, choice, colour and file a scene can set, once.
 //!
-//! It feeds the scene file, `--set`, the resolved print, the README's table and the viewer's sliders.
-//! A `*` in a key stands for a name the scene chooses, or for the number of a quad.
+//! It feeds the scene file, `--set`, the resolved print, docs/parameters.md and the viewer's sliders.
+//! A `*` in a key stands for a name the scene chooses, or for the number of a quad or track.
 
 mod light;
 mod picture;
@@ -72,10 +72,23 @@ pub struct Param {
     pub kind: Kind,
     /// What a change costs.
     pub cost: Cost,
-    /// What it is, in one sentence.
+    /// What it is; begins with a noun. Markdown, of which only backticks are used.
     pub doc: &'static str,
+    /// When one would turn it, and which way; begins with a verb. Markdown as in `doc`.
+    pub when: &'static str,
     /// Where a slider runs, if that is not the whole of the allowed range.
     pub slider: Option<(f64, f64)>,
+}
+
+/// A part of the table that has a heading of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// Heading.
+    pub title: &'static str,
+    /// What its parameters are about, in a few sentences. Markdown, of which only backticks are used.
+    pub about: &'static str,
+    /// The parameters.
+    pub params: &'static [Param],
 }
 
 /// Largest colour component.
@@ -86,43 +99,63 @@ pub const POINT_MAX: f64 = 1.0e7;
 pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest number of a frame.
 pub const MAX_FRAME: i64 = 999_999_999;
+/// Longest line of text in docs/parameters.md.
+const COLUMNS: usize = 110;
 
-const fn p(
-    key: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    kind: Kind,
-    cost: Cost,
-    doc: &'static str,
-) -> Param {
-    Param { key, symbol, unit, kind, cost, doc, slider: None }
+/// A parameter that still needs its [`Param::doc`] and [`Param::when`].
+const fn p(key: &'static str, symbol: &'static str, unit: &'static str, kind: Kind, cost: Cost) -> Param {
+    Param { key, symbol, unit, kind, cost, doc: "", when: "", slider: None }
 }
 
-/// The table, in the order of the method.
+/// The table by groups, in the order of the method.
+pub const GROUPS: &[Group] = &[
+    volume::CURVES,
+    volume::VOLUME,
+    sheet::SHEETS,
+    splash::SPLASHES,
+    trace::MATERIALS_AND_QUADS,
+    trace::TRACE,
+    light::LIGHT,
+    light::STRAND,
+    light::LIGHTS,
+    place::ROCKS,
+    place::POOLS,
+    place::CAMERA,
+    place::BACKGROUND_AND_HAZE,
+    place::ENVIRONMENT_AND_SKY,
+    picture::IMAGE,
+    picture::ANIMATION,
+];
+
+/// The table, group by group.
 pub const PARAMS: &[Param] = &joined();
 
-const SECTIONS: [&[Param]; 7] =
-    [volume::TABLE, sheet::TABLE, splash::TABLE, trace::TABLE, light::TABLE, place::TABLE, picture::TABLE];
-
 const fn count() -> usize {
-    let (mut sum, mut section) = (0, 0);
-    while section < SECTIONS.len() {
-        sum += SECTIONS[section].len();
-        section += 1;
+    let (mut sum, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        sum += GROUPS[group].params.len();
+        group += 1;
     }
     sum
 }
 
+/// Does not compile where a group or a parameter has not been given its words.
 const fn joined() -> [Param; count()] {
-    let mut all = [SECTIONS[0][0]; count()];
-    let (mut at, mut section) = (0, 0);
-    while section < SECTIONS.len() {
+    let mut all = [GROUPS[0].params[0]; count()];
+    let (mut at, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        let Group { title, about, params } = GROUPS[group];
+        assert!(!title.is_empty() && !about.is_empty(), "a group without a title or an introduction");
         let mut i = 0;
-        while i < SECTIONS[section].len() {
-            all[at] = SECTIONS[section][i];
+        while i < params.len() {
+            if params[i].doc.is_empty() || params[i].when.is_empty() {
+                // The compiler shows the key, all that a constant's message can hold.
+                panic!("{}", params[i].key);
+            }
+            all[at] = params[i];
             (at, i) = (at + 1, i + 1);
         }
-        section += 1;
+        group += 1;
     }
     all
 }
@@ -163,6 +196,14 @@ pub fn nearest(key: &str) -> Option<String> {
 impl Param {
     const fn slider(self, low: f64, high: f64) -> Self {
         Param { slider: Some((low, high)), ..self }
+    }
+
+    const fn doc(self, doc: &'static str) -> Self {
+        Param { doc, ..self }
+    }
+
+    const fn when(self, when: &'static str) -> Self {
+        Param { when, ..self }
     }
 
     /// Whether it holds a list, which only a scene file or `--set` can give.
@@ -206,6 +247,13 @@ impl Param {
             Frames | Series => "none".into(),
         }
     }
+
+    /// Its row in [`parameters_markdown`].
+    fn markdown_row(&self) -> String {
+        let Param { key, symbol, unit, doc, when, .. } = self;
+        let (default, range, cost) = (self.default_words(), self.range(), self.cost.word());
+        format!("| `{key}` | {symbol} | {unit} | {default} | {range} | {cost} | {doc} | {when} |\n")
+    }
 }
 
 /// A number as people write it.
@@ -213,22 +261,34 @@ fn number(x: f64) -> String {
     if x != 0.0 && (x.abs() >= 1e5 || x.abs() < 1e-3) { format!("{x:e}") } else { format!("{x}") }
 }
 
-/// The table as Markdown, for the README.
-pub fn markdown_table() -> String {
-    let mut text = String::from(
-        "| key | symbol | unit | default | allowed | a change costs | what |\n|---|---|---|---|---|---|---|\n",
-    );
-    for param in PARAMS {
+/// The table as Markdown, for docs/parameters.md: links to the groups, then each with its parameters.
+pub fn parameters_markdown() -> String {
+    let anchor = |title: &str| title.to_lowercase().replace(' ', "-");
+    let links: Vec<String> = GROUPS.iter().map(|g| format!("[{}](#{})", g.title, anchor(g.title))).collect();
+    let mut text = links.join(" ·\n") + "\n";
+    for Group { title, about, params } in GROUPS {
         text += &format!(
-            "| `{}` | {} | {} | {} | {} | {} | {} |\n",
-            param.key,
-            param.symbol,
-            param.unit,
-            param.default_words(),
-            param.range(),
-            param.cost.word(),
-            param.doc
+            "\n## {title}\n\n{}\n\n\
+             | key | symbol | unit | default | allowed | a change costs | what | when to turn it |\n\
+             |---|---|---|---|---|---|---|---|\n",
+            wrapped(about)
         );
+        params.iter().for_each(|param| text += &param.markdown_row());
     }
     text
+}
+
+/// Breaks a paragraph into lines of at most [`COLUMNS`].
+fn wrapped(paragraph: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for word in paragraph.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= COLUMNS => {
+                *line += " ";
+                *line += word;
+            }
+            _ => lines.push(word.into()),
+        }
+    }
+    lines.join("\n")
 }

@@ -2,147 +2,164 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform, "Width of the picture.")
-        .slider(16.0, 8192.0),
-    p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform, "Height of the picture.")
-        .slider(16.0, 8192.0),
-    p(
-        "image.samples",
-        "",
-        "",
-        Int(1, 4096, 1),
-        Uniform,
-        "Jittered samples a pixel; 1 is the pixel's centre.",
-    )
-    .slider(1.0, 256.0),
-    p(
-        "image.filter",
-        "",
-        "",
-        Choice(&["box", "gaussian", "blackman-harris"]),
-        Uniform,
-        "How several samples are spread about a pixel: evenly over it, or three pixels wide and denser in the middle.",
-    ),
-    p(
-        "image.rock_error",
-        "",
-        "samples",
-        Float(0.0, 16.0, 0.5),
-        Uniform,
-        "How far outlines of rock may be off, in distances between samples: where less is lost, fewer triangles are drawn; 0: all are.",
-    )
-    .slider(0.0, 4.0),
-    p(
-        "image.exposure",
-        "",
-        "stops",
-        Float(-32.0, 32.0, 0.0),
-        Uniform,
-        "Factor 2^exposure on the radiance, in the PNG only.",
-    )
-    .slider(-8.0, 8.0),
-    p(
-        "image.auto_exposure",
-        "",
-        "",
-        Choice(&["none", "average", "highlights"]),
-        Uniform,
-        "Adds stops measured on frame 0: the logarithmic mean becomes middle grey, or the brightest hundredth begins at 1.",
-    ),
-    p(
-        "image.bloom",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "Share of the light that is spread around bright things, in the PNG only; of whole pictures only.",
-    )
-    .slider(0.0, 0.5),
-    p(
-        "image.bloom_radius",
-        "",
-        "heights",
-        Float(0.0, 0.25, 0.04),
-        Uniform,
-        "How far it is spread: standard deviation of the widest of its six octaves, in heights of the image.",
-    ),
-    p(
-        "image.temperature",
-        "",
-        "K",
-        Float(1500.0, 15000.0, 6500.0),
-        Uniform,
-        "White balance of the PNG: light of this colour temperature is shown as that of 6500 K; lower turns the picture blue.",
-    )
-    .slider(2500.0, 12000.0),
-    p(
-        "image.tint",
-        "",
-        "Duv/1000",
-        Float(-50.0, 50.0, 0.0),
-        Uniform,
-        "How much greener than a black body that light is; above 0 turns the picture magenta.",
-    ),
-    p(
-        "image.tone",
-        "",
-        "",
-        Choice(&["filmic", "agx", "none"]),
-        Uniform,
-        "Tone curve of the PNG: Narkowicz's fit of ACES, Sobotka's AgX, or none.",
-    ),
-    p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform, "Frames of the animation; --frames chooses others.")
-        .slider(1.0, 1000.0),
-    p("animate.fps", "", "1/s", Float(0.01, 1000.0, 24.0), Uniform, "Frames a second.").slider(1.0, 120.0),
-    p(
-        "animate.loop",
-        "",
-        "frames",
-        Int(0, 1_000_000, 0),
-        Uniform,
-        "The animation comes round exactly after so many frames, which then are its length; 0: it does not.",
-    )
-    .slider(0.0, 1000.0),
-    p(
-        "animate.speed",
-        "",
-        "lengths/s",
-        Float(-1000.0, 1000.0, 0.5),
-        Uniform,
-        "How fast the volume moves down the flow; in a loop rounded to whole lengths, but not to none.",
-    )
-    .slider(0.0, 4.0),
-    p(
-        "animate.turn",
-        "",
-        "frames",
-        Int(-1_000_000, 1_000_000, 0),
-        Uniform,
-        "Turntable: the camera goes once round its target, about camera.up, in so many frames; 0: it does not.",
-    )
-    .slider(-1000.0, 1000.0),
-    p("animate.path.frames", "", "frames", Frames, Uniform, "When the camera is at the points of its path."),
-    p("animate.path.eyes", "", "m", Series, Uniform, "Points of the camera's path: a smooth curve goes through them."),
-    p(
-        "animate.path.targets",
-        "",
-        "m",
-        Series,
-        Uniform,
-        "What the camera looks at there; without them camera.target all the way.",
-    ),
-    p("animate.tracks.*.key", "", "", Text(""), Uniform, "The parameter that a track moves, any with a numeric value."),
-    p("animate.tracks.*.frames", "", "frames", Frames, Uniform, "Frames of its keyframes."),
-    p("animate.tracks.*.values", "", "", Series, Uniform, "Values at its keyframes."),
-    p(
-        "animate.tracks.*.interpolation",
-        "",
-        "",
-        Choice(&["linear", "smooth", "hold"]),
-        Uniform,
-        "Between keyframes: straight lines, a smooth curve that never overshoots, or steps.",
-    ),
-];
+pub(super) const IMAGE: Group = Group {
+    title: "Image",
+    about: "These parameters set the size of the picture, its samples, and the way from linear radiance to \
+            what is shown. Exposure, bloom, white balance and tone curve change PNGs and movies; an EXR \
+            holds the radiance without them.",
+    params: &[
+        p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform)
+            .slider(16.0, 8192.0)
+            .doc("Width of the picture.")
+            .when("Lower it for drafts, raise it for the final picture; `--size` sets width and height."),
+        p("image.height", "", "pixels", Int(1, 1_000_000, 720), Uniform)
+            .slider(16.0, 8192.0)
+            .doc("Height of the picture.")
+            .when("Lower it for drafts, raise it for the final picture; the field of view stays as it is."),
+        p("image.samples", "", "", Int(1, 4096, 1), Uniform)
+            .slider(1.0, 256.0)
+            .doc("Number of jittered samples in a pixel. A single one lies in the pixel's centre.")
+            .when("Raise it when edges are jagged or strands flicker; the time grows with it."),
+        p("image.filter", "", "", Choice(&["box", "gaussian", "blackman-harris"]), Uniform)
+            .doc(
+                "Spread of a pixel's samples: `box` is even over the pixel; `gaussian` and `blackman-harris` \
+                 are three pixels wide and denser in the middle. A single sample is not spread.",
+            )
+            .when(
+                "Choose `gaussian` or `blackman-harris` when edges look hard; keep `box` for the sharpest \
+                 picture.",
+            ),
+        p("image.rock_error", "", "samples", Float(0.0, 16.0, 0.5), Uniform)
+            .slider(0.0, 4.0)
+            .doc(
+                "Largest error of the outlines of rock, in distances between samples. Where the error is \
+                 smaller, fewer triangles are drawn; 0 draws all of them.",
+            )
+            .when("Raise it to draw rock faster; lower it to 0 for reference pictures."),
+        p("image.exposure", "", "stops", Float(-32.0, 32.0, 0.0), Uniform)
+            .slider(-8.0, 8.0)
+            .doc("Exposure: the radiance is multiplied by 2^exposure.")
+            .when("Raise it when the picture is too dark; lower it when bright water burns out."),
+        p("image.auto_exposure", "", "", Choice(&["none", "average", "highlights"]), Uniform)
+            .doc(
+                "Stops added to the exposure, measured on frame 0: `average` brings the logarithmic mean to \
+                 middle grey; `highlights` brings the brightest hundredth to 1 and above.",
+            )
+            .when(
+                "Choose `average` for a first look at a new scene, `highlights` to keep white water from \
+                 burning out.",
+            ),
+        p("image.bloom", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .slider(0.0, 0.5)
+            .doc(
+                "Share of the light that is spread around bright things. It needs the whole picture, not a \
+                 crop.",
+            )
+            .when(
+                "Raise it to about 0.1 or 0.2 for lamps and glints that should glow; 0 leaves every edge \
+                 clean.",
+            ),
+        p("image.bloom_radius", "", "heights", Float(0.0, 0.25, 0.04), Uniform)
+            .doc("Standard deviation of the widest of the bloom's six octaves, in heights of the image.")
+            .when("Raise it for a wide, faint glow; lower it for a tight one."),
+        p("image.temperature", "", "K", Float(1500.0, 15000.0, 6500.0), Uniform)
+            .slider(2500.0, 12000.0)
+            .doc("White balance: light of this colour temperature is shown as that of 6500 K.")
+            .when(
+                "Lower it to take away the yellow of lamps or evening light; raise it for a warmer picture.",
+            ),
+        p("image.tint", "", "Duv/1000", Float(-50.0, 50.0, 0.0), Uniform)
+            .doc("White balance: distance of that light from a black body, positive towards green.")
+            .when("Raise it against a green cast; lower it against a magenta one."),
+        p("image.tone", "", "", Choice(&["filmic", "agx", "none"]), Uniform)
+            .doc(
+                "Tone curve: `filmic` is Narkowicz's fit of ACES, `agx` is Sobotka's AgX, `none` cuts off \
+                 what is brighter than 1.",
+            )
+            .when(
+                "Choose `agx` when bright coloured light should turn white, `none` when pixel values should \
+                 be compared.",
+            ),
+    ],
+};
+
+pub(super) const ANIMATION: Group = Group {
+    title: "Animation",
+    about: "`taki batch` renders a scene in time, and `--frame` one moment of it. The water moves by itself; \
+            a turntable or a path moves the camera, and tracks move any other number. Frames are counted \
+            from 0.",
+    params: &[
+        p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform)
+            .slider(1.0, 1000.0)
+            .doc("Number of frames of an animation that is no loop.")
+            .when("Raise it for a longer film; `--frames` renders a part of it."),
+        p("animate.fps", "", "1/s", Float(0.01, 1000.0, 24.0), Uniform)
+            .slider(1.0, 120.0)
+            .doc("Number of frames in a second.")
+            .when("Set it to the frame rate of the film; the water keeps its speed."),
+        p("animate.loop", "", "frames", Int(0, 1_000_000, 0), Uniform)
+            .slider(0.0, 1000.0)
+            .doc(
+                "Number of frames after which the animation comes round exactly, which is then its length. \
+                 Keyframes lie within it and lead back to the first. 0 means that it does not come round.",
+            )
+            .when(
+                "Set it for a film that repeats without a jump; a few seconds are enough for falling water.",
+            ),
+        p("animate.speed", "", "lengths/s", Float(-1000.0, 1000.0, 0.5), Uniform)
+            .slider(0.0, 4.0)
+            .doc(
+                "Speed at which the volume moves down the flow. A loop rounds it to whole lengths of the \
+                 volume, but not to none.",
+            )
+            .when(
+                "Raise it for faster water; lower it for slow motion. A sheet falls at its natural speed \
+                 when this is `materials.*.repeat_v` divided by the seconds of the fall.",
+            ),
+        p("animate.turn", "", "frames", Int(-1_000_000, 1_000_000, 0), Uniform)
+            .slider(-1000.0, 1000.0)
+            .doc(
+                "Number of frames in which the camera goes once round its target, about `camera.up`. \
+                 Negative numbers go the other way; 0 leaves the camera where it is.",
+            )
+            .when("Set it to `animate.loop` for a turntable that repeats without a jump."),
+        p("animate.path.frames", "", "frames", Frames, Uniform)
+            .doc(
+                "Frames at which the camera is at the points of its path. Without them they are spread \
+                 evenly.",
+            )
+            .when("Set them when the camera should linger at some points and hurry between others."),
+        p("animate.path.eyes", "", "m", Series, Uniform)
+            .doc("Points of the camera's path, at least two. A smooth curve goes through them.")
+            .when("Set them when the camera should travel; in a loop the path closes by itself."),
+        p("animate.path.targets", "", "m", Series, Uniform)
+            .doc(
+                "Points that the camera looks at, one for each point of the path. Without them it looks at \
+                 `camera.target`.",
+            )
+            .when("Set them when the camera should turn its view on the way."),
+        p("animate.tracks.*.key", "", "", Text(""), Uniform)
+            .doc(
+                "Key of the parameter that the track moves: any with numbers but the size of the image and \
+                 those of the animation.",
+            )
+            .when("Add a track when something besides the water and the camera should change in time."),
+        p("animate.tracks.*.frames", "", "frames", Frames, Uniform)
+            .doc("Frames of the keyframes.")
+            .when("Move keyframes apart for a slower change, together for a faster one."),
+        p("animate.tracks.*.values", "", "", Series, Uniform)
+            .doc("Values at the keyframes, one for each frame.")
+            .when("Set the same value at two keyframes in a row to let the parameter rest between them."),
+        p("animate.tracks.*.interpolation", "", "", Choice(&["linear", "smooth", "hold"]), Uniform)
+            .doc(
+                "Course between keyframes: `linear` is straight, `smooth` is a curve that never overshoots, \
+                 `hold` keeps the value until the next keyframe.",
+            )
+            .when(
+                "Choose `smooth` when a change should start and end gently, `hold` when it should happen at \
+                 once.",
+            ),
+    ],
+};

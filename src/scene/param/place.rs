@@ -1,329 +1,291 @@
-//! What the water is in: rock, camera and surroundings.
+//! What the water is in: rock, pools, camera and surroundings.
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "rocks.*.corners",
-        "",
-        "m",
-        Corners,
-        Upload,
-        "Corners of the patch that the fractal height field is raised on, counter-clockwise from the outside.",
-    ),
-    p(
-        "rocks.*.levels",
-        "",
-        "",
-        Int(0, crate::scene::rock::MAX_LEVELS as i64, 7),
-        Upload,
-        "Subdivisions: the mesh has 2^levels squares a side.",
-    )
-    .slider(0.0, 9.0),
-    p(
-        "rocks.*.h",
-        "",
-        "",
-        Float(0.0, 8.0, 0.9),
-        Upload,
-        "Roughness of the height field, as h of the curves.",
-    )
-    .slider(0.0, 2.0),
-    p(
-        "rocks.*.amplitude",
-        "",
-        "m",
-        Float(0.0, 1e4, 0.5),
-        Upload,
-        "Standard deviation of the displacement at the first level.",
-    )
-    .slider(0.0, 5.0),
-    p(
-        "rocks.*.bulge",
-        "",
-        "m",
-        Float(-1e4, 1e4, 0.0),
-        Upload,
-        "Height of the patch's middle over its border, before it is made rough.",
-    )
-    .slider(-5.0, 5.0),
-    p("rocks.*.seed", "", "", Int(0, i64::MAX, 1), Upload, "Seed of the rock."),
-    p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload, "Mean albedo."),
-    p(
-        "rocks.*.color_noise",
-        "",
-        "",
-        Float(0.0, 1.0, 0.3),
-        Upload,
-        "Relative fractal variation of the albedo.",
-    ),
-    p("rocks.*.cavity", "", "", Float(0.0, 1.0, 0.6), Upload, "How much hollows are darker than ridges."),
-    p(
-        "rocks.*.ridges",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Upload,
-        "How much of the height field is folded into ridges: the share of −|f| of a second field f in it.",
-    ),
-    p(
-        "rocks.*.strata",
-        "",
-        "",
-        Float(0.0, 10.0, 0.0),
-        Upload,
-        "How far layers of rock, and the blocks they are broken into, step out and back, in heights of a layer.",
-    )
-    .slider(0.0, 2.0),
-    p(
-        "rocks.*.strata_height",
-        "",
-        "m",
-        Float(1e-3, 1e4, 0.6),
-        Upload,
-        "Mean height of a layer; the heights differ.",
-    )
-    .slider(0.05, 5.0),
-    p(
-        "rocks.*.strata_tilt",
-        "",
-        "°",
-        Float(-90.0, 90.0, 0.0),
-        Upload,
-        "Angle of the layers with the horizon, seen from the outside.",
-    ),
-    p(
-        "rocks.*.strata_color",
-        "",
-        "",
-        Float(0.0, 1.0, 0.3),
-        Upload,
-        "Largest relative difference of a layer's albedo from the mean.",
-    ),
-    p(
-        "rocks.*.border",
-        "",
-        "m",
-        Float(0.0, 1e4, 0.0),
-        Upload,
-        "Standard deviation of the displacement of points inside the patch at the first level: its sides are no straight lines.",
-    )
-    .slider(0.0, 3.0),
-    p(
-        "rocks.*.wet",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Upload,
-        "How much of a film of water is on the rock where volume quads are: it is darker (Lekner and Dorf 1988), and shines.",
-    ),
-    p(
-        "rocks.*.wet_reach",
-        "",
-        "m",
-        Float(1e-3, 1e4, 1.0),
-        Upload,
-        "How far from the quads the rock is dry; downwards four times as far.",
-    )
-    .slider(0.05, 5.0),
-    p(
-        "rocks.*.occlusion",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Upload,
-        "How much of the light from the surroundings is kept away by the rocks that have this above 0.",
-    ),
-    p(
-        "rocks.*.shadow",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Upload,
-        "How much of the light of the brightest directional light, or of the sun, the rocks that have this above 0 keep away.",
-    ),
-    p(
-        "pools.*.corners",
-        "",
-        "m",
-        Corners,
-        Upload,
-        "Corners of a level patch of water, counter-clockwise seen from above.",
-    ),
-    p("pools.*.depth", "", "m", Float(1e-3, 1e4, 1.2), Upload, "Depth of the water, where no rock reaches into it.")
-        .slider(0.05, 5.0),
-    p(
-        "pools.*.color",
-        "",
-        "",
-        Color([0.016, 0.026, 0.02]),
-        Upload,
-        "Albedo of the water itself where nothing is seen below it, at most 1 each.",
-    ),
-    p("pools.*.bottom", "", "", Color([0.11, 0.095, 0.07]), Upload, "Albedo of the ground, at most 1 each."),
-    p("pools.*.absorption", "", "1/m", Color([1.5, 0.7, 0.9]), Upload, "Absorption of the water."),
-    p("pools.*.height", "", "m", Float(0.0, 10.0, 0.008), Upload, "Standard deviation of the surface's height.")
-        .slider(0.0, 0.1),
-    p("pools.*.wavelength", "", "m", Float(1e-2, 1e4, 1.6), Upload, "Length of the longest waves.")
-        .slider(0.05, 10.0),
-    p(
-        "pools.*.rings",
-        "",
-        "m",
-        Float(0.0, 10.0, 0.02),
-        Upload,
-        "Amplitude of the rings from where quads that are no mist go through the surface.",
-    )
-    .slider(0.0, 0.2),
-    p(
-        "pools.*.period",
-        "",
-        "s",
-        Float(0.01, 1e4, 2.0),
-        Upload,
-        "Time in which volume.flow grows by 1: every wave goes through whole turns in it.",
-    )
-    .slider(0.1, 10.0),
-    p("pools.*.foam", "", "", Float(0.0, 1.0, 0.9), Upload, "How dense the foam is where water falls in."),
-    p("pools.*.foam_reach", "", "m", Float(1e-3, 1e4, 2.0), Upload, "How far from there it reaches.").slider(0.1, 10.0),
-    p("pools.*.seed", "", "", Int(0, i64::MAX, 1), Upload, "Seed of the waves."),
-    p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform, "Where the camera is."),
-    p("camera.target", "", "m", Point([0.0, 0.0, 0.0]), Uniform, "The point in the middle of the image."),
-    p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform, "Direction that is up in the image."),
-    p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform, "Vertical field of view.").slider(5.0, 120.0),
-    p(
-        "camera.near",
-        "",
-        "m",
-        Float(1e-4, 1e4, 0.01),
-        Uniform,
-        "Geometry nearer than this, along the view axis, is cut off.",
-    )
-    .slider(0.001, 10.0),
-    p(
-        "background.zenith",
-        "",
-        "",
-        Color([0.0, 0.0, 0.0]),
-        Uniform,
-        "Radiance of the background straight up.",
-    ),
-    p(
-        "background.horizon",
-        "",
-        "",
-        Color([0.0, 0.0, 0.0]),
-        Uniform,
-        "Radiance of the background at and below the horizon.",
-    ),
-    p(
-        "haze.density",
-        "β₀",
-        "1/m",
-        Float(0.0, 1000.0, 0.0),
-        Uniform,
-        "Extinction of the haze between the eye and rock and water; 0: there is none.",
-    )
-    .slider(0.0, 0.2),
-    p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform, "Radiance of endless haze."),
-    p(
-        "haze.scale_height",
-        "H",
-        "m",
-        Float(0.0, 1e5, 0.0),
-        Uniform,
-        "The haze thins upwards by e in so many metres; 0: it is the same at every height.",
-    )
-    .slider(0.0, 20.0),
-    p(
-        "haze.level",
-        "y₀",
-        "m",
-        Float(-1e7, 1e7, 0.0),
-        Uniform,
-        "Height at which haze that thins has its density.",
-    )
-    .slider(-20.0, 20.0),
-    p(
-        "haze.far",
-        "",
-        "m",
-        Float(0.0, 1e7, 0.0),
-        Uniform,
-        "Metres of haze before the background or environment; 0: it is seen as it is.",
-    )
-    .slider(0.0, 200.0),
-    p(
-        "environment.kind",
-        "",
-        "",
-        Choice(&["none", "sky", "file"]),
-        Upload,
-        "Light of the surroundings, seen in place of the background: none, the clear sky of [sky], or a map from a file.",
-    ),
-    p(
-        "environment.file",
-        "",
-        "",
-        Text(""),
-        Upload,
-        "Equirectangular map of linear radiance, .hdr or .exr: the middle is seen looking along −z, +y is up.",
-    ),
-    p(
-        "environment.intensity",
-        "",
-        "",
-        Float(0.0, 1e4, 1.0),
-        Uniform,
-        "Factor on the light of the environment, its sun included.",
-    )
-    .slider(0.0, 4.0),
-    p(
-        "environment.turn",
-        "",
-        "°",
-        Float(-36_000.0, 36_000.0, 0.0),
-        Uniform,
-        "Turns the environment about the y axis, from +z towards +x.",
-    )
-    .slider(-180.0, 180.0),
-    p(
-        "environment.lights",
-        "",
-        "",
-        Int(1, 1024, 24),
-        Uniform,
-        "Most directional lights that stand for the environment in the water; the time for light walks grows with them.",
-    )
-    .slider(1.0, 256.0),
-    p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload, "Height of the sun above the horizon."),
-    p(
-        "sky.azimuth",
-        "",
-        "°",
-        Float(-360.0, 360.0, 30.0),
-        Uniform,
-        "Direction of the sun, from +z towards +x; environment.turn adds to it.",
-    )
-    .slider(-180.0, 180.0),
-    p("sky.turbidity", "", "", Float(1.0, 10.0, 3.0), Upload, "Haze: 2 is very clear, 3 clear, 6 hazy."),
-    p(
-        "sky.ground",
-        "",
-        "",
-        Color([0.2, 0.2, 0.2]),
-        Upload,
-        "Albedo of the ground below the horizon, at most 1 each: it is lit by sky and sun, and lights the sky.",
-    ),
-    p(
-        "sky.sun",
-        "",
-        "",
-        Float(0.0, 1e4, 1.0),
-        Upload,
-        "Factor on the sun's own light; 0: no sun, as in the shade.",
-    )
-    .slider(0.0, 4.0),
-];
+pub(super) const ROCKS: Group = Group {
+    title: "Rocks",
+    about: "A rock is a fractal height field, raised on a patch of four corners by midpoint displacement. \
+            Ridges, layers, ragged sides, wetness and shade are off unless a scene sets them.",
+    params: &[
+        p("rocks.*.corners", "", "m", Corners, Upload)
+            .doc(
+                "Corners of the patch that the height field is raised on, counter-clockwise from the \
+                 outside.",
+            )
+            .when("Let patches overlap at their borders, so that no gap shows between two rocks."),
+        p("rocks.*.levels", "", "", Int(0, crate::scene::rock::MAX_LEVELS as i64, 7), Upload)
+            .slider(0.0, 9.0)
+            .doc("Number of subdivisions: the mesh has 2^levels squares a side.")
+            .when("Raise it for fine detail near the camera; lower it for small or distant rocks."),
+        p("rocks.*.h", "", "", Float(0.0, 8.0, 0.9), Upload)
+            .slider(0.0, 2.0)
+            .doc("Roughness of the height field, as `curves.h`: small values are rough, large ones smooth.")
+            .when("Lower it for jagged rock; raise it for rounded, worn stone."),
+        p("rocks.*.amplitude", "", "m", Float(0.0, 1e4, 0.5), Upload)
+            .slider(0.0, 5.0)
+            .doc("Standard deviation of the displacement at the first level.")
+            .when("Raise it for deep relief; lower it in proportion for a small patch."),
+        p("rocks.*.bulge", "", "m", Float(-1e4, 1e4, 0.0), Upload)
+            .slider(-5.0, 5.0)
+            .doc("Height of the patch's middle above its border, before it is made rough.")
+            .when("Raise it for boulders; lower it below 0 for a hollow, as behind a fall."),
+        p("rocks.*.seed", "", "", Int(0, i64::MAX, 1), Upload)
+            .doc("Seed of the rock's randomness.")
+            .when("Change it for another rock of the same kind, or when two rocks look alike."),
+        p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload)
+            .doc("Mean albedo of the dry rock, linear RGB.")
+            .when("Lower it when the rock is as bright as the water; raise green against red for moss."),
+        p("rocks.*.color_noise", "", "", Float(0.0, 1.0, 0.3), Upload)
+            .doc("Relative fractal variation of the albedo.")
+            .when("Raise it for stained or mossy rock; lower it for even stone."),
+        p("rocks.*.cavity", "", "", Float(0.0, 1.0, 0.6), Upload)
+            .doc("Share by which the deepest hollows are darker.")
+            .when("Raise it when relief looks flat; lower it when hollows are too black."),
+        p("rocks.*.ridges", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Share of the height field that is folded into ridges. They come from the absolute value of \
+                 a second field, which is sharp where that field passes 0.",
+            )
+            .when("Raise it for sharp crests; lower it for rounded rock."),
+        p("rocks.*.strata", "", "", Float(0.0, 10.0, 0.0), Upload)
+            .slider(0.0, 2.0)
+            .doc(
+                "Distance by which layers of rock, and the blocks they are broken into, step out and back, \
+                 in heights of a layer. 0 leaves layers out.",
+            )
+            .when(
+                "Raise it to about 0.5 for cliffs, to about 0.2 for boulders; leave it at 0 for rock without \
+                 layers.",
+            ),
+        p("rocks.*.strata_height", "", "m", Float(1e-3, 1e4, 0.6), Upload)
+            .slider(0.05, 5.0)
+            .doc("Mean height of a layer. Single layers differ from it.")
+            .when("Raise it for massive blocks; lower it for thin beds and for small rocks."),
+        p("rocks.*.strata_tilt", "", "°", Float(-90.0, 90.0, 0.0), Upload)
+            .doc("Angle of the layers with the horizon, seen from the outside.")
+            .when("Set a few degrees, another for each rock, when the layers look built."),
+        p("rocks.*.strata_color", "", "", Float(0.0, 1.0, 0.3), Upload)
+            .doc("Largest relative difference of a layer's albedo from the mean.")
+            .when("Raise it to tell layers apart by colour; lower it for one kind of stone."),
+        p("rocks.*.border", "", "m", Float(0.0, 1e4, 0.0), Upload)
+            .slider(0.0, 3.0)
+            .doc("Standard deviation of the displacement of points within the patch, at the first level.")
+            .when("Raise it when a rock shows the straight sides of its patch."),
+        p("rocks.*.wet", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Amount of a film of water on the rock near quads that are no mist, below them, and at \
+                 pools. Wet rock is darker and shines.",
+            )
+            .when("Raise it to 1 for rock that water runs over or splashes; leave it at 0 for dry rock."),
+        p("rocks.*.wet_reach", "", "m", Float(1e-3, 1e4, 1.0), Upload)
+            .slider(0.05, 5.0)
+            .doc(
+                "Distance from falling water at which the rock is dry. Below the water it is four times as \
+                 far.",
+            )
+            .when("Raise it for a broad wet margin; lower it in small scenes."),
+        p("rocks.*.occlusion", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Share of the light from the surroundings that rocks may keep away. Only rocks with a value \
+                 above 0 keep it away.",
+            )
+            .when("Raise it when clefts and the ground between rocks look too bright in the shade."),
+        p("rocks.*.shadow", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Share of the light of the brightest directional light, or of the sun, that rocks may keep \
+                 away. Only rocks with a value above 0 keep it away.",
+            )
+            .when(
+                "Raise it when rock should cast shadows on rock; leave it at 0 for far hills, since they \
+                 would coarsen the shadows of all.",
+            ),
+    ],
+};
+
+pub(super) const POOLS: Group = Group {
+    title: "Pools",
+    about: "A pool is a level patch of water with waves and foam. It mirrors the sky and a coarse picture of \
+            the rocks and falls around it, and the ground shows through. A scene has at most 8 pools.",
+    params: &[
+        p("pools.*.corners", "", "m", Corners, Upload)
+            .doc("Corners of the patch, all at one height, counter-clockwise seen from above.")
+            .when("Put the borders inside rock or outside the picture, so that no edge of water shows."),
+        p("pools.*.depth", "", "m", Float(1e-3, 1e4, 1.2), Upload)
+            .slider(0.05, 5.0)
+            .doc("Depth of the water where no rock reaches into it.")
+            .when("Lower it for a basin whose ground shows; raise it for a dark plunge pool."),
+        p("pools.*.color", "", "", Color([0.016, 0.026, 0.02]), Upload)
+            .doc("Albedo of the water itself where nothing is seen below it, at most 1 in each component.")
+            .when("Raise it for milky water; lower it for clear, dark water."),
+        p("pools.*.bottom", "", "", Color([0.11, 0.095, 0.07]), Upload)
+            .doc("Albedo of the ground, at most 1 in each component.")
+            .when("Raise it for sand; lower it for dark stone."),
+        p("pools.*.absorption", "", "1/m", Color([1.5, 0.7, 0.9]), Upload)
+            .doc("Absorption of the water, linear RGB.")
+            .when(
+                "Raise it to hide the ground; raise red against the others for bluer and greener shallows.",
+            ),
+        p("pools.*.height", "", "m", Float(0.0, 10.0, 0.008), Upload)
+            .slider(0.0, 0.1)
+            .doc("Standard deviation of the surface's height.")
+            .when("Raise it for choppy water; lower it for a mirror."),
+        p("pools.*.wavelength", "", "m", Float(1e-2, 1e4, 1.6), Upload)
+            .slider(0.05, 10.0)
+            .doc("Length of the longest waves. The shortest are about a tenth as long.")
+            .when("Raise it for wide water; lower it for small basins."),
+        p("pools.*.rings", "", "m", Float(0.0, 10.0, 0.02), Upload)
+            .slider(0.0, 0.2)
+            .doc(
+                "Amplitude of the rings that run out from where quads that are no mist go through the \
+                 surface.",
+            )
+            .when("Raise it for heavy water that falls into a calm pool; lower it for thin threads."),
+        p("pools.*.period", "", "s", Float(0.01, 1e4, 2.0), Upload)
+            .slider(0.1, 10.0)
+            .doc(
+                "Time in which `volume.flow` grows by 1. Every wave makes a whole number of turns in it, so \
+                 that loops close.",
+            )
+            .when("Set it to 1 divided by `animate.speed`; then the waves run at their natural speed."),
+        p("pools.*.foam", "", "", Float(0.0, 1.0, 0.9), Upload)
+            .doc("Density of the foam where water falls in. Along the shore there is less.")
+            .when("Raise it for a white plunge pool; lower it for quiet water."),
+        p("pools.*.foam_reach", "", "m", Float(1e-3, 1e4, 2.0), Upload)
+            .slider(0.1, 10.0)
+            .doc("Distance from the falling water at which the foam ends.")
+            .when("Raise it for a high fall that churns the whole pool; lower it for a thin jet."),
+        p("pools.*.seed", "", "", Int(0, i64::MAX, 1), Upload)
+            .doc("Seed of the waves' randomness.")
+            .when("Change it for other waves of the same kind."),
+    ],
+};
+
+pub(super) const CAMERA: Group = Group {
+    title: "Camera",
+    about: "The camera is a pinhole at `camera.eye` that looks at `camera.target`. In the viewer the mouse \
+            moves it.",
+    params: &[
+        p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform)
+            .doc("Position of the camera.")
+            .when("Move it low and near to make a fall look high; move it away to show where the water is."),
+        p("camera.target", "", "m", Point([0.0, 0.0, 0.0]), Uniform)
+            .doc("Point that lies in the middle of the image.")
+            .when("Move it to choose what the picture is centred on."),
+        p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform)
+            .doc("Direction that is up in the image.")
+            .when("Tilt it for a slanted picture, or when the view is straight up or down."),
+        p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform)
+            .slider(5.0, 120.0)
+            .doc("Vertical field of view.")
+            .when("Lower it to magnify what is far away; raise it to show more from nearby."),
+        p("camera.near", "", "m", Float(1e-4, 1e4, 0.01), Uniform)
+            .slider(0.001, 10.0)
+            .doc("Distance along the view axis below which geometry is cut off.")
+            .when(
+                "Raise it to look through something close to the camera; lower it when a near thing is cut \
+                 open.",
+            ),
+    ],
+};
+
+pub(super) const BACKGROUND_AND_HAZE: Group = Group {
+    title: "Background and haze",
+    about: "The background runs from the horizon to the zenith. It is seen where nothing else is and \
+            mirrored by wet rock and pools; an environment takes its place. Haze dims what is far away and \
+            shines in a colour of its own.",
+    params: &[
+        p("background.zenith", "", "", Color([0.0, 0.0, 0.0]), Uniform)
+            .doc("Radiance of the background straight up.")
+            .when("Choose a deep blue for a clear day, and nearly black for night."),
+        p("background.horizon", "", "", Color([0.0, 0.0, 0.0]), Uniform)
+            .doc("Radiance of the background at and below the horizon.")
+            .when("Raise it above the zenith's for daylight; lower it for night."),
+        p("haze.density", "β₀", "1/m", Float(0.0, 1000.0, 0.0), Uniform)
+            .slider(0.0, 0.2)
+            .doc("Extinction of the haze between the eye and rock and water. 0 leaves haze out.")
+            .when("Raise it when near and far look equally clear; begin with 0.01 in scenes of some 20 m."),
+        p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform).doc("Radiance of endless haze.").when(
+            "Bring it near `background.horizon`, so that far rock melts into the sky; darken it for \
+                 night.",
+        ),
+        p("haze.scale_height", "H", "m", Float(0.0, 1e5, 0.0), Uniform)
+            .slider(0.0, 20.0)
+            .doc(
+                "Height over which the haze thins upwards by a factor of e. 0 keeps it the same at every \
+                 height.",
+            )
+            .when("Set it to a metre or two for mist that lies on a pool; leave it at 0 for air."),
+        p("haze.level", "y₀", "m", Float(-1e7, 1e7, 0.0), Uniform)
+            .slider(-20.0, 20.0)
+            .doc("Height at which haze that thins upwards has the density `haze.density`.")
+            .when("Set it to the height of the pool that the mist lies on."),
+        p("haze.far", "", "m", Float(0.0, 1e7, 0.0), Uniform)
+            .slider(0.0, 200.0)
+            .doc("Metres of haze in front of the background or the environment. 0 leaves them clear.")
+            .when("Raise it when far rock is hazy and the sky behind it is not."),
+    ],
+};
+
+pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
+    title: "Environment and sky",
+    about: "An environment is light from all directions, of a clear sky or of a map from a file. It lights \
+            rock and water and is seen in place of the background. The scene's own sun and `light.ambient` \
+            usually go to 0 with it.",
+    params: &[
+        p("environment.kind", "", "", Choice(&["none", "sky", "file"]), Upload)
+            .doc(
+                "Source of the environment: `none`, the clear `sky` of the parameters below, or a map from a \
+                 `file`.",
+            )
+            .when("Choose `sky` for daylight at any hour, `file` for the light of a real place."),
+        p("environment.file", "", "", Text(""), Upload)
+            .doc(
+                "Path of an equirectangular map of linear radiance, .hdr or .exr. Its middle is seen looking \
+                 along −z, and +y is up.",
+            )
+            .when("Set it together with `environment.kind=file`."),
+        p("environment.intensity", "", "", Float(0.0, 1e4, 1.0), Uniform)
+            .slider(0.0, 4.0)
+            .doc("Factor on the light of the environment, its sun included.")
+            .when(
+                "Change it when the environment is too bright or too dark beside the scene's own lights; for \
+                 the whole picture change `image.exposure`.",
+            ),
+        p("environment.turn", "", "°", Float(-36_000.0, 36_000.0, 0.0), Uniform)
+            .slider(-180.0, 180.0)
+            .doc("Turn of the environment about the y axis, from +z towards +x.")
+            .when("Turn it to bring the brightest part of a map to the side that it should light."),
+        p("environment.lights", "", "", Int(1, 1024, 24), Uniform)
+            .slider(1.0, 256.0)
+            .doc("Most directional lights that stand for the environment in the water.")
+            .when(
+                "Raise it when the light in the water looks coarse; lower it to save time, which grows with \
+                 it.",
+            ),
+        p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload)
+            .doc("Height of the sun above the horizon.")
+            .when("Lower it for the red light of evening; raise it for noon."),
+        p("sky.azimuth", "", "°", Float(-360.0, 360.0, 30.0), Uniform)
+            .slider(-180.0, 180.0)
+            .doc("Direction of the sun, from +z towards +x. `environment.turn` adds to it.")
+            .when(
+                "Set it to about 180 for a sun behind the water of a fall that faces +z, to about 90 for a \
+                 sun from the side.",
+            ),
+        p("sky.turbidity", "", "", Float(1.0, 10.0, 3.0), Upload)
+            .doc("Haziness of the air: 2 is very clear, 3 is clear, 6 is hazy.")
+            .when("Raise it for a milky sky and a weaker sun; lower it for a deep blue one."),
+        p("sky.ground", "", "", Color([0.2, 0.2, 0.2]), Upload)
+            .doc(
+                "Albedo of the ground below the horizon, at most 1 in each component. Sun and sky light it, \
+                 and it lights the sky.",
+            )
+            .when("Raise it for snow or sand, which light the scene from below; lower it for woods."),
+        p("sky.sun", "", "", Float(0.0, 1e4, 1.0), Upload)
+            .slider(0.0, 4.0)
+            .doc("Factor on the sun's own light. 0 takes the sun away, as in the shade.")
+            .when("Lower it when shadows are too hard; set 0 for the light of the sky alone."),
+    ],
+};

@@ -2,102 +2,89 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "sheets.*.points",
-        "",
-        "m",
-        Series,
-        Uniform,
-        "Profile of a sheet: points from over the lip down to the foot, joined by a smooth curve.",
-    ),
-    p(
-        "sheets.*.widths",
-        "",
-        "m",
-        Series,
-        Uniform,
-        "Width of the sheet at each of its points, or one for all; 1 m if there is none.",
-    ),
-    p("sheets.*.across", "", "", Point([1.0, 0.0, 0.0]), Uniform, "Direction of its rows, across the flow."),
-    p(
-        "sheets.*.material",
-        "",
-        "",
-        Text("water"),
-        Uniform,
-        "Material of the sheet; its copies are those of the whole sheet.",
-    ),
-    p("sheets.*.segments", "", "", Int(1, 1024, 16), Uniform, "Quads along the flow.").slider(1.0, 64.0),
-    p("sheets.*.columns", "", "", Int(1, 256, 1), Uniform, "Quads across, at least.").slider(1.0, 32.0),
-    p(
-        "sheets.*.round",
-        "",
-        "turns",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "How far the sheet is bent across the flow, by its columns: 0 flat, 0.5 half a tube, 1 a tube.",
-    ),
-    p("sheets.*.v0", "v₀", "m/s", Float(0.01, 100.0, 1.0), Uniform, "Speed of the water at the first point.")
-        .slider(0.05, 5.0),
-    p(
-        "sheets.*.stretch",
-        "",
-        "",
-        Float(0.0, 1.0, 1.0),
-        Uniform,
-        "From a texture laid evenly along the flow (0) to one laid by the time of the free fall (1): streaks grow longer and run faster as they fall.",
-    ),
-    p(
-        "sheets.*.offset_u",
-        "",
-        "widths",
-        Float(-1e4, 1e4, 0.0),
-        Uniform,
-        "Where across the volume the sheet begins.",
-    )
-    .slider(0.0, 1.0),
-    p(
-        "sheets.*.offset_v",
-        "",
-        "lengths",
-        Float(-1e4, 1e4, 0.0),
-        Uniform,
-        "Where along the volume's flow the sheet begins.",
-    )
-    .slider(0.0, 1.0),
-    p(
-        "sheets.*.edge",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "Share of the half width over which the sides are eroded, so that they end along strands; 0: straight sides.",
-    ),
-    p(
-        "sheets.*.breakup",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "Erosion at the foot: the water breaks up as it falls, with the square of the way.",
-    ),
-    p(
-        "sheets.*.fade",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "Share of the way over which the foot fades away.",
-    ),
-    p(
-        "sheets.*.head",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Uniform,
-        "Share of the way over which the head comes in.",
-    ),
-];
+pub(super) const SHEETS: Group = Group {
+    title: "Sheets",
+    about: "A sheet is a band of falling water along a profile from over the lip down to the foot. taki cuts \
+            it into quads that share their corners, their texture and their erosion. Erosion takes the same \
+            amount from every density ρ, so thin strands vanish first and borders run along strands.",
+    params: &[
+        p("sheets.*.points", "", "m", Series, Uniform)
+            .doc(
+                "Profile of the sheet: at least two points from over the lip down to the foot, joined by a \
+                 smooth curve.",
+            )
+            .when("Begin it upstream of the lip; add points where the water should keep clear of the rock."),
+        p("sheets.*.widths", "", "m", Series, Uniform)
+            .doc(
+                "Width of the sheet at each of its points, or one width for all. Without any it is 1 m wide.",
+            )
+            .when("Let the widths grow downwards when falling water should spread."),
+        p("sheets.*.across", "", "", Point([1.0, 0.0, 0.0]), Uniform)
+            .doc("Direction of the sheet's rows, across the flow. All rows are parallel to it.")
+            .when("Turn it when the fall does not face along the z axis."),
+        p("sheets.*.material", "", "", Text("water"), Uniform)
+            .doc(
+                "Name of the sheet's material. Its `materials.*.repeat_u` and `materials.*.repeat_v` count \
+                 copies of the volume over the whole sheet.",
+            )
+            .when("Name another material for another thickness, for finer strands, or for mist."),
+        p("sheets.*.segments", "", "", Int(1, 1024, 16), Uniform)
+            .slider(1.0, 64.0)
+            .doc("Number of quads along the flow.")
+            .when("Raise it when the bend over the lip looks angular; lower it to save quads."),
+        p("sheets.*.columns", "", "", Int(1, 256, 1), Uniform)
+            .slider(1.0, 32.0)
+            .doc("Least number of quads across. Eroded sides add borders of their own.")
+            .when(
+                "Raise it for a round sheet, since a tube needs 3 or more, and for mist that fades on all \
+                 sides.",
+            ),
+        p("sheets.*.round", "", "turns", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Bend of the sheet across the flow, in `sheets.*.columns` pieces: 0 is flat, 0.5 half a \
+                 tube, 1 a tube. A tube needs a whole number for `materials.*.repeat_u`.",
+            )
+            .when("Raise it for jets and spouts; leave it at 0 for falls."),
+        p("sheets.*.v0", "v₀", "m/s", Float(0.01, 100.0, 1.0), Uniform)
+            .slider(0.05, 5.0)
+            .doc("Speed of the water at the first point. From there it falls freely.")
+            .when(
+                "Lower it for streaks that lengthen strongly from lip to foot; raise it for a fast stream \
+                 whose streaks stay alike.",
+            ),
+        p("sheets.*.stretch", "", "", Float(0.0, 1.0, 1.0), Uniform)
+            .doc(
+                "Position of the texture along the flow: 0 spreads it evenly, 1 spreads it by the time of \
+                 the free fall, so that streaks grow longer and run faster as they fall.",
+            )
+            .when("Lower it to 0 for mist and for water that slides at an even speed; keep 1 for free fall."),
+        p("sheets.*.offset_u", "", "widths", Float(-1e4, 1e4, 0.0), Uniform)
+            .slider(0.0, 1.0)
+            .doc("Place across the volume at which the sheet begins.")
+            .when("Change it when two sheets show the same strands."),
+        p("sheets.*.offset_v", "", "lengths", Float(-1e4, 1e4, 0.0), Uniform)
+            .slider(0.0, 1.0)
+            .doc("Place along the volume's flow at which the sheet begins.")
+            .when("Change it when two sheets show the same streaks at the same height."),
+        p("sheets.*.edge", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Share of the half width over which the sides are eroded, so that they end along strands. 0 \
+                 leaves the sides straight.",
+            )
+            .when("Raise it when a sheet shows straight borders; 1 suits thin jets and mist."),
+        p("sheets.*.breakup", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Erosion at the foot. It grows with the square of the way, so the water breaks up as it \
+                 falls.",
+            )
+            .when("Raise it for high falls that dissolve into strands; lower it for short or heavy ones."),
+        p("sheets.*.fade", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc("Share of the way over which the foot fades to nothing.")
+            .when("Raise it when the foot ends in a hard line at a pool or a rock."),
+        p("sheets.*.head", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc("Share of the way over which the head grows from nothing.")
+            .when("Raise it for mist, and for sheets whose beginning is in view."),
+    ],
+};

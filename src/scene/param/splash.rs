@@ -2,78 +2,60 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "splashes.*.from",
-        "",
-        "m",
-        Point([0.0, 0.0, 0.0]),
-        Uniform,
-        "Where water hits: one end of a line, from which arcs of drops are thrown up.",
-    ),
-    p(
-        "splashes.*.to",
-        "",
-        "m",
-        Point([0.0, 0.0, 0.0]),
-        Uniform,
-        "The other end; without it all start at one point.",
-    ),
-    p(
-        "splashes.*.material",
-        "",
-        "",
-        Text("water"),
-        Uniform,
-        "Material of the arcs; its copies are those of each.",
-    ),
-    p("splashes.*.count", "", "", Int(1, 1024, 12), Uniform, "Arcs.").slider(1.0, 48.0),
-    p("splashes.*.segments", "", "", Int(1, 64, 6), Uniform, "Quads along each arc."),
-    p(
-        "splashes.*.drop",
-        "h",
-        "m",
-        Float(1e-3, 1e4, 3.0),
-        Uniform,
-        "Height of the fall that ends here: water hits at √(2 g h).",
-    )
-    .slider(0.1, 20.0),
-    p(
-        "splashes.*.restitution",
-        "",
-        "",
-        Float(0.01, 1.0, 0.35),
-        Uniform,
-        "Share of that speed that the fastest drops leave with; none rises above its square times the height.",
-    ),
-    p(
-        "splashes.*.elevation",
-        "",
-        "°",
-        Float(0.0, 90.0, 60.0),
-        Uniform,
-        "Mean angle above the horizon at which drops leave.",
-    ),
-    p("splashes.*.spread", "", "°", Float(0.0, 90.0, 18.0), Uniform, "Largest difference from that angle."),
-    p(
-        "splashes.*.toward",
-        "",
-        "",
-        Point([0.0, 0.0, 1.0]),
-        Uniform,
-        "Direction of the middle of the fan, along the ground.",
-    ),
-    p(
-        "splashes.*.fan",
-        "",
-        "°",
-        Float(0.0, 180.0, 180.0),
-        Uniform,
-        "Angle of the fan on either side of that direction; 180: a crown.",
-    ),
-    p("splashes.*.width", "", "m", Float(1e-3, 1e4, 0.4), Uniform, "Mean width of an arc at its end.")
-        .slider(0.05, 2.0),
-    p("splashes.*.seed", "", "", Int(0, i64::MAX, 1), Uniform, "Seed of the arcs."),
-];
+pub(super) const SPLASHES: Group = Group {
+    title: "Splashes",
+    about: "A splash throws up arcs of drops along a line where water hits. The drops leave with a share of \
+            the speed of impact and fly parabolas; each arc is a short sheet whose borders are eroded.",
+    params: &[
+        p("splashes.*.from", "", "m", Point([0.0, 0.0, 0.0]), Uniform)
+            .doc("One end of the line where water hits.")
+            .when("Put it at the foot of a fall, just above the pool or the ledge that the water meets."),
+        p("splashes.*.to", "", "m", Point([0.0, 0.0, 0.0]), Uniform)
+            .doc("Other end of the line where water hits. Without it all arcs start at one point.")
+            .when("Set it for a broad fall; leave it out for a single jet."),
+        p("splashes.*.material", "", "", Text("water"), Uniform)
+            .doc(
+                "Name of the arcs' material. Its `materials.*.repeat_u` and `materials.*.repeat_v` count \
+                 copies of the volume over each arc.",
+            )
+            .when("Name a thinner material than the fall's when the spray looks too heavy."),
+        p("splashes.*.count", "", "", Int(1, 1024, 12), Uniform)
+            .slider(1.0, 48.0)
+            .doc("Number of arcs.")
+            .when("Raise it for a denser splash or a longer line; lower it to save quads."),
+        p("splashes.*.segments", "", "", Int(1, 64, 6), Uniform)
+            .doc("Number of quads along each arc.")
+            .when("Raise it when large arcs look angular; lower it to save quads."),
+        p("splashes.*.drop", "h", "m", Float(1e-3, 1e4, 3.0), Uniform)
+            .slider(0.1, 20.0)
+            .doc("Height of the fall that ends here. Water hits at √(2·g·h).")
+            .when("Set it to the real height of the fall; raise it for a stronger splash."),
+        p("splashes.*.restitution", "", "", Float(0.01, 1.0, 0.35), Uniform)
+            .doc(
+                "Share of the speed of impact that the fastest drops leave with. No drop rises above its \
+                 square times `splashes.*.drop`.",
+            )
+            .when("Raise it when drops should fly higher and further; lower it for a flat splash."),
+        p("splashes.*.elevation", "", "°", Float(0.0, 90.0, 60.0), Uniform)
+            .doc("Mean angle above the horizon at which drops leave.")
+            .when("Raise it for a steep crown; lower it for spray that flies outwards."),
+        p("splashes.*.spread", "", "°", Float(0.0, 90.0, 18.0), Uniform)
+            .doc("Largest difference of an arc's angle from `splashes.*.elevation`.")
+            .when("Raise it for an untidy splash; lower it for an even crown."),
+        p("splashes.*.toward", "", "", Point([0.0, 0.0, 1.0]), Uniform)
+            .doc("Direction of the middle of the fan, along the ground.")
+            .when("Turn it away from the wall that the water falls along."),
+        p("splashes.*.fan", "", "°", Float(0.0, 180.0, 180.0), Uniform)
+            .doc("Angle of the fan on either side of its middle. 180 is a whole crown.")
+            .when("Lower it to about 45 in front of a wall; keep 180 for a jet that hits open water."),
+        p("splashes.*.width", "", "m", Float(1e-3, 1e4, 0.4), Uniform)
+            .slider(0.05, 2.0)
+            .doc("Mean width of an arc at its end.")
+            .when("Raise it for broad sheets of spray; lower it for thin jets of drops."),
+        p("splashes.*.seed", "", "", Int(0, i64::MAX, 1), Uniform)
+            .doc("Seed of the arcs' randomness.")
+            .when("Change it for another arrangement of the arcs."),
+    ],
+};

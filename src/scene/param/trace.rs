@@ -2,118 +2,103 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "materials.*.thickness",
-        "H",
-        "m",
-        Float(1e-4, 1e4, 0.4),
-        Uniform,
-        "Depth of one volume under the face of the quads.",
-    )
-    .slider(0.01, 10.0),
-    p(
-        "materials.*.repeat_u",
-        "",
-        "",
-        Float(1e-3, 1e4, 1.0),
-        Uniform,
-        "Copies of the volume along u, across the flow.",
-    )
-    .slider(0.1, 20.0),
-    p(
-        "materials.*.repeat_v",
-        "",
-        "",
-        Float(1e-3, 1e4, 1.0),
-        Uniform,
-        "Copies of the volume along v, along the flow.",
-    )
-    .slider(0.1, 20.0),
-    p(
-        "materials.*.mist",
-        "",
-        "",
-        Float(0.0, 4.0, 0.0),
-        Uniform,
-        "Ψ of droplets without a direction, which fill the volume in place of its strands; 0: a material of strands.",
-    ),
-    p(
-        "quads.*.corners",
-        "A B C D",
-        "m",
-        Corners,
-        Upload,
-        "Corners at (u,v) = (0,0) (1,0) (1,1) (0,1): convex, planar; v runs down the flow.",
-    ),
-    p("quads.*.material", "", "", Text("water"), Upload, "Name of the quad's material."),
-    p(
-        "trace.attenuation",
-        "",
-        "",
-        Choice(&["path-length", "per-cell"]),
-        Uniform,
-        "How a cell attenuates: τ_k = σ·ρ·Δs over the metres inside it, or τ_k = τ·ρ however short the way.",
-    ),
-    p(
-        "trace.sigma",
-        "σ",
-        "1/m",
-        Float(0.0, 1e5, 10.0),
-        Uniform,
-        "Extinction at ρ = 1, for path-length attenuation.",
-    )
-    .slider(0.0, 200.0),
-    p(
-        "trace.tau",
-        "τ",
-        "",
-        Float(0.0, 1e3, 0.1),
-        Uniform,
-        "Optical depth of one cell at ρ = 1, for per-cell attenuation.",
-    )
-    .slider(0.0, 2.0),
-    p(
-        "trace.max_cells",
-        "",
-        "cells",
-        Int(1, 65536, 512),
-        Uniform,
-        "Most cells one view ray, and one light ray, may meet.",
-    )
-    .slider(1.0, 2048.0),
-    p(
-        "trace.early_end",
-        "",
-        "",
-        Float(0.0, 1.0, 1.0 / 1024.0),
-        Uniform,
-        "A view ray ends where its transmittance falls below this; 0: never.",
-    ),
-    p(
-        "trace.layers",
-        "",
-        "sheets",
-        Int(1, 16, 4),
-        Uniform,
-        "Most quads one view ray goes through, the nearest first; those behind are left out.",
-    ),
-    p(
-        "trace.filter",
-        "",
-        "",
-        Choice(&["none", "pyramid"]),
-        Upload,
-        "pyramid: where a pixel sees many cells, coarser levels of the volume are walked, so that nothing aliases.",
-    ),
-    p(
-        "trace.lookup",
-        "",
-        "",
-        Choice(&["nearest", "trilinear"]),
-        Uniform,
-        "nearest: cells are blocks; trilinear: ρ, k and v are interpolated between eight cells, for close views.",
-    ),
-];
+pub(super) const MATERIALS_AND_QUADS: Group = Group {
+    title: "Materials and quads",
+    about: "A material says how the volume lies on quads, sheets and splashes; the material `water` always \
+            exists. A quad is a flat piece of water given by its corners, beside those that sheets and \
+            splashes make.",
+    params: &[
+        p("materials.*.thickness", "H", "m", Float(1e-4, 1e4, 0.4), Uniform)
+            .slider(0.01, 10.0)
+            .doc("Depth of one volume below the face of the quads.")
+            .when("Raise it for a deep, full body of water; lower it for a thin film."),
+        p("materials.*.repeat_u", "", "", Float(1e-3, 1e4, 1.0), Uniform)
+            .slider(0.1, 20.0)
+            .doc("Number of copies of the volume along u, across the flow.")
+            .when("Raise it for narrower strands; lower it for broader ones, as on a narrow sheet."),
+        p("materials.*.repeat_v", "", "", Float(1e-3, 1e4, 1.0), Uniform)
+            .slider(0.1, 20.0)
+            .doc("Number of copies of the volume along v, along the flow.")
+            .when("Raise it for shorter streaks; lower it for longer ones, as on a short sheet."),
+        p("materials.*.mist", "", "", Float(0.0, 4.0, 0.0), Uniform)
+            .doc(
+                "Ψ of droplets without a direction, which fill the volume in place of its strands. 0 keeps \
+                 the strands.",
+            )
+            .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
+        p("quads.*.corners", "A B C D", "m", Corners, Upload)
+            .doc(
+                "Corners at (u,v) = (0,0), (1,0), (1,1) and (0,1). They lie in one plane and are convex; v \
+                 runs down the flow.",
+            )
+            .when("Add quads for a form that sheets do not have, as in the paper's figures."),
+        p("quads.*.material", "", "", Text("water"), Upload)
+            .doc("Name of the quad's material.")
+            .when("Name another material for another thickness or other strands."),
+    ],
+};
+
+pub(super) const TRACE: Group = Group {
+    title: "Trace",
+    about: "A view ray walks from cell to cell through copies of the volume, and through one sheet after \
+            another. These parameters set how much light a cell takes away, and how far and how finely rays \
+            look.",
+    params: &[
+        p("trace.attenuation", "", "", Choice(&["path-length", "per-cell"]), Uniform)
+            .doc(
+                "Attenuation of a cell: `path-length` is τ_k = σ·ρ·Δs over the metres Δs of the ray inside \
+                 it; `per-cell` is τ_k = τ·ρ, however short the way.",
+            )
+            .when(
+                "Choose `per-cell` to reproduce the paper; keep `path-length` otherwise, which does not \
+                 depend on the number of cells.",
+            ),
+        p("trace.sigma", "σ", "1/m", Float(0.0, 1e5, 10.0), Uniform)
+            .slider(0.0, 200.0)
+            .doc("Extinction at ρ = 1, with `trace.attenuation=path-length`.")
+            .when(
+                "Raise it when too much shows through the water; lower it for a veil. A scene of half the \
+                 size needs twice as much.",
+            ),
+        p("trace.tau", "τ", "", Float(0.0, 1e3, 0.1), Uniform)
+            .slider(0.0, 2.0)
+            .doc("Optical depth of one cell at ρ = 1, with `trace.attenuation=per-cell`.")
+            .when(
+                "Raise it when too much shows through the water; lower it for a veil. A volume of twice as \
+                 many layers needs half as much.",
+            ),
+        p("trace.max_cells", "", "cells", Int(1, 65536, 512), Uniform)
+            .slider(1.0, 2048.0)
+            .doc("Most cells that one view ray, and one light ray, may meet.")
+            .when(
+                "Raise it for large volumes and flat views, where rays would end inside the water; lower it \
+                 to limit the time.",
+            ),
+        p("trace.early_end", "", "", Float(0.0, 1.0, 1.0 / 1024.0), Uniform)
+            .doc("Transmittance below which a view ray ends. 0 never ends it early.")
+            .when("Raise it to save time in dense water; lower it to 0 for exact sums."),
+        p("trace.layers", "", "sheets", Int(1, 16, 4), Uniform)
+            .doc("Most quads that one view ray goes through, the nearest first. Those behind are left out.")
+            .when("Raise it when water behind other water disappears; lower it to save time."),
+        p("trace.filter", "", "", Choice(&["none", "pyramid"]), Upload)
+            .doc(
+                "Filter against aliasing: `pyramid` walks coarser levels of the volume where a pixel sees \
+                 many cells; `none` always walks the volume's own cells.",
+            )
+            .when(
+                "Choose `pyramid` when distant water flickers or looks grainy; it takes more memory and \
+                 time.",
+            ),
+        p("trace.lookup", "", "", Choice(&["nearest", "trilinear"]), Uniform)
+            .doc(
+                "Values that a ray finds in a cell: `nearest` takes the cell's own, `trilinear` interpolates \
+                 ρ, k and v between eight cells.",
+            )
+            .when(
+                "Choose `trilinear` for close views in which cells show as blocks; the walk takes 2 to 5 \
+                 times as long.",
+            ),
+    ],
+};

@@ -2,154 +2,175 @@
 
 use super::Cost::*;
 use super::Kind::*;
-use super::{Param, p};
+use super::{Group, p};
 
-pub(super) const TABLE: &[Param] = &[
-    p(
-        "curves.across",
-        "",
-        "",
-        Int(1, 65536, 32),
-        Volume,
-        "Columns of the jitter grid of curve ends on the face y = 0, across the flow.",
-    )
-    .slider(1.0, 128.0),
-    p("curves.deep", "", "", Int(1, 65536, 32), Volume, "Rows of the jitter grid, into the surface.")
-        .slider(1.0, 128.0),
-    p(
-        "curves.h",
-        "h",
-        "",
-        Float(0.0, 8.0, 0.9),
-        Volume,
-        "Complexity of the spatial fractal curves: small is rough, large is smooth.",
-    )
-    .slider(0.0, 3.0),
-    p(
-        "curves.amplitude",
-        "",
-        "flow lengths",
-        Float(0.0, 1.0, 0.05),
-        Volume,
-        "Standard deviation of g as a fraction of the flow length ny.",
-    )
-    .slider(0.0, 0.3),
-    p(
-        "curves.levels",
-        "",
-        "",
-        Int(0, 16, 0),
-        Volume,
-        "Depth of the recursion; 0: as deep as makes the leaf segments half a cell.",
-    ),
-    p(
-        "curves.bundles",
-        "",
-        "",
-        Int(0, 65536, 0),
-        Volume,
-        "Parent curves that the curves gather around; 0: every curve goes its own way, as in the paper.",
-    )
-    .slider(0.0, 64.0),
-    p(
-        "curves.radius",
-        "",
-        "widths",
-        Float(0.0, 1.0, 0.03),
-        Volume,
-        "Standard deviation of the curves' distance from their parent, as a fraction of the volume's width nx.",
-    )
-    .slider(0.0, 0.2),
-    p(
-        "curves.wander",
-        "",
-        "flow lengths",
-        Float(0.0, 1.0, 0.08),
-        Volume,
-        "Standard deviation of g of the parents, as curves.amplitude of the curves.",
-    )
-    .slider(0.0, 0.3),
-    p(
-        "curves.breathe",
-        "",
-        "",
-        Float(0.0, 2.0, 0.4),
-        Volume,
-        "How much bundles part and gather along their way: the relative standard deviation of their width.",
-    ),
-    p("curves.loose", "", "", Float(0.0, 1.0, 0.15), Volume, "Share of the curves that belong to no bundle."),
-    p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume, "Cells across the flow.").slider(1.0, 256.0),
-    p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume, "Cells along the flow.").slider(1.0, 256.0),
-    p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume, "Cells into the surface.")
-        .slider(1.0, 256.0),
-    p(
-        "volume.storage",
-        "",
-        "",
-        Choice(&["auto", "dense", "sparse"]),
-        Volume,
-        "How cells are stored: all (dense), those that strands pass (sparse), or sparse only where all would not fit --memory (auto). Pictures do not depend on it.",
-    ),
-    p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume, "Seed of all randomness of the volume."),
-    p(
-        "volume.coherence",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Volume,
-        "From density independent in every cell, as in the paper (0), to density that strands carry along (1).",
-    ),
-    p(
-        "volume.strand_length",
-        "",
-        "flow lengths",
-        Float(0.005, 1.0, 0.08),
-        Volume,
-        "Correlation length of the density along a strand, as a fraction of the flow length ny.",
-    )
-    .slider(0.005, 0.5),
-    p(
-        "volume.coverage",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Volume,
-        "From density whole in every cell that a strand touches, as in the paper (0), to density by the length of the strands in it (1).",
-    ),
-    p(
-        "volume.crest",
-        "",
-        "",
-        Float(0.0, 1.0, 0.0),
-        Upload,
-        "How much k_d grows from the thinnest cells to the densest: foam is bright.",
-    ),
-    p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform, "Scale of the density ρ."),
-    p(
-        "volume.flow",
-        "",
-        "lengths",
-        Float(-1e6, 1e6, 0.0),
-        Uniform,
-        "Moves the volume down the flow by this many of its lengths; every whole number gives the same picture.",
-    )
-    .slider(0.0, 1.0),
-    p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload, "Base of the diffuse reflection coefficient."),
-    p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload, "Base of the specular reflection coefficient."),
-    p(
-        "volume.k_noise",
-        "",
-        "",
-        Float(0.0, 1.0, 0.1),
-        Upload,
-        "Standard deviation of the normal noise added to k_d and k_s.",
-    ),
-    p(
-        "volume.file",
-        "",
-        "",
-        Text(""),
-        Volume,
-        "Takes the volume texture from this .npz file instead of building it.",
-    ),
-];
+pub(super) const CURVES: Group = Group {
+    title: "Curves",
+    about: "Spatial fractal curves run from the face y = 0 of the volume to their twins on y = ny and give \
+            the cells that they pass their flow direction. These parameters set how many curves there are, \
+            how rough they are, and whether they gather into bundles.",
+    params: &[
+        p("curves.across", "", "", Int(1, 65536, 32), Volume)
+            .slider(1.0, 128.0)
+            .doc("Columns of the jittered grid of curve starts on the face y = 0, across the flow.")
+            .when(
+                "Raise it for denser water with finer gaps; lower it for single strands. Raise it in \
+                 proportion to `volume.nx` to keep the water as dense.",
+            ),
+        p("curves.deep", "", "", Int(1, 65536, 32), Volume)
+            .slider(1.0, 128.0)
+            .doc("Rows of the jittered grid of curve starts, into the surface.")
+            .when(
+                "Raise it when the water looks like a single layer of strands; lower it together with \
+                 `volume.nz` for a thin sheet.",
+            ),
+        p("curves.h", "h", "", Float(0.0, 8.0, 0.9), Volume)
+            .slider(0.0, 3.0)
+            .doc(
+                "Complexity h of the curves: each level of the recursion displaces by 2^(−h) of the level \
+                 before. A small h is rough, a large h is smooth.",
+            )
+            .when("Lower it for rough, tangled water; raise it for smooth, glassy threads."),
+        p("curves.amplitude", "", "flow lengths", Float(0.0, 1.0, 0.05), Volume)
+            .slider(0.0, 0.3)
+            .doc(
+                "Standard deviation of g, the displacement of midpoints, as a fraction of the flow length \
+                 ny.",
+            )
+            .when("Raise it for strands that wander and cross; lower it for straight, parallel ones."),
+        p("curves.levels", "", "", Int(0, 16, 0), Volume)
+            .doc(
+                "Depth of the recursion: a curve has 2^levels segments. 0 chooses the depth at which a \
+                 segment spans at most half a cell.",
+            )
+            .when(
+                "Leave it at 0 for pictures; set a small number to see the first steps of the recursion, or \
+                 for strands of straight pieces.",
+            ),
+        p("curves.bundles", "", "", Int(0, 65536, 0), Volume)
+            .slider(0.0, 64.0)
+            .doc(
+                "Number of parent curves that the curves gather around. With 0 every curve is independent, \
+                 as in the paper.",
+            )
+            .when(
+                "Set it to about 5 to 20 when the water should part and let the rock show through; more \
+                 bundles leave smaller gaps.",
+            ),
+        p("curves.radius", "", "widths", Float(0.0, 1.0, 0.03), Volume)
+            .slider(0.0, 0.2)
+            .doc(
+                "Standard deviation of a curve's distance from its parent, as a fraction of the volume's \
+                 width nx.",
+            )
+            .when("Lower it for tight ropes with clear gaps; raise it to let bundles merge into one sheet."),
+        p("curves.wander", "", "flow lengths", Float(0.0, 1.0, 0.08), Volume)
+            .slider(0.0, 0.3)
+            .doc("Standard deviation of g of the parent curves, as a fraction of the flow length ny.")
+            .when(
+                "Raise it to let whole bundles swing from side to side; lower it to let them fall straight.",
+            ),
+        p("curves.breathe", "", "", Float(0.0, 2.0, 0.4), Volume)
+            .doc("Relative standard deviation of a bundle's width along its way.")
+            .when("Raise it when bundles look like cables of constant width; lower it for even ropes."),
+        p("curves.loose", "", "", Float(0.0, 1.0, 0.15), Volume)
+            .doc("Share of the curves that belong to no bundle.")
+            .when("Raise it to fill the gaps between bundles with fine threads; lower it for clear gaps."),
+    ],
+};
+
+pub(super) const VOLUME: Group = Group {
+    title: "Volume",
+    about: "The volume texture is a box of nx × ny × nz cells whose copies join without a seam across and \
+            along the flow. Each cell holds a density ρ, a flow direction v, and the reflection coefficients \
+            k_d and k_s.",
+    params: &[
+        p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume)
+            .slider(1.0, 256.0)
+            .doc("Number of cells across the flow.")
+            .when("Raise it for finer strands; lower it to save memory and time."),
+        p("volume.ny", "ny", "cells", Int(1, 1_000_000, 40), Volume)
+            .slider(1.0, 256.0)
+            .doc("Number of cells along the flow.")
+            .when("Raise it when strands show steps along the flow; lower it to save memory and time."),
+        p("volume.nz", "nz", "cells", Int(1, 1_000_000, 40), Volume)
+            .slider(1.0, 256.0)
+            .doc("Number of cells into the surface.")
+            .when(
+                "Lower it for thin sheets, for which 10 to 14 are enough; raise it for thick water, and \
+                 `trace.max_cells` with it.",
+            ),
+        p("volume.storage", "", "", Choice(&["auto", "dense", "sparse"]), Volume)
+            .doc(
+                "Storage of the cells: `dense` keeps all of them, `sparse` only the blocks that strands \
+                 pass. `auto` is sparse only where dense does not fit into `--memory`. Pictures do not \
+                 depend on it. `sparse` excludes `trace.filter=pyramid`.",
+            )
+            .when(
+                "Leave it at `auto`; choose `sparse` for volumes of 256 cells a side or more that are mostly \
+                 empty.",
+            ),
+        p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume)
+            .doc("Seed of all randomness in the volume. Equal seeds give equal volumes, bit for bit.")
+            .when("Change it for other water of the same kind."),
+        p("volume.coherence", "", "", Float(0.0, 1.0, 0.0), Volume)
+            .doc(
+                "Dependence of the density on the strands: 0 draws ρ independently in every cell, as in the \
+                 paper; 1 lets each strand carry its density along.",
+            )
+            .when("Raise it when the water looks like grain instead of streaks; lower it for fine spray."),
+        p("volume.strand_length", "", "flow lengths", Float(0.005, 1.0, 0.08), Volume)
+            .slider(0.005, 0.5)
+            .doc(
+                "Correlation length of the density along a strand, as a fraction of the flow length ny. It \
+                 has an effect where `volume.coherence` is above 0.",
+            )
+            .when("Raise it for long, unbroken streaks; lower it for water that breaks into short pieces."),
+        p("volume.coverage", "", "", Float(0.0, 1.0, 0.0), Volume)
+            .doc(
+                "Dependence of the density on the length of the strands in a cell: 0 gives every cell that a \
+                 strand touches its whole density, as in the paper; 1 thins the cells that strands only \
+                 clip.",
+            )
+            .when(
+                "Raise it when single cells stand out as specks or blocks; lower it for hard, full strands.",
+            ),
+        p("volume.crest", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc("Difference of k_d between the densest cells and the thinnest.")
+            .when("Raise it to make dense foam bright and thin water dark; set 0 for an even k_d."),
+        p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform)
+            .doc("Factor on the density ρ of all cells.")
+            .when(
+                "Lower it for a transparent veil; raise it for dense water. If 1 is not dense enough, raise \
+                 `trace.sigma` or `trace.tau`.",
+            ),
+        p("volume.flow", "", "lengths", Float(-1e6, 1e6, 0.0), Uniform)
+            .slider(0.0, 1.0)
+            .doc(
+                "Distance by which the volume has moved down the flow, in lengths of the volume. Every whole \
+                 number gives the same picture.",
+            )
+            .when("Change it to choose the moment of a still; in an animation `animate.speed` moves it."),
+        p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload)
+            .doc(
+                "Diffuse reflection coefficient of the cells, before noise is added. With \
+                 `light.reflection=strand` only its ratio to `volume.k_s` counts.",
+            )
+            .when(
+                "Raise it for white, foaming water; lower it for clear water that shows little but \
+                 highlights.",
+            ),
+        p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload)
+            .doc("Specular reflection coefficient of the cells, before noise is added.")
+            .when("Raise it for bright highlights along the strands; lower it for matt, milky water."),
+        p("volume.k_noise", "", "", Float(0.0, 1.0, 0.1), Upload)
+            .doc("Standard deviation of the normal noise that is added to k_d and k_s in every cell.")
+            .when("Raise it for sparkle from cell to cell; lower it for even water."),
+        p("volume.file", "", "", Text(""), Volume)
+            .doc("Path of an .npz file that holds the volume texture. Without one the volume is built.")
+            .when(
+                "Set it to render cells of your own, such as those of a simulation; `taki volume build` \
+                 writes an example of the format.",
+            ),
+    ],
+};
