@@ -46,7 +46,7 @@ const MARKS_WIDTH: f32 = 60.0;
 /// The panel's own state.
 #[derive(Default)]
 pub struct ParameterPanel {
-    /// Only parameters with this text in key, symbol or description are shown.
+    /// Only parameters with these words in their key, symbol, description or cost are shown.
     pub search: String,
     fault: Option<String>,
     lobes: LobesPlot,
@@ -262,8 +262,14 @@ fn together(keys: &mut [&String]) {
 
 fn matches(key: &str, search: &str) -> bool {
     let Some(param) = Param::find(key) else { return false };
-    let text = format!("{key} {} {} {}", param.symbol, param.doc, param.cost.word()).to_lowercase();
+    let words = [param.symbol, param.doc, param.when, param.cost.word()].join(" ");
+    let text = format!("{key} {}", plain(&words)).to_lowercase();
     search.split_whitespace().all(|word| text.contains(word))
+}
+
+/// The table's words without the backticks of Markdown.
+fn plain(words: &str) -> String {
+    words.replace('`', "")
 }
 
 /// The last part of a key, with the paper's symbol.
@@ -284,7 +290,8 @@ pub fn name(response: &Response, label: &str) {
 fn tooltip(ui: &mut Ui, key: &str, param: &Param, costs: Costs) {
     ui.set_max_width(320.0);
     ui.strong(key);
-    ui.label(param.doc);
+    ui.label(plain(param.doc));
+    ui.label(plain(param.when));
     let unit = if param.unit.is_empty() { String::new() } else { format!(" {}", param.unit) };
     ui.weak(format!("{}{unit}; default {}", param.range(), param.default_words()));
     ui.weak(cost_words(param.cost, costs));
