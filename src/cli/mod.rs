@@ -77,8 +77,8 @@ struct SceneOptions {
     /// A preset (see `taki presets`) or a scene file.
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
-    /// Sets any parameter, such as `--set curves.h=1.4`; may be given often. The README's table lists
-    /// them all, and so does `taki scene`.
+    /// Sets any parameter, such as `--set curves.h=1.4`; may be given often. docs/parameters.md
+    /// lists them all, and so does `taki scene`.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// Seed of the volume's randomness: short for --set volume.seed=N.

@@ -262,7 +262,9 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
     };
     match Keyframes::new(&frames, series, interpolation, period, closes) {
         Ok(track) => Ok((key, track)),
-        Err(why) => bad(format!("the keyframes of {key} {why}"), "see animate.loop in the README".into()),
+        Err(why) => {
+            bad(format!("the keyframes of {key} {why}"), "see animate.loop in docs/parameters.md".into())
+        }
     }
 }
 
@@ -297,9 +299,9 @@ fn path(values: &Values, frames: u32, period: Option<u32>) -> Result<Option<Came
             "give at least two eyes, and as many targets and frames or none",
         ));
     }
-    CameraPath::new(&at, eyes, targets, frames, period)
-        .map(Some)
-        .map_err(|why| Error::input(format!("animate.path.frames {why}"), "see animate.loop in the README"))
+    CameraPath::new(&at, eyes, targets, frames, period).map(Some).map_err(|why| {
+        Error::input(format!("animate.path.frames {why}"), "see animate.loop in docs/parameters.md")
+    })
 }
 
 /// Components as the parameter's kind wants them.

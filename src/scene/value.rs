@@ -90,7 +90,7 @@ impl Values {
         let Some(param) = Param::find(key) else {
             let fix = match nearest(key) {
                 Some(near) => format!("did you mean {near}?"),
-                None => "the README's parameter table lists every key".into(),
+                None => "docs/parameters.md lists every key".into(),
             };
             return Err(Error::input(format!("{}: unknown key {key}", place.0), fix));
         };
