@@ -21,9 +21,9 @@ pub(super) const LIGHT: Group = Group {
             ),
         p("light.visibility", "V", "", Choice(&["march", "cached", "none"]), Uniform)
             .doc(
-                "Attenuation between a light and a cell: `march` walks the way exactly, for every cell of \
-                 every ray; `cached` walks it once for every cell of the volume and keeps the result; `none` \
-                 leaves it out.",
+                "Attenuation between a cell and a light: `march` walks from one to the other for every cell \
+                 of every ray; `cached` makes that walk once for every cell of the volume and keeps the \
+                 result; `none` leaves it out.",
             )
             .when(
                 "Choose `cached` for several lights or an environment; choose `none` for quick drafts, in \
@@ -57,7 +57,10 @@ pub(super) const LIGHT: Group = Group {
             .when("Choose `multiple` when thick water is too dark; shadows are filled and foam turns white."),
         p("light.p", "p", "", Float(1.0, 1e4, 20.0), Uniform)
             .slider(1.0, 200.0)
-            .doc("Exponent of the specular term of `kajiya-kay`. Whole numbers up to 255 are fastest.")
+            .doc(
+                "Exponent of the specular term of `light.reflection=kajiya-kay`. Whole numbers up to 255 are \
+                 fastest.",
+            )
             .when("Raise it for narrow, sharp highlights; lower it for a broad sheen."),
         p("light.ambient", "", "", Color([0.1, 0.1, 0.1]), Uniform)
             .doc("Light from everywhere, added in every cell and on rocks and pools.")
@@ -90,7 +93,7 @@ pub(super) const STRAND: Group = Group {
         p("strand.aeration", "", "", Float(0.0, 1.0, 0.5), Uniform)
             .doc(
                 "Share of the light that meets bubbles of air instead of strands, in a cell with k_d = k_s. \
-                 It grows with k_d : k_s.",
+                 It grows with the cell's ratio k_d : k_s.",
             )
             .when("Raise it for white, foaming water; lower it for clear water that passes most light."),
         p("strand.g", "g", "", Float(-0.99, 0.99, 0.8), Uniform)
@@ -99,8 +102,8 @@ pub(super) const STRAND: Group = Group {
                  send it straight on.",
             )
             .when(
-                "Raise it for foam that glows before the light; lower it for foam that is bright on its lit \
-                 side.",
+                "Raise it for foam that glows in front of the light; lower it for foam that is bright on its \
+                 lit side.",
             ),
     ],
 };
@@ -137,8 +140,8 @@ pub(super) const LIGHTS: Group = Group {
         p("lights.*.intensity", "I", "", Float(0.0, 1e9, 1.0), Uniform)
             .slider(0.0, 100.0)
             .doc(
-                "Factor on the colour. A point or spot light has it at a distance of 1 m and falls with the \
-                 square of the distance.",
+                "Factor on the colour. For a point or spot light it holds at a distance of 1 m; the light \
+                 falls with the square of the distance.",
             )
             .when("Raise it when what the light shines on is too dark; 0 switches the light off."),
     ],

@@ -34,8 +34,8 @@ pub(super) const IMAGE: Group = Group {
         p("image.rock_error", "", "samples", Float(0.0, 16.0, 0.5), Uniform)
             .slider(0.0, 4.0)
             .doc(
-                "Largest error of the outlines of rock, in distances between samples. Where the error is \
-                 smaller, fewer triangles are drawn; 0 draws all of them.",
+                "Largest error of the outlines of rock, in distances between samples. Within it fewer \
+                 triangles are drawn; 0 draws all of them.",
             )
             .when("Raise it to draw rock faster; lower it to 0 for reference pictures."),
         p("image.exposure", "", "stops", Float(-32.0, 32.0, 0.0), Uniform)
@@ -45,7 +45,7 @@ pub(super) const IMAGE: Group = Group {
         p("image.auto_exposure", "", "", Choice(&["none", "average", "highlights"]), Uniform)
             .doc(
                 "Stops added to the exposure, measured on frame 0: `average` brings the logarithmic mean to \
-                 middle grey; `highlights` brings the brightest hundredth to 1 and above.",
+                 middle grey; `highlights` lets the brightest hundredth of the pixels begin at 1.",
             )
             .when(
                 "Choose `average` for a first look at a new scene, `highlights` to keep white water from \
@@ -66,12 +66,15 @@ pub(super) const IMAGE: Group = Group {
             .when("Raise it for a wide, faint glow; lower it for a tight one."),
         p("image.temperature", "", "K", Float(1500.0, 15000.0, 6500.0), Uniform)
             .slider(2500.0, 12000.0)
-            .doc("White balance: light of this colour temperature is shown as that of 6500 K.")
+            .doc("White balance: light of this colour temperature is shown as light of 6500 K.")
             .when(
                 "Lower it to take away the yellow of lamps or evening light; raise it for a warmer picture.",
             ),
         p("image.tint", "", "Duv/1000", Float(-50.0, 50.0, 0.0), Uniform)
-            .doc("White balance: distance of that light from a black body, positive towards green.")
+            .doc(
+                "White balance: distance of the light of `image.temperature` from a black body. Above 0 that \
+                 light is greener, and the picture turns magenta.",
+            )
             .when("Raise it against a green cast; lower it against a magenta one."),
         p("image.tone", "", "", Choice(&["filmic", "agx", "none"]), Uniform)
             .doc(
@@ -87,13 +90,13 @@ pub(super) const IMAGE: Group = Group {
 
 pub(super) const ANIMATION: Group = Group {
     title: "Animation",
-    about: "`taki batch` renders a scene in time, and `--frame` one moment of it. The water moves by itself; \
-            a turntable or a path moves the camera, and tracks move any other number. Frames are counted \
-            from 0.",
+    about: "`taki batch` renders a scene in time; `taki render --frame` renders one moment of it. The water \
+            moves by itself, a turntable or a path moves the camera, and tracks move other parameters. \
+            Frames are counted from 0.",
     params: &[
         p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform)
             .slider(1.0, 1000.0)
-            .doc("Number of frames of an animation that is no loop.")
+            .doc("Number of frames of an animation that is not a loop.")
             .when("Raise it for a longer film; `--frames` renders a part of it."),
         p("animate.fps", "", "1/s", Float(0.01, 1000.0, 24.0), Uniform)
             .slider(1.0, 120.0)
@@ -142,8 +145,8 @@ pub(super) const ANIMATION: Group = Group {
             .when("Set them when the camera should turn its view on the way."),
         p("animate.tracks.*.key", "", "", Text(""), Uniform)
             .doc(
-                "Key of the parameter that the track moves: any with numbers but the size of the image and \
-                 those of the animation.",
+                "Key of the parameter that the track moves. It holds numbers, and is neither the size of the \
+                 image nor a parameter of the animation.",
             )
             .when("Add a track when something besides the water and the camera should change in time."),
         p("animate.tracks.*.frames", "", "frames", Frames, Uniform)

@@ -11,7 +11,7 @@ pub(super) const ROCKS: Group = Group {
     params: &[
         p("rocks.*.corners", "", "m", Corners, Upload)
             .doc(
-                "Corners of the patch that the height field is raised on, counter-clockwise from the \
+                "Corners of the patch that the height field is raised on, counter-clockwise seen from the \
                  outside.",
             )
             .when("Let patches overlap at their borders, so that no gap shows between two rocks."),
@@ -65,7 +65,7 @@ pub(super) const ROCKS: Group = Group {
             .when("Raise it for massive blocks; lower it for thin beds and for small rocks."),
         p("rocks.*.strata_tilt", "", "°", Float(-90.0, 90.0, 0.0), Upload)
             .doc("Angle of the layers with the horizon, seen from the outside.")
-            .when("Set a few degrees, another for each rock, when the layers look built."),
+            .when("Set a few degrees, different for each rock, when the layers look built."),
         p("rocks.*.strata_color", "", "", Float(0.0, 1.0, 0.3), Upload)
             .doc("Largest relative difference of a layer's albedo from the mean.")
             .when("Raise it to tell layers apart by colour; lower it for one kind of stone."),
@@ -75,7 +75,7 @@ pub(super) const ROCKS: Group = Group {
             .when("Raise it when a rock shows the straight sides of its patch."),
         p("rocks.*.wet", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Amount of a film of water on the rock near quads that are no mist, below them, and at \
+                "Strength of the film of water on the rock near quads that are not mist, below them, and at \
                  pools. Wet rock is darker and shines.",
             )
             .when("Raise it to 1 for rock that water runs over or splashes; leave it at 0 for dry rock."),
@@ -88,14 +88,14 @@ pub(super) const ROCKS: Group = Group {
             .when("Raise it for a broad wet margin; lower it in small scenes."),
         p("rocks.*.occlusion", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Share of the light from the surroundings that rocks may keep away. Only rocks with a value \
-                 above 0 keep it away.",
+                "Share of the surroundings' light that this rock loses where other rock hides them. Only \
+                 rocks with a value above 0 hide them.",
             )
             .when("Raise it when clefts and the ground between rocks look too bright in the shade."),
         p("rocks.*.shadow", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Share of the light of the brightest directional light, or of the sun, that rocks may keep \
-                 away. Only rocks with a value above 0 keep it away.",
+                "Share of the light of the brightest directional light, the sky's sun included, that this \
+                 rock loses in the shadow of rock. Only rocks with a value above 0 cast it.",
             )
             .when(
                 "Raise it when rock should cast shadows on rock; leave it at 0 for far hills, since they \
@@ -138,7 +138,7 @@ pub(super) const POOLS: Group = Group {
         p("pools.*.rings", "", "m", Float(0.0, 10.0, 0.02), Upload)
             .slider(0.0, 0.2)
             .doc(
-                "Amplitude of the rings that run out from where quads that are no mist go through the \
+                "Amplitude of the rings that run out from where quads that are not mist go through the \
                  surface.",
             )
             .when("Raise it for heavy water that falls into a calm pool; lower it for thin threads."),
@@ -182,7 +182,7 @@ pub(super) const CAMERA: Group = Group {
             .when("Lower it to magnify what is far away; raise it to show more from nearby."),
         p("camera.near", "", "m", Float(1e-4, 1e4, 0.01), Uniform)
             .slider(0.001, 10.0)
-            .doc("Distance along the view axis below which geometry is cut off.")
+            .doc("Distance along the view axis within which geometry is cut off.")
             .when(
                 "Raise it to look through something close to the camera; lower it when a near thing is cut \
                  open.",
@@ -207,8 +207,7 @@ pub(super) const BACKGROUND_AND_HAZE: Group = Group {
             .doc("Extinction of the haze between the eye and rock and water. 0 leaves haze out.")
             .when("Raise it when near and far look equally clear; begin with 0.01 in scenes of some 20 m."),
         p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform).doc("Radiance of endless haze.").when(
-            "Bring it near `background.horizon`, so that far rock melts into the sky; darken it for \
-                 night.",
+            "Bring it near `background.horizon`, so that far rock melts into the sky; darken it for night.",
         ),
         p("haze.scale_height", "H", "m", Float(0.0, 1e5, 0.0), Uniform)
             .slider(0.0, 20.0)
@@ -231,8 +230,8 @@ pub(super) const BACKGROUND_AND_HAZE: Group = Group {
 pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
     title: "Environment and sky",
     about: "An environment is light from all directions, of a clear sky or of a map from a file. It lights \
-            rock and water and is seen in place of the background. The scene's own sun and `light.ambient` \
-            usually go to 0 with it.",
+            rock and water and is seen in place of the background. Set the scene's own sun and \
+            `light.ambient` to 0 with it, unless you want both.",
     params: &[
         p("environment.kind", "", "", Choice(&["none", "sky", "file"]), Upload)
             .doc(
@@ -260,10 +259,7 @@ pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
         p("environment.lights", "", "", Int(1, 1024, 24), Uniform)
             .slider(1.0, 256.0)
             .doc("Most directional lights that stand for the environment in the water.")
-            .when(
-                "Raise it when the light in the water looks coarse; lower it to save time, which grows with \
-                 it.",
-            ),
+            .when("Raise it when the light in the water looks coarse; lower it to render faster."),
         p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload)
             .doc("Height of the sun above the horizon.")
             .when("Lower it for the red light of evening; raise it for noon."),
@@ -271,8 +267,8 @@ pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
             .slider(-180.0, 180.0)
             .doc("Direction of the sun, from +z towards +x. `environment.turn` adds to it.")
             .when(
-                "Set it to about 180 for a sun behind the water of a fall that faces +z, to about 90 for a \
-                 sun from the side.",
+                "Set it to about 180 for a sun behind a fall that faces +z, to about 90 for a sun at its \
+                 side.",
             ),
         p("sky.turbidity", "", "", Float(1.0, 10.0, 3.0), Upload)
             .doc("Haziness of the air: 2 is very clear, 3 is clear, 6 is hazy.")

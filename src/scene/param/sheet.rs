@@ -8,7 +8,7 @@ pub(super) const SHEETS: Group = Group {
     title: "Sheets",
     about: "A sheet is a band of falling water along a profile from over the lip down to the foot. taki cuts \
             it into quads that share their corners, their texture and their erosion. Erosion takes the same \
-            amount from every density ρ, so thin strands vanish first and borders run along strands.",
+            amount from every density ρ, so faint strands vanish first and borders run along strands.",
     params: &[
         p("sheets.*.points", "", "m", Series, Uniform)
             .doc(
@@ -52,7 +52,7 @@ pub(super) const SHEETS: Group = Group {
             .doc("Speed of the water at the first point. From there it falls freely.")
             .when(
                 "Lower it for streaks that lengthen strongly from lip to foot; raise it for a fast stream \
-                 whose streaks stay alike.",
+                 whose streaks keep their length.",
             ),
         p("sheets.*.stretch", "", "", Float(0.0, 1.0, 1.0), Uniform)
             .doc(

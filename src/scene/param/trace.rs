@@ -7,8 +7,8 @@ use super::{Group, p};
 pub(super) const MATERIALS_AND_QUADS: Group = Group {
     title: "Materials and quads",
     about: "A material says how the volume lies on quads, sheets and splashes; the material `water` always \
-            exists. A quad is a flat piece of water given by its corners, beside those that sheets and \
-            splashes make.",
+            exists. A quad is a flat piece of water given by its corners; sheets and splashes make their \
+            own.",
     params: &[
         p("materials.*.thickness", "H", "m", Float(1e-4, 1e4, 0.4), Uniform)
             .slider(0.01, 10.0)
@@ -52,8 +52,8 @@ pub(super) const TRACE: Group = Group {
                  it; `per-cell` is τ_k = τ·ρ, however short the way.",
             )
             .when(
-                "Choose `per-cell` to reproduce the paper; keep `path-length` otherwise, which does not \
-                 depend on the number of cells.",
+                "Choose `per-cell` to reproduce the paper; keep `path-length` otherwise: it does not depend \
+                 on the number of cells.",
             ),
         p("trace.sigma", "σ", "1/m", Float(0.0, 1e5, 10.0), Uniform)
             .slider(0.0, 200.0)
@@ -73,8 +73,8 @@ pub(super) const TRACE: Group = Group {
             .slider(1.0, 2048.0)
             .doc("Most cells that one view ray, and one light ray, may meet.")
             .when(
-                "Raise it for large volumes and flat views, where rays would end inside the water; lower it \
-                 to limit the time.",
+                "Raise it for large volumes and grazing views, where rays would end inside the water; lower \
+                 it to limit the time.",
             ),
         p("trace.early_end", "", "", Float(0.0, 1.0, 1.0 / 1024.0), Uniform)
             .doc("Transmittance below which a view ray ends. 0 never ends it early.")

@@ -27,8 +27,8 @@ pub(super) const CURVES: Group = Group {
         p("curves.h", "h", "", Float(0.0, 8.0, 0.9), Volume)
             .slider(0.0, 3.0)
             .doc(
-                "Complexity h of the curves: each level of the recursion displaces by 2^(−h) of the level \
-                 before. A small h is rough, a large h is smooth.",
+                "Complexity h of the curves: each level of the recursion displaces 2^(−h) times as far as \
+                 the one before. A small h is rough, a large h is smooth.",
             )
             .when("Lower it for rough, tangled water; raise it for smooth, glassy threads."),
         p("curves.amplitude", "", "flow lengths", Float(0.0, 1.0, 0.05), Volume)
