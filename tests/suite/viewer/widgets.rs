@@ -314,8 +314,22 @@ fn the_search_shows_matches_only() {
     let found = shown(&window);
     let rocks = found.iter().filter(|name| name.ends_with(".h") && name.starts_with("rocks.")).count();
     assert_eq!(rocks, 4, "cost and description are searched: {found:?}");
+    window.enter("Search parameters", "glassy threads");
+    let found = shown(&window);
+    let has = |key: &str| found.iter().any(|name| name == key);
+    assert!(has("curves.h") && !has("curves.amplitude"), "when to turn it is searched: {found:?}");
     window.enter("Search parameters", "no such thing");
     assert!(window.reads("No parameter has this"));
     window.press("✖");
     assert!(shown(&window).contains(&"curves.h".to_owned()));
+}
+
+#[test]
+fn hovering_a_name_tells_what_the_parameter_is_and_when_to_turn_it() {
+    let mut window = open_groups();
+    window.enter("Search parameters", "glassy threads");
+    window.harness.get_by_label("h").hover();
+    window.harness.run_steps(60);
+    let param = Param::find("curves.h").expect("a parameter");
+    assert!(window.reads(param.doc) && window.reads(param.when));
 }
