@@ -268,7 +268,7 @@ pub fn parameters_markdown() -> String {
     let mut text = links.join(" ·\n") + "\n";
     for Group { title, about, params } in GROUPS {
         text += &format!(
-            "\n## {title}\n\n{}\n\n\
+            "\n### {title}\n\n{}\n\n\
              | key | symbol | unit | default | allowed | a change costs | what | when to turn it |\n\
              |---|---|---|---|---|---|---|---|\n",
             wrapped(about)
