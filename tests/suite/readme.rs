@@ -124,11 +124,38 @@ fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
     assert!(links > 40, "{links} links");
 }
 
+/// Paths of the repository between backticks: not those of a command or an example, which have other marks in them.
+fn named_paths(text: &str) -> Vec<&str> {
+    let roots = ["src/", "shaders/", "tests/", "assets/", "docs/", "examples/", "findings/"];
+    let is_path = |quoted: &&str| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
+        roots.iter().any(|root| quoted.starts_with(root)) && quoted.chars().all(plain)
+    };
+    let lines = prose_and_fences(text).0.into_iter();
+    lines.flat_map(|line| line.split('`').skip(1).step_by(2)).filter(is_path).collect()
+}
+
 #[test]
-fn links_anchors_and_options_are_found() {
+fn every_path_that_a_page_names_exists() {
+    let pages = pages();
+    let named: Vec<(&str, &str)> = pages
+        .iter()
+        .flat_map(|(name, text)| named_paths(text).into_iter().map(move |p| (name.as_str(), p)))
+        .collect();
+    assert!(named.len() > 40, "{named:?}");
+    let missing = named.into_iter().filter(|(_, there)| !std::path::Path::new(&path(there)).exists());
+    assert_eq!(missing.collect::<Vec<_>>(), []);
+}
+
+#[test]
+fn links_anchors_paths_and_options_are_found() {
     let page = "# One: two\n[a](b.md#c) `[d](e)` ![f](g.png)\n```text\n[h](i)\n# No\n```\n<img src=\"j.png\">\n## 1. One\n## 1. One\n";
     assert_eq!(targets(page), ["b.md#c", "g.png", "j.png"]);
     assert_eq!(anchors(page), ["one-two", "1-one", "1-one-1"]);
+    assert_eq!(
+        named_paths("`src/a.rs` src/b.rs `tests/` `-o docs/c`\n```text\n`src/d.rs`\n```\n"),
+        ["src/a.rs", "tests/"]
+    );
     assert!(names_option("`--size WxH`", "--size") && !names_option("`--sizes`", "--size"));
 }
 
