@@ -149,7 +149,10 @@ fn every_path_that_a_page_names_exists() {
 
 #[test]
 fn links_anchors_paths_and_options_are_found() {
-    let page = "# One: two\n[a](b.md#c) `[d](e)` ![f](g.png)\n```text\n[h](i)\n# No\n```\n<img src=\"j.png\">\n## 1. One\n## 1. One\n";
+    let page = concat!(
+        "# One: two\n[a](b.md#c) `[d](e)` ![f](g.png)\n```text\n[h](i)\n# No\n```\n",
+        "<img src=\"j.png\">\n## 1. One\n## 1. One\n"
+    );
     assert_eq!(targets(page), ["b.md#c", "g.png", "j.png"]);
     assert_eq!(anchors(page), ["one-two", "1-one", "1-one-1"]);
     assert_eq!(
