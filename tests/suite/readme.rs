@@ -124,7 +124,7 @@ fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
     assert!(links > 40, "{links} links");
 }
 
-/// The repository's paths between backticks. Commands and patterns are not among them: they have other characters.
+/// The paths between backticks. Commands and patterns are not among them: they have other characters too.
 fn named_paths(text: &str) -> Vec<&str> {
     let roots = ["src/", "shaders/", "tests/", "assets/", "docs/", "examples/", "findings/"];
     let is_path = |quoted: &&str| {
