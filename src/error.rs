@@ -123,7 +123,7 @@ impl Error {
         }
     }
 
-    /// The exit code of the process, as listed in the README.
+    /// The exit code of the process, as listed in docs/scenes-and-files.md.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Comparison(_) => 1,

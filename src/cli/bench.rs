@@ -1,9 +1,8 @@
 //! `taki bench`: what the passes cost on this machine, with the work they did.
 //!
 //! Times are medians of runs in turn in one process: other programs on the machine disturb all rows
-//! alike, so ratios between rows hold where single times do not.
-//!
-#![doc = include_str!("bench/notes.md")]
+//! alike, so ratios between rows hold where single times do not. What was predicted and measured, what helped and
+//! what did not: `docs/speed.md`.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -77,8 +76,8 @@ const PASSES: &[Step] = &[
     ("integrate trilinear", &["trace.lookup=trilinear"]),
 ];
 
-/// The steps of light in water, on `fig5` with ten times its density: each is the one before and more. The README
-/// shows their pictures.
+/// The steps of light in water, on `fig5` with ten times its density: each is the one before and more.
+/// `docs/method.md` shows their pictures.
 const STEPS: &[Step] = &[
     ("no attenuation", &["light.visibility=none"]),
     ("march", &["light.visibility=march"]),

@@ -201,7 +201,7 @@ fn default_output(scene: &Scene, extension: &str) -> PathBuf {
     PathBuf::from(format!("{}.{extension}", scene.name))
 }
 
-/// Runs the program; the exit code is the table's in the README.
+/// Runs the program; the exit codes are listed in docs/scenes-and-files.md.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

@@ -103,7 +103,10 @@ impl Source {
         let root = DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let message = e.message().lines().collect::<Vec<_>>().join(", ");
-            Error::input(format!("{}: {message}", file.place(at).0), "a scene file is TOML, see the README")
+            Error::input(
+                format!("{}: {message}", file.place(at).0),
+                "a scene file is TOML, see docs/scenes-and-files.md",
+            )
         })?;
         let root = root.into_inner();
         file.version(&root)?;

@@ -27,6 +27,70 @@ fn the_parameter_table_is_the_codes_own() {
     }
 }
 
+/// The README, what stands beside it, and the pages of `docs/`: path from the root, and text.
+fn pages() -> Vec<(String, String)> {
+    let mut names =
+        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md"].map(String::from).to_vec();
+    let docs =
+        std::fs::read_dir(path("docs")).expect("docs/").map(|entry| entry.expect("an entry").file_name());
+    let docs = docs.map(|name| name.into_string().expect("UTF-8")).filter(|name| name.ends_with(".md"));
+    names.extend(docs.map(|name| format!("docs/{name}")));
+    names.sort();
+    let read = |name: &String| std::fs::read_to_string(path(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    names.iter().map(|name| (name.clone(), read(name))).collect()
+}
+
+/// What a user is told: the README and `docs/`, in one text.
+fn documentation() -> String {
+    let told = |name: &str| name == "README.md" || name.starts_with("docs/");
+    pages().into_iter().filter(|(name, _)| told(name)).map(|(_, text)| text + "\n").collect()
+}
+
+/// The lines of a page that are not code, and those that begin or end a block of code.
+fn prose_and_fences(text: &str) -> (Vec<&str>, Vec<&str>) {
+    let (mut prose, mut fences, mut code) = (Vec::new(), Vec::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fences.push(line.trim_start());
+            code = !code;
+        } else if !code {
+            prose.push(line);
+        }
+    }
+    assert!(!code, "a block of code has no end");
+    (prose, fences)
+}
+
+/// What stands between `start` and `end`, every time.
+fn between<'a>(text: &'a str, start: &'a str, end: char) -> impl Iterator<Item = &'a str> {
+    text.split(start).skip(1).map(move |rest| rest.split(end).next().unwrap_or(""))
+}
+
+/// Where a page's links and pictures lead.
+fn targets(text: &str) -> Vec<String> {
+    let prose = prose_and_fences(text).0.join("\n");
+    // What is between backticks is no link.
+    let prose: String = prose.split('`').step_by(2).collect();
+    between(&prose, "](", ')').chain(between(&prose, "src=\"", '"')).map(String::from).collect()
+}
+
+/// The anchors of a page's headings, as GitHub and rustdoc make them.
+fn anchors(text: &str) -> Vec<String> {
+    let mut anchors: Vec<String> = Vec::new();
+    for line in prose_and_fences(text).0 {
+        let title = line.trim_start_matches('#');
+        if title.len() == line.len() || !title.starts_with(' ') {
+            continue;
+        }
+        let kept = title.trim().to_lowercase();
+        let kept = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        let anchor: String = kept.map(|c| if c == ' ' { '-' } else { c }).collect();
+        let before = anchors.iter().filter(|a| **a == anchor).count();
+        anchors.push(if before == 0 { anchor } else { format!("{anchor}-{before}") });
+    }
+    anchors
+}
+
 #[test]
 fn parameters_are_told_in_whole_sentences_that_fit_a_table() {
     for param in PARAMS {
@@ -61,62 +125,148 @@ fn keys_and_choices_that_the_parameters_words_name_exist() {
 }
 
 #[test]
-fn every_linked_file_exists_and_every_preset_is_named() {
+fn the_readme_is_a_front_door() {
     let text = readme();
+    assert!(text.lines().count() <= 200, "{} lines", text.lines().count());
+    assert!(text.len() <= 15_000, "{} bytes", text.len());
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
+    let pages = pages();
     let mut links = 0;
-    for part in text.split("](").skip(1) {
-        let target = part.split(')').next().unwrap_or("");
-        if !target.contains("://") && !target.starts_with('#') {
-            assert!(std::path::Path::new(&path(target)).exists(), "{target}");
+    for (name, text) in &pages {
+        let folder = std::path::Path::new(name).parent().expect("a folder");
+        for target in targets(text) {
+            if target.contains("://") {
+                continue;
+            }
+            let (file, anchor) = target.split_once('#').unwrap_or((&target, ""));
+            let full = path(&folder.join(file).to_string_lossy());
+            assert!(file.is_empty() || std::path::Path::new(&full).exists(), "{name}: {target}");
+            if !anchor.is_empty() {
+                let page = if file.is_empty() {
+                    text.clone()
+                } else {
+                    std::fs::read_to_string(&full).expect("a page")
+                };
+                assert!(anchors(&page).iter().any(|a| a == anchor), "{name}: {target} is no heading");
+            }
             links += 1;
         }
     }
-    assert!(links > 4, "the pictures are links");
+    assert!(links > 40, "{links} links");
+}
+
+/// The paths between backticks. Commands and patterns are not among them: they have other characters too.
+fn named_paths(text: &str) -> Vec<&str> {
+    let roots = ["src/", "shaders/", "tests/", "assets/", "docs/", "examples/", "findings/"];
+    let is_path = |quoted: &&str| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
+        roots.iter().any(|root| quoted.starts_with(root)) && quoted.chars().all(plain)
+    };
+    let lines = prose_and_fences(text).0.into_iter();
+    lines.flat_map(|line| line.split('`').skip(1).step_by(2)).filter(is_path).collect()
+}
+
+#[test]
+fn every_path_that_a_page_names_exists() {
+    let pages = pages();
+    let named: Vec<(&str, &str)> = pages
+        .iter()
+        .flat_map(|(name, text)| named_paths(text).into_iter().map(move |p| (name.as_str(), p)))
+        .collect();
+    assert!(named.len() > 40, "{named:?}");
+    let missing = named.into_iter().filter(|(_, there)| !std::path::Path::new(&path(there)).exists());
+    assert_eq!(missing.collect::<Vec<_>>(), []);
+}
+
+#[test]
+fn links_anchors_paths_and_options_are_found() {
+    let page = concat!(
+        "# One: two\n[a](b.md#c) `[d](e)` ![f](g.png)\n```text\n[h](i)\n# No\n```\n",
+        "<img src=\"j.png\">\n## 1. One\n## 1. One\n"
+    );
+    assert_eq!(targets(page), ["b.md#c", "g.png", "j.png"]);
+    assert_eq!(anchors(page), ["one-two", "1-one", "1-one-1"]);
+    assert_eq!(
+        named_paths("`src/a.rs` src/b.rs `tests/` `-o docs/c`\n```text\n`src/d.rs`\n```\n"),
+        ["src/a.rs", "tests/"]
+    );
+    assert!(names_option("`--size WxH`", "--size") && !names_option("`--sizes`", "--size"));
+}
+
+#[test]
+fn every_page_of_the_docs_is_linked_from_the_readme_and_begins_with_its_purpose() {
+    let linked = targets(&readme());
+    for (name, text) in pages().into_iter().filter(|(name, _)| name.starts_with("docs/")) {
+        assert!(linked.iter().any(|target| target.split('#').next() == Some(&name)), "{name}");
+        let mut lines = text.lines();
+        assert!(lines.next().is_some_and(|line| line.starts_with("# ")), "{name}: a title");
+        assert_eq!(lines.next(), Some(""), "{name}");
+        assert!(lines.next().is_some_and(|line| line.starts_with(char::is_alphabetic)), "{name}: a sentence");
+    }
+}
+
+/// rustdoc shows the pages too, and takes a block of code without a language, or an indented one, for Rust.
+#[test]
+fn every_block_of_code_names_its_language() {
+    for (name, text) in pages() {
+        for fence in prose_and_fences(&text).1.iter().step_by(2) {
+            assert!(fence.len() > 3, "{name}: {fence}");
+        }
+        let lines = prose_and_fences(&text).0;
+        let indented = |pair: &&[&str]| pair[0].is_empty() && pair[1].starts_with("    ");
+        assert_eq!(lines.windows(2).find(indented), None, "{name}");
+    }
+}
+
+#[test]
+fn every_preset_is_named() {
+    let text = documentation();
     for (name, _) in presets() {
         assert!(text.contains(&format!("`{name}`")), "{name}");
     }
 }
 
+fn help(command: &[String]) -> String {
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_taki")).args(command).arg("--help").output();
+    String::from_utf8(out.expect("help").stdout).expect("UTF-8")
+}
+
+/// Every command and its subcommands, as the help lists them.
+fn commands(under: &[String]) -> Vec<Vec<String>> {
+    let text = help(under);
+    let list =
+        text.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    // The description goes on in lines that are indented further.
+    let names = list.filter_map(|line| line.strip_prefix("  ").filter(|rest| !rest.starts_with(' ')));
+    let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    names
+        .flat_map(|name| {
+            let command = [under, &[name.to_owned()]].concat();
+            let more = commands(&command);
+            [vec![command], more].concat()
+        })
+        .collect()
+}
+
+/// Whether an option is named, not only as the beginning of a longer one.
+fn names_option(text: &str, option: &str) -> bool {
+    text.split(option).skip(1).any(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '-'))
+}
+
 #[test]
-fn every_subcommand_and_option_of_the_help_is_in_the_readme() {
-    let text = readme();
-    let help = |args: &[&str]| {
-        let out = std::process::Command::new(env!("CARGO_BIN_EXE_taki")).args(args).arg("--help").output();
-        String::from_utf8(out.expect("help").stdout).expect("UTF-8")
-    };
-    let commands = [
-        "render",
-        "batch",
-        "scene",
-        "volume",
-        "bench",
-        "stitch",
-        "compare",
-        "presets",
-        "devices",
-        "completions",
-        "farm",
-    ];
+fn every_subcommand_and_option_of_the_help_is_in_the_documentation() {
+    let text = documentation();
+    let commands = commands(&[]);
+    assert!(commands.len() > 15, "{commands:?}");
     for command in commands {
-        assert!(help(&[]).contains(command) && text.contains(&format!("taki {command}")), "{command}");
-    }
-    for command in [
-        &["render"][..],
-        &["batch"],
-        &["scene"],
-        &["bench"],
-        &["stitch"],
-        &["compare"],
-        &["volume", "build"],
-        &["volume", "info"],
-        &["farm", "slurm"],
-        &["farm", "openjd"],
-        &["farm", "kubernetes"],
-    ] {
-        for option in help(command).split_whitespace().filter(|w| w.starts_with("--") && w.len() > 3) {
+        assert!(text.contains(&format!("taki {}", command.join(" "))), "{command:?}");
+        for word in help(&command).split_whitespace().filter(|w| w.starts_with("--") && w.len() > 3) {
             let option =
-                option.trim_end_matches([',', ';', '.', ')', ':', '`']).split('=').next().unwrap_or("");
-            assert!(option == "--help" || text.contains(option), "{command:?} {option}");
+                word.trim_end_matches([',', ';', '.', ')', ':', '`']).split('=').next().unwrap_or("");
+            assert!(option == "--help" || names_option(&text, option), "{command:?} {option}");
         }
     }
 }

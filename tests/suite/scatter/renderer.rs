@@ -78,7 +78,7 @@ fn the_renderers_radiance_is_the_path_tracers() {
         let off = (single.iter().sum::<f64>() - once) / whole;
         let allowed = if depth > 5.0 { 0.03 } else { 0.01 };
         assert!(off.abs() < allowed, "single scattering, g {g} {light} {depth}: {off}");
-        // The model's own mean error (README) and that.
+        // The model's own mean error (docs/method.md) and that.
         let allowed = if g > 0.0 { 0.13 } else { 0.06 };
         assert!(share(&multiple).abs() < allowed, "g {g} {light} {depth}: {}", share(&multiple));
         assert!(share(&single) < -0.25, "there is something to get wrong: {}", share(&single));
