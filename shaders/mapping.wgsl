@@ -1,5 +1,7 @@
 // §3 The Jacobian of the map between a quad and the volume's face. Twin: src/mapping.rs, CellFrame.
 
+#import layout
+
 // world_from_cell at one point, in the axes e1, e2 and seen normal of the quad's plane: columns (cx, 0),
 // (cy, 0) and (0, 0, −depth).
 struct CellFrame {

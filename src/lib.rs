@@ -25,34 +25,22 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub mod cache;
-pub mod camera;
 pub mod cli;
-pub mod contact_sheet;
-pub mod cpu;
 pub mod curve;
-pub mod environment;
-pub mod error;
-pub mod exposure;
+pub mod engine;
 pub mod farm;
-pub mod frame;
-pub mod gpu;
-pub mod haze;
 pub mod job;
+pub mod light;
 pub mod mapping;
-pub mod movie;
-pub mod overlap;
-pub mod pool;
-pub mod random;
-pub mod scatter;
+pub mod output;
+pub mod picture;
+pub mod place;
 pub mod scene;
-pub mod shading;
-pub mod strand;
+pub mod trace;
+pub mod util;
 #[cfg(feature = "viewer")]
 pub mod viewer;
-pub mod visibility;
 pub mod volume;
 pub mod walk;
-pub mod white_balance;
 
-pub use error::{Error, Result};
+pub use util::error::{Error, Result};

@@ -9,11 +9,12 @@ use clap::Args;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
-use crate::error::Result;
-use crate::frame::Layer;
+use crate::engine::Engine;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
-use crate::job::{Engine, Monitor};
+use crate::picture::Layer;
 use crate::scene::Animation;
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
 
 const EXAMPLES: &str = "\
 Examples:

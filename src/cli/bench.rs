@@ -12,12 +12,13 @@ use serde::Serialize;
 
 use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
-use crate::cpu::{self, resolve::develop};
-use crate::error::{Error, Result};
-use crate::frame::Window;
-use crate::gpu::GpuBench;
-use crate::job::{Engine, EngineChoice, Monitor, Unwatched};
+use crate::engine::gpu::GpuBench;
+use crate::engine::{Engine, EngineChoice, cpu};
+use crate::picture::resolve::develop;
 use crate::scene::{Limits, Scene};
+use crate::util::error::{Error, Result};
+use crate::util::monitor::{Monitor, Unwatched};
+use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
 #[derive(Args, Clone)]

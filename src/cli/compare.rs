@@ -8,9 +8,11 @@ use serde_json::json;
 
 use super::terminal::say;
 use super::{crop, window};
-use crate::error::{Error, Result};
-use crate::frame::eye::{Flicker, Streaks, bands, decoded, luminance, streaks};
-use crate::frame::{Difference, Frame, Output, Tolerance, Window, encode_png, read_exr, read_png};
+use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
+use crate::output::frame::{Difference, Output, Tolerance, encode_png, read_exr, read_png};
+use crate::picture::Frame;
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
 
 #[derive(Args)]
 pub struct CompareArgs {

@@ -1,8 +1,8 @@
 //! `taki devices`: the adapters.
 
 use super::terminal::say;
-use crate::error::Result;
-use crate::gpu::adapters;
+use crate::engine::gpu::adapters;
+use crate::util::error::Result;
 
 pub fn run() -> Result<()> {
     let adapters = adapters();

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, CommandFactory, Subcommand};
 
 use super::Cli;
-use crate::error::{Error, Result};
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
-use crate::frame::Output;
+use crate::output::frame::Output;
+use crate::util::error::{Error, Result};
 
 #[derive(Args)]
 pub struct FarmArgs {

@@ -19,12 +19,12 @@ use std::time::Duration;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
-use crate::cache::Cache;
-use crate::error::{Error, Result};
-use crate::frame::Window;
-use crate::gpu::DeviceOptions;
-use crate::job::EngineChoice;
+use crate::engine::EngineChoice;
+use crate::engine::gpu::DeviceOptions;
 use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
+use crate::util::cache::Cache;
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \

@@ -8,11 +8,15 @@ use serde_json::json;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
-use crate::error::{Error, Result};
-use crate::frame::{Figures, Layer, Window};
-use crate::gpu::RenderOptions;
-use crate::job::{Engine, Monitor, Still, check_bloom, strips};
+use crate::engine::exposure::exposed;
+use crate::engine::{Engine, RenderOptions};
+use crate::job::{Still, check_bloom, strips};
+use crate::output::frame::Figures;
+use crate::picture::Layer;
 use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 
 #[derive(Args)]
 pub struct RenderArgs {
@@ -55,7 +59,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
-    let (animation, measured) = args.scene.animation(&more, &limits)?.exposed(terminal)?;
+    let (animation, measured) = exposed(args.scene.animation(&more, &limits)?, terminal)?;
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {

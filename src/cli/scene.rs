@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::SceneOptions;
 use super::terminal::say;
-use crate::error::Result;
+use crate::util::error::Result;
 
 #[derive(Args)]
 pub struct SceneArgs {

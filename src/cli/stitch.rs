@@ -6,8 +6,8 @@ use std::time::Instant;
 use clap::Args;
 
 use super::terminal::Terminal;
-use crate::error::Result;
 use crate::job::stitch;
+use crate::util::error::Result;
 
 #[derive(Args)]
 pub struct StitchArgs {

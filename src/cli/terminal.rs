@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::error::{Error, Result};
-use crate::job::Monitor;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 
 /// Prints a line on stdout. A closed stdout loses the line and nothing else: files are still written.
 pub fn say(line: &str) {

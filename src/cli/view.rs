@@ -7,8 +7,9 @@ use clap::Args;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, seconds};
-use crate::error::Result;
-use crate::viewer::{self, Options, WindowChoice, settings::Settings};
+use crate::util::error::Result;
+use crate::viewer::settings::Settings;
+use crate::viewer::{self, Options, WindowChoice};
 
 #[derive(Args)]
 pub struct ViewArgs {

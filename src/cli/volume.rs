@@ -6,9 +6,9 @@ use clap::{Args, Subcommand};
 
 use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output};
-use crate::error::{Error, Result};
-use crate::frame::Output;
-use crate::job::Monitor;
+use crate::output::frame::Output;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 use crate::volume::{Statistics, StorageChoice, read_npz, write_npz};
 
 #[derive(Args)]
@@ -73,7 +73,7 @@ fn in_words(s: &Statistics) -> String {
     [
         format!(
             "size            {nx} × {ny} × {nz} cells, {} packed",
-            crate::error::human_bytes(s.bytes.into())
+            crate::util::error::human_bytes(s.bytes.into())
         ),
         format!("flow cells      {} ({} of all)", s.flow_cells, share(s.flow_cells)),
         format!("occupied cells  {} ({} of all)", s.occupied_cells, share(s.occupied_cells)),

@@ -2,7 +2,7 @@
 
 use super::yaml::{Node, document, list};
 use super::{GRACE_SECONDS, HOPELESS, Job, RETRIED, utf8};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// What only Kubernetes has.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@ mod yaml;
 
 use std::ffi::{OsStr, OsString};
 
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// Exit codes after which a shard is run again: I/O error (network file systems have bad minutes), device
 /// lost, driver hang, and SIGKILL or SIGTERM from outside (memory of the node, time limit, preemption).

@@ -2,7 +2,7 @@
 
 use super::yaml::{Node, document, list};
 use super::{GRACE_SECONDS, Job, RETRIED, bash_words, pattern, utf8};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// Seconds before a shard is run again: time for a driver or a file system to come back.
 const PAUSE_SECONDS: u32 = 5;

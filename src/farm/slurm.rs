@@ -1,7 +1,7 @@
 //! Slurm: an array job for `sbatch`.
 
 use super::{GRACE_SECONDS, Job, RETRIED, bash_word, bash_words, pattern};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// What only Slurm has.
 #[derive(Clone, Debug, Default)]

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::error::{Error, Result};
-use crate::frame::{Life, Owner, folder_of};
+use crate::output::frame::{Life, Owner, folder_of};
+use crate::util::error::{Error, Result};
 
 /// A claim that still does not say whose it is after so long is stale.
 const NAMELESS: Duration = Duration::from_secs(5);

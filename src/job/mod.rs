@@ -2,37 +2,14 @@
 
 pub mod batch;
 mod claim;
-mod engine;
+mod memo;
 mod still;
 mod stitch;
-mod stock;
 mod strips;
 
 pub use claim::{Asked, Claim, Claims};
-pub use engine::{Engine, EngineChoice};
+pub use memo::VolumeStock;
 pub(crate) use still::{About, Sink};
 pub use still::{Still, StillWriter};
 pub use stitch::stitch;
-pub use stock::VolumeStock;
-pub use strips::{check_bloom, check_image, memory_of, spare_for_rasters, strips};
-
-use crate::error::Result;
-
-/// Watches a job: told of progress and warnings, asked between pieces of work whether to go on.
-pub trait Monitor: Sync {
-    /// `done` of `total` pieces of `stage` are finished. An error ends the job at once; nothing
-    /// unfinished is kept.
-    fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()>;
-    /// Something the user should know that does not stop the work.
-    fn warn(&self, text: &str);
-}
-
-/// Watches nothing and never stops.
-pub struct Unwatched;
-
-impl Monitor for Unwatched {
-    fn progress(&self, _: &'static str, _: u64, _: u64) -> Result<()> {
-        Ok(())
-    }
-    fn warn(&self, _: &str) {}
-}
+pub use strips::{check_bloom, memory_of, spare_for_rasters, strips};

@@ -5,15 +5,17 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::environment::Source;
-use crate::error::{Error, Result};
-use crate::frame::{
-    CROP_TEXT, ExrWriter, FIGURES_TEXT, Figures, Frame, Layer, Output, PngWriter, SCENE_TEXT, Seconds,
-    Window, channel_names, crop_text, lines_of, rgb_rows,
+use crate::engine::RenderOptions;
+use crate::light::environment::Source;
+use crate::output::frame::{
+    CROP_TEXT, ExrWriter, FIGURES_TEXT, Figures, Output, PngWriter, SCENE_TEXT, channel_names, crop_text,
+    lines_of, rgb_rows,
 };
-use crate::gpu::RenderOptions;
-use crate::job::Monitor;
+use crate::picture::{Frame, Layer, Seconds};
 use crate::scene::{REFERENCES, Scene};
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
 /// The program that wrote a file.

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{About, Monitor, Sink};
-use crate::error::{Error, Result};
-use crate::frame::{ExrLines, Figures, Kind, PngRows, SCENE_TEXT, Window};
+use super::{About, Sink};
+use crate::output::frame::{ExrLines, Figures, Kind, PngRows, SCENE_TEXT};
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 
 /// Bytes of rows handed to the PNG encoder at a time.
 const PIECE_BYTES: usize = 1 << 20;

@@ -1,17 +1,14 @@
 //! How a large picture is rendered in parts that fit the memory.
 
-use crate::error::{Error, Result};
-use crate::frame::Window;
-use crate::gpu::{Grid, canvas_bytes};
-use crate::overlap;
-use crate::scene::{Image, Pool, Prefilter, Scene, Vertex};
+use crate::engine::overlap;
+use crate::picture::{Grid, PIXEL_BYTES, SURFACE_BYTES, canvas, check_image};
+use crate::place::{Pool, Vertex};
+use crate::scene::Scene;
+use crate::trace::Prefilter;
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
 use crate::volume::{Storage, dense_bytes, expected_cells, sparse_bytes};
 
-/// Bytes of a strip's pixel on the host: radiance 16, counts 8, picture 4; and as R, G, B bytes 3 for the
-/// strip that is being encoded and 3 for the one that waits.
-const PIXEL_BYTES: u64 = 28 + 6;
-/// More with the raster pass's layers: depth 4, uv 8, quad 4, normal 12.
-const SURFACE_BYTES: u64 = 28;
 /// More on the host for the pyramid of bloom: a third of 12 bytes, of a picture that may be widened to whole multiples
 /// of the largest level.
 const BLOOM_BYTES: u64 = 12;
@@ -25,33 +22,6 @@ const PROGRAM_BYTES: u64 = 256 << 20;
 const STRIP_PIXELS: u64 = 1 << 23;
 /// Fewer rows are not rendered at once: for every strip the whole window is drawn again.
 const LEAST_ROWS: u64 = 64;
-/// Most pixels of an image.
-const MAX_PIXELS: u64 = 1 << 36;
-
-/// Bytes for the window that is drawn, under which `layers` quads may lie: [`canvas_bytes`] a pixel on the
-/// device. The CPU engine's targets have as many pixels, at most, and 28 bytes for each and 16 for each layer.
-fn canvas(image: &Image, layers: u32) -> u64 {
-    let [columns, rows] = Grid::default().size([image.width, image.height]);
-    u64::from(columns) * u64::from(rows) * canvas_bytes(layers).max(28 + 16 * u64::from(layers))
-}
-
-/// Refuses an image that cannot be rendered in any strips within `memory` bytes: one window and one row of
-/// pixels must fit.
-pub fn check_image(image: &Image, memory: u64) -> Result<()> {
-    let [width, height] = [image.width, image.height].map(u64::from);
-    let what = format!("an image of {width}×{height} pixels (image.width, height)");
-    if width * height > MAX_PIXELS {
-        // What one that is held whole would take.
-        let need = u128::from(width) * u128::from(height) * 48;
-        let fix = "a picture has at most 6.8e10 pixels, however large --memory is: lower the size";
-        return Err(Error::memory(what, need, memory, fix));
-    }
-    let need = canvas(image, 1) + width * (PIXEL_BYTES + SURFACE_BYTES);
-    if need > memory {
-        return Err(Error::memory(what, need.into(), memory, "lower the size or raise --memory"));
-    }
-    Ok(())
-}
 
 /// Cuts a part of a scene's image into strips of its full width, from the top, that can be rendered within
 /// `memory` bytes together with the device's targets, the scene's volume and its rocks: whole rows of the

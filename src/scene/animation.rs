@@ -11,10 +11,8 @@ use super::keyframes::{CameraPath, Interpolation, Keyframes};
 use super::param::{Kind, Param};
 use super::read::{Source, apply_sets, check_names};
 use super::value::{Place, Raw, Value, Values};
-use super::{AutoExposure, Limits, Scene, expose};
-use crate::error::{Error, Result};
-use crate::exposure;
-use crate::job::Monitor;
+use super::{Limits, Scene, expose};
+use crate::util::error::{Error, Result};
 
 /// A scene, and how it moves.
 #[derive(Clone, Debug)]
@@ -148,17 +146,9 @@ impl Animation {
         Ok(Animation { measured: self.measured, ..animation })
     }
 
-    /// The same animation with its automatic exposure, if it has one, measured on frame 0 and the same for every
-    /// frame from now on; the stops that it chose.
-    pub fn exposed(self, monitor: &dyn Monitor) -> Result<(Animation, Option<f32>)> {
-        let scene = self.at(0)?;
-        if scene.image.look.auto_exposure == AutoExposure::None {
-            return Ok((self, None));
-        }
-        let cache = self.limits.cache.as_ref();
-        let volume = scene.kept_volume(cache, self.limits.memory, monitor)?;
-        let measured = Some(exposure::measure(&scene, &volume, &scene.kept_mesh(cache), monitor)?);
-        Ok((Animation { measured, ..self }, measured))
+    /// The same animation with `stops` more in every frame in place of its automatic exposure.
+    pub fn exposed(self, stops: f32) -> Animation {
+        Animation { measured: Some(stops), ..self }
     }
 
     /// The scene of a frame. It holds no trace of the animation: as a scene file of its own it gives the

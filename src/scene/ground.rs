@@ -1,8 +1,9 @@
 //! Rocks and pools of a scene, made from values that passed the table and checked against one another.
 
-use super::{MAX_POOLS, Pool, Rock, Values, Vertex};
-use crate::error::{Error, Result};
+use super::Values;
 use crate::mapping::QuadMap;
+use crate::place::{MAX_POOLS, Pool, Rock, Vertex};
+use crate::util::error::{Error, Result};
 
 pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
     let mut rocks = Vec::new();

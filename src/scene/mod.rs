@@ -1,21 +1,14 @@
 //! What is asked for: the scene, read strictly, checked whole before any work.
 
 mod animation;
+mod build;
 mod ground;
 mod keyframes;
-mod mesh;
 mod param;
-mod parts;
-mod pool;
-mod preset;
+mod presets;
 mod print;
 mod quads;
 mod read;
-mod rock;
-mod sheet;
-mod splash;
-pub mod tiles;
-mod types;
 mod value;
 
 use std::path::{Path, PathBuf};
@@ -23,29 +16,28 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 pub use animation::Animation;
-pub use mesh::{Ground, Mesh, Vertex};
+pub use build::resolve;
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
-pub use parts::resolve;
-pub use pool::{MAX_POOLS, Pool};
-pub use preset::{DEFAULT as DEFAULT_PRESET, list as presets};
+pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
-pub use rock::{Rock, wet::wet_albedo, wet::wetness};
-pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
-pub use splash::Splash;
-pub use types::{
-    AngleFrame, Attenuation, AutoExposure, Background, Camera, Cone, Filter, Image, Light, Look, Lookup,
-    Prefilter, Quad, Reflection, Scattering, Tone, Trace, Visibility,
-};
 pub use value::{Key, Place, Raw, Value, Values};
 
-use crate::cache::Cache;
 use crate::curve::{CurveShape, levels_for};
-use crate::environment::{self, Environment, EnvironmentStock};
-use crate::error::{Error, Result};
-use crate::haze::Haze;
+use crate::light::environment::{self, Environment, EnvironmentStock};
+use crate::light::haze::Haze;
+use crate::light::scatter::media::Media;
+use crate::light::visibility::{LightVolumes, LitQuads};
+use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility};
+use crate::mapping::Quad;
+use crate::picture::{AutoExposure, Camera, Image, check_image};
+use crate::place::{Ground, Mesh, Pool, Rock};
+use crate::trace::{Attenuation, Lookup, Prefilter, Trace, pyramid_spec};
+use crate::util::cache::Cache;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 use crate::volume::{
-    Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water, kept_water, read_npz,
-    storage_of,
+    PyramidSpec, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water,
+    kept_water, read_npz, storage_of,
 };
 
 /// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
@@ -170,7 +162,7 @@ impl Scene {
                 sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
                 levels,
             },
-            structure: parts::structure(v),
+            structure: build::structure(v),
             seed: v.int("volume.seed") as u64,
             alpha: v.float("volume.alpha"),
             k_d: v.float("volume.k_d"),
@@ -179,9 +171,9 @@ impl Scene {
         };
         let volume_file = match v.text("volume.file") {
             file if file.is_empty() => None,
-            file => Some(parts::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
+            file => Some(build::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
         };
-        let asked = parts::storage(v)?;
+        let asked = build::storage(v)?;
         let mut storage = Storage::Dense;
         if volume_file.is_none() {
             storage = storage_of(&water, asked, limits.memory)?;
@@ -198,12 +190,12 @@ impl Scene {
             width: v.count("image.width"),
             height: v.count("image.height"),
             samples: v.count("image.samples"),
-            filter: parts::filter(v),
+            filter: build::filter(v),
             rock_error: v.float("image.rock_error"),
-            look: parts::look(v),
+            look: build::look(v),
         };
-        image.check_budget(limits.memory)?;
-        let camera = parts::camera(v)?;
+        check_image(&image, limits.memory)?;
+        let camera = build::camera(v)?;
         let trace = Trace {
             attenuation: match v.text("trace.attenuation").as_str() {
                 "per-cell" => Attenuation::PerCell { tau: v.float("trace.tau") },
@@ -221,7 +213,7 @@ impl Scene {
                 _ => Lookup::Nearest,
             },
         };
-        let environment = parts::environment(v, folder, limits)?;
+        let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
         Ok(Scene {
@@ -232,7 +224,7 @@ impl Scene {
             asked_storage: asked,
             flow: v.float("volume.flow"),
             quads: quads::quads(v)?,
-            lights: parts::lights(v, sun, environment_lights.len())?,
+            lights: build::lights(v, sun, environment_lights.len())?,
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
@@ -247,17 +239,17 @@ impl Scene {
             },
             light_cache: (u64::from(v.count("light.cache")) << 20).min(limits.memory / 2),
             reflection: match v.text("light.reflection").as_str() {
-                "strand" => Reflection::Strand(parts::strand(v)),
+                "strand" => Reflection::Strand(build::strand(v)),
                 _ => Reflection::KajiyaKay,
             },
-            scattering: parts::scattering(v)?,
+            scattering: build::scattering(v)?,
             p: v.float("light.p"),
             camera,
             background: Background {
                 zenith: v.triple("background.zenith"),
                 horizon: v.triple("background.horizon"),
             },
-            haze: parts::haze(v),
+            haze: build::haze(v),
             image,
             values,
         })
@@ -272,7 +264,7 @@ impl Scene {
     }
 
     /// Builds the volume texture, or reads it from the scene's file.
-    pub fn volume(&self, memory: u64, monitor: &dyn crate::job::Monitor) -> Result<VolumeTexture> {
+    pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
         match (&self.volume_file, self.storage) {
             (Some(path), _) => read_npz(path, self.asked_storage, memory),
             (None, Storage::Dense) => build_water(&self.water, monitor),
@@ -285,7 +277,7 @@ impl Scene {
         &self,
         cache: Option<&Cache>,
         memory: u64,
-        monitor: &dyn crate::job::Monitor,
+        monitor: &dyn Monitor,
     ) -> Result<VolumeTexture> {
         match cache {
             // A file of the size of those that are sparse would push all others out.
@@ -314,6 +306,35 @@ impl Scene {
     /// The lights that shine on the volume: the scene's own, then those that stand for its environment.
     pub fn volume_lights(&self) -> Vec<Light> {
         self.lights.iter().chain(&self.environment_lights).copied().collect()
+    }
+
+    /// What the levels of its volume are made for.
+    pub fn pyramid_spec(&self, volume: &VolumeTexture) -> PyramidSpec {
+        pyramid_spec(&self.trace, &self.quads, volume)
+    }
+
+    /// Plans the light volumes of a frame with a volume of `size` cells whose density is scaled by `alpha`.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where even the coarsest need more than `budget` bytes.
+    pub fn light_volumes(&self, size: [u32; 3], alpha: f32, budget: u64) -> Result<LightVolumes> {
+        let lit = LitQuads {
+            quads: &self.quads,
+            lights: &self.volume_lights(),
+            own_lights: self.lights.len(),
+            eye: self.camera.eye,
+            trace: &self.trace,
+            scattering: self.scattering,
+            size,
+            alpha,
+        };
+        LightVolumes::new(&lit, budget)
+    }
+
+    /// The diffuse light of its materials in a volume, where light is scattered more than once.
+    pub fn media(&self, volume: &VolumeTexture) -> Option<Media> {
+        let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volume);
+        (self.scattering == Scattering::Multiple).then(make)
     }
 
     /// What the opaque mesh follows from.

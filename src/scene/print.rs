@@ -6,9 +6,10 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value as Json, json};
 
+use super::Scene;
 use super::param::{PARAMS, Param};
 use super::read::VERSION;
-use super::{Light, Scene};
+use crate::light::Light;
 
 impl Scene {
     /// Every concrete key of this scene, in the table's order.
@@ -116,12 +117,13 @@ impl Scene {
                 "sun": environment.sun.map(|sun| json!({
                     "to_sun": sun.to_sun.to_array(),
                     "radiance": sun.radiance.to_array(),
-                    "angular_radius": crate::environment::ANGULAR_RADIUS,
+                    "angular_radius": crate::light::environment::ANGULAR_RADIUS,
                 })),
             })
         });
         let mesh = self.mesh();
-        let column = |get: fn(&super::Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
+        let column =
+            |get: fn(&crate::place::Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
         root.insert(
             "derived".into(),
             json!({
@@ -147,7 +149,7 @@ impl Scene {
                     "tan_half_fov": camera.tan_half_fov,
                     "near": camera.near,
                     "sample_offsets": (0..self.image.samples)
-                        .map(|s| crate::camera::sample_offset(&self.image, s))
+                        .map(|s| crate::picture::camera::sample_offset(&self.image, s))
                         .collect::<Vec<_>>(),
                 },
                 "lights": lights(&self.lights),

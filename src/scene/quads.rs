@@ -2,13 +2,12 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::Values;
 use super::param::POINT_MAX;
-use super::parts::unit;
 use super::read::MAX_QUADS;
-use super::sheet::{Ends, Sheet, SheetFault};
-use super::{Quad, Splash, Values};
-use crate::error::{Error, Result};
-use crate::mapping::Material;
+use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash};
+use crate::util::error::{Error, Result};
+use crate::util::unit::unit;
 
 pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();

@@ -6,10 +6,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::param::{Kind, PARAMS, Param};
-use super::preset;
 use super::value::{Key, Place, Raw, Values};
-use super::{Limits, parts};
-use crate::error::{Error, Result};
+use super::{Limits, build, presets};
+use crate::util::error::{Error, Result};
 
 /// Scene files larger than this are refused: four million numbers are no scene, but a mistake.
 const MAX_BYTES: u64 = 16 << 20;
@@ -40,7 +39,7 @@ impl Source {
     /// A preset by its name, else a scene file.
     pub fn find(scene: &Path) -> Result<Source> {
         if let Some(name) = scene.to_str()
-            && let Some(text) = preset::text(name)
+            && let Some(text) = presets::text(name)
         {
             return Ok(Source {
                 name: name.into(),
@@ -52,7 +51,7 @@ impl Source {
         let meta = std::fs::metadata(scene).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => {
                 let given = scene.display().to_string();
-                let near = preset::names().max_by(|a, b| {
+                let near = presets::names().max_by(|a, b| {
                     strsim::jaro_winkler(a, &given).total_cmp(&strsim::jaro_winkler(b, &given))
                 });
                 let near = near.filter(|n| strsim::jaro_winkler(n, &given) > 0.7);
@@ -60,7 +59,7 @@ impl Source {
                     format!("no preset and no file is named {given}"),
                     match near {
                         Some(n) => format!("did you mean {n}?"),
-                        None => format!("presets: {}", preset::names().collect::<Vec<_>>().join(", ")),
+                        None => format!("presets: {}", presets::names().collect::<Vec<_>>().join(", ")),
                     },
                 )
             }
@@ -114,11 +113,11 @@ impl Source {
             None => Values::default(),
             Some(base) => {
                 let at = file.place(base.span().start);
-                let text = base.get_ref().as_str().and_then(|name| Some((name, preset::text(name)?)));
+                let text = base.get_ref().as_str().and_then(|name| Some((name, presets::text(name)?)));
                 let Some((name, text)) = text else {
                     return Err(Error::input(
                         format!("{}: base is no preset", at.0),
-                        format!("presets: {}", preset::names().collect::<Vec<_>>().join(", ")),
+                        format!("presets: {}", presets::names().collect::<Vec<_>>().join(", ")),
                     ));
                 };
                 if depth > 8 {
@@ -290,7 +289,7 @@ pub fn apply_sets(
     }
     let own = REFERENCES.iter().filter(|key| !set_by_hand(sets, key));
     own.into_iter()
-        .try_for_each(|key| parts::resolve(values, key, Some(&source.folder), &limits.allow_paths))?;
+        .try_for_each(|key| build::resolve(values, key, Some(&source.folder), &limits.allow_paths))?;
     Ok(None)
 }
 

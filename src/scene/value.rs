@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param, nearest};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// A checked value. Numbers are the shortest decimal of the float32 that is rendered with.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,7 +20,6 @@ use super::drive::Drive;
 use super::gallery::Gallery;
 use super::layer_image::show_legend;
 use super::lights::Lights;
-use super::metrics;
 use super::navigate::Pose;
 use super::parameters::{Costs, ParameterPanel};
 use super::probe::{Aim, Probe};
@@ -29,11 +28,11 @@ use super::transfer::{ExportDialog, PathDialog};
 use super::viewport::{self, Shown, Tool};
 use super::volume_panel::VolumePanel;
 use super::worker::{Busy, Message, MessageKind, Picture, Worker};
-use super::{Kept, Loss, Options};
-use crate::cpu::ray::RayReport;
-use crate::error::Result;
-use crate::frame::Layer;
+use super::{Kept, Loss, Options, metrics};
+use crate::engine::cpu::ray::RayReport;
+use crate::picture::Layer;
 use crate::scene::{Raw, Scene};
+use crate::util::error::Result;
 
 /// The inspectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
 use crate::scene::{
     Cost, Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
     set_by_hand,
 };
+use crate::util::error::{Error, Result};
 
 /// Steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -284,7 +284,7 @@ impl Document {
             let raw = Raw::Text(inside.display().to_string());
             scene.values.set(key, &raw, &Place("viewer".into()))?;
         }
-        crate::frame::Output::create(path)?.finish_with(scene.to_toml().as_bytes())?;
+        crate::output::frame::Output::create(path)?.finish_with(scene.to_toml().as_bytes())?;
         self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         self.path = Some(path.to_owned());
         self.folder = Some(folder);

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use eframe::egui;
 
 use super::app::Viewer;
-use crate::error::Result;
 use crate::scene::Raw;
+use crate::util::error::Result;
 
 /// Changes of a uniform, of an upload, of the volume.
 const CHANGES: [(&str, [f64; 2], usize); 3] =

@@ -7,9 +7,10 @@ use std::sync::mpsc::{Receiver, channel};
 use eframe::egui;
 
 use super::parameters::name;
-use crate::cpu;
-use crate::job::Unwatched;
-use crate::scene::{Limits, Scene, Visibility, presets};
+use crate::engine::cpu;
+use crate::light::Visibility;
+use crate::scene::{Limits, Scene, presets};
+use crate::util::monitor::Unwatched;
 
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 108;

@@ -3,7 +3,7 @@
 use eframe::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Vec2};
 use rayon::prelude::*;
 
-use crate::frame::{Frame, Layer, Surface};
+use crate::picture::{Frame, Layer, Surface};
 
 /// A value that is infinite or not a number: a colour that no map holds.
 const NON_FINITE: [u8; 4] = [255, 0, 255, 255];

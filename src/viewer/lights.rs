@@ -14,8 +14,8 @@ pub use handles::{Drawn, show as show_handles};
 
 use super::document::Document;
 use super::navigate::Pose;
-use crate::error::Result;
 use crate::scene::{Raw, Values};
+use crate::util::error::Result;
 
 /// What the viewer knows about lights beside the scene.
 #[derive(Default)]

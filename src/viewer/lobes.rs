@@ -5,10 +5,11 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use glam::DVec3;
 
 use super::lights::shines;
-use crate::environment::luminance;
-use crate::scene::{Reflection, Scene, Values};
-use crate::shading::{fibre_angles, specular_power};
-use crate::strand::{Lobes, Strand, cell_aeration};
+use crate::light::Reflection;
+use crate::light::environment::luminance;
+use crate::light::fibre::{fibre_angles, specular_power};
+use crate::light::strand::{Lobes, Strand, cell_aeration};
+use crate::scene::{Scene, Values};
 
 /// Directions around a plot: one a degree, less than half the standard deviation of the narrowest lobe.
 pub const STEPS: usize = 360;

@@ -32,10 +32,10 @@ use eframe::{NativeOptions, Renderer, egui};
 
 pub use app::Viewer;
 
-use crate::error::{Error, Result};
-use crate::gpu::{DeviceOptions, adapters};
-use crate::job::EngineChoice;
+use crate::engine::EngineChoice;
+use crate::engine::gpu::{DeviceOptions, adapters};
 use crate::scene::Limits;
+use crate::util::error::{Error, Result};
 
 /// How to open the viewer.
 #[derive(Clone, Debug)]

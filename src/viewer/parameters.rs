@@ -10,12 +10,12 @@ use std::collections::HashMap;
 use eframe::egui;
 use egui::{Align, Color32, Layout, Response, RichText, Ui};
 
-use self::lobes::LobesPlot;
-use self::overview::Overview;
-use self::widget::{direction_angles, list, triple, widget};
 use super::document::Document;
 use super::lights::Lights;
 use crate::scene::{Cost, Kind, Param, Raw, Value};
+use lobes::LobesPlot;
+use overview::Overview;
+use widget::{direction_angles, list, triple, widget};
 
 /// Groups of the panel: title, what it is about, sections of keys.
 const GROUPS: [(&str, &str, &[&str]); 9] = [

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use eframe::egui;
 
 use super::worker::Picture;
-use crate::cpu::ray::{RayReport, inspect};
+use crate::engine::cpu::ray::{RayReport, inspect};
 
 /// What the ray is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use egui_extras::{Column, TableBuilder};
 use egui_plot::{AxisHints, HoverPosition, Line, Plot, PlotPoints, Span, VLine};
 use glam::Vec3;
 
-use crate::cpu::ray::{RayReport, RayStep};
+use crate::engine::cpu::ray::{RayReport, RayStep};
 
 /// Rec. 709 weights of linear RGB.
 const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);

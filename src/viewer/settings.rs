@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::frame::Output;
+use crate::output::frame::Output;
+use crate::util::error::{Error, Result};
 
 /// Files that are remembered.
 const MAX_RECENT: usize = 12;

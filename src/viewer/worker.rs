@@ -16,11 +16,12 @@ use std::time::Instant;
 use eframe::egui;
 
 use super::layer_image::Legend;
-use crate::cache::Cache;
-use crate::frame::{Frame, Layer};
-use crate::gpu::DeviceOptions;
-use crate::job::EngineChoice;
-use crate::scene::{Cost, Mesh, Scene};
+use crate::engine::EngineChoice;
+use crate::engine::gpu::DeviceOptions;
+use crate::picture::{Frame, Layer};
+use crate::place::Mesh;
+use crate::scene::{Cost, Scene};
+use crate::util::cache::Cache;
 use crate::volume::VolumeTexture;
 use renderer::Renderer;
 

@@ -5,9 +5,9 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::ripple::Ripple;
-use super::water::WaterSpec;
+use super::spec::WaterSpec;
 use crate::curve::{CurveShape, spatial_fractal_curve};
-use crate::random::{Family, Stream};
+use crate::util::random::{Family, Stream};
 
 /// How far into the volume, as a share of its depth, parents keep from either face: around one that starts on a
 /// face half of the children would be lost.
@@ -17,29 +17,6 @@ const MARGIN: f32 = 0.2;
 const BREATH: f32 = 0.12;
 /// Narrowest that breathing makes a bundle: at 0 all its strands would go through one point.
 const NARROWEST: f32 = 0.15;
-
-/// What the paper's curves do not have; all 0 (`Default`) is the paper.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Structure {
-    /// Parent curves; 0: every curve goes its own way.
-    pub bundles: u32,
-    /// Standard deviation of the children's distance from their parent, in x and in z, cells.
-    pub radius_cells: f32,
-    /// Standard deviation of g of the parents, cells.
-    pub wander_cells: f32,
-    /// Relative standard deviation of a bundle's width along its way.
-    pub breathe: f32,
-    /// Share of the curves that stay without a parent.
-    pub loose: f32,
-    /// From ρ independent in every cell (0) to ρ of the strands (1).
-    pub coherence: f32,
-    /// Correlation length of ρ along a strand, a fraction of the flow length.
-    pub strand_length: f32,
-    /// From ρ whole in every cell a strand touches (0) to ρ by the length of the strands in it (1).
-    pub coverage: f32,
-    /// k_d grows by this from ρ = 0 to ρ = 1.
-    pub crest: f32,
-}
 
 /// Writes the points of curve number `curve` of the jitter grid (column + row·across) into `points`, in
 /// cells, unwrapped: just the curve the volume is built from. Its ends have the same x and z.

@@ -15,7 +15,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 use super::bricks::{BRICK, Bricks, Packer};
 use super::storage::{Storage, StorageChoice, check_stored, file_storage};
 use super::{Cell, Cells, VolumeTexture};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// NumPy pads its headers to 128 bytes; a longer one than this is not an array of numbers, and a
 /// bound keeps the header's parser (recursive) from a hostile file.

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::bricks::{BRICK, Bricks, Marks, parted};
 use super::bundle::curve_points;
 use super::ripple::Ripple;
-use super::water::WaterSpec;
-use crate::error::Result;
-use crate::job::Monitor;
-use crate::random::{Family, Stream};
+use super::spec::WaterSpec;
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
+use crate::util::random::{Family, Stream};
 use crate::walk::{Walk, floor_cell};
 
 /// Curves a task builds before it hands its contributions over.

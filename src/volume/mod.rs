@@ -9,22 +9,25 @@ mod flow;
 mod leaps;
 mod pyramid;
 mod ripple;
+mod spec;
 mod storage;
 mod water;
 
 pub use bricks::{BRICK, Bricks, grid as brick_grid};
-pub use bundle::{Structure, curve_points};
+pub use bundle::curve_points;
 pub use cell::{Cell, V_SCALE};
 pub use cells::Cells;
 pub use file::{read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
-    KeptLevels, Leaps, Levels, Moments, Pyramid, Stack, coarse_levels, level_count, level_size, levels_of,
+    KeptLevels, Leaps, Levels, Moments, Pyramid, PyramidSpec, Stack, coarse_levels, level_count, level_size,
+    levels_of,
 };
 pub use ripple::Ripple;
+pub use spec::{Structure, WaterSpec};
 pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
 pub use water::{
-    WaterSpec, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,
+    BUILDER_VERSION, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,
 };
 
 /// A volume texture: nx × ny × nz packed cells, x fastest, then y, then z.

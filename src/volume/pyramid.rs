@@ -26,8 +26,6 @@ use glam::{DVec3, UVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
-use crate::gpu::layout::extinction;
-use crate::scene::{Attenuation, Lookup, Prefilter, Scene};
 
 /// Levels as walks read them; shared as a volume's cells are.
 pub type Levels = Arc<Pyramid>;
@@ -141,15 +139,6 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// Of the levels that a scene looks into, of a volume of `size` cells.
-    pub fn of(scene: &Scene, size: [u32; 3]) -> Self {
-        let count = match scene.trace.filter {
-            Prefilter::None => 1,
-            Prefilter::Pyramid => level_count(size),
-        };
-        Stack { size, count }
-    }
-
     /// Of levels.
     pub fn new(levels: &[VolumeTexture]) -> Self {
         Stack { size: levels[0].size, count: levels.len() as u32 }
@@ -175,22 +164,19 @@ impl Stack {
     }
 }
 
-/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with. Of
-/// several materials of strands the mean thickness counts, quad by quad.
-pub fn bits(scene: &Scene, volume: &VolumeTexture) -> f32 {
-    let extinction = extinction(&scene.trace.attenuation, volume.alpha);
-    if matches!(scene.trace.attenuation, Attenuation::PerCell { .. }) {
-        return extinction;
-    }
-    let strands =
-        scene.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
-    let (count, sum) = strands.fold((0.0, 0.0), |(count, sum), thickness| (count + 1.0, sum + thickness));
-    extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
+/// What the levels of a volume are made for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PyramidSpec {
+    /// Bits of transmittance along the depth of one cell, per unit of its ρ code: coarse levels hide as much of what
+    /// is behind as their columns do with these. `None`: there are no coarse levels.
+    pub coverage_bits: Option<f32>,
+    /// Whether walks interpolate between cells.
+    pub interpolated: bool,
 }
 
-/// The levels that a scene looks into, for few rays.
-pub fn levels_of(scene: &Scene, volume: &VolumeTexture) -> Levels {
-    KeptLevels { leaps: Leaps::Never, kept: None }.get(scene, volume)
+/// Levels of a volume without boxes to leap over, for few rays.
+pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
+    KeptLevels { leaps: Leaps::Never, kept: None }.get(volume, spec)
 }
 
 /// Levels that are kept from frame to frame.
@@ -205,29 +191,21 @@ pub struct KeptLevels {
 struct Key {
     cells: Cells,
     size: [u32; 3],
-    bits: Option<f32>,
-    between: bool,
+    spec: PyramidSpec,
     leaps: Leaps,
 }
 
 impl PartialEq for Key {
     fn eq(&self, other: &Self) -> bool {
         self.cells.same(&other.cells)
-            && (self.size, self.bits, self.between, self.leaps)
-                == (other.size, other.bits, other.between, other.leaps)
+            && (self.size, self.spec, self.leaps) == (other.size, other.spec, other.leaps)
     }
 }
 
 impl KeptLevels {
-    /// The levels that a scene looks into, made unless they are those of the last call.
-    pub fn get(&mut self, scene: &Scene, volume: &VolumeTexture) -> Levels {
-        let key = Key {
-            cells: volume.cells.clone(),
-            size: volume.size,
-            bits: (scene.trace.filter == Prefilter::Pyramid).then(|| bits(scene, volume)),
-            between: scene.trace.lookup == Lookup::Trilinear,
-            leaps: self.leaps,
-        };
+    /// The levels of a volume, made unless they are those of the last call.
+    pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
+        let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };
         if let Some((of, levels)) = &self.kept
             && *of == key
         {
@@ -236,7 +214,7 @@ impl KeptLevels {
         // The old ones go first: both might not fit.
         self.kept = None;
         let mut levels = vec![volume.clone()];
-        if let Some(bits) = key.bits {
+        if let Some(bits) = spec.coverage_bits {
             levels.extend(coarse_levels(volume, bits));
         }
         let leaps = match key.leaps {
@@ -247,7 +225,7 @@ impl KeptLevels {
             Leaps::Never => false,
         };
         if leaps {
-            levels = levels.iter().map(|level| with_boxes(level, key.between)).collect();
+            levels = levels.iter().map(|level| with_boxes(level, spec.interpolated)).collect();
         }
         let levels = Arc::new(Pyramid { levels, leaps });
         self.kept = Some((key, levels.clone()));

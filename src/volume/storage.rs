@@ -1,7 +1,7 @@
 //! Which form a volume's cells are stored in, and the memory that either takes.
 
 use super::{Bricks, Cell, WaterSpec};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// How the cells of a volume are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

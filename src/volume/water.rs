@@ -6,42 +6,15 @@ use std::sync::Arc;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use xxhash_rust::const_xxh3::xxh3_64;
 
-use super::bundle::Structure;
 use super::flow::{self, Flow};
 use super::storage::check_sparse;
 use super::{Cell, Cells, VolumeTexture};
-use crate::cache::{Cache, key};
-use crate::curve::CurveShape;
-use crate::error::Result;
-use crate::job::Monitor;
-use crate::random::{Family, Stream};
-
-/// Everything the water builder needs; equal specs give equal bytes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WaterSpec {
-    /// nx, ny, nz.
-    pub size: [u32; 3],
-    /// Jitter grid on the face y = 0: columns in x.
-    pub across: u32,
-    /// Jitter grid on the face y = 0: rows in z.
-    pub deep: u32,
-    /// The curves.
-    pub shape: CurveShape,
-    /// Bundles and strands.
-    pub structure: Structure,
-    /// Seed of all randomness.
-    pub seed: u64,
-    /// Scale of ρ; kept beside the cells, not in them.
-    pub alpha: f32,
-    /// Base of k_d.
-    pub k_d: f32,
-    /// Base of k_s.
-    pub k_s: f32,
-    /// Standard deviation of the noise of k.
-    pub k_noise: f32,
-}
+use crate::util::cache::{Cache, key};
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
+use crate::util::random::{Family, Stream};
+use crate::volume::WaterSpec;
 
 impl WaterSpec {
     /// Whether ρ and k need no more than packed cells ([`set_density_and_reflection`]), so that a change of k's
@@ -93,7 +66,7 @@ pub fn expected_cells(spec: &WaterSpec) -> u64 {
 pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let count = spec.size.iter().map(|&n| n as usize).product();
     // α is not in the cells.
-    let key = key("volume", &BUILDER, &WaterSpec { alpha: 0.0, ..*spec });
+    let key = key("volume", BUILDER_VERSION, &WaterSpec { alpha: 0.0, ..*spec });
     let build = || {
         let volume = build_water(spec, monitor)?;
         Ok(Arc::unwrap_or_clone(volume.cells.dense().expect("all cells are stored").clone()))
@@ -102,18 +75,9 @@ pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Res
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
 
-/// What the cells follow from besides the spec: a volume of another builder is another volume.
-const BUILDER: [u64; 9] = [
-    xxh3_64(include_bytes!("water.rs")),
-    xxh3_64(include_bytes!("bundle.rs")),
-    xxh3_64(include_bytes!("flow.rs")),
-    xxh3_64(include_bytes!("cell.rs")),
-    xxh3_64(include_bytes!("cells.rs")),
-    xxh3_64(include_bytes!("ripple.rs")),
-    xxh3_64(include_bytes!("../curve.rs")),
-    xxh3_64(include_bytes!("../walk.rs")),
-    xxh3_64(include_bytes!("../random.rs")),
-];
+/// Version of the builder: part of the key of volumes on disk. Raise it with every change of the cells that a spec
+/// gives; a test compares their checksums.
+pub const BUILDER_VERSION: u32 = 1;
 
 /// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
 /// every cell with a direction. Needs no curves, where [`WaterSpec::density_is_of_cells`].

@@ -7,11 +7,10 @@ use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::cli::faults::{run, taki};
 use proptest::prelude::*;
-use taki::error::Error;
 use taki::farm::{Job, bash_word, kubernetes, openjd, slurm};
-
-use crate::faults::{run, taki};
+use taki::util::error::Error;
 
 fn job(batch: Vec<OsString>) -> Job {
     Job {

@@ -8,13 +8,15 @@ use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
 use super::{Batch, Pattern, Sweep, existing};
-use crate::contact_sheet::{Axis, Sheet, draw};
-use crate::cpu::resolve::develop;
-use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer, Output, Window, figures_of, read_exr, read_png, rgb_rows};
 use crate::job::still::{SOFTWARE, scene_text};
-use crate::movie::{Movie, MovieKind, MovieOptions, mark_of};
-use crate::scene::{Look, Scene};
+use crate::output::contact_sheet::{Axis, Sheet, draw};
+use crate::output::frame::{Output, figures_of, read_exr, read_png, rgb_rows};
+use crate::output::movie::{Movie, MovieKind, MovieOptions, mark_of};
+use crate::picture::resolve::develop;
+use crate::picture::{Frame, Layer, Look};
+use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
 
 /// A file of all frames of a point of the sweep.
 #[derive(Clone, Debug)]

@@ -6,11 +6,12 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::{Batch, stamp};
-use crate::error::{Error, Result};
-use crate::frame::{Kind, Verified, verify};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
-use crate::job::{Claims, Monitor, VolumeStock};
+use crate::job::{Claims, VolumeStock};
+use crate::output::frame::{Kind, Verified, verify};
 use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 
 /// What a file's name holds.
 #[derive(Debug, PartialEq)]
@@ -176,7 +177,8 @@ impl Batch {
         if scene.volume_file.is_some() {
             // A built volume follows from its parameters; one from a file may have changed since.
             let memory = self.base.limits().memory;
-            let (volume, _) = VolumeStock::default().volume(scene, memory, &crate::job::Unwatched)?;
+            let (volume, _) =
+                VolumeStock::default().volume(scene, memory, &crate::util::monitor::Unwatched)?;
             if line != volume_line(&volume) {
                 return Ok(Some("it was made with other contents of volume.file".into()));
             }

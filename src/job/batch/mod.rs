@@ -30,11 +30,15 @@ use rayon::prelude::*;
 
 use assemble::MovieFile;
 
-use crate::error::{Error, Result};
-use crate::frame::{Layer, Output, Window, folder_of, remove_stale};
-use crate::job::{Monitor, Still};
-use crate::movie::MovieKind;
+use super::Still;
+use crate::engine::exposure::exposed;
+use crate::output::frame::{Output, folder_of, remove_stale};
+use crate::output::movie::MovieKind;
+use crate::picture::Layer;
 use crate::scene::{Animation, Place, Scene};
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 
 /// Most pictures of one batch.
 const MAX_PICTURES: usize = 1_000_000;
@@ -104,7 +108,7 @@ fn stamp(path: &Path) -> Option<Stamp> {
 impl Batch {
     /// Checks what is asked for and what is there.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
-        let (base, measured) = base.exposed(monitor)?;
+        let (base, measured) = exposed(base, monitor)?;
         let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
         let keys = first.keys();
         let sweeps = request

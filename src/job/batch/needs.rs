@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::Batch;
 use super::report::word;
-use crate::error::{Result, human_bytes};
-use crate::gpu::canvas_bytes;
+use crate::engine::overlap;
 use crate::job::{check_bloom, memory_of, spare_for_rasters};
-use crate::overlap;
+use crate::picture::canvas_bytes;
+use crate::util::error::{Result, human_bytes};
 
 /// What a run would render, and what it needs for it.
 #[derive(Clone, Debug, PartialEq, Serialize)]

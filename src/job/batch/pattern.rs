@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 
 /// A file's name with places for the frame's number and the values of a sweep.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::frame::Seconds;
-use crate::job::Monitor;
+use crate::picture::Seconds;
+use crate::util::monitor::Monitor;
 
 /// Something that happened, as `--events json` prints it: one object with `event` and what belongs to it.
 #[derive(Clone, Debug, Serialize)]

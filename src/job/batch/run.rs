@@ -5,11 +5,14 @@ use std::time::{Duration, Instant};
 use super::Batch;
 use super::report::{Event, Name, Summary, Watcher};
 use super::writer::{Outcomes, Start, Writer};
-use crate::error::{Error, Result};
-use crate::frame::{Window, remove_left_by};
-use crate::gpu::RenderOptions;
-use crate::job::{Asked, Claim, Claims, Engine, Monitor, Still, VolumeStock, memory_of, spare_for_rasters};
-use crate::scene::{Ground, Mesh, Scene};
+use crate::engine::{Engine, RenderOptions};
+use crate::job::{Asked, Claim, Claims, Still, VolumeStock, memory_of, spare_for_rasters};
+use crate::output::frame::remove_left_by;
+use crate::place::{Ground, Mesh};
+use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 
 /// Between two looks at what others have claimed.
 const WAIT: Duration = Duration::from_millis(200);

@@ -1,7 +1,7 @@
 //! Values to try: `alpha=0.25:1:0.25`, `h=0.6,1,1.4`.
 
-use crate::error::{Error, Result};
 use crate::scene::{PARAMS, Param, Raw, Values, check_names, parse_value};
+use crate::util::error::{Error, Result};
 
 /// Most values of one sweep.
 const MAX_VALUES: usize = 1000;

@@ -6,12 +6,14 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use super::report::{Event, Name, Watcher, word, words};
-use crate::error::{Error, Result};
-use crate::frame::{Frame, Layer, Seconds, Window, rgb_rows};
 use crate::job::still::StillWriter;
 use crate::job::{Claim, Still};
-use crate::movie::{Movie, MovieKind, MovieOptions};
+use crate::output::frame::rgb_rows;
+use crate::output::movie::{Movie, MovieKind, MovieOptions};
+use crate::picture::{Frame, Layer, Seconds};
 use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
 /// A picture to write, once its first strip is there.

@@ -15,7 +15,7 @@ pub(super) const ROCKS: Group = Group {
                  outside.",
             )
             .when("Let patches overlap at their borders, so that no gap shows between two rocks."),
-        p("rocks.*.levels", "", "", Int(0, crate::scene::rock::MAX_LEVELS as i64, 7), Upload)
+        p("rocks.*.levels", "", "", Int(0, crate::place::MAX_LEVELS as i64, 7), Upload)
             .slider(0.0, 9.0)
             .doc("Number of subdivisions: the mesh has 2^levels squares a side.")
             .when("Raise it for fine detail near the camera; lower it for small or distant rocks."),

@@ -7,7 +7,7 @@ use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 use super::{Viewer, preference};
-use crate::frame::Layer;
+use crate::picture::Layer;
 use crate::scene::Raw;
 use crate::viewer::navigate::Pose;
 use crate::viewer::settings::Theme;

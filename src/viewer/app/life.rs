@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use eframe::egui;
 
 use super::{Leaving, Shot, Viewer};
-use crate::error::{Error, Result};
+use crate::util::error::{Error, Result};
 use crate::viewer::Kept;
 
 impl Viewer {

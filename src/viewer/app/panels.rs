@@ -7,9 +7,8 @@ use egui::{RichText, Ui};
 
 use super::input::LightCommand;
 use super::{Inspector, Viewer};
-use crate::error::human_bytes;
-use crate::frame::Layer;
-use crate::scene::AutoExposure;
+use crate::picture::{AutoExposure, Layer};
+use crate::util::error::human_bytes;
 use crate::viewer::parameters::lights::add_menu;
 use crate::viewer::parameters::{cost_color, name};
 use crate::viewer::ray_panel;

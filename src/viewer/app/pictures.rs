@@ -6,7 +6,7 @@ use std::time::Instant;
 use eframe::egui;
 
 use super::{Inspector, Viewer};
-use crate::frame::Layer;
+use crate::picture::Layer;
 use crate::viewer::navigate::Pose;
 use crate::viewer::probe::Aim;
 use crate::viewer::worker::Request;

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::error::Result;
 use crate::scene::{Kind, Param, Place, Raw, Values};
+use crate::util::error::Result;
 use crate::viewer::navigate::{Pose, raw};
 
 /// The kinds of light, as the scene file spells them.

@@ -8,7 +8,8 @@ use egui::{Color32, RichText, Sense, Shape, Stroke, Ui, Vec2};
 use egui_plot::{Arrows, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Text};
 
 use super::name;
-use crate::scene::{Reflection, Scene, Values};
+use crate::light::Reflection;
+use crate::scene::{Scene, Values};
 use crate::viewer::lobes::{Curve, Plane, STEPS, Scale, Setting, alpha, curves, incidence};
 
 /// Widest plot, points.

@@ -6,9 +6,9 @@ use eframe::egui;
 use egui::{Color32, ColorImage, Pos2, Sense, Stroke, TextureHandle, TextureOptions, Ui, Vec2};
 
 use super::name;
-use crate::cpu::resolve::Resolver;
-use crate::environment::{Environment, Map};
-use crate::scene::{Image, Look};
+use crate::light::environment::{Environment, Map};
+use crate::picture::resolve::Resolver;
+use crate::picture::{Image, Look};
 
 /// Columns and rows.
 const SIZE: [usize; 2] = [256, 128];

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, RichText};
 
-use crate::error::human_bytes;
+use crate::util::error::human_bytes;
 use crate::volume::Statistics;
 
 /// One row a figure: name, value, theory.

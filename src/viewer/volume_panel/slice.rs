@@ -4,8 +4,8 @@ use eframe::egui::{
     self, Color32, ColorImage, Pos2, Rect, Sense, Stroke, TextureHandle, TextureOptions, Vec2,
 };
 
-use super::super::layer_image::{direction_colour, sequential};
 use super::{Shown, axis_colour};
+use crate::viewer::layer_image::{direction_colour, sequential};
 use crate::volume::{Cell, VolumeTexture};
 
 /// Cells across (right, down) of the plane across each axis: y goes down as water does; z, into the

@@ -13,14 +13,16 @@ use eframe::egui;
 use rayon::prelude::*;
 
 use super::{Export, MessageKind, Picture, Request, Shared, lock};
-use crate::cache::Cache;
-use crate::cpu::resolve::develop;
-use crate::error::Result;
-use crate::exposure;
-use crate::frame::Frame;
-use crate::gpu::{DeviceOptions, RenderOptions};
-use crate::job::{Engine, EngineChoice, Monitor, VolumeStock};
-use crate::scene::{AutoExposure, Cost, Ground, Look, Mesh, Scene, Values};
+use crate::engine::gpu::DeviceOptions;
+use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
+use crate::job::VolumeStock;
+use crate::picture::resolve::develop;
+use crate::picture::{AutoExposure, Frame, Look};
+use crate::place::{Ground, Mesh};
+use crate::scene::{Cost, Scene, Values};
+use crate::util::cache::Cache;
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
@@ -43,7 +45,7 @@ const BUILD_PATIENCE: Duration = Duration::from_secs(2);
 const KEPT_RASTERS: u64 = 48 << 20;
 /// From this scale on the rocks are drawn coarsely,
 const COARSE_SCALE: u32 = 3;
-/// and may be off by so many of a preview's pixels, [`Image::rock_error`](crate::scene::Image).
+/// and may be off by so many of a preview's pixels, [`Image::rock_error`](crate::picture::Image).
 const COARSE_ROCK: f32 = 6.0;
 /// Preview pixels per side of a full pixel that are tried.
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];

@@ -1,10 +1,9 @@
 //! What a change costs, and that the picture is the picture of what the document says.
 
-use taki::cpu;
-use taki::job::Unwatched;
-use taki::scene::Cost;
-
 use super::*;
+use taki::engine::cpu;
+use taki::scene::Cost;
+use taki::util::monitor::Unwatched;
 
 /// Radiance and bytes of what is shown.
 fn shown(window: &Window) -> (Vec<[f32; 4]>, Vec<[u8; 4]>) {
@@ -60,7 +59,7 @@ fn each_change_shows_its_cost_and_undo_gives_the_first_bytes_back() {
 
 #[test]
 fn so_it_is_on_the_gpu() {
-    if crate::gpu::renderer("viewer").is_none() {
+    if crate::engine::gpu::renderer("viewer").is_none() {
         return;
     }
     let window = Setup { engine: EngineChoice::Gpu, ..Setup::bare() }.open();

@@ -2,11 +2,10 @@
 
 use std::process::Command;
 
-use taki::frame::read_png;
+use super::*;
+use taki::output::frame::read_png;
 use taki::viewer::document::changed_keys;
 use taki::viewer::settings::{Settings, Theme};
-
-use super::*;
 
 /// A window wide enough for its dialogs.
 fn wide() -> Setup {
@@ -285,7 +284,7 @@ fn an_export_is_what_the_command_line_renders(engine: EngineChoice, name: &str) 
     exported(&mut window, 1);
     let (width, height, _) = read_png(&window.path("out.png")).expect("a PNG");
     assert_eq!((width, height), (75, 44));
-    let (width, height, channels) = taki::frame::read_exr(&window.path("out.exr")).expect("an EXR");
+    let (width, height, channels) = taki::output::frame::read_exr(&window.path("out.exr")).expect("an EXR");
     assert_eq!((width, height), (75, 44));
     assert!(channels.len() > 4, "layers beside the colours");
     assert!(window.reads("wrote "));
@@ -311,7 +310,7 @@ fn an_export_is_byte_by_byte_what_the_command_line_renders() {
 
 #[test]
 fn an_export_on_the_gpu_is_what_the_command_line_renders_there() {
-    if crate::gpu::renderer("viewer export").is_some() {
+    if crate::engine::gpu::renderer("viewer export").is_some() {
         an_export_is_what_the_command_line_renders(EngineChoice::Gpu, "gpu");
     }
 }

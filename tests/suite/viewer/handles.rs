@@ -1,9 +1,8 @@
 //! Lights dragged in the picture.
 
+use super::*;
 use glam::DVec3;
 use taki::viewer::navigate::Pose;
-
-use super::*;
 
 const LAMP: &str = r#"
 [lights.lamp]

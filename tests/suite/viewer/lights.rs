@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use super::*;
 use taki::scene::{Place, Values};
 use taki::viewer::lights::edit;
-
-use super::*;
 
 /// A window in which the whole list is seen.
 fn with_list() -> Setup {

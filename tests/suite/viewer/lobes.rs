@@ -2,14 +2,14 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
+use super::*;
 use glam::DVec3;
-use taki::scene::{Reflection, Scene};
-use taki::strand::StrandParams;
+use taki::light::Reflection;
+use taki::light::strand::StrandParams;
+use taki::scene::Scene;
 use taki::viewer::lobes::{
     Curve, DECADES, Incidence, Plane, STEPS, Scale, Setting, alpha, curves, flow, incidence,
 };
-
-use super::*;
 
 /// Smooth strands: every lobe stands out.
 fn strand(theta_i: f64, plane: Plane) -> Setting {

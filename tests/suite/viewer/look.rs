@@ -1,9 +1,8 @@
 //! How the window looks.
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use taki::frame::{Difference, Tolerance};
-
 use super::*;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use taki::output::frame::{Difference, Tolerance};
 
 #[test]
 fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
@@ -60,7 +59,7 @@ const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
 
 /// The picture itself is tested elsewhere; some of it is kept, to see that it is there.
 fn snapshot(theme: egui::Theme, name: &str, prepare: impl FnOnce(&mut Window)) {
-    if crate::gpu::renderer(name).is_none() {
+    if crate::engine::gpu::renderer(name).is_none() {
         return;
     }
     let word = if theme == egui::Theme::Dark { "dark" } else { "light" };
@@ -88,7 +87,7 @@ fn snapshot(theme: egui::Theme, name: &str, prepare: impl FnOnce(&mut Window)) {
         std::fs::metadata(&place).expect("a snapshot").len() <= MAX_SNAPSHOT_BYTES,
         "{name} is too large"
     );
-    let (width, height, golden) = taki::frame::read_png(&place).expect("a snapshot");
+    let (width, height, golden) = taki::output::frame::read_png(&place).expect("a snapshot");
     assert_eq!((width, height), image.dimensions());
     let shown: Vec<[f32; 3]> =
         image.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(|x| f32::from(x) / 255.0)).collect();
@@ -117,7 +116,7 @@ fn the_light_window_looks_as_it_did_when_last_looked_at() {
 fn the_snapshot_of_one_theme_is_not_that_of_the_other() {
     let place = |name| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots").join(name);
     let [dark, light] =
-        ["viewer_dark.png", "viewer_light.png"].map(|name| taki::frame::read_png(&place(name)));
+        ["viewer_dark.png", "viewer_light.png"].map(|name| taki::output::frame::read_png(&place(name)));
     let ((width, _, dark), (_, _, light)) = (dark.expect("a snapshot"), light.expect("a snapshot"));
     assert!(!is_alike(width, &dark, &light));
 }

@@ -2,12 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
-use taki::environment::{Environment, direction_at, luminance, uv_of};
-use taki::scene::Scene;
-
 use super::*;
-use crate::environment::{map, uneven};
+use crate::light::environment::{map, uneven};
+use glam::DVec3;
+use taki::light::environment::{Environment, direction_at, luminance, uv_of};
+use taki::scene::Scene;
 
 fn of(sets: &[String]) -> Environment {
     let scene = Scene::load(Path::new("front"), sets, &Limits::default()).expect("a valid scene");

@@ -1,12 +1,11 @@
 //! Layers, pixels, faults, lost devices and windows of every size.
 
-use rand::{RngExt, SeedableRng};
-use taki::cpu;
-use taki::frame::Layer;
-use taki::job::Unwatched;
-use taki::viewer::layer_image::Legend;
-
 use super::*;
+use rand::{RngExt, SeedableRng};
+use taki::engine::cpu;
+use taki::picture::Layer;
+use taki::util::monitor::Unwatched;
+use taki::viewer::layer_image::Legend;
 
 const NUMBERS: [Key; 7] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
 
@@ -100,7 +99,7 @@ fn without_the_adapter_that_was_asked_for_the_cpu_renders_and_the_window_says_so
 
 #[test]
 fn a_lost_device_is_replaced_and_after_four_in_a_minute_the_cpu_takes_over() {
-    if crate::gpu::renderer("lost devices of the viewer").is_none() {
+    if crate::engine::gpu::renderer("lost devices of the viewer").is_none() {
         return;
     }
     let setup = Setup { engine: EngineChoice::Gpu, size: [700.0, 400.0], ..Setup::bare() };
@@ -131,7 +130,7 @@ fn a_lost_device_is_replaced_and_after_four_in_a_minute_the_cpu_takes_over() {
 
 #[test]
 fn a_lost_device_during_an_export_is_replaced_too() {
-    if crate::gpu::renderer("a lost device under an export").is_none() {
+    if crate::engine::gpu::renderer("a lost device under an export").is_none() {
         return;
     }
     let mut window = Setup { engine: EngineChoice::Gpu, ..Setup::bare() }.open();
@@ -140,7 +139,7 @@ fn a_lost_device_during_an_export_is_replaced_too() {
     window.viewer().worker().lose_device();
     window.viewer().worker().export(taki::viewer::worker::Export { scene, paths: vec![file.clone()] });
     window.until("the export", |viewer| viewer.worker().state().exports_done == 1);
-    let (width, height, _) = taki::frame::read_png(&file).expect("a picture");
+    let (width, height, _) = taki::output::frame::read_png(&file).expect("a picture");
     assert_eq!((width, height), (160, 90));
 }
 

@@ -1,11 +1,10 @@
 //! Reference truth of what drags in the picture mean: closed forms of the pinhole camera and of the dial.
 
+use super::*;
 use glam::{DVec2, DVec3};
 use taki::scene::Scene;
 use taki::viewer::lights::projection::View;
 use taki::viewer::navigate::Pose;
-
-use super::*;
 
 /// Float64 carries 16 digits; a window has a thousand points, and a chain of ten operations.
 const ROUNDING: f64 = 1e-11;

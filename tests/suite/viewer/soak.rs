@@ -2,11 +2,10 @@
 
 use std::process::Command;
 
-use rand::{RngExt, SeedableRng};
-use taki::frame::Layer;
-use taki::scene::{Kind, Param};
-
 use super::*;
+use rand::{RngExt, SeedableRng};
+use taki::picture::Layer;
+use taki::scene::{Kind, Param};
 
 const CHANGES: usize = 2_000;
 /// From here on everything that is kept has its size: buffers, textures, most of the steps of undo.

@@ -1,8 +1,7 @@
 //! The parameter panel: a widget for every value, and what each does to the document.
 
-use taki::scene::{Kind, Param, Values};
-
 use super::*;
+use taki::scene::{Kind, Param, Values};
 
 /// A window with all groups and all corners open.
 fn open_groups() -> Window {

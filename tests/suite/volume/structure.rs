@@ -2,11 +2,10 @@
 
 use std::collections::HashSet;
 
-use glam::Vec3;
-use taki::random::{Family, Stream};
-use taki::volume::{Ripple, Structure, VolumeTexture, WaterSpec, build_water, curve_points};
-
 use super::{build, mean, on_threads, spec};
+use glam::Vec3;
+use taki::util::random::{Family, Stream};
+use taki::volume::{Ripple, Structure, VolumeTexture, WaterSpec, build_water, curve_points};
 
 /// With everything on.
 fn rich(size: [u32; 3], grid: u32) -> WaterSpec {
@@ -184,7 +183,7 @@ fn crests_are_bright_where_the_water_is_dense() {
 fn a_coherent_volume_tiles_along_the_flow() {
     let mut spec = rich([20, 64, 20], 30);
     spec.structure = Structure { coherence: 1.0, coverage: 0.0, ..spec.structure };
-    let volume = build_water(&spec, &taki::job::Unwatched).unwrap();
+    let volume = build_water(&spec, &taki::util::monitor::Unwatched).unwrap();
     // Mean |Δρ| between neighbours along y, by the first one's y: the seam is a place like others.
     let step = |y: u32| {
         let next = (y + 1) % 64;

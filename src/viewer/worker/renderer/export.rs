@@ -4,10 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::Renderer;
-use crate::error::{Error, Result};
-use crate::frame::{Layer, Window};
-use crate::gpu::RenderOptions;
-use crate::job::{Monitor, Still, check_bloom, strips};
+use crate::engine::RenderOptions;
+use crate::job::{Still, check_bloom, strips};
+use crate::picture::Layer;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
 use crate::viewer::worker::{Export, MessageKind, Request};
 
 impl Renderer {

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::{Renderer, Speed};
-use crate::error::{Error, Result};
-use crate::job::{Engine, EngineChoice};
+use crate::engine::{Engine, EngineChoice};
+use crate::util::error::{Error, Result};
 use crate::viewer::worker::{Message, MessageKind, lock};
 
 /// More than this many lost devices a minute, and the CPU takes over.

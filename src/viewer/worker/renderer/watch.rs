@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::Renderer;
-use crate::error::{Error, Result};
-use crate::job::Monitor;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 use crate::viewer::worker::{Busy, Message, MessageKind, Shared, lock};
 
 impl Renderer {

@@ -1,0 +1,201 @@
+// §3 Raster pass: z-buffer, opaque radiance, texture coordinates and quad id.
+//
+// Pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `place` finds out where on which tile of
+// the mesh a sample is, and `opaque` shades what rock is seen, once a sample; `volume` finds the point of its quad under the pixel's own ray and maps it by the exact
+// inverse bilinear map (src/mapping.rs, QuadMap::uv), so nothing depends on how a quad is cut into
+// triangles; `peel` finds the sheets behind the nearest, in a pass each. CPU twin: src/cpu/gbuffer.rs.
+
+#import engine::opaque
+#import engine::pool
+#import layout
+#import light::environment
+#import light::haze
+#import mapping
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var<storage, read> quads: array<Quad>;
+// Of the sheets before: the last one's depth, and the numbers of all.
+@group(0) @binding(3) var known_depth: texture_depth_2d;
+@group(0) @binding(4) var known_ids: texture_2d_array<u32>;
+@group(0) @binding(5) var<uniform> environment: Environment;
+@group(0) @binding(6) var environment_map: texture_2d<f32>;
+@group(0) @binding(8) var<storage, read> positions: array<vec4<f32>>;
+@group(0) @binding(9) var<storage, read> tiles: array<MeshTile>;
+@group(0) @binding(11) var<storage, read> coats: array<Coat>;
+// Of the sample in its tile, in squares; number of the tile; depth.
+@group(0) @binding(10) var places: texture_2d<f32>;
+
+// What is shaded at a vertex. Numbers to 1 are halves of words: the normal (signed), film of water, occlusion and shadow.
+struct Coat {
+    albedo_r: f32,
+    albedo_g: f32,
+    albedo_b: f32,
+    normal_xy: u32,
+    normal_z_wet: u32,
+    occlusion_shadow: u32,
+}
+
+// Twin: src/scene/tiles.rs, Tile.
+struct MeshTile {
+    // Number of its first vertex.
+    first: u32,
+    // Vertices in a row of its grid.
+    pitch: u32,
+    // Squares on a side.
+    side: u32,
+    pad: u32,
+}
+
+// Corners of the largest tile in a row.
+const TILE_ROW: u32 = 17u;
+
+// One light stands at a constant place, which software Vulkan reads once for eight samples, and lane by lane in a loop.
+override ONE_LIGHT: bool = false;
+
+struct PlaceVarying {
+    @builtin(position) clip: vec4<f32>,
+    // In the tile, in squares.
+    @location(0) place: vec2<f32>,
+    @location(1) @interpolate(flat) tile: u32,
+}
+
+struct OpaquePoint {
+    pixel: vec2<u32>,
+    position_world: vec3<f32>,
+    normal_world: vec3<f32>,
+    albedo: vec3<f32>,
+    // Occlusion, shadow, film of water.
+    shade: vec3<f32>,
+}
+
+struct OpaqueTargets {
+    // Radiance, and metres from the eye.
+    @location(0) radiance: vec4<f32>,
+    @location(1) normal: vec4<f32>,
+}
+
+@vertex
+fn place_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> PlaceVarying {
+    let row = corner / TILE_ROW;
+    let column = corner - row * TILE_ROW;
+    let vertex = tiles[number].first + row * tiles[number].pitch + column;
+    var out: PlaceVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(positions[vertex].xyz, 1.0);
+    out.place = vec2<f32>(f32(column), f32(row));
+    out.tile = number;
+    return out;
+}
+
+@fragment
+fn place_fragment(in: PlaceVarying) -> @location(0) vec4<f32> {
+    return vec4<f32>(in.place, f32(in.tile), in.clip.z);
+}
+
+// A vertex's share of a point.
+fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
+    let coat = coats[number];
+    let normal_z = unpack2x16snorm(coat.normal_z_wet).x;
+    let wet = unpack2x16unorm(coat.normal_z_wet).y;
+    var out = in;
+    out.normal_world += vec3<f32>(unpack2x16snorm(coat.normal_xy), normal_z) * weight;
+    out.albedo += vec3<f32>(coat.albedo_r, coat.albedo_g, coat.albedo_b) * weight;
+    out.shade += vec3<f32>(unpack2x16unorm(coat.occlusion_shadow), wet) * weight;
+    return out;
+}
+
+// Opaque::at; where the ray of the pixel is at the depth that is drawn.
+fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
+    let found = textureLoad(places, pixel, 0);
+    let tile = tiles[u32(found.z)];
+    let cell = clamp(floor(found.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
+    let f = clamp(found.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
+    let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
+    let low = min(f.x, f.y);
+    let high = max(f.x, f.y);
+    let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let near = frame.clip_from_world[3].z;
+    var out: OpaquePoint;
+    out.pixel = pixel;
+    out.position_world = frame.eye_world + d * (near / (found.w * dot3(d, frame.forward)));
+    out = add_coat(out, first, 1.0 - high);
+    out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
+    return add_coat(out, first + tile.pitch + 1u, low);
+}
+
+struct VolumeVarying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) @interpolate(flat) quad: u32,
+}
+
+struct VolumeTargets {
+    // u, v, metres from the eye.
+    @location(0) surface: vec4<f32>,
+    // Number of the quad plus 1; 0 where there is none.
+    @location(1) quad_id: u32,
+}
+
+@vertex
+fn volume_vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) quad: u32) -> VolumeVarying {
+    var corner_of_vertex = array<u32, 6>(0u, 1u, 2u, 0u, 2u, 3u);
+    let corner = quads[quad].corners[corner_of_vertex[vertex]].xyz;
+    var out: VolumeVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(corner, 1.0);
+    out.quad = quad;
+    return out;
+}
+
+@fragment
+fn volume_fragment(in: VolumeVarying) -> VolumeTargets {
+    let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
+    var out: VolumeTargets;
+    out.surface = vec4<f32>(quad_hit(quads[in.quad], d), 0.0);
+    out.quad_id = in.quad + 1u;
+    return out;
+}
+
+// The next sheet of each pixel (depth peeling, Everitt 2001): of the quads that come after the last one that
+// is known, the nearest. Equal depths come in the order of the quads, and no quad comes twice.
+@fragment
+fn peel_fragment(in: VolumeVarying) -> @location(0) u32 {
+    let pixel = vec2<u32>(in.clip.xy);
+    let id = in.quad + 1u;
+    let known = textureNumLayers(known_ids);
+    let depth = textureLoad(known_depth, pixel, 0);
+    let last = textureLoad(known_ids, pixel, known - 1u, 0).x;
+    var out = in.clip.z > depth || (in.clip.z == depth && id < last);
+    for (var layer = 0u; layer < known; layer++) {
+        out |= textureLoad(known_ids, pixel, layer, 0).x == id;
+    }
+    if out {
+        discard;
+    }
+    return id;
+}
+
+// One triangle over the whole image, at infinity.
+@vertex
+fn behind_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
+    return vec4<f32>(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+// Distance and normal 0 mark that nothing is there.
+@fragment
+fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
+    let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
+    var out: OpaqueTargets;
+    out.radiance = vec4<f32>(haze_over(frame, background_radiance(d), d.y, frame.haze_far), 0.0);
+    out.normal = vec4<f32>(0.0);
+    return out;
+}
+
+// Environment::radiance.
+@fragment
+fn background_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
+    let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
+    var out: OpaqueTargets;
+    let radiance = environment_radiance(environment, environment_map, d);
+    out.radiance = vec4<f32>(haze_over(frame, radiance, d.y, frame.haze_far), 0.0);
+    out.normal = vec4<f32>(0.0);
+    return out;
+}

@@ -1,0 +1,96 @@
+// What a point of rock sends to the eye; put after gbuffer.wgsl. Twin: src/cpu/opaque.rs.
+
+#import engine::gbuffer
+#import layout
+#import light::environment
+#import light::haze
+
+fn seen_normal(in: OpaquePoint) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
+    return select(n, -n, dot3(n, to_eye) < 0.0);
+}
+
+struct Lit {
+    irradiance: vec3<f32>,
+    gloss: vec3<f32>,
+}
+
+fn lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit {
+    let light = lights[i];
+    let arrives = light_from(light, in.position_world);
+    let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
+    let cos_light = max(dot3(n, arrives.xyz), 0.0);
+    var out = sum;
+    out.irradiance += light.intensity * (arrives.w * lit * cos_light);
+    if in.shade.z > 0.0 {
+        out.gloss += light.intensity * (arrives.w * lit * cos_light * film_lobe(n, arrives.xyz, e));
+    }
+    return out;
+}
+
+// Lambert, two-sided, with the gloss of a film of water: `sky` is what the surroundings send along the mirrored
+// view.
+fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
+    let to_eye = frame.eye_world - in.position_world;
+    let distance = sqrt(dot3(to_eye, to_eye));
+    let e = to_eye / max(distance, 1e-6);
+    let open = 1.0 - in.shade.x;
+    var sum = Lit(ambient * open, vec3<f32>(0.0));
+    if ONE_LIGHT {
+        sum = lit_by(sum, in, n, e, 0u);
+    } else {
+        for (var i = 0u; i < frame.light_count; i++) {
+            sum = lit_by(sum, in, n, e, i);
+        }
+    }
+    var radiance = in.albedo * sum.irradiance;
+    if in.shade.z > 0.0 {
+        radiance += (sum.gloss + sky * (open * fresnel(dot3(n, e)))) * in.shade.z;
+    }
+    var out: OpaqueTargets;
+    let d_y = -to_eye.y / max(distance, 1e-20);
+    out.radiance = vec4<f32>(haze_over(frame, radiance, d_y, distance), distance);
+    out.normal = vec4<f32>(n, 1.0);
+    return out;
+}
+
+// π times the reflection of a film on rough rock: Blinn 1977 with the exponent 32, which (s + 8)/8π normalises.
+fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
+    let sum = l + e;
+    let h = sum / sqrt(max(dot3(sum, sum), 1e-12));
+    let c = max(dot3(n, h), 0.0);
+    let c2 = c * c;
+    let c4 = c2 * c2;
+    let c8 = c4 * c4;
+    let c16 = c8 * c8;
+    return 5.0 * fresnel(dot3(l, h)) * (c16 * c16);
+}
+
+// The view against the normal, mirrored.
+fn mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    let e = to_eye / sqrt(max(dot3(to_eye, to_eye), 1e-12));
+    return n * (2.0 * dot3(n, e)) - e;
+}
+
+// Background::radiance.
+fn background_radiance(d: vec3<f32>) -> vec3<f32> {
+    return frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
+}
+
+@fragment
+fn opaque_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
+    let in = opaque_point(vec2<u32>(clip.xy));
+    let n = seen_normal(in);
+    return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
+}
+
+// Under an environment: on rough rock its film sends back what comes from all around the mirrored view.
+@fragment
+fn opaque_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
+    let in = opaque_point(vec2<u32>(clip.xy));
+    let n = seen_normal(in);
+    let sky = environment_irradiance(environment, mirrored(in, n));
+    return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n), sky);
+}

@@ -1,0 +1,252 @@
+// The surface of a pool under a pixel; put after gbuffer.wgsl. Twin: src/cpu/pool.rs, where the reasoning stands;
+// what is made for it once a picture: src/pool.
+
+#import engine::gbuffer
+#import engine::opaque
+#import layout
+#import light::environment
+#import light::haze
+
+const WAVES: u32 = 32u;
+const AROUND_COLUMNS: u32 = 64u;
+const AROUND_ROWS: u32 = 12u;
+
+struct Wave {
+    // Unit direction, or the middle of rings: x and z.
+    toward: vec2<f32>,
+    // Waves in a metre, and turns at the origin or the middle.
+    k: f32,
+    phase: f32,
+    // The steepest slope.
+    slope: f32,
+    ring: f32,
+    // Of rings, 1/m.
+    decay: f32,
+    pad: f32,
+}
+
+struct Surface {
+    color: vec3<f32>,
+    // Of the ball that what is around lies on.
+    radius: f32,
+    bottom: vec3<f32>,
+    pad_a: f32,
+    absorption: vec3<f32>,
+    pad_b: f32,
+    middle: vec3<f32>,
+    pad_c: f32,
+    waves: array<Wave, 32>,
+    // Radiance × cover, and cover.
+    around: array<vec4<f32>, 768>,
+}
+
+@group(0) @binding(7) var<uniform> pool: Surface;
+
+// sin(2πt), to 3e-5: WGSL leaves the error of its own open.
+fn sin_turns(t: f32) -> f32 {
+    let x = t - floor(t + 0.5);
+    let x2 = x * x;
+    var sum = 3.8199526;
+    sum = sum * x2 - 15.094643;
+    sum = sum * x2 + 42.058694;
+    sum = sum * x2 - 76.70586;
+    sum = sum * x2 + 81.60525;
+    sum = sum * x2 - 41.3417;
+    sum = sum * x2 + 6.2831855;
+    return sum * x;
+}
+
+fn lattice(x: u32, y: u32) -> f32 {
+    var h = (x * 0x8da6b343u) ^ (y * 0xd8163841u);
+    h = (h ^ (h >> 13u)) * 0x9e3779b1u;
+    h = h ^ (h >> 16u);
+    return f32(h >> 8u) / 16777216.0;
+}
+
+fn value_noise(p: vec2<f32>) -> f32 {
+    let cell = floor(p);
+    let f = p - cell;
+    let s = f * f * (vec2<f32>(3.0) - f * 2.0);
+    let x = bitcast<u32>(i32(cell.x));
+    let y = bitcast<u32>(i32(cell.y));
+    let near = lattice(x, y) + (lattice(x + 1u, y) - lattice(x, y)) * s.x;
+    let far = lattice(x, y + 1u) + (lattice(x + 1u, y + 1u) - lattice(x, y + 1u)) * s.x;
+    return near + (far - near) * s.y;
+}
+
+fn on_pool(in: OpaquePoint) -> OpaquePoint {
+    let d = view_ray(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
+    let t = (pool.middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
+    var at = in;
+    if t > 0.0 && t < 1e6 {
+        at.position_world = frame.eye_world + d * t;
+    }
+    return at;
+}
+
+fn to_eye_unit(in: OpaquePoint) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    return to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);
+}
+
+// Slopes and lift of one wave; `waves`, put after this, adds up those of all.
+fn rise(wave: Wave, toward: vec2<f32>, along: f32, steepest: f32, footprint: f32) -> vec3<f32> {
+    let wide = 3.0 * wave.k * footprint;
+    let blur = 1.0 + wide * wide;
+    let steep = steepest / (blur * blur);
+    let t = wave.k * along + wave.phase;
+    return vec3<f32>(toward * (steep * sin_turns(t + 0.25)), steep * sin_turns(t));
+}
+
+fn straight_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
+    return rise(wave, wave.toward, dot2(wave.toward, p), wave.slope * churn, footprint);
+}
+
+fn ring_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
+    let away = p - wave.toward;
+    let along = max(sqrt(dot2(away, away)), 1e-3);
+    let fall = 1.0 + along * wave.decay;
+    return rise(wave, away / along, along, wave.slope * churn / (fall * fall), footprint);
+}
+
+fn pool_normal(in: OpaquePoint) -> vec3<f32> {
+    let to_eye = frame.eye_world - in.position_world;
+    let e = to_eye_unit(in);
+    let pixel = 2.0 * sqrt(dot3(frame.up, frame.up)) / frame.image_height;
+    let footprint = sqrt(dot3(to_eye, to_eye)) * pixel / max(e.y, 0.05);
+    let p = in.position_world.xz;
+    let churn = 1.0 + 1.5 * in.albedo.y;
+    let sum = waves(p, churn, footprint);
+    let n = vec3<f32>(-sum.x, max(1.0 - sum.z, 0.3), -sum.y);
+    return n / sqrt(dot3(n, n));
+}
+
+fn pool_mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
+    let e = to_eye_unit(in);
+    let r = n * (2.0 * dot3(n, e)) - e;
+    let up = vec3<f32>(r.x, max(abs(r.y), 0.01), r.z);
+    return up / sqrt(dot3(up, up));
+}
+
+fn turn(d: vec3<f32>) -> f32 {
+    let p = d.x / max(abs(d.x) + abs(d.z), 1e-20);
+    return select(0.25 * (3.0 + p), 0.25 * (1.0 - p), d.z >= 0.0);
+}
+
+fn around(position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
+    let o = position - pool.middle;
+    let b = dot3(o, r);
+    let radius = pool.radius;
+    let c = dot3(o, o) - radius * radius;
+    let far = o + r * max(sqrt(max(b * b - c, 0.0)) - b, 0.0);
+    let d = far / sqrt(max(dot3(far, far), 1e-12));
+    let s = turn(d) * f32(AROUND_COLUMNS) - 0.5;
+    let t = clamp(d.y * f32(AROUND_ROWS) - 0.5, 0.0, f32(AROUND_ROWS) - 1.0);
+    let f = s - floor(s);
+    let g = t - floor(t);
+    let x0 = u32(floor(s) + f32(AROUND_COLUMNS)) % AROUND_COLUMNS;
+    let x1 = (x0 + 1u) % AROUND_COLUMNS;
+    let y0 = u32(floor(t)) * AROUND_COLUMNS;
+    let y1 = min(u32(floor(t)) + 1u, AROUND_ROWS - 1u) * AROUND_COLUMNS;
+    let low = pool.around[y0 + x0] * (1.0 - f) + pool.around[y0 + x1] * f;
+    let high = pool.around[y1 + x0] * (1.0 - f) + pool.around[y1 + x1] * f;
+    return low * (1.0 - g) + high * g;
+}
+
+fn pool_lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit {
+    let light = lights[i];
+    let arrives = light_from(light, in.position_world);
+    let lit = select(1.0, 1.0 - in.shade.y, i == frame.shadow_light);
+    let both = arrives.xyz + e;
+    let h = both / sqrt(max(dot3(both, both), 1e-12));
+    let c = max(dot3(n, h), 0.0);
+    let c2 = c * c;
+    let c4 = c2 * c2;
+    let c8 = c4 * c4;
+    let c16 = c8 * c8;
+    let c32 = c16 * c16;
+    let c64 = c32 * c32;
+    let c128 = c64 * c64;
+    let lobe = 33.0 * fresnel(dot3(arrives.xyz, h)) * (c128 * c128) * max(dot3(n, arrives.xyz), 0.0);
+    var out = sum;
+    out.irradiance += light.intensity * (arrives.w * lit * max(arrives.y, 0.0));
+    out.gloss += light.intensity * (arrives.w * lit * lobe);
+    return out;
+}
+
+fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
+    let to_eye = frame.eye_world - in.position_world;
+    let e = to_eye_unit(in);
+    var sum = Lit(ambient * (1.0 - in.shade.x), vec3<f32>(0.0));
+    if ONE_LIGHT {
+        sum = pool_lit_by(sum, in, n, e, 0u);
+    } else {
+        for (var i = 0u; i < frame.light_count; i++) {
+            sum = pool_lit_by(sum, in, n, e, i);
+        }
+    }
+    let mirrors = around(in.position_world, pool_mirrored(in, n));
+    let mirror = mirrors.rgb + sky * (1.0 - mirrors.a);
+    let through = exp2(pool.absorption * (-3.174 * in.albedo.x));
+    let body = pool.color * (1.0 - through) + pool.bottom * through;
+    let back = fresnel(max(dot3(n, e), 0.02));
+    let clear = mirror * back + sum.gloss + body * sum.irradiance * (1.0 - back);
+
+    let p = in.position_world.xz + vec2<f32>(n.x, n.z) * 0.3;
+    let noise = 0.45 * value_noise(p * 2.3) + 0.27 * value_noise(p * 5.1) + 0.17 * value_noise(p * 11.0)
+        + 0.11 * value_noise(p * 23.0);
+    let cover = clamp((1.6 * in.albedo.y + noise - 1.05) * 2.2, 0.0, 1.0);
+    var out: OpaqueTargets;
+    let foam = sum.irradiance * ((0.25 + 0.5 * noise) * cover);
+    let distance = sqrt(dot3(to_eye, to_eye));
+    let d_y = -to_eye.y / max(distance, 1e-20);
+    out.radiance = vec4<f32>(haze_over(frame, clear * (1.0 - cover) + foam, d_y, distance), distance);
+    out.normal = vec4<f32>(n, 1.0);
+    return out;
+}
+
+// In full vectors, for software Vulkan mixes those.
+struct PoolVarying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position_world_occlusion: vec4<f32>,
+    @location(1) shadow_depth_foam: vec4<f32>,
+}
+
+@vertex
+fn pool_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> PoolVarying {
+    let row = corner / TILE_ROW;
+    let column = corner - row * TILE_ROW;
+    let vertex = tiles[number].first + row * tiles[number].pitch + column;
+    let coat = coats[vertex];
+    let shade = unpack2x16unorm(coat.occlusion_shadow);
+    let position = positions[vertex].xyz;
+    var out: PoolVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(position, 1.0);
+    out.position_world_occlusion = vec4<f32>(position, shade.x);
+    out.shadow_depth_foam = vec4<f32>(shade.y, coat.albedo_r, coat.albedo_g, 0.0);
+    return out;
+}
+
+fn pool_point(in: PoolVarying) -> OpaquePoint {
+    var out: OpaquePoint;
+    out.pixel = vec2<u32>(in.clip.xy);
+    out.position_world = in.position_world_occlusion.xyz;
+    out.albedo = vec3<f32>(in.shadow_depth_foam.yz, 0.0);
+    out.shade = vec3<f32>(in.position_world_occlusion.w, in.shadow_depth_foam.x, 0.0);
+    return out;
+}
+
+@fragment
+fn pool_fragment(in: PoolVarying) -> OpaqueTargets {
+    let at = on_pool(pool_point(in));
+    let n = pool_normal(at);
+    return shade_pool(at, n, frame.ambient, background_radiance(pool_mirrored(at, n)));
+}
+
+@fragment
+fn pool_environment_fragment(in: PoolVarying) -> OpaqueTargets {
+    let at = on_pool(pool_point(in));
+    let n = pool_normal(at);
+    let ambient = frame.ambient + environment_irradiance(environment, vec3<f32>(0.0, 1.0, 0.0));
+    return shade_pool(at, n, ambient, environment_irradiance(environment, pool_mirrored(at, n)));
+}

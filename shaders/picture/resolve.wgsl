@@ -1,0 +1,88 @@
+// The picture from the linear frame: mean of the samples, white balance, exposure, tone curve, encoding, 8 bits.
+// CPU twin: src/cpu/resolve.rs.
+
+#import layout
+
+struct Develop {
+    // Rows of the white balance, where there is any.
+    balance: array<vec4<f32>, 3>,
+    exposure: f32,
+    tone: u32,
+    balanced: u32,
+    pad_a: u32,
+}
+
+const TONE_FILMIC: u32 = 1u;
+const TONE_AGX: u32 = 2u;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> radiance: array<vec4<f32>>;
+// One pixel a word: red in the lowest byte, alpha 255 in the highest.
+@group(0) @binding(2) var<storage, read_write> picture: array<u32>;
+@group(0) @binding(3) var<uniform> tile: Tile;
+@group(0) @binding(4) var<uniform> develop: Develop;
+
+// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
+fn filmic(x: f32) -> f32 {
+    return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+}
+
+// IEC 61966-2-1.
+fn srgb(x: f32) -> f32 {
+    return select(1.055 * pow(x, 1.0 / 2.4) - 0.055, 12.92 * x, x <= 0.0031308);
+}
+
+// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023.
+fn agx(x: vec3<f32>) -> vec3<f32> {
+    let least_ev = -12.47393;
+    let most_ev = 4.026069;
+    let drawn_in = vec3<f32>(
+        0.842479 * x.r + 0.0784336 * x.g + 0.079223745 * x.b,
+        0.04232824 * x.r + 0.8784686 * x.g + 0.07916613 * x.b,
+        0.042375655 * x.r + 0.0784336 * x.g + 0.879143 * x.b,
+    );
+    let ev = clamp(log2(max(drawn_in, vec3<f32>(1e-10))), vec3<f32>(least_ev), vec3<f32>(most_ev));
+    let s = (ev - least_ev) / (most_ev - least_ev);
+    let v = (((((15.5 * s - 40.14) * s + 31.96) * s - 6.868) * s + 0.4298) * s + 0.1191) * s - 0.00232;
+    return vec3<f32>(
+        1.196879 * v.r - 0.09802088 * v.g - 0.09902974 * v.b,
+        -0.05289685 * v.r + 1.1519031 * v.g - 0.09896118 * v.b,
+        -0.052971635 * v.r - 0.09804345 * v.g + 1.1510737 * v.b,
+    );
+}
+
+fn channel(exposed: f32) -> u32 {
+    var x = exposed;
+    if develop.tone == TONE_FILMIC {
+        x = filmic(x);
+    }
+    return byte(srgb(clamp(x, 0.0, 1.0)));
+}
+
+fn byte(encoded: f32) -> u32 {
+    return u32(clamp(encoded, 0.0, 1.0) * 255.0 + 0.5);
+}
+
+@compute @workgroup_size(WORKGROUP, WORKGROUP)
+fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= tile.width || id.y >= tile.height {
+        return;
+    }
+    let index = (tile.y + id.y) * frame.window_width + tile.x + id.x;
+    var linear = radiance[index].rgb / f32(frame.samples);
+    if develop.balanced != 0u {
+        linear = vec3<f32>(
+            dot3(develop.balance[0].xyz, linear),
+            dot3(develop.balance[1].xyz, linear),
+            dot3(develop.balance[2].xyz, linear),
+        );
+    }
+    // Past 10⁴ all curves are flat; the bound keeps their squares finite.
+    let x = clamp(linear * develop.exposure, vec3<f32>(0.0), vec3<f32>(1e4));
+    var bytes = vec3<u32>(channel(x.r), channel(x.g), channel(x.b));
+    if develop.tone == TONE_AGX {
+        let v = agx(x);
+        bytes = vec3<u32>(byte(v.r), byte(v.g), byte(v.b));
+    }
+    picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | 0xff000000u;
+}

@@ -1,0 +1,148 @@
+// What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; many directions and the light
+// they send on. Part of the stage integrate. Twins: src/cpu/lookup.rs and src/shading.rs, Spread.
+
+#import layout
+#import light::fibre
+#import trace::levels
+#import trace::matter
+#import volume::cells
+
+// Interpolates between cells.
+override TRILINEAR: bool = false;
+// Cells have more than one direction.
+override MANY_DIRECTIONS: bool = PYRAMID || TRILINEAR;
+
+// Second moments of directions: xx, yy, zz and xy, xz, yz.
+struct Moments {
+    diagonal: vec3<f32>,
+    mixed: vec3<f32>,
+}
+
+// What a ray finds: in codes, ρ of what the sheet leaves.
+struct Found {
+    rho: f32,
+    k_d: f32,
+    k_s: f32,
+    moments: Moments,
+}
+
+fn moments_times(m: Moments, v: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(
+        m.diagonal.x * v.x + m.mixed.x * v.y + m.mixed.y * v.z,
+        m.mixed.x * v.x + m.diagonal.y * v.y + m.mixed.z * v.z,
+        m.mixed.y * v.x + m.mixed.z * v.y + m.diagonal.z * v.z,
+    );
+}
+
+fn moments_of_one(v: vec3<f32>) -> Moments {
+    return Moments(v * v, v.xxy * v.yzz);
+}
+
+fn moments_of(word: u32, level: Level) -> Moments {
+    let one = moments_of_one(v_code(word));
+    if !PYRAMID {
+        return one;
+    }
+    let x = f32(word & 127u) * (1.0 / 127.0);
+    let z = f32((word >> 7u) & 127u) * (1.0 / 127.0);
+    let yy = max(1.0 - x * x - z * z, 0.0);
+    let y = sqrt(yy);
+    let bits = vec3<u32>(word << 12u, word << 6u, word);
+    let r = vec3<f32>(bitcast<vec3<i32>>(bits) >> vec3<u32>(26u)) * (1.0 / 31.0);
+    let whole = level.number == 0u;
+    return Moments(
+        select(vec3<f32>(x * x, yy, z * z), one.diagonal, whole),
+        select(r * vec3<f32>(x * y, x * z, y * z), one.mixed, whole),
+    );
+}
+
+// Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the level's cells.
+fn between(
+    level: Level,
+    matter: Matter,
+    cell: vec3<i32>,
+    middle: vec3<f32>,
+) -> Found {
+    let inside = middle - floor(middle) - 0.5;
+    let side = select(vec3<i32>(1), vec3<i32>(-1), inside < vec3<f32>(0.0));
+    let far = abs(inside);
+    var rho = 0.0;
+    var k = vec2<f32>(0.0);
+    var moments = Moments(vec3<f32>(0.0), vec3<f32>(0.0));
+    for (var corner = 0; corner < 8; corner++) {
+        let away = vec3<i32>(corner & 1, (corner >> 1u) & 1, corner >> 2u);
+        let shares = select(far, 1.0 - far, away == vec3<i32>(0));
+        var at = cell + side * away;
+        at = select(at, level.size - 1, at < vec3<i32>(0));
+        at = select(at, vec3<i32>(0), at >= level.size);
+        at.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
+        let texel = cell_words(in_level(at, level));
+        let weight = shares.x * shares.y * shares.z * f32(texel.x & 0xffffu);
+        rho += weight;
+        k += vec2<f32>(f32((texel.x >> 16u) & 0xffu), f32(texel.x >> 24u)) * weight;
+        // The length of a direction's code is no weight of it.
+        let own = moments_of(texel.y, level);
+        let share = weight / max(own.diagonal.x + own.diagonal.y + own.diagonal.z, 1e-20);
+        moments.diagonal += own.diagonal * share;
+        moments.mixed += own.mixed * share;
+    }
+    let inverse = 1.0 / max(rho, 1e-20);
+    k *= inverse;
+    moments.diagonal *= inverse;
+    moments.mixed *= inverse;
+    return Found(matter_rho(rho, matter), k.x, k.y, moments);
+}
+
+// Moments as seen by a ray.
+struct Spread {
+    moments: Moments,
+    // S·e / tr(M·S).
+    s_e: vec3<f32>,
+    inverse_q: f32,
+    // Mean of (t·e)².
+    cos2_e: f32,
+    variance: f32,
+}
+
+// `metric` = (M₀₀, 2M₀₁, M₁₁, M₂₂).
+fn spread_new(metric: vec4<f32>, moments: Moments, e_v: vec3<f32>) -> Spread {
+    let s = moments.diagonal;
+    let m = moments.mixed;
+    let b = 0.5 * metric.y;
+    // P = M·S.
+    let p0 = vec3<f32>(metric.x * s.x + b * m.x, metric.x * m.x + b * s.y, metric.x * m.y + b * m.z);
+    let p1 = vec3<f32>(b * s.x + metric.z * m.x, b * m.x + metric.z * s.y, b * m.y + metric.z * m.z);
+    let p2 = vec3<f32>(metric.w * m.y, metric.w * m.z, metric.w * s.z);
+    let inverse_q = 1.0 / max(p0.x + p1.y + p2.z, 1e-30);
+    let crossed = p0.y * p1.x + p0.z * p2.x + p1.z * p2.y;
+    let squares = p0.x * p0.x + p1.y * p1.y + p2.z * p2.z + 2.0 * crossed;
+    let s_e = moments_times(moments, e_v) * inverse_q;
+    let variance = max(0.5 - 0.5 * squares * inverse_q * inverse_q, 0.0);
+    return Spread(moments, s_e, inverse_q, dot3(s_e, e_v), variance);
+}
+
+// Mean of (t·l)², and of (t·l)(t·e).
+fn spread_cosines(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
+    let cos2_l = dot3(moments_times(spread.moments, l_v), l_v) * spread.inverse_q;
+    return vec2<f32>(cos2_l, dot3(spread.s_e, l_v));
+}
+
+// t·l and t·e of the one direction that would have these means, but for the sign of both.
+fn spread_of_one(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
+    let cosines = spread_cosines(spread, l_v);
+    let e = sqrt(clamp(spread.cos2_e, 0.0, 1.0));
+    return vec2<f32>(sqrt(clamp(cosines.x, 0.0, 1.0)), select(e, -e, cosines.y < 0.0));
+}
+
+// Ψ of many directions.
+fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>, l_dot_e: f32) -> f32 {
+    let cosines = spread_cosines(spread, l_v);
+    let sin2_l = max(1.0 - cosines.x, 0.0);
+    let sin2_e = max(1.0 - spread.cos2_e, 0.0);
+    let root = sqrt(sin2_l * sin2_e);
+    let cos_phi = clamp((l_dot_e - cosines.y) / max(root, 1e-6), -1.0, 1.0);
+    let variance = spread.variance * (1.0 + cos_phi);
+    let base = clamp(root - cosines.y + 0.5 * variance, 0.0, 1.0);
+    let wide = 1.0 + p * variance;
+    return k_d * sqrt(sin2_l) + k_s * pow(base, p / wide) / sqrt(wide);
+}

@@ -1,0 +1,117 @@
+//! The whole frame on the CPU, on all cores: the reference of the GPU engine, and the engine where
+//! there is no GPU.
+
+pub mod gbuffer;
+pub mod integrate;
+pub mod opaque;
+pub mod pool;
+pub mod ray;
+pub mod visibility;
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+pub use visibility::KeptVolumes;
+
+use crate::picture::resolve::develop;
+use crate::picture::{Frame, Seconds};
+use crate::place::Mesh;
+use crate::scene::Scene;
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
+use crate::volume::VolumeTexture;
+
+/// Renders a scene. With `surface` the raster pass's layers are kept.
+pub fn render(
+    scene: &Scene,
+    volume: &VolumeTexture,
+    mesh: &Mesh,
+    surface: bool,
+    monitor: &dyn Monitor,
+) -> Result<Frame> {
+    let window = Window::whole([scene.image.width, scene.image.height]);
+    let kept = &mut KeptVolumes::default();
+    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
+}
+
+/// Pixels rendered at once: 28 bytes each and 16 for every layer of quads, besides the frame.
+const BAND_PIXELS: u64 = 1 << 21;
+
+/// Renders a part of the image with only some of a scene's samples; the radiance is their mean. The pixels
+/// have the same bits whatever the part is. Light volumes are left in `kept` for later frames.
+#[expect(clippy::too_many_arguments, reason = "what is drawn, which part of it, and what watches")]
+pub fn render_samples(
+    scene: &Scene,
+    volume: &VolumeTexture,
+    mesh: &Mesh,
+    window: Window,
+    samples: Range<u32>,
+    surface: bool,
+    kept: &mut KeptVolumes,
+    monitor: &dyn Monitor,
+) -> Result<Frame> {
+    let image = &scene.image;
+    let width = window.width as usize;
+    let mut frame = Frame::new(window.width, window.height, surface);
+    let mut seconds = Seconds::default();
+    let clock = Instant::now();
+    let integrator = integrate::Integrator::prepared(scene, volume, kept, monitor)?;
+    seconds.visibility = clock.elapsed().as_secs_f64();
+    let total = window.pixels() * samples.len() as u64;
+    let done = AtomicU64::new(0);
+    let rows = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);
+    for y in (0..window.height).step_by(rows as usize) {
+        let band = Window { y: window.y + y, height: rows.min(window.height - y), ..window };
+        let first = y as usize * width;
+        let pixels = first..first + band.pixels() as usize;
+        for sample in samples.clone() {
+            let clock = Instant::now();
+            let gbuffer = gbuffer::run_window(scene, mesh, band, sample);
+            seconds.gbuffer += clock.elapsed().as_secs_f64();
+            if sample == samples.start
+                && let Some(surface) = &mut frame.surface
+            {
+                for i in 0..gbuffer.opaque.len() {
+                    let nearest = i * gbuffer.layers;
+                    let [u, v, t] = gbuffer.surface[nearest];
+                    let behind = (gbuffer.opaque[i][3], gbuffer.normal[i]);
+                    surface.set(
+                        first + i,
+                        (&scene.quads, scene.camera.eye),
+                        gbuffer.quad_id[nearest],
+                        [u, v, t, 0.0],
+                        behind,
+                    );
+                }
+            }
+            let clock = Instant::now();
+            frame.radiance[pixels.clone()]
+                .par_chunks_mut(width)
+                .zip(frame.counts[pixels.clone()].par_chunks_mut(width))
+                .zip(band.y..band.bottom())
+                .try_for_each(|((radiance, counts), y)| {
+                    for x in 0..width {
+                        let pixel = [band.x + x as u32, y];
+                        let traced = integrator.pixel(&gbuffer, pixel, sample, &mut ());
+                        let new = traced.radiance.extend(traced.transmittance).to_array();
+                        radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
+                        counts[x] = [0, 1].map(|c| counts[x][c] + traced.cells[c]);
+                    }
+                    let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
+                    monitor.progress("pixels", pixels, total)
+                })?;
+            seconds.integrate += clock.elapsed().as_secs_f64();
+        }
+    }
+    let clock = Instant::now();
+    let inverse = 1.0 / samples.len() as f32;
+    frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));
+    develop(&mut frame, &image.look, window == Window::whole([image.width, image.height]));
+    seconds.resolve = clock.elapsed().as_secs_f64();
+    frame.seconds = seconds;
+    Ok(frame)
+}

@@ -1,0 +1,209 @@
+//! The device: one per process, its faults, and waiting for it.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use crate::util::error::{Error, Result};
+
+/// How to open a device.
+#[derive(Clone, Debug)]
+pub struct DeviceOptions {
+    /// Part of the adapter's name; none takes the fastest.
+    pub adapter: Option<String>,
+    /// Longest wait for one submission.
+    pub watchdog: Duration,
+}
+
+impl Default for DeviceOptions {
+    fn default() -> Self {
+        DeviceOptions { adapter: None, watchdog: Duration::from_secs(60) }
+    }
+}
+
+/// An open device.
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// What the adapter says of itself.
+    pub info: wgpu::AdapterInfo,
+    /// Whether passes can be timed on the device.
+    pub timestamps: bool,
+    watchdog: Duration,
+    fault: Arc<Mutex<Option<Fault>>>,
+}
+
+#[derive(Clone, Debug)]
+enum Fault {
+    Lost(String),
+    OutOfMemory(String),
+    /// Validation or internal: this program's mistake.
+    Bug(String),
+}
+
+fn is_software(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu
+}
+
+fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::PRIMARY;
+    wgpu::Instance::new(descriptor)
+}
+
+/// All adapters of this machine.
+pub fn adapters() -> Vec<wgpu::Adapter> {
+    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY))
+}
+
+impl Gpu {
+    /// Opens the fastest adapter, or the first whose name contains `options.adapter`.
+    pub fn open(options: &DeviceOptions) -> Result<Gpu> {
+        let adapter = match &options.adapter {
+            Some(name) => {
+                let wanted = name.to_lowercase();
+                adapters()
+                    .into_iter()
+                    .find(|a| a.get_info().name.to_lowercase().contains(&wanted))
+                    .ok_or_else(|| Error::NoAdapter(format!("no adapter's name contains {name:?}")))?
+            }
+            None => pollster::block_on(instance().request_adapter(&wgpu::RequestAdapterOptions {
+                power_preference: wgpu::PowerPreference::HighPerformance,
+                ..Default::default()
+            }))
+            .map_err(|_| Error::NoAdapter("no GPU adapter was found".into()))?,
+        };
+        let info = adapter.get_info();
+        let has = adapter.limits();
+        let required_limits = wgpu::Limits {
+            max_texture_dimension_2d: has.max_texture_dimension_2d,
+            max_texture_dimension_3d: has.max_texture_dimension_3d,
+            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+            max_buffer_size: has.max_buffer_size,
+            // Quads, lights, light places, radiance and counts; WebGPU grants 8 everywhere.
+            max_storage_buffers_per_shader_stage: has.max_storage_buffers_per_shader_stage.min(8),
+            ..wgpu::Limits::downlevel_defaults()
+        };
+        // Software Vulkan writes the first time stamp of a compute pass when it gets round to it: after a
+        // submission that drew nothing lavapipe tells 0.03 ms of 40. The host's clock is right to 0.4 ms there.
+        let software = is_software(&info);
+        let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) && !software;
+        let required_features =
+            if timestamps { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() };
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("taki"),
+            required_features,
+            required_limits,
+            ..Default::default()
+        }))
+        .map_err(|e| {
+            Error::NoAdapter(format!("{} cannot do the work: {}", info.name, one_line(&e.to_string())))
+        })?;
+
+        let fault: Arc<Mutex<Option<Fault>>> = Arc::default();
+        let note = |fault: &Arc<Mutex<Option<Fault>>>, new: Fault| {
+            let mut slot = fault.lock().unwrap_or_else(|e| e.into_inner());
+            // A lost device explains every later error.
+            if slot.is_none() || matches!(new, Fault::Lost(_)) {
+                *slot = Some(new);
+            }
+        };
+        let on_error = fault.clone();
+        device.on_uncaptured_error(Arc::new(move |error| {
+            let new = match error {
+                wgpu::Error::OutOfMemory { .. } => Fault::OutOfMemory(one_line(&error.to_string())),
+                other => Fault::Bug(one_line(&other.to_string())),
+            };
+            note(&on_error, new);
+        }));
+        let on_lost = fault.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            note(&on_lost, Fault::Lost(one_line(&format!("{reason:?} {message}"))));
+        });
+        Ok(Gpu { device, queue, info, timestamps, watchdog: options.watchdog, fault })
+    }
+
+    /// Name and kind of the adapter for people.
+    pub fn name(&self) -> String {
+        format!("{} ({:?}, {:?})", self.info.name, self.info.device_type, self.info.backend)
+    }
+
+    /// Whether the device is the host's processor.
+    pub fn is_software(&self) -> bool {
+        is_software(&self.info)
+    }
+
+    /// The first fault the device reported, if any.
+    pub fn check(&self) -> Result<()> {
+        let fault = || self.fault.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        if matches!(fault(), Some(Fault::Bug(_))) {
+            // A lost device refuses commands before it tells of its loss.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
+        match fault() {
+            None => Ok(()),
+            Some(Fault::Lost(why)) => Err(Error::DeviceLost(why)),
+            Some(Fault::OutOfMemory(why)) => Err(Error::Memory {
+                what: format!("the device ({why})"),
+                need: "more memory than it has".into(),
+                budget: "exhausted".into(),
+                fix: "lower the volume's or the image's size, or use --engine cpu".into(),
+            }),
+            Some(Fault::Bug(why)) => panic!("the GPU refused a command: {why}"),
+        }
+    }
+
+    /// Submits and waits, no longer than the watchdog allows.
+    pub fn run(&self, encoder: wgpu::CommandEncoder) -> Result<()> {
+        let index = self.queue.submit([encoder.finish()]);
+        self.wait(index)
+    }
+
+    /// Waits for a submission and what came before it.
+    pub fn wait(&self, index: wgpu::SubmissionIndex) -> Result<()> {
+        let waited = self
+            .device
+            .poll(wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.watchdog) });
+        self.check()?;
+        match waited {
+            Ok(_) => Ok(()),
+            Err(wgpu::PollError::Timeout) => {
+                // Dropping a queue waits until it is idle, which after a hang may be never: a handle that
+                // is never dropped keeps the device until the process ends.
+                std::mem::forget((self.device.clone(), self.queue.clone()));
+                Err(Error::Watchdog { seconds: self.watchdog.as_secs_f64() })
+            }
+            Err(e) => Err(Error::DeviceLost(e.to_string())),
+        }
+    }
+
+    /// A command encoder.
+    pub fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// A buffer of `size` bytes.
+    pub fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A buffer with contents; at least 16 bytes, for empty bindings are not allowed.
+    pub fn buffer_with(&self, label: &str, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let size = (bytes.len() as u64).next_multiple_of(4).max(16);
+        let buffer = self.buffer(label, size, usage | wgpu::BufferUsages::COPY_DST);
+        if !bytes.is_empty() {
+            self.queue.write_buffer(&buffer, 0, bytes);
+        }
+        buffer
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,326 @@
+//! §4 and §5: the compute pass that walks the volume under each pixel.
+
+use super::device::Gpu;
+use super::layout::{Groups, WORKGROUP};
+use super::shader::resolve;
+use super::specialise::Source;
+use super::{Inputs, compute_pipeline};
+use crate::light::fibre::whole_exponent;
+use crate::light::visibility::{Form, LightVolumes};
+use crate::light::{Reflection, Scattering, Visibility};
+use crate::scene::Scene;
+use crate::trace::{Attenuation, Lookup, Prefilter};
+use crate::util::error::Result;
+
+/// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
+/// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
+const TILE_SECONDS: f64 = 0.03;
+/// Pixels of the first tile, when nothing is known about the scene's cost; with many lights fewer. With every
+/// pixel at the cap of 512 cells and a full walk to one light from each, software Vulkan takes about a second for it.
+const FIRST_TILE_PIXELS: f64 = 1024.0;
+/// A tile grows at most this much over the one before.
+const TILE_GROWTH: f64 = 4.0;
+
+/// Pixels of a workgroup.
+const GROUP_PIXELS: u64 = WORKGROUP as u64 * WORKGROUP as u64;
+/// Workgroups along one dimension of a dispatch.
+const MOST_GROUPS: u32 = 65535;
+
+/// The stage's shader, for pixels under which there may be `many` sheets or one.
+pub fn source(many: bool) -> String {
+    resolve(if many { "#import engine::sheets_many" } else { "#import engine::sheets_one" })
+}
+
+/// What the pipeline is specialised to (`override` constants of the shader).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// None, one, or (2) several.
+    lights: u32,
+    per_cell: bool,
+    march: bool,
+    cached: bool,
+    codes: bool,
+    cornered: bool,
+    strand: bool,
+    multiple: bool,
+    eroded: bool,
+    pyramid: bool,
+    trilinear: bool,
+    leaps: bool,
+    sparse: bool,
+    many: bool,
+    exponent: u32,
+}
+
+impl Variant {
+    /// For a scene of which at most `layers` sheets lie under a pixel, the light volumes it has if its
+    /// visibility is cached, whether the levels are made for leaps, and whether cells are stored in bricks.
+    pub fn of(
+        scene: &Scene,
+        layers: u32,
+        light_volumes: Option<&LightVolumes>,
+        [leaps, sparse]: [bool; 2],
+    ) -> Self {
+        Variant {
+            lights: scene.volume_lights().len().min(2) as u32,
+            per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
+            march: scene.visibility == Visibility::March,
+            cached: light_volumes.is_some(),
+            codes: light_volumes.is_some_and(|volumes| volumes.form == Form::Codes),
+            cornered: light_volumes.is_some_and(LightVolumes::cornered),
+            strand: matches!(scene.reflection, Reflection::Strand(_)),
+            multiple: scene.scattering == Scattering::Multiple,
+            eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
+            pyramid: scene.trace.filter == Prefilter::Pyramid,
+            trilinear: scene.trace.lookup == Lookup::Trilinear,
+            leaps,
+            sparse,
+            many: layers > 1,
+            exponent: whole_exponent(scene.p).unwrap_or(0),
+        }
+    }
+}
+
+/// What stands for both numbers of cells where the device ended a walk; `CUT` of the shader.
+pub const CUT: u32 = u32::MAX;
+
+/// Sums over samples, per pixel of a window.
+pub struct Sums {
+    /// Radiance rgb and transmittance, `vec4<f32>`.
+    pub radiance: wgpu::Buffer,
+    /// Cells of view rays and of light rays, `vec2<u32>`.
+    pub counts: wgpu::Buffer,
+}
+
+impl Sums {
+    /// Sums for `pixels` pixels.
+    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        Sums {
+            radiance: gpu.buffer("radiance", pixels * 16, usage),
+            counts: gpu.buffer("counts", pixels * 8, usage),
+        }
+    }
+}
+
+/// The pass: one specialised pipeline.
+pub struct Integrate {
+    pipeline: wgpu::ComputePipeline,
+    /// For workgroups without water.
+    dry: Option<wgpu::ComputePipeline>,
+    group_layout: wgpu::BindGroupLayout,
+    /// What it is specialised to.
+    pub variant: Variant,
+}
+
+/// Chooses tile sizes from the time the last one took. The picture does not depend on them.
+pub struct Tiler {
+    pixels: f64,
+    fixed: bool,
+    /// Of the sizes that were found right.
+    smallest: f64,
+}
+
+impl Tiler {
+    /// Learns the size; with `fixed` every tile has about that many pixels. `known` is what the last frame of
+    /// the like has learned; `lights` is their number.
+    pub fn new(fixed: Option<u32>, known: Option<f64>, lights: usize) -> Self {
+        let first = (FIRST_TILE_PIXELS / lights.max(1) as f64).max(64.0);
+        let pixels = fixed.map(f64::from).or(known).unwrap_or(first);
+        Tiler { pixels, fixed: fixed.is_some(), smallest: f64::INFINITY }
+    }
+
+    /// The size that suited the dearest part of the frame; none if no tile was timed.
+    pub fn learned(&self) -> Option<f64> {
+        self.smallest.is_finite().then_some(self.smallest)
+    }
+
+    /// How many of `left` workgroups the next submission takes.
+    fn next(&self, left: u32) -> u32 {
+        let count = (self.pixels.max(1.0) as u64).div_ceil(GROUP_PIXELS).clamp(1, MOST_GROUPS.into()) as u32;
+        // Submissions alike, not large ones and a rest: every one waits for its last workgroup.
+        left.div_ceil(left.div_ceil(count))
+    }
+
+    fn learn(&mut self, groups: u32, seconds: f64) {
+        if !self.fixed {
+            let pixels = f64::from(groups) * GROUP_PIXELS as f64;
+            let wanted = pixels * TILE_SECONDS / seconds.max(1e-6);
+            self.pixels = wanted.clamp(64.0, pixels.max(self.pixels) * TILE_GROWTH);
+            self.smallest = self.smallest.min(self.pixels);
+        }
+    }
+}
+
+impl Integrate {
+    /// Compiles the pipeline for one variant.
+    pub fn new(gpu: &Gpu, variant: Variant) -> Self {
+        let number = |on: bool| f64::from(u8::from(on));
+        let constants = [
+            ("LIGHTS", variant.lights as f64),
+            ("PER_CELL", number(variant.per_cell)),
+            ("MARCH", number(variant.march)),
+            ("CACHED", number(variant.cached)),
+            ("CODES", number(variant.codes)),
+            ("CORNERED", number(variant.cornered)),
+            ("STRAND", number(variant.strand)),
+            ("MULTIPLE", number(variant.multiple)),
+            ("ERODED", number(variant.eroded)),
+            ("PYRAMID", number(variant.pyramid)),
+            ("TRILINEAR", number(variant.trilinear)),
+            ("LEAPS", number(variant.leaps)),
+            ("SPARSE", number(variant.sparse)),
+            ("EXPONENT", variant.exponent as f64),
+        ];
+        Self::compile(gpu, variant, &source(variant.many), &constants, true)
+    }
+
+    /// The bench's bare walk: the same bindings, no light.
+    pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
+        let number = |on: bool| f64::from(u8::from(on));
+        let constants = [("LEAPS", number(variant.leaps)), ("SPARSE", number(variant.sparse))];
+        Self::compile(gpu, variant, &resolve("#import engine::bare"), &constants, false)
+    }
+
+    fn compile(gpu: &Gpu, variant: Variant, source: &str, constants: &[(&str, f64)], dry: bool) -> Self {
+        let source = Source::read("integrate", source);
+        let group_layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("integrate"),
+            entries: &bindings(),
+        });
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("integrate"),
+            bind_group_layouts: &[Some(&group_layout)],
+            immediate_size: 0,
+        });
+        let pipeline = |entry_point| compute_pipeline(gpu, Some(&layout), &source, entry_point, constants);
+        let dry = dry.then(|| pipeline("dry"));
+        Integrate { pipeline: pipeline("integrate"), dry, group_layout, variant }
+    }
+
+    /// Adds one sample of a window's area to `sums`, some workgroups at a time; seconds on the device. `between` is called
+    /// after each submission with the pixels done so far, and may stop the work.
+    pub fn run(
+        &self,
+        inputs: &Inputs,
+        sums: &Sums,
+        tiler: &mut Tiler,
+        mut between: impl FnMut(u64) -> Result<()>,
+    ) -> Result<f64> {
+        let Inputs { gpu, timer, up, targets, area, frame, groups, filled, reflection, .. } = *inputs;
+        let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
+        let part = gpu.buffer(
+            "part of the workgroups",
+            size_of::<Groups>() as u64,
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        );
+        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let (surface, opaque) = (view(&targets.surface), view(&targets.opaque));
+        let quad_id = targets.ids(0..frame.layers);
+        let entries = [
+            entry(0, uniform.as_entire_binding()),
+            entry(1, up.lights.as_entire_binding()),
+            entry(2, up.quads.as_entire_binding()),
+            entry(3, part.as_entire_binding()),
+            entry(4, wgpu::BindingResource::TextureView(&up.volume)),
+            entry(5, wgpu::BindingResource::TextureView(&surface)),
+            entry(6, wgpu::BindingResource::TextureView(&quad_id)),
+            entry(7, wgpu::BindingResource::TextureView(&opaque)),
+            entry(8, sums.radiance.as_entire_binding()),
+            entry(9, sums.counts.as_entire_binding()),
+            entry(10, wgpu::BindingResource::TextureView(&filled.texture)),
+            entry(11, filled.places.as_entire_binding()),
+            entry(12, reflection.uniform.as_entire_binding()),
+            entry(13, wgpu::BindingResource::TextureView(&reflection.table)),
+            entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
+            entry(15, reflection.profiles.as_entire_binding()),
+            entry(16, groups.buffer.as_entire_binding()),
+            entry(17, wgpu::BindingResource::TextureView(&up.bricks)),
+        ];
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("integrate"),
+            layout: &self.group_layout,
+            entries: &entries,
+        });
+        let submit = |pipeline: &wgpu::ComputePipeline, first: u32, count: u32| {
+            let uniform = Groups { area, first, count, pad_a: 0, pad_b: 0 };
+            gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
+            timer.run(gpu, "integrate", |encoder, span| {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("integrate"),
+                    timestamp_writes: span.compute(),
+                });
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                pass.dispatch_workgroups(count, 1, 1);
+            })
+        };
+        let pixels =
+            |groups: u32| (u64::from(groups) * GROUP_PIXELS).min(area.width as u64 * area.height as u64);
+        let (mut seconds, mut done) = (0.0, 0);
+        while let Some(dry) = &self.dry
+            && done < groups.dry
+        {
+            let count = (groups.dry - done).min(MOST_GROUPS);
+            seconds += submit(dry, groups.wet + done, count)?;
+            done += count;
+            between(pixels(done))?;
+        }
+        let mut first = 0;
+        while first < groups.wet {
+            let count = tiler.next(groups.wet - first);
+            let took = submit(&self.pipeline, first, count)?;
+            seconds += took;
+            tiler.learn(count, took);
+            first += count;
+            between(pixels(done + first))?;
+        }
+        Ok(seconds)
+    }
+}
+
+/// The bindings of `shaders/integrate.wgsl`, in order.
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
+    use wgpu::{
+        BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
+        TextureSampleType, TextureViewDimension,
+    };
+    let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let uniform = buffer(BufferBindingType::Uniform);
+    let texture = |sample_type, view_dimension| BindingType::Texture {
+        sample_type,
+        view_dimension,
+        multisampled: false,
+    };
+    let floats = texture(TextureSampleType::Float { filterable: false }, TextureViewDimension::D2);
+    let sums = buffer(BufferBindingType::Storage { read_only: false });
+    let cells = |format| BindingType::StorageTexture {
+        access: StorageTextureAccess::ReadOnly,
+        format,
+        view_dimension: TextureViewDimension::D3,
+    };
+    let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Uint));
+    let bricks = cells(TextureFormat::Rgba32Uint);
+    let list = buffer(BufferBindingType::Storage { read_only: true });
+    let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
+    let table = texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3);
+    let linear = BindingType::Sampler(SamplerBindingType::Filtering);
+    let types = [
+        uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list, uniform, table,
+        linear, list, list, bricks,
+    ];
+    let mut binding = 0;
+    types.map(|ty| {
+        binding += 1;
+        wgpu::BindGroupLayoutEntry {
+            binding: binding - 1,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty,
+            count: None,
+        }
+    })
+}
+
+fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {
+    wgpu::BindGroupEntry { binding, resource }
+}

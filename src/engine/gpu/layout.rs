@@ -1,0 +1,394 @@
+//! Structs the host shares with the shaders: twins of those in `shaders/frame.wgsl`, checked by a
+//! test through naga (names, offsets, sizes, constants).
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+
+use crate::light::strand::table::StrandShading;
+use crate::light::{AngleFrame, environment, scatter};
+use crate::picture::camera::{clip_to_window, footprint, sample_offset};
+use crate::scene::Scene;
+use crate::trace::{extinction, flow_cells, level_atlas};
+use crate::util::window::Window;
+use crate::volume::VolumeTexture;
+
+/// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
+pub const WORKGROUP: u32 = 8;
+
+/// Uniforms of one sample of one window.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)] // The fields are described where the shaders read them.
+pub struct Frame {
+    pub clip_from_world: [[f32; 4]; 4],
+    pub eye_world: [f32; 3],
+    pub jitter_x: f32,
+    pub right: [f32; 3],
+    pub jitter_y: f32,
+    pub up: [f32; 3],
+    pub sample_index: u32,
+    pub forward: [f32; 3],
+    pub samples: u32,
+    pub zenith: [f32; 3],
+    pub light_count: u32,
+    pub horizon: [f32; 3],
+    pub p: f32,
+    pub ambient: [f32; 3],
+    pub early_end: f32,
+    pub cells: [i32; 3],
+    pub max_cells: u32,
+    pub image_width: f32,
+    pub image_height: f32,
+    pub extinction: f32,
+    pub texture_frame: u32,
+    pub haze_density: f32,
+    pub haze_falloff: f32,
+    pub window_x: u32,
+    pub window_y: u32,
+    pub window_width: u32,
+    pub window_height: u32,
+    pub flow_cells: f32,
+    pub layers: u32,
+    pub haze_color: [f32; 3],
+    pub haze_far: f32,
+    pub shadow_light: u32,
+    pub levels: u32,
+    pub footprint: f32,
+    pub pad_c: f32,
+}
+
+/// What is shaded at a vertex of the opaque mesh; numbers to 1 are halves of words.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Coat {
+    pub albedo_r: f32,
+    pub albedo_g: f32,
+    pub albedo_b: f32,
+    pub normal_xy: u32,
+    pub normal_z_wet: u32,
+    pub occlusion_shadow: u32,
+}
+
+impl From<&crate::place::Vertex> for Coat {
+    fn from(vertex: &crate::place::Vertex) -> Self {
+        let both = |low: u16, high: u16| u32::from(low) | u32::from(high) << 16;
+        let unit = |x: f32| (x.clamp(0.0, 1.0) * 65535.0).round() as u16;
+        let signed = |x: f32| (x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16;
+        let [albedo_r, albedo_g, albedo_b] = vertex.albedo;
+        let [x, y, z] = vertex.normal.map(signed);
+        Coat {
+            albedo_r,
+            albedo_g,
+            albedo_b,
+            normal_xy: both(x, y),
+            normal_z_wet: both(z, unit(vertex.wet)),
+            occlusion_shadow: both(unit(vertex.occlusion), unit(vertex.shadow)),
+        }
+    }
+}
+
+/// A tile of the opaque mesh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct MeshTile {
+    pub first: u32,
+    pub pitch: u32,
+    pub side: u32,
+    pub pad: u32,
+}
+
+/// One light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Light {
+    pub vector: [f32; 3],
+    pub has_position: u32,
+    pub intensity: [f32; 3],
+    pub cos_edge: f32,
+    pub axis: [f32; 3],
+    pub inverse_soft: f32,
+}
+
+/// One quad.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Quad {
+    pub corners: [[f32; 4]; 4],
+    pub e1: [f32; 3],
+    pub thickness: f32,
+    pub e2: [f32; 3],
+    pub repeat_u: f32,
+    pub n: [f32; 3],
+    pub repeat_v: f32,
+    pub eye_plane: [f32; 3],
+    pub profile: u32,
+    pub e: [f32; 2],
+    pub f: [f32; 2],
+    pub g: [f32; 2],
+    pub offset: [f32; 2],
+    pub erosion: [f32; 4],
+    pub mist: f32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
+}
+
+/// The light volume that one submission fills, or a part of it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct LightVolume {
+    pub direction: [f32; 3],
+    pub first_column: u32,
+    pub offset: [i32; 3],
+    pub column_count: u32,
+    pub bits: f32,
+    pub pad: [u32; 3],
+}
+
+/// The reflection model of flowing water, beside its table.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Strand {
+    pub squeeze: f32,
+    pub spread: f32,
+    pub aeration: f32,
+    pub g: f32,
+}
+
+/// The environment of a scene that has one; `shaders/environment.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Environment {
+    pub irradiance: [[f32; 4]; 9],
+    pub to_sun: [f32; 3],
+    pub rim2: f32,
+    pub sun_radiance: [f32; 3],
+    pub intensity: f32,
+    pub turn: f32,
+    pub pad_a: f32,
+    pub pad_b: f32,
+    pub pad_c: f32,
+}
+
+impl Environment {
+    /// Of an environment.
+    pub fn new(environment: &environment::Environment) -> Self {
+        let sun = environment.sun;
+        Environment {
+            irradiance: environment.irradiance.0.map(|c| c.extend(0.0).to_array()),
+            to_sun: sun.map_or([0.0; 3], |sun| sun.to_sun.to_array()),
+            rim2: sun.map_or(0.0, |sun| sun.rim2),
+            sun_radiance: sun.map_or([0.0; 3], |sun| sun.radiance.to_array()),
+            intensity: environment.intensity,
+            turn: environment.turn,
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
+        }
+    }
+}
+
+/// The part of a window that is looked at, pixels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Tile {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// The workgroups that one submission of the integrate pass works on.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Groups {
+    pub area: Tile,
+    pub first: u32,
+    pub count: u32,
+    pub pad_a: u32,
+    pub pad_b: u32,
+}
+
+/// `tone` of [`Develop`]: Narkowicz's curve.
+pub const TONE_FILMIC: u32 = 1;
+/// Constants of multiple scattering.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Similarity {
+    pub extinction: [f32; 3],
+    pub g: f32,
+    pub albedo: [f32; 3],
+    pub pad_0: f32,
+    pub reduced: [f32; 3],
+    pub pad_1: f32,
+    pub isotropic: [f32; 3],
+    pub pad_2: f32,
+}
+
+/// What the integrate pass knows of how the volume's matter reflects.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Reflection {
+    pub strand: Strand,
+    pub similarity: Similarity,
+}
+
+impl Reflection {
+    /// Of the parts that are asked for.
+    pub fn new(strand: Option<&StrandShading>, similarity: Option<&scatter::Similarity>) -> Self {
+        let similarity = similarity.map(|s| Similarity {
+            extinction: s.extinction.to_array(),
+            g: s.g,
+            albedo: s.albedo.to_array(),
+            reduced: s.reduced.to_array(),
+            isotropic: s.isotropic.to_array(),
+            ..Similarity::default()
+        });
+        let strand = strand.map(Strand::from);
+        Reflection { strand: strand.unwrap_or_default(), similarity: similarity.unwrap_or_default() }
+    }
+}
+
+impl From<&StrandShading> for Strand {
+    fn from(shading: &StrandShading) -> Self {
+        let table = &shading.table;
+        Strand { squeeze: table.squeeze, spread: table.spread, aeration: shading.aeration, g: shading.g }
+    }
+}
+
+impl Tile {
+    /// All of a window.
+    pub fn whole(window: Window) -> Tile {
+        Tile { x: 0, y: 0, width: window.width, height: window.height }
+    }
+}
+
+impl Frame {
+    /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with; the targets have
+    /// `layers` layers.
+    pub fn new(
+        scene: &Scene,
+        volume: &VolumeTexture,
+        window: Window,
+        samples: &Range<u32>,
+        sample: u32,
+        layers: u32,
+    ) -> Self {
+        let camera = &scene.camera;
+        let image = &scene.image;
+        let haze = scene.haze.seen_from(camera.eye);
+        let [jitter_x, jitter_y] = sample_offset(image, sample);
+        let (right, up) = camera.image_plane(image.width, image.height);
+        let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
+        Frame {
+            clip_from_world: clip_to_window(clip, [image.width, image.height], window).to_cols_array_2d(),
+            eye_world: camera.eye.to_array(),
+            jitter_x,
+            right: right.to_array(),
+            jitter_y,
+            up: up.to_array(),
+            sample_index: sample - samples.start,
+            forward: camera.forward.to_array(),
+            samples: samples.len() as u32,
+            zenith: scene.background.zenith.to_array(),
+            light_count: scene.lights.len() as u32,
+            horizon: scene.background.horizon.to_array(),
+            p: scene.p,
+            ambient: scene.ambient.to_array(),
+            early_end: scene.trace.early_end,
+            cells: volume.size.map(|n| n as i32),
+            max_cells: scene.trace.max_cells,
+            image_width: image.width as f32,
+            image_height: image.height as f32,
+            extinction: extinction(&scene.trace.attenuation, volume.alpha),
+            texture_frame: u32::from(scene.frame == AngleFrame::Texture),
+            haze_density: haze.density,
+            haze_falloff: haze.falloff,
+            window_x: window.x,
+            window_y: window.y,
+            window_width: window.width,
+            window_height: window.height,
+            flow_cells: flow_cells(scene.flow, volume.size[1]),
+            layers,
+            haze_color: haze.color.to_array(),
+            haze_far: haze.far,
+            shadow_light: scene.shadow_light().map_or(u32::MAX, |i| i as u32),
+            levels: level_atlas(&scene.trace, volume.size).count,
+            footprint: footprint(camera, image),
+            pad_c: 0.0,
+        }
+    }
+}
+
+/// The scene's lights, then those that stand for its environment in the volume; a light that shines on
+/// nothing if there are none, for no buffer is empty.
+pub fn lights(scene: &Scene) -> Vec<Light> {
+    let mut lights: Vec<Light> = scene.volume_lights().iter().map(Light::new).collect();
+    lights.resize(lights.len().max(1), Light::default());
+    lights
+}
+
+impl Light {
+    fn new(light: &crate::light::Light) -> Self {
+        let base = |vector: Vec3, has_position, intensity: Vec3| Light {
+            vector: vector.to_array(),
+            has_position,
+            intensity: intensity.to_array(),
+            cos_edge: -2.0,
+            ..Light::default()
+        };
+        match *light {
+            crate::light::Light::Directional { to_light, intensity } => base(to_light, 0, intensity),
+            crate::light::Light::Point { position, intensity } => base(position, 1, intensity),
+            crate::light::Light::Spot { position, intensity, cone } => Light {
+                cos_edge: cone.cos_edge,
+                axis: cone.axis.to_array(),
+                inverse_soft: cone.inverse_soft,
+                ..base(position, 1, intensity)
+            },
+        }
+    }
+}
+
+impl Quad {
+    /// A quad seen by an eye. The eye's place relative to the quad is taken in float64: far eyes
+    /// would lose the digits that texture coordinates need. `profile` is where its material's profile begins.
+    pub fn new(quad: &crate::mapping::Quad, eye: Vec3, profile: u32) -> Self {
+        let map = &quad.map;
+        let away: DVec3 = eye.as_dvec3() - map.a_world.as_dvec3();
+        let along = |axis: Vec3| away.dot(axis.as_dvec3()) as f32;
+        Quad {
+            corners: quad.corners.map(|c| c.extend(1.0).to_array()),
+            e1: map.e1_world.to_array(),
+            thickness: quad.material.thickness_m,
+            e2: map.e2_world.to_array(),
+            repeat_u: quad.material.repeat_u,
+            n: map.n_world.to_array(),
+            repeat_v: quad.material.repeat_v,
+            eye_plane: [along(map.e1_world), along(map.e2_world), along(map.n_world)],
+            profile,
+            e: map.e.to_array(),
+            f: map.f.to_array(),
+            g: map.g.to_array(),
+            offset: quad.offset.to_array(),
+            erosion: quad.erosion,
+            mist: quad.mist,
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
+        }
+    }
+}

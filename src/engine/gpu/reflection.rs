@@ -1,0 +1,74 @@
+//! §5 What the integrate pass reads of the reflection model and of multiple scattering.
+
+use std::sync::Arc;
+
+use super::device::Gpu;
+use super::layout;
+use super::strand::StrandTexture;
+use crate::light::Reflection;
+use crate::light::scatter::Profile;
+use crate::light::strand::table::{StrandShading, StrandTable};
+use crate::scene::Scene;
+use crate::volume::VolumeTexture;
+
+/// Tables that stay on the device.
+#[derive(Default)]
+pub struct Reflections {
+    strand: Option<(Option<Arc<StrandTable>>, StrandTexture)>,
+    profiles: Option<(Vec<Arc<Profile>>, wgpu::Buffer)>,
+}
+
+/// The bindings.
+pub struct BoundReflection {
+    /// `Reflection`.
+    pub uniform: wgpu::Buffer,
+    /// Table of the strand model.
+    pub table: wgpu::TextureView,
+    /// Its sampler.
+    pub sampler: wgpu::Sampler,
+    /// `array<vec4<f32>>`: profiles, one after the other.
+    pub profiles: wgpu::Buffer,
+}
+
+impl Reflections {
+    /// For a scene, uploading what is not there yet.
+    pub fn bind(&mut self, gpu: &Gpu, scene: &Scene, volume: &VolumeTexture) -> BoundReflection {
+        let strand = match &scene.reflection {
+            Reflection::Strand(params) => Some(StrandShading::new(params)),
+            Reflection::KajiyaKay => None,
+        };
+        let media = scene.media(volume);
+        let uniform = layout::Reflection::new(strand.as_ref(), media.as_ref().map(|m| &m.similarity));
+        let table = strand.map(|strand| strand.table);
+        let is_there = match (&self.strand, &table) {
+            (Some(_), None) => true,
+            (Some((Some(old), _)), Some(new)) => Arc::ptr_eq(old, new),
+            _ => false,
+        };
+        if !is_there {
+            let texture = match &table {
+                Some(table) => StrandTexture::new(gpu, table),
+                None => StrandTexture::empty(gpu),
+            };
+            self.strand = Some((table, texture));
+        }
+        let profiles = media.map_or(Vec::new(), |media| media.profiles);
+        let alike = |old: &[Arc<Profile>]| {
+            old.len() == profiles.len() && old.iter().zip(&profiles).all(|(a, b)| Arc::ptr_eq(a, b))
+        };
+        if !self.profiles.as_ref().is_some_and(|(old, _)| alike(old)) {
+            let values: Vec<[f32; 4]> = profiles.iter().flat_map(|p| p.values.iter().copied()).collect();
+            let bytes = bytemuck::cast_slice(&values);
+            self.profiles = Some((profiles, gpu.buffer_with("profiles", bytes, wgpu::BufferUsages::STORAGE)));
+        }
+        let (Some((_, strand)), Some((_, profiles))) = (&self.strand, &self.profiles) else {
+            unreachable!("both were just filled")
+        };
+        BoundReflection {
+            uniform: gpu.buffer_with("reflection", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
+            table: strand.view.clone(),
+            sampler: strand.sampler.clone(),
+            profiles: profiles.clone(),
+        }
+    }
+}

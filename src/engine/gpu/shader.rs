@@ -1,0 +1,47 @@
+//! The shaders' text: each file names what it needs with `#import folder::file`.
+
+use std::collections::HashSet;
+
+macro_rules! files {
+    ($($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../../../shaders/", $name, ".wgsl")))),*]
+    };
+}
+
+/// Name and text of every file in `shaders/`, without its ending.
+pub const FILES: &[(&str, &str)] = files! {
+    "layout" "mapping" "walk" "volume/cells"
+    "trace/levels" "trace/lookup" "trace/matter"
+    "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/scatter" "light/strand"
+    "light/visibility"
+    "engine/bare" "engine/gbuffer" "engine/integrate" "engine/integrate_light" "engine/opaque" "engine/pool"
+    "engine/sheets_many" "engine/sheets_one"
+    "picture/resolve"
+};
+
+/// The names that a line `#import a::b` of a text asks for, as in [`FILES`].
+pub fn imports(text: &str) -> impl Iterator<Item = String> {
+    text.lines().filter_map(|line| line.strip_prefix("#import ")).map(|path| path.trim().replace("::", "/"))
+}
+
+/// The text of a stage with all that it imports, directly or not: each file once, before the file that names it first.
+/// Files may import one another, since the order of declarations means nothing in WGSL.
+///
+/// # Panics
+/// Where an import names no file. The shaders are part of the program, and tests resolve each of them.
+pub fn resolve(stage: &str) -> String {
+    fn add(text: &str, known: &mut HashSet<String>, whole: &mut String) {
+        for name in imports(text) {
+            let found = FILES.iter().find(|(file, _)| **file == *name);
+            let (_, imported) = found.unwrap_or_else(|| panic!("no shader {name} to import"));
+            if known.insert(name) {
+                add(imported, known, whole);
+            }
+        }
+        let own = text.lines().filter(|line| !line.starts_with("#import "));
+        own.for_each(|line| whole.extend([line, "\n"]));
+    }
+    let mut whole = String::new();
+    add(stage, &mut HashSet::new(), &mut whole);
+    whole
+}

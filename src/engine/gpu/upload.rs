@@ -1,0 +1,326 @@
+//! The scene on the device: volume texture, quads, lights, mesh.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::bricks;
+use super::device::Gpu;
+use super::layout::{self, Coat, Quad};
+use super::rasters::hash_twice;
+use super::tiles::{self, Part};
+use crate::engine::pool_surface;
+use crate::light::environment::Map;
+use crate::light::scatter::media::{profile_length, thicknesses};
+use crate::place::tiles::steps;
+use crate::place::{Mesh, Vertex};
+use crate::scene::Scene;
+use crate::util::error::{Error, Result};
+use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
+
+/// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
+pub(super) const SLAB_BYTES: usize = 64 << 20;
+
+/// What stays on the device from frame to frame: the volume's cells and the mesh, known again by the
+/// memory they came from.
+#[derive(Default)]
+pub struct Resident {
+    /// The volume's levels, and whether they are made for leaps.
+    pub levels: KeptLevels,
+    volume: Option<(Levels, [wgpu::TextureView; 2])>,
+    mesh: Option<ResidentMesh>,
+    /// The environment's map, and its number.
+    map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
+    /// Uploads of meshes and maps so far.
+    uploads: u64,
+}
+
+/// A mesh on the device.
+#[derive(Clone)]
+struct ResidentMesh {
+    of: Mesh,
+    positions: wgpu::Buffer,
+    coats: wgpu::Buffer,
+    tiles: wgpu::Buffer,
+    /// Of all kinds of tiles, and where each is.
+    indices: wgpu::Buffer,
+    lists: Arc<Vec<Range<u32>>>,
+    /// Each upload has a number of its own.
+    upload: u64,
+}
+
+/// Everything of a scene that does not change from sample to sample.
+pub struct Uploaded {
+    /// The volume's levels.
+    pub levels: Levels,
+    /// They as a 3-D storage texture, `rg32uint`; [`Stack`]. Of sparse storage the stored cells.
+    pub volume: wgpu::TextureView,
+    /// Bricks of sparse storage, `rgba32uint`.
+    pub bricks: wgpu::TextureView,
+    /// `array<Quad>`.
+    pub quads: wgpu::Buffer,
+    /// Number of quads.
+    pub quad_count: u32,
+    /// `array<Light>`, at least one.
+    pub lights: wgpu::Buffer,
+    /// Positions of the opaque mesh's vertices, four floats each.
+    pub positions: wgpu::Buffer,
+    /// What is shaded there, `array<Coat>`.
+    pub coats: wgpu::Buffer,
+    /// Its tiles, `array<MeshTile>`.
+    pub tiles: wgpu::Buffer,
+    /// The triangles of a tile.
+    pub indices: wgpu::Buffer,
+    /// What of the rock is drawn.
+    pub rock: Vec<Part>,
+    /// `Surface` of each pool, and what of it is drawn.
+    pub pools: Vec<(wgpu::Buffer, Vec<Part>)>,
+    /// The environment, where the scene has one.
+    pub environment: Option<UploadedEnvironment>,
+    /// Hash of quads, lights, mesh and environment: all that is drawn but the pools' waves.
+    pub geometry: [u64; 2],
+    /// Hash of the pools' surfaces.
+    pub waves: [u64; 2],
+}
+
+/// An environment on the device.
+pub struct UploadedEnvironment {
+    /// `Environment`.
+    pub uniform: wgpu::Buffer,
+    /// Its map, `rgba32float`.
+    pub map: wgpu::TextureView,
+}
+
+impl Uploaded {
+    /// Uploads what of a scene is not resident yet.
+    pub fn new(
+        gpu: &Gpu,
+        resident: &mut Resident,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+    ) -> Result<Self> {
+        let limits = gpu.device.limits();
+        let (_, thickness_of_quad) = thicknesses(&scene.quads);
+        let length = profile_length(volume.size[2]);
+        let numbered = scene.quads.iter().zip(thickness_of_quad);
+        let quads: Vec<Quad> =
+            numbered.map(|(quad, which)| Quad::new(quad, scene.camera.eye, which * length)).collect();
+        let lights = layout::lights(scene);
+        let (quad_bytes, light_bytes): (&[u8], &[u8]) =
+            (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
+        let pools = pool_surface::surfaces(scene, mesh);
+        let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
+        let largest = [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<Coat>()];
+        if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
+            return Err(Error::input(
+                format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
+                "lower their number or use --engine cpu",
+            ));
+        }
+        let ResidentMesh { positions, coats, tiles, indices, lists, upload, .. } =
+            resident.mesh(gpu, mesh).clone();
+        let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
+        let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
+        pool_parts.resize_with(pools.len(), Vec::new);
+        let levels = resident.levels.get(volume, scene.pyramid_spec(volume));
+        let [cells, bricks] = resident.volume(gpu, &levels)?;
+        let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
+        let environment = scene.environment.as_ref().map(layout::Environment::new);
+        let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
+        let number = map.as_ref().map(|(_, number)| *number);
+        Ok(Uploaded {
+            geometry: hash_twice(&(quad_bytes, light_bytes, upload, &steps, environment_bytes, number)),
+            waves: hash_twice(&pool_bytes),
+            environment: map.map(|(map, _)| UploadedEnvironment {
+                uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
+                map,
+            }),
+            volume: cells,
+            bricks,
+            levels,
+            // A buffer without any would be too small to bind.
+            quads: gpu.buffer_with(
+                "quads",
+                if quads.is_empty() { &[0; size_of::<Quad>()] } else { quad_bytes },
+                wgpu::BufferUsages::STORAGE,
+            ),
+            quad_count: quads.len() as u32,
+            lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
+            positions,
+            coats,
+            tiles,
+            indices,
+            rock,
+            pools: pools
+                .iter()
+                .map(|pool| gpu.buffer_with("pool", bytemuck::bytes_of(pool), wgpu::BufferUsages::UNIFORM))
+                .zip(pool_parts)
+                .collect(),
+        })
+    }
+}
+
+impl Resident {
+    /// Cells and bricks.
+    fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<[wgpu::TextureView; 2]> {
+        if let Some((old, views)) = &self.volume
+            && Arc::ptr_eq(old, levels)
+        {
+            return Ok(views.clone());
+        }
+        // The old volume goes first: two large ones might not fit.
+        self.volume = None;
+        let views = match levels[0].cells.bricks() {
+            Some(stored) => bricks::upload(gpu, stored)?,
+            None => [upload_volume(gpu, levels)?, bricks::none(gpu)],
+        };
+        self.volume = Some((levels.clone(), views.clone()));
+        Ok(views)
+    }
+
+    /// The map, and its number.
+    fn map(&mut self, gpu: &Gpu, map: &Arc<Map>) -> Result<(wgpu::TextureView, u64)> {
+        if let Some((old, view, upload)) = &self.map
+            && Arc::ptr_eq(old, map)
+        {
+            return Ok((view.clone(), *upload));
+        }
+        self.map = None;
+        let view = upload_map(gpu, map)?;
+        self.uploads += 1;
+        self.map = Some((map.clone(), view.clone(), self.uploads));
+        Ok((view, self.uploads))
+    }
+
+    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> &ResidentMesh {
+        self.mesh.take_if(|known| !Arc::ptr_eq(&known.of.vertices, &mesh.vertices));
+        let uploads = &mut self.uploads;
+        self.mesh.get_or_insert_with(|| {
+            *uploads += 1;
+            let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
+            let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
+            let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
+            let mut coats: Vec<Coat> = mesh.vertices.iter().map(Coat::from).collect();
+            // Bound even where there is none.
+            coats.resize(coats.len().max(1), Coat::from(&Vertex::default()));
+            let (indices, lists) = tiles::lists();
+            let storage = wgpu::BufferUsages::STORAGE;
+            ResidentMesh {
+                of: mesh.clone(),
+                positions: buffer("positions", bytemuck::cast_slice(&positions), storage),
+                coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
+                tiles: buffer("tiles", bytemuck::cast_slice(&tiles::packed(&mesh.tiles)), storage),
+                indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+                lists: Arc::new(lists),
+                upload: *uploads,
+            }
+        })
+    }
+}
+
+fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
+    let stack = Stack::new(levels);
+    let [nx, ny, nz] = stack.extent();
+    let most = gpu.device.limits().max_texture_dimension_3d;
+    if [nx, ny, nz].iter().any(|&n| n > most) {
+        return Err(Error::input(
+            format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
+            format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
+        ));
+    }
+    let texture = bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
+    for (number, level) in levels.iter().enumerate() {
+        upload_level(gpu, &texture, stack.place(number as u32), level)?;
+    }
+    Ok(texture.create_view(&Default::default()))
+}
+
+fn upload_level(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    [x, y, z]: [u32; 3],
+    volume: &VolumeTexture,
+) -> Result<()> {
+    let [nx, ny, _] = volume.size;
+    let layer = nx as usize * ny as usize;
+    let layers = (SLAB_BYTES / (layer * size_of::<Cell>())).max(1);
+    let cells = volume.cells.dense().expect("levels are stored whole");
+    for (slab, cells) in cells.chunks(layers * layer).enumerate() {
+        write_layers(gpu, texture, [x, y, z + (slab * layers) as u32], [nx, ny], cells)?;
+    }
+    Ok(())
+}
+
+/// Puts whole layers of `width` × `height` texels into a 3-D texture, and waits for it.
+pub(super) fn write_layers<T: bytemuck::Pod>(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    [x, y, z]: [u32; 3],
+    [width, height]: [u32; 2],
+    texels: &[T],
+) -> Result<()> {
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: 0,
+            origin: wgpu::Origin3d { x, y, z },
+            aspect: wgpu::TextureAspect::All,
+        },
+        bytemuck::cast_slice(texels),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(width * size_of::<T>() as u32),
+            rows_per_image: Some(height),
+        },
+        wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: (texels.len() / (width as usize * height as usize)) as u32,
+        },
+    );
+    gpu.run(gpu.encoder("upload volume")).map(drop)
+}
+
+fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
+    let Map { width, height, .. } = *map;
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    if width.max(height) > most {
+        return Err(Error::input(
+            format!("an environment map of {width}×{height} texels is too large for {}", gpu.name()),
+            format!("it has at most {most} on a side there; make it smaller or use --engine cpu"),
+        ));
+    }
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("environment"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let row = width as usize * 16;
+    let rows = (SLAB_BYTES / row).max(1);
+    for (slab, texels) in map.texels.chunks(rows * width as usize).enumerate() {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
+            wgpu::Extent3d {
+                width,
+                height: (texels.len() / width as usize) as u32,
+                depth_or_array_layers: 1,
+            },
+        );
+        gpu.run(gpu.encoder("upload environment"))?;
+    }
+    Ok(texture.create_view(&Default::default()))
+}

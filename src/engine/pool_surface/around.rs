@@ -1,0 +1,118 @@
+//! What a pool mirrors besides the sky: rock and falling water, as seen from its middle, in cells of equal solid
+//! angle over the upper half of the sphere. Coarse, for waves blur it.
+
+use glam::Vec3;
+
+use super::{AROUND, turn};
+use crate::mapping::Quad;
+use crate::place::{Mesh, Vertex};
+use crate::scene::Scene;
+
+/// Every so many vertices are looked at.
+const STRIDE: usize = 5;
+/// What is this much farther than the nearest in a cell is behind it.
+const BEHIND: f32 = 1.4;
+/// Points on a side of a quad.
+const POINTS: u32 = 6;
+/// Share of the lights' radiance that white water sends back, and how much of a cell it covers at most.
+const WATER: (f32, f32) = (0.35, 0.75);
+
+/// The cell of a unit direction. Twin of its lookup, which is between cells: `around` of `shaders/pool.wgsl`.
+fn cell(d: Vec3) -> Option<usize> {
+    if d.y < 0.0 {
+        return None;
+    }
+    let column = (turn(d) * AROUND[0] as f32) as usize % AROUND[0];
+    let row = ((d.y * AROUND[1] as f32) as usize).min(AROUND[1] - 1);
+    Some(row * AROUND[0] + column)
+}
+
+/// Mean distance of what is around, and the cells.
+pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROUND[0] * AROUND[1]]) {
+    const CELLS: usize = AROUND[0] * AROUND[1];
+    let seen = || {
+        let rock = mesh.vertices.iter().filter(|v| v.pool == 0).step_by(STRIDE);
+        rock.filter_map(|vertex| {
+            let away = Vec3::from(vertex.position) - middle;
+            let distance = away.length();
+            Some((vertex, distance, cell(away / distance.max(1e-6))?))
+        })
+    };
+    let mut nearest = [f32::INFINITY; CELLS];
+    for (_, distance, cell) in seen() {
+        nearest[cell] = nearest[cell].min(distance);
+    }
+    let mut sums = [Vec3::ZERO; CELLS];
+    let mut counts = [0.0f32; CELLS];
+    for (vertex, distance, cell) in seen() {
+        if distance < BEHIND * nearest[cell] {
+            sums[cell] += radiance(scene, vertex);
+            counts[cell] += 1.0;
+        }
+    }
+    let mut cells = [[0.0; 4]; CELLS];
+    for column in 0..AROUND[0] {
+        // Rock stands on the ground: below its highest cell there is no sky.
+        let mut above: Option<Vec3> = None;
+        for row in (0..AROUND[1]).rev() {
+            let i = row * AROUND[0] + column;
+            if counts[i] > 0.0 {
+                above = Some(sums[i] / counts[i]);
+            }
+            if let Some(colour) = above {
+                cells[i] = colour.extend(1.0).to_array();
+            }
+        }
+    }
+    add_water(scene, middle, &mut cells);
+    let near: Vec<f32> = nearest.iter().copied().filter(|d| d.is_finite()).collect();
+    let radius = if near.is_empty() { 1e4 } else { near.iter().sum::<f32>() / near.len() as f32 };
+    (radius, cells)
+}
+
+/// Lambert, as of [`shade_opaque`](crate::engine::cpu::opaque::shade_opaque).
+fn radiance(scene: &Scene, vertex: &Vertex) -> Vec3 {
+    let n = Vec3::from(vertex.normal);
+    let surroundings = scene.environment.as_ref().map_or(Vec3::ZERO, |e| e.irradiance.at(n));
+    let mut irradiance = (scene.ambient + surroundings) * (1.0 - vertex.occlusion);
+    for (i, light) in scene.lights.iter().enumerate() {
+        let (to_light, intensity) = light.at(vertex.position.into());
+        let lit = if scene.shadow_light() == Some(i) { 1.0 - vertex.shadow } else { 1.0 };
+        irradiance += intensity * (lit * n.dot(to_light).max(0.0));
+    }
+    Vec3::from(vertex.albedo) * irradiance
+}
+
+/// Puts falling water in front.
+fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
+    let solid_angle = std::f32::consts::TAU / cells.len() as f32;
+    let mut cover = vec![0.0f32; cells.len()];
+    for quad in scene.quads.iter().filter(|quad| quad.mist == 0.0) {
+        let Quad { corners: [a, b, c, d], erosion, .. } = quad;
+        let area = (*c - *a).cross(*d - *b).length() * 0.5 / (POINTS * POINTS) as f32;
+        let kept = (1.0 - erosion.iter().sum::<f32>() / 4.0).clamp(0.0, 1.0);
+        for i in 0..POINTS * POINTS {
+            let u = ((i % POINTS) as f32 + 0.5) / POINTS as f32;
+            let v = ((i / POINTS) as f32 + 0.5) / POINTS as f32;
+            let away = a.lerp(*b, u).lerp(d.lerp(*c, u), v) - middle;
+            let distance = away.length().max(1e-3);
+            if let Some(cell) = cell(away / distance) {
+                let facing = away.dot(quad.map.n_world).abs() / distance;
+                cover[cell] += kept * area * facing / (distance * distance * solid_angle);
+            }
+        }
+    }
+    let mut white = scene.ambient;
+    if let Some(environment) = &scene.environment {
+        white += environment.irradiance.at(Vec3::Y);
+    }
+    for light in &scene.lights {
+        white += light.at(middle).1 * WATER.0;
+    }
+    for (cell, cover) in cells.iter_mut().zip(cover) {
+        let cover = cover.min(WATER.1);
+        let [r, g, b, under] = *cell;
+        let mixed = Vec3::new(r, g, b) * (1.0 - cover) + white * cover;
+        *cell = mixed.extend(under + (1.0 - under) * cover).to_array();
+    }
+}

@@ -1,0 +1,15 @@
+//! §5 Light: what lights send, what of it reaches a cell, and what the cell sends on to the eye.
+
+pub mod environment;
+pub mod fibre;
+pub mod fill;
+pub mod haze;
+mod lights;
+pub mod optical_depth;
+pub mod scatter;
+mod settings;
+pub mod strand;
+pub mod visibility;
+
+pub use lights::{Background, Cone, Light};
+pub use settings::{AngleFrame, Reflection, Scattering, Visibility};

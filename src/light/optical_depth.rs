@@ -1,0 +1,67 @@
+//! §5 What lies between cells and lights. Twins: `shaders/light/optical_depth.wgsl` and
+//! `shaders/light/visibility.wgsl`.
+
+use glam::{IVec3, Vec3};
+
+use super::visibility::{DARK_BITS, Form, LightVolume, Medium, transmittance_code};
+use crate::trace::Matter;
+use crate::trace::lookup::Level;
+use crate::volume::large_box;
+use crate::walk::{NEVER, Walk};
+
+/// What a light volume of a form holds for a cell.
+pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Medium, form: Form) -> f32 {
+    let depth = |enough: f32| {
+        let direction = light_volume.direction * level.scale;
+        optical_depth(level, &Matter::WHOLE, cell, direction, medium, enough, &mut 0)
+    };
+    let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
+    match form {
+        Form::Codes => transmittance_code(depth(DARK_BITS / bits.max(1e-20)) * bits).into(),
+        Form::Depths => depth(NEVER),
+    }
+}
+
+/// From the middle of the cell `start` of a level to where the light ray leaves the slab: Σ ρ code × length, in units of
+/// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. Ends early where the depth is `enough`. `walked` grows by the cells of the way.
+pub fn optical_depth(
+    level: &Level,
+    matter: &Matter,
+    start: IVec3,
+    direction: Vec3,
+    medium: Medium,
+    enough: f32,
+    walked: &mut u32,
+) -> f32 {
+    let mut depth = 0.0f32;
+    let mut n = 0;
+    let mut walk = Walk::new(level.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
+    let octant = walk.octant();
+    let leaps = level.leaps && matter.keeps_empty();
+    while n < medium.max_cells && (0..level.size.z).contains(&walk.cell().z) {
+        let cell = level.cell(walk.cell());
+        if leaps
+            && cell.rho_code() == 0
+            && let Some(exponents) = large_box(cell, octant)
+        {
+            n += 1 + walk.leap(exponents);
+            walk.next();
+            continue;
+        }
+        let Some(crossing) = walk.next() else { break };
+        let rho = matter.rho(cell.rho_code() as f32);
+        if medium.per_cell {
+            // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+            let own = 0.5 - 0.5 * level.scale.z;
+            depth += rho * if n == 0 { own } else { 1.0 };
+        } else {
+            depth += rho * (crossing.t_exit - crossing.t_enter);
+        }
+        n += 1;
+        if depth > enough {
+            break;
+        }
+    }
+    *walked += n.min(medium.max_cells);
+    depth
+}

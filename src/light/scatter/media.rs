@@ -1,0 +1,94 @@
+//! The diffuse light of a scene's materials: what is to be known of the scene before its rays are walked.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::{COSINES, Profile, Scattering, Similarity, layer_depths};
+use crate::light::Reflection;
+use crate::light::strand::table::StrandShading;
+use crate::mapping::Quad;
+use crate::trace::Attenuation;
+use crate::volume::VolumeTexture;
+
+/// Largest albedo that Kajiya and Kay's fibres are given: what gains light at every scattering has no end.
+const MOST_ALBEDO: f32 = 0.99;
+
+/// Profiles kept: a slider that goes back and forth finds them again.
+const KEPT: usize = 16;
+
+/// Multiple scattering in a scene.
+pub struct Media {
+    /// Constants of the matter.
+    pub similarity: Similarity,
+    /// One for every thickness, in the order the quads have them first.
+    pub profiles: Vec<Arc<Profile>>,
+}
+
+impl Media {
+    /// The diffuse light of quads' materials in a volume. `p` is the exponent of the specular term.
+    pub fn new(
+        quads: &[Quad],
+        attenuation: &Attenuation,
+        reflection: &Reflection,
+        p: f32,
+        volume: &VolumeTexture,
+    ) -> Media {
+        let scattering = scattering(reflection, p, volume);
+        let (thicknesses, _) = thicknesses(quads);
+        let profiles = thicknesses.iter().map(|thickness_m| {
+            let depths = layer_depths(volume, attenuation, thickness_m / volume.size[2] as f32);
+            profile(depths, scattering)
+        });
+        Media { similarity: scattering.similarity(), profiles: profiles.collect() }
+    }
+}
+
+/// The thicknesses of quads, metres, each once; and for every quad which of them it has.
+pub fn thicknesses(quads: &[Quad]) -> (Vec<f32>, Vec<u32>) {
+    let (mut list, mut known) = (Vec::new(), HashMap::new());
+    let of_quad = quads.iter().map(|quad| {
+        let thickness_m = quad.material.thickness_m;
+        *known.entry(thickness_m.to_bits()).or_insert_with(|| {
+            list.push(thickness_m);
+            list.len() as u32 - 1
+        })
+    });
+    let of_quad = of_quad.collect();
+    (list, of_quad)
+}
+
+/// Values of one profile for `layers` layers.
+pub fn profile_length(layers: u32) -> u32 {
+    2 * COSINES * layers
+}
+
+fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scattering {
+    match reflection {
+        Reflection::Strand(params) => {
+            let moments = StrandShading::new(params).moments();
+            let g = moments.mean_cosine.element_sum() / 3.0;
+            Scattering { albedo: moments.albedo.as_vec3(), g: g as f32 }
+        }
+        Reflection::KajiyaKay => {
+            let s = volume.statistics();
+            Scattering::kajiya_kay(s.k_d_mean as f32, s.k_s_mean as f32, p, MOST_ALBEDO)
+        }
+    }
+}
+
+fn profile(depths: Vec<f64>, scattering: Scattering) -> Arc<Profile> {
+    type Kept = (Vec<f64>, Scattering, Arc<Profile>);
+    static CACHE: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+    let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
+    let kept = match cache.iter().position(|kept| kept.0 == depths && kept.1 == scattering) {
+        Some(i) => cache.remove(i),
+        None => {
+            let profile = Arc::new(Profile::new(&depths, &scattering));
+            (depths, scattering, profile)
+        }
+    };
+    let profile = kept.2.clone();
+    cache.insert(0, kept);
+    cache.truncate(KEPT);
+    profile
+}

@@ -1,0 +1,248 @@
+//! Sheets of falling water: a profile from over the lip down to the foot, tessellated into quads.
+//!
+//! A point of the sheet is P(s) + w(s)·C(u): the profile, and the width times a cross-section of one shape. All
+//! rows are parallel, so that every quad is a trapezoid and planar, however the profile bends.
+
+use glam::{DVec2, DVec3, Vec2, Vec3};
+
+use super::{Material, Quad, QuadFault, QuadMap};
+
+/// Acceleration of gravity, m/s².
+pub const GRAVITY: f64 = 9.81;
+/// Straight pieces that each span of the spline is measured by: at a right angle's turn their length is short of
+/// the arc's by 1e-4.
+const PIECES: usize = 64;
+/// Least speed, as a share of that at the first point: the steepest arc of a splash, 87°, keeps 0.052 of it across.
+const SLOWEST: f64 = 0.05;
+
+/// What a sheet is made from.
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    /// The profile, metres: at least two, no two neighbours the same.
+    pub points: Vec<Vec3>,
+    /// Width at each point, metres.
+    pub widths: Vec<f32>,
+    /// Unit, along the rows.
+    pub across: Vec3,
+    /// Quads along the profile.
+    pub segments: u32,
+    /// Quads across, at least; eroded sides have borders of their own.
+    pub columns: u32,
+    /// Share of a full turn that the cross-section bends: 0 flat, 1 a tube.
+    pub round: f32,
+    /// Speed at the first point, m/s.
+    pub v0: f32,
+    /// From a texture laid evenly along the profile (0) to one laid by the time of the fall (1).
+    pub stretch: f32,
+    /// Where in the texture it begins, copies along u and v.
+    pub offset: Vec2,
+    /// How it ends.
+    pub ends: Ends,
+    /// On every quad; its copies are those of the whole sheet.
+    pub material: Material,
+    /// Of the material: [`Quad::mist`].
+    pub mist: f32,
+}
+
+/// How far ρ is eroded towards a sheet's borders.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ends {
+    /// Share of the half width over which the sides are eroded.
+    pub edge: f32,
+    /// Erosion at the foot; it grows with the square of the way.
+    pub breakup: f32,
+    /// Share of the way over which the foot fades to nothing.
+    pub fade: f32,
+    /// Share of the way over which the head grows from nothing.
+    pub head: f32,
+}
+
+impl Ends {
+    /// e at `u` across and the share `way` of the profile, both 0 to 1: no more is left of ρ than its sides,
+    /// break-up and fading leave each by itself.
+    pub fn erosion(&self, u: f32, way: f32) -> f32 {
+        let ramp = |from_end: f32, share: f32| match share > 0.0 {
+            true => (from_end / share).clamp(0.0, 1.0),
+            false => 1.0,
+        };
+        let sides = ramp(2.0 * u.min(1.0 - u).max(0.0), self.edge);
+        let broken = 1.0 - self.breakup * way * way;
+        1.0 - sides * broken * ramp(1.0 - way, self.fade) * ramp(way, self.head)
+    }
+
+    /// Places across where e has a corner.
+    fn borders(&self) -> [f32; 2] {
+        [0.5 * self.edge, 1.0 - 0.5 * self.edge]
+    }
+}
+
+/// A place on the profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// Metres.
+    pub point: DVec3,
+    /// Metres.
+    pub width: f64,
+    /// Arc length from the first point, metres.
+    pub arc: f64,
+    /// Time since the first point, seconds.
+    pub time: f64,
+}
+
+/// Why a sheet cannot be tessellated: which quad along and across, and its fault.
+#[derive(Clone, Copy, Debug)]
+pub struct SheetFault {
+    /// From the lip.
+    pub segment: usize,
+    /// From u = 0.
+    pub column: usize,
+    /// Of this quad.
+    pub fault: QuadFault,
+}
+
+impl Sheet {
+    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that rises
+    /// higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
+    pub fn stations(&self) -> Vec<Station> {
+        let mut stations: Vec<Station> = Vec::new();
+        for (point, width) in spline(&self.points, &self.widths) {
+            let next = match stations.last() {
+                Some(last) => self.next(last, point, width),
+                None => Station { point, width, arc: 0.0, time: 0.0 },
+            };
+            stations.push(next);
+        }
+        stations
+    }
+
+    /// At the end of the straight piece from `last` to `point`.
+    fn next(&self, last: &Station, point: DVec3, width: f64) -> Station {
+        let (v0, top) = (f64::from(self.v0), f64::from(self.points[0].y));
+        let least = (SLOWEST * v0).powi(2);
+        let speed = |point: DVec3| (v0 * v0 + 2.0 * GRAVITY * (top - point.y)).max(least).sqrt();
+        let step = point.distance(last.point);
+        let time = last.time + 2.0 * step / (speed(last.point) + speed(point));
+        Station { point, width, arc: last.arc + step, time }
+    }
+
+    /// Where along the texture, 0 to 1, a place on a profile that ends at `last` lies.
+    pub fn along(&self, at: &Station, last: &Station) -> f64 {
+        let stretch = f64::from(self.stretch);
+        (1.0 - stretch) * at.arc / last.arc + stretch * at.time / last.time
+    }
+
+    /// The rows' places: half by arc and half by texture, so that neither the bend at the lip nor the long
+    /// streaks at the foot are cut too coarsely.
+    pub fn rows(&self) -> Vec<Station> {
+        let stations = self.stations();
+        let last = stations[stations.len() - 1];
+        let place = |at: &Station| 0.5 * at.arc / last.arc + 0.5 * self.along(at, &last);
+        let mut piece = 0;
+        let row = |n: u32| {
+            if n == self.segments {
+                return last;
+            }
+            let wanted = f64::from(n) / f64::from(self.segments);
+            while piece + 2 < stations.len() && place(&stations[piece + 1]) <= wanted {
+                piece += 1;
+            }
+            let (a, b) = (&stations[piece], &stations[piece + 1]);
+            let part = ((wanted - place(a)) / (place(b) - place(a))).clamp(0.0, 1.0);
+            self.next(a, a.point.lerp(b.point, part), a.width + (b.width - a.width) * part)
+        };
+        (0..=self.segments).map(row).collect()
+    }
+
+    /// Borders between the columns, u from 0 to 1.
+    pub fn borders(&self) -> Vec<f32> {
+        let mut borders: Vec<f32> = (0..=self.columns).map(|i| i as f32 / self.columns as f32).collect();
+        if self.ends.edge > 0.0 {
+            for border in self.ends.borders() {
+                if borders.iter().all(|b| (b - border).abs() > 1e-3) {
+                    borders.push(border);
+                }
+            }
+            borders.sort_by(f32::total_cmp);
+        }
+        borders
+    }
+
+    /// The cross-section at u, in widths: along `across`, and out of the sheet. An arc as wide as the sheet.
+    fn section(&self, u: f32) -> DVec2 {
+        let turn = std::f64::consts::TAU * f64::from(self.round);
+        let angle = (f64::from(u) - 0.5) * turn;
+        if turn < 1e-3 {
+            return DVec2::new(f64::from(u) - 0.5, 0.0);
+        }
+        let radius = 0.5 / (0.5 * turn.min(std::f64::consts::PI)).sin();
+        DVec2::new(angle.sin(), angle.cos() - 1.0) * radius
+    }
+
+    /// Its quads, row by row from the lip, each from u = 0. Neighbours share corners, texture coordinates and
+    /// erosion to the last bit.
+    pub fn quads(&self) -> Result<Vec<Quad>, SheetFault> {
+        let rows = self.rows();
+        let (first, last) = (rows[0], rows[rows.len() - 1]);
+        let across = self.across.as_dvec3();
+        let out = (last.point - first.point).cross(across).normalize_or_zero();
+        let borders = self.borders();
+        let corner = |row: &Station, u: f32| {
+            let section = self.section(u) * row.width;
+            (row.point + across * section.x + out * section.y).as_vec3()
+        };
+        let repeat = Vec2::new(self.material.repeat_u, self.material.repeat_v);
+        let texture = |row: &Station, u: f32| {
+            let place = DVec2::new(f64::from(u), self.along(row, &last));
+            self.offset.as_dvec2() + place * repeat.as_dvec2()
+        };
+        let mut quads = Vec::new();
+        for (segment, ends) in rows.windows(2).enumerate() {
+            for (column, sides) in borders.windows(2).enumerate() {
+                let (u0, u1) = (sides[0], sides[1]);
+                let at = [(0, u0), (0, u1), (1, u1), (1, u0)];
+                let corners = at.map(|(row, u)| corner(&ends[row], u));
+                let map = QuadMap::new(corners).map_err(|fault| SheetFault { segment, column, fault })?;
+                let (from, to) = (texture(&ends[0], u0), texture(&ends[1], u1));
+                let extent = (to - from).as_vec2();
+                let material = Material { repeat_u: extent.x, repeat_v: extent.y, ..self.material };
+                let way = |row: usize| (ends[row].arc / last.arc) as f32;
+                let erosion = at.map(|(row, u)| self.ends.erosion(u, way(row)));
+                let (offset, mist) = (from.as_vec2(), self.mist);
+                quads.push(Quad { corners, map, material, offset, erosion, mist });
+            }
+        }
+        Ok(quads)
+    }
+}
+
+/// The centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and Keyser 2011:
+/// no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after the last point it
+/// is continued by their reflections. Widths are splines in the same knots, kept between their neighbours.
+fn spline(points: &[Vec3], widths: &[f32]) -> Vec<(DVec3, f64)> {
+    let n = points.len();
+    let node = |i: usize| points[i].as_dvec3().extend(f64::from(widths[i]));
+    let reflected = |end: usize, next: usize| node(end) * 2.0 - node(next);
+    let mut out = Vec::with_capacity((n - 1) * PIECES + 1);
+    for i in 0..n - 1 {
+        let before = if i == 0 { reflected(0, 1) } else { node(i - 1) };
+        let after = if i + 2 == n { reflected(n - 1, n - 2) } else { node(i + 2) };
+        let p = [before, node(i), node(i + 1), after];
+        let mut t = [0.0; 4];
+        for k in 1..4 {
+            t[k] = t[k - 1] + p[k].truncate().distance(p[k - 1].truncate()).sqrt();
+        }
+        for piece in 0..PIECES {
+            let at = t[1] + (t[2] - t[1]) * piece as f64 / PIECES as f64;
+            let mix = |a, b, from: usize, to: usize| -> glam::DVec4 {
+                let part = (at - t[from]) / (t[to] - t[from]);
+                a * (1.0 - part) + b * part
+            };
+            let [a1, a2, a3] = [mix(p[0], p[1], 0, 1), mix(p[1], p[2], 1, 2), mix(p[2], p[3], 2, 3)];
+            let here = mix(mix(a1, a2, 0, 2), mix(a2, a3, 1, 3), 1, 2);
+            out.push((here.truncate(), here.w.clamp(p[1].w.min(p[2].w), p[1].w.max(p[2].w))));
+        }
+    }
+    let last = node(n - 1);
+    out.push((last.truncate(), last.w));
+    out
+}

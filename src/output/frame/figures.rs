@@ -1,0 +1,199 @@
+//! Figures of a picture that can be added up from its parts.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::Kind;
+use super::exr_file::ExrLines;
+use super::png_file::PngRows;
+use crate::picture::Frame;
+use crate::util::error::Result;
+
+/// Sums are kept in these parts of one: adding whole numbers gives the same sum in any order.
+const UNIT: f64 = 65536.0;
+/// Brighter values count as this, so that the sum over the largest picture fits.
+const BRIGHTEST: f32 = 1_048_576.0;
+
+/// Figures of a whole picture, or of a part of one. Those of parts that do not overlap add up exactly to
+/// those of the whole.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Pixels.
+    pub pixels: u64,
+    /// Pixels with a volume quad in any sample.
+    pub covered_pixels: u64,
+    /// Cells of view rays, all samples.
+    pub cells_walked: u64,
+    /// Cells of light rays, all samples.
+    pub light_cells_walked: u64,
+    /// Pixels whose radiance or transmittance is infinite or not a number.
+    pub non_finite_pixels: u64,
+    /// Sum over the pixels of linear R, G, B, each at most 2²⁰ and rounded, in units of 2⁻¹⁶.
+    pub radiance_sum: [i128; 3],
+    /// The same of the transmittance.
+    pub transmittance_sum: i128,
+}
+
+impl Figures {
+    /// Of a frame.
+    pub fn of(frame: &Frame) -> Figures {
+        const CHUNK: usize = 1 << 14;
+        let chunks = frame.radiance.par_chunks(CHUNK).zip(frame.counts.par_chunks(CHUNK));
+        let sums = chunks.map(|(radiance, counts)| {
+            let mut sum = Figures { pixels: radiance.len() as u64, ..Default::default() };
+            for (value, count) in radiance.iter().zip(counts) {
+                sum.covered_pixels += u64::from(count[0] > 0);
+                sum.cells_walked += u64::from(count[0]);
+                sum.light_cells_walked += u64::from(count[1]);
+                sum.non_finite_pixels += u64::from(!value.iter().all(|x| x.is_finite()));
+                (0..3).for_each(|c| sum.radiance_sum[c] += fixed(value[c]));
+                sum.transmittance_sum += fixed(value[3]);
+            }
+            sum
+        });
+        sums.reduce(Figures::default, |mut a, b| {
+            a.add(&b);
+            a
+        })
+    }
+
+    /// Adds those of another part.
+    pub fn add(&mut self, other: &Figures) {
+        self.pixels = self.pixels.saturating_add(other.pixels);
+        self.covered_pixels = self.covered_pixels.saturating_add(other.covered_pixels);
+        self.cells_walked = self.cells_walked.saturating_add(other.cells_walked);
+        self.light_cells_walked = self.light_cells_walked.saturating_add(other.light_cells_walked);
+        self.non_finite_pixels = self.non_finite_pixels.saturating_add(other.non_finite_pixels);
+        for (sum, more) in self.radiance_sum.iter_mut().zip(other.radiance_sum) {
+            *sum = sum.saturating_add(more);
+        }
+        self.transmittance_sum = self.transmittance_sum.saturating_add(other.transmittance_sum);
+    }
+
+    /// Mean linear R, G, B of the pixels.
+    pub fn mean_radiance(&self) -> [f64; 3] {
+        self.radiance_sum.map(|sum| mean(sum, self.pixels))
+    }
+
+    /// Mean transmittance of the pixels.
+    pub fn mean_transmittance(&self) -> f64 {
+        mean(self.transmittance_sum, self.pixels)
+    }
+}
+
+/// Figures as far as a file tells them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KnownFigures {
+    /// Pixels of the file.
+    pub pixels: u64,
+    /// See [`Figures::covered_pixels`].
+    pub covered_pixels: Option<u64>,
+    /// See [`Figures::cells_walked`].
+    pub cells_walked: Option<u64>,
+    /// See [`Figures::light_cells_walked`].
+    pub light_cells_walked: Option<u64>,
+    /// See [`Figures::non_finite_pixels`].
+    pub non_finite_pixels: Option<u64>,
+    /// See [`Figures::radiance_sum`].
+    pub radiance_sum: Option<[i128; 3]>,
+    /// See [`Figures::transmittance_sum`].
+    pub transmittance_sum: Option<i128>,
+}
+
+impl From<Figures> for KnownFigures {
+    fn from(f: Figures) -> Self {
+        KnownFigures {
+            pixels: f.pixels,
+            covered_pixels: Some(f.covered_pixels),
+            cells_walked: Some(f.cells_walked),
+            light_cells_walked: Some(f.light_cells_walked),
+            non_finite_pixels: Some(f.non_finite_pixels),
+            radiance_sum: Some(f.radiance_sum),
+            transmittance_sum: Some(f.transmittance_sum),
+        }
+    }
+}
+
+impl KnownFigures {
+    /// Mean linear R, G, B of the pixels.
+    pub fn mean_radiance(&self) -> Option<[f64; 3]> {
+        self.radiance_sum.map(|sums| sums.map(|sum| mean(sum, self.pixels)))
+    }
+
+    /// Mean transmittance of the pixels.
+    pub fn mean_transmittance(&self) -> Option<f64> {
+        self.transmittance_sum.map(|sum| mean(sum, self.pixels))
+    }
+}
+
+fn mean(sum: i128, pixels: u64) -> f64 {
+    sum as f64 / UNIT / pixels.max(1) as f64
+}
+
+fn fixed(value: f32) -> i128 {
+    // NaN becomes 0.
+    (f64::from(value.clamp(-BRIGHTEST, BRIGHTEST)) * UNIT).round() as i64 as i128
+}
+
+/// The figures of a PNG from its text, or of an EXR from the layers it has. Reads and checks the whole
+/// file, in constant memory; errors are those of [`super::verify`].
+pub fn figures_of(path: &Path) -> Result<KnownFigures> {
+    match Kind::of(path)? {
+        Kind::Png => {
+            let mut rows = PngRows::open(path)?;
+            let pixels = rows.window.pixels();
+            rows.skip_rows()?;
+            let unknown = KnownFigures { pixels, ..Default::default() };
+            Ok(rows.finish()?.map_or(unknown, KnownFigures::from))
+        }
+        Kind::Exr => of_exr(ExrLines::open(path)?),
+    }
+}
+
+fn of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
+    let width = lines.window.width as usize;
+    let channel = |name: &str| lines.channels.iter().position(|c| c == name);
+    let rgb = channel("R").zip(channel("G")).zip(channel("B")).map(|((r, g), b)| [r, g, b]);
+    let (transmittance, cells) = (channel("transmittance.T"), channel("cells.N"));
+    let (mut radiance_sum, mut transmittance_sum) = ([0i128; 3], 0i128);
+    let (mut covered, mut walked, mut non_finite) = (0u64, 0u64, 0u64);
+    let mut line = Vec::new();
+    for _ in 0..lines.window.height {
+        lines.read_line(&mut line)?;
+        let value = |channel: usize, x: usize| -> f32 {
+            let at = 4 * (channel * width + x);
+            bytemuck::pod_read_unaligned(&line[at..at + 4])
+        };
+        for x in 0..width {
+            let mut finite = true;
+            if let Some(channels) = rgb {
+                for (sum, channel) in radiance_sum.iter_mut().zip(channels) {
+                    finite &= value(channel, x).is_finite();
+                    *sum += fixed(value(channel, x));
+                }
+            }
+            if let Some(t) = transmittance {
+                finite &= value(t, x).is_finite();
+                transmittance_sum += fixed(value(t, x));
+            }
+            if let Some(n) = cells {
+                covered += u64::from(value(n, x) > 0.0);
+                walked = walked.saturating_add(value(n, x) as u64);
+            }
+            non_finite += u64::from(!finite);
+        }
+    }
+    let pixels = lines.window.pixels();
+    lines.finish()?;
+    Ok(KnownFigures {
+        pixels,
+        covered_pixels: cells.map(|_| covered),
+        cells_walked: cells.map(|_| walked),
+        light_cells_walked: None,
+        non_finite_pixels: rgb.and(transmittance).map(|_| non_finite),
+        radiance_sum: rgb.map(|_| radiance_sum),
+        transmittance_sum: transmittance.map(|_| transmittance_sum),
+    })
+}

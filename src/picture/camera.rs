@@ -1,0 +1,145 @@
+//! The pinhole camera: rays through pixels, and the matrix that puts geometry under them.
+
+use std::sync::LazyLock;
+
+use glam::{DMat4, DVec4, Mat4, Vec3, Vec4};
+
+use super::{Filter, Image};
+use crate::util::window::Window;
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Metres.
+    pub eye: Vec3,
+    /// Unit, to the right of the image.
+    pub right: Vec3,
+    /// Unit, up in the image.
+    pub up: Vec3,
+    /// Unit, into the image.
+    pub forward: Vec3,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_fov: f32,
+    /// Near plane, metres along `forward`.
+    pub near: f32,
+}
+
+impl Camera {
+    /// Half the image plane at distance 1: (right, up), scaled by the field of view.
+    pub fn image_plane(&self, width: u32, height: u32) -> (Vec3, Vec3) {
+        let aspect = width as f32 / height as f32;
+        (self.right * (self.tan_half_fov * aspect), self.up * self.tan_half_fov)
+    }
+
+    /// Clip space with reversed infinite depth (z/w is 1 at the near plane, 0 at infinity): the sample
+    /// at `offset` inside each pixel comes to lie on the pixel's centre, where rasterisers look.
+    pub fn clip_from_world(&self, width: u32, height: u32, offset: [f32; 2]) -> Mat4 {
+        let (right, up) = self.image_plane(width, height);
+        // Rows of view coordinates in units of the image plane; the eye goes in with float64.
+        let row = |axis: Vec3, scale: f32| {
+            let axis64 = axis.as_dvec3() / scale as f64;
+            let moved = -axis64.dot(self.eye.as_dvec3());
+            axis64.as_vec3().extend(moved as f32)
+        };
+        let w = row(self.forward, 1.0);
+        let x = row(right, right.length_squared()) - w * ((2.0 * offset[0] - 1.0) / width as f32);
+        let y = row(up, up.length_squared()) + w * ((2.0 * offset[1] - 1.0) / height as f32);
+        let z = Vec4::new(0.0, 0.0, 0.0, self.near);
+        Mat4::from_cols(x, y, z, w).transpose()
+    }
+
+    /// Unit direction through a pixel of the whole image, at `offset` from its top left corner.
+    /// Twin: `view_ray` in `shaders/frame.wgsl`.
+    pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
+        let (right, up) = self.image_plane(width, height);
+        let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;
+        let y = 1.0 - 2.0 * (pixel[1] as f32 + offset[1]) / height as f32;
+        let d = self.forward + right * x + up * y;
+        d / d.dot(d).sqrt()
+    }
+}
+
+/// The clip space of a window from that of the whole image, in float64; the same bits where the window is
+/// the whole image.
+pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: Window) -> Mat4 {
+    let [w, h] = [width, height].map(f64::from);
+    let [x, y, window_w, window_h] = [window.x, window.y, window.width, window.height].map(f64::from);
+    let window_from_clip = DMat4::from_cols(
+        DVec4::new(w / window_w, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, h / window_h, 0.0, 0.0),
+        DVec4::Z,
+        DVec4::new((w - 2.0 * x) / window_w - 1.0, 1.0 - (h - 2.0 * y) / window_h, 0.0, 1.0),
+    );
+    (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
+}
+
+/// Where sample `sample` of an image's lies from the top left corner of a pixel: in the centre for one sample, else
+/// by the R2 sequence (Roberts 2018), which fills a square evenly for any number and needs no random numbers. A
+/// filter other than the box bends the square, so that samples lie as densely as it weighs (Ernst, Stamminger and
+/// Greiner, "Filter Importance Sampling", 2006): every pixel has its own samples, and their mean stays plain.
+pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
+    if image.samples == 1 {
+        return [0.5, 0.5];
+    }
+    // Powers of the inverse of the plastic number.
+    const A: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    let even = A.map(|a| (0.5 + a * sample as f64).fract());
+    match image.filter {
+        Filter::Box => even.map(|x| x as f32),
+        Filter::Gaussian => even.map(|x| (0.5 + GAUSSIAN.quantile(x)) as f32),
+        Filter::BlackmanHarris => even.map(|x| (0.5 + BLACKMAN_HARRIS.quantile(x)) as f32),
+    }
+}
+
+/// Half the width of the filters but the box, pixels.
+pub const FILTER_RADIUS: f64 = 1.5;
+/// Steps of the table on either side: with them a sample lies within 10⁻⁵ pixels of its place.
+const STEPS: usize = 1024;
+
+static GAUSSIAN: LazyLock<Quantiles> = LazyLock::new(|| {
+    const SIGMA: f64 = 0.5;
+    Quantiles::new(|x| (-x * x / (2.0 * SIGMA * SIGMA)).exp())
+});
+
+/// Harris, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform", 1978.
+static BLACKMAN_HARRIS: LazyLock<Quantiles> = LazyLock::new(|| {
+    Quantiles::new(|x| {
+        let a = std::f64::consts::PI * x / FILTER_RADIUS;
+        0.35875 + 0.48829 * a.cos() + 0.14128 * (2.0 * a).cos() + 0.01168 * (3.0 * a).cos()
+    })
+});
+
+/// The share of a symmetric filter between 0 and each step of its radius.
+struct Quantiles(Vec<f64>);
+
+impl Quantiles {
+    /// Of a filter that is above 0 inside its radius.
+    fn new(weight: impl Fn(f64) -> f64) -> Self {
+        let step = FILTER_RADIUS / STEPS as f64;
+        let mut sum = 0.0;
+        let mut shares = vec![0.0];
+        for i in 0..STEPS {
+            // Simpson's rule.
+            let [a, m, b] = [0.0, 0.5, 1.0].map(|part| weight((i as f64 + part) * step));
+            sum += a + 4.0 * m + b;
+            shares.push(sum);
+        }
+        Quantiles(shares.into_iter().map(|share| share / sum).collect())
+    }
+
+    /// Pixels from the middle that the share `p` of the filter lies before.
+    fn quantile(&self, p: f64) -> f64 {
+        let wanted = (2.0 * p - 1.0).abs();
+        let above = self.0.partition_point(|&share| share <= wanted).clamp(1, STEPS);
+        let (a, b) = (self.0[above - 1], self.0[above]);
+        let place = (above - 1) as f64 + ((wanted - a) / (b - a)).min(1.0);
+        (place * FILTER_RADIUS / STEPS as f64).copysign(p - 0.5)
+    }
+}
+
+/// Solid angle of the pixel in the middle of the image, over its number of samples.
+pub fn footprint(camera: &Camera, image: &Image) -> f32 {
+    let (right, up) = camera.image_plane(image.width, image.height);
+    let pixels = image.width as f32 * image.height as f32;
+    4.0 * (right.length() * up.length()) / (pixels * image.samples as f32)
+}

@@ -1,0 +1,19 @@
+//! The picture: camera, the linear frame, and how it becomes an image.
+
+pub mod bloom;
+mod budget;
+pub mod camera;
+pub mod develop;
+mod frame;
+mod grid;
+mod image;
+pub mod resolve;
+pub mod white_balance;
+
+pub use budget::{PICTURE_BYTES, canvas, canvas_bytes, check_image, target_bytes};
+pub(crate) use budget::{PIXEL_BYTES, SURFACE_BYTES};
+pub use camera::Camera;
+pub use develop::{Develop, TONE_AGX, TONE_FILMIC};
+pub use frame::{Frame, Layer, Seconds, Surface};
+pub use grid::Grid;
+pub use image::{AutoExposure, Filter, Image, Look, Tone};

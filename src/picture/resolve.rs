@@ -1,0 +1,86 @@
+//! The picture from linear radiance, on the CPU. Twin: `shaders/resolve.wgsl`.
+
+use rayon::prelude::*;
+
+use super::bloom::Bloom;
+use super::{Develop, Frame, Look, TONE_AGX, TONE_FILMIC};
+
+/// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
+fn filmic(x: f32) -> f32 {
+    (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
+}
+
+/// IEC 61966-2-1.
+fn srgb(x: f32) -> f32 {
+    if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023: primaries drawn in towards white,
+/// the curve over 16.5 stops about 0.18, and primaries drawn out again. What comes out is encoded for a display.
+fn agx(x: [f32; 3]) -> [f32; 3] {
+    const LEAST_EV: f32 = -12.47393;
+    const MOST_EV: f32 = 4.026069;
+    let drawn_in = [
+        0.842_479 * x[0] + 0.078_433_6 * x[1] + 0.079_223_745 * x[2],
+        0.042_328_24 * x[0] + 0.878_468_6 * x[1] + 0.079_166_13 * x[2],
+        0.042_375_655 * x[0] + 0.078_433_6 * x[1] + 0.879_143 * x[2],
+    ];
+    let v = drawn_in.map(|x| {
+        let ev = x.max(1e-10).log2().clamp(LEAST_EV, MOST_EV);
+        agx_curve((ev - LEAST_EV) / (MOST_EV - LEAST_EV))
+    });
+    [
+        1.196_879 * v[0] - 0.098_020_88 * v[1] - 0.099_029_74 * v[2],
+        -0.052_896_85 * v[0] + 1.151_903_1 * v[1] - 0.098_961_18 * v[2],
+        -0.052_971_635 * v[0] - 0.098_043_45 * v[1] + 1.151_073_7 * v[2],
+    ]
+}
+
+/// Wrensch's fit of AgX's curve.
+fn agx_curve(x: f32) -> f32 {
+    (((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x - 0.00232
+}
+
+fn byte(encoded: f32) -> u8 {
+    (encoded.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// Makes a picture's pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Resolver(Develop);
+
+impl Resolver {
+    /// For pictures that look so.
+    pub fn new(look: &Look) -> Self {
+        Resolver(Develop::new(look))
+    }
+
+    /// White balance, exposure, tone curve, encoding and 8 bits of one pixel; alpha is 255.
+    pub fn pixel(&self, linear: [f32; 4]) -> [u8; 4] {
+        let develop = &self.0;
+        let mut rgb = [linear[0], linear[1], linear[2]];
+        if develop.balanced != 0 {
+            rgb = develop.balance.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]);
+        }
+        // Past 10⁴ all curves are flat; the bound keeps their squares finite.
+        let x = rgb.map(|x| (x * develop.exposure).clamp(0.0, 1e4));
+        let [r, g, b] = match develop.tone {
+            TONE_AGX => agx(x).map(byte),
+            TONE_FILMIC => x.map(|x| byte(srgb(filmic(x).clamp(0.0, 1.0)))),
+            _ => x.map(|x| byte(srgb(x.clamp(0.0, 1.0)))),
+        };
+        [r, g, b, 255]
+    }
+}
+
+/// Makes the picture of a frame from its radiance. Bloom is that of a whole image: a part of one gets none.
+pub fn develop(frame: &mut Frame, look: &Look, whole: bool) {
+    let resolver = Resolver::new(look);
+    let picture = frame.picture.par_iter_mut().enumerate();
+    if whole && look.bloom > 0.0 {
+        let bloom = Bloom::new(&frame.radiance, frame.width as usize, frame.height as usize, look);
+        picture.for_each(|(i, picture)| *picture = resolver.pixel(bloom.pixel(i)));
+    } else {
+        picture.for_each(|(i, picture)| *picture = resolver.pixel(frame.radiance[i]));
+    }
+}

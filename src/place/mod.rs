@@ -1,0 +1,12 @@
+//! The place that water is in: rock, pools, and the mesh of both.
+
+mod mesh;
+mod pool;
+mod rock;
+pub mod tiles;
+mod vertex;
+
+pub use mesh::{BUILDER_VERSION, Ground, Mesh};
+pub use pool::{MAX_POOLS, Pool};
+pub use rock::{MAX_LEVELS, Rock, wet::wet_albedo, wet::wetness};
+pub use vertex::Vertex;

@@ -1,0 +1,116 @@
+//! Pools: level water that falls end in, as part of the opaque mesh. What it looks like is in [`crate::engine::pool_surface`].
+
+use glam::Vec3;
+
+use super::Vertex;
+use super::rock::wet::nearest_on_triangle;
+
+/// Most pools of a scene.
+pub const MAX_POOLS: usize = 8;
+/// Squares on a side of the mesh of a pool, which holds depth and foam; waves are finer, and made for each pixel.
+const SQUARES: usize = 128;
+/// Foam along the shore, where water is shallower than this; metres.
+const SHORE: f32 = 0.05;
+
+/// What a pool is made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pool {
+    /// The scene's name for it.
+    pub name: String,
+    /// Corners, counter-clockwise seen from above, at one height; metres.
+    pub corners: [Vec3; 4],
+    /// Greatest depth, metres; less where rock is.
+    pub depth: f32,
+    /// Albedo of water so deep that nothing is seen below it.
+    pub color: Vec3,
+    /// Albedo of the ground.
+    pub bottom: Vec3,
+    /// Absorption, 1/m.
+    pub absorption: Vec3,
+    /// Standard deviation of the surface's height, metres.
+    pub height: f32,
+    /// Longest wave, metres.
+    pub wavelength: f32,
+    /// Amplitude of the rings where water falls in, metres.
+    pub rings: f32,
+    /// Seconds in which the volume moves once through its length; the waves repeat with it.
+    pub period: f32,
+    /// Density of the foam where water falls in, 0 to 1.
+    pub foam: f32,
+    /// Metres from there to where there is none.
+    pub foam_reach: f32,
+    /// Seed of the waves.
+    pub seed: u64,
+}
+
+impl Pool {
+    /// Squares on a side of its mesh.
+    pub const SQUARES: usize = SQUARES;
+    /// Vertices of its mesh.
+    pub const VERTICES: usize = (SQUARES + 1) * (SQUARES + 1);
+
+    /// Height of the surface.
+    pub fn level(&self) -> f32 {
+        self.corners[0].y
+    }
+
+    /// The parts of its level at which the quads `water` go through it, as two ends each.
+    pub fn impacts(&self, water: &[[Vec3; 4]]) -> Vec<[Vec3; 2]> {
+        let level = self.level();
+        let mut impacts = Vec::new();
+        for corners in water {
+            let mut ends = Vec::new();
+            for i in 0..4 {
+                let (a, b) = (corners[i], corners[(i + 1) % 4]);
+                if (a.y > level) != (b.y > level) {
+                    ends.push(a.lerp(b, (level - a.y) / (b.y - a.y)));
+                }
+            }
+            if let [a, b] = ends[..]
+                && self.holds((a + b) * 0.5)
+            {
+                impacts.push([a, b]);
+            }
+        }
+        impacts
+    }
+
+    /// Whether a point is above or below it.
+    pub fn holds(&self, p: Vec3) -> bool {
+        let side = |i: usize| {
+            let (a, b) = (self.corners[i], self.corners[(i + 1) % 4]);
+            (b - a).cross(p - a).y >= 0.0
+        };
+        (0..4).all(side)
+    }
+
+    pub(super) fn add_vertices(&self, number: u32, vertices: &mut Vec<Vertex>) {
+        let [a, b, c, d] = self.corners;
+        for y in 0..=SQUARES {
+            for x in 0..=SQUARES {
+                let (u, v) = (x as f32 / SQUARES as f32, y as f32 / SQUARES as f32);
+                let position = a.lerp(b, u).lerp(d.lerp(c, u), v).with_y(self.level());
+                vertices.push(Vertex {
+                    position: position.to_array(),
+                    normal: [0.0, 1.0, 0.0],
+                    pool: number,
+                    ..Vertex::default()
+                });
+            }
+        }
+    }
+
+    /// Sets depth and foam of its vertices, over ground of these heights.
+    pub(super) fn fill(&self, vertices: &mut [Vertex], ground: &[f32], water: &[[Vec3; 4]]) {
+        let impacts = self.impacts(water);
+        for (vertex, ground) in vertices.iter_mut().zip(ground) {
+            let p = Vec3::from(vertex.position);
+            let away = |[a, b]: &[Vec3; 2]| p.distance(nearest_on_triangle(p, [*a, *b, *b]));
+            let metres = impacts.iter().map(away).fold(self.foam_reach, f32::min);
+            let near = 1.0 - metres / self.foam_reach;
+            let depth = (self.level() - ground).clamp(0.0, self.depth);
+            let shore = 0.45 * (1.0 - depth / SHORE).max(0.0);
+            vertex.albedo = [depth, self.foam * (near * near * (3.0 - 2.0 * near)).max(shore), 0.0];
+        }
+    }
+}

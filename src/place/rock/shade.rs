@@ -1,0 +1,195 @@
+//! What rock takes of the light of rock: depth maps seen along a direction (Williams 1978), looked up at every
+//! vertex. One towards the sun gives its shadow, many over the upper half of the sphere how much of the
+//! surroundings a vertex does not see (Pharr and Green 2004).
+
+use std::f32::consts::PI;
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Rock;
+use crate::place::Vertex;
+
+/// Directions that stand for the surroundings: twice as many change the occlusion by some hundredths.
+const DIRECTIONS: u32 = 48;
+/// Cells on a side of the map for one of them; it sees the mesh with a sixteenth of its triangles.
+const SIDE: usize = 224;
+/// Cells on a side of the sun's map: 2 cm for rocks of 20 m.
+const SUN_SIDE: usize = 1024;
+
+/// How far along a direction the rocks reach, over a plane across it.
+struct DepthMap {
+    x: Vec3,
+    y: Vec3,
+    to_light: Vec3,
+    origin: [f32; 2],
+    /// Metres.
+    cell: f32,
+    side: usize,
+    depth: Vec<f32>,
+}
+
+/// Vertices that are shaded, and by how much where nothing arrives.
+pub type Taker = (f32, Range<usize>);
+
+/// Sets the vertices' occlusion by the rocks that have one.
+pub fn occlude(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut [Vertex]) {
+    let casters = triangles(rocks, |rock| rock.occlusion, 4);
+    if casters.is_empty() {
+        return;
+    }
+    let maps: Vec<DepthMap> = (0..DIRECTIONS)
+        .into_par_iter()
+        .map(|i| DepthMap::new(&casters, vertices, direction(i), SIDE))
+        .collect();
+    for (amount, own) in takers {
+        if *amount == 0.0 {
+            continue;
+        }
+        vertices[own.clone()].par_iter_mut().for_each(|vertex| {
+            let (point, n) = (Vec3::from(vertex.position), Vec3::from(vertex.normal));
+            let (mut all, mut seen) = (0.0, 0.0);
+            for map in &maps {
+                let cos = n.dot(map.to_light);
+                if cos > 0.0 {
+                    all += cos;
+                    seen += cos * map.lit(point, n);
+                }
+            }
+            vertex.occlusion = amount * (1.0 - seen / f32::max(all, 1e-6));
+        });
+    }
+}
+
+/// Sets the vertices' shadow from a light infinitely far off, by the rocks that have one.
+pub fn shadow(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut [Vertex], to_light: Vec3) {
+    let casters = triangles(rocks, |rock| rock.shadow, 1);
+    if casters.is_empty() {
+        return;
+    }
+    let map = DepthMap::new(&casters, vertices, to_light, SUN_SIDE);
+    for (amount, own) in takers {
+        vertices[own.clone()].par_iter_mut().for_each(|vertex| {
+            vertex.shadow = amount * (1.0 - map.lit(vertex.position.into(), vertex.normal.into()));
+        });
+    }
+}
+
+/// Highest point of the rocks above or below each of the vertices in `own`; −∞ where there is none.
+pub fn heights(rocks: &[(&Rock, Range<usize>)], vertices: &[Vertex], own: Range<usize>) -> Vec<f32> {
+    let casters = triangles(rocks, |_| 1.0, 1);
+    if casters.is_empty() {
+        return vec![f32::NEG_INFINITY; own.len()];
+    }
+    let map = DepthMap::new(&casters, vertices, Vec3::Y, SUN_SIDE);
+    vertices[own].iter().map(|vertex| map.at(vertex.position.into())).collect()
+}
+
+/// The `i`-th direction of a spiral over the upper half of the sphere, all with the same solid angle.
+fn direction(i: u32) -> Vec3 {
+    let y = (i as f32 + 0.5) / DIRECTIONS as f32;
+    let (sin, cos) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();
+    let r = (1.0 - y * y).sqrt();
+    Vec3::new(r * cos, y, r * sin)
+}
+
+/// Every `step`-th vertex's triangles of the rocks that have `what`.
+fn triangles(rocks: &[(&Rock, Range<usize>)], what: fn(&Rock) -> f32, step: u32) -> Vec<u32> {
+    let mut indices = Vec::new();
+    for (rock, own) in rocks.iter().filter(|(rock, _)| what(rock) > 0.0) {
+        rock.add_triangles(own.start as u32, step.min(1 << rock.levels), &mut indices);
+    }
+    indices
+}
+
+impl DepthMap {
+    fn new(indices: &[u32], vertices: &[Vertex], to_light: Vec3, side: usize) -> DepthMap {
+        let (x, y) = to_light.any_orthonormal_pair();
+        let mut map = DepthMap {
+            x,
+            y,
+            to_light,
+            origin: [0.0; 2],
+            cell: 1.0,
+            side,
+            depth: vec![f32::NEG_INFINITY; side * side],
+        };
+        let corner = |i: u32| Vec3::from(vertices[i as usize].position);
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for &i in indices {
+            let p = corner(i);
+            for (axis, c) in [p.dot(x), p.dot(y)].into_iter().enumerate() {
+                low[axis] = low[axis].min(c);
+                high[axis] = high[axis].max(c);
+            }
+        }
+        map.origin = low;
+        map.cell = ((high[0] - low[0]).max(high[1] - low[1]) / side as f32).max(1e-6);
+        for t in indices.chunks_exact(3) {
+            map.draw([t[0], t[1], t[2]].map(corner));
+        }
+        map
+    }
+
+    /// In cells across, and metres along.
+    fn project(&self, p: Vec3) -> Vec3 {
+        let [left, low] = self.origin;
+        Vec3::new((p.dot(self.x) - left) / self.cell, (p.dot(self.y) - low) / self.cell, p.dot(self.to_light))
+    }
+
+    fn draw(&mut self, corners: [Vec3; 3]) {
+        let [a, b, c] = corners.map(|p| self.project(p));
+        let (ab, ac) = (b - a, c - a);
+        let area = ab.x * ac.y - ab.y * ac.x;
+        if area == 0.0 {
+            return;
+        }
+        let cells = |p: f32, q: f32, r: f32| {
+            let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+            (low - 0.5).ceil().max(0.0) as usize..((high + 0.5).floor().max(0.0) as usize).min(self.side)
+        };
+        let (columns, rows) = (cells(a.x, b.x, c.x), cells(a.y, b.y, c.y));
+        for row in rows {
+            for column in columns.clone() {
+                let (x, y) = (column as f32 + 0.5 - a.x, row as f32 + 0.5 - a.y);
+                let (u, v) = ((x * ac.y - y * ac.x) / area, (ab.x * y - ab.y * x) / area);
+                // A little more than the triangle, so that neighbours leave no gap.
+                if u >= -1e-4 && v >= -1e-4 && u + v <= 1.0 + 1e-4 {
+                    let depth = &mut self.depth[row * self.side + column];
+                    *depth = depth.max(a.z + u * ab.z + v * ac.z);
+                }
+            }
+        }
+    }
+
+    /// The depth in the cell of a point.
+    fn at(&self, point: Vec3) -> f32 {
+        let p = self.project(point);
+        let inside = |c: f32| c >= 0.0 && c < self.side as f32;
+        if inside(p.x) && inside(p.y) {
+            self.depth[p.y as usize * self.side + p.x as usize]
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+
+    /// Share of the light that reaches a point of a surface with normal `n`: of the four cells around it, those
+    /// that nothing nearer to the light covers (Reeves, Salesin and Cook 1987). The point is taken two cells off
+    /// the surface, for a cell has one depth, and a surface aslant many.
+    fn lit(&self, point: Vec3, n: Vec3) -> f32 {
+        let p = self.project(point + (n + self.to_light) * (1.5 * self.cell));
+        let (x, y) = (p.x - 0.5, p.y - 0.5);
+        let (left, low) = (x.floor(), y.floor());
+        let (f, g) = (x - left, y - low);
+        let open = |dx: f32, dy: f32| {
+            let (column, row) = (left + dx, low + dy);
+            let inside = |c: f32| c >= 0.0 && c < self.side as f32;
+            let covered =
+                inside(column) && inside(row) && self.depth[row as usize * self.side + column as usize] > p.z;
+            if covered { 0.0 } else { 1.0 }
+        };
+        (open(0.0, 0.0) * (1.0 - f) + open(1.0, 0.0) * f) * (1.0 - g)
+            + (open(0.0, 1.0) * (1.0 - f) + open(1.0, 1.0) * f) * g
+    }
+}

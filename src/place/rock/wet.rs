@@ -1,0 +1,107 @@
+//! Rock that water wets: where it is near falling water, below it, or in a pool.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Rock;
+use crate::place::{Pool, Vertex};
+
+/// Water runs down this many times as far as it spreads.
+const RUN: f32 = 4.0;
+/// Share of light that a film sends back before it reaches the rock, n = 1.33, at normal incidence.
+const OUTSIDE: f32 = 0.02;
+/// Share of diffuse light that the film sends back to the rock: 1 − (1 − 0.066)/n², 0.066 being what water reflects
+/// of light from all sides (Lekner and Dorf 1988).
+const INSIDE: f32 = 0.474;
+
+/// Albedo of rock under a film of water, from that of dry rock: what comes through the film, is reflected, and gets
+/// out again after any number of reflections between the two (Ångström 1925; Lekner and Dorf 1988, without the
+/// smaller reflection of the rock itself against water).
+pub fn wet_albedo(dry: Vec3) -> Vec3 {
+    (1.0 - OUTSIDE) * (1.0 - INSIDE) * dry / (1.0 - INSIDE * dry.min(Vec3::ONE))
+}
+
+/// How wet a point is at `metres` from the water: 1 on it, 0 at `reach`.
+pub fn wetness(metres: f32, reach: f32) -> f32 {
+    let x = (1.0 - metres / reach).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// A quad as two triangles, and a ball around all that can be wet from it.
+struct Source {
+    corners: [Vec3; 4],
+    middle: Vec3,
+    radius: f32,
+}
+
+/// A pool wets the rock above it this share as far as falling water does.
+const SPLASH: f32 = 0.5;
+
+/// Wets the vertices of rocks near the quads `water`, and in and over pools.
+pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[Vec3; 4]], pools: &[Pool]) {
+    let sources: Vec<Source> = water
+        .iter()
+        .map(|&corners| {
+            let middle = corners.iter().sum::<Vec3>() / 4.0;
+            let radius = corners.iter().map(|c| c.distance(middle)).fold(0.0, f32::max);
+            Source { corners, middle, radius }
+        })
+        .collect();
+    for (rock, own) in rocks {
+        if rock.wet == 0.0 || (sources.is_empty() && pools.is_empty()) {
+            continue;
+        }
+        vertices[own.clone()].par_iter_mut().for_each(|vertex| {
+            let (point, reach) = (Vec3::from(vertex.position), rock.wet_reach);
+            let over = pools.iter().filter(|pool| pool.holds(point));
+            let above = over.map(|pool| (point.y - pool.level()).max(0.0) / SPLASH).fold(reach, f32::min);
+            let wet = rock.wet * wetness(distance(&sources, point, above), reach);
+            if wet > 0.0 {
+                let dry = Vec3::from_array(vertex.albedo);
+                vertex.albedo = dry.lerp(wet_albedo(dry), wet).to_array();
+                vertex.wet = wet;
+            }
+        });
+    }
+}
+
+/// Metres from the nearest source, those down from it divided by [`RUN`]; at least `reach` where it is that far.
+fn distance(sources: &[Source], point: Vec3, reach: f32) -> f32 {
+    let mut best = reach;
+    for source in sources {
+        let away = point - source.middle;
+        let down = (-away.y - source.radius).max(0.0) / RUN;
+        let ball = source.radius + best;
+        if away.x * away.x + away.z * away.z > ball * ball || away.y > ball || down > best {
+            continue;
+        }
+        let [a, b, c, d] = source.corners;
+        for corners in [[a, b, c], [a, c, d]] {
+            let mut away = point - nearest_on_triangle(point, corners);
+            if away.y < 0.0 {
+                away.y /= RUN;
+            }
+            best = best.min(away.length());
+        }
+    }
+    best
+}
+
+/// The point of a triangle nearest to `p` (Ericson 2005, Real-Time Collision Detection, 5.1.5: by Voronoi regions).
+pub fn nearest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    let (ab, ac) = (b - a, c - a);
+    let n = ab.cross(ac);
+    let inside = |from: Vec3, to: Vec3| (to - from).cross(p - from).dot(n) >= 0.0;
+    if n != Vec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {
+        return p - n * ((p - a).dot(n) / n.length_squared());
+    }
+    let on_edge = |from: Vec3, to: Vec3| {
+        let edge = to - from;
+        from + edge * ((p - from).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0)
+    };
+    let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    let nearer = |x: Vec3, y: Vec3| if x.distance_squared(p) <= y.distance_squared(p) { x } else { y };
+    nearer(nearer(edges[0], edges[1]), edges[2])
+}

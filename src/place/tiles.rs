@@ -1,0 +1,254 @@
+//! The opaque mesh as tiles, of whose vertices a picture takes as few as it can do with.
+//!
+//! Rocks and pools are grids of squares, cut into tiles. Of a tile every 1st, 2nd, 4th … vertex is drawn (de Boer, "Fast
+//! Terrain Rendering Using Geometrical MipMapping", 2000), and what is shaded comes from all of them: a sample finds its
+//! place on the grid, and there mixes the three nearest vertices as if all were drawn. So a coarser tile costs the outline
+//! and the depth some exactness, and normals, albedo and shadows none.
+
+use std::sync::LazyLock;
+
+use glam::{Vec2, Vec3};
+
+use super::Vertex;
+use crate::picture::{Camera, Image};
+
+/// Squares on a side of a tile, where its grid has as many: twice as many would be drawn that lie out of view, half as many
+/// are drawn one by one for long.
+pub const SIDE: u32 = 16;
+/// Steps: 1, 2, 4, 8 and 16.
+const STEPS: usize = 5;
+
+/// A square part of a grid of vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// Number of its first vertex.
+    pub first: u32,
+    /// Vertices in a row of its grid.
+    pub pitch: u32,
+    /// Squares on a side, [`SIDE`] or a smaller power of two.
+    pub side: u32,
+    /// Number of the pool plus 1; 0: rock.
+    pub pool: u32,
+    /// The tiles of the same grid at its edges y = 0, x = side, y = side and x = 0.
+    pub neighbours: [Option<u32>; 4],
+    /// The box it lies in, metres.
+    pub low: Vec3,
+    /// Its other corner.
+    pub high: Vec3,
+    /// Unit normal of the grid's patch.
+    out: Vec3,
+    /// How far vertices lie from what is drawn in their place with each step, along `out` and across it: the root of the mean
+    /// square, or a third of the most where that is more; metres.
+    lost: [Vec2; STEPS],
+}
+
+/// Cuts grids into tiles: one after the other they have `squares` squares a side, a power of two.
+pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile> {
+    let mut tiles = Vec::new();
+    let mut first = 0;
+    for squares in squares {
+        let (side, pitch) = (squares.min(SIDE), squares + 1);
+        let (across, number) = (squares / side, tiles.len() as u32);
+        let corner = |x, y| Vec3::from(vertices[(first + y * pitch + x) as usize].position);
+        let diagonals = [corner(squares, squares) - corner(0, 0), corner(0, squares) - corner(squares, 0)];
+        let out = diagonals[0].cross(diagonals[1]).normalize_or(Vec3::Z);
+        for y in 0..across {
+            for x in 0..across {
+                let own = number + y * across + x;
+                let mut tile = Tile {
+                    first: first + (y * pitch + x) * side,
+                    pitch,
+                    side,
+                    pool: vertices[first as usize].pool,
+                    neighbours: [
+                        (y > 0).then(|| own - across),
+                        (x + 1 < across).then_some(own + 1),
+                        (y + 1 < across).then_some(own + across),
+                        (x > 0).then(|| own - 1),
+                    ],
+                    low: Vec3::INFINITY,
+                    high: Vec3::NEG_INFINITY,
+                    out,
+                    lost: [Vec2::ZERO; STEPS],
+                };
+                tile.measure(vertices);
+                tiles.push(tile);
+            }
+        }
+        first += pitch * pitch;
+    }
+    tiles
+}
+
+/// The step of each tile that an image takes.
+///
+/// A vertex that is left out lies about `lost` from the triangle in its place. With θ between the patch's normal and the
+/// view, what is seen of that at most is lost · (sin θ, 1); at a depth z and a distance r it moves a point of the
+/// picture, whose focal length is f pixels, by no more than f·r/z² times as much. That is at most `image.rock_error` of the distance
+/// between samples, 1/√samples pixels: what moves less falls between them. Tiles beside each other differ by one step at
+/// most. Windows and samples of one image take the same.
+pub fn steps(tiles: &[Tile], camera: &Camera, image: &Image) -> Vec<u32> {
+    let focal = 0.5 * f64::from(image.height) / f64::from(camera.tan_half_fov);
+    let most = f64::from(image.rock_error) / (f64::from(image.samples).sqrt() * focal);
+    let mut steps: Vec<u32> = tiles.iter().map(|tile| tile.step(camera, most)).collect();
+    // Where neighbours are made finer theirs may have to be.
+    let mut changed = true;
+    while changed {
+        changed = false;
+        for (i, tile) in tiles.iter().enumerate() {
+            let around = tile.neighbours.iter().flatten().map(|&other| steps[other as usize]);
+            let most = 2 * around.min().unwrap_or(SIDE);
+            if steps[i] > most {
+                steps[i] = most;
+                changed = true;
+            }
+        }
+    }
+    steps
+}
+
+/// Which of a tile's edges lie at coarser tiles.
+pub fn coarser(tiles: &[Tile], steps: &[u32], tile: usize) -> [bool; 4] {
+    tiles[tile].neighbours.map(|other| other.is_some_and(|other| steps[other as usize] > steps[tile]))
+}
+
+/// A tile's triangles, as numbers of corners: [`place`] tells where they are. At an edge with a coarser tile every
+/// other vertex moves to the one before it, so that both have the same edges there.
+pub fn triangles(side: u32, step: u32, coarser: [bool; 4]) -> &'static [u16] {
+    list(list_number(side, step, coarser))
+}
+
+/// Lists of triangles that there are.
+pub const LISTS: usize = STEPS * STEPS * 16;
+
+/// Which of them [`triangles`] gives.
+pub fn list_number(side: u32, step: u32, coarser: [bool; 4]) -> usize {
+    let edges: usize = (0..4).map(|edge| usize::from(coarser[edge]) << edge).sum();
+    (side.ilog2() as usize * STEPS + step.ilog2() as usize) * 16 + edges
+}
+
+/// One of them; empty where the step is larger than the side.
+pub fn list(number: usize) -> &'static [u16] {
+    static LISTS_MADE: LazyLock<Vec<Vec<u16>>> = LazyLock::new(|| {
+        let made = |number: usize| {
+            let [side, step] = [number / 16 / STEPS, number / 16 % STEPS].map(|k| 1u32 << k);
+            make_list(side, step, [0, 1, 2, 3].map(|edge| number >> edge & 1 == 1))
+        };
+        (0..LISTS).map(made).collect()
+    });
+    &LISTS_MADE[number]
+}
+
+/// Column and row of a corner in its tile.
+pub fn place(corner: u16) -> [u32; 2] {
+    let corner = u32::from(corner);
+    [corner % (SIDE + 1), corner / (SIDE + 1)]
+}
+
+/// The same, in squares.
+pub fn at(corner: u16) -> Vec2 {
+    Vec2::from(place(corner).map(|i| i as f32))
+}
+
+fn make_list(side: u32, step: u32, coarser: [bool; 4]) -> Vec<u16> {
+    if step > side {
+        return Vec::new();
+    }
+    let corner = |x: u32, y: u32| {
+        let moved = |at: u32, moves: bool| if moves { at & !(2 * step - 1) } else { at };
+        let x_moves = (y == 0 && coarser[0]) || (y == side && coarser[2]);
+        let y_moves = (x == 0 && coarser[3]) || (x == side && coarser[1]);
+        (moved(y, y_moves) * (SIDE + 1) + moved(x, x_moves)) as u16
+    };
+    let mut out = Vec::new();
+    for y in (0..side).step_by(step as usize) {
+        for x in (0..side).step_by(step as usize) {
+            let (right, up) = (x + step, y + step);
+            let [a, b, c, d] = [corner(x, y), corner(right, y), corner(right, up), corner(x, up)];
+            for triangle in [[a, b, c], [a, c, d]] {
+                if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
+                    out.extend(triangle);
+                }
+            }
+        }
+    }
+    out
+}
+
+impl Tile {
+    /// Number of the vertex in a column and row.
+    pub fn vertex(&self, [x, y]: [u32; 2]) -> u32 {
+        self.first + y * self.pitch + x
+    }
+
+    /// The three vertices around a place in the tile, in squares, and how much each counts. Twin: `opaque_point`.
+    pub fn around(&self, place: Vec2) -> ([u32; 3], Vec3) {
+        let cell = place.floor().clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
+        let f = (place - cell).clamp(Vec2::ZERO, Vec2::ONE);
+        let a = self.vertex([cell.x as u32, cell.y as u32]);
+        let b = if f.x >= f.y { a + 1 } else { a + self.pitch };
+        let (low, high) = (f.min_element(), f.max_element());
+        ([a, b, a + self.pitch + 1], Vec3::new(1.0 - high, high - low, low))
+    }
+
+    fn measure(&mut self, vertices: &[Vertex]) {
+        let at = |x: u32, y: u32| Vec3::from(vertices[self.vertex([x, y]) as usize].position);
+        let (mut low, mut high) = (self.low, self.high);
+        for p in (0..=self.side).flat_map(|y| (0..=self.side).map(move |x| at(x, y))) {
+            (low, high) = (low.min(p), high.max(p));
+        }
+        let mut lost = self.lost;
+        for k in 1..STEPS {
+            let step = 1 << k;
+            if self.pool > 0 || step > self.side {
+                lost[k] = Vec2::INFINITY;
+                continue;
+            }
+            let (mut most, mut sum, mut count) = (Vec2::ZERO, Vec2::ZERO, 0.0);
+            let squares = (0..self.side).step_by(step as usize);
+            for (left, bottom) in squares.clone().flat_map(|x| squares.clone().map(move |y| (x, y))) {
+                let (right, top) = (left + step, bottom + step);
+                let [a, b, c, d] = [at(left, bottom), at(right, bottom), at(right, top), at(left, top)];
+                for (x, y) in (0..=step).flat_map(|y| (0..=step).map(move |x| (x, y))) {
+                    let [f, g] = [x, y].map(|i| i as f32 / step as f32);
+                    let mixed =
+                        if x >= y { a + (b - a) * f + (c - b) * g } else { a + (d - a) * g + (c - d) * f };
+                    let away = at(left + x, bottom + y) - mixed;
+                    let along = away.dot(self.out);
+                    let parts = Vec2::new(along.abs(), (away - self.out * along).length());
+                    most = most.max(parts);
+                    sum += parts * parts;
+                    count += 1.0;
+                }
+            }
+            lost[k] = lost[k - 1].max((sum / count).map(f32::sqrt)).max(most / 3.0);
+        }
+        (self.low, self.high, self.lost) = (low, high, lost);
+    }
+
+    /// The largest step that moves no point of the picture by more than `most` focal lengths.
+    fn step(&self, camera: &Camera, most: f64) -> u32 {
+        let corners = (0..8).map(|i| {
+            let corner =
+                Vec3::from_array([0, 1, 2].map(|c| if i >> c & 1 == 0 { self.low[c] } else { self.high[c] }));
+            corner.as_dvec3() - camera.eye.as_dvec3()
+        });
+        let (mut depth, mut distance, mut sin2) = (f64::INFINITY, 0f64, 0f64);
+        let (mut front, mut back) = (false, false);
+        for to_corner in corners {
+            let (r, along) = (to_corner.length(), to_corner.dot(self.out.as_dvec3()));
+            depth = depth.min(to_corner.dot(camera.forward.as_dvec3()));
+            distance = distance.max(r);
+            // Directions that make at most one angle with the normal are a cone, which holds the box if it holds its corners.
+            sin2 = sin2.max(1.0 - (along / r) * (along / r));
+            (front, back) = (front || along >= 0.0, back || along <= 0.0);
+        }
+        if depth <= f64::from(camera.near) {
+            return 1;
+        }
+        let sin = if front && back { 1.0 } else { sin2.sqrt() };
+        let reach = depth * depth / distance;
+        let fits = |lost: &Vec2| f64::from(lost.x) * sin + f64::from(lost.y) <= most * reach;
+        1 << (1..STEPS).take_while(|&k| fits(&self.lost[k])).count()
+    }
+}

@@ -1,0 +1,36 @@
+//! §4 Which levels of the volume the rays of a scene look into.
+
+use super::{Attenuation, Lookup, Prefilter, Trace, extinction};
+use crate::mapping::Quad;
+use crate::volume::{PyramidSpec, Stack, VolumeTexture, level_count};
+
+/// What the levels of a volume are made for, where `quads` are traced through it.
+pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> PyramidSpec {
+    let filtered = trace.filter == Prefilter::Pyramid;
+    PyramidSpec {
+        coverage_bits: filtered.then(|| coverage_bits(trace, quads, volume)),
+        interpolated: trace.lookup == Lookup::Trilinear,
+    }
+}
+
+/// Where those levels lie in one texture, for a volume of `size` cells.
+pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> Stack {
+    let count = match trace.filter {
+        Prefilter::None => 1,
+        Prefilter::Pyramid => level_count(size),
+    };
+    Stack { size, count }
+}
+
+/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with. Of
+/// several materials of strands the mean thickness counts, quad by quad.
+fn coverage_bits(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> f32 {
+    let extinction = extinction(&trace.attenuation, volume.alpha);
+    if matches!(trace.attenuation, Attenuation::PerCell { .. }) {
+        return extinction;
+    }
+    let strands =
+        quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
+    let (count, sum) = strands.fold((0.0, 0.0), |(count, sum), thickness| (count + 1.0, sum + thickness));
+    extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
+}

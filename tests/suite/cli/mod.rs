@@ -1,0 +1,3 @@
+//! What the command line says and does where things go wrong.
+
+pub mod faults;

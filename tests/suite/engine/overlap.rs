@@ -1,0 +1,61 @@
+//! Which squares of the image water may lie under: none under water is left out, and few others are in.
+
+use super::gpu::{COARSE_PLACE, scene};
+use glam::Vec3;
+use rand::{RngExt, SeedableRng};
+use taki::engine::cpu::gbuffer;
+use taki::engine::overlap::covered;
+use taki::util::window::Window;
+
+#[test]
+fn no_square_under_water_is_left_out_wherever_the_eye_is() {
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(17);
+    let size = ["image.width=90", "image.height=50", "image.samples=4", "image.filter=gaussian"];
+    let (mut wet, mut dry) = (0, 0);
+    for preset in ["fig5", "waterfall", "front"] {
+        let rocks: &[&str] = if preset == "waterfall" { &COARSE_PLACE } else { &[] };
+        let base = scene(preset, &[&size[..], rocks].concat());
+        let mesh = base.mesh();
+        for _ in 0..24 {
+            let mut scene = base.clone();
+            let place = |rng: &mut rand_pcg::Pcg64Mcg| {
+                Vec3::from_array([(); 3].map(|()| rng.random_range(-3.0..3.0)))
+            };
+            let (eye, forward) = (place(&mut rng), place(&mut rng).normalize());
+            // Also eyes among the quads, so that some are cut by the near plane.
+            scene.camera.eye = base.camera.eye.lerp(eye, rng.random_range(0.0..1.0));
+            scene.camera.forward = base.camera.forward.lerp(forward, rng.random_range(0.0..1.0)).normalize();
+            scene.camera.right = scene.camera.forward.cross(Vec3::Y).normalize();
+            scene.camera.up = scene.camera.right.cross(scene.camera.forward);
+            let window = Window { x: 5, y: 3, width: 80, height: 45 };
+            let squares = covered(&scene, [window.x, window.y], [10, 6], 8);
+            for sample in 0..4 {
+                let raster = gbuffer::run_window(&scene, &mesh, window, sample);
+                for y in 0..window.height {
+                    for x in 0..window.width {
+                        let under = squares[(y / 8 * 10 + x / 8) as usize];
+                        let i = (y * window.width + x) as usize;
+                        assert!(
+                            under || raster.faces(i).next().is_none(),
+                            "{preset}: pixel {x}, {y} is left out"
+                        );
+                        if under { wet += 1 } else { dry += 1 }
+                    }
+                }
+            }
+        }
+    }
+    assert!(wet > 10_000 && dry > 10_000, "{wet} and {dry} pixels");
+}
+
+#[test]
+fn a_small_quad_covers_its_own_squares_and_a_margin() {
+    // A quad of 1 m seen from 3 m: a tenth of the image's height, in its middle.
+    let sets = ["image.width=640", "image.height=640", "camera.fov=118"];
+    let scene = scene("front", &sets);
+    let squares = covered(&scene, [0, 0], [80, 80], 8);
+    // 2·3·tan 59° = 9.98 m are 640 pixels, so 64 pixels or 8 squares a side; with 3 pixels more on each, at most 10.
+    let count = squares.iter().filter(|&&under| under).count();
+    assert!((64..=100).contains(&count), "{count}");
+    assert!(squares[40 * 80 + 40] && !squares[0]);
+}

@@ -1,0 +1,221 @@
+//! The shaders against the host: every file is valid and imports what it uses, and every struct, constant and binding
+//! that both sides share is the same on both.
+
+use std::mem::offset_of;
+use std::path::Path;
+
+use taki::engine::gpu::layout::{
+    Coat, Environment, Frame, Groups, Light, LightVolume, MeshTile, Quad, Strand, Tile, WORKGROUP,
+};
+use taki::engine::gpu::shader::{FILES, imports, resolve};
+use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
+use taki::engine::pool_surface::{AROUND, Surface, WAVES, Wave};
+use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
+use wgpu::naga;
+
+/// The stages: name, and text with all that it imports.
+fn stages() -> [(&'static str, String); 6] {
+    [
+        ("bare", resolve("#import engine::bare")),
+        ("gbuffer", gbuffer_source()),
+        ("integrate", integrate_source(true)),
+        ("integrate, one sheet", integrate_source(false)),
+        ("resolve", resolve("#import picture::resolve")),
+        ("visibility", visibility_source()),
+    ]
+}
+
+fn stage(name: &str) -> String {
+    let found = stages().into_iter().find(|(of, _)| *of == name);
+    found.unwrap_or_else(|| panic!("no stage {name}")).1
+}
+
+fn validate(source: &str) -> Result<naga::Module, String> {
+    let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string(source))?;
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
+        .validate(&module)
+        .map_err(|e| e.emit_to_string(source))?;
+    Ok(module)
+}
+
+/// Names of the files in a folder of shaders, without their ending, as imports write them.
+fn files_in(folder: &Path, prefix: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
+        let entry = entry.expect("an entry");
+        let name = entry.file_name().into_string().expect("UTF-8");
+        if entry.path().is_dir() {
+            names.extend(files_in(&entry.path(), &format!("{prefix}{name}/")));
+        } else {
+            names.push(format!("{prefix}{}", name.strip_suffix(".wgsl").expect("a shader")));
+        }
+    }
+    names
+}
+
+#[test]
+fn every_file_in_shaders_is_in_the_program_and_some_stage_imports_it() {
+    let mut found = files_in(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), "");
+    let mut known: Vec<&str> = FILES.iter().map(|(name, _)| *name).collect();
+    found.sort_unstable();
+    known.sort_unstable();
+    assert_eq!(found, known);
+    let stages = stages().map(|(_, text)| text).concat();
+    for (name, text) in FILES {
+        let own: String =
+            text.lines().filter(|l| !l.starts_with("#import ")).flat_map(|l| [l, "\n"]).collect();
+        assert!(stages.contains(&own), "no stage imports {name}");
+    }
+}
+
+/// The names that a shader declares for others: functions and types, constants and overrides.
+fn declared(text: &str) -> Vec<&str> {
+    let mut names = Vec::new();
+    for line in text.lines() {
+        let words = ["fn ", "struct ", "const ", "override "];
+        if let Some(rest) = words.iter().find_map(|word| line.strip_prefix(word)) {
+            names.push(rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or(""));
+        }
+    }
+    names
+}
+
+/// Whether a shader uses a name that is declared elsewhere, outside comments.
+fn uses(text: &str, name: &str) -> bool {
+    let called = name.starts_with(|c: char| c.is_lowercase());
+    let part = |c: char| c.is_alphanumeric() || c == '_';
+    text.lines().map(|line| line.split("//").next().unwrap_or("")).any(|line| {
+        line.match_indices(name).any(|(at, _)| {
+            let (before, after) = (&line[..at], &line[at + name.len()..]);
+            !before.ends_with(part) && !after.starts_with(part) && (!called || after.starts_with('('))
+        })
+    })
+}
+
+#[test]
+fn every_shader_imports_the_files_whose_names_it_uses() {
+    let mut checked = 0;
+    for (file, text) in FILES {
+        let imported: Vec<String> = imports(text).collect();
+        for (other, declares) in FILES.iter().filter(|(other, _)| other != file) {
+            // What two files declare, as both kinds of sheets do, tells nothing.
+            let only_there =
+                |name: &&str| FILES.iter().filter(|(_, text)| declared(text).contains(name)).count() == 1;
+            for name in declared(declares).into_iter().filter(only_there).filter(|name| uses(text, name)) {
+                assert!(
+                    imported.iter().any(|i| i == other),
+                    "{file} uses {name} of {other} without an import"
+                );
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 100, "{checked}");
+}
+
+#[test]
+fn every_stage_is_valid_wgsl() {
+    for (name, text) in stages() {
+        if let Err(e) = validate(&text) {
+            panic!("{name}:\n{e}");
+        }
+    }
+}
+
+#[test]
+fn the_validation_can_fail() {
+    assert!(validate(&resolve("#import layout\nfn broken() -> f32 { return 1u; }")).is_err());
+}
+
+#[test]
+#[should_panic(expected = "no shader light/nothing to import")]
+fn an_import_of_nothing_is_an_error_of_the_program() {
+    resolve("#import light::nothing");
+}
+
+/// (name, offset) of each member, and the size, of a struct of a module.
+fn members(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+        panic!("no struct {name}");
+    };
+    let named = |m: &naga::StructMember| (m.name.clone().expect("a name"), m.offset);
+    (members.iter().map(named).collect(), *span)
+}
+
+macro_rules! fields {
+    ($ty:ty: $($field:ident)*) => {
+        (vec![$((stringify!($field).to_owned(), offset_of!($ty, $field) as u32)),*], size_of::<$ty>() as u32)
+    };
+}
+
+#[test]
+fn host_structs_have_the_layout_the_shaders_read() {
+    let module = validate(&stage("integrate")).expect("valid");
+    let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
+        zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
+        texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
+        haze_color haze_far shadow_light levels footprint pad_c);
+    assert_eq!(members(&module, "Frame"), frame);
+    assert_eq!(
+        members(&module, "Light"),
+        fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
+    );
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset erosion mist pad_a pad_b pad_c);
+    assert_eq!(members(&module, "Quad"), quad);
+    let environment =
+        fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
+    assert_eq!(members(&module, "Environment"), environment);
+    assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
+    assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
+    assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
+    let module = validate(&stage("resolve")).expect("valid");
+    assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
+    let module = validate(&stage("visibility")).expect("valid");
+    // Padded on the host to what a uniform takes.
+    let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
+    light_volume.pop();
+    assert_eq!(members(&module, "LightVolume"), (light_volume, size));
+    let module = validate(&stage("gbuffer")).expect("valid");
+    let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
+    assert_eq!(members(&module, "Surface"), surface);
+    let coat = fields!(Coat: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
+    assert_eq!(members(&module, "Coat"), coat);
+    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side pad));
+    assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
+}
+
+#[test]
+fn constants_are_the_same_on_both_sides() {
+    let [integrate, resolve] = ["integrate", "resolve"].map(|name| validate(&stage(name)).expect("valid"));
+    let of = |module: &naga::Module, name: &str| {
+        let found = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name));
+        let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(x)) => x as f64,
+            naga::Expression::Literal(naga::Literal::I32(x)) => x as f64,
+            naga::Expression::Literal(naga::Literal::F32(x)) => x as f64,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    let constant = |name: &str| of(&integrate, name);
+    assert_eq!(of(&resolve, "TONE_FILMIC"), TONE_FILMIC as f64);
+    assert_eq!(of(&resolve, "TONE_AGX"), TONE_AGX as f64);
+    assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
+    assert_eq!(constant("CUT"), taki::engine::gpu::CUT as f64);
+    assert_eq!(constant("CELLS_A_WORD"), taki::light::visibility::CELLS_A_WORD as f64);
+    assert_eq!(constant("COSINES"), taki::light::scatter::COSINES as f64);
+    assert_eq!(constant("DARK_BITS"), f64::from(taki::light::visibility::DARK_BITS));
+    assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
+    assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
+    assert_eq!(constant("SHY"), taki::walk::SHY as f64);
+    assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::trace::MIST_OF_CELLS));
+    assert_eq!(constant("MIST_RHO"), f64::from(taki::trace::MIST_RHO));
+    assert_eq!(constant("SINE_SHARE"), taki::light::strand::table::SINE_SHARE as f64);
+    let gbuffer = validate(&stage("gbuffer")).expect("valid");
+    let wide = |name: &str| of(&gbuffer, name) as usize;
+    assert_eq!(wide("WAVES"), WAVES);
+    assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
+    let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
+    assert_eq!(size, taki::light::strand::table::SIZE);
+}

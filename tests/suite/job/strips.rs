@@ -1,0 +1,462 @@
+//! Large pictures: parts of an image are that part of the whole bit for bit, files do not depend on how the
+//! rows came, crops stitch to the file of the whole, and damaged files are seen.
+
+use std::path::{Path, PathBuf};
+
+use crate::cli::faults::{run, taki};
+use crate::engine::gpu::{renderer, scene};
+use rand::{RngExt, SeedableRng};
+use taki::engine::gpu::DeviceOptions;
+use taki::engine::{Engine, RenderOptions};
+use taki::job::{Still, stitch, strips};
+use taki::output::frame::{Figures, figures_of, read_exr, verify};
+use taki::picture::camera::clip_to_window;
+use taki::picture::{Frame, Grid, Layer, Surface};
+use taki::place::Mesh;
+use taki::scene::{Limits, Scene};
+use taki::util::error::Error;
+use taki::util::monitor::Unwatched;
+use taki::util::window::Window;
+use taki::volume::VolumeTexture;
+use tempfile::{TempDir, tempdir};
+
+/// A scene with what its engines need.
+struct Subject {
+    scene: Scene,
+    volume: VolumeTexture,
+    mesh: Mesh,
+}
+
+impl Subject {
+    fn new(preset: &str, sets: &[&str]) -> Subject {
+        let scene = scene(preset, sets);
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        Subject { mesh: scene.mesh(), volume, scene }
+    }
+
+    /// Small, with water, rock and background.
+    fn small() -> Subject {
+        let sets = ["image.width=97", "image.height=61", "image.samples=2", "rocks.foot.levels=5"];
+        Subject::new("fig5", &sets)
+    }
+
+    fn whole(&self) -> Window {
+        Window::whole([self.scene.image.width, self.scene.image.height])
+    }
+
+    fn render(&self, engine: &mut Engine, window: Option<Window>, grid: Grid) -> Frame {
+        let options = RenderOptions { surface: true, window, grid, ..Default::default() };
+        engine.render(&self.scene, &self.volume, &self.mesh, &options, &Unwatched).expect("a frame")
+    }
+
+    /// Writes `window` to `path` in strips of the given rows, the last again and again.
+    fn write(&self, path: &Path, window: Window, rows: &[u32]) -> Figures {
+        let still = Still::create(&[path.to_owned()]).expect("an output");
+        let mut writer = still.begin(&self.scene, &self.volume, window, &Layer::ALL).expect("begun");
+        let (mut y, mut rows) =
+            (window.y, rows.iter().copied().chain(std::iter::repeat(rows[rows.len() - 1])));
+        while y < window.bottom() {
+            let height = rows.next().expect("endless").min(window.bottom() - y);
+            let strip =
+                self.render(&mut Engine::cpu(), Some(Window { y, height, ..window }), Grid::default());
+            writer.push(&strip).expect("written");
+            y += height;
+        }
+        writer.finish().expect("finished")
+    }
+}
+
+fn part_of(frame: &Frame, window: Window) -> Frame {
+    let whole = Window::whole([frame.width, frame.height]);
+    let places: Vec<usize> = (window.y..window.bottom())
+        .flat_map(|y| (window.x..window.right()).map(move |x| whole.index([x, y])))
+        .collect();
+    fn pick<T: Copy>(places: &[usize], from: &[T]) -> Vec<T> {
+        places.iter().map(|&i| from[i]).collect()
+    }
+    let surface = frame.surface.as_ref().map(|s| Surface {
+        depth: pick(&places, &s.depth),
+        uv: pick(&places, &s.uv),
+        quad: pick(&places, &s.quad),
+        normal: pick(&places, &s.normal),
+    });
+    Frame {
+        width: window.width,
+        height: window.height,
+        radiance: pick(&places, &frame.radiance),
+        counts: pick(&places, &frame.counts),
+        picture: pick(&places, &frame.picture),
+        surface,
+        seconds: Default::default(),
+    }
+}
+
+fn assert_same(what: &str, a: &Frame, b: &Frame) {
+    let bits = |f: &Frame| f.radiance.iter().map(|r| r.map(f32::to_bits)).collect::<Vec<_>>();
+    assert!(bits(a) == bits(b), "{what}: radiance");
+    assert!(a.counts == b.counts, "{what}: counts");
+    assert!(a.picture == b.picture, "{what}: picture");
+    assert!(a.surface == b.surface, "{what}: surface");
+}
+
+/// Windows of every kind, always with the same numbers.
+fn crops(size: [u32; 2], count: usize) -> Vec<Window> {
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let mut some = |n: u32| {
+        let first = random.random_range(0..n);
+        (first, random.random_range(1..=n - first))
+    };
+    let mut crops = vec![
+        Window { x: 0, y: 0, width: 1, height: 1 },
+        Window { x: size[0] - 1, y: size[1] - 1, width: 1, height: 1 },
+        Window { x: 0, y: 5, width: size[0], height: 40 },
+    ];
+    crops.extend((0..count).map(|_| {
+        let ((x, width), (y, height)) = (some(size[0]), some(size[1]));
+        Window { x, y, width, height }
+    }));
+    crops
+}
+
+#[test]
+fn a_part_of_an_image_is_that_part_of_the_whole_bit_for_bit_on_both_engines() {
+    let subject = Subject::small();
+    let mut engines = vec![Engine::cpu()];
+    engines.extend(renderer("crops").map(|r| Engine::Gpu(Box::new(r), DeviceOptions::default())));
+    // As many windows of the device as a picture of gigapixels has.
+    for grid in [Grid { side: 32, pixels: 32 * 16 }, Grid { side: 64, pixels: 64 * 64 }, Grid::default()] {
+        for engine in &mut engines {
+            let whole = subject.render(engine, None, grid);
+            assert!(whole.covered_pixels() > 0 && whole.counts.iter().any(|c| c[0] == 0), "rock and water");
+            for crop in crops([97, 61], 12) {
+                let part = subject.render(engine, Some(crop), grid);
+                assert_same(&format!("{} {grid:?} {crop}", engine.word()), &part, &part_of(&whole, crop));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_window_that_is_the_whole_image_has_the_matrix_of_the_image() {
+    let scene = scene("waterfall", &[]);
+    let clip = scene.camera.clip_from_world(1280, 720, [0.25, 0.75]);
+    let bits = |m: glam::Mat4| m.to_cols_array().map(|x| (x + 0.0).to_bits());
+    assert_eq!(bits(clip_to_window(clip, [1280, 720], Window::whole([1280, 720]))), bits(clip));
+    // And the corner of any other is the corner of its clip space.
+    let window = Window { x: 320, y: 90, width: 64, height: 40 };
+    let moved = clip_to_window(glam::Mat4::IDENTITY, [1280, 720], window);
+    let corner = moved * glam::Vec4::new(320.0 / 640.0 - 1.0, 1.0 - 90.0 / 360.0, 0.5, 1.0);
+    assert!((corner - glam::Vec4::new(-1.0, 1.0, 0.5, 1.0)).length() < 1e-5, "{corner}");
+}
+
+#[test]
+fn the_grid_depends_on_the_image_alone_and_covers_it_once() {
+    let grid = Grid::default();
+    assert_eq!(grid.size([1280, 720]), [1280, 720]);
+    assert_eq!(grid.size([16384, 16384]), [4096, 512]);
+    assert_eq!(grid.size([1, 1_000_000]), [1, 4096]);
+    assert_eq!(grid.size([1_000_000, 1]), [4096, 1]);
+    let image = [9000, 1100];
+    let whole = grid.windows(image, Window::whole(image));
+    assert_eq!(whole.iter().map(Window::pixels).sum::<u64>(), 9000 * 1100);
+    let part = Window { x: 4095, y: 511, width: 2, height: 2 };
+    let met = grid.windows(image, part);
+    assert_eq!(met.len(), 4);
+    assert!(met.iter().all(|w| whole.contains(w) && w.meet(&part).is_some()));
+}
+
+#[test]
+fn strips_follow_one_another_and_shrink_with_the_memory() {
+    let scene = scene("waterfall", &["image.width=16384", "image.height=16384"]);
+    let whole = Window::whole([16384, 16384]);
+    let of = |window, memory: u64| strips(&scene, window, true, memory << 20).expect("strips");
+    let (large, small) = (of(whole, 4096), of(whole, 700));
+    assert!(large.iter().all(|s| s.y % 512 == 0 && s.height == 512), "{large:?}");
+    assert!(small.len() > large.len());
+    for (window, list) in
+        [(whole, large), (whole, small), (Window { x: 3, y: 700, width: 90, height: 900 }, vec![])]
+    {
+        let list = if list.is_empty() { of(window, 500) } else { list };
+        let mut y = window.y;
+        for strip in &list {
+            assert_eq!(*strip, Window { y, height: strip.height, ..window });
+            y += strip.height;
+        }
+        assert_eq!(y, window.bottom());
+    }
+    let refused = strips(&scene, whole, true, 100 << 20);
+    assert!(matches!(&refused, Err(Error::Memory { .. })), "{refused:?}");
+    let load = |size: u32, memory| {
+        let sets = [format!("image.width={size}"), format!("image.height={size}")];
+        Scene::load(Path::new("front"), &sets, &Limits { memory, ..Limits::default() })
+    };
+    assert!(load(262_144, 1 << 30).is_ok());
+    assert!(matches!(load(262_145, u64::MAX), Err(Error::Memory { .. })), "2^36 pixels at most");
+}
+
+#[test]
+fn a_file_does_not_depend_on_how_its_rows_came() {
+    let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));
+    let crop = Window { x: 11, y: 4, width: 70, height: 50 };
+    for window in [subject.whole(), crop] {
+        for extension in ["png", "exr"] {
+            let file = |name: &str| dir.path().join(format!("{name}.{extension}"));
+            let figures = subject.write(&file("a"), window, &[61]);
+            for (name, rows) in [("b", &[1][..]), ("c", &[7, 1, 30, 2]), ("d", &[16])] {
+                assert_eq!(subject.write(&file(name), window, rows), figures);
+                let same =
+                    std::fs::read(file("a")).expect("a") == std::fs::read(file(name)).expect("another");
+                assert!(same, "{extension} {window} {name}");
+            }
+            let frame = subject.render(&mut Engine::cpu(), Some(window), Grid::default());
+            assert_eq!(figures, Figures::of(&frame));
+            let verified = verify(&file("a")).expect("whole");
+            assert_eq!((verified.size, verified.window), ([97, 61], window));
+            let scene = verified.scene.expect("a scene");
+            assert!(scene.contains("[camera]") && scene.contains("width = 97"), "{scene}");
+            assert_eq!(verified.figures, (extension == "png").then_some(figures.clone()));
+            check_contents(&file("a"), &frame, window);
+            let known = figures_of(&file("a")).expect("figures");
+            assert_eq!(known.mean_radiance(), Some(figures.mean_radiance()));
+            assert_eq!(known.mean_transmittance(), Some(figures.mean_transmittance()));
+            assert_eq!(known.covered_pixels, Some(figures.covered_pixels));
+            assert_eq!(known.cells_walked, Some(figures.cells_walked));
+        }
+    }
+}
+
+/// Other programs read what was rendered.
+fn check_contents(path: &Path, frame: &Frame, window: Window) {
+    if path.extension().is_some_and(|e| e == "png") {
+        let image = image::open(path).expect("a PNG").into_rgb8();
+        let want: Vec<[u8; 3]> = frame.picture.iter().map(|p| [p[0], p[1], p[2]]).collect();
+        assert!(image.pixels().map(|p| p.0).eq(want));
+        return;
+    }
+    let (width, height, channels) = read_exr(path).expect("an EXR");
+    assert_eq!((width, height, channels.len()), (window.width, window.height, 12));
+    for (name, values) in channels {
+        let (layer, c) = Layer::ALL
+            .iter()
+            .find_map(|l| l.channels().iter().position(|n| *n == name).map(|c| (*l, c)))
+            .expect("a known channel");
+        let want = (0..values.len()).map(|i| layer.value(frame, c, i).to_bits());
+        assert!(values.iter().map(|v| v.to_bits()).eq(want), "{name}");
+    }
+    let meta = exr::prelude::MetaData::read_from_file(path, true).expect("a header");
+    let header = &meta.headers[0];
+    let (data, display) = (header.data_window(), header.shared_attributes.display_window);
+    assert_eq!((data.position.0, data.position.1), (window.x as i32, window.y as i32));
+    assert_eq!((display.size.0, display.size.1), (97, 61));
+}
+
+#[test]
+fn figures_of_parts_add_up_to_those_of_the_whole() {
+    let subject = Subject::small();
+    let frame = subject.render(&mut Engine::cpu(), None, Grid::default());
+    let whole = Figures::of(&frame);
+    assert_eq!([whole.cells_walked, whole.light_cells_walked], frame.cells_walked());
+    assert_eq!((whole.pixels, whole.covered_pixels), (97 * 61, frame.covered_pixels()));
+    let mean = frame.radiance.iter().map(|r| f64::from(r[1])).sum::<f64>() / (97.0 * 61.0);
+    assert!((whole.mean_radiance()[1] - mean).abs() < 1e-5);
+    let parts = [(0, 0, 40, 61), (40, 0, 57, 20), (40, 20, 57, 41)];
+    let mut sum = Figures::default();
+    for (x, y, width, height) in parts {
+        sum.add(&Figures::of(&part_of(&frame, Window { x, y, width, height })));
+    }
+    assert_eq!(sum, whole);
+    let text = serde_json::to_string(&whole).expect("JSON");
+    assert_eq!(serde_json::from_str::<Figures>(&text).expect("the same"), whole);
+    let mut odd = frame;
+    odd.radiance[0] = [f32::NAN, f32::INFINITY, -f32::INFINITY, 1.0];
+    assert_eq!(Figures::of(&odd).non_finite_pixels, 1);
+}
+
+/// Crops of the small subject in a folder, and the file of the whole.
+fn pieces(extension: &str, windows: &[(u32, u32, u32, u32)]) -> (TempDir, Vec<PathBuf>, PathBuf) {
+    let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));
+    let file = |name: String| dir.path().join(format!("{name}.{extension}"));
+    let parts = windows.iter().map(|&(x, y, width, height)| {
+        let window = Window { x, y, width, height };
+        let path = file(window.to_string());
+        subject.write(&path, window, &[61]);
+        path
+    });
+    let parts = parts.collect();
+    let whole = file("whole".into());
+    subject.write(&whole, subject.whole(), &[61]);
+    (dir, parts, whole)
+}
+
+#[test]
+fn crops_stitch_to_the_file_of_the_whole() {
+    let tiles = [(40, 20, 57, 41), (0, 0, 40, 61), (40, 0, 57, 20)];
+    let inside = [(0, 0, 97, 30), (0, 30, 97, 31), (5, 5, 10, 10), (0, 30, 97, 31)];
+    let lapped = [(0, 0, 60, 61), (50, 0, 47, 61)];
+    for extension in ["png", "exr"] {
+        for (windows, figures) in [(&tiles[..], true), (&inside, true), (&lapped, false)] {
+            let (dir, parts, whole) = pieces(extension, windows);
+            let joined = dir.path().join(format!("joined.{extension}"));
+            let known = stitch(&parts, &joined, &Unwatched).expect("stitched");
+            let same = std::fs::read(&joined).expect("joined") == std::fs::read(&whole).expect("whole");
+            // Where crops overlap, the sums of a PNG cannot be known from its parts.
+            assert_eq!(same, figures || extension == "exr", "{extension} {windows:?}");
+            assert_eq!(known.is_some(), figures && extension == "png");
+            let (a, b) = (verify(&joined).expect("whole"), verify(&whole).expect("whole"));
+            assert_eq!((a.size, a.window, a.scene), (b.size, b.window, b.scene));
+        }
+    }
+}
+
+#[test]
+fn parts_that_make_no_whole_are_refused() {
+    let windows = [(0, 0, 40, 61), (40, 0, 57, 20), (40, 20, 30, 41), (70, 20, 27, 11), (80, 31, 17, 30)];
+    for extension in ["png", "exr"] {
+        let (dir, parts, whole) = pieces(extension, &windows);
+        let out = dir.path().join(format!("out.{extension}"));
+        let refused = |parts: &[PathBuf], words: &[&str]| {
+            let e = stitch(parts, &out, &Unwatched).expect_err("refused");
+            assert_eq!(e.exit_code(), 65, "{e}");
+            words.iter().for_each(|word| assert!(e.to_string().contains(word), "no {word} in {e}"));
+            assert!(!out.exists());
+        };
+        refused(&parts, &["--crop 70,31,10,30"]);
+        refused(&parts[1..], &["--crop 0,0,40,61"]);
+
+        let other = Subject::new(
+            "fig5",
+            &["image.width=97", "image.height=61", "rocks.foot.levels=5", "image.samples=2", "light.p=7"],
+        );
+        let file = dir.path().join(format!("other.{extension}"));
+        other.write(&file, other.whole(), &[61]);
+        refused(&[whole.clone(), file.clone()], &["different scenes", "p = 7", "other."]);
+        let size = Subject::new("fig5", &["image.width=60", "image.height=61", "rocks.foot.levels=5"]);
+        size.write(&file, size.whole(), &[61]);
+        refused(&[whole.clone(), file.clone()], &["97×61", "60×61"]);
+        refused(
+            &[whole.clone(), dir.path().join("absent.toml")]
+                .map(|p| if p.exists() { p } else { file.clone() }),
+            &["60×61"],
+        );
+
+        // The same scene by its text, but another picture: one that was tampered with.
+        let mut wrong = Subject::small();
+        wrong.scene.ambient *= 2.0;
+        let window = Window { x: 30, y: 10, width: 50, height: 40 };
+        wrong.write(&file, window, &[61]);
+        refused(&[whole.clone(), file], &["whole.", "other.", "differ at the pixel ("]);
+        let e = stitch(&[whole], &dir.path().join("out.jpg"), &Unwatched).expect_err("refused");
+        assert_eq!(e.exit_code(), 2, "{e}");
+    }
+}
+
+#[test]
+fn a_file_that_is_cut_anywhere_is_refused() {
+    let (subject, dir) =
+        (Subject::new("front", &["image.width=9", "image.height=7"]), tempdir().expect("a folder"));
+    for extension in ["png", "exr"] {
+        let path = dir.path().join(format!("x.{extension}"));
+        subject.write(&path, subject.whole(), &[7]);
+        verify(&path).expect("whole");
+        let bytes = std::fs::read(&path).expect("read");
+        let cut = dir.path().join("cut");
+        for length in 0..bytes.len() {
+            std::fs::write(&cut, &bytes[..length]).expect("written");
+            let e = verify(&cut).expect_err("a prefix is not whole");
+            assert!(matches!(e, Error::Input { .. }), "{extension} {length}: {e}");
+        }
+        std::fs::write(&cut, [&bytes[..], &[0]].concat()).expect("written");
+        assert!(matches!(verify(&cut), Err(Error::Input { .. })), "{extension}: a byte too many");
+    }
+}
+
+#[test]
+fn a_changed_byte_of_a_png_is_seen_and_one_of_an_exr_does_no_harm() {
+    let (subject, dir) =
+        (Subject::new("front", &["image.width=9", "image.height=7"]), tempdir().expect("a folder"));
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(3);
+    for extension in ["png", "exr"] {
+        let path = dir.path().join(format!("x.{extension}"));
+        subject.write(&path, subject.whole(), &[7]);
+        let bytes = std::fs::read(&path).expect("read");
+        let flipped = dir.path().join("flipped");
+        let mut unseen = 0;
+        for round in 0..bytes.len() {
+            let mut wrong = bytes.clone();
+            wrong[round] ^= 1 << random.random_range(0..8);
+            // Several at once, too: one alone rarely makes a header that is read further.
+            for _ in 0..round % 4 * usize::from(extension == "exr") {
+                let at = random.random_range(0..bytes.len());
+                wrong[at] = random.random();
+            }
+            std::fs::write(&flipped, wrong).expect("written");
+            match verify(&flipped) {
+                Err(Error::Input { .. }) => {}
+                Err(e) => panic!("{extension} byte {round}: {e}"),
+                Ok(_) => unseen += 1,
+            }
+            let _ = figures_of(&flipped);
+        }
+        assert!(extension == "exr" || unseen == 0, "{unseen} of {} unseen", bytes.len());
+    }
+}
+
+#[test]
+fn hostile_headers_are_refused_without_much_memory() {
+    let dir = tempdir().expect("a folder");
+    let path = dir.path().join("x");
+    // A PNG of a million pixels a side with no data, and with its checksum right.
+    let mut ihdr = b"IHDR".to_vec();
+    ihdr.extend(1_000_000u32.to_be_bytes());
+    ihdr.extend(1_000_000u32.to_be_bytes());
+    ihdr.extend([8, 2, 0, 0, 0]);
+    let crc = crc32fast::hash(&ihdr).to_be_bytes();
+    let png = [b"\x89PNG\r\n\x1a\n\0\0\0\x0d", &ihdr[..], &crc].concat();
+    for bytes in [&png[..], b"", b"\x89PN", b"GIF89a", b"version = 1\n"] {
+        std::fs::write(&path, bytes).expect("written");
+        assert!(matches!(verify(&path), Err(Error::Input { .. })));
+    }
+    assert!(matches!(verify(dir.path()), Err(Error::Input { .. })));
+    assert!(matches!(verify(&dir.path().join("absent")), Err(Error::Io { .. })));
+}
+
+#[test]
+fn the_command_line_crops_and_stitches() {
+    let dir = tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    let render = |crop: Option<&str>, name: &str| {
+        let mut command = taki(["render", "front", "--engine=cpu", "--size=48x40", "--json", "-o"]);
+        command.arg(at(name));
+        command.args(crop.map(|crop| format!("--crop={crop}")));
+        command
+    };
+    run(&mut render(None, "whole.png")).done();
+    let text = run(&mut render(Some("0,0,48,25"), "a.png"));
+    let json: serde_json::Value = serde_json::from_str(text.done()).expect("JSON");
+    assert_eq!((&json["width"], &json["height"], &json["rays"]), (&48.into(), &25.into(), &1200.into()));
+    assert_eq!(json["crop"], serde_json::json!({"x": 0, "y": 0, "of": {"width": 48, "height": 40}}));
+    run(&mut render(Some("0, 25, 48, 15"), "b.png")).done();
+    run(taki(["stitch"]).arg(at("a.png")).arg(at("b.png")).arg("-o").arg(at("joined.png"))).done();
+    assert!(
+        std::fs::read(at("joined.png")).expect("joined") == std::fs::read(at("whole.png")).expect("whole")
+    );
+    run(taki(["stitch"]).arg(at("b.png")).arg("-o").arg(at("x.png"))).refused(65, &["--crop 0,0,48,25"]);
+    for crop in ["0,0,49,1", "47,0,2,1", "0,39,1,2", "0,0,0,1", "4294967295,0,4294967295,1"] {
+        run(&mut render(Some(crop), "x.png")).refused(2, &["--crop", "columns 0 to 47", "rows 0 to 39"]);
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 4);
+}
+
+#[test]
+fn a_disk_that_fills_up_in_the_middle_of_a_picture_leaves_no_file() {
+    let dir = tempdir().expect("a folder");
+    for name in ["x.png", "x.exr"] {
+        let render = taki(["render", "fig5", "--engine=cpu", "--size=300x300", "--samples=1", "-o"]);
+        // 64 KiB fit, and then no more.
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash"]).arg(render.get_program());
+        shell.args(render.get_args()).arg(dir.path().join(name));
+        run(&mut shell).refused(74, &["cannot write", name, "free some space"]);
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 0, "{name}");
+    }
+}

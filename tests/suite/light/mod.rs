@@ -1,0 +1,9 @@
+//! §5 Light.
+
+pub mod environment;
+pub mod fibre;
+pub mod haze;
+pub mod lights;
+pub mod scatter;
+pub mod strand;
+pub mod visibility;

@@ -1,0 +1,19 @@
+//! Light scattered more than once: the model of `taki::light::scatter` against a path tracer, and both against
+//! closed forms.
+
+mod closed_forms;
+mod parity;
+mod pictures;
+mod renderer;
+mod tracer;
+
+use glam::DVec3;
+use tracer::Phase;
+
+const ISOTROPIC: Phase = Phase::HenyeyGreenstein(0.0);
+
+/// The unit vector at `degrees` from the normal, `side` −1 on the seen side and 1 behind.
+fn toward(degrees: f64, turn: f64, side: f64) -> DVec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    DVec3::new(sin * turn.cos(), sin * turn.sin(), side * cos)
+}

@@ -1,0 +1,198 @@
+//! The reflection model made for flowing water. Reference truth: closed forms of optics, and the direct model in
+//! float64 for the table. Its shader against the CPU is parity.
+
+mod lookup;
+mod optics;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use taki::light::strand::table::{StrandShading, StrandTable};
+use taki::light::strand::{Strand, StrandParams, cell_aeration, henyey_greenstein};
+
+/// Roughnesses along and around: both ends of the range, the default, and mixtures.
+const ROUGHNESSES: [[f32; 2]; 7] =
+    [[0.1, 0.1], [0.1, 1.0], [0.3, 0.2], [0.3, 0.1], [0.6, 0.6], [1.0, 0.1], [1.0, 1.0]];
+
+/// Strands without air.
+fn strands([roughness_m, roughness_n]: [f32; 2], absorption: f32) -> StrandParams {
+    StrandParams { roughness_m, roughness_n, absorption, aeration: 0.0, ..StrandParams::default() }
+}
+
+/// The cosines t·l, t·e and l·e of directions given by inclinations and the azimuth between them.
+fn cosines(theta_i: f64, theta_o: f64, phi: f64) -> [f32; 3] {
+    let l_dot_e = theta_i.sin() * theta_o.sin() + theta_i.cos() * theta_o.cos() * phi.cos();
+    [theta_i.sin(), theta_o.sin(), l_dot_e].map(|x| x as f32)
+}
+
+/// ∫ f(θ, φ) dω over the sphere: cells of equal angles, each with its exact solid angle.
+fn over_sphere(thetas: usize, phis: usize, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let step = PI / thetas as f64;
+    let mut sum = 0.0;
+    for i in 0..thetas {
+        let low = i as f64 * step - FRAC_PI_2;
+        let ring: f64 = (0..phis).map(|j| f(low + 0.5 * step, (j as f64 + 0.5) * PI / phis as f64)).sum();
+        sum += ring * ((low + step).sin() - low.sin());
+    }
+    sum * TAU / phis as f64
+}
+
+/// Directions of light and eye: one half anywhere, the other about the mirror cone, where Φ is large.
+fn directions(count: usize, sigma: f64) -> Vec<[f64; 3]> {
+    let mut rng = Pcg64Mcg::seed_from_u64(1986);
+    let mut unit = || rng.random_range(-1.0..1.0f64);
+    (0..count)
+        .map(|k| {
+            let theta_i = unit().asin();
+            let anywhere = unit().asin();
+            let beside = (3.0 * sigma * unit() - theta_i).clamp(-1.56, 1.56);
+            [theta_i, if k % 2 == 0 { anywhere } else { beside }, PI * unit().abs()]
+        })
+        .collect()
+}
+
+#[test]
+fn white_strands_give_back_all_light_at_every_inclination_and_roughness() {
+    for roughness in ROUGHNESSES {
+        let table = StrandTable::build(&strands(roughness, 0.0));
+        for degrees in [0.0f64, 3.0, 17.0, 30.0, 45.0, 59.4, 70.0, 80.0, 86.0, 88.5, 89.5] {
+            let theta_i = degrees.to_radians();
+            let sum = over_sphere(720, 120, |theta_o, phi| {
+                let [l, e, le] = cosines(theta_i, theta_o, phi);
+                table.psi(l, e, le).y as f64 / PI
+            });
+            assert!((sum - 1.0).abs() < 0.01, "{sum} of 1 at {degrees}° with roughness {roughness:?}");
+        }
+    }
+}
+
+#[test]
+fn the_model_itself_gives_back_all_light() {
+    for roughness_m in [0.1, 0.3, 1.0] {
+        let strand = Strand::new(&strands([roughness_m, 0.5], 0.0));
+        for degrees in [0.0f64, 30.0, 60.0, 85.0] {
+            let phi_and_theta =
+                |theta_o: f64, phi: f64| strand.lobes(degrees.to_radians(), theta_o, phi).total().x;
+            let sum = over_sphere(720, 16, phi_and_theta);
+            // The balance's own inclinations are 0.7° apart, its iteration is done.
+            assert!((sum - 1.0).abs() < 2e-3, "{sum} at {degrees}°, roughness {roughness_m}");
+        }
+    }
+}
+
+#[test]
+fn light_and_eye_change_places_without_a_change() {
+    let strand = Strand::new(&StrandParams { radius_m: 0.1, ..StrandParams::default() });
+    let shading = StrandShading::new(&StrandParams { radius_m: 0.1, ..StrandParams::default() });
+    for [theta_i, theta_o, phi] in directions(300, 0.3) {
+        let there = strand.lobes(theta_i, theta_o, phi).total();
+        let back = strand.lobes(theta_o, theta_i, phi).total();
+        assert!((there - back).abs().max_element() <= 1e-12 * there.max_element(), "{there} and {back}");
+        let [l, e, le] = cosines(theta_i, theta_o, phi);
+        assert_eq!(shading.psi(0.4, 0.6, l, e, le), shading.psi(0.4, 0.6, e, l, le));
+    }
+}
+
+#[test]
+fn neither_the_sense_of_the_flow_nor_that_of_the_azimuth_matters() {
+    let strand = Strand::new(&StrandParams::default());
+    let shading = StrandShading::new(&StrandParams::default());
+    for [theta_i, theta_o, phi] in directions(300, 0.3) {
+        let here = strand.lobes(theta_i, theta_o, phi).total();
+        for other in [strand.lobes(-theta_i, -theta_o, phi), strand.lobes(theta_i, theta_o, -phi)] {
+            assert!((here - other.total()).abs().max_element() <= 1e-12 * here.max_element());
+        }
+        let [l, e, le] = cosines(theta_i, theta_o, phi);
+        assert_eq!(shading.psi(0.4, 0.6, l, e, le), shading.psi(0.4, 0.6, -l, -e, le));
+    }
+}
+
+#[test]
+fn light_goes_to_the_mirror_cone_and_on_through_the_strand() {
+    let strand = Strand::new(&strands([0.1, 0.1], 0.0));
+    for degrees in [20.0f64, 45.0, 70.0] {
+        let theta = degrees.to_radians();
+        let mirror = strand.lobes(theta, -theta, PI);
+        let beside = strand.lobes(theta, theta, PI);
+        assert!(mirror.total().x > 1e3 * beside.total().x, "{mirror:?}, {beside:?}");
+        // Straight on is what went through; back to the light's side only what was reflected.
+        let back = strand.lobes(theta, -theta, 0.0);
+        assert!(mirror.tt.x > 10.0 * mirror.r.x && back.tt.x < 1e-3 * back.r.x, "{mirror:?}, {back:?}");
+    }
+}
+
+#[test]
+fn water_takes_most_of_red_and_least_of_blue() {
+    // A strand of a metre: thin ones absorb next to nothing.
+    let thick = StrandParams { radius_m: 0.5, ..strands([0.3, 0.2], 1.0) };
+    let albedo = StrandTable::of(&thick).moments().albedo;
+    assert!(albedo.x < albedo.y && albedo.y < albedo.z && albedo.z < 1.0, "{albedo}");
+    let more = StrandTable::of(&StrandParams { absorption: 2.0, ..thick }).moments().albedo;
+    assert!(more.cmplt(albedo).all(), "{more}, {albedo}");
+    let none = StrandTable::of(&StrandParams { absorption: 0.0, ..thick }).moments().albedo;
+    assert!((none - 1.0).abs().max_element() < 1e-3, "{none}");
+}
+
+#[test]
+fn air_scatters_all_light_by_its_mean_cosine() {
+    for g in [-0.9f64, -0.3, 0.0, 0.5, 0.9] {
+        let steps = 100_000;
+        let (mut sum, mut cosine) = (0.0, 0.0);
+        for i in 0..steps {
+            let mu = (i as f64 + 0.5) * 2.0 / steps as f64 - 1.0;
+            let phi = TAU * 2.0 / steps as f64 * henyey_greenstein(g, mu);
+            sum += phi;
+            cosine += phi * mu;
+        }
+        // The midpoint rule's h²/24·f′ at g = 0.9, where f′ is 6e3.
+        assert!((sum - 1.0).abs() < 1e-6 && (cosine - g).abs() < 1e-6, "{g}: {sum}, {cosine}");
+    }
+}
+
+#[test]
+fn isotropic_air_alone_is_a_quarter_everywhere_and_g_is_its_own_mean_cosine() {
+    let air = |g: f32| StrandShading::new(&StrandParams { aeration: 1.0, g, ..StrandParams::default() });
+    for [theta_i, theta_o, phi] in directions(100, 0.3) {
+        let [l, e, le] = cosines(theta_i, theta_o, phi);
+        assert_eq!(air(0.0).psi(0.5, 0.5, l, e, le).to_array(), [0.25; 3]);
+        // Forward is where the eye is opposite to the light.
+        let want = PI * henyey_greenstein(0.6, -le as f64);
+        assert!((air(0.6).psi(0.5, 0.5, l, e, le).x as f64 - want).abs() < 1e-5 * want);
+    }
+    assert!((air(0.7).moments().mean_cosine - 0.7f32 as f64).abs().max_element() < 1e-12);
+}
+
+#[test]
+fn means_over_all_directions_are_those_of_the_model() {
+    let params = StrandParams { radius_m: 0.1, ..strands([0.4, 0.4], 1.0) };
+    let strand = Strand::new(&params);
+    let moments = StrandTable::of(&params).moments();
+    let mut albedo = 0.0;
+    let mut cosine = 0.0;
+    let light = 24;
+    for i in 0..light {
+        // Equal shares of the sphere, of one half of it.
+        let theta_i = ((i as f64 + 0.5) / light as f64).asin();
+        albedo += over_sphere(120, 24, |theta_o, phi| strand.lobes(theta_i, theta_o, phi).total().x);
+        cosine += over_sphere(120, 24, |theta_o, phi| {
+            -strand.lobes(theta_i, theta_o, phi).total().x * cosines(theta_i, theta_o, phi)[2] as f64
+        });
+    }
+    assert!((moments.albedo.x - albedo / light as f64).abs() < 2e-3, "{moments:?}, {albedo}");
+    assert!((moments.mean_cosine.x - cosine / albedo).abs() < 2e-3, "{moments:?}, {cosine} / {albedo}");
+    let half = StrandShading::new(&StrandParams { aeration: 0.5, g: 0.2, ..params }).moments();
+    let want = (moments.albedo.x * moments.mean_cosine.x + 0.2) / (moments.albedo.x + 1.0);
+    assert!((half.mean_cosine.x - want).abs() < 1e-7, "{half:?}, not {want}");
+}
+
+#[test]
+fn the_noise_of_k_is_noise_of_the_air() {
+    assert_eq!(cell_aeration(0.3, 0.5, 0.5), 0.3);
+    assert_eq!(cell_aeration(0.3, 0.0, 0.0), 0.3);
+    assert_eq!(cell_aeration(0.3, 0.0, 0.5), 0.0);
+    assert_eq!(cell_aeration(0.3, 0.5, 0.0), 0.6);
+    assert_eq!(cell_aeration(0.8, 0.5, 0.0), 1.0);
+    // Any unit: the shader has k in 1/255.
+    assert_eq!(cell_aeration(0.3, 0.25, 0.75), cell_aeration(0.3, 1.0, 3.0));
+}

@@ -1,0 +1,6 @@
+//! Files: pictures, movies, contact sheets.
+
+pub mod contact_sheet;
+pub mod difference;
+pub mod movie;
+pub mod streaks;

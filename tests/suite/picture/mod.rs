@@ -1,0 +1,7 @@
+//! From radiance to picture: samples' filter, bloom, exposure, white balance and tone curves, against closed forms and
+//! published values.
+
+pub mod bloom;
+pub mod filter;
+pub mod resolve;
+pub mod white_balance;

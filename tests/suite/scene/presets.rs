@@ -1,0 +1,162 @@
+//! The scenes that come with the program: what the figures promise, and snapshots, last in trust.
+//!
+//! `TAKI_BLESS=1 tests/run presets` writes the snapshots anew; look at each before keeping it.
+
+use std::path::PathBuf;
+
+use crate::engine::gpu::{assert_parity, both, renderer, scene};
+use taki::engine::{RenderOptions, cpu};
+use taki::output::frame::{Difference, Tolerance, encode_png, read_png};
+use taki::picture::Frame;
+use taki::scene::{Scene, presets};
+use taki::util::monitor::Unwatched;
+
+/// Small enough that a snapshot stays under 64 KiB.
+const SMALL: [&str; 3] = ["image.width=96", "image.height=154", "image.samples=2"];
+const FIGURES: [&str; 3] = ["fig5", "fig6", "fig7"];
+const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
+
+fn on_cpu(scene: &Scene) -> Frame {
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame")
+}
+
+fn encoded(frame: &Frame) -> Vec<[f32; 3]> {
+    frame.picture.iter().map(|p| [p[0], p[1], p[2]].map(|x| x as f32 / 255.0)).collect()
+}
+
+fn snapshot(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots").join(format!("{name}.png"))
+}
+
+/// Two steps of 255 for other compilers' and drivers' rounding; a hundredth of the pixels for edges.
+fn assert_like_snapshot(name: &str, frame: &Frame) {
+    let (width, height, golden) = read_png(&snapshot(name)).expect("a snapshot");
+    assert_eq!((width, height), (frame.width, frame.height));
+    let d =
+        Difference::new(width, &encoded(frame), &golden, Tolerance { relative: 0.0, absolute: 2.5 / 255.0 });
+    assert!(d.share_outside() <= 0.01, "{name}: {d:?}");
+}
+
+#[test]
+fn the_figures_look_as_they_did_when_last_looked_at() {
+    for name in FIGURES {
+        let frame = on_cpu(&scene(name, &SMALL));
+        if std::env::var_os("TAKI_BLESS").is_some() {
+            std::fs::write(snapshot(name), encode_png(&frame, &[]).expect("a PNG")).expect("written");
+        }
+        assert_like_snapshot(name, &frame);
+    }
+}
+
+#[test]
+fn the_gpu_engine_gives_the_same_figures() {
+    let Some(mut renderer) = renderer("snapshots") else { return };
+    for name in FIGURES {
+        let scene = scene(name, &SMALL);
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let options = RenderOptions::default();
+        let frame = renderer.render(&scene, &volume, &scene.mesh(), &options, &Unwatched).expect("a frame");
+        assert_like_snapshot(name, &frame);
+    }
+}
+
+#[test]
+fn a_snapshot_of_another_figure_does_not_pass() {
+    let frame = on_cpu(&scene("fig6", &SMALL));
+    assert!(std::panic::catch_unwind(|| assert_like_snapshot("fig5", &frame)).is_err());
+}
+
+#[test]
+fn snapshots_are_small() {
+    for name in FIGURES {
+        let bytes = std::fs::metadata(snapshot(name)).expect("a snapshot").len();
+        assert!(bytes <= MAX_SNAPSHOT_BYTES, "{name}: {bytes} bytes");
+    }
+}
+
+#[test]
+fn every_preset_renders_light_and_no_pixel_that_is_not_finite() {
+    for (name, _) in presets() {
+        let frame = on_cpu(&scene(name, &["image.width=48", "image.height=40", "image.samples=1"]));
+        assert_eq!(frame.non_finite_pixels(), 0, "{name}");
+        assert!(frame.covered_pixels() > 40 * 48 / 20, "{name}: the water covers hardly anything");
+        let brightest = encoded(&frame).into_iter().flatten().fold(0.0, f32::max);
+        assert!(brightest > 0.5, "{name} is dark");
+    }
+}
+
+/// The scenes of falling water besides the default one.
+const PLACES: [&str; 4] = ["cascade", "curtain", "spout", "night"];
+
+/// A preset whose place is coarse, as `COARSE_PLACE` is the default's and for its reason.
+fn coarse(name: &str, more: &[&str]) -> Scene {
+    let values = &scene(name, &[]).values;
+    // The film's lobe is a 32nd power: it magnifies what is left.
+    let rock = |rock: String| [format!("rocks.{rock}.levels=1"), format!("rocks.{rock}.wet=0")];
+    let rocks = values.names("rocks").into_iter().flat_map(rock);
+    let pools = values.names("pools").into_iter().map(|pool| format!("pools.{pool}.foam=0"));
+    let sets: Vec<String> = rocks.chain(pools).chain(more.iter().map(|s| s.to_string())).collect();
+    scene(name, &sets.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn the_engines_agree_on_every_scene_of_falling_water() {
+    let Some(mut renderer) = renderer("scenes of falling water") else { return };
+    for name in PLACES {
+        let scene = coarse(name, &["image.width=96", "image.height=54", "image.samples=1"]);
+        assert_parity(name, &both(&mut renderer, &scene));
+    }
+}
+
+#[test]
+fn every_scene_of_falling_water_flows_and_comes_round() {
+    for name in PLACES {
+        let at = |flow: &str| {
+            on_cpu(&coarse(name, &["image.width=64", "image.height=36", "image.samples=1", flow])).picture
+        };
+        let start = at("volume.flow=0");
+        assert!(start == at("volume.flow=1"), "{name} comes round");
+        let moved = start.iter().zip(&at("volume.flow=0.37")).filter(|(a, b)| a != b).count();
+        assert!(moved > 64 * 36 / 50, "{name}: only {moved} pixels change while it flows");
+    }
+}
+
+#[test]
+fn figure_six_is_denser_and_figure_seven_smoother_than_figure_five() {
+    let [five, six, seven] = FIGURES.map(|name| scene(name, &SMALL));
+    let mean_t = |s: &Scene| {
+        let f = on_cpu(s);
+        let water: Vec<f32> =
+            f.radiance.iter().zip(&f.counts).filter(|(_, c)| c[0] > 0).map(|(r, _)| r[3]).collect();
+        water.iter().sum::<f32>() / water.len() as f32
+    };
+    assert!(mean_t(&six) < 0.8 * mean_t(&five), "6 lets less light through");
+    // Less complex curves keep closer to the flow.
+    let along = |s: &Scene| s.volume(1 << 30, &Unwatched).expect("a volume").statistics().v_mean[1];
+    assert!(along(&seven) > along(&five) + 0.02, "{} against {}", along(&seven), along(&five));
+}
+
+#[test]
+fn a_scene_that_takes_its_volume_from_a_file_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let taki = |args: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_taki"));
+        command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
+        let out = command.current_dir(folder.path()).args(args).output().expect("it runs");
+        assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    };
+    taki(&["volume", "build", "fig5", "-o", "v.npz"]);
+    let text = "version = 1\nbase = \"fig5\"\n[volume]\nfile = \"v.npz\"\n";
+    std::fs::write(folder.path().join("mine.toml"), text).expect("written");
+    let picture = |scene: &str, engine: &str, file: &str| {
+        taki(&["render", scene, "--engine", engine, "--size", "80x128", "--samples", "1", "-o", file]);
+        std::fs::read(folder.path().join(file)).expect("a picture")
+    };
+    for file in ["a.png", "b.exr"] {
+        assert!(picture("fig5", "cpu", file) == picture("mine.toml", "cpu", file), "cpu {file}");
+        if renderer("bytes").is_some() {
+            assert!(picture("fig5", "gpu", file) == picture("mine.toml", "gpu", file), "gpu {file}");
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! §4 The trace.
+
+pub mod closed_forms;
+pub mod flow;

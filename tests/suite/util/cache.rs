@@ -1,0 +1,215 @@
+//! The cache on disk: what it gives is what would have been made, whatever became of its files.
+
+use std::cell::Cell;
+use std::convert::Infallible;
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+use std::time::{Duration, SystemTime};
+
+use crate::cli::faults;
+use taki::scene::{Limits, Scene};
+use taki::util::cache::Cache;
+use taki::util::monitor::Unwatched;
+use taki::volume::{build_water, kept_water};
+use tempfile::tempdir;
+
+const ROOMY: u64 = 1 << 20;
+const SLOW: Duration = Duration::from_secs(60);
+
+/// The values of a key, and whether they had to be made.
+fn get(cache: &Cache, key: &str) -> (Vec<u32>, bool) {
+    let made = Cell::new(false);
+    let make = || {
+        made.set(true);
+        Ok::<_, Infallible>(values())
+    };
+    let Ok(found) = cache.get("things", key, values().len(), make);
+    (found, made.get())
+}
+
+fn values() -> Vec<u32> {
+    (0..40).map(|i| i * 0x0101_0101 + 7).collect()
+}
+
+#[test]
+fn what_was_slow_to_make_is_found_again_and_what_was_quick_is_not_kept() {
+    let dir = tempdir().unwrap();
+    let cache = Cache::new(dir.path(), ROOMY);
+    assert_eq!(get(&cache, "a"), (values(), true));
+    assert_eq!(get(&cache, "a"), (values(), true), "it took less time than reading does");
+    cache.keep_if_slow("things", "a", &values(), SLOW);
+    assert_eq!(get(&cache, "a"), (values(), false));
+    assert_eq!(get(&cache, "b"), (values(), true), "another key");
+    // 10 ms, and 2 ns a byte: 12.1 ms.
+    let mebibyte = vec![0u8; 1 << 20];
+    let cache = Cache::new(dir.path(), 1 << 40);
+    cache.keep_if_slow("things", "c", &mebibyte, Duration::from_micros(12_000));
+    assert!(!cache.path("things", "c").exists());
+}
+
+#[test]
+fn a_file_with_any_byte_changed_cut_off_or_added_is_as_if_it_were_not_there() {
+    let dir = tempdir().unwrap();
+    let cache = Cache::new(dir.path(), ROOMY);
+    cache.keep_if_slow("things", "a", &values(), SLOW);
+    let path = cache.path("things", "a");
+    let whole = fs::read(&path).unwrap();
+    for at in 0..whole.len() {
+        for bit in [1, 0x80] {
+            let mut damaged = whole.clone();
+            damaged[at] ^= bit;
+            fs::write(&path, damaged).unwrap();
+            assert_eq!(get(&cache, "a"), (values(), true), "byte {at}");
+        }
+        fs::write(&path, &whole[..at]).unwrap();
+        assert_eq!(get(&cache, "a"), (values(), true), "cut off at {at}");
+    }
+    fs::write(&path, [&whole[..], b"x"].concat()).unwrap();
+    assert_eq!(get(&cache, "a"), (values(), true), "a byte more");
+    fs::write(&path, &whole).unwrap();
+    assert_eq!(get(&cache, "a"), (values(), false), "the whole file is read");
+    // Two names that came to be the same, or a file that somebody renamed.
+    fs::copy(&path, cache.path("things", "b")).unwrap();
+    assert_eq!(get(&cache, "b"), (values(), true), "a whole file of another key");
+    fs::remove_file(&path).unwrap();
+    fs::create_dir(&path).unwrap();
+    assert_eq!(get(&cache, "a"), (values(), true), "a folder of this name");
+}
+
+#[test]
+fn what_was_used_longest_ago_makes_room() {
+    let dir = tempdir().unwrap();
+    let one = {
+        let cache = Cache::new(dir.path().join("measured"), ROOMY);
+        cache.keep_if_slow("things", "0", &values(), SLOW);
+        fs::metadata(cache.path("things", "0")).unwrap().len()
+    };
+    let cache = Cache::new(dir.path(), 3 * one);
+    for (age, key) in [(40, "0"), (30, "1"), (20, "2")] {
+        cache.keep_if_slow("things", key, &values(), SLOW);
+        let file = fs::File::options().write(true).open(cache.path("things", key)).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(age)).unwrap();
+    }
+    let stale = dir.path().join("things/dead.tmp");
+    fs::write(&stale, "left").unwrap();
+    let file = fs::File::options().write(true).open(&stale).unwrap();
+    file.set_modified(SystemTime::now() - Duration::from_secs(7200)).unwrap();
+    fs::write(dir.path().join("things/readme.txt"), "somebody's own").unwrap();
+
+    assert!(!get(&cache, "0").1, "used again");
+    cache.keep_if_slow("things", "3", &values(), SLOW);
+    let there = ["0", "1", "2", "3"].map(|key| cache.path("things", key).exists());
+    assert_eq!(there, [true, false, true, true]);
+    assert!(!stale.exists() && dir.path().join("things/readme.txt").exists());
+    // What does not fit at all leaves the others alone.
+    cache.keep_if_slow("things", "large", &vec![1u32; one as usize], SLOW);
+    let there = ["0", "2", "3", "large"].map(|key| cache.path("things", key).exists());
+    assert_eq!(there, [true, true, true, false]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_used_is_as_good_as_none() {
+    let dir = tempdir().unwrap();
+    fs::write(dir.path().join("file"), "").unwrap();
+    for root in [Path::new("/proc/taki"), &dir.path().join("file"), &dir.path().join("file/below")] {
+        let cache = Cache::new(root, ROOMY);
+        cache.keep_if_slow("things", "a", &values(), SLOW);
+        assert_eq!(get(&cache, "a"), (values(), true), "{}", root.display());
+    }
+}
+
+#[test]
+fn many_at_once_all_get_the_values() {
+    let dir = tempdir().unwrap();
+    let cache = &Cache::new(dir.path(), ROOMY);
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(move || {
+                for i in 0..50 {
+                    cache.keep_if_slow("things", "a", &values(), SLOW);
+                    assert_eq!(get(cache, "a").0, values(), "{i}");
+                }
+            });
+        }
+    });
+    assert_eq!(fs::read_dir(dir.path().join("things")).unwrap().count(), 1, "no temporary files");
+}
+
+#[test]
+fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
+    let dir = tempdir().unwrap();
+    let cache = Cache::new(dir.path(), 64 << 20).keeping_all();
+    let base = ["volume.nx=16", "volume.ny=16", "volume.nz=8", "curves.across=5", "curves.deep=3"];
+    let place = ["rocks.wall.levels=3", "rocks.bed.levels=2", "rocks.left.levels=2", "rocks.hills.levels=2"];
+    let changes = [
+        &[][..],
+        &["volume.alpha=0.5"],
+        &["volume.seed=8"],
+        &["volume.ny=8", "volume.nx=32"],
+        &["curves.across=3", "curves.deep=5"],
+        &["curves.h=1.1"],
+        &["curves.breathe=0.2"],
+        &["volume.crest=0.1"],
+        &["volume.k_d=0.25"],
+        &["rocks.wall.seed=2"],
+        &["rocks.wall.color=[0.2,0.1,0.1]"],
+        &["rocks.bed.wet_reach=0.3"],
+        &["lights.sun.direction=[1,1,1]"],
+        &["sheets.main.widths=[1,1,1,1,1,1]"],
+        &["pools.plunge.foam=0.1"],
+    ];
+    // Its light on itself would take all the time.
+    let rocks = ["wall", "bed", "left", "right", "far_right", "boulder_a", "boulder_b", "boulder_c"];
+    let open = rocks.map(|rock| format!("rocks.{rock}.occlusion=0"));
+    // Twice: made, and found.
+    for sets in changes.iter().chain(&changes) {
+        let sets = base.iter().chain(&place).chain(*sets).map(|s| s.to_string()).chain(open.clone());
+        let sets: Vec<String> = sets.collect();
+        let scene = Scene::load(Path::new("waterfall"), &sets, &Limits::default()).expect("valid");
+        let made = build_water(&scene.water, &Unwatched).expect("built");
+        assert!(kept_water(&scene.water, &cache, &Unwatched).expect("found") == made, "{sets:?}");
+        assert!(scene.kept_mesh(Some(&cache)) == scene.mesh(), "{sets:?}");
+    }
+    let files = |kind| fs::read_dir(dir.path().join(kind)).unwrap().count();
+    // α is not in the cells; the last six change no volume, the first nine no mesh.
+    assert_eq!((files("volumes"), files("meshes")), (8, 7));
+}
+
+/// A render of a scene whose mesh is slow to make, with this folder for caches.
+fn render(cache: &Path, output: &Path, more: &[&str]) -> std::process::Command {
+    let mut taki =
+        faults::taki(["render", "waterfall", "--size", "32x18", "--samples", "1", "--engine", "cpu"]);
+    taki.args(["--set", "volume.ny=64", "-o"]).arg(output).args(more).env("XDG_CACHE_HOME", cache);
+    taki
+}
+
+fn done(out: Output) {
+    let words = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success() && !words.contains("warning"), "{words}");
+}
+
+#[test]
+fn renders_with_a_new_a_used_a_damaged_and_no_cache_make_the_same_file() {
+    let dir = tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    done(render(&at("cache"), &at("plain.png"), &["--no-cache"]).output().unwrap());
+    assert!(!at("cache").exists(), "--no-cache leaves nothing");
+    // Two processes at once find nothing there.
+    let both = ["one.png", "two.png"].map(|name| render(&at("cache"), &at(name), &[]).spawn().unwrap());
+    both.into_iter().for_each(|child| done(child.wait_with_output().unwrap()));
+    let mesh = fs::read_dir(at("cache/taki/meshes")).unwrap().next().expect("a mesh is kept").unwrap().path();
+    done(render(&at("cache"), &at("three.png"), &[]).output().unwrap());
+    let mut bytes = fs::read(&mesh).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    fs::write(&mesh, bytes).unwrap();
+    done(render(&at("cache"), &at("four.png"), &[]).output().unwrap());
+    // A file where the folder should be.
+    fs::write(at("file"), "").unwrap();
+    done(render(&at("file"), &at("five.png"), &[]).output().unwrap());
+    let plain = fs::read(at("plain.png")).unwrap();
+    for name in ["one.png", "two.png", "three.png", "four.png", "five.png"] {
+        assert!(fs::read(at(name)).unwrap() == plain, "{name}");
+    }
+}

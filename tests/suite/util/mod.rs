@@ -1,0 +1,3 @@
+//! What every room needs.
+
+pub mod cache;
