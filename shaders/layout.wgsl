@@ -3,7 +3,7 @@
 
 const WORKGROUP: u32 = 8u;
 
-struct Frame {
+struct FrameUniforms {
     clip_from_world: mat4x4<f32>,
     eye_world: vec3<f32>,
     jitter_x: f32,
@@ -150,7 +150,7 @@ fn fresnel(cos_angle: f32) -> f32 {
 }
 
 // Camera::view_ray: unit direction through a pixel of the whole image.
-fn view_ray(frame: Frame, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
+fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
     let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
     let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;
     let d = frame.forward + frame.right * x + frame.up * y;

@@ -3,7 +3,7 @@
 const NEVER: f32 = 1.0e30;
 const PARALLEL: f32 = 1.0e-20;
 // Of where a ray leaves a box: 1 − 2^−20.
-const SHY: f32 = 0.99999905;
+const LEAP_MARGIN: f32 = 0.99999905;
 
 // Whether empty cells hold boxes to leap over (src/volume/leaps.rs).
 override LEAPS: bool = false;
@@ -22,7 +22,7 @@ struct Walk {
     // Of leaps: cells along each axis in one unit of t and the inverse, where the ray leaves the slab, where the words of an
     // empty cell have what is of the ray's octant, and the tile.
     speed: vec3<f32>,
-    reach: vec3<f32>,
+    inverse_abs: vec3<f32>,
     t_slab: f32,
     octant: vec3<u32>,
     tile: vec2<i32>,
@@ -49,7 +49,7 @@ fn walk_new(size: vec3<i32>, origin: vec3<f32>, direction: vec3<f32>) -> Walk {
     walk.cell.y = select(walk.cell.y, 0, walk.cell.y >= size.y);
     if LEAPS {
         walk.speed = select(vec3<f32>(0.0), abs(direction), moves);
-        walk.reach = abs(walk.inverse);
+        walk.inverse_abs = abs(walk.inverse);
         let last = select(0.0, f32(size.z), forward.z);
         walk.t_slab = select(NEVER, (last - walk.origin.z) * walk.inverse.z, moves.z);
         let down = select(vec3<u32>(0u), vec3<u32>(2u, 4u, 8u), walk.step < vec3<i32>(0));
@@ -74,10 +74,10 @@ fn walk_leap(walk: ptr<function, Walk>, texel: vec2<u32>, on: bool) -> u32 {
     let empty = on & ((texel.x & 0xffffu) == 0u);
     let exponents = (vec3<u32>(texel.y, texel.y, texel.x) >> (*walk).octant) & vec3<u32>(3u);
     let more = vec3<f32>((vec3<u32>(1u) << exponents) - 1u);
-    let far = (*walk).t_next + more * (*walk).reach;
+    let far = (*walk).t_next + more * (*walk).inverse_abs;
     let xy = select(far.y, far.x, far.x < far.y);
     let end = select((*walk).t_slab, far.z, far.z < (*walk).t_slab);
-    let t = select(end, xy, xy < end) * SHY;
+    let t = select(end, xy, xy < end) * LEAP_MARGIN;
     let ahead = ceil((t - (*walk).t_next) * (*walk).speed);
     let passed = select(vec3<f32>(0.0), ahead, (ahead > vec3<f32>(0.0)) & vec3<bool>(empty));
     let way = passed * (*walk).step_f32;

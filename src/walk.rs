@@ -33,7 +33,7 @@ pub const PARALLEL: f32 = 1.0e-20;
 
 /// A leap ends before this share of the parameter where the ray leaves the box, 1 − 2^−20: parameters, each a difference, a
 /// reciprocal and a product, are good to 4·2^−24.
-pub const SHY: f32 = 1.0 - 1.0 / (1 << 20) as f32;
+pub const LEAP_MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
 /// One cell on the way of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,28 +145,28 @@ impl Walk {
         let [x, y, z] = exponents.map(|l| ((1i32 << l) - 1) as f32);
         let far = self.t_next + Vec3::new(x, y, z) * self.inverse.abs();
         let least = |a: f32, b: f32| if a < b { a } else { b };
-        let t = least(least(far.x, far.y), least(far.z, self.t_slab)) * SHY;
+        let t = least(least(far.x, far.y), least(far.z, self.t_slab)) * LEAP_MARGIN;
         let passed = (t - self.t_next) * self.speed;
-        let way = IVec3::new(above(passed.x), above(passed.y), above(passed.z));
+        let way = IVec3::new(ceil_from_zero(passed.x), ceil_from_zero(passed.y), ceil_from_zero(passed.z));
         self.boundary += (way * self.step).as_vec3();
         self.t_next = (self.boundary - self.origin) * self.inverse;
         self.cell += way * self.step;
-        self.cell.x = around(self.cell.x, self.size.x);
-        self.cell.y = around(self.cell.y, self.size.y);
+        self.cell.x = wrap_within_one_tile(self.cell.x, self.size.x);
+        self.cell.y = wrap_within_one_tile(self.cell.y, self.size.y);
         way.element_sum() as u32
     }
 }
 
 /// The whole number at or above x, but 0 below that.
 #[inline]
-fn above(x: f32) -> i32 {
+fn ceil_from_zero(x: f32) -> i32 {
     let whole = x as i32;
     (whole + i32::from(x > whole as f32)).max(0)
 }
 
 /// Less than a tile past either end of 0..n comes in at the other.
 #[inline]
-fn around(x: i32, n: i32) -> i32 {
+fn wrap_within_one_tile(x: i32, n: i32) -> i32 {
     if x < 0 {
         x + n
     } else if x >= n {
@@ -191,11 +191,11 @@ impl Iterator for Walk {
         if t_next.x <= t_next.y && t_next.x <= t_next.z {
             self.boundary.x += self.step.x as f32;
             self.t_next.x = (self.boundary.x - self.origin.x) * self.inverse.x;
-            self.cell.x = wrap(self.cell.x + self.step.x, self.size.x);
+            self.cell.x = wrap_one_step(self.cell.x + self.step.x, self.size.x);
         } else if t_next.y <= t_next.z {
             self.boundary.y += self.step.y as f32;
             self.t_next.y = (self.boundary.y - self.origin.y) * self.inverse.y;
-            self.cell.y = wrap(self.cell.y + self.step.y, self.size.y);
+            self.cell.y = wrap_one_step(self.cell.y + self.step.y, self.size.y);
         } else {
             self.boundary.z += self.step.z as f32;
             self.t_next.z = (self.boundary.z - self.origin.z) * self.inverse.z;
@@ -208,7 +208,7 @@ impl Iterator for Walk {
 
 /// One step past either end of 0..n comes in at the other.
 #[inline]
-fn wrap(x: i32, n: i32) -> i32 {
+fn wrap_one_step(x: i32, n: i32) -> i32 {
     if x < 0 {
         n - 1
     } else if x >= n {

@@ -6,7 +6,7 @@
 #import volume::cells
 #import walk
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
 @group(0) @binding(3) var<uniform> groups: Groups;
 @group(0) @binding(4) var volume: texture_storage_3d<rg32uint, read>;

@@ -12,7 +12,7 @@
 #import light::haze
 #import mapping
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
 // Of the sheets before: the last one's depth, and the numbers of all.
@@ -22,12 +22,12 @@
 @group(0) @binding(6) var environment_map: texture_2d<f32>;
 @group(0) @binding(8) var<storage, read> positions: array<vec4<f32>>;
 @group(0) @binding(9) var<storage, read> tiles: array<MeshTile>;
-@group(0) @binding(11) var<storage, read> coats: array<Coat>;
+@group(0) @binding(11) var<storage, read> coats: array<VertexMaterial>;
 // Of the sample in its tile, in squares; number of the tile; depth.
 @group(0) @binding(10) var places: texture_2d<f32>;
 
 // What is shaded at a vertex. Numbers to 1 are halves of words: the normal (signed), film of water, occlusion and shadow.
-struct Coat {
+struct VertexMaterial {
     albedo_r: f32,
     albedo_g: f32,
     albedo_b: f32,

@@ -34,7 +34,7 @@ override IN_COLOUR: bool = STRAND || MULTIPLE;
 // Mist has a walk of its own, in which no cell is empty and all shine alike.
 override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
 @group(0) @binding(3) var<uniform> groups: Groups;
@@ -150,7 +150,7 @@ struct View {
     strand: Strand,
     similarity: Similarity,
     // What the sheet makes of the cells.
-    matter: Matter,
+    matter: SheetDensity,
     // Whether it leaves empty cells empty; mist does not.
     leaps: bool,
     // Where the quad's profile begins.
@@ -366,7 +366,7 @@ fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
 }
 
 // Half way through the cell the ray is in.
-fn found_between(walk: Walk, ray: Ray, view: View) -> Found {
+fn found_between(walk: Walk, ray: Ray, view: View) -> CellSample {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
     return between(view.level, view.matter, walk.cell, middle);
 }
@@ -379,7 +379,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         passed_by = walk_leap(walk, texel, view.leaps);
     }
     let t_exit = walk_exit(*walk);
-    var found: Found;
+    var found: CellSample;
     if TRILINEAR {
         found = found_between(*walk, *ray, view);
     } else {
@@ -398,7 +398,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     }
     let passed = (*ray).transmittance * exp2(-tau_bits);
 
-    var seen: Seen;
+    var seen: CellShading;
     seen.cell = (*walk).cell;
     seen.occupied = rho > 0.0;
     seen.tau_bits = tau_bits;

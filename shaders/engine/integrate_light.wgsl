@@ -56,7 +56,7 @@ struct Place {
 }
 
 // What a cell is to every light.
-struct Seen {
+struct CellShading {
     cell: vec3<i32>,
     occupied: bool,
     tau_bits: f32,
@@ -137,7 +137,7 @@ fn is_mist(view: View) -> bool {
 }
 
 // 255·Ψ of strands, or of mist.
-fn psi_of(seen: Seen, light: RayLight, view: View) -> f32 {
+fn psi_of(seen: CellShading, light: RayLight, view: View) -> f32 {
     if MANY_DIRECTIONS {
         let psi = spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
         return select(psi, view.matter.mist, is_mist(view));
@@ -147,13 +147,13 @@ fn psi_of(seen: Seen, light: RayLight, view: View) -> f32 {
 }
 
 // What a cell sends to the eye of a light of intensity 1, in 255ths.
-fn lit(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
+fn lit(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
     let fibre = psi_of(seen, light, view);
     return seen.weight * fibre * visibility_of(seen, light, view, ray).x;
 }
 
 // The same where it has a colour: strands, or light scattered more than once.
-fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
+fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
     let visibility = visibility_of(seen, light, view, ray);
     let weight = seen.weight * visibility.x;
     let fibre = psi_of(seen, light, view);
@@ -179,7 +179,7 @@ fn lit_in_colour(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray
 }
 
 // V_i(k); and −log₂ of it, which is 0 where codes are kept.
-fn visibility_of(seen: Seen, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
+fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
     var depth = 0.0;
     if (MARCH | CACHED) & ERODED {
         if is_mist(view) {

@@ -12,7 +12,7 @@ fn haze_transmittance(density: f32, falloff: f32, d_y: f32, t: f32) -> f32 {
     return exp(-(density * t * mean));
 }
 
-fn haze_over(frame: Frame, radiance: vec3<f32>, d_y: f32, t: f32) -> vec3<f32> {
+fn haze_over(frame: FrameUniforms, radiance: vec3<f32>, d_y: f32, t: f32) -> vec3<f32> {
     if frame.haze_density == 0.0 {
         return radiance;
     }
@@ -21,7 +21,7 @@ fn haze_over(frame: Frame, radiance: vec3<f32>, d_y: f32, t: f32) -> vec3<f32> {
 }
 
 // EyeHaze::over_water: `seen` is the light of the water and of what is behind it, and what it lets through.
-fn haze_over_water(frame: Frame, seen: vec4<f32>, behind: vec3<f32>, d_y: f32, t: f32) -> vec4<f32> {
+fn haze_over_water(frame: FrameUniforms, seen: vec4<f32>, behind: vec3<f32>, d_y: f32, t: f32) -> vec4<f32> {
     let transmittance = haze_transmittance(frame.haze_density, frame.haze_falloff, d_y, t);
     let passed = behind * seen.w;
     let water = (seen.rgb - passed) * transmittance;

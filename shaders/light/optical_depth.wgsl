@@ -21,7 +21,7 @@ struct LightWalk {
 // In cells of a level, along a direction in those. Ends early where the depth is `enough`.
 fn optical_depth(
     level: Level,
-    matter: Matter,
+    matter: SheetDensity,
     cell: vec3<i32>,
     direction: vec3<f32>,
     max_cells: u32,
@@ -39,7 +39,7 @@ fn optical_depth(
 }
 
 fn pass_cell(
-    matter: Matter,
+    matter: SheetDensity,
     walk: ptr<function, Walk>,
     ray: ptr<function, LightWalk>,
     level: Level,

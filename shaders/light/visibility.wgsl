@@ -25,7 +25,7 @@ struct LightVolume {
     bits: f32,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<uniform> light_volume: LightVolume;
 @group(0) @binding(2) var volume: texture_storage_3d<rg32uint, read>;
 // Linear indices of the columns in which any cell has density.
@@ -64,7 +64,7 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     let y = i32((index % of_slice) / u32(extent.x));
     let column = i32(index / of_slice);
     // Sheets of one volume share a light volume, whatever they make of it.
-    let whole = Matter(1.0, 0.0, 0.0, 0.0, 1.0);
+    let whole = SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);
     let level = level_with(frame.cells, y, column * CELLS_A_WORD);
     let direction = light_volume.direction * level.scale;
     let bits = light_volume.bits * select(1.0, level.deep, PER_CELL);

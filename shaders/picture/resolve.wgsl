@@ -15,7 +15,7 @@ struct Develop {
 const TONE_FILMIC: u32 = 1u;
 const TONE_AGX: u32 = 2u;
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> radiance: array<vec4<f32>>;
 // One pixel a word: red in the lowest byte, alpha 255 in the highest.
 @group(0) @binding(2) var<storage, read_write> picture: array<u32>;

@@ -19,7 +19,7 @@ struct Moments {
 }
 
 // What a ray finds: in codes, ρ of what the sheet leaves.
-struct Found {
+struct CellSample {
     rho: f32,
     k_d: f32,
     k_s: f32,
@@ -59,10 +59,10 @@ fn moments_of(word: u32, level: Level) -> Moments {
 // Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the level's cells.
 fn between(
     level: Level,
-    matter: Matter,
+    matter: SheetDensity,
     cell: vec3<i32>,
     middle: vec3<f32>,
-) -> Found {
+) -> CellSample {
     let inside = middle - floor(middle) - 0.5;
     let side = select(vec3<i32>(1), vec3<i32>(-1), inside < vec3<f32>(0.0));
     let far = abs(inside);
@@ -90,7 +90,7 @@ fn between(
     k *= inverse;
     moments.diagonal *= inverse;
     moments.mixed *= inverse;
-    return Found(matter_rho(rho, matter), k.x, k.y, moments);
+    return CellSample(matter_rho(rho, matter), k.x, k.y, moments);
 }
 
 // Moments as seen by a ray.

@@ -231,7 +231,7 @@ fn passes(
         let scenes: Vec<_> = scenes.iter().map(|(name, scene)| (*name, scene)).collect();
         gpu.prepare(&scenes, volume, &mesh)?;
     }
-    let mut kept = cpu::KeptVolumes::default();
+    let mut kept = cpu::LightVolumeCache::default();
     // The first round warms caches and tile sizes and is not counted.
     for round in 0..=args.runs {
         terminal.progress("rounds", round as u64, args.runs as u64)?;

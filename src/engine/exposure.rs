@@ -4,7 +4,7 @@
 //! every size of picture and on both engines, and nothing flickers. What is chosen is written into the scene as an
 //! ordinary `image.exposure`.
 
-use super::cpu::{self, KeptVolumes};
+use super::cpu::{self, LightVolumeCache};
 use crate::picture::AutoExposure;
 use crate::place::Mesh;
 use crate::scene::{Animation, Scene};
@@ -37,7 +37,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
     let window = Window::whole([image.width, image.height]);
     let watch = Quiet(monitor);
-    let kept = &mut KeptVolumes::default();
+    let kept = &mut LightVolumeCache::default();
     let frame = cpu::render_samples(&small, volume, mesh, window, 0..1, false, kept, &watch)?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }

@@ -35,7 +35,7 @@ pub enum Engine {
     /// On a device.
     Gpu(Box<GpuRenderer>, DeviceOptions),
     /// On all cores.
-    Cpu(cpu::KeptVolumes),
+    Cpu(cpu::LightVolumeCache),
 }
 
 /// Pixels a submission after a device was lost: small enough for the shortest watchdog known.
@@ -44,7 +44,7 @@ const CAREFUL_TILE_PIXELS: u32 = 4096;
 impl Engine {
     /// The CPU engine.
     pub fn cpu() -> Engine {
-        Engine::Cpu(cpu::KeptVolumes::default())
+        Engine::Cpu(cpu::LightVolumeCache::default())
     }
 
     /// Opens the engine; says in one line what was taken and why.

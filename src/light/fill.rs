@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
-use super::optical_depth::number;
+use super::optical_depth::light_volume_value;
 use super::visibility::{Form, LightVolume, Medium, transmittance_code};
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
@@ -84,7 +84,7 @@ impl<'a> Rows<'a> {
     fn walked(&self, level: &Level, light_volume: &LightVolume, medium: Medium, form: Form) -> Numbers {
         let of = |cell: IVec3| {
             let asked = self.lookup == Lookup::Trilinear || level.cell(cell).rho_code() > 0;
-            if asked { number(level, cell, light_volume, medium, form) } else { 0.0 }
+            if asked { light_volume_value(level, cell, light_volume, medium, form) } else { 0.0 }
         };
         match form {
             Form::Codes => Numbers::Codes(in_order(level, |cell| of(cell) as u8)),

@@ -4,16 +4,22 @@
 use glam::{IVec3, Vec3};
 
 use super::visibility::{DARK_BITS, Form, LightVolume, Medium, transmittance_code};
-use crate::trace::Matter;
+use crate::trace::SheetDensity;
 use crate::trace::lookup::Level;
 use crate::volume::large_box;
 use crate::walk::{NEVER, Walk};
 
 /// What a light volume of a form holds for a cell.
-pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Medium, form: Form) -> f32 {
+pub fn light_volume_value(
+    level: &Level,
+    cell: IVec3,
+    light_volume: &LightVolume,
+    medium: Medium,
+    form: Form,
+) -> f32 {
     let depth = |enough: f32| {
         let direction = light_volume.direction * level.scale;
-        optical_depth(level, &Matter::WHOLE, cell, direction, medium, enough, &mut 0)
+        optical_depth(level, &SheetDensity::WHOLE, cell, direction, medium, enough, &mut 0)
     };
     let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
     match form {
@@ -26,7 +32,7 @@ pub fn number(level: &Level, cell: IVec3, light_volume: &LightVolume, medium: Me
 /// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. Ends early where the depth is `enough`. `walked` grows by the cells of the way.
 pub fn optical_depth(
     level: &Level,
-    matter: &Matter,
+    matter: &SheetDensity,
     start: IVec3,
     direction: Vec3,
     medium: Medium,

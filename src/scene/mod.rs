@@ -78,7 +78,7 @@ pub struct Scene {
     /// The walk through the volume.
     pub trace: Trace,
     /// Where angles are measured.
-    pub frame: AngleFrame,
+    pub angles: AngleFrame,
     /// Attenuation between light and cell.
     pub visibility: Visibility,
     /// Bytes that light volumes may take: at most half of what the work may use.
@@ -231,7 +231,7 @@ impl Scene {
             rocks: ground::rocks(v, limits.memory)?,
             pools: ground::pools(v)?,
             trace,
-            frame: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
+            angles: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
             visibility: match v.text("light.visibility").as_str() {
                 "none" => Visibility::None,
                 "cached" => Visibility::Cached,

@@ -2,7 +2,7 @@
 
 use super::{Attenuation, Lookup, Prefilter, Trace, extinction};
 use crate::mapping::Quad;
-use crate::volume::{PyramidSpec, Stack, VolumeTexture, level_count};
+use crate::volume::{LevelAtlas, PyramidSpec, VolumeTexture, level_count};
 
 /// What the levels of a volume are made for, where `quads` are traced through it.
 pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> PyramidSpec {
@@ -14,12 +14,12 @@ pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> Py
 }
 
 /// Where those levels lie in one texture, for a volume of `size` cells.
-pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> Stack {
+pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> LevelAtlas {
     let count = match trace.filter {
         Prefilter::None => 1,
         Prefilter::Pyramid => level_count(size),
     };
-    Stack { size, count }
+    LevelAtlas { size, count }
 }
 
 /// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with. Of

@@ -3,7 +3,7 @@
 
 use glam::{IVec3, UVec3, Vec3};
 
-use super::matter::Matter;
+use super::matter::SheetDensity;
 use crate::mapping::CellFrame;
 use crate::volume::{Cell, Moments, Pyramid, VolumeTexture};
 use crate::walk::Crossing;
@@ -65,14 +65,20 @@ impl<'a> Level<'a> {
     }
 
     /// The cell's own.
-    pub fn found(&self, cell: Cell, matter: &Matter) -> Found {
+    pub fn found(&self, cell: Cell, matter: &SheetDensity) -> CellSample {
         let (k_d, k_s) = cell.k_codes();
-        Found { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
+        CellSample { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
     }
 
     /// Between the centres of the eight cells around the point in the middle of a ray's way through a cell; the ray starts at
     /// `origin` and goes along `direction`, in the level's cells.
-    pub fn between(&self, crossing: &Crossing, origin: Vec3, direction: Vec3, matter: &Matter) -> Found {
+    pub fn between(
+        &self,
+        crossing: &Crossing,
+        origin: Vec3,
+        direction: Vec3,
+        matter: &SheetDensity,
+    ) -> CellSample {
         let middle = (crossing.t_enter + crossing.t_exit) * 0.5;
         let p = origin + direction * middle;
         let inside = p - p.floor() - 0.5;
@@ -103,7 +109,7 @@ impl<'a> Level<'a> {
             moments.mixed += of.mixed * share;
         }
         let inverse = 1.0 / rho.max(1e-20);
-        Found {
+        CellSample {
             rho: matter.rho(rho),
             k: k.map(|k| k * inverse),
             moments: Some(Moments { diagonal: moments.diagonal * inverse, mixed: moments.mixed * inverse }),
@@ -112,7 +118,7 @@ impl<'a> Level<'a> {
 }
 
 /// What a ray finds.
-pub struct Found {
+pub struct CellSample {
     /// In codes, of what the sheet leaves.
     pub rho: f32,
     /// k_d and k_s, in codes.

@@ -15,7 +15,7 @@ pub const MIST_RHO: f32 = 32768.0;
 /// have ρ = 1, and would stay whole up to e = 1. Light rays lose as much as the view ray: they end near it, and thin
 /// water is thin in every direction. What was walked before, for light volumes, is lessened in the mean. Mist is even, but for what it has of the cells.
 #[derive(Clone, Copy)]
-pub struct Matter {
+pub struct SheetDensity {
     scale: f32,
     shift: f32,
     /// 255·Ψ of mist; 0 where there is none.
@@ -26,14 +26,15 @@ pub struct Matter {
     pub left: f32,
 }
 
-impl Matter {
+impl SheetDensity {
     /// At texture coordinates of a quad.
     pub fn new(quad: &Quad, uv: Vec2) -> Self {
         let [a, b, c, d] = quad.erosion;
         let near = a + (b - a) * uv.x;
         let far = d + (c - d) * uv.x;
         let e = (near + (far - near) * uv.y).clamp(0.0, 1.0);
-        let mut matter = Matter { scale: 1.0, shift: e * -65535.0, mist: 0.0, even: 0.0, left: mean_left(e) };
+        let mut matter =
+            SheetDensity { scale: 1.0, shift: e * -65535.0, mist: 0.0, even: 0.0, left: mean_left(e) };
         if quad.mist > 0.0 {
             let left = 1.0 - e;
             matter.scale = MIST_OF_CELLS * left;
@@ -46,10 +47,10 @@ impl Matter {
 
     /// The same of cells that stand for many: taken away in the mean, for ρ of a coarse cell is not that of any in it.
     pub fn of_coarse(quad: &Quad, uv: Vec2) -> Self {
-        let matter = Matter::new(quad, uv);
+        let matter = SheetDensity::new(quad, uv);
         match quad.mist > 0.0 {
             true => matter,
-            false => Matter { scale: matter.left, shift: 0.0, ..matter },
+            false => SheetDensity { scale: matter.left, shift: 0.0, ..matter },
         }
     }
 
@@ -59,7 +60,7 @@ impl Matter {
     }
 
     /// That leaves the cells as they are.
-    pub const WHOLE: Matter = Matter { scale: 1.0, shift: 0.0, mist: 0.0, even: 0.0, left: 1.0 };
+    pub const WHOLE: SheetDensity = SheetDensity { scale: 1.0, shift: 0.0, mist: 0.0, even: 0.0, left: 1.0 };
 
     /// ρ of a cell with this code, or of what lies between several.
     #[inline]

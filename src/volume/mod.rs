@@ -20,8 +20,8 @@ pub use cells::Cells;
 pub use file::{read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
-    KeptLevels, Leaps, Levels, Moments, Pyramid, PyramidSpec, Stack, coarse_levels, level_count, level_size,
-    levels_of,
+    Leaps, LevelAtlas, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels, level_count,
+    level_size, levels_of,
 };
 pub use ripple::Ripple;
 pub use spec::{Structure, WaterSpec};

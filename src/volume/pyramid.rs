@@ -117,7 +117,7 @@ pub fn level_size(size: [u32; 3], level: u32) -> [u32; 3] {
 }
 
 /// Levels of a volume of `size` cells, itself included: down to one cell across the face, as far as they fit beside one
-/// another in [`Stack`].
+/// another in [`LevelAtlas`].
 pub fn level_count(size: [u32; 3]) -> u32 {
     let coarse = size[0].max(size[1]).next_power_of_two().trailing_zeros();
     let mut height = 0;
@@ -131,17 +131,17 @@ pub fn level_count(size: [u32; 3]) -> u32 {
 /// Where levels lie in one texture: the volume itself first, behind it along z the coarse levels, one after the other
 /// along y. Twin: `shaders/levels.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stack {
+pub struct LevelAtlas {
     /// Of the volume itself.
     pub size: [u32; 3],
     /// Number of levels, 1: the volume alone.
     pub count: u32,
 }
 
-impl Stack {
+impl LevelAtlas {
     /// Of levels.
     pub fn new(levels: &[VolumeTexture]) -> Self {
-        Stack { size: levels[0].size, count: levels.len() as u32 }
+        LevelAtlas { size: levels[0].size, count: levels.len() as u32 }
     }
 
     /// The first cell of a level.
@@ -176,12 +176,12 @@ pub struct PyramidSpec {
 
 /// Levels of a volume without boxes to leap over, for few rays.
 pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
-    KeptLevels { leaps: Leaps::Never, kept: None }.get(volume, spec)
+    LevelsCache { leaps: Leaps::Never, kept: None }.get(volume, spec)
 }
 
 /// Levels that are kept from frame to frame.
 #[derive(Default)]
-pub struct KeptLevels {
+pub struct LevelsCache {
     /// Whether they are made for leaps.
     pub leaps: Leaps,
     kept: Option<(Key, Levels)>,
@@ -202,7 +202,7 @@ impl PartialEq for Key {
     }
 }
 
-impl KeptLevels {
+impl LevelsCache {
     /// The levels of a volume, made unless they are those of the last call.
     pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
         let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };

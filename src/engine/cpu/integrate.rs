@@ -5,7 +5,7 @@ mod light;
 use glam::{Vec2, Vec3};
 
 use super::gbuffer::Gbuffer;
-use super::visibility::{Filled, KeptVolumes};
+use super::visibility::{Filled, LightVolumeCache};
 use crate::light::fibre::{Metric, Spread, fibre_angles, specular_power};
 use crate::light::haze::EyeHaze;
 use crate::light::scatter::media::{Media, thicknesses};
@@ -16,8 +16,8 @@ use crate::light::{AngleFrame, Light, Reflection, Visibility};
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::camera::{footprint, sample_offset};
 use crate::scene::Scene;
-use crate::trace::lookup::{Found, Level, level_at};
-use crate::trace::{Attenuation, Lookup, Matter, Prefilter, extinction, flow_cells};
+use crate::trace::lookup::{CellSample, Level, level_at};
+use crate::trace::{Attenuation, Lookup, Prefilter, SheetDensity, extinction, flow_cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Cell, Levels, VolumeTexture, large_box, levels_of};
@@ -47,7 +47,7 @@ pub struct Integrator<'a> {
 
 /// What one ray brings home.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Traced {
+pub struct RayResult {
     /// Radiance towards the eye, what is behind included.
     pub radiance: Vec3,
     /// T at the end of the walk.
@@ -73,7 +73,7 @@ pub trait Observer {
 impl Observer for () {}
 
 /// Where a ray meets a sheet: what is constant along it.
-struct Passage<'a> {
+struct SheetHit<'a> {
     quad: usize,
     map: &'a QuadMap,
     uv: Vec2,
@@ -88,25 +88,25 @@ struct Passage<'a> {
     metric: Metric,
     e_v: Vec3,
     /// What the sheet makes of the volume's own cells, and of coarser ones.
-    matter: [Matter; 2],
+    matter: [SheetDensity; 2],
 }
 
-impl Passage<'_> {
-    fn matter(&self, level: &Level) -> &Matter {
+impl SheetHit<'_> {
+    fn matter(&self, level: &Level) -> &SheetDensity {
         &self.matter[usize::from(!level.is_whole)]
     }
 }
 
 /// What a walk brings home.
-struct Walked {
+struct LevelResult {
     transmittance: f32,
     lights: Vec<RayLight>,
     cells: [u32; 2],
 }
 
-impl Walked {
+impl LevelResult {
     /// Between two levels.
-    fn mixed(mut self, other: Walked, share: f32) -> Walked {
+    fn mixed(mut self, other: LevelResult, share: f32) -> LevelResult {
         let own = 1.0 - share;
         self.transmittance = self.transmittance * own + other.transmittance * share;
         for (light, next) in self.lights.iter_mut().zip(other.lights) {
@@ -124,7 +124,7 @@ impl<'a> Integrator<'a> {
     pub fn prepared(
         scene: &'a Scene,
         volume: &VolumeTexture,
-        kept: &mut KeptVolumes,
+        kept: &mut LightVolumeCache,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
         let mut integrator =
@@ -177,17 +177,17 @@ impl<'a> Integrator<'a> {
         pixel: [u32; 2],
         sample: u32,
         observer: &mut O,
-    ) -> Traced {
+    ) -> RayResult {
         let image = &self.scene.image;
         let i = gbuffer.window.index(pixel);
         let behind = Vec3::from_slice(&gbuffer.opaque[i]);
         let mut faces = gbuffer.faces(i).peekable();
         if faces.peek().is_none() {
-            return Traced { radiance: behind, transmittance: 1.0, cells: [0, 0] };
+            return RayResult { radiance: behind, transmittance: 1.0, cells: [0, 0] };
         }
         let offset = sample_offset(image, sample);
         let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
-        let mut all = Traced { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
+        let mut all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
         while let Some((quad, hit)) = faces.next() {
             observer.sheet();
             let is_last = faces.peek().is_none();
@@ -217,7 +217,7 @@ impl<'a> Integrator<'a> {
         hit: [f32; 3],
         behind: Vec3,
         observer: &mut O,
-    ) -> Traced {
+    ) -> RayResult {
         self.sheet(quad, d_world, hit, behind, 1.0, true, observer)
     }
 
@@ -234,7 +234,7 @@ impl<'a> Integrator<'a> {
         before: f32,
         is_last: bool,
         observer: &mut O,
-    ) -> Traced {
+    ) -> RayResult {
         let ray = self.passage(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
         let mut home = self.walk(&ray, &Level::of(&self.levels, level), before, observer);
@@ -242,7 +242,7 @@ impl<'a> Integrator<'a> {
             let next = self.walk(&ray, &Level::of(&self.levels, level + 1), before, observer);
             home = home.mixed(next, share);
         }
-        let Walked { transmittance, lights, cells } = home;
+        let LevelResult { transmittance, lights, cells } = home;
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
         let mut radiance = self.scene.ambient * (before - transmittance) + passed;
@@ -250,7 +250,7 @@ impl<'a> Integrator<'a> {
             let sum = if self.in_colour() { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
             radiance += light.intensity * sum;
         }
-        Traced { radiance, transmittance, cells }
+        RayResult { radiance, transmittance, cells }
     }
 
     fn in_colour(&self) -> bool {
@@ -262,7 +262,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// `hit` = (u, v, metres).
-    fn passage(&self, number: usize, d_world: Vec3, hit: [f32; 3]) -> Passage<'_> {
+    fn passage(&self, number: usize, d_world: Vec3, hit: [f32; 3]) -> SheetHit<'_> {
         let scene = self.scene;
         let quad = &scene.quads[number];
         let map = &quad.map;
@@ -284,11 +284,11 @@ impl<'a> Integrator<'a> {
             ],
         };
         let mut e_v = -frame.transposed(d);
-        if scene.frame == AngleFrame::Texture {
+        if scene.angles == AngleFrame::Texture {
             metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
-        Passage {
+        SheetHit {
             quad: number,
             map,
             uv,
@@ -300,7 +300,7 @@ impl<'a> Integrator<'a> {
             point: scene.camera.eye + d_world * hit[2],
             metric,
             e_v,
-            matter: [Matter::new(quad, uv), Matter::of_coarse(quad, uv)],
+            matter: [SheetDensity::new(quad, uv), SheetDensity::of_coarse(quad, uv)],
         }
     }
 
@@ -314,7 +314,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The finer of the two levels that suit the ray `t` metres away, and the share of the coarser.
-    fn level_of(&self, ray: &Passage, t: f32) -> (u32, f32) {
+    fn level_of(&self, ray: &SheetHit, t: f32) -> (u32, f32) {
         if self.scene.trace.filter == Prefilter::None {
             return (0, 0.0);
         }
@@ -325,7 +325,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Through one level of the volume.
-    fn walk<O: Observer>(&self, ray: &Passage, level: &Level, before: f32, observer: &mut O) -> Walked {
+    fn walk<O: Observer>(&self, ray: &SheetHit, level: &Level, before: f32, observer: &mut O) -> LevelResult {
         let scene = self.scene;
         let mut lights = self.ray_lights(ray, level);
         let matter = ray.matter(level);
@@ -355,7 +355,7 @@ impl<'a> Integrator<'a> {
                 Lookup::Trilinear => level.between(&crossing, origin, d_cell, matter),
                 Lookup::Nearest => level.found(cell, matter),
             };
-            let Found { rho, k: [k_d, k_s], moments } = found;
+            let CellSample { rho, k: [k_d, k_s], moments } = found;
             observer.enter(&crossing, cell, rho / 65535.0, transmittance);
             if rho <= 0.0 {
                 continue;
@@ -416,7 +416,7 @@ impl<'a> Integrator<'a> {
             transmittance = passed;
             depth += tau_bits;
         }
-        Walked { transmittance, lights, cells: walked }
+        LevelResult { transmittance, lights, cells: walked }
     }
 
     /// The volume's own layer in the middle of layer `z` of a level.

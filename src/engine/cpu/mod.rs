@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-pub use visibility::KeptVolumes;
+pub use visibility::LightVolumeCache;
 
 use crate::picture::resolve::develop;
 use crate::picture::{Frame, Seconds};
@@ -34,7 +34,7 @@ pub fn render(
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let window = Window::whole([scene.image.width, scene.image.height]);
-    let kept = &mut KeptVolumes::default();
+    let kept = &mut LightVolumeCache::default();
     render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
 }
 
@@ -51,7 +51,7 @@ pub fn render_samples(
     window: Window,
     samples: Range<u32>,
     surface: bool,
-    kept: &mut KeptVolumes,
+    kept: &mut LightVolumeCache,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;

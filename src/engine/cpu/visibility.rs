@@ -8,13 +8,13 @@ use crate::light::visibility::LightVolumes;
 use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::volume::{KeptLevels, Levels};
+use crate::volume::{Levels, LevelsCache};
 
 /// Light volumes that are kept from frame to frame.
 #[derive(Default)]
-pub struct KeptVolumes {
+pub struct LightVolumeCache {
     /// What they are of.
-    pub levels: KeptLevels,
+    pub levels: LevelsCache,
     kept: Option<Kept>,
 }
 
@@ -28,7 +28,7 @@ struct Kept {
 /// All light volumes, number by number: of every level, in its order of cells.
 pub type Filled = Arc<Vec<Vec<Numbers>>>;
 
-impl KeptVolumes {
+impl LightVolumeCache {
     /// Lets go of the light volumes.
     pub fn forget(&mut self) {
         self.kept = None;

@@ -4,7 +4,7 @@ use super::groups::GroupList;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
 use super::layout::{self, Tile};
 use super::targets::Targets;
-use super::visibility::{FilledVolumes, Visibility};
+use super::visibility::{FilledVolumes, VisibilityPass};
 use super::{BoundReflection, GpuRenderer, Inputs, Redraw, Reflections, Resident, Uploaded, readback};
 use crate::engine::overlap;
 use crate::light::visibility::LightVolumes;
@@ -35,7 +35,7 @@ struct Prepared {
 struct Pass {
     work: Work,
     up: Uploaded,
-    frame: layout::Frame,
+    frame: layout::FrameUniforms,
     filled: FilledVolumes,
     reflection: BoundReflection,
 }
@@ -69,7 +69,7 @@ impl GpuBench {
         let mut resident = Resident::default();
         let mut passes = Vec::new();
         for (number, &(name, scene)) in scenes.iter().enumerate() {
-            let frame = layout::Frame::new(scene, volume, window, &(0..1), 0, layers);
+            let frame = layout::FrameUniforms::new(scene, volume, window, &(0..1), 0, layers);
             let mut up = || Uploaded::new(gpu, &mut resident, scene, volume, mesh);
             let light_volumes = match scene.visibility {
                 crate::light::Visibility::Cached => {
@@ -82,7 +82,7 @@ impl GpuBench {
             let integrate = |pass| {
                 Work::Integrate(Box::new(pass), Tiler::new(None, None, scene.volume_lights().len()), None)
             };
-            let mut visibility = Visibility::new(gpu);
+            let mut visibility = VisibilityPass::new(gpu);
             let (mut work, mut bare) = (Vec::new(), Vec::new());
             if number == 0 {
                 work.push(("gbuffer", Work::Gbuffer));
@@ -151,7 +151,7 @@ impl GpuBench {
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, Redraw::All, || Ok(()))?, 0)),
             Work::Visibility(volumes, lookup) => {
-                let mut pass = Visibility::new(gpu);
+                let mut pass = VisibilityPass::new(gpu);
                 let found = pass.get(gpu, timer, up, frame, volumes.clone(), *lookup, |_, _| Ok(()))?;
                 Ok((found.1, 0))
             }

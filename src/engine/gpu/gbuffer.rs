@@ -16,7 +16,7 @@ use super::{Inputs, Uploaded};
 use crate::engine::pool_surface::{STRAIGHT, WAVES};
 use crate::scene::Scene;
 use crate::util::error::Result;
-use pipeline::{Kind, NEARER, Under, pipeline};
+use pipeline::{NEARER, OpaqueVariant, PipelineState, pipeline};
 
 const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 const CLEAR: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -82,10 +82,10 @@ impl Gbuffer {
 
     /// Compiles what a scene under whose pixels `layers` quads may lie has use for.
     pub fn compile(&self, gpu: &Gpu, scene: &Scene, layers: u32) {
-        let under = Under::new(scene.environment.is_some(), scene.lights.len());
+        let under = OpaqueVariant::new(scene.environment.is_some(), scene.lights.len());
         self.background(gpu, under);
         if !scene.rocks.is_empty() {
-            self.place(gpu);
+            self.rock_surface_pipeline(gpu);
             self.rock(gpu, under);
         }
         if !scene.pools.is_empty() {
@@ -100,29 +100,29 @@ impl Gbuffer {
     }
 
     /// Where nothing has been drawn.
-    fn background(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+    fn background(&self, gpu: &Gpu, under: OpaqueVariant) -> &wgpu::RenderPipeline {
         self.behind(
             gpu,
             &self.background,
-            Under { one_light: false, ..under },
+            OpaqueVariant { one_light: false, ..under },
             "background",
             wgpu::CompareFunction::GreaterEqual,
         )
     }
 
-    fn place(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+    fn rock_surface_pipeline(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
         self.place.get_or_init(|| {
             pipeline(gpu, &self.module, ["place_vertex", "place_fragment"], &[FLOATS], NEARER)
         })
     }
 
     /// Where rock has been drawn.
-    fn rock(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+    fn rock(&self, gpu: &Gpu, under: OpaqueVariant) -> &wgpu::RenderPipeline {
         self.behind(gpu, &self.rock, under, "opaque", wgpu::CompareFunction::Less)
     }
 
     /// Drawn again where it was drawn before.
-    fn pool(&self, gpu: &Gpu, under: Under) -> &wgpu::RenderPipeline {
+    fn pool(&self, gpu: &Gpu, under: OpaqueVariant) -> &wgpu::RenderPipeline {
         self.behind(gpu, &self.pool, under, "pool", wgpu::CompareFunction::GreaterEqual)
     }
 
@@ -130,14 +130,14 @@ impl Gbuffer {
         &self,
         gpu: &Gpu,
         of: &'a [OnceLock<wgpu::RenderPipeline>],
-        under: Under,
+        under: OpaqueVariant,
         name: &str,
         compare: wgpu::CompareFunction,
     ) -> &'a wgpu::RenderPipeline {
         of[usize::from(under.environment) + 2 * usize::from(under.one_light)].get_or_init(|| {
             let vertex = if name == "pool" { "pool_vertex" } else { "behind_vertex" };
             let fragment = format!("{name}{}_fragment", if under.environment { "_environment" } else { "" });
-            let kind = Kind { compare, writes_depth: name == "pool", one_light: under.one_light };
+            let kind = PipelineState { compare, writes_depth: name == "pool", one_light: under.one_light };
             pipeline(gpu, &self.module, [vertex, &fragment], &[FLOATS; 2], kind)
         })
     }
@@ -230,9 +230,9 @@ impl Run<'_> {
             depth_stencil_attachment: Some(depth(&self.depths[0], depth_load)),
             ..Default::default()
         });
-        self.place(&mut pass);
+        self.set_viewport(&mut pass);
         if !parts.is_empty() {
-            let pipeline = self.pass.place(gpu);
+            let pipeline = self.pass.rock_surface_pipeline(gpu);
             pass.set_pipeline(pipeline);
             let buffers = [(0, &self.uniform), (8, &up.positions), (9, &up.tiles)];
             let entries = buffers.map(|(binding, buffer)| entry(binding, buffer.as_entire_binding()));
@@ -308,7 +308,7 @@ impl Run<'_> {
             timestamp_writes,
             ..Default::default()
         });
-        self.place(&mut pass);
+        self.set_viewport(&mut pass);
         draw(&mut pass);
     }
 
@@ -323,7 +323,7 @@ impl Run<'_> {
             timestamp_writes: span.render(true, true),
             ..Default::default()
         });
-        self.place(&mut pass);
+        self.set_viewport(&mut pass);
         if up.quad_count > 0 {
             let pipeline = self.pass.volume(gpu);
             let group = self.bind(pipeline, &[(0, &self.uniform), (2, &up.quads)], false, None);
@@ -355,7 +355,7 @@ impl Run<'_> {
             timestamp_writes: span.render(true, true),
             ..Default::default()
         });
-        self.place(&mut pass);
+        self.set_viewport(&mut pass);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..up.quad_count);
@@ -383,12 +383,12 @@ impl Run<'_> {
         group(gpu, pipeline, &entries)
     }
 
-    fn under(&self) -> Under {
-        Under::new(self.inputs.up.environment.is_some(), self.inputs.frame.light_count as usize)
+    fn under(&self) -> OpaqueVariant {
+        OpaqueVariant::new(self.inputs.up.environment.is_some(), self.inputs.frame.light_count as usize)
     }
 
     /// The targets may be larger than a window at the image's edge.
-    fn place(&self, pass: &mut wgpu::RenderPass) {
+    fn set_viewport(&self, pass: &mut wgpu::RenderPass) {
         let window = self.inputs.window;
         pass.set_viewport(0.0, 0.0, window.width as f32, window.height as f32, 0.0, 1.0);
     }

@@ -21,7 +21,7 @@ pub const WORKGROUP: u32 = 8;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)] // The fields are described where the shaders read them.
-pub struct Frame {
+pub struct FrameUniforms {
     pub clip_from_world: [[f32; 4]; 4],
     pub eye_world: [f32; 3],
     pub jitter_x: f32,
@@ -63,7 +63,7 @@ pub struct Frame {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
-pub struct Coat {
+pub struct VertexMaterial {
     pub albedo_r: f32,
     pub albedo_g: f32,
     pub albedo_b: f32,
@@ -72,14 +72,14 @@ pub struct Coat {
     pub occlusion_shadow: u32,
 }
 
-impl From<&crate::place::Vertex> for Coat {
+impl From<&crate::place::Vertex> for VertexMaterial {
     fn from(vertex: &crate::place::Vertex) -> Self {
         let both = |low: u16, high: u16| u32::from(low) | u32::from(high) << 16;
         let unit = |x: f32| (x.clamp(0.0, 1.0) * 65535.0).round() as u16;
         let signed = |x: f32| (x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16;
         let [albedo_r, albedo_g, albedo_b] = vertex.albedo;
         let [x, y, z] = vertex.normal.map(signed);
-        Coat {
+        VertexMaterial {
             albedo_r,
             albedo_g,
             albedo_b,
@@ -276,7 +276,7 @@ impl Tile {
     }
 }
 
-impl Frame {
+impl FrameUniforms {
     /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with; the targets have
     /// `layers` layers.
     pub fn new(
@@ -293,7 +293,7 @@ impl Frame {
         let [jitter_x, jitter_y] = sample_offset(image, sample);
         let (right, up) = camera.image_plane(image.width, image.height);
         let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
-        Frame {
+        FrameUniforms {
             clip_from_world: clip_to_window(clip, [image.width, image.height], window).to_cols_array_2d(),
             eye_world: camera.eye.to_array(),
             jitter_x,
@@ -314,7 +314,7 @@ impl Frame {
             image_width: image.width as f32,
             image_height: image.height as f32,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
-            texture_frame: u32::from(scene.frame == AngleFrame::Texture),
+            texture_frame: u32::from(scene.angles == AngleFrame::Texture),
             haze_density: haze.density,
             haze_falloff: haze.falloff,
             window_x: window.x,

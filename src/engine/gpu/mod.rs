@@ -32,7 +32,7 @@ pub use strand::StrandTexture;
 pub use targets::Targets;
 pub use timing::Timer;
 pub use upload::{Resident, Uploaded};
-pub use visibility::{FilledVolumes, Filling, Visibility, source as visibility_source};
+pub use visibility::{FilledVolumes, Filling, VisibilityPass, source as visibility_source};
 
 use std::borrow::Cow;
 use std::time::Instant;
@@ -91,7 +91,7 @@ pub struct Inputs<'a> {
     /// What of it is looked at.
     pub area: Tile,
     /// The window's uniforms.
-    pub frame: &'a layout::Frame,
+    pub frame: &'a layout::FrameUniforms,
     /// Its workgroups.
     pub groups: &'a GroupList,
     /// The light volumes.
@@ -110,17 +110,17 @@ pub struct GpuRenderer {
     /// The latest first.
     integrate: Vec<Integrate>,
     resident: Resident,
-    visibility: Visibility,
+    visibility: VisibilityPass,
     reflections: Reflections,
     /// The latest first.
     canvases: Vec<Canvas>,
     rasters: Rasters,
     /// Pixels of a tile that suited the last frame, and what that frame was.
-    learned: Option<(Like, f64)>,
+    learned: Option<(TileHint, f64)>,
 }
 
 /// What frames share whose tiles take alike: the pass, where the volume's cells are, the image's size.
-type Like = (Variant, usize, [u32; 2]);
+type TileHint = (Variant, usize, [u32; 2]);
 
 /// Specialised pipelines that are kept: a slider that goes to and fro finds them again.
 const KEPT_PIPELINES: usize = 16;
@@ -154,7 +154,12 @@ impl Canvas {
 
 /// The first item that `is` it, moved to the front; a new one if there is none. The last of more than
 /// `most` goes, before the new one is made.
-fn recent<T>(items: &mut Vec<T>, most: usize, is: impl Fn(&T) -> bool, new: impl FnOnce() -> T) -> &T {
+fn lru_get_or_insert<T>(
+    items: &mut Vec<T>,
+    most: usize,
+    is: impl Fn(&T) -> bool,
+    new: impl FnOnce() -> T,
+) -> &T {
     let item = match items.iter().position(is) {
         Some(i) => items.remove(i),
         None => {
@@ -170,7 +175,7 @@ impl GpuRenderer {
     /// Compiles the passes that do not depend on the scene.
     pub fn new(gpu: Gpu) -> Self {
         let (timer, gbuffer, resolve) = (Timer::new(&gpu), Gbuffer::new(&gpu), Resolve::new(&gpu));
-        let visibility = Visibility::new(&gpu);
+        let visibility = VisibilityPass::new(&gpu);
         GpuRenderer {
             gpu,
             timer,
@@ -196,7 +201,7 @@ impl GpuRenderer {
                 // Most volumes are too full for leaps.
                 let variant = Variant::of(scene, layers, None, [false, scene.storage == Storage::Sparse]);
                 let known = |pass: &Integrate| pass.variant == variant;
-                recent(integrate, KEPT_PIPELINES, known, || Integrate::new(gpu, variant));
+                lru_get_or_insert(integrate, KEPT_PIPELINES, known, || Integrate::new(gpu, variant));
             }
         });
     }
@@ -234,7 +239,7 @@ impl GpuRenderer {
         let clock = Instant::now();
         let variant =
             Variant::of(scene, layers, light_volumes.as_ref(), [up.levels.leaps, volume.is_sparse()]);
-        let integrate = recent(
+        let integrate = lru_get_or_insert(
             &mut self.integrate,
             KEPT_PIPELINES,
             |pass| pass.variant == variant,
@@ -248,7 +253,7 @@ impl GpuRenderer {
         let mut frame = Frame::new(part.width, part.height, options.surface);
         let size = options.grid.size(whole);
         let pools = !scene.pools.is_empty();
-        let canvas = recent(
+        let canvas = lru_get_or_insert(
             &mut self.canvases,
             KEPT_CANVASES,
             |c| c.size == size && c.layers == layers && c.pools == pools,
@@ -265,7 +270,7 @@ impl GpuRenderer {
                 self.visibility.none()
             }
             Some(light_volumes) => {
-                let mut frame = layout::Frame::new(scene, volume, part, &samples, samples.start, 1);
+                let mut frame = layout::FrameUniforms::new(scene, volume, part, &samples, samples.start, 1);
                 frame.max_cells = light_volumes.medium.max_cells;
                 let watch = |done, all| monitor.progress("light volumes", done, all);
                 let found = self.visibility.get(
@@ -284,7 +289,7 @@ impl GpuRenderer {
         let look = Develop::new(&image.look);
         let total = part.pixels() * samples.len() as u64;
         let mut done = 0;
-        let like: Like = (variant, volume.cells.address(), whole);
+        let like: TileHint = (variant, volume.cells.address(), whole);
         let known = self.learned.filter(|(of, _)| *of == like).map(|(_, pixels)| pixels);
         let mut tiler = Tiler::new(options.tile_pixels, known, scene.volume_lights().len());
         for window in options.grid.windows(whole, part) {
@@ -296,7 +301,8 @@ impl GpuRenderer {
                 width: wanted.width,
                 height: wanted.height,
             };
-            let uniforms = |sample| layout::Frame::new(scene, volume, window, &samples, sample, layers);
+            let uniforms =
+                |sample| layout::FrameUniforms::new(scene, volume, window, &samples, sample, layers);
             let groups = GroupList::new(gpu, scene, window, area);
             for sample in samples.clone() {
                 let frame_uniforms = uniforms(sample);

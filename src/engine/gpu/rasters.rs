@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::device::Gpu;
-use super::layout::Frame;
+use super::layout::FrameUniforms;
 use super::targets::Targets;
 use crate::picture::target_bytes;
 
@@ -41,9 +41,9 @@ pub struct Kept {
 
 impl Key {
     /// Of a pass with these uniforms over geometry and lights that have this `geometry` hash.
-    pub fn new(frame: &Frame, geometry: &[u64; 2]) -> Key {
+    pub fn new(frame: &FrameUniforms, geometry: &[u64; 2]) -> Key {
         // What the pass does not read; shaders/gbuffer.wgsl.
-        let frame = Frame {
+        let frame = FrameUniforms {
             sample_index: 0,
             samples: 0,
             p: 0.0,

@@ -2,7 +2,7 @@
 
 use super::device::Gpu;
 use super::integrate::Sums;
-use super::layout::{Frame, Tile, WORKGROUP};
+use super::layout::{FrameUniforms, Tile, WORKGROUP};
 use super::specialise::Source;
 use super::timing::Timer;
 use super::{compute_pipeline, shader};
@@ -31,7 +31,7 @@ impl Resolve {
         sums: &Sums,
         picture: &wgpu::Buffer,
         area: Tile,
-        frame: &Frame,
+        frame: &FrameUniforms,
         develop: &Develop,
     ) -> Result<f64> {
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);

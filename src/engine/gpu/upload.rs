@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::bricks;
 use super::device::Gpu;
-use super::layout::{self, Coat, Quad};
+use super::layout::{self, Quad, VertexMaterial};
 use super::rasters::hash_twice;
 use super::tiles::{self, Part};
 use crate::engine::pool_surface;
@@ -17,7 +17,7 @@ use crate::place::tiles::steps;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
-use crate::volume::{Cell, KeptLevels, Levels, Stack, VolumeTexture};
+use crate::volume::{Cell, LevelAtlas, Levels, LevelsCache, VolumeTexture};
 
 /// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
 pub(super) const SLAB_BYTES: usize = 64 << 20;
@@ -27,7 +27,7 @@ pub(super) const SLAB_BYTES: usize = 64 << 20;
 #[derive(Default)]
 pub struct Resident {
     /// The volume's levels, and whether they are made for leaps.
-    pub levels: KeptLevels,
+    pub levels: LevelsCache,
     volume: Option<(Levels, [wgpu::TextureView; 2])>,
     mesh: Option<ResidentMesh>,
     /// The environment's map, and its number.
@@ -54,7 +54,7 @@ struct ResidentMesh {
 pub struct Uploaded {
     /// The volume's levels.
     pub levels: Levels,
-    /// They as a 3-D storage texture, `rg32uint`; [`Stack`]. Of sparse storage the stored cells.
+    /// They as a 3-D storage texture, `rg32uint`; [`LevelAtlas`]. Of sparse storage the stored cells.
     pub volume: wgpu::TextureView,
     /// Bricks of sparse storage, `rgba32uint`.
     pub bricks: wgpu::TextureView,
@@ -66,7 +66,7 @@ pub struct Uploaded {
     pub lights: wgpu::Buffer,
     /// Positions of the opaque mesh's vertices, four floats each.
     pub positions: wgpu::Buffer,
-    /// What is shaded there, `array<Coat>`.
+    /// What is shaded there, `array<VertexMaterial>`.
     pub coats: wgpu::Buffer,
     /// Its tiles, `array<MeshTile>`.
     pub tiles: wgpu::Buffer,
@@ -112,7 +112,8 @@ impl Uploaded {
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
         let pools = pool_surface::surfaces(scene, mesh);
         let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
-        let largest = [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<Coat>()];
+        let largest =
+            [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<VertexMaterial>()];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
             return Err(Error::input(
                 format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
@@ -202,9 +203,9 @@ impl Resident {
             let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
             let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
             let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
-            let mut coats: Vec<Coat> = mesh.vertices.iter().map(Coat::from).collect();
+            let mut coats: Vec<VertexMaterial> = mesh.vertices.iter().map(VertexMaterial::from).collect();
             // Bound even where there is none.
-            coats.resize(coats.len().max(1), Coat::from(&Vertex::default()));
+            coats.resize(coats.len().max(1), VertexMaterial::from(&Vertex::default()));
             let (indices, lists) = tiles::lists();
             let storage = wgpu::BufferUsages::STORAGE;
             ResidentMesh {
@@ -221,7 +222,7 @@ impl Resident {
 }
 
 fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
-    let stack = Stack::new(levels);
+    let stack = LevelAtlas::new(levels);
     let [nx, ny, nz] = stack.extent();
     let most = gpu.device.limits().max_texture_dimension_3d;
     if [nx, ny, nz].iter().any(|&n| n > most) {

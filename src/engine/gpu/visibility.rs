@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::compute_pipeline;
 use super::device::Gpu;
-use super::layout::{Frame, LightVolume};
+use super::layout::{FrameUniforms, LightVolume};
 use super::shader::resolve;
 use super::specialise::Source;
 use super::timing::Timer;
@@ -15,7 +15,7 @@ use crate::light::fill::{Numbers, Rows};
 use crate::light::visibility::{CELLS_A_WORD, Form, LightVolumes};
 use crate::trace::Lookup;
 use crate::util::error::{Error, Result};
-use crate::volume::{Levels, Stack};
+use crate::volume::{LevelAtlas, Levels};
 
 /// The stage's shader.
 pub fn source() -> String {
@@ -43,7 +43,7 @@ pub enum Filling {
 }
 
 /// The pass, and the light volumes of the last frame that had any.
-pub struct Visibility {
+pub struct VisibilityPass {
     /// Where they are filled.
     pub filling: Filling,
     pipelines: Vec<(Kind, wgpu::ComputePipeline)>,
@@ -82,12 +82,12 @@ pub struct FilledVolumes {
 }
 
 /// Where the light volumes lie in their texture: as many as fit along x, then y, then z.
-struct Shelf {
+struct LightVolumeAtlas {
     size: [u32; 3],
     along: [u32; 3],
 }
 
-impl Shelf {
+impl LightVolumeAtlas {
     fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
         let most = gpu.device.limits().max_texture_dimension_3d;
         // Along z first: the order of the volume's own slices.
@@ -104,7 +104,7 @@ impl Shelf {
                 "use light.visibility=march, or --engine cpu",
             ));
         }
-        Ok(Shelf { size, along })
+        Ok(LightVolumeAtlas { size, along })
     }
 
     fn extent(&self) -> [u32; 3] {
@@ -118,14 +118,14 @@ impl Shelf {
     }
 }
 
-impl Visibility {
+impl VisibilityPass {
     /// Nothing is compiled before it is needed.
     pub fn new(gpu: &Gpu) -> Self {
         let none = FilledVolumes {
             texture: texture(gpu, [1; 3]),
             places: gpu.buffer_with("light places", &[], wgpu::BufferUsages::STORAGE),
         };
-        Visibility { filling: Filling::Auto, pipelines: Vec::new(), occupied: None, kept: None, none }
+        VisibilityPass { filling: Filling::Auto, pipelines: Vec::new(), occupied: None, kept: None, none }
     }
 
     /// What the integrate pass binds where no light volumes are asked for.
@@ -146,7 +146,7 @@ impl Visibility {
         gpu: &Gpu,
         timer: &Timer,
         up: &Uploaded,
-        frame: &Frame,
+        frame: &FrameUniforms,
         plan: LightVolumes,
         lookup: Lookup,
         between: impl FnMut(u64, u64) -> Result<()>,
@@ -161,7 +161,11 @@ impl Visibility {
         }
         // The old ones go first: both might not fit.
         self.kept = None;
-        let shelf = Shelf::new(gpu, plan.words(Stack::new(&up.levels).extent()), plan.volumes.len() as u32)?;
+        let shelf = LightVolumeAtlas::new(
+            gpu,
+            plan.words(LevelAtlas::new(&up.levels).extent()),
+            plan.volumes.len() as u32,
+        )?;
         let filled =
             FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
         gpu.check()?;
@@ -187,10 +191,10 @@ impl Visibility {
         gpu: &Gpu,
         timer: &Timer,
         up: &Uploaded,
-        frame: &Frame,
+        frame: &FrameUniforms,
         plan: &LightVolumes,
         everywhere: bool,
-        shelf: &Shelf,
+        shelf: &LightVolumeAtlas,
         filled: &FilledVolumes,
         mut between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<f64> {
@@ -272,7 +276,7 @@ impl Visibility {
         {
             return (buffer.clone(), *count);
         }
-        let stack = Stack::new(levels);
+        let stack = LevelAtlas::new(levels);
         let [width, height, _] = stack.extent();
         let mut indices: Vec<u32> = Vec::new();
         for (level, number) in levels.iter().zip(0..) {
@@ -319,12 +323,12 @@ fn fill_on_host(
     levels: &Levels,
     plan: &LightVolumes,
     lookup: Lookup,
-    shelf: &Shelf,
+    shelf: &LightVolumeAtlas,
     filled: &FilledVolumes,
     mut between: impl FnMut(u64, u64) -> Result<()>,
 ) -> Result<f64> {
     let clock = Instant::now();
-    let (rows, stack) = (Rows::new(levels, lookup), Stack::new(levels));
+    let (rows, stack) = (Rows::new(levels, lookup), LevelAtlas::new(levels));
     let texture = filled.texture.texture();
     let mut staged = 0;
     for (number, light_volume) in plan.volumes.iter().enumerate() {
@@ -403,7 +407,7 @@ fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
     texture.create_view(&Default::default())
 }
 
-fn places(gpu: &Gpu, plan: &LightVolumes, shelf: &Shelf) -> wgpu::Buffer {
+fn places(gpu: &Gpu, plan: &LightVolumes, shelf: &LightVolumeAtlas) -> wgpu::Buffer {
     let before = plan.patches.len() as u32;
     let patches = plan.patches.iter().map(|p| {
         let [nu, nv] = p.count.map(|n| n as i32);

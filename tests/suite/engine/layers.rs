@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use taki::engine::cpu;
 use taki::engine::cpu::gbuffer::{self, eye_in_plane, map_quad};
-use taki::engine::cpu::integrate::{Integrator, Traced};
+use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::engine::cpu::ray::inspect;
 use taki::engine::overlap;
 use taki::light::Light;
@@ -155,7 +155,7 @@ fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
 }
 
 /// One sheet alone, before nothing.
-fn alone(scene: &Scene, volume: &VolumeTexture, quad: usize, d: Vec3) -> Traced {
+fn alone(scene: &Scene, volume: &VolumeTexture, quad: usize, d: Vec3) -> RayResult {
     let own = &scene.quads[quad];
     let hit = map_quad(own, eye_in_plane(own, scene.camera.eye), d);
     Integrator::new(scene, volume).trace(quad, d, hit, Vec3::ZERO, &mut ())

@@ -5,7 +5,8 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use taki::engine::gpu::layout::{
-    Coat, Environment, Frame, Groups, Light, LightVolume, MeshTile, Quad, Strand, Tile, WORKGROUP,
+    Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Strand, Tile, VertexMaterial,
+    WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
@@ -152,20 +153,17 @@ macro_rules! fields {
 #[test]
 fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("integrate")).expect("valid");
-    let frame = fields!(Frame: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
+    let frame = fields!(FrameUniforms: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
         zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
         texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
         haze_color haze_far shadow_light levels footprint pad_c);
-    assert_eq!(members(&module, "Frame"), frame);
+    assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset erosion mist pad_a pad_b pad_c);
     assert_eq!(members(&module, "Quad"), quad);
-    let environment =
-        fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
-    assert_eq!(members(&module, "Environment"), environment);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
@@ -177,10 +175,13 @@ fn host_structs_have_the_layout_the_shaders_read() {
     light_volume.pop();
     assert_eq!(members(&module, "LightVolume"), (light_volume, size));
     let module = validate(&stage("gbuffer")).expect("valid");
+    let environment =
+        fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
+    assert_eq!(members(&module, "Environment"), environment);
     let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
     assert_eq!(members(&module, "Surface"), surface);
-    let coat = fields!(Coat: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
-    assert_eq!(members(&module, "Coat"), coat);
+    let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
+    assert_eq!(members(&module, "VertexMaterial"), coat);
     assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side pad));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
@@ -208,7 +209,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("DARK_BITS"), f64::from(taki::light::visibility::DARK_BITS));
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
-    assert_eq!(constant("SHY"), taki::walk::SHY as f64);
+    assert_eq!(constant("LEAP_MARGIN"), taki::walk::LEAP_MARGIN as f64);
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::trace::MIST_OF_CELLS));
     assert_eq!(constant("MIST_RHO"), f64::from(taki::trace::MIST_RHO));
     assert_eq!(constant("SINE_SHARE"), taki::light::strand::table::SINE_SHARE as f64);

@@ -8,12 +8,12 @@ use taki::engine::gpu::Filling;
 use taki::engine::{RenderOptions, cpu};
 use taki::light::Light;
 use taki::light::fill::Rows;
-use taki::light::optical_depth::{number, optical_depth};
+use taki::light::optical_depth::{light_volume_value, optical_depth};
 use taki::light::visibility::{Form, LightVolume, Medium};
 use taki::picture::Frame;
 use taki::scene::{Limits, Scene};
 use taki::trace::lookup::Level;
-use taki::trace::{Lookup, Matter};
+use taki::trace::{Lookup, SheetDensity};
 use taki::util::monitor::Unwatched;
 use taki::volume::{VolumeTexture, levels_of};
 use taki::walk::NEVER;
@@ -131,7 +131,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
             let cell = IVec3::new(3, 5, z);
             let depth = optical_depth(
                 &Level::new(std::slice::from_ref(&uniform), 0),
-                &Matter::WHOLE,
+                &SheetDensity::WHOLE,
                 cell,
                 volumes.volumes[0].direction,
                 volumes.medium,
@@ -147,7 +147,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     let mut walked = 0;
     let depth = optical_depth(
         &Level::new(&[uniform], 0),
-        &Matter::WHOLE,
+        &SheetDensity::WHOLE,
         IVec3::new(3, 5, 7),
         Vec3::NEG_Z,
         medium,
@@ -256,7 +256,7 @@ fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
                         let place = [index % nx, index / nx % ny, index / nx / ny].map(|c| c as i32);
                         let asked = cell.rho_code() > 0 || lookup == Lookup::Trilinear;
                         let expected = match asked {
-                            true => number(&level, place.into(), &light_volume, medium, form),
+                            true => light_volume_value(&level, place.into(), &light_volume, medium, form),
                             false => 0.0,
                         };
                         assert_eq!(numbers.at(index), expected, "{direction} {medium:?} {form:?} {place:?}");
@@ -336,7 +336,7 @@ fn a_kept_walk_that_ends_in_the_dark_has_the_code_of_the_whole_one() {
     for x in 0..40 {
         let cell = IVec3::new(x, 9, 30);
         let depth = |enough, walked: &mut u32| {
-            optical_depth(&level, &Matter::WHOLE, cell, direction, medium, enough, walked) * bits
+            optical_depth(&level, &SheetDensity::WHOLE, cell, direction, medium, enough, walked) * bits
         };
         let codes = [depth(NEVER, &mut whole), depth(DARK_BITS / bits, &mut early)].map(transmittance_code);
         assert_eq!(codes[0], codes[1], "{x}");

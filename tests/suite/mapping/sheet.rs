@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 use glam::{DVec3, Vec2, Vec3};
-use taki::engine::cpu::integrate::{Integrator, Traced};
+use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::light::{Light, Visibility};
 use taki::mapping::{CellFrame, GRAVITY, Quad};
 use taki::scene::{Limits, Scene, Source};
@@ -265,7 +265,7 @@ fn through(
     visibility: Visibility,
     volume: &VolumeTexture,
     uv: [f32; 2],
-) -> Traced {
+) -> RayResult {
     let mut scene = plumb("segments = 1");
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let rectangle = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];

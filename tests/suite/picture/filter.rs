@@ -1,7 +1,7 @@
 use std::f64::consts::PI;
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};
-use taki::engine::cpu::{KeptVolumes, render_samples};
+use taki::engine::cpu::{LightVolumeCache, render_samples};
 use taki::picture::camera::{FILTER_RADIUS, sample_offset};
 use taki::picture::{Filter, Image};
 use taki::util::monitor::Unwatched;
@@ -70,7 +70,7 @@ fn a_part_of_a_filtered_picture_has_the_bits_of_the_whole_and_the_engines_agree(
         let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
         let mesh = scene.mesh();
         let render = |window| {
-            let kept = &mut KeptVolumes::default();
+            let kept = &mut LightVolumeCache::default();
             render_samples(&scene, &volume, &mesh, window, 0..5, false, kept, &Unwatched).expect("a frame")
         };
         let whole = render(Window::whole([60, 50]));

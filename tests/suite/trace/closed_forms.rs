@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 use glam::{Vec2, Vec3};
-use taki::engine::cpu::integrate::{Integrator, Traced};
+use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::light::{Light, Visibility};
 use taki::mapping::{Material, Quad};
 use taki::scene::{Limits, Scene};
@@ -63,7 +63,7 @@ fn slanted(degrees: f64, around: f64) -> Vec3 {
     Vec3::new((sin * around.cos()) as f32, (sin * around.sin()) as f32, -cos as f32)
 }
 
-fn trace(scene: &Scene, volume: &VolumeTexture, d: Vec3, uv: [f32; 2], behind: Vec3) -> Traced {
+fn trace(scene: &Scene, volume: &VolumeTexture, d: Vec3, uv: [f32; 2], behind: Vec3) -> RayResult {
     Integrator::new(scene, volume).trace(0, d, [uv[0], uv[1], 3.0], behind, &mut ())
 }
 

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taki::engine::RenderOptions;
-use taki::engine::cpu::{self, KeptVolumes};
+use taki::engine::cpu::{self, LightVolumeCache};
 use taki::engine::gpu::GpuRenderer;
 use taki::picture::Frame;
 use taki::scene::{Scene, presets};
@@ -182,7 +182,7 @@ fn rays_through_an_empty_volume_take_a_fifth_of_the_turns() {
 }
 
 fn on_cpu(scene: &Scene, volume: &VolumeTexture, leaps: Leaps) -> Frame {
-    let mut kept = KeptVolumes::default();
+    let mut kept = LightVolumeCache::default();
     kept.levels.leaps = leaps;
     let window = Window::whole([scene.image.width, scene.image.height]);
     let samples = 0..scene.image.samples;

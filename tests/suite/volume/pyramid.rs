@@ -11,10 +11,10 @@ use taki::output::frame::streaks::{Flicker, luminance};
 use taki::picture::Frame;
 use taki::scene::Scene;
 use taki::trace::lookup::Level;
-use taki::trace::{Lookup, Matter, Prefilter};
+use taki::trace::{Lookup, Prefilter, SheetDensity};
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
-use taki::volume::{Cell, Moments, Stack, VolumeTexture, coarse_levels, level_count, level_size};
+use taki::volume::{Cell, LevelAtlas, Moments, VolumeTexture, coarse_levels, level_count, level_size};
 use taki::walk::Walk;
 
 /// Angles as they are.
@@ -163,7 +163,7 @@ fn levels_of_odd_volumes_join_without_a_seam_and_lose_no_water() {
 #[test]
 fn levels_lie_beside_one_another_in_their_texture() {
     for size in [[1, 1, 1], [2, 3, 1], [40, 40, 40], [5, 9, 4], [128, 256, 14], [257, 31, 3], [64, 2048, 1]] {
-        let stack = Stack { size, count: level_count(size) };
+        let stack = LevelAtlas { size, count: level_count(size) };
         let extent = stack.extent();
         let boxes: Vec<[[u32; 3]; 2]> = (0..stack.count)
             .map(|level| {
@@ -276,7 +276,7 @@ fn between_cells_lies_what_their_centres_say() {
                 rho += weight;
                 k_d += weight * f64::from(at(low.as_ivec3() + away)[1]);
             }
-            let found = level.between(&crossing, origin, direction, &Matter::WHOLE);
+            let found = level.between(&crossing, origin, direction, &SheetDensity::WHOLE);
             // Codes of ρ are good to 2^(−17), of k to 2^(−9).
             assert!(close((found.rho / 65535.0).into(), rho, 1e-3, 1e-3), "{} {rho}", found.rho / 65535.0);
             assert!(close((found.k[0] / 255.0).into(), k_d / rho, 0.0, 4e-3));
@@ -383,7 +383,7 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
         ["image.width=40", "image.height=60", "volume.nx=64", "volume.ny=64", "light.visibility=cached"];
     let base = scene("front", &small);
     let mut volume = base.volume(1 << 30, &Unwatched).expect("a volume");
-    let mut kept = cpu::KeptVolumes::default();
+    let mut kept = cpu::LightVolumeCache::default();
     let steps: [&[&str]; 7] = [
         &["trace.filter=pyramid"],
         &["trace.filter=pyramid", "volume.alpha=0.5"],
@@ -404,7 +404,7 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
         let fresh = fresh.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
         assert!(used.radiance == fresh.radiance, "{step:?}");
         let window = Window::whole([scene.image.width, scene.image.height]);
-        let on_cpu = |kept: &mut cpu::KeptVolumes| {
+        let on_cpu = |kept: &mut cpu::LightVolumeCache| {
             cpu::render_samples(&scene, &volume, &mesh, window, 0..1, false, kept, &Unwatched)
                 .expect("a frame")
         };

@@ -2,8 +2,8 @@
 
 use glam::{IVec3, UVec2, Vec2, Vec3};
 
-use super::{Integrator, Passage};
-use crate::light::optical_depth::{number, optical_depth};
+use super::{Integrator, SheetHit};
+use crate::light::optical_depth::{light_volume_value, optical_depth};
 use crate::light::scatter::{ORDERS, Row, forward_peak};
 use crate::light::visibility::{Form, LightVolumes};
 use crate::light::{AngleFrame, Visibility};
@@ -38,8 +38,8 @@ struct LightPlaces {
 
 impl Integrator<'_> {
     /// All lights, as a ray sees them from a level of the volume.
-    pub(super) fn ray_lights(&self, ray: &Passage, level: &Level) -> Vec<RayLight> {
-        let texture_frame = self.scene.frame == AngleFrame::Texture;
+    pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> Vec<RayLight> {
+        let texture_frame = self.scene.angles == AngleFrame::Texture;
         let as_seen = |(i, light): (usize, &crate::light::Light)| {
             let (to_light, intensity) = light.at(ray.point);
             let l_n = to_light.dot(ray.map.n_world) * ray.side;
@@ -68,7 +68,7 @@ impl Integrator<'_> {
     /// V_i(k); and −log₂ of it, which is 0 where codes are kept.
     pub(super) fn visibility_of(
         &self,
-        ray: &Passage,
+        ray: &SheetHit,
         level: &Level,
         cell: IVec3,
         light: &RayLight,
@@ -118,7 +118,7 @@ impl Integrator<'_> {
         let c = cell.as_uvec3();
         match &self.filled {
             Some(filled) => filled[i][level.number as usize].at(level.volume.index(c.x, c.y, c.z)),
-            None => number(level, cell, &plan.volumes[i], plan.medium, plan.form),
+            None => light_volume_value(level, cell, &plan.volumes[i], plan.medium, plan.form),
         }
     }
 }

@@ -5,22 +5,22 @@ use crate::engine::gpu::targets::DEPTH;
 
 /// What a scene is lit by, as far as shaders differ.
 #[derive(Clone, Copy)]
-pub struct Under {
+pub struct OpaqueVariant {
     /// Whether there is an environment.
     pub environment: bool,
     /// Whether one light is all.
     pub one_light: bool,
 }
 
-impl Under {
+impl OpaqueVariant {
     /// Of so many lights.
-    pub fn new(environment: bool, lights: usize) -> Under {
-        Under { environment, one_light: lights == 1 }
+    pub fn new(environment: bool, lights: usize) -> OpaqueVariant {
+        OpaqueVariant { environment, one_light: lights == 1 }
     }
 }
 
 /// How pipelines differ besides their shaders.
-pub struct Kind {
+pub struct PipelineState {
     /// Which depths are drawn.
     pub compare: wgpu::CompareFunction,
     /// Whether they stay.
@@ -30,8 +30,8 @@ pub struct Kind {
 }
 
 /// Draws what is nearer.
-pub const NEARER: Kind =
-    Kind { compare: wgpu::CompareFunction::Greater, writes_depth: true, one_light: false };
+pub const NEARER: PipelineState =
+    PipelineState { compare: wgpu::CompareFunction::Greater, writes_depth: true, one_light: false };
 
 /// A pipeline without vertex buffers.
 pub fn pipeline(
@@ -39,7 +39,7 @@ pub fn pipeline(
     module: &wgpu::ShaderModule,
     [vertex, fragment]: [&str; 2],
     targets: &[wgpu::TextureFormat],
-    kind: Kind,
+    kind: PipelineState,
 ) -> wgpu::RenderPipeline {
     let target =
         |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });

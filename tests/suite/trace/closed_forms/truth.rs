@@ -92,7 +92,7 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: DVec3, uv: [f64; 2], x: DVec3
                     (away.normalize(), intensity.as_dvec3() / away.length_squared())
                 }
             };
-            let (t, l_frame, e_frame) = match scene.frame {
+            let (t, l_frame, e_frame) = match scene.angles {
                 AngleFrame::World => (world_from_cell * v, l, -d),
                 AngleFrame::Texture => (v, cell_from_world * l, cell_from_world * -d),
             };
@@ -136,7 +136,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
         let mut scene = scene(corners, material(span(0.1, 0.6), span(0.5, 3.0), span(0.5, 3.0)));
         scene.trace.attenuation = attenuation;
         scene.visibility = visibility;
-        scene.frame = frame;
+        scene.angles = frame;
         scene.p = [1.0, 8.0, 20.0, 7.5][i % 4];
         scene.ambient = Vec3::new(0.1, 0.2, 0.05);
         let volume = noise([5, 7, 3], seed + i as u64);
