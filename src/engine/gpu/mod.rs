@@ -38,7 +38,7 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use super::overlap;
-use crate::engine::RenderOptions;
+use crate::engine::options::RenderOptions;
 use crate::picture::resolve::develop;
 use crate::picture::{Develop, Frame, PICTURE_BYTES, Seconds, Surface};
 use crate::place::Mesh;

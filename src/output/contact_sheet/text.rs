@@ -94,7 +94,7 @@ mod tests {
     fn every_symbol_of_the_parameters_is_in_the_font() {
         let fonts = Fonts::new().unwrap();
         let greek = ('α'..='ω').chain('Α'..='Ρ').chain('Σ'..='Ω');
-        let table = crate::scene::parameters_markdown();
+        let table = include_str!("../../../docs/parameters.md");
         for c in greek.chain("…·×²³⁻¹°→−–µ".chars()).chain(table.chars()).filter(|c| !c.is_whitespace())
         {
             assert!(fonts.0.iter().any(|font| font.glyph_id(c).0 != 0), "{c}");
