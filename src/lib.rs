@@ -1,46 +1,87 @@
-//! taki (滝, waterfall) renders matter that is too fine for geometry, gushing water first, as volume
-//! textures on the GPU. It implements Kimoto and Ohno, "Rendering Gushing Water Using Texture Mapping".
+//! taki (滝, waterfall) renders matter that is too fine for geometry, gushing water first, as volume textures on the
+//! GPU. It implements Kimoto and Ohno, "Rendering Gushing Water Using Texture Mapping", and goes past it.
 //!
-//! The frame, stage by stage:
+//! ```
+//! use taki::{Engine, EngineChoice, RenderOptions, Scene};
 //!
-//! 1. [`scene`] reads what is asked for, strictly, and checks it whole before any work.
-//! 2. [`curve`] makes spatial fractal curves (§1 of the method); [`walk`] finds the cells they pass.
-//! 3. [`volume`] gives each cell density ρ, flow direction v and reflection coefficients k (§2), packed
-//!    to 64 bits.
-//! 4. [`mapping`] is the one-to-one map between a quad and the volume's face (§3): the raster pass
-//!    (`gbuffer`) finds the quads under each pixel, as many as [`overlap`] tells, in order of depth, and the
-//!    texture coordinates there; behind them rock, and [`pool`]s that mirror it.
-//! 5. [`shading`] is the light of one cell (§5), or [`strand`], a model made for water; [`visibility`] keeps what is
-//!    left of the lights in every cell, [`environment`] makes lights of sun, sky and maps; the compute pass
-//!    (`integrate`) walks the cells under each pixel (§4) and adds them up; [`scatter`] is the light that is
-//!    scattered more than once, [`haze`] what lies before all of it.
-//! 6. `resolve` makes the picture from the linear [`frame`], with its bloom, [`white_balance`], [`exposure`] and tone; that becomes
-//!    PNG or EXR; many frames become
-//!    a [`movie`] or a labelled [contact sheet](contact_sheet).
+//! # fn main() -> taki::Result<()> {
+//! let scene = Scene::preset("fig5")?.with(&["image.width=67", "image.height=107"])?;
+//! let mut engine = Engine::new(EngineChoice::Cpu)?;
+//! let frame = engine.render(&scene, &RenderOptions::default())?;
+//! assert_eq!((frame.width, frame.height), (67, 107));
+//! assert!(frame.covered_pixels() > 1000);
+//! # Ok(())
+//! # }
+//! ```
 //!
-//! [`cache`] keeps volumes and meshes for the next process. [`gpu`] and [`cpu`] each do stages 4 to 6, with the same names and the same order of operations;
-//! [`job`] chooses between them and watches over long work; [`farm`] writes job files that split it over many
-//! machines. The command line and the viewer are clients of all this.
+//! # The frame, stage by stage
+//!
+//! The modules stand in the order in which the data meets them, and a module imports only those before it.
+//!
+//! 1. [`curve`] makes spatial fractal curves (§1 of the [method](guide::method)), and [`walk`] finds the cells that a
+//!    segment passes.
+//! 2. [`volume`] gives each cell a density ρ, a flow direction v and reflection coefficients k, packed to 64 bits
+//!    (§2).
+//! 3. [`mapping`] is the one-to-one map between a quad and the face of the volume (§3). Sheets and splashes of falling
+//!    water are made of quads.
+//! 4. [`trace`] is what a view ray finds on its way through the cells (§4): the level of the volume it looks into, the
+//!    sample there, and what a sheet leaves of it.
+//! 5. [`light`] is what lights send, what of it reaches a cell, and what the cell sends on to the eye (§5): the paper's
+//!    [fibre](light::fibre) or [strands](light::strand) of water, [visibility](light::visibility), multiple
+//!    [scattering](light::scatter), [environments](light::environment), [haze](light::haze).
+//! 6. [`picture`] has the camera, the linear [`Frame`], and its way to an image (§6).
+//! 7. [`place`] is what the water is in: rock and pools.
+//! 8. [`output`] writes and reads files: PNG, EXR, movies, contact sheets.
+//! 9. [`scene`] reads what is asked for, and checks it whole before any work.
+//! 10. [`engine`] puts these together: the raster pass `gbuffer` finds the quads under each pixel and the texture
+//!     coordinates there, `integrate` walks the cells and adds up their light, `resolve` makes the picture. It does so
+//!     on a [GPU](engine::gpu) and on the [CPU](engine::cpu), with the same names and the same order of operations.
+//!
+//! # Where each stage is
+//!
+#![doc = include_str!("map.md")]
 
-#![forbid(unsafe_code)]
-#![warn(missing_docs)]
-
-pub mod cli;
-pub mod curve;
-pub mod engine;
-pub mod farm;
-pub mod job;
-pub mod light;
-pub mod mapping;
-pub mod output;
-pub mod picture;
-pub mod place;
-pub mod scene;
-pub mod trace;
+#[doc(hidden)]
 pub mod util;
-#[cfg(feature = "viewer")]
-pub mod viewer;
-pub mod volume;
+
+pub mod curve;
 pub mod walk;
 
+pub mod volume;
+
+pub mod mapping;
+
+pub mod trace;
+
+pub mod light;
+
+pub mod picture;
+
+pub mod place;
+
+pub mod output;
+
+pub mod scene;
+
+pub mod engine;
+
+#[doc(hidden)]
+pub mod job;
+
+#[doc(hidden)]
+pub mod farm;
+
+#[cfg(feature = "viewer")]
+#[doc(hidden)]
+pub mod viewer;
+
+#[doc(hidden)]
+pub mod cli;
+
+pub mod guide;
+
+pub use engine::{Engine, EngineChoice, RenderOptions};
+pub use picture::Frame;
+pub use scene::{Limits, Scene};
 pub use util::error::{Error, Result};
+pub use util::monitor::{Monitor, Unwatched};

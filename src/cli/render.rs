@@ -106,7 +106,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     }
     let mut writer = still.begin(&scene, &volume, window, &layers)?;
     let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
-        engine.render(&scene, &volume, &mesh, options, monitor)
+        engine.render_volume(&scene, &volume, &mesh, options, monitor)
     })?;
     let not_finite = writer.figures().non_finite_pixels;
     if not_finite > 0 {

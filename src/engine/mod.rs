@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod exposure;
+mod frame;
 pub mod gpu;
 mod options;
 pub mod overlap;
@@ -107,7 +108,7 @@ impl Engine {
 
     /// Renders. After a lost device or exhausted device memory it tries once more on a new device
     /// with smaller tiles.
-    pub fn render(
+    pub fn render_volume(
         &mut self,
         scene: &Scene,
         volume: &VolumeTexture,

@@ -4,6 +4,7 @@ mod animation;
 mod build;
 mod ground;
 mod keyframes;
+mod open;
 mod param;
 mod presets;
 mod print;

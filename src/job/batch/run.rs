@@ -204,7 +204,7 @@ impl Work<'_> {
             let options = RenderOptions { surface, window: Some(part), keep_rasters, ..Default::default() };
             let rows = [part.y - window.y, part.height, window.height];
             let watch = Share { watcher: self.watcher, name: &name, rows };
-            let frame = match self.engine.render(&scene, &volume, &mesh, &options, &watch) {
+            let frame = match self.engine.render_volume(&scene, &volume, &mesh, &options, &watch) {
                 Ok(frame) => frame,
                 Err(e) => {
                     if start.is_none() {

@@ -6,6 +6,7 @@ mod figures;
 mod output;
 mod owner;
 mod png_file;
+mod save;
 pub mod streaks;
 mod verify;
 

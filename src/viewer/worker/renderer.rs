@@ -374,7 +374,7 @@ impl Renderer {
     ) -> Result<Frame> {
         match self.engine.get_or_insert(Engine::cpu()) {
             Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
-            cpu => cpu.render(scene, volume, mesh, options, watch),
+            cpu => cpu.render_volume(scene, volume, mesh, options, watch),
         }
     }
 

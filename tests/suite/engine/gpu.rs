@@ -315,7 +315,7 @@ fn a_destroyed_device_is_an_error_and_the_engine_recovers_on_a_new_one() {
         assert!(matches!(lost, Err(Error::DeviceLost(_))), "{lost:?}");
     }
     let frame =
-        engine.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame on the new device");
+        engine.render_volume(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame on the new device");
     assert!(frame.covered_pixels() > 0);
 }
 
@@ -330,7 +330,7 @@ fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
     for engine in &mut engines {
         let mut part = |samples| {
             let options = RenderOptions { samples, ..Default::default() };
-            engine.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
+            engine.render_volume(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
         };
         let whole = part(None);
         let parts = [part(Some(0..1)), part(Some(1..4))];

@@ -46,7 +46,7 @@ impl Subject {
 
     fn render(&self, engine: &mut Engine, window: Option<Window>, grid: Grid) -> Frame {
         let options = RenderOptions { surface: true, window, grid, ..Default::default() };
-        engine.render(&self.scene, &self.volume, &self.mesh, &options, &Unwatched).expect("a frame")
+        engine.render_volume(&self.scene, &self.volume, &self.mesh, &options, &Unwatched).expect("a frame")
     }
 
     /// Writes `window` to `path` in strips of the given rows, the last again and again.

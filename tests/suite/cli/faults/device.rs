@@ -89,7 +89,7 @@ fn a_device_that_hangs_is_not_waited_for() {
     let (mut engine, _) = Engine::open(EngineChoice::Gpu, &device).unwrap();
     let options = RenderOptions { tile_pixels: Some(1 << 20), ..Default::default() };
     let clock = Instant::now();
-    let result = engine.render(&scene, &volume, &scene.mesh(), &options, &Unwatched);
+    let result = engine.render_volume(&scene, &volume, &scene.mesh(), &options, &Unwatched);
     if result.is_ok() {
         eprintln!("skipped: this GPU is too fast to seem hung");
         return;
@@ -141,13 +141,13 @@ fn a_lost_device_is_replaced_once_with_a_warning() {
     let volume = scene.volume(1 << 30, &Unwatched).unwrap();
     let (mut engine, _) = Engine::open(EngineChoice::Gpu, &DeviceOptions::default()).unwrap();
     let (options, warnings) = (RenderOptions::default(), Warnings::default());
-    let mut picture = || engine.render(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
+    let mut picture = || engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
     let before = picture();
     assert!(warnings.0.lock().unwrap().is_empty());
     if let Engine::Gpu(renderer, _) = &engine {
         renderer.gpu.device.destroy();
     }
-    let after = engine.render(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
+    let after = engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
     // Smaller tiles give the same pixels.
     assert!(before == after);
     let warnings = warnings.0.into_inner().unwrap();

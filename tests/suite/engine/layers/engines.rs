@@ -22,7 +22,7 @@ fn the_order_of_the_quads_in_the_scene_does_not_matter() {
         for engine in &mut engines {
             let mut frame = |scene: &Scene| {
                 let options = RenderOptions::default();
-                engine.render(scene, &volume, &no_rock(), &options, &Unwatched).expect("a frame")
+                engine.render_volume(scene, &volume, &no_rock(), &options, &Unwatched).expect("a frame")
             };
             let first = frame(&scene);
             for _ in 0..2 {

@@ -24,7 +24,7 @@ fn engines(what: &str) -> Vec<Engine> {
 }
 
 fn frame(engine: &mut Engine, scene: &Scene, volume: &VolumeTexture) -> Frame {
-    engine.render(scene, volume, &scene.mesh(), &RenderOptions::default(), &Unwatched).expect("a frame")
+    engine.render_volume(scene, volume, &scene.mesh(), &RenderOptions::default(), &Unwatched).expect("a frame")
 }
 
 fn volume(scene: &Scene) -> VolumeTexture {

@@ -1,0 +1,18 @@
+//! The pages of `docs/`, to read beside the modules.
+
+macro_rules! pages {
+    ($($name:ident $file:literal)*) => {
+        $(#[doc = include_str!(concat!("../docs/", $file))] pub mod $name {})*
+    };
+}
+
+pages! {
+    method "method.md"
+    parameters "parameters.md"
+    scenes_and_files "scenes-and-files.md"
+    viewer "viewer.md"
+    batch "batch.md"
+    farms "farms.md"
+    speed "speed.md"
+    architecture "architecture.md"
+}

@@ -1,0 +1,41 @@
+//! A frame as a file of its own, without the scene that made it.
+
+use std::io::BufWriter;
+use std::path::Path;
+
+use super::{ExrWriter, Output, channel_names, encode_png, lines_of};
+use crate::picture::{Frame, Layer};
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
+
+impl Frame {
+    /// Writes the picture as an 8-bit sRGB PNG. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        let output = Output::create(path.as_ref())?;
+        let bytes = encode_png(self, &[]).map_err(|e| Error::write(output.path(), e))?;
+        output.finish_with(&bytes)
+    }
+
+    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all. A layer of the raster pass that
+    /// the frame was rendered without is 0.
+    ///
+    /// # Errors
+    /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.
+    pub fn write_exr(&self, path: impl AsRef<Path>, layers: &[Layer]) -> Result<()> {
+        let mut output = Output::create(path.as_ref())?;
+        let target = output.path().to_owned();
+        let fault = |e: &dyn std::fmt::Display| Error::write(&target, e.to_string());
+        let file = BufWriter::new(output.file().try_clone().map_err(|e| fault(&e))?);
+        let size = [self.width, self.height];
+        let mut writer = ExrWriter::new(file, size, Window::whole(size), &channel_names(layers), &[])
+            .map_err(|e| fault(&e))?;
+        for line in lines_of(self, layers, 0..self.height) {
+            writer.push(line).map_err(|e| fault(&e))?;
+        }
+        writer.finish().map_err(|e| fault(&e))?;
+        output.finish()
+    }
+}
