@@ -1,0 +1,103 @@
+# Read by every script of this folder: a temporary folder that goes at the end, pinned installations, verdicts.
+# shellcheck shell=bash disable=SC2034
+set -euo pipefail
+# Short: a path of a socket in it has at most 107 bytes.
+work=$(mktemp -d /tmp/finding.XXXXXX)
+# Commands to run before the folder goes, the last one first.
+leaving=()
+leave() {
+    local code=$? i
+    trap - EXIT
+    for ((i = ${#leaving[@]} - 1; i >= 0; i--)); do
+        "${leaving[i]}" || true
+    done
+    rm -rf -- "$work"
+    exit "$code"
+}
+trap leave EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM HUP
+
+say() { printf '%s\n' "$*"; }
+# What cannot be tried here: exit code 77.
+cannot() {
+    say "${0##*/}: not tried: $*" >&2
+    exit 77
+}
+needs() {
+    local tool
+    for tool in "$@"; do
+        command -v "$tool" >/dev/null || cannot "$tool is not installed"
+    done
+}
+# Names the Debian package's version, and tells where it is another than the one that was looked at.
+debian() {
+    local package=$1 looked_at=$2 here
+    here=$(dpkg-query --show --showformat='${Version}' "$package" 2>/dev/null) || here=""
+    [ -n "$here" ] || cannot "the Debian package $package ($looked_at) is not installed"
+    say "version: $package $here"
+    [[ $here == *"$looked_at"* ]] || say "other version than $looked_at: its behaviour may differ"
+}
+# A virtual environment with these packages and no others but what they need; its python is `$python`.
+pip_install() {
+    local with=$1
+    shift
+    needs "$with"
+    "$with" -m venv "$work/venv"
+    "$work/venv/bin/pip" install --quiet --disable-pip-version-check "$@"
+    python=$work/venv/bin/python
+    say "version: $* ($("$python" --version))"
+}
+# The dependencies of a crate whose src/main.rs is stdin; it is built as `$work/crate/target/debug/finding`.
+cargo_build() {
+    needs cargo cc
+    mkdir -p "$work/crate/src"
+    cat >"$work/crate/src/main.rs"
+    printf '[package]\nname = "finding"\nversion = "0.0.0"\nedition = "2024"\n\n[dependencies]\n' >"$work/crate/Cargo.toml"
+    printf '%s\n' "$@" >>"$work/crate/Cargo.toml"
+    cargo build --quiet --manifest-path "$work/crate/Cargo.toml" --target-dir "$work/crate/target"
+    say "version: $*"
+}
+# The source of a crate: NAME VERSION. Its folder is `$crate`.
+cargo_source() {
+    needs cargo
+    mkdir -p "$work/source/src"
+    touch "$work/source/src/lib.rs"
+    printf '[package]\nname = "finding"\nversion = "0.0.0"\n\n[dependencies]\n%s = { version = "=%s", default-features = false }\n' \
+        "$1" "$2" >"$work/source/Cargo.toml"
+    cargo vendor --quiet --versioned-dirs --manifest-path "$work/source/Cargo.toml" "$work/vendor" >/dev/null
+    crate=$work/vendor/$1-$2
+    say "version: $1 $2"
+}
+# Packages of npm in `$work/node`, without their installation scripts.
+npm_install() {
+    needs node npm
+    npm install --silent --no-audit --no-fund --ignore-scripts --prefix "$work/node" "$@"
+    say "version: $* (node $(node --version))"
+}
+# Vulkan has lavapipe alone.
+lavapipe() {
+    local drivers=(/usr/share/vulkan/icd.d/lvp_icd.*.json)
+    debian mesa-vulkan-drivers 22.3.6
+    [ -e "${drivers[0]}" ] || cannot "lavapipe's file in /usr/share/vulkan/icd.d is missing"
+    export VK_DRIVER_FILES=${drivers[0]} VK_ICD_FILENAMES=${drivers[0]} XDG_RUNTIME_DIR=$work
+}
+
+changed=0
+# Compares what came with what was seen when the finding was written: WHAT CAME EXPECTED.
+expect() {
+    if [ "$2" = "$3" ]; then
+        say "as found: $1: $2"
+    else
+        say "CHANGED: $1: came $2, expected $3"
+        changed=1
+    fi
+}
+verdict() {
+    if [ "$changed" = 0 ]; then
+        say "${0##*/}: confirmed"
+    else
+        say "${0##*/}: the behaviour has changed"
+        exit 1
+    fi
+}
