@@ -101,8 +101,8 @@ print("pictures =", "equal" if cut_picture == off_picture else "different")
 print("factor =", "more than 3" if off > 3 * cut else f"{off / cut:.1f}")
 print("on =", "as long as off" if 0.7 < on / off < 1.4 else f"{on / off:.1f} times as long")
 PY
-"$python" "$work/draw.py" "$crate/src/egui.wgsl" | tee "$work/seen"
-expect "pictures with the branch cut out and with the filter off" "$(sed -n 's/^pictures = //p' "$work/seen")" equal
-expect "time with the filter off, in times of the branch cut out" "$(sed -n 's/^factor = //p' "$work/seen")" "more than 3"
-expect "time with the filter on" "$(sed -n 's/^on = //p' "$work/seen")" "as long as off"
+observe "$python" "$work/draw.py" "$crate/src/egui.wgsl"
+expect "pictures with the branch cut out and with the filter off" "$(seen pictures)" equal
+expect "time with the filter off, in times of the branch cut out" "$(seen factor)" "more than 3"
+expect "time with the filter on" "$(seen on)" "as long as off"
 verdict

@@ -64,10 +64,10 @@ ramp("r16unorm", np.array([0, 2570], np.uint16), 65535)
 ramp("r16float", np.array([0, 1], np.float16), 1)
 ramp("r32float", np.array([0, 1], np.float32), 1)
 PY
-"$python" "$work/filter.py" | tee "$work/seen"
-expect "r8unorm from 0 to 255" "$(sed -n 's/^r8unorm 255 = //p' "$work/seen")" "256 values, largest error 0.004"
-expect "r8unorm from 0 to 10" "$(sed -n 's/^r8unorm 10 = //p' "$work/seen")" "11 values, largest error 0.052"
-expect "r16unorm from 0 to 2570" "$(sed -n 's/^r16unorm 2570 = //p' "$work/seen")" "16384 values, largest error 0.000"
-expect "r16float from 0 to 1" "$(sed -n 's/^r16float 1.0 = //p' "$work/seen")" "16384 values, largest error 0.000"
-expect "r32float from 0 to 1" "$(sed -n 's/^r32float 1.0 = //p' "$work/seen")" "16384 values, largest error 0.000"
+observe "$python" "$work/filter.py"
+expect "r8unorm from 0 to 255" "$(seen "r8unorm 255")" "256 values, largest error 0.004"
+expect "r8unorm from 0 to 10" "$(seen "r8unorm 10")" "11 values, largest error 0.052"
+expect "r16unorm from 0 to 2570" "$(seen "r16unorm 2570")" "16384 values, largest error 0.000"
+expect "r16float from 0 to 1" "$(seen "r16float 1.0")" "16384 values, largest error 0.000"
+expect "r32float from 0 to 1" "$(seen "r32float 1.0")" "16384 values, largest error 0.000"
 verdict

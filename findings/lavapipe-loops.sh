@@ -54,9 +54,9 @@ print("long =", run("for (var i = 0u; i < n; i++) { count++; }", 68000))
 print("two =", run("for (var i = 0u; i < n; i++) { count++; } for (var i = 0u; i < n; i++) { count++; }", 40000))
 print("nested =", run("for (var i = 0u; i < n; i++) { for (var j = 0u; j < n; j++) { count++; } }", 1000))
 PY
-"$python" "$work/loops.py" | tee "$work/seen"
-expect "turns of a loop of 60000" "$(sed -n 's/^short = //p' "$work/seen")" 60000
-expect "turns of a loop of 68000" "$(sed -n 's/^long = //p' "$work/seen")" 65535
-expect "turns of two loops of 40000" "$(sed -n 's/^two = //p' "$work/seen")" 65534
-expect "turns of 1000 times 1000" "$(sed -n 's/^nested = //p' "$work/seen")" 65405
+observe "$python" "$work/loops.py"
+expect "turns of a loop of 60000" "$(seen short)" 60000
+expect "turns of a loop of 68000" "$(seen long)" 65535
+expect "turns of two loops of 40000" "$(seen two)" 65534
+expect "turns of 1000 times 1000" "$(seen nested)" 65405
 verdict

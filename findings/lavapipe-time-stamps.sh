@@ -81,8 +81,8 @@ render()
 print("one =", word(run(1)))
 print("two =", word(run(2)))
 PY
-"$python" "$work/stamps.py" | tee "$work/seen"
-expect "told of one dispatch before anything was rendered" "$(sed -n 's/^before = //p' "$work/seen")" all
-expect "told of one dispatch afterwards" "$(sed -n 's/^one = //p' "$work/seen")" "next to nothing"
-expect "told of two dispatches afterwards" "$(sed -n 's/^two = //p' "$work/seen")" half
+observe "$python" "$work/stamps.py"
+expect "told of one dispatch before anything was rendered" "$(seen before)" all
+expect "told of one dispatch afterwards" "$(seen one)" "next to nothing"
+expect "told of two dispatches afterwards" "$(seen two)" half
 verdict

@@ -83,6 +83,10 @@ lavapipe() {
     export VK_DRIVER_FILES=${drivers[0]} VK_ICD_FILENAMES=${drivers[0]} XDG_RUNTIME_DIR=$work
 }
 
+# Runs a program whose lines `NAME = VALUE` are results; they are shown and kept.
+observe() { "$@" | tee -a "$work/seen"; }
+seen() { sed -n "s/^$1 = //p" "$work/seen"; }
+
 changed=0
 # Compares what came with what was seen when the finding was written: WHAT CAME EXPECTED.
 expect() {
