@@ -58,6 +58,17 @@ cargo_build() {
     cargo build --quiet --manifest-path "$work/crate/Cargo.toml" --target-dir "$work/crate/target"
     say "version: $*"
 }
+# An interpreter of Python 3.MINOR is `$interpreter`.
+python_of() {
+    local candidate
+    for candidate in "python3.$1" python3 "$HOME/.pyenv/versions/3.$1".*/bin/python3; do
+        if [ "$("$candidate" -c 'import sys; print(sys.version_info[1])' 2>/dev/null)" = "$1" ]; then
+            interpreter=$candidate
+            return
+        fi
+    done
+    cannot "Python 3.$1 is not installed"
+}
 # The source of a crate: NAME VERSION. Its folder is `$crate`.
 cargo_source() {
     needs cargo
