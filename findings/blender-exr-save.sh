@@ -2,12 +2,13 @@
 # Blender's Image.save writes sRGB-coded numbers into an OpenEXR file.
 #
 # Versions: bpy 5.2.3 of pip (Blender 5.2 LTS), OpenEXR 3.5.3 of pip.
-# Expected: a float image in the colour space "Linear Rec.709" is saved as its linear numbers, as EXR files are
-#   taken to be.
-# Seen: 0.18 is stored as 0.4614, 0.5 as 0.7354, 4 as 1.825, beside colorInteropID srgb_rec709_display, which few
-#   readers look at. save_render of the same image writes the linear numbers (and lin_rec709_scene).
-# Why it matters: light probes and textures baked by a script this way come out washed out and with their lights
-#   cut to a half or less, in every renderer that takes EXR for linear.
+# Expected: a float image in the colour space "Linear Rec.709" is saved as its linear numbers, which is what
+#   readers take an EXR file to hold.
+# Seen: 0.18 is stored as 0.461, 0.5 as 0.735 and 4 as 1.825, with colorInteropID srgb_rec709_display beside
+#   them. save_render of the same image writes the linear numbers, with lin_rec709_scene.
+# Why it matters: a light probe or texture that a script bakes and saves this way looks washed out, and its
+#   lights lose half of their strength or more, in every renderer that does not read colorInteropID.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 python_of 13
 pip_install "$interpreter" bpy==5.2.3 openexr==3.5.3

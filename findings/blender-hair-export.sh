@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Blender "exports" hair curves as OBJ, PLY and glTF with success, and none of them holds any.
+# Blender "exports" hair curves to OBJ, PLY and glTF with success, and no hair is in them.
 #
 # Versions: bpy 5.2.3 of pip (Blender 5.2 LTS).
-# Expected: an exporter that cannot write hair raises an error or answers CANCELLED; OBJ has a curve type of its own
-#   and glTF has lines.
-# Seen: all answer FINISHED. OBJ says "File exported successfully" and writes no file; PLY has no vertex; glTF has
-#   a node without a mesh. USD and Alembic hold the curves: USD as cubic Catmull-Rom, pinned, with widths
-#   that are diameters.
-# Why it matters: a pipeline that checks the operator's answer, or only that the file is there, hands a bald
+# Expected: an exporter that cannot write hair raises an error or answers CANCELLED.
+# Seen: all answer FINISHED. OBJ says "File exported successfully" and writes no file, PLY has no vertices,
+#   and glTF has a node without a mesh. USD and Alembic hold the curves: USD as pinned cubic Catmull-Rom
+#   whose widths are diameters.
+# Why it matters: a pipeline that checks the operator's answer, or only that a file is there, hands a bald
 #   scene to the renderer.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 python_of 13
 pip_install "$interpreter" bpy==5.2.3
@@ -65,7 +65,7 @@ for name, write, read in [
     back = [thing.data for thing in bpy.data.objects if thing.type == "CURVES"]
     print(f"{name} = FINISHED,", *[f"{len(c.curves)} curves, {len(c.points)} points" for c in back])
 PY
-observe "$python" "$work/export.py" "$work" >"$work/all" 2>&1 || { cat "$work/all"; exit 2; }
+observe "$python" "$work/export.py" "$work" >"$work/all" 2>&1 || { cat "$work/all"; exit 1; }
 grep -E ' = |successfully' "$work/all"
 expect "OBJ" "$(seen obj)" "FINISHED, no file"
 expect "PLY" "$(seen ply)" "FINISHED, element vertex 0"

@@ -2,12 +2,14 @@
 # Dawn finds no adapter on Debian 12's lavapipe, where wgpu does.
 #
 # Versions: Mesa 22.3.6 (Debian 12), webgpu 0.6.2 of npm (Dawn), wgpu-py 0.32.0, vulkan 1.3.275.1.
-# Expected: lavapipe 22.3.6 is a driver of Vulkan 1.3, so what runs on it through wgpu also runs through Dawn.
-# Seen: Dawn warns that "shaderUniform*ArrayDynamicIndexing" is required and requestAdapter answers null.
-#   lavapipe has the feature for uniform and storage buffers, but not for sampled images
-#   (shaderSampledImageArrayDynamicIndexing), which Vulkan leaves optional.
-# Why it matters: WebGPU code cannot be tried with both implementations on this driver; a CI that draws on
-#   it through wgpu says nothing about pages and programs on Dawn.
+# Expected: lavapipe 22.3.6 is a driver of Vulkan 1.3, so WebGPU runs on it through Dawn as well as through
+#   wgpu.
+# Seen: Dawn warns "Vulkan shaderUniform*ArrayDynamicIndexing required" and requestAdapter answers null.
+#   lavapipe has dynamic indexing for uniform and storage buffers, but not for sampled images, where Vulkan
+#   leaves it optional.
+# Why it matters: a CI that draws on this driver through wgpu cannot try the same code with Dawn, and says
+#   nothing about Chromium.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 lavapipe
 npm_install webgpu@0.6.2

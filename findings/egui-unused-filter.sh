@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# egui's WGSL shader takes several times as long on software Vulkan, for a texture filter that is switched off.
+# egui's WGSL shader is several times slower on software Vulkan because of a filter that is off.
 #
 # Versions: egui-wgpu 0.37.0, Mesa 22.3.6 (Debian 12), wgpu-py 0.32.0.
 # Expected: `predictable_texture_filtering` is a uniform and 0, so every pixel takes the branch with one
-#   textureSample, and the filter in the other branch (four textureLoad with wrap modes) costs nothing.
-# Seen: drawing takes more than three times as long as with the other branch cut out of the shader, for an
-#   equal picture, and as long as with the filter switched on. llvmpipe runs both sides of a branch and
-#   chooses afterwards.
-# Why it matters: an egui program without a GPU is several times slower through wgpu than through OpenGL, whose
-#   shader has no such branch. A renderer's own shaders pay in the same way for what a uniform switches off:
-#   specialise pipelines instead.
+#   textureSample. The filter in the other branch, four textureLoad with wrap modes, costs nothing.
+# Seen: drawing takes more than three times as long as with that branch cut out of the shader, for an equal
+#   picture, and as long as with the filter on. llvmpipe runs both sides of a branch and then selects.
+# Why it matters: an egui window without a GPU is faster through OpenGL, whose shader has no such branch. A
+#   renderer's own shaders pay in the same way for what a uniform switches off; specialised pipelines do
+#   not.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 lavapipe
 cargo_source egui-wgpu 0.37.0
@@ -70,7 +70,8 @@ def draw(code, predictable):
         entries.append({"binding": 2, "resource": {"buffer": flags}})
     groups = [
         device.create_bind_group(
-            layout=pipeline.get_bind_group_layout(0), entries=[{"binding": 0, "resource": {"buffer": values}}]),
+            layout=pipeline.get_bind_group_layout(0),
+            entries=[{"binding": 0, "resource": {"buffer": values}}]),
         device.create_bind_group(layout=pipeline.get_bind_group_layout(1), entries=entries),
     ]
     fastest = float("inf")
@@ -88,7 +89,8 @@ def draw(code, predictable):
         render.end()
         start = time.perf_counter()
         device.queue.submit([encoder.finish()])
-        picture = device.queue.read_texture({"texture": target}, {"bytes_per_row": 4 * width}, (width, height, 1))
+        rows = {"bytes_per_row": 4 * width}
+        picture = device.queue.read_texture({"texture": target}, rows, (width, height, 1))
         fastest = min(fastest, time.perf_counter() - start)
     return fastest * 1e3 / layers, bytes(picture)
 

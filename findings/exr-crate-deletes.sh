@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# The exr crate deletes the file that stood under the name before, even when it could not open it.
+# The exr crate deletes the old file when it cannot open it to write a new one.
 #
 # Versions: exr 1.74.2 (crate).
-# Expected: an error of write_rgb_file or to_file leaves a torn file if the disk is full, and the old file
-#   untouched if the new one could not even be opened.
-# Seen: after any error the name is removed. With no file handle left ("Too many open files") nothing has been
-#   written, and the frame of the last run is gone all the same.
-# Why it matters: a renderer that overwrites frames in place loses finished ones to a passing fault.
-#   Write to a name of your own beside it and rename.
+# Expected: if the file cannot be opened, an error is returned and the old file stays as it is.
+# Seen: with no file handle left ("Too many open files") nothing is written, the error is returned, and the
+#   name is removed: the frame of the last run is gone. std::fs::File::create fails in the same way and
+#   leaves the file.
+# Why it matters: a renderer that overwrites its frames in place loses finished ones to a fault that passes.
+#   Write to a temporary name beside the frame and rename it.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 cargo_build 'exr = "=1.74.2"' <<'RUST'
 use exr::prelude::write_rgb_file;

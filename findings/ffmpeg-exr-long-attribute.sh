@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# ffmpeg loses rows, or the picture, of an EXR file that has an attribute longer than 255 bytes.
+# ffmpeg loses rows, or the whole picture, of an EXR file with an attribute longer than 255 bytes.
 #
 # Versions: ffmpeg 5.1.9 (Debian 12), OpenEXR 3.5.3 of pip.
-# Expected: attributes that ffmpeg does not know are skipped, whatever their length.
-# Seen: up to 255 bytes they are. From 256 on, an attribute that sorts before the necessary ones makes the file
-#   unreadable ("Missing compression attribute"). One that sorts behind them lets ffmpeg start the table of
-#   rows at a wrong place: half of the rows come out wrong, with exit code 0 and nothing on stderr.
-# Why it matters: renderers keep the scene, the command or Cryptomatte's manifest in such attributes. The frames
-#   are whole; the movie made of them is not.
+# Expected: an attribute that ffmpeg does not know is skipped, whatever its length.
+# Seen: up to 255 bytes it is. From 256 bytes on, an attribute whose name sorts before the required ones
+#   makes the file unreadable ("Missing compression attribute"). With one that sorts after them half of the
+#   rows come out wrong, with exit code 0 and nothing on stderr.
+# Why it matters: renderers keep the scene, the command line or a Cryptomatte manifest in such attributes.
+#   The frames are intact; the movie made of them is not.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 needs ffmpeg
 debian ffmpeg 5.1.9
@@ -27,12 +28,12 @@ for name in "about", "zscene":
         OpenEXR.File(header, dict(picture)).write(path)
         read = OpenEXR.File(path, separate_channels=True).channels()
         assert all(np.array_equal(read[c].pixels, picture[c]) for c in picture)
-        command = ["ffmpeg", "-v", "warning", "-nostdin", "-i", path, "-f", "rawvideo", "-pix_fmt", "gbrpf32le", "-"]
-        ran = subprocess.run(command, capture_output=True)
+        command = f"ffmpeg -v warning -nostdin -i {path} -f rawvideo -pix_fmt gbrpf32le -"
+        ran = subprocess.run(command.split(), capture_output=True)
         said = "something" if ran.stderr else "nothing"
         if ran.stdout:
             planes = np.frombuffer(ran.stdout, np.float32).reshape(3, n, n)
-            wrong = sum(any((came[row] != picture[c][row]).any() for c, came in zip("GBR", planes)) for row in range(n))
+            wrong = (planes != np.stack([picture[c] for c in "GBR"])).any(axis=(0, 2)).sum()
             told = f"{wrong} of {n} rows wrong"
         else:
             told = "no picture"

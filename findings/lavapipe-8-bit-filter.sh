@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
-# lavapipe: a linear filter on an 8-bit texture returns 8-bit values.
+# lavapipe: linear filtering of an 8-bit texture returns 8-bit values.
 #
 # Versions: Mesa 22.3.6 (Debian 12), wgpu-py 0.32.0.
-# Expected: between two texels the sampled value changes in steps of the filter's weights, at least 256 of them
-#   (subTexelPrecisionBits is 8), whatever the texels hold: fractions of 1/255 come out of an r8unorm texture.
-# Seen: between texels of 0 and 10 of 255 only 11 values come out, with errors up to half a step, which is
-#   5 % of the range. The same ramp as r16unorm, r16float or r32float has all of 16,384 values, without error.
-# Why it matters: thin densities and dim light volumes kept in 8 bits show terraces here and nowhere
-#   else, and a comparison with a CPU twin that filters in floating point fails.
+# Expected: the filter's weights have at least 8 bits (subTexelPrecisionBits is 8), so between any two
+#   texels of an r8unorm texture some 256 values come out, whatever the texels hold.
+# Seen: between texels of 0/255 and 10/255 only 11 values come out, with errors up to half a step, 5 % of
+#   the range. The same ramp as r16unorm, and ramps of r16float and r32float, have all of 16,384 values,
+#   without error.
+# Why it matters: thin densities and dim light volumes kept in 8 bits show terraces, and a comparison with a
+#   CPU twin that filters in floating point fails.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 lavapipe
 pip_install python3 wgpu==0.32.0 numpy==2.4.6

@@ -2,12 +2,13 @@
 # lavapipe: after 65,535 turns all loops of an invocation end, without a word.
 #
 # Versions: Mesa 22.3.6 (Debian 12), wgpu-py 0.32.0.
-# Expected: a loop with a counted end runs to it, however many turns that takes, or the device is lost.
-# Seen: turns of all loops of an invocation are counted together. A loop of 68,000 turns runs 65,535; of two
-#   loops of 40,000 the second ends after 25,534; 1000 times 1000 turns come to 65,405.
-#   The invocation goes on behind the loop, and nothing reports an error.
-# Why it matters: long walks through a volume, nested loops over lights, and path tracers with a loop for samples
-#   give plausible, wrong pictures on the driver that most tests run on.
+# Expected: a counted loop runs to its end, or the device is lost.
+# Seen: the turns of all loops of an invocation are counted together. A loop of 68,000 turns ends after
+#   65,535. Two loops of 40,000 make 65,534 turns together. 1000 times 1000 turns come to 65,405. The
+#   invocation then goes on behind the loop, and nothing reports an error.
+# Why it matters: long walks through a volume, nested loops over lights and path tracers that loop over
+#   samples give plausible, wrong pictures on the driver that most tests run on.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 lavapipe
 pip_install python3 wgpu==0.32.0 numpy==2.4.6
@@ -34,7 +35,8 @@ def run(body, turns):
             out[0] = count;
         }
     """.replace("BODY", body))
-    pipeline = device.create_compute_pipeline(layout="auto", compute={"module": shader, "entry_point": "main"})
+    stage = {"module": shader, "entry_point": "main"}
+    pipeline = device.create_compute_pipeline(layout="auto", compute=stage)
     n = device.create_buffer_with_data(data=np.array([turns], np.uint32), usage=usage.STORAGE)
     out = device.create_buffer(size=4, usage=usage.STORAGE | usage.COPY_SRC)
     entries = [{"binding": 0, "resource": {"buffer": n}}, {"binding": 1, "resource": {"buffer": out}}]
@@ -49,9 +51,10 @@ def run(body, turns):
     return int(np.frombuffer(device.queue.read_buffer(out), np.uint32)[0])
 
 
-print("short =", run("for (var i = 0u; i < n; i++) { count++; }", 60000))
-print("long =", run("for (var i = 0u; i < n; i++) { count++; }", 68000))
-print("two =", run("for (var i = 0u; i < n; i++) { count++; } for (var i = 0u; i < n; i++) { count++; }", 40000))
+loop = "for (var i = 0u; i < n; i++) { count++; }"
+print("short =", run(loop, 60000))
+print("long =", run(loop, 68000))
+print("two =", run(loop + loop, 40000))
 print("nested =", run("for (var i = 0u; i < n; i++) { for (var j = 0u; j < n; j++) { count++; } }", 1000))
 PY
 observe "$python" "$work/loops.py"

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# lavapipe: once a device has rendered, time stamps leave out the first dispatch of each compute pass.
+# lavapipe: once a device has rendered, time stamps leave out the first dispatch of a compute pass.
 #
 # Versions: Mesa 22.3.6 (Debian 12), wgpu-py 0.32.0.
-# Expected: the difference of the two stamps is the time that the pass took, within a few per cent of the
+# Expected: the difference of a pass's two stamps is the time that it took, within a few per cent of the
 #   host's clock.
-# Seen: so it is until the device begins its first render pass, which need not draw. From then on the stamp of
-#   a compute pass's begin tells when its first dispatch was over: a pass of one dispatch shows less than a
+# Seen: that holds until the device's first render pass, even one without a draw. From then on the first
+#   stamp is written when the pass's first dispatch is over: a pass of one dispatch shows less than a
 #   thousandth of its time, a pass of two equal ones shows half.
-# Why it matters: a renderer that sizes its tiles or reports its speed by time stamps takes software Vulkan for
-#   a thousand times as fast as it is; and a test of the timer that only computes passes.
+# Why it matters: a renderer that sizes its tiles or reports its speed by time stamps takes software Vulkan
+#   to be a thousand times as fast as it is. A test that never renders does not see it.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 lavapipe
 pip_install python3 wgpu==0.32.0 numpy==2.4.6
@@ -63,7 +64,9 @@ def run(dispatches):
 
 
 def word(share):
-    return "next to nothing" if share < 0.02 else "half" if 0.4 < share < 0.6 else "all" if share > 0.75 else share
+    if share < 0.02:
+        return "next to nothing"
+    return "half" if 0.4 < share < 0.6 else "all" if share > 0.75 else share
 
 
 def render():

@@ -2,12 +2,13 @@
 # OpenEXR's DWAA and DWAB: the name of a float channel decides whether its values survive.
 #
 # Versions: OpenEXR 3.5.3 of pip.
-# Expected: DWA loses a little of every channel, or of none that holds 32-bit floats.
-# Seen: channels whose last name is R, G, B or Y, in capitals, are stored lossily and as half floats: values above
-#   65,504 shrink to about that. Equal values under other names (density, Z, A, r, red, N.X) come back exactly.
-#   That holds in any layer: emission.R loses, emission.density does not.
-# Why it matters: positions, identifiers or optical depths kept as R, G, B of a layer are damaged, though the file
-#   says FLOAT and single-letter depth beside them is exact. Bright suns over 65,504 dim.
+# Expected: DWA loses a little of every channel, or nothing of channels that hold 32-bit floats.
+# Seen: channels named R, G, B or Y (capitals, in any layer: emission.R) lose, and pass through half floats:
+#   1e6 comes back as some 65 thousand. The same values under other names (density, Z, A, r, red, N.X,
+#   emission.density) come back exactly.
+# Why it matters: positions, identifiers or optical depths kept in R, G, B are damaged although the file
+#   says FLOAT, and bright suns are cut.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 pip_install python3 openexr==3.5.3 numpy==2.4.6
 cat >"$work/names.py" <<'PY'
@@ -28,7 +29,8 @@ for kind in "DWAA", "DWAB":
         if np.array_equal(came, truth):
             told = "exact"
         else:
-            told = f"{'off by more than 0.01' if off > 0.01 else off}, 1e6 came as {'65 thousand' if 64e3 < came[0, 0] < 66e3 else came[0, 0]}"
+            large = "65 thousand" if 64e3 < came[0, 0] < 66e3 else came[0, 0]
+            told = f"off by {'more than 0.01' if off > 0.01 else off}, 1e6 came as {large}"
         print(f"{kind} {name} = {told}")
 PY
 observe "$python" "$work/names.py" "$work/a.exr"

@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
-# OpenJD's chunks of frames are evened out, written in several ways, and of every second frame hold one.
+# OpenJD evens out chunks of frames, writes them in several ways, and does not chunk a range with a step.
 #
 # Versions: openjd-cli 0.8.0, openjd-model 0.13.0 (the specification 2023-09, extension TASK_CHUNKING).
-# Expected: a CHUNK[INT] of 1-10 by 3 runs as 1-3, 4-6, 7-9 and 10; every second frame, as many to a chunk.
-# Seen: 1-10 by 3 runs as 1-3, 4-5, 6-8, 9-10: as many chunks as needed, of like sizes. CONTIGUOUS writes one
-#   frame as "4-4", and cuts 1-10:2, or 4-1:-1, into chunks of one frame each. NONCONTIGUOUS writes three
-#   frames in a row as "1-3", but two as "4,5", and others as "5,8,9".
-# Why it matters: a command that reads its frames from such a parameter has to take all of these forms; a template
-#   with a step in its range starts the renderer for each frame, which chunks were to avoid.
+# Expected: a CHUNK[INT] of 1-10 by 3 runs as 1-3, 4-6, 7-9 and 10; every second frame is chunked three by
+#   three as well.
+# Seen: 1-10 by 3 runs as 1-3, 4-5, 6-8, 9-10: the fewest chunks, evened out. CONTIGUOUS writes one frame as
+#   "4-4", and cuts 1-10:2 or 4-1:-1 into chunks of one frame. NONCONTIGUOUS writes three frames in a row as
+#   "1-3", but two as "4,5".
+# Why it matters: a command that reads its frames from such a parameter has to understand all of these
+#   forms. A template that renders every second frame starts the renderer once a frame, which chunks were to
+#   avoid.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 pip_install python3 openjd-cli==0.8.0 openjd-model==0.13.0
 # RANGE CONSTRAINT: the chunks by 3 in the order they run.

@@ -3,10 +3,12 @@
 #
 # Versions: Slurm 22.05.8 (Debian 12); one node on the loopback interface.
 # Expected: scancel ends a job for good, whatever the job asks for while it ends.
-# Seen: scancel sends SIGTERM. A script that answers with `scontrol requeue` is obeyed though squeue calls its job
-#   COMPLETING by then: the job is queued again, runs anew and ends as COMPLETED.
-# Why it matters: requeueing on SIGTERM is the usual answer to a time limit or a preempted node. The same lines
-#   make renders that their owner cannot stop with one scancel. Requeue only if squeue says RUNNING.
+# Seen: scancel sends SIGTERM. A script that answers with `scontrol requeue` is obeyed, although squeue
+#   calls its job COMPLETING by then: the job is queued again, runs anew and ends as COMPLETED.
+# Why it matters: requeueing on SIGTERM is the usual answer to a time limit or a preempted node. The same
+#   lines make renders that their owner cannot stop with one scancel. Requeue only while squeue says
+#   RUNNING.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/slurm.bash"
 slurm_start

@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# Slurm: the last task of an array that requeues $SLURM_JOB_ID runs the whole array again.
+# Slurm: when the last task of an array requeues $SLURM_JOB_ID, the whole array runs again.
 #
 # Versions: Slurm 22.05.8 (Debian 12); one node on the loopback interface.
-# Expected: SLURM_JOB_ID names the task that it is set in, as its number differs from task to task.
-# Seen: the task that starts last keeps the array's own number. `scontrol requeue $SLURM_JOB_ID` concerns that task
-#   alone in all others; in this one it starts every task again, those that are COMPLETED too.
-# Why it matters: frames are spread over an array, and a task whose device was lost requeues itself. In one
-#   task of each array that throws the finished ones back. Name it as ARRAY_JOB_ID_ARRAY_TASK_ID.
+# Expected: SLURM_JOB_ID names the task that it is set in: it differs from task to task.
+# Seen: the last task's SLURM_JOB_ID is the array's number. In any other task `scontrol requeue
+#   $SLURM_JOB_ID` concerns that task alone. In the last one it runs every task again, those that are
+#   COMPLETED too.
+# Why it matters: a task that requeues itself after losing its device throws away the finished frames of the
+#   others, in one task of each array. Requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID".
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/slurm.bash"
 slurm_start

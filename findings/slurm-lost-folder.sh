@@ -3,10 +3,11 @@
 #
 # Versions: Slurm 22.05.8 (Debian 12); one node on the loopback interface.
 # Expected: a job that cannot enter its working folder fails before its first command.
-# Seen: it starts in /tmp, also where the folder was named with --chdir. What it writes under relative names lies
-#   there, on the node; the job ends as COMPLETED with exit code 0:0. Only the job's own log tells.
-# Why it matters: on a node that has not mounted the disk of the frames, a batch renders hours into /tmp and reports
-#   success. A job script begins with cd "$SLURM_SUBMIT_DIR" || exit.
+# Seen: it starts in /tmp, also where the folder was named with --chdir. What it writes under relative names
+#   lies there, on the node. The job ends as COMPLETED with exit code 0:0; only the job's own log tells.
+# Why it matters: on a node that has not mounted the disk of the frames, a batch renders for hours into /tmp
+#   and reports success. Begin the job script with cd "$SLURM_SUBMIT_DIR" || exit 1.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/slurm.bash"
 slurm_start

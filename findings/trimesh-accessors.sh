@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# trimesh reads quantised glTF meshes 32,767 times too large, and sparse positions as zeros.
+# trimesh reads normalised glTF positions 32,767 times too large, and sparse ones as zeros.
 #
 # Versions: trimesh 5.2.0.
-# Expected: an accessor with `normalized` is divided by its type's largest number; a sparse accessor without a
-#   bufferView is zeros overwritten by its own values; a file that cannot be read is refused.
-# Seen: a triangle of normalised 16-bit integers under a node of scale 2 comes with sides of 65,534 in place of 2,
-#   though KHR_mesh_quantization is listed as required. Of a sparse accessor without a bufferView
-#   all vertices come as 0. Neither raises an error or warns.
-# Why it matters: quantised meshes and sparse morph targets are of these kinds; trimesh is no reference for
-#   testing a loader of one's own.
+# Expected: values of an accessor with `normalized` are divided by their type's largest number. A sparse
+#   accessor without a bufferView is zeros, overwritten by its own values. A file that cannot be read is
+#   refused.
+# Seen: a triangle of normalised 16-bit integers under a node of scale 2 has sides of 65,534, not 2. Of a
+#   sparse accessor without a bufferView every vertex is 0. Neither raises an error or warns.
+# Why it matters: quantised meshes and sparse morph targets are of these kinds. trimesh is no reference when
+#   a loader is tested.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 pip_install python3 trimesh==5.2.0 numpy==2.4.6
 cat >"$work/load.py" <<'PY'
@@ -59,7 +60,8 @@ where = np.array([1, 2], np.uint16)
 values = np.array([[1, 0, 0], [0, 1, 0]], np.float32)
 print("sparse =", load(
     {"componentType": 5126, "min": [0, 0, 0], "max": [1, 1, 0],
-     "sparse": {"count": 2, "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 2}}},
+     "sparse": {
+         "count": 2, "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 2}}},
     [where.tobytes(), values.tobytes()]))
 PY
 observe "$python" "$work/load.py"

@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# USD computes the extent of Catmull-Rom hair from its control points; the curve leaves that box.
+# USD computes the extent of Catmull-Rom hair from its control points, and the curve leaves that box.
 #
 # Versions: usd-core 26.11.
-# Expected: the extent that ComputeExtentFromPlugins gives for BasisCurves, and a BBoxCache uses, holds the curve.
-# Seen: it is the box of the control points, widened by half of the widths, for every basis. Bézier and B-spline
-#   curves stay inside; a Catmull-Rom curve through four corners of a unit square swings out by 0.125.
-# Why it matters: hair that Blender writes is Catmull-Rom. A renderer that culls, splits or builds its
-#   tree by the extent cuts the outermost bends off.
+# Expected: the extent that ComputeExtentFromPlugins gives for BasisCurves, and that BBoxCache uses, holds
+#   the curve.
+# Seen: it is the box of the control points, whatever the basis. Bézier and B-spline curves stay inside. A
+#   Catmull-Rom curve through four corners of a unit square swings out by 0.125.
+# Why it matters: Blender writes hair as Catmull-Rom. A renderer that culls or builds its tree by this
+#   extent cuts off the outermost bends.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 pip_install python3 usd-core==26.11 numpy==2.4.6
 cat >"$work/extent.py" <<'PY'
@@ -34,7 +36,8 @@ for basis, weights in BASIS.items():
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     bound = cache.ComputeWorldBound(stage.GetPrimAtPath("/hair")).GetRange()
     curve = np.stack([t**3, t**2, t, t**0], 1) @ weights @ points
-    print(f"{basis} = extent to {high[1]:g}, bound to {bound.GetMax()[1]:g}, curve to {curve[:, 1].max():.3f}")
+    reach = curve[:, 1].max()
+    print(f"{basis} = extent to {high[1]:g}, bound to {bound.GetMax()[1]:g}, curve to {reach:.3f}")
 PY
 observe "$python" "$work/extent.py"
 expect "catmullRom, y" "$(seen catmullRom)" "extent to 1, bound to 1, curve to 1.125"

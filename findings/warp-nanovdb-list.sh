@@ -2,13 +2,14 @@
 # A NanoVDB file saved by Warp lists its grid with no voxels and an empty box.
 #
 # Versions: warp-lang 1.19.0 (on the CPU), NanoVDB tools 10.0.1 (Debian 12).
-# Expected: the record before a grid in a .nvdb file repeats the grid's count of voxels and its box in index space,
-#   so that a reader can choose grids and allocate before it reads them; save_to_nvdb fills it.
-# Seen: of 4096 voxels from (0, 0, 0) to (15, 15, 15) the record tells 0 voxels and a box from 0 to 0; so does
-#   nanovdb_print, which reads the records alone. The grid behind it is whole: converted to OpenVDB it
-#   has all voxels and the true box, and the record that nanovdb_convert writes is right.
-# Why it matters: a loader that skips grids without voxels, or takes bounds for its camera and its acceleration
-#   structure from the records, shows nothing.
+# Expected: the record in front of a grid in a .nvdb file repeats the grid's voxel count and its box in
+#   index space, so that a reader can choose grids and allocate before it reads them.
+# Seen: of 4096 voxels from (0, 0, 0) to (15, 15, 15) the record tells 0 voxels and a box from 0 to 0; so
+#   does nanovdb_print. The grid behind it is whole: after two conversions by nanovdb_convert the record is
+#   right.
+# Why it matters: a loader that skips empty grids, or takes the bounds for its camera or acceleration
+#   structure from the record, shows nothing.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 needs nanovdb_convert nanovdb_print
 debian libnanovdb-tools 10.0.1
@@ -43,7 +44,8 @@ nanovdb_print -v "$work/warp.nvdb" | sed -n '/^# *Name/,/^$/p'
 nanovdb_convert --force "$work/warp.nvdb" "$work/warp.vdb"
 nanovdb_convert --force "$work/warp.vdb" "$work/again.nvdb"
 observe "$python" "$work/list.py" again "$work/again.nvdb"
-printed=$(nanovdb_print -v "$work/warp.nvdb" | awk '/ float /{print $(NF - 5) " voxels, " $(NF - 4), $(NF - 3), $(NF - 2), $(NF - 1), $NF}')
+printed=$(nanovdb_print -v "$work/warp.nvdb" |
+    sed -nE 's/^.* float .*\) +([0-9]+) +([0-9]+ x [0-9]+ x [0-9]+) *$/\1 voxels, \2/p')
 expect "voxels of the grid" "$(seen grid)" 4096
 expect "voxels and box of the record" "$(seen record)" "0 voxels, 0 0 0 0 0 0"
 expect "voxels and resolution by nanovdb_print" "$printed" "0 voxels, 1 x 1 x 1"

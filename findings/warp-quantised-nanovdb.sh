@@ -2,11 +2,13 @@
 # Warp loads quantised NanoVDB volumes without an error and samples them as 0.
 #
 # Versions: warp-lang 1.19.0 (on the CPU), NanoVDB tools 10.0.1 (Debian 12).
-# Expected: a grid of the type Fp4, Fp8, Fp16 or FpN is decoded by the sampling functions for floats, or refused
+# Expected: a grid of type Fp4, Fp8, Fp16 or FpN is decoded by the sampling functions for floats, or refused
 #   when it is loaded.
-# Seen: load_from_nvdb takes the file, counts its voxels and names its type ("Float8"); only `dtype` is None.
-#   volume_sample_f and volume_lookup_f return 0 everywhere. The float grid that it was made from is right.
-# Why it matters: a cache that was quantised to fit the GPU's memory renders as empty space, and nothing says so.
+# Seen: load_from_nvdb takes the file, counts its voxels and names its type ("Float8"). volume_sample_f and
+#   volume_lookup_f return 0 everywhere. The float grid that it was made from is sampled correctly.
+# Why it matters: a cache that was quantised to fit the GPU's memory renders as empty space, and nothing
+#   says so.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 needs nanovdb_convert
 debian libnanovdb-tools 10.0.1

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# naga refuses a function that ends with a loop left only by `return`, and statements behind a `return`.
+# naga refuses a function that ends with a loop left only by `return`, or with code after a `return`.
 #
 # Versions: naga 30.0.1, webgpu 0.6.2 of npm (Tint).
-# Expected: WGSL lets a function end so where control cannot reach its end: a `loop` without a `break` and a
-#   `return` followed by more are valid. Tint takes both, the second with a warning.
-# Seen: naga takes the missing value for a `return` without one: "The `return` expression None does not match
-#   the declared return type". An `if` and a `switch` that return on all ways it takes.
-# Why it matters: walks along a ray are such loops. A `return` put in front of the rest, to see one value while
-#   searching for a fault, stops the shader from compiling.
+# Expected: WGSL only asks for a `return` where control can reach the end of a function. A `loop` without a
+#   `break`, and a `return` followed by more statements, are valid.
+# Seen: naga refuses both: "The `return` expression None does not match the declared return type". It takes
+#   an `if` or a `switch` in which every branch returns. Tint takes all of them.
+# Why it matters: a walk along a ray is such a loop. A `return` put in front of the rest of a function, to
+#   look at one value, stops the shader from compiling.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/wgsl.bash"
 wgsl_compilers

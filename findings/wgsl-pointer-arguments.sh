@@ -2,13 +2,14 @@
 # naga refuses functions that take pointers to uniform, storage or workgroup variables; Tint takes them.
 #
 # Versions: naga 30.0.1, webgpu 0.6.2 of npm (Tint).
-# Expected: WGSL has a language extension of its own for this, unrestricted_pointer_parameters, which needs
-#   no `requires`, so a shader that a browser compiles also compiles in wgpu.
-# Seen: naga refuses the function itself, even uncalled, and refuses the line
-#   `requires unrestricted_pointer_parameters;` as not supported. A pointer to one element of an array of
-#   the function's own, from the same extension, it takes.
-# Why it matters: helpers that walk one of several buffers have to be written once for each buffer, or copy
-#   what they read; a shader written in a browser has to be rebuilt for wgpu.
+# Expected: a shader that a browser compiles also compiles in wgpu. This is a WGSL language extension,
+#   unrestricted_pointer_parameters, which Tint offers without a `requires`.
+# Seen: naga refuses the function itself, even if it is not called, and also the line `requires
+#   unrestricted_pointer_parameters;`. A pointer to one element of a function's own array, which belongs to
+#   the same extension, it takes.
+# Why it matters: a helper that reads one of several buffers has to be written once for each buffer, or has
+#   to copy what it reads.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/wgsl.bash"
 wgsl_compilers

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# naga takes derivatives and barriers in non-uniform branches, and aliased pointers; Tint refuses all three.
+# naga takes derivatives and barriers in non-uniform branches, and aliased pointers; Tint refuses them.
 #
 # Versions: naga 30.0.1, webgpu 0.6.2 of npm (Tint).
-# Expected: WGSL makes all three an error when the shader is created, so naga with all of its validation flags
-#   finds them as Tint does.
-# Seen: naga takes textureSample and dpdx in a branch that depends on an interpolated input, workgroupBarrier in
-#   a branch that depends on the invocation's index, and a function called with the same pointer twice that
-#   writes through one and reads through the other. Tint refuses each.
-# Why it matters: shaders that pass every test of a wgpu program fail on a page in Chromium. Two compilers must
-#   see a shader that is to run in both.
+# Expected: WGSL makes all of them errors at shader creation, so naga finds them when all of its validation
+#   flags are set.
+# Seen: naga takes textureSample and dpdx in a branch that depends on an interpolated input,
+#   workgroupBarrier in a branch that depends on the invocation's index, and a call that passes one pointer
+#   twice, to be written and to be read. Tint refuses each.
+# Why it matters: a shader that passes every test of a wgpu program fails on a page in Chromium. A shader
+#   for both has to be compiled by both.
+set -euo pipefail
 source "$(dirname -- "$0")/lib/common.bash"
 source "$(dirname -- "$0")/lib/wgsl.bash"
 wgsl_compilers

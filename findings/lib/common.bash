@@ -1,9 +1,10 @@
-# Read by every script of this folder: a temporary folder that goes at the end, pinned installations, verdicts.
+# Read by every script of this folder: a temporary folder that is removed at the end, pinned installations,
+# verdicts.
 # shellcheck shell=bash disable=SC2034
-set -euo pipefail
+
 # Short: a path of a socket in it has at most 107 bytes.
 work=$(mktemp -d /tmp/finding.XXXXXX)
-# Commands to run before the folder goes, the last one first.
+# Commands to run before the folder is removed, the last one first.
 leaving=()
 leave() {
     local code=$? i
@@ -43,19 +44,23 @@ pip_install() {
     local with=$1
     shift
     needs "$with"
-    "$with" -m venv "$work/venv"
-    "$work/venv/bin/pip" install --quiet --disable-pip-version-check "$@"
+    "$with" -m venv "$work/venv" || cannot "$with has no venv (Debian: python3-venv)"
+    "$work/venv/bin/pip" install --quiet --disable-pip-version-check "$@" || cannot "pip did not install $*"
     python=$work/venv/bin/python
     say "version: $* ($("$python" --version))"
+}
+cargo_head() {
+    printf '%s\n' '[package]' 'name = "finding"' 'version = "0.0.0"' 'edition = "2024"' '' '[dependencies]'
 }
 # The dependencies of a crate whose src/main.rs is stdin; it is built as `$work/crate/target/debug/finding`.
 cargo_build() {
     needs cargo cc
     mkdir -p "$work/crate/src"
     cat >"$work/crate/src/main.rs"
-    printf '[package]\nname = "finding"\nversion = "0.0.0"\nedition = "2024"\n\n[dependencies]\n' >"$work/crate/Cargo.toml"
+    cargo_head >"$work/crate/Cargo.toml"
     printf '%s\n' "$@" >>"$work/crate/Cargo.toml"
-    cargo build --quiet --manifest-path "$work/crate/Cargo.toml" --target-dir "$work/crate/target"
+    cargo build --quiet --manifest-path "$work/crate/Cargo.toml" --target-dir "$work/crate/target" ||
+        cannot "cargo did not build with $*"
     say "version: $*"
 }
 # An interpreter of Python 3.MINOR is `$interpreter`.
@@ -74,16 +79,18 @@ cargo_source() {
     needs cargo
     mkdir -p "$work/source/src"
     touch "$work/source/src/lib.rs"
-    printf '[package]\nname = "finding"\nversion = "0.0.0"\n\n[dependencies]\n%s = { version = "=%s", default-features = false }\n' \
-        "$1" "$2" >"$work/source/Cargo.toml"
-    cargo vendor --quiet --versioned-dirs --manifest-path "$work/source/Cargo.toml" "$work/vendor" >/dev/null
+    cargo_head >"$work/source/Cargo.toml"
+    printf '%s = { version = "=%s", default-features = false }\n' "$1" "$2" >>"$work/source/Cargo.toml"
+    cargo vendor --quiet --versioned-dirs --manifest-path "$work/source/Cargo.toml" "$work/vendor" \
+        >/dev/null || cannot "cargo did not fetch $1 $2"
     crate=$work/vendor/$1-$2
     say "version: $1 $2"
 }
 # Packages of npm in `$work/node`, without their installation scripts.
 npm_install() {
     needs node npm
-    npm install --silent --no-audit --no-fund --ignore-scripts --prefix "$work/node" "$@"
+    npm install --silent --no-audit --no-fund --ignore-scripts --prefix "$work/node" "$@" ||
+        cannot "npm did not install $*"
     say "version: $* (node $(node --version))"
 }
 # Vulkan has lavapipe alone.

@@ -21,7 +21,7 @@ await() {
     done
     say "after $seconds s still not so: $what" >&2
     tail -n 5 "$work"/*.log >&2 || true
-    exit 2
+    exit 1
 }
 slurm_stop() {
     local i
