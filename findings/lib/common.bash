@@ -4,6 +4,9 @@
 
 # Short: a path of a socket in it has at most 107 bytes.
 work=$(mktemp -d /tmp/finding.XXXXXX)
+# What the software under trial leaves behind goes with it.
+mkdir "$work/tmp"
+export TMPDIR=$work/tmp
 # Commands to run before the folder is removed, the last one first.
 leaving=()
 leave() {
