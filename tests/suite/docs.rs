@@ -1,6 +1,6 @@
 //! The README and docs/parameters.md say what is so: tables come from the code, files and links exist.
 //!
-//! `TAKI_BLESS=1 tests/run readme` writes the generated parts anew.
+//! `TAKI_BLESS=1 tests/run docs` writes the generated parts anew.
 
 use taki::scene::{GROUPS, Kind, PARAMS, Param, parameters_markdown, presets};
 
@@ -23,7 +23,7 @@ fn the_parameter_table_is_the_codes_own() {
         let new = format!("{}{}{}", &text[..from], parameters_markdown(), &text[to..]);
         std::fs::write(name, new).expect("written");
     } else {
-        assert_eq!(&text[from..to], parameters_markdown(), "TAKI_BLESS=1 tests/run readme writes it anew");
+        assert_eq!(&text[from..to], parameters_markdown(), "TAKI_BLESS=1 tests/run docs writes it anew");
     }
 }
 
@@ -269,4 +269,47 @@ fn every_subcommand_and_option_of_the_help_is_in_the_documentation() {
             assert!(option == "--help" || names_option(&text, option), "{command:?} {option}");
         }
     }
+}
+
+#[test]
+fn the_map_of_the_readme_is_that_of_the_crates_front_page() {
+    let map = std::fs::read_to_string(path("src/map.md")).expect("the map");
+    let text = readme();
+    assert_eq!(between(&text, "<!-- map -->\n", '<').next(), Some(map.as_str()));
+    let files = map.split('`').skip(1).step_by(2).collect::<Vec<_>>();
+    assert!(files.len() > 40, "{files:?}");
+    for file in files {
+        assert!(std::path::Path::new(&path(file)).exists(), "the map names {file}");
+    }
+}
+
+/// Files of sources, shaders and docs, with their text.
+fn lines_of_the_house() -> Vec<(String, String)> {
+    let mut folders: Vec<_> = ["src", "shaders", "docs"].map(|name| path(name).into()).to_vec();
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir::<std::path::PathBuf>(folder).expect("a folder") {
+            let at = entry.expect("an entry").path();
+            if at.is_dir() {
+                folders.push(at);
+            } else if at.extension().is_some_and(|e| e == "rs" || e == "wgsl" || e == "md") {
+                found.push((at.display().to_string(), std::fs::read_to_string(&at).expect("a text")));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn no_line_is_wider_than_110_columns() {
+    let allowed = |line: &str| line.trim_start().starts_with('|') || line.contains("](") || line.contains("://");
+    let files = lines_of_the_house();
+    assert!(files.len() > 200, "{} files", files.len());
+    let mut wide = Vec::new();
+    for (file, text) in &files {
+        for (i, line) in text.lines().enumerate().filter(|(_, line)| line.chars().count() > 110 && !allowed(line)) {
+            wide.push(format!("{file}:{}: {} columns", i + 1, line.chars().count()));
+        }
+    }
+    assert!(wide.is_empty(), "{}", wide.join("\n"));
 }
