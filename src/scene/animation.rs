@@ -244,7 +244,7 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
     for (frame, value) in frames.iter().zip(&series) {
         scratch.set(&key, &raw(&key, value), &Place(format!("{section}.values at frame {frame}")))?;
     }
-    let interpolation = Interpolation::of(&values.text(&format!("{section}.interpolation")));
+    let interpolation = values.choice(&format!("{section}.interpolation"), Interpolation::from_word);
     // Copies of the volume join: a whole length on, the flow is where it was.
     let closes = |first: &[f64], last: &[f64]| match key.as_str() {
         "volume.flow" => (last[0] - first[0]).fract() == 0.0,

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::util::words::words;
+
 /// Pieces of a path's segment whose lengths are added up: a curve between two points of a path bends by less
 /// than half a turn, of which a chord this short misses less than a ten thousandth.
 const PIECES: usize = 64;
@@ -17,16 +19,7 @@ pub enum Interpolation {
     Hold,
 }
 
-impl Interpolation {
-    /// From the parameter's word.
-    pub fn of(word: &str) -> Self {
-        match word {
-            "smooth" => Interpolation::Smooth,
-            "hold" => Interpolation::Hold,
-            _ => Interpolation::Linear,
-        }
-    }
-}
+words! { Interpolation { Linear => "linear", Smooth => "smooth", Hold => "hold" } }
 
 /// Values at frames, and what is between.
 #[derive(Clone, Debug, PartialEq)]

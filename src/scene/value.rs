@@ -204,6 +204,16 @@ impl Values {
         }
     }
 
+    /// Returns the variant that the value of a choice names. `from_word` is that of the enum whose words the
+    /// table lists.
+    ///
+    /// # Panics
+    /// If `from_word` does not know the word.
+    pub fn choice<T>(&self, key: &str, from_word: impl Fn(&str) -> Option<T>) -> T {
+        let word = self.text(key);
+        from_word(&word).unwrap_or_else(|| panic!("{key} has no choice {word}"))
+    }
+
     /// A point, direction or colour.
     pub fn triple(&self, key: &str) -> glam::Vec3 {
         match self.get(key) {
