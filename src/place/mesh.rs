@@ -41,8 +41,8 @@ impl Mesh {
     }
 }
 
-/// Version of the mesh's builder: part of the key of meshes on disk. Raise it with every change of the vertices that a
-/// [`Ground`] gives; a test compares their checksums.
+/// Version of the mesh's builder: part of the key of meshes on disk. Raise it with every change of the
+/// vertices that a [`Ground`] gives; a test compares their checksums.
 pub const BUILDER_VERSION: u32 = 1;
 
 /// All that the opaque mesh of a scene follows from: equal grounds have equal meshes.

@@ -1,4 +1,5 @@
-//! Pools: level water that falls end in, as part of the opaque mesh. What it looks like is in [`crate::engine::pool_surface`].
+//! Pools: level water that falls end in, as part of the opaque mesh. What it looks like is in
+//! [`crate::engine::pool_surface`].
 
 use glam::Vec3;
 
@@ -7,7 +8,8 @@ use super::rock::wet::nearest_on_triangle;
 
 /// Most pools of a scene.
 pub const MAX_POOLS: usize = 8;
-/// Squares on a side of the mesh of a pool, which holds depth and foam; waves are finer, and made for each pixel.
+/// Squares on a side of the mesh of a pool, which holds depth and foam; waves are finer, and made for each
+/// pixel.
 const SQUARES: usize = 128;
 /// Foam along the shore, where water is shallower than this; metres.
 const SHORE: f32 = 0.05;

@@ -1,9 +1,10 @@
 //! The opaque mesh as tiles, of whose vertices a picture takes as few as it can do with.
 //!
-//! Rocks and pools are grids of squares, cut into tiles. Of a tile every 1st, 2nd, 4th … vertex is drawn (de Boer, "Fast
-//! Terrain Rendering Using Geometrical MipMapping", 2000), and what is shaded comes from all of them: a sample finds its
-//! place on the grid, and there mixes the three nearest vertices as if all were drawn. So a coarser tile costs the outline
-//! and the depth some exactness, and normals, albedo and shadows none.
+//! Rocks and pools are grids of squares, cut into tiles. Of a tile every 1st, 2nd, 4th … vertex is drawn (de
+//! Boer, "Fast Terrain Rendering Using Geometrical MipMapping", 2000), and what is shaded comes from all of
+//! them: a sample finds its place on the grid, and there mixes the three nearest vertices as if all were
+//! drawn. So a coarser tile costs the outline and the depth some exactness, and normals, albedo and shadows
+//! none.
 
 use std::sync::LazyLock;
 
@@ -12,8 +13,8 @@ use glam::{Vec2, Vec3};
 use super::Vertex;
 use crate::picture::{Camera, Image};
 
-/// Squares on a side of a tile, where its grid has as many: twice as many would be drawn that lie out of view, half as many
-/// are drawn one by one for long.
+/// Squares on a side of a tile, where its grid has as many: twice as many would be drawn that lie out of
+/// view, half as many are drawn one by one for long.
 pub const SIDE: u32 = 16;
 /// Steps: 1, 2, 4, 8 and 16.
 const STEPS: usize = 5;
@@ -37,8 +38,8 @@ pub struct Tile {
     pub high: Vec3,
     /// Unit normal of the grid's patch.
     out: Vec3,
-    /// How far vertices lie from what is drawn in their place with each step, along `out` and across it: the root of the mean
-    /// square, or a third of the most where that is more; metres.
+    /// How far vertices lie from what is drawn in their place with each step, along `out` and across it: the
+    /// root of the mean square, or a third of the most where that is more; metres.
     lost: [Vec2; STEPS],
 }
 
@@ -82,11 +83,12 @@ pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile>
 
 /// The step of each tile that an image takes.
 ///
-/// A vertex that is left out lies about `lost` from the triangle in its place. With θ between the patch's normal and the
-/// view, what is seen of that at most is lost · (sin θ, 1); at a depth z and a distance r it moves a point of the
-/// picture, whose focal length is f pixels, by no more than f·r/z² times as much. That is at most `image.rock_error` of the distance
-/// between samples, 1/√samples pixels: what moves less falls between them. Tiles beside each other differ by one step at
-/// most. Windows and samples of one image take the same.
+/// A vertex that is left out lies about `lost` from the triangle in its place. With θ between the patch's
+/// normal and the view, what is seen of that at most is lost · (sin θ, 1); at a depth z and a distance r it
+/// moves a point of the picture, whose focal length is f pixels, by no more than f·r/z² times as much. That
+/// is at most `image.rock_error` of the distance between samples, 1/√samples pixels: what moves less falls
+/// between them. Tiles beside each other differ by one step at most. Windows and samples of one image take
+/// the same.
 pub fn steps(tiles: &[Tile], camera: &Camera, image: &Image) -> Vec<u32> {
     let focal = 0.5 * f64::from(image.height) / f64::from(camera.tan_half_fov);
     let most = f64::from(image.rock_error) / (f64::from(image.samples).sqrt() * focal);
@@ -112,8 +114,8 @@ pub fn coarser(tiles: &[Tile], steps: &[u32], tile: usize) -> [bool; 4] {
     tiles[tile].neighbours.map(|other| other.is_some_and(|other| steps[other as usize] > steps[tile]))
 }
 
-/// A tile's triangles, as numbers of corners: [`place`] tells where they are. At an edge with a coarser tile every
-/// other vertex moves to the one before it, so that both have the same edges there.
+/// A tile's triangles, as numbers of corners: [`place`] tells where they are. At an edge with a coarser tile
+/// every other vertex moves to the one before it, so that both have the same edges there.
 pub fn triangles(side: u32, step: u32, coarser: [bool; 4]) -> &'static [u16] {
     list(list_number(side, step, coarser))
 }
@@ -181,7 +183,8 @@ impl Tile {
         self.first + y * self.pitch + x
     }
 
-    /// The three vertices around a place in the tile, in squares, and how much each counts. Twin: `opaque_point`.
+    /// The three vertices around a place in the tile, in squares, and how much each counts. Twin:
+    /// `opaque_point`.
     pub fn around(&self, place: Vec2) -> ([u32; 3], Vec3) {
         let cell = place.floor().clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
         let f = (place - cell).clamp(Vec2::ZERO, Vec2::ONE);
@@ -239,7 +242,8 @@ impl Tile {
             let (r, along) = (to_corner.length(), to_corner.dot(self.out.as_dvec3()));
             depth = depth.min(to_corner.dot(camera.forward.as_dvec3()));
             distance = distance.max(r);
-            // Directions that make at most one angle with the normal are a cone, which holds the box if it holds its corners.
+            // Directions that make at most one angle with the normal are a cone, which holds the box if it
+            // holds its corners.
             sin2 = sin2.max(1.0 - (along / r) * (along / r));
             (front, back) = (front || along >= 0.0, back || along <= 0.0);
         }

@@ -12,7 +12,8 @@ pub struct Vertex {
     pub albedo: [f32; 3],
     /// Share of the surroundings' light that does not arrive, 0 to 1.
     pub occlusion: f32,
-    /// Share of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light) that does not arrive, 0 to 1.
+    /// Share of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light) that does not arrive,
+    /// 0 to 1.
     pub shadow: f32,
     /// How much of a film of water there is, 0 to 1.
     pub wet: f32,

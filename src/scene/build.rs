@@ -55,8 +55,8 @@ pub(super) fn water(v: &Values) -> WaterSpec {
     }
 }
 
-/// Returns the fine structure of the water. Lengths are fractions of the volume, so a look survives a change of
-/// resolution.
+/// Returns the fine structure of the water. Lengths are fractions of the volume, so a look survives a change
+/// of resolution.
 fn structure(v: &Values) -> Structure {
     let bundles = v.count("curves.bundles");
     // Without bundles their parameters are 0, so that they do not tell equal volumes apart.
@@ -82,13 +82,14 @@ pub(super) fn volume_file(v: &Values, folder: Option<&Path>, limits: &Limits) ->
     }
 }
 
-/// Returns the storage that the scene asks for. Coarse levels are made from all cells, so with them sparse storage
-/// is refused and automatic storage is dense.
+/// Returns the storage that the scene asks for. Coarse levels are made from all cells, so with them sparse
+/// storage is refused and automatic storage is dense.
 pub(super) fn asked_storage(v: &Values) -> Result<StorageChoice> {
     let pyramid = v.choice("trace.filter", Prefilter::from_word) == Prefilter::Pyramid;
     match v.choice("volume.storage", StorageChoice::from_word) {
         StorageChoice::Sparse if pyramid => Err(Error::input(
-            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": coarse levels are made from all cells",
+            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": \
+             coarse levels are made from all cells",
             "set trace.filter=none, or volume.storage=dense",
         )),
         StorageChoice::Auto if pyramid => Ok(StorageChoice::Dense),
@@ -185,8 +186,8 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
     Environment::new(source, settings, &limits.environments, limits.memory).map(Some)
 }
 
-/// Returns the scene's own lights and the `sun` of its environment. `others` is the number of directional lights
-/// that stand for the rest of the environment; they count towards [`MAX_LIGHTS`].
+/// Returns the scene's own lights and the `sun` of its environment. `others` is the number of directional
+/// lights that stand for the rest of the environment; they count towards [`MAX_LIGHTS`].
 pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     for name in v.names("lights") {
@@ -292,12 +293,12 @@ pub(super) fn scattering(v: &Values) -> Result<Scattering> {
     Ok(scattering)
 }
 
-/// Replaces the reference `key` by its full path. A reference that the scene does not have or does not use stays as
-/// it is.
+/// Replaces the reference `key` by its full path. A reference that the scene does not have or does not use
+/// stays as it is.
 ///
 /// # Errors
-/// [`Error::Input`] where the file does not exist, lies outside the scene's folder and `allowed`, or has a path that
-/// is not UTF-8.
+/// [`Error::Input`] where the file does not exist, lies outside the scene's folder and `allowed`, or has a
+/// path that is not UTF-8.
 pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<()> {
     let file = values.text(key);
     let unused = key == "environment.file"

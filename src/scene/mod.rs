@@ -39,8 +39,8 @@ use crate::volume::{
     kept_water, read_npz,
 };
 
-/// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with more
-/// lights even the smallest tile of a picture would run into the driver's timeout.
+/// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
+/// more lights even the smallest tile of a picture would run into the driver's timeout.
 pub const MAX_LIGHTS: usize = 4096;
 
 /// A complete, valid scene.
@@ -122,7 +122,8 @@ impl Default for Limits {
     }
 }
 
-/// Replaces an automatic exposure by `stops` added to `image.exposure`. Returns the resulting exposure, in stops.
+/// Replaces an automatic exposure by `stops` added to `image.exposure`. Returns the resulting exposure, in
+/// stops.
 fn expose(values: &mut Values, stops: f32) -> f32 {
     let exposure = (values.float("image.exposure") + stops).clamp(-32.0, 32.0);
     let place = Place("image.auto_exposure".into());
@@ -139,8 +140,8 @@ impl Scene {
     /// Reads a preset or file, applies the `--set`s in order and checks the result.
     ///
     /// # Errors
-    /// `Error::Usage` where a `--set` has no value. `Error::Io` where a file cannot be read. Otherwise those of
-    /// [`Scene::from_values`].
+    /// `Error::Usage` where a `--set` has no value. `Error::Io` where a file cannot be read. Otherwise those
+    /// of [`Scene::from_values`].
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
@@ -153,8 +154,8 @@ impl Scene {
     /// References resolve inside `folder`. Without a folder they are trusted.
     ///
     /// # Errors
-    /// `Error::Input` where values do not fit one another or a file is unusable, `Error::Memory` where the work
-    /// needs more than [`Limits::memory`].
+    /// `Error::Input` where values do not fit one another or a file is unusable, `Error::Memory` where the
+    /// work needs more than [`Limits::memory`].
     pub fn from_values(name: &str, values: Values, folder: Option<&Path>, limits: &Limits) -> Result<Scene> {
         let v = &values;
         let water = build::water(v);
@@ -254,7 +255,8 @@ impl Scene {
         REFERENCES.into_iter().zip(files).filter_map(|(key, file)| Some((key, file?))).collect()
     }
 
-    /// Returns the lights that shine on the volume: the scene's own, then those that stand for its environment.
+    /// Returns the lights that shine on the volume: the scene's own, then those that stand for its
+    /// environment.
     pub fn volume_lights(&self) -> Vec<Light> {
         self.lights.iter().chain(&self.environment_lights).copied().collect()
     }
@@ -311,7 +313,8 @@ impl Scene {
         self.ground().mesh()
     }
 
-    /// Returns the index in `lights` of the light whose shadows rock casts on rock: the brightest directional one.
+    /// Returns the index in `lights` of the light whose shadows rock casts on rock: the brightest directional
+    /// one.
     pub fn shadow_light(&self) -> Option<usize> {
         let bright = |light: &Light| match light {
             Light::Directional { intensity, .. } => Some(intensity.element_sum()),
@@ -328,7 +331,8 @@ impl Scene {
         if volume.is_sparse() && self.asked_storage == StorageChoice::Auto {
             let [nx, ny, nz] = volume.size;
             notes.push(format!(
-                "{} of the volume's {nx}×{ny}×{nz} cells are stored (sparse): all of them would not fit into memory",
+                "{} of the volume's {nx}×{ny}×{nz} cells are stored (sparse): \
+                 all of them would not fit into memory",
                 volume.cells.stored().len()
             ));
         }

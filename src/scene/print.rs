@@ -70,8 +70,8 @@ impl Scene {
         text
     }
 
-    /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed from
-    /// them (camera basis, unit vectors to lights, the opaque mesh with normals and albedo).
+    /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed
+    /// from them (camera basis, unit vectors to lights, the opaque mesh with normals and albedo).
     pub fn to_json(&self) -> Json {
         let mut root = Map::new();
         root.insert("taki".into(), json!(env!("CARGO_PKG_VERSION")));
@@ -191,8 +191,8 @@ fn numbered_list(object: Map<String, Json>) -> Json {
     numbered.into_iter().map(|(_, value)| value).collect()
 }
 
-/// Returns a name as a TOML key: bare where TOML allows that, otherwise a JSON string. TOML has the escapes of JSON
-/// but also requires one for U+007F.
+/// Returns a name as a TOML key: bare where TOML allows that, otherwise a JSON string. TOML has the escapes
+/// of JSON but also requires one for U+007F.
 fn quoted(name: &str) -> String {
     if name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
         name.into()

@@ -2,8 +2,8 @@
 
 /// Gives an enum without fields the words of its variants: `WORDS`, `word` and `from_word`.
 ///
-/// The first word is the parameter's default. `word` matches every variant, so a variant that has no word does
-/// not compile.
+/// The first word is the parameter's default. `word` matches every variant, so a variant that has no word
+/// does not compile.
 macro_rules! words {
     ($Enum:ident { $($Variant:ident => $word:literal),+ $(,)? }) => {
         impl $Enum {

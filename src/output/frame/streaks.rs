@@ -4,16 +4,16 @@ use serde::Serialize;
 
 use crate::util::window::Window;
 
-/// How streaky a part of a picture is, where the flow goes down the image: the mean absolute difference of the
-/// luminance of neighbours across the flow (in a row), and along it (in a column).
+/// How streaky a part of a picture is, where the flow goes down the image: the mean absolute difference of
+/// the luminance of neighbours across the flow (in a row), and along it (in a column).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Streaks {
     /// Of pixels side by side.
     pub across: f64,
     /// Of pixels one above the other.
     pub along: f64,
-    /// The first over the second: 1 for matter without a direction, large for long threads; none where nothing
-    /// changes along the flow.
+    /// The first over the second: 1 for matter without a direction, large for long threads; none where
+    /// nothing changes along the flow.
     pub ratio: Option<f64>,
 }
 
@@ -52,9 +52,9 @@ pub fn bands(part: Window, count: u32) -> Vec<Window> {
     (0..count).map(|i| Window { y: edge(i), height: edge(i + 1) - edge(i), ..part }).collect()
 }
 
-/// Flicker of a sequence: what is left of each pixel's luminance by the filter (−¼, ½, −¼) over three frames, its root
-/// of the mean square over pixels and time, over the mean luminance. A part that alternates by ±a has all of it left, one that swings by
-/// ω a frame sin²(ω/2), and steady change nothing.
+/// Flicker of a sequence: what is left of each pixel's luminance by the filter (−¼, ½, −¼) over three frames,
+/// its root of the mean square over pixels and time, over the mean luminance. A part that alternates by ±a
+/// has all of it left, one that swings by ω a frame sin²(ω/2), and steady change nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Flicker {
     last: Vec<Vec<f32>>,

@@ -203,8 +203,8 @@ impl Encoder {
             }
             std::thread::sleep(Duration::from_millis(5));
         };
-        // ffmpeg 5 ends with 0 where the disk is full just when it writes its last bytes, but says so: at this
-        // log level a word is an error.
+        // ffmpeg 5 ends with 0 where the disk is full just when it writes its last bytes, but says so: at
+        // this log level a word is an error.
         match self.last_line() {
             None if status.success() => Ok(()),
             line => Err(self.error(line.as_deref().unwrap_or(&status.to_string()))),

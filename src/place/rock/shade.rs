@@ -1,5 +1,5 @@
-//! What rock takes of the light of rock: depth maps seen along a direction (Williams 1978), looked up at every
-//! vertex. One towards the sun gives its shadow, many over the upper half of the sphere how much of the
+//! What rock takes of the light of rock: depth maps seen along a direction (Williams 1978), looked up at
+//! every vertex. One towards the sun gives its shadow, many over the upper half of the sphere how much of the
 //! surroundings a vertex does not see (Pharr and Green 2004).
 
 use std::f32::consts::PI;
@@ -174,9 +174,9 @@ impl DepthMap {
         }
     }
 
-    /// Share of the light that reaches a point of a surface with normal `n`: of the four cells around it, those
-    /// that nothing nearer to the light covers (Reeves, Salesin and Cook 1987). The point is taken two cells off
-    /// the surface, for a cell has one depth, and a surface aslant many.
+    /// Share of the light that reaches a point of a surface with normal `n`: of the four cells around it,
+    /// those that nothing nearer to the light covers (Reeves, Salesin and Cook 1987). The point is taken two
+    /// cells off the surface, for a cell has one depth, and a surface aslant many.
     fn lit(&self, point: Vec3, n: Vec3) -> f32 {
         let p = self.project(point + (n + self.to_light) * (1.5 * self.cell));
         let (x, y) = (p.x - 0.5, p.y - 0.5);

@@ -1,5 +1,5 @@
-//! Layers of rock: beds of uneven height, broken by joints into blocks that step back or stand out, with ledges
-//! where one bed ends and the next begins; in each bed thinner ones.
+//! Layers of rock: beds of uneven height, broken by joints into blocks that step back or stand out, with
+//! ledges where one bed ends and the next begins; in each bed thinner ones.
 
 use glam::Vec3;
 use rand::RngExt;

@@ -12,13 +12,13 @@ use crate::place::{Pool, Vertex};
 const RUN: f32 = 4.0;
 /// Share of light that a film sends back before it reaches the rock, n = 1.33, at normal incidence.
 const OUTSIDE: f32 = 0.02;
-/// Share of diffuse light that the film sends back to the rock: 1 − (1 − 0.066)/n², 0.066 being what water reflects
-/// of light from all sides (Lekner and Dorf 1988).
+/// Share of diffuse light that the film sends back to the rock: 1 − (1 − 0.066)/n², 0.066 being what water
+/// reflects of light from all sides (Lekner and Dorf 1988).
 const INSIDE: f32 = 0.474;
 
-/// Albedo of rock under a film of water, from that of dry rock: what comes through the film, is reflected, and gets
-/// out again after any number of reflections between the two (Ångström 1925; Lekner and Dorf 1988, without the
-/// smaller reflection of the rock itself against water).
+/// Albedo of rock under a film of water, from that of dry rock: what comes through the film, is reflected,
+/// and gets out again after any number of reflections between the two (Ångström 1925; Lekner and Dorf 1988,
+/// without the smaller reflection of the rock itself against water).
 pub fn wet_albedo(dry: Vec3) -> Vec3 {
     (1.0 - OUTSIDE) * (1.0 - INSIDE) * dry / (1.0 - INSIDE * dry.min(Vec3::ONE))
 }
@@ -67,7 +67,8 @@ pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[V
     }
 }
 
-/// Metres from the nearest source, those down from it divided by [`RUN`]; at least `reach` where it is that far.
+/// Metres from the nearest source, those down from it divided by [`RUN`]; at least `reach` where it is that
+/// far.
 fn distance(sources: &[Source], point: Vec3, reach: f32) -> f32 {
     let mut best = reach;
     for source in sources {
@@ -89,7 +90,8 @@ fn distance(sources: &[Source], point: Vec3, reach: f32) -> f32 {
     best
 }
 
-/// The point of a triangle nearest to `p` (Ericson 2005, Real-Time Collision Detection, 5.1.5: by Voronoi regions).
+/// The point of a triangle nearest to `p` (Ericson 2005, Real-Time Collision Detection, 5.1.5: by Voronoi
+/// regions).
 pub fn nearest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     let (ab, ac) = (b - a, c - a);
     let n = ab.cross(ac);
