@@ -44,8 +44,8 @@ impl Animation {
     /// Reads a preset or file, applies the `--set`s in order, and checks the motion.
     ///
     /// # Errors
-    /// [`Error::Usage`] where a `--set` has no value, [`Error::Io`] where a file cannot be read, and those of
-    /// [`Animation::new`].
+    /// [`Error::Usage`] where a `--set` has no value, [`Error::Io`] where a file cannot be read, and the
+    /// errors of [`Animation::new`].
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
@@ -149,7 +149,7 @@ impl Animation {
     /// Returns the animation with other values for some keys.
     ///
     /// # Errors
-    /// Those of [`Values::set`] and [`Animation::new`].
+    /// The errors of [`Values::set`] and [`Animation::new`].
     pub fn with(&self, changes: &[(String, Raw, Place)]) -> Result<Animation> {
         let mut values = self.values.clone();
         changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
@@ -166,7 +166,7 @@ impl Animation {
     /// the same picture.
     ///
     /// # Errors
-    /// Those of [`Scene::from_values`]; from frame 1 on the message names the frame.
+    /// The errors of [`Scene::from_values`]; from frame 1 on the message names the frame.
     pub fn at(&self, frame: u32) -> Result<Scene> {
         let mut values = self.values.clone();
         values.clear_under("animate");

@@ -224,7 +224,7 @@ impl Scene {
     /// Returns [`Scene::volume`], from the cache where it is stored there.
     ///
     /// # Errors
-    /// Those of [`Scene::volume`].
+    /// The errors of [`Scene::volume`].
     pub fn kept_volume(
         &self,
         cache: Option<&Cache>,

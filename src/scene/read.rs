@@ -288,7 +288,7 @@ pub fn set_by_hand(sets: &[String], reference: &str) -> bool {
 /// them may be trusted: once a `--set` gives a reference, those of the scene itself are resolved here.
 ///
 /// # Errors
-/// Those of [`apply_set`] and [`build::resolve`].
+/// The errors of [`apply_set`] and [`build::resolve`].
 pub fn apply_sets(
     values: &mut Values,
     sets: &[String],

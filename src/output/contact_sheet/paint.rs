@@ -17,7 +17,7 @@ const FRAME: [u8; 3] = [50, 53, 58];
 /// Draws a sheet. `cell` returns the picture of a row and column, or `None` where there is none.
 ///
 /// # Errors
-/// Those of [`Sheet::layout`] and of `cell`.
+/// The errors of [`Sheet::layout`] and of `cell`.
 pub fn draw(
     sheet: &Sheet,
     mut cell: impl FnMut(usize, usize) -> Result<Option<RgbImage>>,
@@ -131,7 +131,7 @@ mod tests {
         let checks = RgbImage::from_fn(64, 64, |x, y| Rgb([if (x + y) % 2 == 0 { 255 } else { 0 }; 3]));
         let small = shrink(checks, Rect { x: 0, y: 0, w: 16, h: 16 });
         assert_eq!(small.dimensions(), (16, 16));
-        // Half the light is byte 188, not 128.
+        // Half the light encodes to byte 188, not 128.
         assert!(small.pixels().all(|p| p.0[0].abs_diff(188) <= 2));
     }
 

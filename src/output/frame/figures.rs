@@ -142,7 +142,7 @@ fn fixed(value: f32) -> i128 {
 /// in constant memory.
 ///
 /// # Errors
-/// Those of [`super::verify`].
+/// The errors of [`super::verify`].
 pub fn figures_of(path: &Path) -> Result<KnownFigures> {
     match Kind::of(path)? {
         Kind::Png => {

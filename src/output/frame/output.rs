@@ -35,7 +35,7 @@ impl Output {
     /// Opens a temporary file as [`Output::create`] does, but leaves other files in the folder alone.
     ///
     /// # Errors
-    /// Those of [`Output::create`].
+    /// The errors of [`Output::create`].
     pub fn open(path: &Path) -> Result<Output> {
         let fail =
             |why: String, fix: &str| Error::CannotCreate { path: path.to_owned(), why, fix: fix.into() };

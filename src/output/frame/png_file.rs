@@ -323,7 +323,7 @@ impl PngRows {
     /// Reads the remaining rows.
     ///
     /// # Errors
-    /// Those of [`PngRows::read_row`].
+    /// The errors of [`PngRows::read_row`].
     pub fn skip_rows(&mut self) -> Result<()> {
         let mut row = vec![0; 3 * self.window.width as usize];
         (0..self.rows_left).try_for_each(|_| self.read_row(&mut row))

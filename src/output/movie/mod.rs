@@ -143,7 +143,7 @@ impl Movie {
     /// PATH.
     ///
     /// # Errors
-    /// Those of [`Movie::create`].
+    /// The errors of [`Movie::create`].
     pub fn create_with(path: &Path, kind: MovieKind, options: &MovieOptions, ffmpeg: &Path) -> Result<Movie> {
         check(path, kind, options)?;
         let output = Output::create(path)?;
@@ -191,7 +191,7 @@ impl Movie {
     /// here, and a video encoder still has many frames to encode. The stage is `encoding`.
     ///
     /// # Errors
-    /// Those of [`Movie::finish`] and of `monitor`.
+    /// The errors of [`Movie::finish`] and of `monitor`.
     pub fn finish_watched(self, monitor: &dyn Monitor) -> Result<()> {
         let Movie { writer, path, options, pushed } = self;
         if pushed != options.frames {

@@ -1,4 +1,4 @@
-//! What the water is in: rock, pools, camera and surroundings.
+//! Rock, pools, camera and surroundings.
 
 use super::Cost::*;
 use super::Kind::*;

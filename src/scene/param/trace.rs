@@ -1,4 +1,4 @@
-//! The quads the volume is mapped onto, and the walk through it.
+//! Materials, the quads that the volume is mapped onto, and the walk through it.
 
 use super::Cost::*;
 use super::Kind::*;
