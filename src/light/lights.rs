@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::util::words::words;
+
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
@@ -28,6 +30,30 @@ pub enum Light {
         /// Where it shines.
         cone: Cone,
     },
+}
+
+/// Kind of a [`Light`], without its position, direction and intensity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightKind {
+    /// [`Light::Directional`].
+    Directional,
+    /// [`Light::Point`].
+    Point,
+    /// [`Light::Spot`].
+    Spot,
+}
+
+words! { LightKind { Directional => "directional", Point => "point", Spot => "spot" } }
+
+impl Light {
+    /// Returns the kind alone.
+    pub fn kind(&self) -> LightKind {
+        match self {
+            Light::Directional { .. } => LightKind::Directional,
+            Light::Point { .. } => LightKind::Point,
+            Light::Spot { .. } => LightKind::Spot,
+        }
+    }
 }
 
 /// The cone of a spot light. With c the cosine of the angle between the beam and the way to a point, and

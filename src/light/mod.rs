@@ -11,5 +11,5 @@ mod settings;
 pub mod strand;
 pub mod visibility;
 
-pub use lights::{Background, Cone, Light};
-pub use settings::{AngleFrame, Reflection, Scattering, Visibility};
+pub use lights::{Background, Cone, Light, LightKind};
+pub use settings::{AngleFrame, Reflection, ReflectionKind, Scattering, Visibility};

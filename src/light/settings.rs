@@ -1,6 +1,7 @@
 //! §5 How light is worked out.
 
 use super::strand::StrandParams;
+use crate::util::words::words;
 
 /// Where the fibre model's angles are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +11,8 @@ pub enum AngleFrame {
     /// v against J⁻¹l and J⁻¹e, normalised: the paper's.
     Texture,
 }
+
+words! { AngleFrame { World => "world", Texture => "texture" } }
 
 /// V_i(k).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +25,8 @@ pub enum Visibility {
     Cached,
 }
 
+words! { Visibility { March => "march", Cached => "cached", None => "none" } }
+
 /// How a cell reflects light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
@@ -29,6 +34,27 @@ pub enum Reflection {
     KajiyaKay,
     /// Strands of water and air.
     Strand(StrandParams),
+}
+
+/// Model of a [`Reflection`], without its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReflectionKind {
+    /// [`Reflection::KajiyaKay`].
+    KajiyaKay,
+    /// [`Reflection::Strand`].
+    Strand,
+}
+
+words! { ReflectionKind { KajiyaKay => "kajiya-kay", Strand => "strand" } }
+
+impl Reflection {
+    /// Returns the model without its parameters.
+    pub fn kind(&self) -> ReflectionKind {
+        match self {
+            Reflection::KajiyaKay => ReflectionKind::KajiyaKay,
+            Reflection::Strand(_) => ReflectionKind::Strand,
+        }
+    }
 }
 
 /// How often light may be scattered on its way through the volume.
@@ -39,3 +65,5 @@ pub enum Scattering {
     /// As often as it is.
     Multiple,
 }
+
+words! { Scattering { Single => "single", Multiple => "multiple" } }

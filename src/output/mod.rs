@@ -1,4 +1,4 @@
-//! Files: pictures, movies and contact sheets.
+//! Output files: pictures, movies and contact sheets.
 
 pub mod contact_sheet;
 pub mod frame;

@@ -1,5 +1,7 @@
 //! The picture that is asked for: size, samples and look.
 
+use crate::util::words::words;
+
 /// The picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Image {
@@ -27,6 +29,8 @@ pub enum Filter {
     /// The window of Blackman and Harris (1978), three pixels wide.
     BlackmanHarris,
 }
+
+words! { Filter { Box => "box", Gaussian => "gaussian", BlackmanHarris => "blackman-harris" } }
 
 /// How a picture is made from linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +62,8 @@ pub enum AutoExposure {
     Highlights,
 }
 
+words! { AutoExposure { None => "none", Average => "average", Highlights => "highlights" } }
+
 /// Tone curve of the PNG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
@@ -68,3 +74,5 @@ pub enum Tone {
     /// Sobotka 2022.
     Agx,
 }
+
+words! { Tone { Filmic => "filmic", Agx => "agx", None => "none" } }

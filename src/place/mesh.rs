@@ -1,4 +1,4 @@
-//! Opaque geometry as triangles: rocks and pools, and the light that they take from one another.
+//! Opaque geometry as triangles: rocks and pools, with the light that they block from one another.
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -13,23 +13,23 @@ use super::tiles::{self, Tile};
 use crate::place::Vertex;
 use crate::util::cache::{Cache, key};
 
-/// Opaque geometry: square grids of vertices, those of rocks and then those of pools.
+/// Opaque geometry: square grids of vertices, first of the rocks and then of the pools.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertices row by row, shared: who keeps them on a device knows them again.
+    /// Vertices, row by row. They are shared, so that the owner of a copy on the GPU can recognise them.
     pub vertices: Arc<Vec<Vertex>>,
-    /// The grids' tiles.
+    /// Tiles of the grids.
     pub tiles: Arc<Vec<Tile>>,
 }
 
 impl Mesh {
-    /// Grids one after the other with so many squares a side, powers of two.
+    /// Makes a mesh of consecutive grids. `squares` are the squares on a side of each, powers of two.
     pub fn new(vertices: Vec<Vertex>, squares: impl IntoIterator<Item = u32>) -> Mesh {
         let tiles = tiles::cut(&vertices, squares.into_iter());
         Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
     }
 
-    /// All triangles, as three numbers of vertices each; with these steps of the tiles.
+    /// Returns all triangles as indices of vertices, with the given step for each tile.
     pub fn triangles(&self, steps: &[u32]) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         for (i, tile) in self.tiles.iter().enumerate() {
@@ -41,30 +41,30 @@ impl Mesh {
     }
 }
 
-/// Version of the mesh's builder: part of the key of meshes on disk. Raise it with every change of the vertices that a
-/// [`Ground`] gives; a test compares their checksums.
+/// Version of the mesh builder, a part of the cache key of meshes. Raise it with every change to the vertices
+/// that a [`Ground`] makes; a test compares their checksums.
 pub const BUILDER_VERSION: u32 = 1;
 
-/// All that the opaque mesh of a scene follows from: equal grounds have equal meshes.
+/// Everything that determines the opaque mesh of a scene: equal grounds have equal meshes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
-    /// The rocks, in the order of their vertices.
+    /// Rocks, in the order of their vertices.
     pub rocks: Vec<Rock>,
-    /// The pools, whose vertices follow.
+    /// Pools; their vertices follow those of the rocks.
     pub pools: Vec<Pool>,
-    /// Corners of the quads that make rock wet and fall into pools; none where nothing can be wet.
+    /// Corners of the quads that wet rock and fall into pools, metres; empty where nothing can be wet.
     pub water: Vec<[Vec3; 4]>,
-    /// Unit vector to the light that rock shades rock from; none where no rock is shaded.
+    /// Unit vector to the light that makes rock cast shadows on rock; `None` where no rock is shaded.
     pub sun: Option<Vec3>,
 }
 
 impl Ground {
-    /// The mesh of all.
+    /// Builds the mesh.
     pub fn mesh(&self) -> Mesh {
         Mesh::new(self.vertices(), self.squares())
     }
 
-    /// As [`Ground::mesh`], or from `cache`.
+    /// Returns [`Ground::mesh`], from `cache` where it is stored there.
     pub fn kept_mesh(&self, cache: &Cache) -> Mesh {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
         let make = || Ok::<_, Infallible>(self.vertices());
@@ -72,15 +72,15 @@ impl Ground {
         Mesh::new(vertices, self.squares())
     }
 
-    /// On a side of each grid.
+    /// Returns the number of squares on a side of each grid.
     fn squares(&self) -> impl Iterator<Item = u32> {
         let pools = self.pools.iter().map(|_| Pool::SQUARES as u32);
         self.rocks.iter().map(|rock| 1 << rock.levels).chain(pools)
     }
 
     fn vertices(&self) -> Vec<Vertex> {
-        let made: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
-        let vertices = &mut made.concat();
+        let of_rocks: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
+        let vertices = &mut of_rocks.concat();
         let rocks: Vec<(&Rock, Range<usize>)> = self.rocks.iter().zip(self.ranges()).collect();
         let mut pools = Vec::new();
         for (i, pool) in self.pools.iter().enumerate() {
@@ -108,7 +108,7 @@ impl Ground {
         self.rocks.iter().map(Rock::vertex_count).sum()
     }
 
-    /// Where each rock's vertices are.
+    /// Returns the range of each rock's vertices.
     fn ranges(&self) -> Vec<Range<usize>> {
         let mut first = 0;
         let range = |rock: &Rock| {

@@ -1,4 +1,4 @@
-//! The place that water is in: rock, pools, and the mesh of both.
+//! Surroundings of the water: rock, pools, and the mesh of both.
 
 mod mesh;
 mod pool;

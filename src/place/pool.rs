@@ -1,27 +1,28 @@
-//! Pools: level water that falls end in, as part of the opaque mesh. What it looks like is in [`crate::engine::pool_surface`].
+//! Pools: level water that falls end in, as part of the opaque mesh. [`crate::engine::pool_surface`] shades
+//! them.
 
 use glam::Vec3;
 
 use super::Vertex;
 use super::rock::wet::nearest_on_triangle;
 
-/// Most pools of a scene.
+/// Largest number of pools in a scene.
 pub const MAX_POOLS: usize = 8;
-/// Squares on a side of the mesh of a pool, which holds depth and foam; waves are finer, and made for each pixel.
+/// Squares on a side of a pool's mesh. The mesh holds depth and foam; the finer waves are computed per pixel.
 const SQUARES: usize = 128;
-/// Foam along the shore, where water is shallower than this; metres.
+/// Depth below which the shore has foam, metres.
 const SHORE: f32 = 0.05;
 
-/// What a pool is made from.
+/// Parameters of a pool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pool {
-    /// The scene's name for it.
+    /// Name in the scene.
     pub name: String,
     /// Corners, counter-clockwise seen from above, at one height; metres.
     pub corners: [Vec3; 4],
-    /// Greatest depth, metres; less where rock is.
+    /// Greatest depth, metres. Rock makes the water shallower.
     pub depth: f32,
-    /// Albedo of water so deep that nothing is seen below it.
+    /// Albedo of water that is too deep for its ground to be seen.
     pub color: Vec3,
     /// Albedo of the ground.
     pub bottom: Vec3,
@@ -29,32 +30,32 @@ pub struct Pool {
     pub absorption: Vec3,
     /// Standard deviation of the surface's height, metres.
     pub height: f32,
-    /// Longest wave, metres.
+    /// Length of the longest wave, metres.
     pub wavelength: f32,
     /// Amplitude of the rings where water falls in, metres.
     pub rings: f32,
-    /// Seconds in which the volume moves once through its length; the waves repeat with it.
+    /// Time in which the volume moves by its own length, seconds. The waves repeat with it.
     pub period: f32,
     /// Density of the foam where water falls in, 0 to 1.
     pub foam: f32,
-    /// Metres from there to where there is none.
+    /// Distance from the falling water at which the foam ends, metres.
     pub foam_reach: f32,
     /// Seed of the waves.
     pub seed: u64,
 }
 
 impl Pool {
-    /// Squares on a side of its mesh.
+    /// Squares on a side of the mesh.
     pub const SQUARES: usize = SQUARES;
-    /// Vertices of its mesh.
+    /// Vertices of the mesh.
     pub const VERTICES: usize = (SQUARES + 1) * (SQUARES + 1);
 
-    /// Height of the surface.
+    /// Returns the height of the surface, metres.
     pub fn level(&self) -> f32 {
         self.corners[0].y
     }
 
-    /// The parts of its level at which the quads `water` go through it, as two ends each.
+    /// Returns the segments in which the quads `water` cross the surface, by their two ends; metres.
     pub fn impacts(&self, water: &[[Vec3; 4]]) -> Vec<[Vec3; 2]> {
         let level = self.level();
         let mut impacts = Vec::new();
@@ -75,7 +76,7 @@ impl Pool {
         impacts
     }
 
-    /// Whether a point is above or below it.
+    /// Whether a point lies above or below the pool.
     pub fn holds(&self, p: Vec3) -> bool {
         let side = |i: usize| {
             let (a, b) = (self.corners[i], self.corners[(i + 1) % 4]);
@@ -84,6 +85,7 @@ impl Pool {
         (0..4).all(side)
     }
 
+    /// Appends the vertices of the mesh, without depth and foam. `number` is the pool's number plus 1.
     pub(super) fn add_vertices(&self, number: u32, vertices: &mut Vec<Vertex>) {
         let [a, b, c, d] = self.corners;
         for y in 0..=SQUARES {
@@ -100,7 +102,7 @@ impl Pool {
         }
     }
 
-    /// Sets depth and foam of its vertices, over ground of these heights.
+    /// Sets depth and foam of the pool's vertices. `ground` is the height of the rock at each vertex, metres.
     pub(super) fn fill(&self, vertices: &mut [Vertex], ground: &[f32], water: &[[Vec3; 4]]) {
         let impacts = self.impacts(water);
         for (vertex, ground) in vertices.iter_mut().zip(ground) {

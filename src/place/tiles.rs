@@ -1,9 +1,10 @@
-//! The opaque mesh as tiles, of whose vertices a picture takes as few as it can do with.
+//! Level of detail of the opaque mesh: a picture draws only as many vertices of each tile as it needs.
 //!
-//! Rocks and pools are grids of squares, cut into tiles. Of a tile every 1st, 2nd, 4th … vertex is drawn (de Boer, "Fast
-//! Terrain Rendering Using Geometrical MipMapping", 2000), and what is shaded comes from all of them: a sample finds its
-//! place on the grid, and there mixes the three nearest vertices as if all were drawn. So a coarser tile costs the outline
-//! and the depth some exactness, and normals, albedo and shadows none.
+//! Rocks and pools are grids of squares, which are cut into tiles. A tile is drawn with every 1st, 2nd, 4th …
+//! vertex (de Boer, "Fast Terrain Rendering Using Geometrical MipMapping", 2000). Shading always uses all
+//! vertices: a sample finds its position on the grid, and interpolates the three nearest vertices as if all
+//! were drawn. A coarser tile therefore changes outlines and depth slightly, but no normals, albedo or
+//! shadows.
 
 use std::sync::LazyLock;
 
@@ -12,37 +13,37 @@ use glam::{Vec2, Vec3};
 use super::Vertex;
 use crate::picture::{Camera, Image};
 
-/// Squares on a side of a tile, where its grid has as many: twice as many would be drawn that lie out of view, half as many
-/// are drawn one by one for long.
+/// Squares on a side of a tile, if its grid has as many. With twice as many, more is drawn outside the view;
+/// with half as many, drawing the tiles one by one takes longer.
 pub const SIDE: u32 = 16;
-/// Steps: 1, 2, 4, 8 and 16.
+/// Number of steps: 1, 2, 4, 8 and 16.
 const STEPS: usize = 5;
 
 /// A square part of a grid of vertices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// Number of its first vertex.
+    /// Index of the first vertex.
     pub first: u32,
-    /// Vertices in a row of its grid.
+    /// Vertices in a row of the grid.
     pub pitch: u32,
     /// Squares on a side, [`SIDE`] or a smaller power of two.
     pub side: u32,
-    /// Number of the pool plus 1; 0: rock.
+    /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
-    /// The tiles of the same grid at its edges y = 0, x = side, y = side and x = 0.
+    /// Neighbours in the same grid at the edges y = 0, x = side, y = side and x = 0.
     pub neighbours: [Option<u32>; 4],
-    /// The box it lies in, metres.
+    /// Lower corner of the bounding box, metres.
     pub low: Vec3,
-    /// Its other corner.
+    /// Upper corner of the bounding box, metres.
     pub high: Vec3,
     /// Unit normal of the grid's patch.
     out: Vec3,
-    /// How far vertices lie from what is drawn in their place with each step, along `out` and across it: the root of the mean
-    /// square, or a third of the most where that is more; metres.
+    /// Distance between the vertices and the triangles drawn in their place, for each step, along `out` and
+    /// across it: the root mean square, or a third of the largest distance where that is more; metres.
     lost: [Vec2; STEPS],
 }
 
-/// Cuts grids into tiles: one after the other they have `squares` squares a side, a power of two.
+/// Cuts consecutive grids into tiles. `squares` are the squares on a side of each grid, powers of two.
 pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile> {
     let mut tiles = Vec::new();
     let mut first = 0;
@@ -80,18 +81,19 @@ pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile>
     tiles
 }
 
-/// The step of each tile that an image takes.
+/// Returns the step of each tile in an image.
 ///
-/// A vertex that is left out lies about `lost` from the triangle in its place. With θ between the patch's normal and the
-/// view, what is seen of that at most is lost · (sin θ, 1); at a depth z and a distance r it moves a point of the
-/// picture, whose focal length is f pixels, by no more than f·r/z² times as much. That is at most `image.rock_error` of the distance
-/// between samples, 1/√samples pixels: what moves less falls between them. Tiles beside each other differ by one step at
-/// most. Windows and samples of one image take the same.
+/// A vertex that is left out lies about `lost` from the triangle in its place. Let θ be the angle between the
+/// patch's normal and the view; at most lost · (sin θ, 1) of that distance is visible. At depth z and
+/// distance r, a point of a picture with a focal length of f pixels moves by no more than f·r/z² times as
+/// much. The step keeps this movement below `image.rock_error` of the distance between samples, 1/√samples
+/// pixels: a smaller movement falls between samples. The steps of neighbouring tiles differ by at most a
+/// factor of two. All windows and samples of an image have the same steps.
 pub fn steps(tiles: &[Tile], camera: &Camera, image: &Image) -> Vec<u32> {
     let focal = 0.5 * f64::from(image.height) / f64::from(camera.tan_half_fov);
     let most = f64::from(image.rock_error) / (f64::from(image.samples).sqrt() * focal);
     let mut steps: Vec<u32> = tiles.iter().map(|tile| tile.step(camera, most)).collect();
-    // Where neighbours are made finer theirs may have to be.
+    // A tile made finer may require finer neighbours in turn.
     let mut changed = true;
     while changed {
         changed = false;
@@ -107,27 +109,27 @@ pub fn steps(tiles: &[Tile], camera: &Camera, image: &Image) -> Vec<u32> {
     steps
 }
 
-/// Which of a tile's edges lie at coarser tiles.
+/// Returns which edges of a tile border on coarser tiles.
 pub fn coarser(tiles: &[Tile], steps: &[u32], tile: usize) -> [bool; 4] {
     tiles[tile].neighbours.map(|other| other.is_some_and(|other| steps[other as usize] > steps[tile]))
 }
 
-/// A tile's triangles, as numbers of corners: [`place`] tells where they are. At an edge with a coarser tile every
-/// other vertex moves to the one before it, so that both have the same edges there.
+/// Returns a tile's triangles as numbers of corners; [`place`] gives their positions. At an edge with a
+/// coarser tile, every other vertex moves to the one before it, so that both tiles have the same edges there.
 pub fn triangles(side: u32, step: u32, coarser: [bool; 4]) -> &'static [u16] {
     list(list_number(side, step, coarser))
 }
 
-/// Lists of triangles that there are.
+/// Number of lists of triangles.
 pub const LISTS: usize = STEPS * STEPS * 16;
 
-/// Which of them [`triangles`] gives.
+/// Returns the number of the list that [`triangles`] returns.
 pub fn list_number(side: u32, step: u32, coarser: [bool; 4]) -> usize {
     let edges: usize = (0..4).map(|edge| usize::from(coarser[edge]) << edge).sum();
     (side.ilog2() as usize * STEPS + step.ilog2() as usize) * 16 + edges
 }
 
-/// One of them; empty where the step is larger than the side.
+/// Returns a list of triangles by its number. It is empty where the step is larger than the side.
 pub fn list(number: usize) -> &'static [u16] {
     static LISTS_MADE: LazyLock<Vec<Vec<u16>>> = LazyLock::new(|| {
         let made = |number: usize| {
@@ -139,13 +141,13 @@ pub fn list(number: usize) -> &'static [u16] {
     &LISTS_MADE[number]
 }
 
-/// Column and row of a corner in its tile.
+/// Returns the column and row of a corner in its tile.
 pub fn place(corner: u16) -> [u32; 2] {
     let corner = u32::from(corner);
     [corner % (SIDE + 1), corner / (SIDE + 1)]
 }
 
-/// The same, in squares.
+/// Returns [`place`] as a position in squares.
 pub fn at(corner: u16) -> Vec2 {
     Vec2::from(place(corner).map(|i| i as f32))
 }
@@ -176,21 +178,23 @@ fn make_list(side: u32, step: u32, coarser: [bool; 4]) -> Vec<u16> {
 }
 
 impl Tile {
-    /// Number of the vertex in a column and row.
+    /// Returns the index of the vertex in a column and row.
     pub fn vertex(&self, [x, y]: [u32; 2]) -> u32 {
         self.first + y * self.pitch + x
     }
 
-    /// The three vertices around a place in the tile, in squares, and how much each counts. Twin: `opaque_point`.
-    pub fn around(&self, place: Vec2) -> ([u32; 3], Vec3) {
-        let cell = place.floor().clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
-        let f = (place - cell).clamp(Vec2::ZERO, Vec2::ONE);
+    /// Returns the three vertices around a position in the tile, in squares, with their weights. Twin:
+    /// `opaque_point` in shaders/engine/gbuffer.wgsl.
+    pub fn around(&self, position: Vec2) -> ([u32; 3], Vec3) {
+        let cell = position.floor().clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
+        let f = (position - cell).clamp(Vec2::ZERO, Vec2::ONE);
         let a = self.vertex([cell.x as u32, cell.y as u32]);
         let b = if f.x >= f.y { a + 1 } else { a + self.pitch };
         let (low, high) = (f.min_element(), f.max_element());
         ([a, b, a + self.pitch + 1], Vec3::new(1.0 - high, high - low, low))
     }
 
+    /// Sets the bounding box and `lost`.
     fn measure(&mut self, vertices: &[Vertex]) {
         let at = |x: u32, y: u32| Vec3::from(vertices[self.vertex([x, y]) as usize].position);
         let (mut low, mut high) = (self.low, self.high);
@@ -226,7 +230,7 @@ impl Tile {
         (self.low, self.high, self.lost) = (low, high, lost);
     }
 
-    /// The largest step that moves no point of the picture by more than `most` focal lengths.
+    /// Returns the largest step that moves no point of the picture by more than `most` focal lengths.
     fn step(&self, camera: &Camera, most: f64) -> u32 {
         let corners = (0..8).map(|i| {
             let corner =
@@ -239,7 +243,8 @@ impl Tile {
             let (r, along) = (to_corner.length(), to_corner.dot(self.out.as_dvec3()));
             depth = depth.min(to_corner.dot(camera.forward.as_dvec3()));
             distance = distance.max(r);
-            // Directions that make at most one angle with the normal are a cone, which holds the box if it holds its corners.
+            // Directions within one angle of the normal form a cone. It is convex, so it contains the box if
+            // it contains the corners.
             sin2 = sin2.max(1.0 - (along / r) * (along / r));
             (front, back) = (front || along >= 0.0, back || along <= 0.0);
         }
@@ -247,8 +252,8 @@ impl Tile {
             return 1;
         }
         let sin = if front && back { 1.0 } else { sin2.sqrt() };
-        let reach = depth * depth / distance;
-        let fits = |lost: &Vec2| f64::from(lost.x) * sin + f64::from(lost.y) <= most * reach;
+        let effective_depth = depth * depth / distance;
+        let fits = |lost: &Vec2| f64::from(lost.x) * sin + f64::from(lost.y) <= most * effective_depth;
         1 << (1..STEPS).take_while(|&k| fits(&self.lost[k])).count()
     }
 }

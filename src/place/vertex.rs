@@ -8,14 +8,15 @@ pub struct Vertex {
     pub position: [f32; 3],
     /// Unit normal.
     pub normal: [f32; 3],
-    /// Linear albedo; of a pool its depth in metres and how dense its foam is, 0 to 1.
+    /// Linear albedo of rock. A pool stores its depth (metres) and the density of its foam (0 to 1) here.
     pub albedo: [f32; 3],
-    /// Share of the surroundings' light that does not arrive, 0 to 1.
+    /// Share of the surroundings' light that is blocked, 0 to 1.
     pub occlusion: f32,
-    /// Share of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light) that does not arrive, 0 to 1.
+    /// Share of the light of [`Scene::shadow_light`](crate::scene::Scene::shadow_light) that is blocked,
+    /// 0 to 1.
     pub shadow: f32,
-    /// How much of a film of water there is, 0 to 1.
+    /// Strength of the film of water, 0 to 1.
     pub wet: f32,
-    /// Number of the pool plus 1; 0: rock.
+    /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
 }

@@ -1,7 +1,7 @@
-//! A scene in time: what of it changes from frame to frame.
+//! A scene in time, as one scene for each frame.
 //!
-//! A frame's scene depends on the animation and the frame's number alone. In a loop of N frames, frame f is
-//! frame f mod N, so that frame N is frame 0 to the last bit.
+//! The scene of a frame depends only on the animation and the number of the frame. In a loop of N frames,
+//! frame f is frame f mod N, so frame N equals frame 0 to the last bit.
 
 use std::path::{Path, PathBuf};
 
@@ -14,33 +14,38 @@ use super::value::{Place, Raw, Value, Values};
 use super::{Limits, Scene, expose};
 use crate::util::error::{Error, Result};
 
-/// A scene, and how it moves.
+/// A scene and its motion.
 #[derive(Clone, Debug)]
 pub struct Animation {
     name: String,
-    /// As read, with all of `animate`.
+    /// Values as read, including all keys under `animate`.
     values: Values,
-    /// Where references resolve; trusted without one.
+    /// Folder in which references resolve; without one they are trusted.
     folder: Option<PathBuf>,
     limits: Limits,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
-    /// Its length in frames.
+    /// Length, frames.
     pub frames: u32,
-    /// After so many frames it comes round.
+    /// Length of the loop, frames, if the animation is one.
     pub period: Option<u32>,
-    /// Lengths of the volume a frame: (whole lengths, frames), so that a loop closes exactly.
+    /// Speed of the flow as a fraction: lengths of the volume over frames. Whole lengths close a loop
+    /// exactly.
     flow: (f64, f64),
-    /// Frames of one turn of the camera; 0: none.
+    /// Frames in one turn of the camera; 0 for no turn.
     turn: i64,
     tracks: Vec<(String, Keyframes)>,
     path: Option<CameraPath>,
-    /// Stops in place of an automatic exposure, once they are measured.
+    /// Measured stops, which replace the automatic exposure.
     measured: Option<f32>,
 }
 
 impl Animation {
-    /// Reads a preset or file, applies `--set`s in order, and checks what moves.
+    /// Reads a preset or file, applies the `--set`s in order, and checks the motion.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where a `--set` has no value, [`Error::Io`] where a file cannot be read, and the
+    /// errors of [`Animation::new`].
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
@@ -48,12 +53,15 @@ impl Animation {
         Animation::new(&source.name, values, folder, limits)
     }
 
-    /// The animation of values that passed the table.
+    /// Makes the animation of values that the table accepted. The scenes of its frames are not checked yet.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the keyframes, the camera's path, its turn and the loop do not fit one another.
     pub fn new(name: &str, values: Values, folder: Option<PathBuf>, limits: &Limits) -> Result<Animation> {
         let period = Some(values.count("animate.loop")).filter(|&n| n > 0);
         let frames = period.unwrap_or(values.count("animate.frames"));
         let number = |key: &str| match values.get(key) {
-            // As written: 23.976 is not its float32.
+            // Taken in float64: the float32 of 23.976 is another number.
             Value::Float(x) => x,
             _ => f64::from(values.float(key)),
         };
@@ -123,22 +131,25 @@ impl Animation {
         })
     }
 
-    /// The scene's name.
+    /// Returns the scene's name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What the command line allows.
+    /// Returns the limits that the command line sets.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// Its values as read, those of frame 0 where nothing moves.
+    /// Returns the values as read. Frame 0 has them where nothing moves.
     pub fn values(&self) -> &Values {
         &self.values
     }
 
-    /// The same animation with other values for some keys.
+    /// Returns the animation with other values for some keys.
+    ///
+    /// # Errors
+    /// The errors of [`Values::set`] and [`Animation::new`].
     pub fn with(&self, changes: &[(String, Raw, Place)]) -> Result<Animation> {
         let mut values = self.values.clone();
         changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
@@ -146,13 +157,16 @@ impl Animation {
         Ok(Animation { measured: self.measured, ..animation })
     }
 
-    /// The same animation with `stops` more in every frame in place of its automatic exposure.
+    /// Replaces the automatic exposure by `stops` added to the exposure of every frame.
     pub fn exposed(self, stops: f32) -> Animation {
         Animation { measured: Some(stops), ..self }
     }
 
-    /// The scene of a frame. It holds no trace of the animation: as a scene file of its own it gives the
-    /// same picture.
+    /// Returns the scene of a frame. It contains nothing of the animation: printed as a scene file, it gives
+    /// the same picture.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::from_values`]; from frame 1 on the message names the frame.
     pub fn at(&self, frame: u32) -> Result<Scene> {
         let mut values = self.values.clone();
         values.clear_under("animate");
@@ -161,7 +175,7 @@ impl Animation {
         let time = f64::from(number);
         let moves_flow = self.tracks.iter().any(|(key, _)| key == "volume.flow");
         if self.flow.0 != 0.0 && number != 0 && !moves_flow {
-            // Whole lengths change nothing, and would take the digits that long animations need.
+            // Whole lengths do not change the picture, but would cost long animations precision.
             let moved = (self.flow.0 * time / self.flow.1) % 1.0;
             let flow = f64::from(values.float("volume.flow")) + moved;
             values.set("volume.flow", &Raw::Float(flow), &place("volume.flow"))?;
@@ -193,7 +207,7 @@ impl Animation {
     }
 }
 
-/// An error of one frame's scene tells the frame.
+/// Adds the number of the frame to an error.
 fn at_frame(error: Error, frame: u32) -> Error {
     match error {
         Error::Input { what, fix } => Error::Input { what: format!("frame {frame}: {what}"), fix },
@@ -201,7 +215,7 @@ fn at_frame(error: Error, frame: u32) -> Error {
     }
 }
 
-/// The keyframes of a track, and the key they move.
+/// Reads a track: the key that it moves, and its keyframes.
 fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String, Keyframes)> {
     let bad = |what: String, fix: String| Err(Error::input(format!("{section}: {what}"), fix));
     let key = values.text(&format!("{section}.key"));
@@ -215,7 +229,7 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
         (values.frames(&format!("{section}.frames")), values.series(&format!("{section}.values")));
     let place = Place(format!("{section}.key"));
     let Some(param) = Param::find(&key) else {
-        // It finds nothing to set, and says so with the nearest key.
+        // The key is unknown, so `set` fails with an error that names the nearest key.
         return Err(match values.clone().set(&key, &Raw::Int(0), &place) {
             Err(e) => e,
             Ok(()) => Error::input(format!("{section}: {key} cannot move"), "name another parameter"),
@@ -244,8 +258,8 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
     for (frame, value) in frames.iter().zip(&series) {
         scratch.set(&key, &raw(&key, value), &Place(format!("{section}.values at frame {frame}")))?;
     }
-    let interpolation = Interpolation::of(&values.text(&format!("{section}.interpolation")));
-    // Copies of the volume join: a whole length on, the flow is where it was.
+    let interpolation = values.choice(&format!("{section}.interpolation"), Interpolation::from_word);
+    // A whole length of the volume further, the flow shows the same picture.
     let closes = |first: &[f64], last: &[f64]| match key.as_str() {
         "volume.flow" => (last[0] - first[0]).fract() == 0.0,
         _ => first == last,
@@ -258,13 +272,17 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
     }
 }
 
+/// Reads the camera's path, if the animation has one.
 fn path(values: &Values, frames: u32, period: Option<u32>) -> Result<Option<CameraPath>> {
     let [eyes, targets] = ["eyes", "targets"].map(|what| values.series(&format!("animate.path.{what}")));
     let at = values.frames("animate.path.frames");
     if eyes.is_empty() {
         return match targets.is_empty() && at.is_empty() {
             true => Ok(None),
-            false => Err(Error::input("animate.path has no eyes", "give the points the camera goes through")),
+            false => Err(Error::input(
+                "animate.path has no eyes",
+                "give the points that the camera passes through",
+            )),
         };
     }
     let mut scratch = values.clone();
@@ -294,7 +312,7 @@ fn path(values: &Values, frames: u32, period: Option<u32>) -> Result<Option<Came
     })
 }
 
-/// Components as the parameter's kind wants them.
+/// Converts components to a value of the parameter's kind.
 fn raw(key: &str, components: &[f64]) -> Raw {
     let whole = Param::find(key).is_some_and(|p| matches!(p.kind, Kind::Int(..)));
     match components {

@@ -1,26 +1,162 @@
-//! The parts of a scene, made from values that passed the table and checked against one another.
+//! Builders of a scene's parts. They take values that the table accepted and check them against one another.
 
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
 use super::{Limits, MAX_LIGHTS, Place, Raw, Values};
+use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
 use crate::light::strand::StrandParams;
-use crate::light::{Cone, Light, Scattering};
-use crate::picture::{AutoExposure, Camera, Filter, Look, Tone};
+use crate::light::{Background, Cone, Light, LightKind, Reflection, ReflectionKind, Scattering, Visibility};
+use crate::picture::{AutoExposure, Camera, Filter, Image, Look, Tone};
+use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
-use crate::volume::{StorageChoice, Structure};
+use crate::util::words::words;
+use crate::volume::{Storage, StorageChoice, Structure, WaterSpec, storage_of};
 
+/// Source of a scene's environment, if it has one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EnvironmentKind {
+    /// No environment.
+    None,
+    /// The sky of the parameters `sky.*`.
+    Sky,
+    /// The map in `environment.file`.
+    File,
+}
+
+words! { EnvironmentKind { None => "none", Sky => "sky", File => "file" } }
+
+/// Returns the recipe of the scene's water volume.
+pub(super) fn water(v: &Values) -> WaterSpec {
+    let size = [v.count("volume.nx"), v.count("volume.ny"), v.count("volume.nz")];
+    let levels = match v.count("curves.levels") {
+        0 => levels_for(size[1]).min(16),
+        n => n,
+    };
+    WaterSpec {
+        size,
+        across: v.count("curves.across"),
+        deep: v.count("curves.deep"),
+        shape: CurveShape {
+            h: v.float("curves.h"),
+            sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
+            levels,
+        },
+        structure: structure(v),
+        seed: v.int("volume.seed") as u64,
+        alpha: v.float("volume.alpha"),
+        k_d: v.float("volume.k_d"),
+        k_s: v.float("volume.k_s"),
+        k_noise: v.float("volume.k_noise"),
+    }
+}
+
+/// Returns the fine structure of the water. Lengths are fractions of the volume, so a look survives a change
+/// of resolution.
+fn structure(v: &Values) -> Structure {
+    let bundles = v.count("curves.bundles");
+    // Without bundles their parameters are 0, so that they do not tell equal volumes apart.
+    let of_bundles = |key: &str| if bundles > 0 { v.float(key) } else { 0.0 };
+    Structure {
+        bundles,
+        radius_cells: of_bundles("curves.radius") * v.count("volume.nx") as f32,
+        wander_cells: of_bundles("curves.wander") * v.count("volume.ny") as f32,
+        breathe: of_bundles("curves.breathe"),
+        loose: of_bundles("curves.loose"),
+        coherence: v.float("volume.coherence"),
+        strand_length: v.float("volume.strand_length"),
+        coverage: v.float("volume.coverage"),
+        crest: v.float("volume.crest"),
+    }
+}
+
+/// Returns the resolved path of the volume's file, if the scene names one.
+pub(super) fn volume_file(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<PathBuf>> {
+    match v.text("volume.file") {
+        file if file.is_empty() => Ok(None),
+        file => confine("volume.file", Path::new(&file), folder, &limits.allow_paths).map(Some),
+    }
+}
+
+/// Returns the storage that the scene asks for. Coarse levels are made from all cells, so with them sparse
+/// storage is refused and automatic storage is dense.
+pub(super) fn asked_storage(v: &Values) -> Result<StorageChoice> {
+    let pyramid = v.choice("trace.filter", Prefilter::from_word) == Prefilter::Pyramid;
+    match v.choice("volume.storage", StorageChoice::from_word) {
+        StorageChoice::Sparse if pyramid => Err(Error::input(
+            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": \
+             coarse levels are made from all cells",
+            "set trace.filter=none, or volume.storage=dense",
+        )),
+        StorageChoice::Auto if pyramid => Ok(StorageChoice::Dense),
+        asked => Ok(asked),
+    }
+}
+
+/// Returns the storage of a water volume within `memory` bytes, and checks the number of its curve points.
+pub(super) fn water_storage(water: &WaterSpec, asked: StorageChoice, memory: u64) -> Result<Storage> {
+    let storage = storage_of(water, asked, memory)?;
+    let curves = water.across as u128 * water.deep as u128;
+    let points = curves << water.shape.levels;
+    if points > 1 << 36 {
+        return Err(Error::input(
+            format!("curves.across × curves.deep × 2^levels makes {points} curve points"),
+            "lower curves.across, curves.deep or curves.levels: at most 6.8e10",
+        ));
+    }
+    Ok(storage)
+}
+
+pub(super) fn image(v: &Values) -> Image {
+    Image {
+        width: v.count("image.width"),
+        height: v.count("image.height"),
+        samples: v.count("image.samples"),
+        filter: v.choice("image.filter", Filter::from_word),
+        rock_error: v.float("image.rock_error"),
+        look: look(v),
+    }
+}
+
+fn look(v: &Values) -> Look {
+    Look {
+        exposure: v.float("image.exposure"),
+        auto_exposure: v.choice("image.auto_exposure", AutoExposure::from_word),
+        bloom: v.float("image.bloom"),
+        bloom_radius: v.float("image.bloom_radius"),
+        temperature: v.float("image.temperature"),
+        tint: v.float("image.tint"),
+        tone: v.choice("image.tone", Tone::from_word),
+    }
+}
+
+pub(super) fn trace(v: &Values) -> Trace {
+    Trace {
+        attenuation: match v.choice("trace.attenuation", AttenuationKind::from_word) {
+            AttenuationKind::PathLength => Attenuation::PathLength { sigma: v.float("trace.sigma") },
+            AttenuationKind::PerCell => Attenuation::PerCell { tau: v.float("trace.tau") },
+        },
+        max_cells: v.count("trace.max_cells"),
+        early_end: v.float("trace.early_end"),
+        layers: v.count("trace.layers"),
+        filter: v.choice("trace.filter", Prefilter::from_word),
+        lookup: v.choice("trace.lookup", Lookup::from_word),
+    }
+}
+
+/// Returns the environment, if the scene has one.
 pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<Environment>> {
-    let source = match v.text("environment.kind").as_str() {
-        "sky" => {
+    let source = match v.choice("environment.kind", EnvironmentKind::from_word) {
+        EnvironmentKind::None => return Ok(None),
+        EnvironmentKind::Sky => {
             let ground = v.triple("sky.ground");
             if ground.max_element() > 1.0 {
                 return Err(Error::input(
-                    format!("sky.ground = {ground} sends back more light than it gets"),
+                    format!("sky.ground = {ground} reflects more light than it receives"),
                     "an albedo is at most 1 in each component",
                 ));
             }
@@ -31,7 +167,7 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
                 sun: v.float("sky.sun"),
             })
         }
-        "file" => match v.text("environment.file") {
+        EnvironmentKind::File => match v.text("environment.file") {
             file if file.is_empty() => {
                 return Err(Error::input(
                     "environment.kind = \"file\" without a file",
@@ -40,7 +176,6 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
             }
             file => Source::File(confine("environment.file", Path::new(&file), folder, &limits.allow_paths)?),
         },
-        _ => return Ok(None),
     };
     let settings = Settings {
         intensity: v.float("environment.intensity"),
@@ -51,7 +186,8 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
     Environment::new(source, settings, &limits.environments, limits.memory).map(Some)
 }
 
-/// The scene's own lights, and the `sun` of its environment, for which `others` more will stand.
+/// Returns the scene's own lights and the `sun` of its environment. `others` is the number of directional
+/// lights that stand for the rest of the environment; they count towards [`MAX_LIGHTS`].
 pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     for name in v.names("lights") {
@@ -73,13 +209,13 @@ pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Ve
                 )
             })
         };
-        let light = match v.text(&key("kind")).as_str() {
-            "point" => Light::Point { position: position(), intensity },
-            "spot" => {
+        let light = match v.choice(&key("kind"), LightKind::from_word) {
+            LightKind::Directional => Light::Directional { to_light: to_light()?, intensity },
+            LightKind::Point => Light::Point { position: position(), intensity },
+            LightKind::Spot => {
                 let cone = Cone::new(to_light()?, v.float(&key("angle")), v.float(&key("softness")));
                 Light::Spot { position: position(), intensity, cone }
             }
-            _ => Light::Directional { to_light: to_light()?, intensity },
         };
         if intensity != Vec3::ZERO {
             lights.push(light);
@@ -88,42 +224,11 @@ pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Ve
     lights.extend(sun);
     if lights.len() + others > MAX_LIGHTS {
         return Err(Error::input(
-            format!("the scene has {} lights, those of its environment included", lights.len() + others),
+            format!("the scene has {} lights, including those of its environment", lights.len() + others),
             format!("at most {MAX_LIGHTS}"),
         ));
     }
     Ok(lights)
-}
-
-/// Lengths are fractions of the volume, so that a look survives a change of resolution.
-pub(super) fn structure(v: &Values) -> Structure {
-    let bundles = v.count("curves.bundles");
-    Structure {
-        bundles,
-        // What is not used does not make volumes differ.
-        radius_cells: if bundles > 0 { v.float("curves.radius") * v.count("volume.nx") as f32 } else { 0.0 },
-        wander_cells: if bundles > 0 { v.float("curves.wander") * v.count("volume.ny") as f32 } else { 0.0 },
-        breathe: if bundles > 0 { v.float("curves.breathe") } else { 0.0 },
-        loose: if bundles > 0 { v.float("curves.loose") } else { 0.0 },
-        coherence: v.float("volume.coherence"),
-        strand_length: v.float("volume.strand_length"),
-        coverage: v.float("volume.coverage"),
-        crest: v.float("volume.crest"),
-    }
-}
-
-/// Coarse levels are made of all cells: with them sparse storage is refused, and not chosen.
-pub(super) fn storage(v: &Values) -> Result<StorageChoice> {
-    let pyramid = v.text("trace.filter") == "pyramid";
-    match v.text("volume.storage").as_str() {
-        "sparse" if pyramid => Err(Error::input(
-            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": coarse levels are made of all cells",
-            "set trace.filter=none, or volume.storage=dense",
-        )),
-        "sparse" => Ok(StorageChoice::Sparse),
-        "auto" if !pyramid => Ok(StorageChoice::Auto),
-        _ => Ok(StorageChoice::Dense),
-    }
 }
 
 pub(super) fn camera(v: &Values) -> Result<Camera> {
@@ -153,35 +258,19 @@ pub(super) fn haze(v: &Values) -> Haze {
     }
 }
 
-pub(super) fn filter(v: &Values) -> Filter {
-    match v.text("image.filter").as_str() {
-        "gaussian" => Filter::Gaussian,
-        "blackman-harris" => Filter::BlackmanHarris,
-        _ => Filter::Box,
+/// Returns the background, linear radiance.
+pub(super) fn background(v: &Values) -> Background {
+    Background { zenith: v.triple("background.zenith"), horizon: v.triple("background.horizon") }
+}
+
+pub(super) fn reflection(v: &Values) -> Reflection {
+    match v.choice("light.reflection", ReflectionKind::from_word) {
+        ReflectionKind::KajiyaKay => Reflection::KajiyaKay,
+        ReflectionKind::Strand => Reflection::Strand(strand(v)),
     }
 }
 
-pub(super) fn look(v: &Values) -> Look {
-    Look {
-        exposure: v.float("image.exposure"),
-        auto_exposure: match v.text("image.auto_exposure").as_str() {
-            "average" => AutoExposure::Average,
-            "highlights" => AutoExposure::Highlights,
-            _ => AutoExposure::None,
-        },
-        bloom: v.float("image.bloom"),
-        bloom_radius: v.float("image.bloom_radius"),
-        temperature: v.float("image.temperature"),
-        tint: v.float("image.tint"),
-        tone: match v.text("image.tone").as_str() {
-            "none" => Tone::None,
-            "agx" => Tone::Agx,
-            _ => Tone::Filmic,
-        },
-    }
-}
-
-pub(super) fn strand(v: &Values) -> StrandParams {
+fn strand(v: &Values) -> StrandParams {
     StrandParams {
         radius_m: v.float("strand.radius"),
         roughness_m: v.float("strand.roughness_m"),
@@ -193,25 +282,27 @@ pub(super) fn strand(v: &Values) -> StrandParams {
 }
 
 pub(super) fn scattering(v: &Values) -> Result<Scattering> {
-    if v.text("light.scattering") == "single" {
-        return Ok(Scattering::Single);
-    }
-    if v.text("light.visibility") == "none" {
+    let scattering = v.choice("light.scattering", Scattering::from_word);
+    let visibility = v.choice("light.visibility", Visibility::from_word);
+    if scattering == Scattering::Multiple && visibility == Visibility::None {
         return Err(Error::input(
-            "light.scattering = \"multiple\" with light.visibility = \"none\": there is no light left to scatter",
+            "light.scattering = \"multiple\" with light.visibility = \"none\": no light is left to scatter",
             "use light.visibility=cached or march",
         ));
     }
-    Ok(Scattering::Multiple)
+    Ok(scattering)
 }
 
-/// Puts the whole path in place of the reference `key`, if the scene has one that it uses.
+/// Replaces the reference `key` by its full path. A reference that the scene does not have or does not use
+/// stays as it is.
 ///
 /// # Errors
-/// Where it leads out of the scene's folder, or nowhere.
+/// [`Error::Input`] where the file does not exist, lies outside the scene's folder and `allowed`, or has a
+/// path that is not UTF-8.
 pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<()> {
     let file = values.text(key);
-    let unused = key == "environment.file" && values.text("environment.kind") != "file";
+    let unused = key == "environment.file"
+        && values.choice("environment.kind", EnvironmentKind::from_word) != EnvironmentKind::File;
     if file.is_empty() || unused {
         return Ok(());
     }
@@ -222,7 +313,8 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
     values.set(key, &Raw::Text(whole), &Place("the scene".into()))
 }
 
-/// Resolves a reference inside the scene's folder (or an allowed one), following links.
+/// Resolves a reference inside the scene's folder or an allowed one, and follows links. Without a folder the
+/// reference is trusted.
 pub(super) fn confine(key: &str, file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
     let Some(folder) = folder else { return Ok(file.to_owned()) };
     let joined = folder.join(file);

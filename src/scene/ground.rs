@@ -1,4 +1,5 @@
-//! Rocks and pools of a scene, made from values that passed the table and checked against one another.
+//! Builders of a scene's rocks and pools. They take values that the table accepted and check them against one
+//! another.
 
 use super::Values;
 use crate::mapping::QuadMap;
@@ -38,7 +39,7 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
             name,
         });
     }
-    // Vertex and six indices, on the CPU and on the device.
+    // A vertex and six indices, in host memory and on the GPU.
     let need: u128 =
         rocks.iter().map(|r| r.vertex_count() as u128 * 2 * (size_of::<Vertex>() as u128 + 24)).sum();
     if need > memory as u128 {
@@ -81,7 +82,7 @@ pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
         for (what, albedo) in [("color", color), ("bottom", bottom)] {
             if albedo.max_element() > 1.0 {
                 return Err(Error::input(
-                    format!("{} = {albedo} sends back more light than it gets", key(what)),
+                    format!("{} = {albedo} reflects more light than it receives", key(what)),
                     "an albedo is at most 1 in each component",
                 ));
             }

@@ -1,47 +1,45 @@
-//! Between keyframes: lines, steps, and curves that never overshoot; and the path of a camera.
+//! Interpolation between keyframes (lines, steps, and curves that never overshoot), and the camera's path.
 
 use glam::DVec3;
 
-/// Pieces of a path's segment whose lengths are added up: a curve between two points of a path bends by less
-/// than half a turn, of which a chord this short misses less than a ten thousandth.
+use crate::util::words::words;
+
+/// Number of chords that measure the length of one segment of a path. The curve between two points bends by
+/// less than half a turn, so the chords are short by less than a ten thousandth.
 const PIECES: usize = 64;
 
-/// What lies between two keyframes.
+/// Course of a value between two keyframes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// A straight line.
     Linear,
-    /// A monotone cubic (Fritsch and Butland 1984), so no value lies outside its two keyframes'.
+    /// A monotone cubic (Fritsch and Butland 1984): no value lies outside those of its two keyframes.
     Smooth,
-    /// The value of the one before.
+    /// The value of the keyframe before.
     Hold,
 }
 
-impl Interpolation {
-    /// From the parameter's word.
-    pub fn of(word: &str) -> Self {
-        match word {
-            "smooth" => Interpolation::Smooth,
-            "hold" => Interpolation::Hold,
-            _ => Interpolation::Linear,
-        }
-    }
-}
+words! { Interpolation { Linear => "linear", Smooth => "smooth", Hold => "hold" } }
 
-/// Values at frames, and what is between.
+/// Values at frames, with the interpolation between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframes {
-    /// Frame and components, by frame.
+    /// Frame and components of each keyframe, sorted by frame.
     keys: Vec<(f64, Vec<f64>)>,
-    /// Change a frame of each component at each keyframe.
+    /// Slope of each component at each keyframe, per frame.
     slopes: Vec<Vec<f64>>,
     interpolation: Interpolation,
     period: Option<f64>,
 }
 
 impl Keyframes {
-    /// Of increasing frames. With a `period` the track comes round: after its last keyframe it goes on to
-    /// its first; `closes` tells whether a last value, a period after the first, is the same. The error says what is wrong with the frames.
+    /// Makes keyframes at increasing frames.
+    ///
+    /// With a `period` the track is a loop: after its last keyframe it continues to its first. If the last
+    /// keyframe lies exactly one period after the first, `closes` tells whether their values agree.
+    ///
+    /// # Errors
+    /// The fault of the frames, as the end of a sentence.
     pub fn new(
         frames: &[i64],
         values: Vec<Vec<f64>>,
@@ -71,12 +69,12 @@ impl Keyframes {
         let secant = |i: usize, c: usize| (keys[i + 1].1[c] - keys[i].1[c]) / (keys[i + 1].0 - keys[i].0);
         let width = |i: usize| keys[i + 1].0 - keys[i].0;
         let slope = |i: usize, c: usize| {
-            // The intervals before and after; a curve that comes round has both at its ends.
+            // The intervals before and after the keyframe. In a loop the ends have both, too.
             let (before, after) = match (i, period) {
                 _ if last == 0 => return 0.0,
                 (0, Some(_)) => (last - 1, 0),
                 (i, Some(_)) if i == last => (last - 1, 0),
-                // It starts and ends at rest.
+                // An open curve starts and ends at rest.
                 (0, None) => return 0.0,
                 (i, None) if i == last => return 0.0,
                 (i, _) => (i - 1, i),
@@ -92,7 +90,7 @@ impl Keyframes {
         Keyframes { keys, slopes, interpolation, period }
     }
 
-    /// The components at a frame.
+    /// Returns the components at a frame.
     pub fn at(&self, frame: f64) -> Vec<f64> {
         let first = self.keys[0].0;
         let frame = match self.period {
@@ -117,7 +115,7 @@ impl Keyframes {
                     + (s3 - 2.0 * s2 + s) * h * m0[c]
                     + (3.0 * s2 - 2.0 * s3) * b[c]
                     + (s3 - s2) * h * m1[c];
-                // What rounding adds must not leave the parameter's range.
+                // Rounding must not push the value out of the parameter's range.
                 hermite.clamp(a[c].min(b[c]), a[c].max(b[c]))
             }
         };
@@ -125,7 +123,7 @@ impl Keyframes {
     }
 }
 
-/// Keyframes of a loop lie inside it.
+/// Checks that the keyframes of a loop lie inside it.
 fn check_loop(frames: &[i64], period: f64) -> Result<(), String> {
     match frames.iter().find(|&&f| f as f64 > period) {
         Some(f) => Err(format!("have frame {f}, which is past the loop of {period} frames")),
@@ -133,20 +131,24 @@ fn check_loop(frames: &[i64], period: f64) -> Result<(), String> {
     }
 }
 
-/// A smooth curve through the places of a camera (centripetal Catmull-Rom, which neither loops nor cusps
-/// between its points: Yuksel, Schaefer and Keyser 2011), gone along with smoothly changing speed.
+/// A smooth curve through positions of the camera, along which it moves with smoothly changing speed. The
+/// curve is centripetal Catmull-Rom, which has neither loops nor cusps between its points (Yuksel, Schaefer
+/// and Keyser 2011).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// Points of the curve: metres along it, and where.
+    /// Points of the curve: distance along it in metres, and position.
     curve: Vec<(f64, DVec3)>,
-    /// Metres along the curve, by frame.
-    way: Keyframes,
+    /// Distance along the curve at each frame, metres.
+    distances: Keyframes,
     targets: Option<Keyframes>,
 }
 
 impl CameraPath {
-    /// Through `eyes`, at least two, at `at` frames; without them evenly over the animation's `frames` or
-    /// its loop, in which the path is closed.
+    /// Makes a path through `eyes`, at least two, at the frames `at`. Without `at` the points are spread
+    /// evenly over the animation's `frames` or over its loop. In a loop the path is closed.
+    ///
+    /// # Errors
+    /// The fault of the frames, as the end of a sentence.
     pub fn new(
         at: &[i64],
         eyes: Vec<Vec<f64>>,
@@ -183,24 +185,24 @@ impl CameraPath {
         let (curve, lengths) = trace(&points, period.is_some());
         let keys = |values: Vec<Vec<f64>>| times.iter().copied().zip(values).collect();
         let period = period.map(f64::from);
-        let way = Keyframes::of_keys(
+        let distances = Keyframes::of_keys(
             keys(lengths.into_iter().map(|l| vec![l]).collect()),
             Interpolation::Smooth,
             period,
         );
         let targets =
             (!looks.is_empty()).then(|| Keyframes::of_keys(keys(looks), Interpolation::Smooth, period));
-        Ok(CameraPath { curve, way, targets })
+        Ok(CameraPath { curve, distances, targets })
     }
 
-    /// Whether it says where to look, too.
+    /// Whether the path moves the target, too.
     pub fn has_targets(&self) -> bool {
         self.targets.is_some()
     }
 
-    /// Where the camera is, and what it looks at.
+    /// Returns the camera's position at a frame, and its target if the path moves it.
     pub fn at(&self, frame: f64) -> (DVec3, Option<Vec<f64>>) {
-        let metres = self.way.at(frame)[0];
+        let metres = self.distances.at(frame)[0];
         let next = self.curve.partition_point(|(s, _)| *s <= metres).clamp(1, self.curve.len() - 1);
         let ((s0, a), (s1, b)) = (self.curve[next - 1], self.curve[next]);
         let share = if s1 > s0 { ((metres - s0) / (s1 - s0)).clamp(0.0, 1.0) } else { 0.0 };
@@ -208,10 +210,11 @@ impl CameraPath {
     }
 }
 
-/// The curve through points in short pieces, with the metres so far; and the metres at each point.
+/// Returns the curve through `points` as short chords with the distance along them, and the distance at each
+/// point; metres.
 fn trace(points: &[DVec3], closed: bool) -> (Vec<(f64, DVec3)>, Vec<f64>) {
     let last = points.len() - 1;
-    // Beyond an open path's ends it goes straight on.
+    // An open path continues straight beyond its ends.
     let before = if closed { points[last - 1] } else { 2.0 * points[0] - points[1] };
     let after = if closed { points[1] } else { 2.0 * points[last] - points[last - 1] };
     let point = |i: isize| match usize::try_from(i) {
@@ -234,12 +237,13 @@ fn trace(points: &[DVec3], closed: bool) -> (Vec<(f64, DVec3)>, Vec<f64>) {
     (curve, lengths)
 }
 
-/// Barry and Goldman's pyramid with centripetal knots, between p₁ (s = 0) and p₂ (s = 1).
+/// Evaluates a centripetal Catmull-Rom curve between p₁ (s = 0) and p₂ (s = 1) by Barry and Goldman's
+/// pyramid.
 fn catmull_rom(p: [DVec3; 4], s: f64) -> DVec3 {
     if s == 1.0 {
         return p[2];
     }
-    // Equal points have no knots between them: a distance of nothing stands in.
+    // Equal points would have no knot interval between them, so it is at least 1e-9.
     let knot = |a: DVec3, b: DVec3| a.distance(b).sqrt().max(1e-9);
     let t1 = knot(p[0], p[1]);
     let t2 = t1 + knot(p[1], p[2]);

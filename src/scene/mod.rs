@@ -1,4 +1,4 @@
-//! What is asked for: the scene, read strictly, checked whole before any work.
+//! Reading of scenes: files, presets and `--set`, all checked before any work begins.
 
 mod animation;
 mod build;
@@ -23,7 +23,6 @@ pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use value::{Key, Place, Raw, Value, Values};
 
-use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{self, Environment, EnvironmentStock};
 use crate::light::haze::Haze;
 use crate::light::scatter::media::Media;
@@ -32,84 +31,84 @@ use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibi
 use crate::mapping::Quad;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
 use crate::place::{Ground, Mesh, Pool, Rock};
-use crate::trace::{Attenuation, Lookup, Prefilter, Trace, pyramid_spec};
+use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{
     PyramidSpec, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water,
-    kept_water, read_npz, storage_of,
+    kept_water, read_npz,
 };
 
-/// Most lights of a scene. No buffer is of this size: with more, and a walk to each from every cell, the least
-/// tile of a picture would take longer than drivers wait.
+/// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
+/// more lights even the smallest tile of a picture would run into the driver's timeout.
 pub const MAX_LIGHTS: usize = 4096;
 
-/// A whole scene, valid.
+/// A complete, valid scene.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Its name: the preset's, or the file's stem.
+    /// Name: the preset's, or the stem of the file.
     pub name: String,
-    /// The values it was made from.
+    /// Values that the scene was made from.
     pub values: Values,
-    /// How the volume is built, unless it comes from `volume_file`.
+    /// Recipe of the volume, used where there is no `volume_file`.
     pub water: WaterSpec,
-    /// The `.npz` to take the volume from, resolved and inside the allowed folders.
+    /// Path of the volume's `.npz` file, resolved and inside the allowed folders.
     pub volume_file: Option<PathBuf>,
-    /// How the volume's cells are stored.
+    /// Storage of the volume's cells.
     pub storage: Storage,
-    /// What the scene says of it.
+    /// Storage that the scene asks for.
     pub asked_storage: StorageChoice,
-    /// How far the volume has moved down the flow, in lengths of the volume.
+    /// Distance that the volume has moved down the flow, in lengths of the volume.
     pub flow: f32,
-    /// The volume's quads.
+    /// Quads of the volume.
     pub quads: Vec<Quad>,
-    /// The lights, those without intensity left out; the environment's sun is the last.
+    /// Lights with an intensity above 0; the environment's sun is the last.
     pub lights: Vec<Light>,
-    /// Light of the surroundings: rock's irradiance, and seen instead of the background.
+    /// Light of the surroundings. It lights rock and is seen in place of the background.
     pub environment: Option<Environment>,
-    /// The lights that stand for the environment in the volume, after `lights`.
+    /// Directional lights that stand for the environment in the volume; they follow `lights`.
     pub environment_lights: Vec<Light>,
-    /// Light of the whole surroundings.
+    /// Light from everywhere, linear RGB.
     pub ambient: Vec3,
-    /// Opaque geometry.
+    /// Opaque rocks.
     pub rocks: Vec<Rock>,
     /// Level water, opaque too.
     pub pools: Vec<Pool>,
-    /// The walk through the volume.
+    /// Settings of the walk through the volume.
     pub trace: Trace,
-    /// Where angles are measured.
+    /// Space in which angles are measured.
     pub angles: AngleFrame,
     /// Attenuation between light and cell.
     pub visibility: Visibility,
-    /// Bytes that light volumes may take: at most half of what the work may use.
+    /// Budget of the light volumes, bytes; at most half of [`Limits::memory`].
     pub light_cache: u64,
-    /// How a cell reflects.
+    /// Reflection of a cell.
     pub reflection: Reflection,
-    /// Whether light may be scattered more than once.
+    /// Single or multiple scattering.
     pub scattering: Scattering,
     /// Exponent of the specular term.
     pub p: f32,
-    /// The camera.
+    /// Camera.
     pub camera: Camera,
-    /// What is seen where nothing is.
+    /// Radiance where a ray meets nothing.
     pub background: Background,
-    /// What lies between the eye and everything.
+    /// Haze between the eye and everything else.
     pub haze: Haze,
-    /// Size, samples and tone.
+    /// Size, samples and tone of the picture.
     pub image: Image,
 }
 
-/// What the command line allows a scene.
+/// Limits that the command line sets for a scene.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Folders besides the scene's own that references may lead into.
+    /// Folders, besides the scene's own, that references may lead into.
     pub allow_paths: Vec<PathBuf>,
-    /// Bytes the work may use.
+    /// Memory that the work may use, bytes.
     pub memory: u64,
-    /// Environments that its scenes share.
+    /// Environments that the scenes share.
     pub environments: EnvironmentStock,
-    /// Where volumes and meshes are kept for the next process.
+    /// Disk cache of volumes and meshes, shared with later processes.
     pub cache: Option<Cache>,
 }
 
@@ -124,12 +123,14 @@ impl Default for Limits {
     }
 }
 
-/// Puts `stops` more in place of an automatic exposure; the exposure that comes of it.
+/// Replaces an automatic exposure by `stops` added to `image.exposure`. Returns the resulting exposure, in
+/// stops.
 fn expose(values: &mut Values, stops: f32) -> f32 {
     let exposure = (values.float("image.exposure") + stops).clamp(-32.0, 32.0);
     let place = Place("image.auto_exposure".into());
+    let none = AutoExposure::None.word();
     for (key, raw) in
-        [("image.exposure", Raw::Float(exposure.into())), ("image.auto_exposure", Raw::Text("none".into()))]
+        [("image.exposure", Raw::Float(exposure.into())), ("image.auto_exposure", Raw::Text(none.into()))]
     {
         values.set(key, &raw, &place).expect("inside the table's range");
     }
@@ -137,7 +138,11 @@ fn expose(values: &mut Values, stops: f32) -> f32 {
 }
 
 impl Scene {
-    /// Reads a preset or file, applies `--set`s in order, and checks the whole.
+    /// Reads a preset or file, applies the `--set`s in order and checks the result.
+    ///
+    /// # Errors
+    /// `Error::Usage` where a `--set` has no value. `Error::Io` where a file cannot be read. Otherwise those
+    /// of [`Scene::from_values`].
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
@@ -145,75 +150,25 @@ impl Scene {
         Scene::from_values(&source.name, values, folder.as_deref(), limits)
     }
 
-    /// Checks values that passed the table against one another. References resolve inside `folder`;
-    /// without one they are trusted.
+    /// Makes a scene of values that the table accepted, and checks them against one another.
+    ///
+    /// References resolve inside `folder`. Without a folder they are trusted.
+    ///
+    /// # Errors
+    /// `Error::Input` where values do not fit one another or a file is unusable, `Error::Memory` where the
+    /// work needs more than [`Limits::memory`].
     pub fn from_values(name: &str, values: Values, folder: Option<&Path>, limits: &Limits) -> Result<Scene> {
         let v = &values;
-        let size = [v.count("volume.nx"), v.count("volume.ny"), v.count("volume.nz")];
-        let levels = match v.count("curves.levels") {
-            0 => levels_for(size[1]).min(16),
-            n => n,
+        let water = build::water(v);
+        let volume_file = build::volume_file(v, folder, limits)?;
+        let asked_storage = build::asked_storage(v)?;
+        let storage = match volume_file {
+            Some(_) => Storage::Dense,
+            None => build::water_storage(&water, asked_storage, limits.memory)?,
         };
-        let water = WaterSpec {
-            size,
-            across: v.count("curves.across"),
-            deep: v.count("curves.deep"),
-            shape: CurveShape {
-                h: v.float("curves.h"),
-                sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
-                levels,
-            },
-            structure: build::structure(v),
-            seed: v.int("volume.seed") as u64,
-            alpha: v.float("volume.alpha"),
-            k_d: v.float("volume.k_d"),
-            k_s: v.float("volume.k_s"),
-            k_noise: v.float("volume.k_noise"),
-        };
-        let volume_file = match v.text("volume.file") {
-            file if file.is_empty() => None,
-            file => Some(build::confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?),
-        };
-        let asked = build::storage(v)?;
-        let mut storage = Storage::Dense;
-        if volume_file.is_none() {
-            storage = storage_of(&water, asked, limits.memory)?;
-            let curves = water.across as u128 * water.deep as u128;
-            let points = curves << levels;
-            if points > 1 << 36 {
-                return Err(Error::input(
-                    format!("curves.across × curves.deep × 2^levels makes {points} curve points"),
-                    "lower curves.across, curves.deep or curves.levels: at most 6.8e10",
-                ));
-            }
-        }
-        let image = Image {
-            width: v.count("image.width"),
-            height: v.count("image.height"),
-            samples: v.count("image.samples"),
-            filter: build::filter(v),
-            rock_error: v.float("image.rock_error"),
-            look: build::look(v),
-        };
+        let image = build::image(v);
         check_image(&image, limits.memory)?;
         let camera = build::camera(v)?;
-        let trace = Trace {
-            attenuation: match v.text("trace.attenuation").as_str() {
-                "per-cell" => Attenuation::PerCell { tau: v.float("trace.tau") },
-                _ => Attenuation::PathLength { sigma: v.float("trace.sigma") },
-            },
-            max_cells: v.count("trace.max_cells"),
-            early_end: v.float("trace.early_end"),
-            layers: v.count("trace.layers"),
-            filter: match v.text("trace.filter").as_str() {
-                "pyramid" => Prefilter::Pyramid,
-                _ => Prefilter::None,
-            },
-            lookup: match v.text("trace.lookup").as_str() {
-                "trilinear" => Lookup::Trilinear,
-                _ => Lookup::Nearest,
-            },
-        };
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
@@ -222,7 +177,7 @@ impl Scene {
             water,
             volume_file,
             storage,
-            asked_storage: asked,
+            asked_storage,
             flow: v.float("volume.flow"),
             quads: quads::quads(v)?,
             lights: build::lights(v, sun, environment_lights.len())?,
@@ -231,32 +186,22 @@ impl Scene {
             ambient: v.triple("light.ambient"),
             rocks: ground::rocks(v, limits.memory)?,
             pools: ground::pools(v)?,
-            trace,
-            angles: if v.text("light.frame") == "texture" { AngleFrame::Texture } else { AngleFrame::World },
-            visibility: match v.text("light.visibility").as_str() {
-                "none" => Visibility::None,
-                "cached" => Visibility::Cached,
-                _ => Visibility::March,
-            },
+            trace: build::trace(v),
+            angles: v.choice("light.frame", AngleFrame::from_word),
+            visibility: v.choice("light.visibility", Visibility::from_word),
             light_cache: (u64::from(v.count("light.cache")) << 20).min(limits.memory / 2),
-            reflection: match v.text("light.reflection").as_str() {
-                "strand" => Reflection::Strand(build::strand(v)),
-                _ => Reflection::KajiyaKay,
-            },
+            reflection: build::reflection(v),
             scattering: build::scattering(v)?,
             p: v.float("light.p"),
             camera,
-            background: Background {
-                zenith: v.triple("background.zenith"),
-                horizon: v.triple("background.horizon"),
-            },
+            background: build::background(v),
             haze: build::haze(v),
             image,
             values,
         })
     }
 
-    /// The same scene with `stops` more in place of an automatic exposure.
+    /// Replaces the automatic exposure by `stops` added to the scene's exposure.
     pub fn exposed(mut self, stops: f32) -> Scene {
         let look = &mut self.image.look;
         look.exposure = expose(&mut self.values, stops);
@@ -264,7 +209,11 @@ impl Scene {
         self
     }
 
-    /// Builds the volume texture, or reads it from the scene's file.
+    /// Builds the volume texture, or reads it from the scene's file, within `memory` bytes.
+    ///
+    /// # Errors
+    /// `Error::Memory` where it does not fit, `Error::Input` or `Error::Io` where the file is unusable, and
+    /// those of `monitor`.
     pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
         match (&self.volume_file, self.storage) {
             (Some(path), _) => read_npz(path, self.asked_storage, memory),
@@ -273,7 +222,10 @@ impl Scene {
         }
     }
 
-    /// As [`Scene::volume`], from the cache where there is one.
+    /// Returns [`Scene::volume`], from the cache where it is stored there.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::volume`].
     pub fn kept_volume(
         &self,
         cache: Option<&Cache>,
@@ -281,7 +233,7 @@ impl Scene {
         monitor: &dyn Monitor,
     ) -> Result<VolumeTexture> {
         match cache {
-            // A file of the size of those that are sparse would push all others out.
+            // A sparse volume's cache file would be large enough to evict every other.
             Some(cache) if self.volume_file.is_none() && self.storage == Storage::Dense => {
                 kept_water(&self.water, cache, monitor)
             }
@@ -289,12 +241,12 @@ impl Scene {
         }
     }
 
-    /// As [`Scene::mesh`], from the cache where there is one.
+    /// Returns [`Scene::mesh`], from the cache where it is stored there.
     pub fn kept_mesh(&self, cache: Option<&Cache>) -> Mesh {
         cache.map_or_else(|| self.mesh(), |cache| self.ground().kept_mesh(cache))
     }
 
-    /// The files it is made from besides its own, resolved, and the keys that name them.
+    /// Returns the files that the scene refers to, resolved, with the keys that name them.
     pub fn references(&self) -> Vec<(&'static str, PathBuf)> {
         let map = self.environment.as_ref().and_then(|e| match &e.source {
             environment::Source::File(path) => Some(path.clone()),
@@ -304,12 +256,13 @@ impl Scene {
         REFERENCES.into_iter().zip(files).filter_map(|(key, file)| Some((key, file?))).collect()
     }
 
-    /// The lights that shine on the volume: the scene's own, then those that stand for its environment.
+    /// Returns the lights that shine on the volume: the scene's own, then those that stand for its
+    /// environment.
     pub fn volume_lights(&self) -> Vec<Light> {
         self.lights.iter().chain(&self.environment_lights).copied().collect()
     }
 
-    /// What the levels of its volume are made for.
+    /// Returns the specification of the volume's coarse levels.
     pub fn pyramid_spec(&self, volume: &VolumeTexture) -> PyramidSpec {
         pyramid_spec(&self.trace, &self.quads, volume)
     }
@@ -317,7 +270,7 @@ impl Scene {
     /// Plans the light volumes of a frame with a volume of `size` cells whose density is scaled by `alpha`.
     ///
     /// # Errors
-    /// [`Error::Memory`] where even the coarsest need more than `budget` bytes.
+    /// `Error::Memory` where even the coarsest light volumes need more than `budget` bytes.
     pub fn light_volumes(&self, size: [u32; 3], alpha: f32, budget: u64) -> Result<LightVolumes> {
         let lit = LitQuads {
             quads: &self.quads,
@@ -332,13 +285,13 @@ impl Scene {
         LightVolumes::new(&lit, budget)
     }
 
-    /// The diffuse light of its materials in a volume, where light is scattered more than once.
+    /// Returns the media of diffuse light, one for each material in `volume`; `None` with single scattering.
     pub fn media(&self, volume: &VolumeTexture) -> Option<Media> {
         let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volume);
         (self.scattering == Scattering::Multiple).then(make)
     }
 
-    /// What the opaque mesh follows from.
+    /// Returns everything that determines the opaque mesh.
     pub fn ground(&self) -> Ground {
         let wet = !self.pools.is_empty() || self.rocks.iter().any(|rock| rock.wet > 0.0);
         let shaded = self.rocks.iter().any(|rock| rock.shadow > 0.0);
@@ -351,17 +304,18 @@ impl Scene {
         }
     }
 
-    /// The quads that are no mist.
+    /// Returns the corners of the quads that are not mist, metres.
     pub fn falls(&self) -> Vec<[Vec3; 4]> {
         self.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| quad.corners).collect()
     }
 
-    /// All opaque geometry as one mesh.
+    /// Builds all opaque geometry as one mesh.
     pub fn mesh(&self) -> Mesh {
         self.ground().mesh()
     }
 
-    /// Which of `lights` rock keeps from rock: the brightest directional one.
+    /// Returns the index in `lights` of the light whose shadows rock casts on rock: the brightest directional
+    /// one.
     pub fn shadow_light(&self) -> Option<usize> {
         let bright = |light: &Light| match light {
             Light::Directional { intensity, .. } => Some(intensity.element_sum()),
@@ -372,20 +326,21 @@ impl Scene {
         directional.rev().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
     }
 
-    /// What the user may want to know about how it is rendered.
+    /// Returns notes on how the scene is rendered.
     pub fn notes(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut notes = self.environment.iter().map(Environment::words).collect::<Vec<_>>();
         if volume.is_sparse() && self.asked_storage == StorageChoice::Auto {
             let [nx, ny, nz] = volume.size;
             notes.push(format!(
-                "the volume of {nx}×{ny}×{nz} cells is stored sparse, {} of them: all would not fit the memory",
+                "{} of the volume's {nx}×{ny}×{nz} cells are stored (sparse): \
+                 all of them would not fit into memory",
                 volume.cells.stored().len()
             ));
         }
         notes
     }
 
-    /// What is valid but surely not meant.
+    /// Returns warnings about what is valid but probably a mistake.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);

@@ -1,9 +1,9 @@
-//! The scenes that come with the program: scene files in `assets/scenes/`.
+//! Presets: the scene files in `assets/scenes/`, which the program contains.
 
-/// A preset: name, what it shows, its scene file.
+/// A preset: name, description, text of the scene file.
 type Preset = (&'static str, &'static str, &'static str);
 
-/// In the order they are listed; the first is the default scene.
+/// The presets in the order of the list; the first is the default scene.
 const PRESETS: &[Preset] = &[
     (
         "waterfall",
@@ -45,20 +45,20 @@ const PRESETS: &[Preset] = &[
     ),
 ];
 
-/// The scene rendered when none is named.
+/// Name of the scene that is rendered when none is given.
 pub const DEFAULT: &str = PRESETS[0].0;
 
-/// The scene file of a preset.
+/// Returns the text of a preset's scene file.
 pub fn text(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|p| p.0 == name).map(|p| p.2)
 }
 
-/// The presets' names.
+/// Returns the presets' names.
 pub fn names() -> impl Iterator<Item = &'static str> {
     PRESETS.iter().map(|p| p.0)
 }
 
-/// The presets' names and what they show.
+/// Returns the presets' names and descriptions.
 pub fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
     PRESETS.iter().map(|p| (p.0, p.1))
 }

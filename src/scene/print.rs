@@ -1,5 +1,5 @@
-//! The scene fully resolved: as a scene file that gives the same picture, and as JSON with everything
-//! an independent program needs to compute the image.
+//! Prints of a resolved scene: a scene file that gives the same picture, and JSON with everything that an
+//! independent program needs to compute the image.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -10,9 +10,14 @@ use super::Scene;
 use super::param::{PARAMS, Param};
 use super::read::VERSION;
 use crate::light::Light;
+use crate::light::environment::{ANGULAR_RADIUS, Environment};
+use crate::mapping::Quad;
+use crate::picture::camera::sample_offset;
+use crate::picture::{Camera, Image};
+use crate::place::{Mesh, Vertex};
 
 impl Scene {
-    /// Every concrete key of this scene, in the table's order.
+    /// Returns every concrete key of this scene, in the table's order.
     pub fn keys(&self) -> Vec<String> {
         let mut keys = Vec::new();
         for param in PARAMS {
@@ -27,16 +32,16 @@ impl Scene {
                 }
             }
         }
-        // A list that is not given has nothing to say.
+        // An absent list has no value to print.
         keys.retain(|key| self.values.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
         keys
     }
 
-    /// The scene as a scene file with every default filled in.
+    /// Prints the scene as a scene file with every default filled in.
     pub fn to_toml(&self) -> String {
         let mut text = format!("version = {VERSION}\n");
         let mut keys = self.keys();
-        // A stable sort by table: `a.b.c` belongs to table `a.b`.
+        // The sort by table is stable; `a.b.c` belongs to table `a.b`.
         let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(t, _)| t.to_owned());
         let mut tables: HashMap<String, usize> = HashMap::new();
         for key in &keys {
@@ -46,18 +51,18 @@ impl Scene {
         keys.sort_by_cached_key(|key| tables.get(&table(key)).copied());
         let mut open = String::new();
         for key in &keys {
-            let this = table(key);
-            if this != open {
-                // Infallible: writing to a String.
-                let _ = match this.split_once('.') {
+            let own_table = table(key);
+            if own_table != open {
+                // Writing to a String cannot fail.
+                let _ = match own_table.split_once('.') {
                     Some(("quads", _)) => writeln!(text, "\n[[quads]]"),
                     Some(("animate", track)) if track.starts_with("tracks.") => {
                         writeln!(text, "\n[[animate.tracks]]")
                     }
                     Some((section, name)) => writeln!(text, "\n[{section}.{}]", quoted(name)),
-                    None => writeln!(text, "\n[{this}]"),
+                    None => writeln!(text, "\n[{own_table}]"),
                 };
-                open = this;
+                open = own_table;
             }
             let name = key.rsplit('.').next().unwrap_or(key);
             let _ = writeln!(text, "{name} = {}", self.values.get(key).to_toml());
@@ -65,8 +70,8 @@ impl Scene {
         text
     }
 
-    /// The scene as JSON: parameters as in the scene file, and under `derived` what follows from them
-    /// (camera basis, unit lights, the rock mesh with normals and albedo).
+    /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed
+    /// from them (camera basis, unit vectors to lights, the opaque mesh with normals and albedo).
     pub fn to_json(&self) -> Json {
         let mut root = Map::new();
         root.insert("taki".into(), json!(env!("CARGO_PKG_VERSION")));
@@ -75,103 +80,119 @@ impl Scene {
         for key in self.keys() {
             insert(&mut root, &key, self.values.get(&key).to_json());
         }
-        // A list, as in the scene file.
         if let Some(Json::Object(quads)) = root.remove("quads") {
-            let mut numbered: Vec<(u64, Json)> =
-                quads.into_iter().map(|(n, quad)| (n.parse().unwrap_or(u64::MAX), quad)).collect();
-            numbered.sort_by_key(|(n, _)| *n);
-            root.insert("quads".into(), numbered.into_iter().map(|(_, quad)| quad).collect());
+            root.insert("quads".into(), numbered_list(quads));
         }
-        let camera = &self.camera;
-        let lights = |lights: &[Light]| -> Vec<Json> {
-            lights
-            .iter()
-            .map(|light| match light {
-                Light::Directional { to_light, intensity } => {
-                    json!({"kind": "directional", "to_light": to_light.to_array(), "intensity": intensity.to_array()})
-                }
-                Light::Point { position, intensity } => {
-                    json!({"kind": "point", "position": position.to_array(), "intensity": intensity.to_array()})
-                }
-                Light::Spot { position, intensity, cone } => json!({
-                    "kind": "spot", "position": position.to_array(), "intensity": intensity.to_array(),
-                    "axis": cone.axis.to_array(), "cos_edge": cone.cos_edge, "inverse_soft": cone.inverse_soft,
-                }),
-            })
-            .collect()
-        };
-        let environment = self.environment.as_ref().map(|environment| {
-            json!({
-                "map": {
-                    "width": environment.map.width,
-                    "height": environment.map.height,
-                    "crc32": format!("{:08x}", environment.map.checksum()),
-                },
-                // Columns of u are looked up this much further right.
-                "turn": environment.turn,
-                "intensity": environment.intensity,
-                "irradiance": environment.irradiance.0.map(|c| c.to_array()),
-                "irradiance_error": environment.irradiance_error(),
-                "lights": lights(&self.environment_lights),
-                "lights_error": environment.error(),
-                "sun": environment.sun.map(|sun| json!({
-                    "to_sun": sun.to_sun.to_array(),
-                    "radiance": sun.radiance.to_array(),
-                    "angular_radius": crate::light::environment::ANGULAR_RADIUS,
-                })),
-            })
-        });
-        let mesh = self.mesh();
-        let column =
-            |get: fn(&crate::place::Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
-        root.insert(
-            "derived".into(),
-            json!({
-                "curves": {
-                    "levels": self.water.shape.levels,
-                    "sigma_g_cells": self.water.shape.sigma_g_cells,
-                },
-                "quads": self.quads.iter().map(|quad| json!({
-                    "corners": quad.corners.map(|c| c.to_array()),
-                    "thickness": quad.material.thickness_m,
-                    // Copies of the volume before its corner A, and on it.
-                    "offset": quad.offset.to_array(),
-                    "extent": [quad.material.repeat_u, quad.material.repeat_v],
-                    "erosion": quad.erosion,
-                    "mist": quad.mist,
-                })).collect::<Vec<_>>(),
-                "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
-                "camera": {
-                    "eye": camera.eye.to_array(),
-                    "right": camera.right.to_array(),
-                    "up": camera.up.to_array(),
-                    "forward": camera.forward.to_array(),
-                    "tan_half_fov": camera.tan_half_fov,
-                    "near": camera.near,
-                    "sample_offsets": (0..self.image.samples)
-                        .map(|s| crate::picture::camera::sample_offset(&self.image, s))
-                        .collect::<Vec<_>>(),
-                },
-                "lights": lights(&self.lights),
-                "environment": environment,
-                "mesh": {
-                    "positions": column(|v| v.position),
-                    "normals": column(|v| v.normal),
-                    "albedos": column(|v| v.albedo),
-                    // Occlusion, shadow and film of water of each.
-                    "shades": column(|v| [v.occlusion, v.shadow, v.wet]),
-                    // Number of the pool that it belongs to, plus 1; 0: rock.
-                    "pools": mesh.vertices.iter().map(|v| v.pool).collect::<Vec<_>>(),
-                    "triangles": mesh.triangles(&vec![1; mesh.tiles.len()]),
-                },
-            }),
-        );
+        root.insert("derived".into(), self.derived_json());
         Json::Object(root)
+    }
+
+    fn derived_json(&self) -> Json {
+        json!({
+            "curves": {
+                "levels": self.water.shape.levels,
+                "sigma_g_cells": self.water.shape.sigma_g_cells,
+            },
+            "quads": self.quads.iter().map(quad_json).collect::<Vec<_>>(),
+            "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
+            "camera": camera_json(&self.camera, &self.image),
+            "lights": lights_json(&self.lights),
+            "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
+            "mesh": mesh_json(&self.mesh()),
+        })
     }
 }
 
-/// A name as a TOML key: bare where it may be, else a string with JSON's escapes, which TOML shares but
-/// for U+007F.
+fn quad_json(quad: &Quad) -> Json {
+    json!({
+        "corners": quad.corners.map(|c| c.to_array()),
+        "thickness": quad.material.thickness_m,
+        // Copies of the volume before the quad's corner A, and on the quad.
+        "offset": quad.offset.to_array(),
+        "extent": [quad.material.repeat_u, quad.material.repeat_v],
+        "erosion": quad.erosion,
+        "mist": quad.mist,
+    })
+}
+
+fn camera_json(camera: &Camera, image: &Image) -> Json {
+    json!({
+        "eye": camera.eye.to_array(),
+        "right": camera.right.to_array(),
+        "up": camera.up.to_array(),
+        "forward": camera.forward.to_array(),
+        "tan_half_fov": camera.tan_half_fov,
+        "near": camera.near,
+        "sample_offsets": (0..image.samples).map(|s| sample_offset(image, s)).collect::<Vec<_>>(),
+    })
+}
+
+fn lights_json(lights: &[Light]) -> Vec<Json> {
+    lights.iter().map(light_json).collect()
+}
+
+fn light_json(light: &Light) -> Json {
+    let kind = light.kind().word();
+    match light {
+        Light::Directional { to_light, intensity } => {
+            json!({"kind": kind, "to_light": to_light.to_array(), "intensity": intensity.to_array()})
+        }
+        Light::Point { position, intensity } => {
+            json!({"kind": kind, "position": position.to_array(), "intensity": intensity.to_array()})
+        }
+        Light::Spot { position, intensity, cone } => json!({
+            "kind": kind, "position": position.to_array(), "intensity": intensity.to_array(),
+            "axis": cone.axis.to_array(), "cos_edge": cone.cos_edge, "inverse_soft": cone.inverse_soft,
+        }),
+    }
+}
+
+fn environment_json(environment: &Environment, lights: &[Light]) -> Json {
+    json!({
+        "map": {
+            "width": environment.map.width,
+            "height": environment.map.height,
+            "crc32": format!("{:08x}", environment.map.checksum()),
+        },
+        // Lookups of a column u are shifted to the right by this much.
+        "turn": environment.turn,
+        "intensity": environment.intensity,
+        "irradiance": environment.irradiance.0.map(|c| c.to_array()),
+        "irradiance_error": environment.irradiance_error(),
+        "lights": lights_json(lights),
+        "lights_error": environment.error(),
+        "sun": environment.sun.map(|sun| json!({
+            "to_sun": sun.to_sun.to_array(),
+            "radiance": sun.radiance.to_array(),
+            "angular_radius": ANGULAR_RADIUS,
+        })),
+    })
+}
+
+fn mesh_json(mesh: &Mesh) -> Json {
+    let column = |get: fn(&Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
+    json!({
+        "positions": column(|v| v.position),
+        "normals": column(|v| v.normal),
+        "albedos": column(|v| v.albedo),
+        // Occlusion, shadow and film of water of each vertex.
+        "shades": column(|v| [v.occlusion, v.shadow, v.wet]),
+        // Number of the vertex's pool plus 1; 0 for rock.
+        "pools": mesh.vertices.iter().map(|v| v.pool).collect::<Vec<_>>(),
+        "triangles": mesh.triangles(&vec![1; mesh.tiles.len()]),
+    })
+}
+
+/// Turns an object whose keys are numbers into the list of its values, as in the scene file.
+fn numbered_list(object: Map<String, Json>) -> Json {
+    let mut numbered: Vec<(u64, Json)> =
+        object.into_iter().map(|(number, value)| (number.parse().unwrap_or(u64::MAX), value)).collect();
+    numbered.sort_by_key(|(number, _)| *number);
+    numbered.into_iter().map(|(_, value)| value).collect()
+}
+
+/// Returns a name as a TOML key: bare where TOML allows that, otherwise a JSON string. TOML has the escapes
+/// of JSON but also requires one for U+007F.
 fn quoted(name: &str) -> String {
     if name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
         name.into()
@@ -180,6 +201,7 @@ fn quoted(name: &str) -> String {
     }
 }
 
+/// Sets a dotted key, and makes the objects on its way.
 fn insert(map: &mut Map<String, Json>, key: &str, value: Json) {
     match key.split_once('.') {
         None => {

@@ -1,4 +1,4 @@
-//! The volume's quads: those of the scene itself, of its sheets and of its splashes, checked.
+//! Builders of the volume's quads: the scene's own, those of its sheets and those of its splashes.
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -38,7 +38,7 @@ pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
     Ok(quads)
 }
 
-/// The material that `key` of `what` names, and its mist.
+/// Returns the material that `key` names, and its mist. `what` names the user of the material in messages.
 fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(Material, f32)> {
     let name = v.text(key);
     if name != "water" && !materials.contains(&name) {
@@ -48,10 +48,13 @@ fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(
             format!("add [materials.{name}] or use one of: water {known}"),
         ));
     }
-    let of = |what: &str| v.float(&format!("materials.{name}.{what}"));
-    let material =
-        Material { thickness_m: of("thickness"), repeat_u: of("repeat_u"), repeat_v: of("repeat_v") };
-    Ok((material, of("mist")))
+    let float = |what: &str| v.float(&format!("materials.{name}.{what}"));
+    let material = Material {
+        thickness_m: float("thickness"),
+        repeat_u: float("repeat_u"),
+        repeat_v: float("repeat_v"),
+    };
+    Ok((material, float("mist")))
 }
 
 /// Adds the quads of a sheet.
@@ -68,8 +71,8 @@ fn sheet_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qua
         Error::input(
             format!("sheet {name}: quad {segment} along, {column} across {}", fault.words()),
             format!(
-                "sheets.{name}.points must go across sheets.{name}.across, and the more it is round, the less they \
-                 may bend"
+                "sheets.{name}.points must run across sheets.{name}.across; the rounder the sheet, the less \
+                 they may bend"
             ),
         )
     })?;
@@ -85,7 +88,7 @@ fn splash_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qu
     let Some(toward) = unit(toward.with_y(0.0)) else {
         return Err(Error::input(
             format!("splash {name}: {} = {toward} has no direction along the ground", key("toward")),
-            "give a vector that is not plumb",
+            "give a vector that is not vertical",
         ));
     };
     let (material, mist) = material(v, materials, &format!("splash {name}"), &key("material"))?;

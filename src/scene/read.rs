@@ -1,4 +1,5 @@
-//! Scene files: strict TOML with the line of every fault, bases, and `--set`.
+//! Reading of scene files, their bases and `--set`. The TOML is checked strictly, and every error names its
+//! line.
 
 use std::path::{Path, PathBuf};
 
@@ -10,33 +11,37 @@ use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
 use crate::util::error::{Error, Result};
 
-/// Scene files larger than this are refused: four million numbers are no scene, but a mistake.
+/// Largest scene file, bytes. A larger one holds millions of numbers and is a mistake.
 const MAX_BYTES: u64 = 16 << 20;
-/// More quads than this would not fit the quad buffer of a small GPU.
+/// Largest number of quads in a scene. More would not fit into the quad buffer of a small GPU.
 pub const MAX_QUADS: usize = 65_536;
-/// The version of the scene format this program writes and reads.
+/// Version of the scene format that this program reads and writes.
 pub const VERSION: i64 = 1;
 
-/// The list of keyframed parameters.
+/// Key of the list of keyframed parameters.
 const TRACKS: &str = "animate.tracks";
 
-/// The sections whose second key part is a name the scene chooses.
+/// Sections whose keys have a name of the scene's choice as their second part.
 const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
 
-/// A scene as text, with its name and the folder its references resolve in.
+/// The text of a scene, with its name and the folder in which its references resolve.
 pub struct Source {
     /// Name for messages and for the default output.
     pub name: String,
-    /// Where the text comes from, for messages.
+    /// Origin of the text, for messages.
     pub origin: String,
-    /// The folder of a scene file; the current folder for a preset.
+    /// Folder of the scene file; the current folder for a preset.
     pub folder: PathBuf,
-    /// The TOML.
+    /// TOML of the scene.
     pub text: String,
 }
 
 impl Source {
-    /// A preset by its name, else a scene file.
+    /// Finds a preset of this name, otherwise a scene file at this path.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where there is neither, or the file is no regular file, too large or not UTF-8;
+    /// [`Error::Io`] where it cannot be read.
     pub fn find(scene: &Path) -> Result<Source> {
         if let Some(name) = scene.to_str()
             && let Some(text) = presets::text(name)
@@ -92,7 +97,10 @@ impl Source {
         })
     }
 
-    /// Parses the text over its bases.
+    /// Parses the text. Its values override those of its base.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the line of the fault.
     pub fn values(&self) -> Result<Values> {
         self.values_at_depth(0)
     }
@@ -121,7 +129,7 @@ impl Source {
                     ));
                 };
                 if depth > 8 {
-                    return Err(Error::input(format!("{}: bases go round in a circle", at.0), "remove one"));
+                    return Err(Error::input(format!("{}: the bases form a circle", at.0), "remove one"));
                 }
                 let base = Source {
                     name: name.into(),
@@ -144,7 +152,8 @@ impl Source {
 
 struct File<'a> {
     source: &'a Source,
-    /// Where the lines end: every value has its place, so finding one must not read the text again.
+    /// Offsets of the line ends. Every value needs its line number; a search avoids reading the text again
+    /// for each.
     newlines: Vec<usize>,
 }
 
@@ -180,7 +189,7 @@ impl File<'_> {
 
     fn section(&self, name: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
         match value.get_ref() {
-            // A scene's own quads replace all of its base's.
+            // The scene's own quads replace all quads of its base.
             DeValue::Array(quads) if name == "quads" => {
                 if quads.len() > MAX_QUADS {
                     return Err(Error::input(
@@ -195,7 +204,7 @@ impl File<'_> {
                     .try_for_each(|(i, quad)| self.keys(&format!("quads.{i}"), quad, values))
             }
             _ if name == "quads" => Err(Error::input(
-                format!("{}: quads is a list", self.place(value.span().start).0),
+                format!("{}: quads must be a list", self.place(value.span().start).0),
                 "write [[quads]] before each",
             )),
             _ => self.keys(name, value, values),
@@ -212,7 +221,7 @@ impl File<'_> {
                     self.keys(&format!("{path}.{}", key.get_ref()), value, values)
                 })
             }
-            // A scene's own tracks replace its base's, as its quads do.
+            // The scene's own tracks replace all tracks of its base, as its quads do.
             DeValue::Array(tracks) if path == TRACKS => {
                 values.clear_under(TRACKS);
                 tracks
@@ -224,7 +233,7 @@ impl File<'_> {
         }
     }
 
-    /// A table without keys: a light or material with every default, or a mistake.
+    /// Reads a table without keys: a light or material with every default, or a mistake.
     fn empty(&self, path: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
         let section = path.split('.').next().unwrap_or(path);
         let key = match section {
@@ -252,7 +261,7 @@ impl File<'_> {
     }
 }
 
-/// A TOML value without its positions.
+/// Converts a TOML value, without its positions.
 fn raw(value: &DeValue) -> Raw {
     match value {
         DeValue::String(s) => Raw::Text(s.to_string()),
@@ -266,17 +275,20 @@ fn raw(value: &DeValue) -> Raw {
     }
 }
 
-/// The keys whose values are paths.
+/// Keys whose values are paths.
 pub const REFERENCES: [&str; 2] = ["volume.file", "environment.file"];
 
-/// Whether `--set`s name files: paths on the command line are the user's own word, relative to the current
-/// folder.
+/// Whether a `--set` gives this reference. Paths from the command line are trusted and relative to the
+/// current folder.
 pub fn set_by_hand(sets: &[String], reference: &str) -> bool {
     sets.iter().any(|s| s.split('=').next().is_some_and(|key| key.trim() == reference))
 }
 
-/// Applies `--set`s in order; the folder in which references of the scene resolve. None if all may be
-/// trusted: then those of the scene's own were resolved.
+/// Applies `--set`s in order. Returns the folder in which the scene's references resolve, or `None` if all of
+/// them may be trusted: once a `--set` gives a reference, those of the scene itself are resolved here.
+///
+/// # Errors
+/// The errors of [`apply_set`] and [`build::resolve`].
 pub fn apply_sets(
     values: &mut Values,
     sets: &[String],
@@ -293,9 +305,13 @@ pub fn apply_sets(
     Ok(None)
 }
 
-/// Applies one `--set key=value`. The value is TOML; what is not TOML is taken as a word.
+/// Applies one `--set key=value`. The value is TOML; text that is not TOML is taken as a word.
+///
+/// # Errors
+/// [`Error::Usage`] where there is no `=`, [`Error::Input`] where the table has no such key or does not allow
+/// the value, or the scene has no such name.
 pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
-    // A name in a key may hold an = of its own: the first one that ends a known key is meant.
+    // A name in the key may contain an = itself. The key ends at the first = that makes it a known one.
     let splits = || setting.match_indices('=').map(|(at, _)| (&setting[..at], &setting[at + 1..]));
     let known = splits().find(|(key, _)| Param::find(key.trim()).is_some());
     let Some((key, text)) = known.or(splits().next()) else {
@@ -307,13 +323,13 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     values.set(key, &parsed, &Place("--set".into()))
 }
 
-/// A value as `--set` takes it: TOML, else a word.
+/// Parses a value of `--set`: TOML, otherwise a word.
 pub fn parse_value(text: &str) -> Raw {
     DeValue::parse(text).map_or_else(|_| Raw::Text(text.into()), |v| raw(v.get_ref()))
 }
 
-/// Names come from the scene: a misspelt one must not make a second light. The error is what is wrong and
-/// what there is.
+/// Checks that the scene has the name in `key`, so that a misspelt one does not add a second light. The error
+/// is the fault and the list of the names there are.
 pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (String, String)> {
     let mut parts = key.split('.');
     let (Some(section), Some(name)) = (parts.next(), parts.next()) else { return Ok(()) };

@@ -1,11 +1,11 @@
-//! Parameter values: checked against the table, merged, printed.
+//! Parameter values: they are checked against the table, merged and printed.
 
 use std::collections::BTreeMap;
 
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param, nearest};
 use crate::util::error::{Error, Result};
 
-/// A checked value. Numbers are the shortest decimal of the float32 that is rendered with.
+/// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A number.
@@ -18,13 +18,13 @@ pub enum Value {
     Triple([f64; 3]),
     /// Four corners.
     Corners([[f64; 3]; 4]),
-    /// Numbers of frames.
+    /// Frame numbers.
     Frames(Vec<i64>),
-    /// Values of one kind, by their components: 1, 3 or 12.
+    /// Values of one kind, each as 1, 3 or 12 components.
     Series(Vec<Vec<f64>>),
 }
 
-/// A value as some syntax gave it, before it meets the table.
+/// A value as its syntax gives it, not yet checked against the table.
 #[derive(Clone, Debug)]
 pub enum Raw {
     /// A float.
@@ -35,19 +35,19 @@ pub enum Raw {
     Text(String),
     /// A list.
     List(Vec<Raw>),
-    /// Anything else, by its name.
+    /// Anything else, by the name of its type.
     Other(&'static str),
 }
 
-/// Where a value comes from, for messages: `file:line` or `--set`.
+/// Origin of a value, for messages: `file:line` or `--set`.
 #[derive(Clone, Debug)]
 pub struct Place(pub String);
 
-/// Dotted concrete keys and their values; keys not in the map have their defaults.
+/// Dotted concrete keys and their values. Keys that are absent have their defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values(pub BTreeMap<Key, Value>);
 
-/// A dotted key that sorts numbers (of quads) by size and names by letters.
+/// A dotted key. Numeric parts (quads, tracks) sort by value, names by letters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key(Vec<Part>);
 
@@ -58,12 +58,12 @@ enum Part {
 }
 
 impl Key {
-    /// From its dotted form.
+    /// Parses the dotted form.
     pub fn new(dotted: &str) -> Self {
         Key(dotted
             .split('.')
             .map(|part| match part.parse::<u32>() {
-                // A light named 007 keeps its name.
+                // "007" stays a name: as a number it would print as "7".
                 Ok(n) if n.to_string() == part => Part::Number(n),
                 _ => Part::Name(part.into()),
             })
@@ -86,6 +86,10 @@ impl std::fmt::Display for Key {
 
 impl Values {
     /// Checks `raw` against the table and stores it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the table has no such key or does not allow the value. The message begins with
+    /// `place`.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
         let Some(param) = Param::find(key) else {
             let fix = match nearest(key) {
@@ -107,7 +111,7 @@ impl Values {
         self.0.retain(|key, _| !key.0.starts_with(&prefix.0));
     }
 
-    /// Gives `key` the value it has in `other`, or none if it has none there.
+    /// Gives `key` the value that it has in `other`, or removes it if it has none there.
     pub fn copy_from(&mut self, other: &Values, key: &str) {
         let key = Key::new(key);
         match other.0.get(&key) {
@@ -122,7 +126,7 @@ impl Values {
         self.0.range(&prefix..).next().is_some_and(|(key, _)| key.0.starts_with(&prefix.0))
     }
 
-    /// Takes every key that `other` has under `from`, as a key under `to`.
+    /// Copies every key of `other` under `from` to the same key under `to`.
     pub fn copy_under(&mut self, other: &Values, from: &str, to: &str) {
         let (from, to) = (Key::new(from), Key::new(to));
         for (key, value) in &other.0 {
@@ -132,7 +136,7 @@ impl Values {
         }
     }
 
-    /// The names (or numbers) below `section`, in order.
+    /// Returns the names (or numbers) below `section`, in order.
     pub fn names(&self, section: &str) -> Vec<String> {
         let section = Key::new(section);
         let mut names: Vec<String> = Vec::new();
@@ -149,10 +153,10 @@ impl Values {
         names
     }
 
-    /// The value of a concrete key: set, or the table's default.
+    /// Returns the value of a concrete key, or the table's default.
     ///
     /// # Panics
-    /// If the table has no such key, or a required value was not given: callers check first.
+    /// If the table has no such key, or a required value is absent. Callers check first.
     pub fn get(&self, key: &str) -> Value {
         if let Some(value) = self.0.get(&Key::new(key)) {
             return value.clone();
@@ -170,12 +174,12 @@ impl Values {
         }
     }
 
-    /// Whether the scene sets this key itself.
+    /// Whether the scene itself sets this key.
     pub fn is_set(&self, key: &str) -> bool {
         self.0.contains_key(&Key::new(key))
     }
 
-    /// A float32 parameter.
+    /// Returns a float32 parameter.
     pub fn float(&self, key: &str) -> f32 {
         match self.get(key) {
             Value::Float(x) => x as f32,
@@ -183,7 +187,7 @@ impl Values {
         }
     }
 
-    /// A whole parameter.
+    /// Returns a whole number.
     pub fn int(&self, key: &str) -> i64 {
         match self.get(key) {
             Value::Int(x) => x,
@@ -191,12 +195,12 @@ impl Values {
         }
     }
 
-    /// A whole parameter whose range fits 32 bits.
+    /// Returns a whole number whose range fits 32 bits.
     pub fn count(&self, key: &str) -> u32 {
         u32::try_from(self.int(key)).unwrap_or_else(|_| panic!("{key} does not fit 32 bits"))
     }
 
-    /// A word.
+    /// Returns a word, path or name.
     pub fn text(&self, key: &str) -> String {
         match self.get(key) {
             Value::Text(t) => t,
@@ -204,7 +208,17 @@ impl Values {
         }
     }
 
-    /// A point, direction or colour.
+    /// Returns the variant that the value of a choice names. `from_word` is that of the enum whose words the
+    /// table lists.
+    ///
+    /// # Panics
+    /// If `from_word` does not know the word.
+    pub fn choice<T>(&self, key: &str, from_word: impl Fn(&str) -> Option<T>) -> T {
+        let word = self.text(key);
+        from_word(&word).unwrap_or_else(|| panic!("{key} has no choice {word}"))
+    }
+
+    /// Returns a point, direction or colour.
     pub fn triple(&self, key: &str) -> glam::Vec3 {
         match self.get(key) {
             Value::Triple(t) => glam::Vec3::from_array(t.map(|x| x as f32)),
@@ -212,7 +226,7 @@ impl Values {
         }
     }
 
-    /// Numbers of frames.
+    /// Returns frame numbers.
     pub fn frames(&self, key: &str) -> Vec<i64> {
         match self.get(key) {
             Value::Frames(frames) => frames,
@@ -220,7 +234,7 @@ impl Values {
         }
     }
 
-    /// Values by their components.
+    /// Returns a list of values, each by its components.
     pub fn series(&self, key: &str) -> Vec<Vec<f64>> {
         match self.get(key) {
             Value::Series(values) => values,
@@ -228,7 +242,7 @@ impl Values {
         }
     }
 
-    /// Four corners.
+    /// Returns four corners.
     pub fn corners(&self, key: &str) -> [glam::Vec3; 4] {
         match self.get(key) {
             Value::Corners(c) => c.map(|p| glam::Vec3::from_array(p.map(|x| x as f32))),
@@ -237,12 +251,12 @@ impl Values {
     }
 }
 
-/// The value as the renderer's float32, in its shortest decimal.
+/// Rounds to the renderer's float32, as its shortest decimal.
 fn round_f32(x: f64) -> f64 {
     (x as f32).to_string().parse().unwrap_or(f64::NAN)
 }
 
-/// Checks a raw value against a parameter's kind; the error is the value in words.
+/// Checks a raw value against a parameter's kind. The error is the value as text.
 fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
     let words = || raw.words();
     match param.kind {
@@ -283,7 +297,8 @@ fn frames(raw: &Raw) -> Option<Vec<i64>> {
     (numbers.len() <= MAX_KEYFRAMES && numbers.is_sorted_by(|a, b| a < b)).then_some(numbers)
 }
 
-/// The numbers of each value in one row; whether they are allowed is for the key they are meant for.
+/// Returns the components of each value. Their range depends on the key that they are meant for, and is
+/// checked with it.
 fn series(raw: &Raw) -> Option<Vec<Vec<f64>>> {
     let Raw::List(list) = raw else { return None };
     let number = |raw: &Raw| match *raw {
@@ -307,7 +322,7 @@ fn series(raw: &Raw) -> Option<Vec<Vec<f64>>> {
     (values.len() <= MAX_KEYFRAMES && alike).then_some(values)
 }
 
-/// A number inside the range whose float32 is neither denormal nor infinite.
+/// Returns a number inside the range whose float32 is neither denormal nor infinite.
 fn float(raw: &Raw, min: f64, max: f64) -> Option<f64> {
     let x = match *raw {
         Raw::Float(x) => x,
@@ -316,7 +331,7 @@ fn float(raw: &Raw, min: f64, max: f64) -> Option<f64> {
     };
     let single = x as f32;
     let usable = single.is_normal() || x == 0.0;
-    // −0 would turn signs of derived values; it means 0.
+    // −0 becomes 0: it would flip the signs of derived values.
     ((min..=max).contains(&x) && usable).then(|| if x == 0.0 { 0.0 } else { round_f32(x) })
 }
 
@@ -327,7 +342,7 @@ fn triple(raw: &Raw, min: f64, max: f64) -> Option<[f64; 3]> {
 }
 
 impl Raw {
-    /// The value in words, cut to a length that fits a message.
+    /// Formats the value for a message, cut to 60 characters.
     fn words(&self) -> String {
         let text = match self {
             Raw::Float(x) => format!("{x:?}"),
@@ -346,7 +361,7 @@ impl Raw {
 }
 
 impl Value {
-    /// As TOML.
+    /// Formats the value as TOML.
     pub fn to_toml(&self) -> String {
         let list = |items: Vec<String>| format!("[{}]", items.join(", "));
         match self {
@@ -376,7 +391,7 @@ impl Value {
         }
     }
 
-    /// As JSON.
+    /// Converts the value to JSON.
     pub fn to_json(&self) -> serde_json::Value {
         match self {
             Value::Float(x) => serde_json::json!(x),

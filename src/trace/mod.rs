@@ -7,4 +7,4 @@ mod settings;
 
 pub use levels::{level_atlas, pyramid_spec};
 pub use matter::{MIST_OF_CELLS, MIST_RHO, SheetDensity};
-pub use settings::{Attenuation, Lookup, Prefilter, Trace, extinction, flow_cells};
+pub use settings::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace, extinction, flow_cells};

@@ -1,5 +1,7 @@
 //! §4 How view rays go through the volume.
 
+use crate::util::words::words;
+
 /// How view rays go through the volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trace {
@@ -26,6 +28,8 @@ pub enum Prefilter {
     Pyramid,
 }
 
+words! { Prefilter { None => "none", Pyramid => "pyramid" } }
+
 /// What a ray finds in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lookup {
@@ -34,6 +38,8 @@ pub enum Lookup {
     /// At the middle of its way through the cell, what lies between the centres of eight cells.
     Trilinear,
 }
+
+words! { Lookup { Nearest => "nearest", Trilinear => "trilinear" } }
 
 /// τ_k of a cell with density ρ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +54,27 @@ pub enum Attenuation {
         /// Optical depth at ρ = 1.
         tau: f32,
     },
+}
+
+/// Form of an [`Attenuation`], without its coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AttenuationKind {
+    /// [`Attenuation::PathLength`].
+    PathLength,
+    /// [`Attenuation::PerCell`].
+    PerCell,
+}
+
+words! { AttenuationKind { PathLength => "path-length", PerCell => "per-cell" } }
+
+impl Attenuation {
+    /// Returns the form without the coefficient.
+    pub fn kind(&self) -> AttenuationKind {
+        match self {
+            Attenuation::PathLength { .. } => AttenuationKind::PathLength,
+            Attenuation::PerCell { .. } => AttenuationKind::PerCell,
+        }
+    }
 }
 
 /// Optical depth in bits (log₂ of the transmittance) per unit of a cell's ρ code, and per metre with

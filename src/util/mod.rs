@@ -6,3 +6,4 @@ pub mod monitor;
 pub mod random;
 pub mod unit;
 pub mod window;
+pub(crate) mod words;

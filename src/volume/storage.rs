@@ -2,6 +2,7 @@
 
 use super::{Bricks, Cell, WaterSpec};
 use crate::util::error::{Error, Result};
+use crate::util::words::words;
 
 /// How the cells of a volume are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub enum StorageChoice {
     /// In bricks.
     Sparse,
 }
+
+words! { StorageChoice { Auto => "auto", Dense => "dense", Sparse => "sparse" } }
 
 /// Bytes of a volume of `size` cells, all stored, in a picture: on the host, there again where its empty cells hold boxes to leap
 /// over, and on the device. Coarse levels (`pyramid`) take a seventh on the host, and up to three quarters on the device.

@@ -1,25 +1,27 @@
-//! Where everything on a sheet is.
+//! Layout of a sheet.
 
 use super::text::Fonts;
 use super::{LONGEST_SIDE, Label, Layout, Place, Rect, Sheet};
 use crate::util::error::{Error, Result};
 
-/// Shortest side that a picture is shrunk to. A value of four digits still stands over it.
+/// Shortest side to which a picture is shrunk, pixels. A value of four digits still fits above it.
 const SMALLEST_CELL: u32 = 36;
 
-/// Width over height that a wrapped row of pictures comes nearest to.
+/// Ratio of width to height at which a wrapped row of pictures aims.
 const ASPECT: f64 = 1.6;
 
-/// Pictures that one parameter may have in a single row.
+/// Largest number of pictures of one parameter in a single row.
 const ONE_ROW: usize = 6;
 
 const BRIGHT: [u8; 3] = [222, 224, 228];
 const QUIET: [u8; 3] = [160, 164, 171];
 
 impl Sheet {
-    /// Where everything goes. Pictures keep their size if the sheet then has no side longer than
-    /// [`LONGEST_SIDE`]; else they shrink as much as it takes. Exit 65 if they would have to be smaller than
-    /// 36 pixels, or if there are none.
+    /// Lays out the sheet. Pictures keep their size if no side of the sheet is then longer than
+    /// [`LONGEST_SIDE`]; otherwise they shrink as far as necessary.
+    ///
+    /// # Errors
+    /// [`Error::Input`] (exit 65) where pictures would have to be smaller than 36 pixels, or have no pixels.
     pub fn layout(&self) -> Result<Layout> {
         let [columns, rows] = [&self.columns, &self.rows].map(|axis| axis.values.len().max(1));
         let shortest = self.cell[0].min(self.cell[1]);
@@ -28,7 +30,7 @@ impl Sheet {
         }
         let longest = self.cell[0].max(self.cell[1]);
         let fonts = Fonts::new()?;
-        // By the longer side, so that a picture keeps its shape to the pixel.
+        // Sizes follow from the longer side, so that a picture keeps its shape to the pixel.
         let cell = |side: u32| {
             self.cell
                 .map(|full| ((full as u64 * side as u64 + longest as u64 / 2) / longest as u64).max(1) as u32)
@@ -37,7 +39,7 @@ impl Sheet {
             let layout = self.arrange(&fonts, cell(side));
             layout.size.iter().all(|s| *s <= LONGEST_SIDE).then_some(layout)
         };
-        // Pictures far too many are refused before their places are made.
+        // Far too many pictures are refused before their places are computed.
         let smallest =
             longest.min(SMALLEST_CELL.max(SMALLEST_CELL.saturating_mul(longest / shortest).min(512)));
         let most = (LONGEST_SIDE / SMALLEST_CELL.min(shortest)) as usize;
@@ -63,9 +65,9 @@ impl Sheet {
         Ok(best)
     }
 
-    /// The layout with pictures of this size.
+    /// Returns the layout for pictures of this size.
     fn arrange(&self, fonts: &Fonts, [w, h]: [u32; 2]) -> Layout {
-        // Text grows with the pictures, for a large sheet is looked at from further away.
+        // Text grows with the pictures, because a large sheet is viewed from further away.
         let text = (6.0 + 0.075 * w.min(h) as f32).clamp(14.0, 34.0).round();
         let em = text as u32;
         let (margin, gap) = (2 * em, (em / 2).max(6));
@@ -73,13 +75,13 @@ impl Sheet {
         let wrapped = self.rows.values.is_empty();
         let count = self.columns.values.len().max(1);
         let caption = if wrapped && !self.columns.values.is_empty() { line + gap / 2 } else { 0 };
-        // Beside a picture lower than a line stands a line all the same.
+        // A row label needs a whole line even beside a picture that is lower than one.
         let slot = if wrapped { h } else { h.max(line) };
         let pitch = [w + gap, slot + caption + gap + if caption > 0 { gap } else { 0 }];
         let across = if wrapped { wrap(count, pitch) } else { count };
         let down = if wrapped { count.div_ceil(across) } else { self.rows.values.len() };
 
-        // Left of the grid: an arrow, and the rows' values.
+        // Left of the grid are an arrow and the values of the rows.
         let values = self.rows.values.iter().map(|v| fonts.width(v, text)).max().unwrap_or(0);
         let strip = if wrapped {
             0
@@ -164,8 +166,8 @@ impl Sheet {
     }
 }
 
-/// Pictures in a row, of `count` that wrap at `pitch` pixels: the sheet comes near to [`ASPECT`], with few
-/// places left empty in the last row.
+/// Returns the number of pictures in a row, out of `count` that wrap at a pitch of `pitch` pixels. It brings
+/// the sheet near to [`ASPECT`] and leaves few places empty in the last row.
 fn wrap(count: usize, pitch: [u32; 2]) -> usize {
     if count <= ONE_ROW {
         return count;

@@ -1,8 +1,8 @@
-//! A labelled contact sheet: the pictures of a parameter sweep side by side, with its axes and values.
+//! Labelled contact sheets: the pictures of a parameter sweep side by side, with its axes and values.
 //!
-//! One parameter fills rows like lines of text, each picture with its value below it. Two make a grid, the
-//! first across and the second down; of three and more, the first goes across and a row stands for each
-//! combination of the others. Pictures are drawn one at a time, so the sheet itself is all the memory taken.
+//! The pictures of one parameter fill rows like words in a text, each with its value below it. Two parameters
+//! make a grid, the first across and the second down. With three or more, the first goes across and each row
+//! is a combination of the others. Pictures are drawn one at a time, so only the sheet itself takes memory.
 
 mod layout;
 mod paint;
@@ -10,34 +10,34 @@ mod text;
 
 pub use paint::draw;
 
-/// Most pixels a side of a sheet: 192 MiB if it is a square. Pictures shrink until it fits.
+/// Longest side of a sheet, pixels; a square sheet takes 192 MiB. Pictures shrink until the sheet fits.
 pub const LONGEST_SIDE: u32 = 8192;
 
-/// A parameter and the values it takes.
+/// A parameter and its values.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Axis {
     /// Name with symbol and unit, such as `σ 1/m`.
     pub name: String,
-    /// Its values as text, in order.
+    /// Values as text, in order.
     pub values: Vec<String>,
 }
 
-/// What a sheet shows.
+/// Contents of a sheet.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sheet {
     /// First line, large.
     pub title: String,
-    /// Second line: what all pictures have in common.
+    /// Second line: the properties that all pictures share.
     pub subtitle: String,
-    /// From left to right.
+    /// Axis from left to right.
     pub columns: Axis,
-    /// From top to bottom. Without values there is one parameter only, whose pictures wrap.
+    /// Axis from top to bottom. Without values there is only one parameter, and its pictures wrap.
     pub rows: Axis,
-    /// Width and height of a picture, pixels; it is shown no larger.
+    /// Width and height of a picture, pixels. It is never enlarged.
     pub cell: [u32; 2],
 }
 
-/// Pixels from the top left.
+/// A rectangle, in pixels from the top left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rect {
     /// Left edge.
@@ -51,7 +51,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Whether the two have a pixel in common.
+    /// Whether the two rectangles share a pixel.
     pub fn meets(&self, other: &Rect) -> bool {
         self.x < other.x + other.w
             && other.x < self.x + self.w
@@ -63,13 +63,13 @@ impl Rect {
 /// A piece of text in its box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
-    /// As it is drawn, shortened with … where its place is short.
+    /// Text as drawn, shortened with … where the box is too narrow.
     pub text: String,
-    /// Holds every pixel of it.
+    /// Box that contains every pixel of the text.
     pub rect: Rect,
     /// Height of the line, pixels.
     pub size: f32,
-    /// sRGB.
+    /// Colour, sRGB.
     pub color: [u8; 3],
 }
 
@@ -80,27 +80,28 @@ pub struct Place {
     pub row: usize,
     /// Index in the columns' values.
     pub column: usize,
-    /// The picture is in its middle.
+    /// Box in whose middle the picture is drawn.
     pub rect: Rect,
 }
 
-/// Where everything is.
+/// Positions of everything on a sheet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
     /// Width and height of the sheet, pixels.
     pub size: [u32; 2],
-    /// Pictures, row by row.
+    /// Places of the pictures, row by row.
     pub places: Vec<Place>,
-    /// All text but the notes in absent pictures.
+    /// All text except the notes in absent pictures.
     pub labels: Vec<Label>,
-    /// From start to head, x and y, one along each axis.
+    /// Arrows along the axes: x and y of start and head.
     pub arrows: Vec<[[u32; 2]; 2]>,
     /// Height of the text, pixels.
     text: f32,
 }
 
 impl Sheet {
-    /// The sheet of a sweep: the first axis goes across, the product of the others down, the last fastest.
+    /// Makes the sheet of a sweep. The first axis goes across and the product of the others down; the last
+    /// one varies fastest.
     pub fn of(title: &str, subtitle: &str, axes: &[Axis], cell: [u32; 2]) -> Sheet {
         let mut rest = axes.iter().skip(1);
         let rows = rest.next().cloned().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Drawing a sheet: pictures shrunk, arrows, frames.
+//! Drawing of a sheet: shrunk pictures, labels, arrows and frames.
 
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Rgb, RgbImage};
@@ -7,15 +7,17 @@ use super::text::Fonts;
 use super::{Label, Rect, Sheet};
 use crate::util::error::Result;
 
-/// In the middle of an absent picture.
+/// Note in the middle of an absent picture.
 const ABSENT: &str = "not rendered";
 
 const PAPER: [u8; 3] = [19, 20, 22];
 const LINE: [u8; 3] = [92, 96, 104];
 const FRAME: [u8; 3] = [50, 53, 58];
 
-/// Draws the sheet; `cell` gives the picture of a row and a column, or `None` where there is none. Its
-/// errors end the drawing.
+/// Draws a sheet. `cell` returns the picture of a row and column, or `None` where there is none.
+///
+/// # Errors
+/// The errors of [`Sheet::layout`] and of `cell`.
 pub fn draw(
     sheet: &Sheet,
     mut cell: impl FnMut(usize, usize) -> Result<Option<RgbImage>>,
@@ -43,8 +45,9 @@ pub fn draw(
     Ok(image)
 }
 
-/// The picture no larger than its place, its shape kept. The mean is taken of light, not of sRGB bytes:
-/// thin bright threads keep their brightness. No sharpening filter: its halos would pass for water.
+/// Shrinks a picture to fit its place, and keeps its shape. The mean is taken in linear light and not of sRGB
+/// bytes, so that thin bright threads keep their brightness. A sharpening filter is not used: its halos would
+/// look like water.
 fn shrink(picture: RgbImage, place: Rect) -> RgbImage {
     let (w, h) = picture.dimensions();
     if w <= place.w && h <= place.h {
@@ -61,20 +64,20 @@ fn shrink(picture: RgbImage, place: Rect) -> RgbImage {
     ImageBuffer::from_fn(small.width(), small.height(), |x, y| Rgb(small.get_pixel(x, y).0.map(byte)))
 }
 
-/// Linear light of an sRGB byte.
+/// Decodes an sRGB byte to linear light.
 fn light(byte: u8) -> f32 {
     let x = byte as f32 / 255.0;
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-/// sRGB byte of linear light.
+/// Encodes linear light as an sRGB byte.
 fn byte(x: f32) -> u8 {
     let x = x.clamp(0.0, 1.0);
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0 + 0.5) as u8
 }
 
-/// Lays `color` over a pixel, in linear light.
+/// Blends `color` over a pixel by its share, in linear light.
 pub fn blend(image: &mut RgbImage, x: u32, y: u32, color: [u8; 3], share: f32) {
     if let Some(pixel) = image.get_pixel_mut_checked(x, y) {
         for (under, over) in pixel.0.iter_mut().zip(color) {
@@ -84,7 +87,7 @@ pub fn blend(image: &mut RgbImage, x: u32, y: u32, color: [u8; 3], share: f32) {
     }
 }
 
-/// A line of one pixel with an open head, to the right or down.
+/// Draws a line of one pixel with an open head, to the right or down.
 fn draw_arrow(image: &mut RgbImage, [[x0, y0], [x1, y1]]: &[[u32; 2]; 2], text: f32) {
     for x in *x0..=*x1 {
         blend(image, x, *y0, LINE, 1.0);
@@ -102,7 +105,7 @@ fn draw_arrow(image: &mut RgbImage, [[x0, y0], [x1, y1]]: &[[u32; 2]; 2], text: 
     }
 }
 
-/// An empty frame with a note, as far as there is room for one.
+/// Draws an empty frame, with a note where there is room for it.
 fn draw_absent(image: &mut RgbImage, fonts: &Fonts, place: Rect, size: f32) {
     let [right, bottom] = [place.x + place.w - 1, place.y + place.h - 1];
     for x in place.x..=right {
@@ -128,7 +131,7 @@ mod tests {
         let checks = RgbImage::from_fn(64, 64, |x, y| Rgb([if (x + y) % 2 == 0 { 255 } else { 0 }; 3]));
         let small = shrink(checks, Rect { x: 0, y: 0, w: 16, h: 16 });
         assert_eq!(small.dimensions(), (16, 16));
-        // Half the light is byte 188, not 128.
+        // Half the light encodes to byte 188, not 128.
         assert!(small.pixels().all(|p| p.0[0].abs_diff(188) <= 2));
     }
 

@@ -1,4 +1,4 @@
-//! Text of a sheet, in the fonts that the binary holds.
+//! Text of a sheet, in fonts that the binary contains.
 
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
 use image::RgbImage;
@@ -7,7 +7,7 @@ use super::paint::blend;
 use super::{Label, Rect};
 use crate::util::error::{Error, Result};
 
-/// The fonts: the second has signs that the first lacks.
+/// The fonts. The second has characters that the first lacks.
 pub struct Fonts([FontRef<'static>; 2]);
 
 impl Fonts {
@@ -19,12 +19,13 @@ impl Fonts {
         Ok(Fonts([open(epaint_default_fonts::UBUNTU_LIGHT)?, open(epaint_default_fonts::HACK_REGULAR)?]))
     }
 
-    /// Height of a line of text.
+    /// Returns the height of a line of text, pixels.
     pub fn line(&self, size: f32) -> u32 {
         size.ceil() as u32
     }
 
-    /// The glyphs of a text from x = 0, and its end. What no font has is a `?`, and control signs are blanks.
+    /// Lays out a text from x = 0. Returns its glyphs, each with the index of its font, and its end. A
+    /// character that no font has becomes `?`, and control characters become blanks.
     pub fn glyphs(&self, text: &str, size: f32) -> (Vec<(usize, Glyph)>, f32) {
         let (mut glyphs, mut x, mut before) = (Vec::new(), 0.0, None);
         for c in text.chars() {
@@ -45,17 +46,18 @@ impl Fonts {
         (glyphs, x)
     }
 
+    /// Returns the width of a text, pixels.
     pub fn width(&self, text: &str, size: f32) -> u32 {
         self.glyphs(text, size).1.ceil() as u32
     }
 
-    /// The text, or as much of its start as fits into `width` pixels with a … behind it; nothing if not even
-    /// that fits.
+    /// Returns the text, or as much of its start as fits into `width` pixels with … after it. The result is
+    /// empty if not even … fits.
     pub fn shorten(&self, text: &str, size: f32, width: u32) -> String {
         if self.width(text, size) <= width {
             return text.to_owned();
         }
-        // No more signs than pixels can fit: the rest of a hostile name is never measured.
+        // At most one character per pixel can fit, so the rest of a very long name need not be measured.
         let mut starts: Vec<usize> = text.char_indices().map(|(i, _)| i).take(width as usize + 1).collect();
         while let Some(end) = starts.pop() {
             let short = format!("{}…", text[..end].trim_end());
@@ -66,6 +68,7 @@ impl Fonts {
         String::new()
     }
 
+    /// Draws a label, clipped to its box.
     pub fn draw(&self, image: &mut RgbImage, label: &Label) {
         let Rect { x, y, w, h } = label.rect;
         let ascent = self.0[0].as_scaled(PxScale::from(label.size)).ascent();

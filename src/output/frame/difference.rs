@@ -1,17 +1,18 @@
-//! How far two pictures are apart.
+//! Comparison of two pictures.
 
 use serde::Serialize;
 
-/// What counts as the same pixel: every channel within absolute + relative·max(|a|, |b|).
+/// Tolerance within which two pixels count as the same: every channel differs by at most
+/// absolute + relative·max(|a|, |b|).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Share of the larger value.
+    /// Tolerated difference as a share of the larger value.
     pub relative: f32,
-    /// In the picture's units.
+    /// Tolerated difference in the picture's units.
     pub absolute: f32,
 }
 
-/// Error figures over all channels of all pixels.
+/// Error figures over all channels of all pixels, in the picture's units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Root of the mean squared difference.
@@ -20,9 +21,9 @@ pub struct Difference {
     pub mean: f64,
     /// Largest absolute difference.
     pub max: f64,
-    /// Pixels outside the tolerance, or not finite in either picture.
+    /// Number of pixels outside the tolerance or not finite in either picture.
     pub outside: u64,
-    /// All pixels.
+    /// Number of pixels.
     pub pixels: u64,
     /// Column and row of the pixel with the largest difference.
     pub worst: [u32; 2],
@@ -32,7 +33,7 @@ impl Difference {
     /// Compares two pictures of the same size, row by row.
     ///
     /// # Panics
-    /// If their lengths differ or are no multiple of `width`.
+    /// If the lengths differ or are not a multiple of `width`.
     pub fn new(width: u32, a: &[[f32; 3]], b: &[[f32; 3]], tolerance: Tolerance) -> Self {
         assert_eq!(a.len(), b.len(), "pictures of one size");
         assert!(a.len().is_multiple_of(width.max(1) as usize), "whole rows");
@@ -41,7 +42,7 @@ impl Difference {
             let mut same = true;
             for (&x, &y) in p.iter().zip(q) {
                 let d = (x - y).abs();
-                // NaN and infinity are outside even beside themselves.
+                // NaN and infinity are outside the tolerance even where both pictures have them.
                 same &= d.is_finite() && d <= tolerance.absolute + tolerance.relative * x.abs().max(y.abs());
                 let d = if d.is_finite() { d as f64 } else { f64::from(f32::MAX) };
                 squares += d * d;
@@ -53,18 +54,18 @@ impl Difference {
             outside += u64::from(!same);
         }
         let values = (a.len() * 3).max(1) as f64;
-        let place = worst as u32;
+        let index = worst as u32;
         Difference {
             rmse: (squares / values).sqrt(),
             mean: sum / values,
             max,
             outside,
             pixels: a.len() as u64,
-            worst: [place % width.max(1), place / width.max(1)],
+            worst: [index % width.max(1), index / width.max(1)],
         }
     }
 
-    /// Share of the pixels outside the tolerance.
+    /// Returns the share of the pixels outside the tolerance.
     pub fn share_outside(&self) -> f64 {
         self.outside as f64 / self.pixels.max(1) as f64
     }

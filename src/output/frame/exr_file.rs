@@ -1,7 +1,7 @@
-//! EXR: float32, linear, one part with dotted channel names, and the resolved scene as attributes.
+//! EXR files: linear float32 in one part, with dotted channel names and the resolved scene as an attribute.
 //!
-//! Scan lines in increasing order, one to a block, compressed by run lengths: lossless, quick, and the same
-//! bytes however the rows come.
+//! Scan lines are in increasing order, one per block, and compressed by run lengths. That is lossless and
+//! fast, and the bytes do not depend on how the rows are divided.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -23,18 +23,19 @@ use crate::picture::{Frame, Layer};
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
-/// Bytes compressed at a time, on all cores.
+/// Bytes that are compressed at a time, on all cores.
 const BATCH_BYTES: usize = 8 << 20;
-/// Most bytes of one line of a file that is read: those of the widest picture with all layers are 48 MB.
+/// Largest line of a file that is read, bytes. A line of the widest picture with all layers has 48 MB.
 const LINE_BYTES: u64 = 64 << 20;
-/// Most bytes of the header of a file that is read.
+/// Largest header of a file that is read, bytes.
 const HEADER_BYTES: u64 = 64 << 20;
 
-/// The names of the channels of layers, in the order of the file.
+/// Returns the names of the layers' channels, in the order of the file.
 pub fn channel_names(layers: &[Layer]) -> Vec<String> {
     sorted(layers).into_iter().map(|(name, ..)| name.to_owned()).collect()
 }
 
+/// Returns the channels in the order of the file: name, layer, index in the layer.
 fn sorted(layers: &[Layer]) -> Vec<(&'static str, Layer, usize)> {
     let channels =
         layers.iter().flat_map(|layer| layer.channels().iter().zip(0..).map(|(name, c)| (*name, *layer, c)));
@@ -44,7 +45,7 @@ fn sorted(layers: &[Layer]) -> Vec<(&'static str, Layer, usize)> {
     channels
 }
 
-/// Rows of a frame as the file holds them, each channel by channel, in native float32.
+/// Returns rows of a frame as lines of the file: channel by channel, native float32.
 pub fn lines_of(frame: &Frame, layers: &[Layer], rows: Range<u32>) -> Vec<Vec<u8>> {
     rows.into_par_iter().map(|row| line_of(frame, layers, row)).collect()
 }
@@ -62,19 +63,24 @@ fn line_of(frame: &Frame, layers: &[Layer], row: u32) -> Vec<u8> {
     line
 }
 
-/// Writes a picture line by line.
+/// Writer of a picture, line by line.
 pub struct ExrWriter<W> {
     out: W,
     headers: [Header; 1],
+    /// Offset of the table of lines, bytes.
     table: u64,
+    /// Offset of the next line, bytes.
     position: u64,
     offsets: Vec<u64>,
     lines: Vec<Vec<u8>>,
 }
 
 impl<W: Write + Seek> ExrWriter<W> {
-    /// For the part `window` of an image of `whole` pixels. `texts` are the file's; `out` should have a
-    /// buffer and stand at its start.
+    /// Begins a file with the part `window` of an image of `whole` pixels. `out` should be buffered and at
+    /// its start.
+    ///
+    /// # Errors
+    /// Errors of `out`, and of a header that EXR does not allow.
     pub fn new(
         mut out: W,
         whole: [u32; 2],
@@ -90,7 +96,7 @@ impl<W: Write + Seek> ExrWriter<W> {
             if key == "Software" {
                 attributes.software_name = Some(Text::from(text.as_str()));
             } else {
-                // A hash map: a second text of this kind would come in an order of its own each time.
+                // `other` is a hash map. A second text would make the order of the attributes random.
                 let value = AttributeValue::Text(Text::from(text.as_str()));
                 attributes.other.insert(Text::from(key.as_str()), value);
             }
@@ -107,13 +113,16 @@ impl<W: Write + Seek> ExrWriter<W> {
         requirements.write(&mut out)?;
         Header::write_all(&headers, &mut out, false)?;
         let table = out.stream_position()?;
-        // The places of the blocks: known when they are written.
+        // Space for the offsets of the blocks, which are known once the blocks are written.
         let bytes = 8 * u64::from(window.height);
         std::io::copy(&mut std::io::repeat(0).take(bytes), &mut out)?;
         Ok(ExrWriter { out, headers, table, position: table + bytes, offsets: Vec::new(), lines: Vec::new() })
     }
 
     /// Writes the next line: channel by channel, native float32.
+    ///
+    /// # Errors
+    /// Errors of compression and of the output.
     pub fn push(&mut self, line: Vec<u8>) -> std::result::Result<(), exr::error::Error> {
         let most = (BATCH_BYTES / line.len().max(1)).max(1);
         self.lines.push(line);
@@ -142,7 +151,10 @@ impl<W: Write + Seek> ExrWriter<W> {
         Ok(())
     }
 
-    /// Ends the file. All lines must have been written.
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// Errors of the output, and an error where lines are missing.
     pub fn finish(mut self) -> std::result::Result<(), exr::error::Error> {
         self.write_lines()?;
         if self.offsets.len() != self.headers[0].chunk_count {
@@ -156,10 +168,13 @@ impl<W: Write + Seek> ExrWriter<W> {
     }
 }
 
-/// Channels of an EXR file, by name, row by row.
+/// Names and values of an EXR file's channels; values row by row.
 pub type Channels = Vec<(String, Vec<f32>)>;
 
-/// Reads every channel of the first part of an EXR file: width, height, channels.
+/// Reads every channel of the first part of an EXR file. Returns width, height and channels.
+///
+/// # Errors
+/// [`Error::Io`] where the file cannot be read, [`Error::Input`] where it is no EXR.
 pub fn read_exr(path: &Path) -> Result<(u32, u32, Channels)> {
     let file = File::open(path).map_err(|e| Error::read(path, e))?;
     let image = exr::prelude::read()
@@ -181,7 +196,7 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::input(format!("{}: {why}", path.display()), "give an EXR image")
 }
 
-/// A file that ends too early is damaged; others that cannot be read are a fault of the disk.
+/// Converts a read error. A file that ends too early is damaged; other errors come from the disk.
 fn unreadable(path: &Path, e: std::io::Error) -> Error {
     match e.kind() {
         std::io::ErrorKind::UnexpectedEof => bad(path, "it ends too early"),
@@ -189,32 +204,37 @@ fn unreadable(path: &Path, e: std::io::Error) -> Error {
     }
 }
 
-/// A picture of this program read line by line.
+/// Reader of this program's pictures, line by line.
 pub struct ExrLines {
     path: PathBuf,
     file: BufReader<File>,
+    /// Size of the file.
     bytes: u64,
     meta: MetaData,
-    /// Where each line begins.
+    /// Offset of each line in the file, bytes.
     offsets: Vec<u64>,
     position: u64,
     next: usize,
-    /// Size of the whole image.
+    /// Width and height of the whole image, pixels.
     pub whole: [u32; 2],
-    /// The part of it in the file.
+    /// Part of the image in the file.
     pub window: Window,
-    /// Names of the channels, in the order of a line.
+    /// Names of the channels, in their order within a line.
     pub channels: Vec<String>,
 }
 
 impl ExrLines {
-    /// Reads what stands before the pixels.
+    /// Opens a file and reads everything before the pixels.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it
+    /// cannot be read.
     pub fn open(path: &Path) -> Result<ExrLines> {
         let file = File::open(path).map_err(|e| Error::read(path, e))?;
         let bytes = file.metadata().map_err(|e| Error::read(path, e))?.len();
         let mut file = BufReader::new(file);
         let foreign = || bad(path, "not a picture of taki (one part of float32 scan lines, run lengths)");
-        // Version 2, nothing but perhaps long names: other kinds are not even parsed.
+        // Only version 2 is parsed, with no flag except that of long names.
         let mut start = [0; 8];
         file.read_exact(&mut start).map_err(|e| unreadable(path, e))?;
         if start[..5] != [0x76, 0x2f, 0x31, 0x01, 2] || start[5] & !4 != 0 || start[6..] != [0, 0] {
@@ -246,7 +266,7 @@ impl ExrLines {
             return Err(foreign());
         }
         MetaData::validate(&meta.headers, true).map_err(|e| bad(path, e))?;
-        // Run lengths make at most 64 bytes of one.
+        // Run lengths expand a byte to at most 64.
         let pixels = u64::from(window[2]) * u64::from(window[3]);
         let values = pixels.saturating_mul(4 * header.channels.list.len() as u64);
         if values / u64::from(window[3]) > LINE_BYTES {
@@ -278,7 +298,7 @@ impl ExrLines {
         })
     }
 
-    /// The scene's text.
+    /// Returns the text of the scene.
     pub fn scene(&self) -> Option<String> {
         match self.meta.headers[0].own_attributes.other.get(&Text::from(SCENE_TEXT)) {
             Some(AttributeValue::Text(text)) => Some(text.to_string()),
@@ -287,6 +307,9 @@ impl ExrLines {
     }
 
     /// Reads the next line into `line`: channel by channel, native float32.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the line is damaged, [`Error::Io`] where it cannot be read.
     pub fn read_line(&mut self, line: &mut Vec<u8>) -> Result<()> {
         let fail = |why: &str| bad(&self.path, format!("line {}: {why}", self.next));
         let header = &self.meta.headers[0];
@@ -300,7 +323,7 @@ impl ExrLines {
         let size = u32::try_from(size).unwrap_or(0) as usize;
         self.position += 8 + size as u64;
         if i64::from(y) != i64::from(self.window.y) + self.next as i64 {
-            return Err(fail("it stands in another's place"));
+            return Err(fail("its row number is wrong"));
         }
         if size == 0 || size > expected || self.position > self.bytes {
             return Err(fail("it has a wrong length"));
@@ -320,13 +343,17 @@ impl ExrLines {
     }
 
     /// Checks that nothing follows the last line.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where something does, or not all lines have been read.
     pub fn finish(self) -> Result<()> {
         let whole = self.next == self.offsets.len() && self.position == self.bytes;
-        if whole { Ok(()) } else { Err(bad(&self.path, "bytes follow its end")) }
+        if whole { Ok(()) } else { Err(bad(&self.path, "there are bytes after its end")) }
     }
 }
 
-/// Bytes that a line makes of its run lengths: known before any is made.
+/// Returns the number of bytes that run lengths expand to, without expanding them; `None` where they are
+/// malformed.
 fn unpacked_length(packed: &[u8]) -> Option<usize> {
     let (mut i, mut length) = (0, 0);
     while i < packed.len() {

@@ -1,4 +1,4 @@
-//! Figures of a picture that can be added up from its parts.
+//! Figures of a picture that add up from those of its parts.
 
 use std::path::Path;
 
@@ -11,33 +11,33 @@ use super::png_file::PngRows;
 use crate::picture::Frame;
 use crate::util::error::Result;
 
-/// Sums are kept in these parts of one: adding whole numbers gives the same sum in any order.
+/// Units of a sum in 1. Sums are whole numbers, which add up to the same value in any order.
 const UNIT: f64 = 65536.0;
-/// Brighter values count as this, so that the sum over the largest picture fits.
+/// Largest value that is added. Brighter ones are clamped, so that the sum over the largest picture fits.
 const BRIGHTEST: f32 = 1_048_576.0;
 
-/// Figures of a whole picture, or of a part of one. Those of parts that do not overlap add up exactly to
-/// those of the whole.
+/// Figures of a picture or of a part of one. The figures of parts that do not overlap add up exactly to those
+/// of the whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Pixels.
+    /// Number of pixels.
     pub pixels: u64,
-    /// Pixels with a volume quad in any sample.
+    /// Number of pixels with a volume quad in any sample.
     pub covered_pixels: u64,
-    /// Cells of view rays, all samples.
+    /// Number of cells that view rays walk, over all samples.
     pub cells_walked: u64,
-    /// Cells of light rays, all samples.
+    /// Number of cells that light rays walk, over all samples.
     pub light_cells_walked: u64,
-    /// Pixels whose radiance or transmittance is infinite or not a number.
+    /// Number of pixels whose radiance or transmittance is infinite or not a number.
     pub non_finite_pixels: u64,
     /// Sum over the pixels of linear R, G, B, each at most 2²⁰ and rounded, in units of 2⁻¹⁶.
     pub radiance_sum: [i128; 3],
-    /// The same of the transmittance.
+    /// Sum over the pixels of the transmittance, rounded, in units of 2⁻¹⁶.
     pub transmittance_sum: i128,
 }
 
 impl Figures {
-    /// Of a frame.
+    /// Returns the figures of a frame.
     pub fn of(frame: &Frame) -> Figures {
         const CHUNK: usize = 1 << 14;
         let chunks = frame.radiance.par_chunks(CHUNK).zip(frame.counts.par_chunks(CHUNK));
@@ -59,7 +59,7 @@ impl Figures {
         })
     }
 
-    /// Adds those of another part.
+    /// Adds the figures of another part.
     pub fn add(&mut self, other: &Figures) {
         self.pixels = self.pixels.saturating_add(other.pixels);
         self.covered_pixels = self.covered_pixels.saturating_add(other.covered_pixels);
@@ -72,21 +72,21 @@ impl Figures {
         self.transmittance_sum = self.transmittance_sum.saturating_add(other.transmittance_sum);
     }
 
-    /// Mean linear R, G, B of the pixels.
+    /// Returns the mean linear R, G, B of the pixels.
     pub fn mean_radiance(&self) -> [f64; 3] {
         self.radiance_sum.map(|sum| mean(sum, self.pixels))
     }
 
-    /// Mean transmittance of the pixels.
+    /// Returns the mean transmittance of the pixels.
     pub fn mean_transmittance(&self) -> f64 {
         mean(self.transmittance_sum, self.pixels)
     }
 }
 
-/// Figures as far as a file tells them.
+/// Figures that a file contains; `None` for those that it lacks.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KnownFigures {
-    /// Pixels of the file.
+    /// Number of pixels in the file.
     pub pixels: u64,
     /// See [`Figures::covered_pixels`].
     pub covered_pixels: Option<u64>,
@@ -117,12 +117,12 @@ impl From<Figures> for KnownFigures {
 }
 
 impl KnownFigures {
-    /// Mean linear R, G, B of the pixels.
+    /// Returns the mean linear R, G, B of the pixels.
     pub fn mean_radiance(&self) -> Option<[f64; 3]> {
         self.radiance_sum.map(|sums| sums.map(|sum| mean(sum, self.pixels)))
     }
 
-    /// Mean transmittance of the pixels.
+    /// Returns the mean transmittance of the pixels.
     pub fn mean_transmittance(&self) -> Option<f64> {
         self.transmittance_sum.map(|sum| mean(sum, self.pixels))
     }
@@ -132,13 +132,17 @@ fn mean(sum: i128, pixels: u64) -> f64 {
     sum as f64 / UNIT / pixels.max(1) as f64
 }
 
+/// Converts a value to whole units of 1 / [`UNIT`].
 fn fixed(value: f32) -> i128 {
-    // NaN becomes 0.
+    // NaN becomes 0 in the conversion to i64.
     (f64::from(value.clamp(-BRIGHTEST, BRIGHTEST)) * UNIT).round() as i64 as i128
 }
 
-/// The figures of a PNG from its text, or of an EXR from the layers it has. Reads and checks the whole
-/// file, in constant memory; errors are those of [`super::verify`].
+/// Returns the figures of a PNG from its text, or of an EXR from its layers. Reads and checks the whole file
+/// in constant memory.
+///
+/// # Errors
+/// The errors of [`super::verify`].
 pub fn figures_of(path: &Path) -> Result<KnownFigures> {
     match Kind::of(path)? {
         Kind::Png => {
@@ -148,11 +152,11 @@ pub fn figures_of(path: &Path) -> Result<KnownFigures> {
             let unknown = KnownFigures { pixels, ..Default::default() };
             Ok(rows.finish()?.map_or(unknown, KnownFigures::from))
         }
-        Kind::Exr => of_exr(ExrLines::open(path)?),
+        Kind::Exr => figures_of_exr(ExrLines::open(path)?),
     }
 }
 
-fn of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
+fn figures_of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
     let width = lines.window.width as usize;
     let channel = |name: &str| lines.channels.iter().position(|c| c == name);
     let rgb = channel("R").zip(channel("G")).zip(channel("B")).map(|((r, g), b)| [r, g, b]);

@@ -1,4 +1,4 @@
-//! The linear frame with named layers, and the files it becomes.
+//! Picture files: PNG and EXR, written and read row by row, with their checks and figures.
 
 mod difference;
 mod exr_file;
@@ -18,12 +18,12 @@ pub use owner::{Life, Owner};
 pub use png_file::{PngRows, PngWriter, crop_text, encode_png, read_png, rgb_rows};
 pub use verify::{Kind, Verified, verify};
 
-/// Key of the text that holds the scene, as a scene file.
+/// Key of the text that contains the scene, as a scene file.
 pub const SCENE_TEXT: &str = "taki.scene";
-/// Key of the text that tells which part of the image a PNG is.
+/// Key of the text that gives the part of the image that a PNG shows.
 pub const CROP_TEXT: &str = "taki.crop";
-/// Key of the text that holds the figures of a PNG, as JSON.
+/// Key of the text that contains the figures of a PNG, as JSON.
 pub const FIGURES_TEXT: &str = "taki.figures";
 
-/// Largest side of an image: the limit of the parameter table.
+/// Largest side of an image, pixels: the limit of the parameter table.
 const MAX_SIDE: u32 = 1_000_000;

@@ -1,4 +1,5 @@
-//! Outputs that are whole or absent: a temporary file beside the target, synced, renamed.
+//! Atomic outputs: a file is complete or absent. The data goes to a temporary file beside the target, which
+//! is synced and renamed at the end.
 //!
 //! The temporary file of `fall.png` is `.fall.png.taki-XXXXXX.MACHINE-PID.tmp`.
 
@@ -12,15 +13,18 @@ use tempfile::NamedTempFile;
 use super::owner::{Life, Owner, life_of};
 use crate::util::error::{Error, Result};
 
-/// A file that appears under its name when it is finished, and not before.
+/// A file that appears under its name only once it is finished.
 pub struct Output {
     path: PathBuf,
     temp: NamedTempFile,
 }
 
 impl Output {
-    /// Opens a temporary file beside `path`, so that a missing folder or right is known before any
+    /// Opens a temporary file beside `path`, so that a missing folder or permission is noticed before any
     /// work. Removes temporary files that dead processes left for the same target.
+    ///
+    /// # Errors
+    /// [`Error::CannotCreate`] where the file cannot be created, [`Error::Io`] where the disk is full.
     pub fn create(path: &Path) -> Result<Output> {
         if let Some(name) = path.file_name() {
             remove_stale(folder_of(path), |target| target == name.as_encoded_bytes());
@@ -28,7 +32,10 @@ impl Output {
         Output::open(path)
     }
 
-    /// As [`Output::create`], but looks at no other file of the folder.
+    /// Opens a temporary file as [`Output::create`] does, but leaves other files in the folder alone.
+    ///
+    /// # Errors
+    /// The errors of [`Output::create`].
     pub fn open(path: &Path) -> Result<Output> {
         let fail =
             |why: String, fix: &str| Error::CannotCreate { path: path.to_owned(), why, fix: fix.into() };
@@ -62,29 +69,35 @@ impl Output {
         Ok(Output { path: path.to_owned(), temp })
     }
 
-    /// Where it will appear.
+    /// Returns the path at which the file will appear.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The open temporary file.
+    /// Returns the open temporary file.
     pub fn file(&mut self) -> &mut File {
         self.temp.as_file_mut()
     }
 
-    /// Writes `bytes` and finishes.
+    /// Writes `bytes` and finishes the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the file cannot be written.
     pub fn finish_with(mut self, bytes: &[u8]) -> Result<()> {
         self.file().write_all(bytes).map_err(|e| Error::write(&self.path, e))?;
         self.finish()
     }
 
-    /// Flushes, syncs and renames.
+    /// Syncs the file and gives it its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the disk fails.
     pub fn finish(self) -> Result<()> {
         let Output { path, temp } = self;
         let done = (|| {
             temp.as_file().sync_all()?;
             temp.persist(&path).map_err(|e| e.error)?;
-            // The name itself is only safe once the folder is on disk; not every file system can.
+            // The new name is only safe once the folder is synced, which not every file system supports.
             let _ = File::open(folder_of(&path)).and_then(|f| f.sync_all());
             Ok::<(), std::io::Error>(())
         })();
@@ -92,7 +105,8 @@ impl Output {
     }
 }
 
-/// Temporary files are private; this one becomes a picture, readable as the umask lets any new file be.
+/// Gives a temporary file the permissions of any new file under the umask. Temporary files are private by
+/// default, but this one becomes a picture.
 #[cfg(unix)]
 fn readable(builder: &mut tempfile::Builder) {
     use std::os::unix::fs::PermissionsExt;
@@ -102,17 +116,17 @@ fn readable(builder: &mut tempfile::Builder) {
 #[cfg(not(unix))]
 fn readable(_: &mut tempfile::Builder) {}
 
-/// The folder a file is in.
+/// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary file of another machine, which cannot be asked, is stale when it was not written to for so
-/// long.
+/// Age after which a temporary file of another machine is stale. Whether its process still runs cannot be
+/// known.
 const ELSEWHERE_STALE: Duration = Duration::from_secs(24 * 3600);
 
-/// Removes the temporary files in `folder` that dead processes left for targets (names as encoded bytes)
-/// that `mine` accepts. Best effort: a file that cannot be removed harms nobody.
+/// Removes temporary files in `folder` that dead processes left for the targets that `mine` accepts (file
+/// names as encoded bytes). Files that cannot be removed are harmless and stay.
 pub fn remove_stale(folder: &Path, mine: impl Fn(&[u8]) -> bool) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -132,19 +146,19 @@ pub fn remove_stale(folder: &Path, mine: impl Fn(&[u8]) -> bool) {
     }
 }
 
-/// Removes the temporary files for `target` of a process that is known to be gone.
+/// Removes the temporary files for `target` of a process that is known to have ended.
 pub fn remove_left_by(owner: &Owner, target: &Path) {
     let Ok(entries) = std::fs::read_dir(folder_of(target)) else { return };
-    let of = target.file_name().unwrap_or_default().as_encoded_bytes();
+    let target_name = target.file_name().unwrap_or_default().as_encoded_bytes();
     for entry in entries.flatten() {
         let name = entry.file_name();
-        if parse(name.as_encoded_bytes()) == Some((of, owner.machine.as_str(), owner.pid)) {
+        if parse(name.as_encoded_bytes()) == Some((target_name, owner.machine.as_str(), owner.pid)) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
-/// Target, machine and process of a temporary file's name.
+/// Parses target, machine and process number from the name of a temporary file.
 fn parse(name: &[u8]) -> Option<(&[u8], &str, u32)> {
     let rest = name.strip_prefix(b".")?.strip_suffix(b".tmp")?;
     let dot = rest.iter().rposition(|&b| b == b'.')?;

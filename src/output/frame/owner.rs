@@ -1,37 +1,37 @@
-//! Who writes a file: which process on which machine, and whether it still lives.
+//! Identity of the process that writes a file: its machine, its number, and whether it still runs.
 
 use std::path::Path;
 use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-/// A process, told from every other on any machine that shares a folder.
+/// A process, distinguished from every other on all machines that share a folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
-    /// The machine's name, for people.
+    /// Name of the machine, for messages.
     pub host: String,
-    /// Tells machines, their starts and containers apart where names do not: CRC-32 of name, boot and
-    /// process namespace, in hex.
+    /// CRC-32 of machine name, boot and process namespace, in hex. It distinguishes machines of one name,
+    /// restarts and containers.
     pub machine: String,
-    /// Number of the process on that machine.
+    /// Process number on that machine.
     pub pid: u32,
-    /// When it started, in the system's clock ticks since the machine's start; 0 where that is not known.
+    /// Start of the process, in clock ticks since the machine's start; 0 where it is unknown.
     pub started: u64,
 }
 
-/// What is known of another process.
+/// State of a process, as far as it can be known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Life {
-    /// It runs.
+    /// The process runs.
     Alive,
-    /// It has ended.
+    /// The process has ended.
     Dead,
-    /// It is, or was, on another machine.
+    /// The process belongs to another machine, which cannot be asked.
     Elsewhere,
 }
 
 impl Owner {
-    /// This process.
+    /// Returns this process.
     pub fn me() -> &'static Owner {
         static ME: OnceLock<Owner> = OnceLock::new();
         ME.get_or_init(|| {
@@ -44,10 +44,10 @@ impl Owner {
         })
     }
 
-    /// Whether the process still runs.
+    /// Returns whether the process still runs.
     pub fn life(&self) -> Life {
         match life_of(&self.machine, self.pid) {
-            // Another process may have the number by now.
+            // Another process may have taken the number since.
             Life::Alive if self.started != 0 && started(self.pid).is_some_and(|s| s != self.started) => {
                 Life::Dead
             }
@@ -56,7 +56,7 @@ impl Owner {
     }
 }
 
-/// Whether process `pid` of a machine runs. When in doubt it does.
+/// Returns whether process `pid` of a machine runs. In doubt it counts as alive.
 pub fn life_of(machine: &str, pid: u32) -> Life {
     let proc = Path::new("/proc");
     if machine != Owner::me().machine {
@@ -65,7 +65,7 @@ pub fn life_of(machine: &str, pid: u32) -> Life {
         Life::Alive
     } else {
         match std::fs::read_to_string(proc.join(format!("{pid}/stat"))) {
-            // A zombie has ended; nobody has asked for its exit code yet.
+            // A zombie has ended; only its exit code has not been collected.
             Ok(stat) if matches!(fields(&stat).next(), Some("Z" | "X")) => Life::Dead,
             Ok(_) => Life::Alive,
             Err(_) if proc.join(pid.to_string()).exists() => Life::Alive,
@@ -74,12 +74,13 @@ pub fn life_of(machine: &str, pid: u32) -> Life {
     }
 }
 
-/// The fields of a process's `stat` after its name, which stands in parentheses and may hold any character.
+/// Returns the fields of a process's `stat` after its name. The name stands in parentheses and may contain
+/// any character.
 fn fields(stat: &str) -> std::str::SplitWhitespace<'_> {
     stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace()
 }
 
-/// When a process started, by field 22 of its `stat`.
+/// Returns the start of a process in clock ticks, from field 22 of its `stat`.
 fn started(pid: u32) -> Option<u64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     fields(&stat).nth(19)?.parse().ok()

@@ -1,4 +1,4 @@
-//! PNG: sRGB, 8 bits, with the resolved scene as text before the pixels and the figures after them.
+//! PNG files: sRGB, 8 bits, with the resolved scene as text before the pixels and the figures after them.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, Write};
@@ -13,11 +13,11 @@ use crate::picture::Frame;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
-/// Largest side and pixel count read by [`read_png`]: 2³⁰ bytes of pixels.
+/// Memory limit of [`read_png`], in pixels of 8 bytes.
 const MAX_PIXELS: u64 = 1 << 28;
-/// Compressed bytes of one IDAT chunk.
+/// Compressed bytes in an IDAT chunk.
 const CHUNK_BYTES: usize = 1 << 18;
-/// Most bytes of texts and one row of a file that is read.
+/// Memory for the texts and one row of a file that is read, bytes.
 const READ_BYTES: usize = 64 << 20;
 
 fn encoder<W: Write>(
@@ -36,6 +36,9 @@ fn encoder<W: Write>(
 }
 
 /// Encodes a small picture in memory.
+///
+/// # Errors
+/// Errors of the encoder, such as a text that PNG does not allow.
 pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let texts: Vec<_> = texts.iter().map(|(key, text)| (key.to_string(), text.to_string())).collect();
@@ -45,12 +48,12 @@ pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> std::result::Result<
     Ok(bytes)
 }
 
-/// The picture as R, G, B bytes.
+/// Returns the picture as R, G, B bytes.
 pub fn rgb_rows(frame: &Frame) -> Vec<u8> {
     frame.picture.iter().flat_map(|p| [p[0], p[1], p[2]]).collect()
 }
 
-/// Keeps the first error: the encoder loses those of its destructors.
+/// A writer that keeps its first error, because the encoder drops those of its destructors.
 struct Checked<W> {
     inner: W,
     error: Option<io::Error>,
@@ -75,8 +78,8 @@ impl<W: Write> Write for Checked<W> {
     }
 }
 
-/// Writes a picture row by row. It is encoded by a thread of its own, beside the work that makes the next
-/// rows; the bytes do not depend on how the rows are divided.
+/// Writer of a picture, row by row. A thread of its own encodes them while the next rows are computed. The
+/// bytes do not depend on how the rows are divided.
 pub struct PngWriter {
     rows: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<io::Result<()>>>,
@@ -84,14 +87,18 @@ pub struct PngWriter {
 
 enum Message {
     Rows(Vec<u8>),
-    /// The texts after the pixels: the end.
+    /// The end of the picture, with the texts that follow the pixels.
     Finish(Vec<(String, String)>),
 }
 
 impl PngWriter {
-    /// For a picture of `size` pixels; `texts` come before the pixels.
+    /// Begins a picture of `size` pixels. `texts` stand before the pixels.
+    ///
+    /// # Errors
+    /// An error where the thread cannot be started.
     pub fn new(file: File, size: [u32; 2], texts: Vec<(String, String)>) -> io::Result<PngWriter> {
-        // Without a queue one piece is encoded and one waits: more would only take memory.
+        // A queue of length 0: one piece is encoded while the next waits. A longer one would only take
+        // memory.
         let (rows, queue) = sync_channel(0);
         let work = move || {
             let inner = BufWriter::with_capacity(1 << 16, file);
@@ -106,12 +113,18 @@ impl PngWriter {
         Ok(PngWriter { rows: Some(rows), thread: Some(thread) })
     }
 
-    /// Writes the next rows: R, G, B bytes, any whole number of rows.
+    /// Writes the next rows: R, G, B bytes of any whole number of rows.
+    ///
+    /// # Errors
+    /// Errors of the encoder and the file, also from rows written earlier.
     pub fn push(&mut self, rows: Vec<u8>) -> io::Result<()> {
         self.send(Message::Rows(rows))
     }
 
     /// Writes `texts` and ends the file. All rows must have been written.
+    ///
+    /// # Errors
+    /// Errors of the encoder and the file.
     pub fn finish(mut self, texts: Vec<(String, String)>) -> io::Result<()> {
         self.send(Message::Finish(texts))?;
         self.join()
@@ -120,7 +133,7 @@ impl PngWriter {
     fn send(&mut self, message: Message) -> io::Result<()> {
         match &self.rows {
             Some(rows) if rows.send(message).is_ok() => Ok(()),
-            // The thread ended early: it knows why.
+            // The thread ended early and returns the reason.
             _ => self.join().and(Err(io::Error::other("the picture has ended"))),
         }
     }
@@ -147,7 +160,7 @@ fn write(
         match queue.recv() {
             Ok(Message::Rows(rows)) => stream.write_all(&rows)?,
             Ok(Message::Finish(texts)) => break texts,
-            // Given up: the file is removed.
+            // The picture was abandoned, and its file is removed.
             Err(_) => return Ok(()),
         }
     };
@@ -158,7 +171,10 @@ fn write(
     Ok(writer.finish()?)
 }
 
-/// Reads a PNG as RGB float in 0..=1 (as encoded, not linear): width, height, pixels.
+/// Reads a PNG. Returns width, height and pixels: RGB from 0 to 1, as encoded, not linear.
+///
+/// # Errors
+/// [`Error::Io`] where the file cannot be opened, [`Error::Input`] where it is no PNG or too large.
 pub fn read_png(path: &Path) -> Result<(u32, u32, Vec<[f32; 3]>)> {
     let file = File::open(path).map_err(|e| Error::read(path, e))?;
     let mut reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
@@ -175,7 +191,7 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::input(format!("{}: {why}", path.display()), "give a PNG image")
 }
 
-/// Damage is the file's fault, all else the disk's.
+/// Converts a decoding error. Damage is a fault of the file, other input errors come from the disk.
 fn decoding(path: &Path, e: png::DecodingError) -> Error {
     match e {
         png::DecodingError::IoError(e) if e.kind() != io::ErrorKind::UnexpectedEof => Error::read(path, e),
@@ -183,7 +199,7 @@ fn decoding(path: &Path, e: png::DecodingError) -> Error {
     }
 }
 
-/// A file that tells how far it was read.
+/// A file that counts the bytes read.
 struct Counted {
     inner: BufReader<File>,
     read: Arc<AtomicU64>,
@@ -216,21 +232,27 @@ impl Seek for Counted {
     }
 }
 
-/// A picture of this program read row by row, every checksum checked.
+/// Reader of this program's pictures, row by row. It checks every checksum.
 pub struct PngRows {
     path: PathBuf,
     reader: png::Reader<Counted>,
+    /// Bytes read so far.
     read: Arc<AtomicU64>,
+    /// Size of the file.
     bytes: u64,
-    left: u32,
-    /// Size of the whole image.
+    rows_left: u32,
+    /// Width and height of the whole image, pixels.
     pub whole: [u32; 2],
-    /// The part of it in the file.
+    /// Part of the image in the file.
     pub window: Window,
 }
 
 impl PngRows {
-    /// Reads what stands before the pixels.
+    /// Opens a file and reads everything before the pixels.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it
+    /// cannot be read.
     pub fn open(path: &Path) -> Result<PngRows> {
         let file = File::open(path).map_err(|e| Error::read(path, e))?;
         let bytes = file.metadata().map_err(|e| Error::read(path, e))?.len();
@@ -250,7 +272,7 @@ impl PngRows {
         {
             return Err(bad(path, "not a picture of taki (8 bits RGB, not interlaced)"));
         }
-        // Deflate makes at most 1032 bytes of one.
+        // Deflate expands a byte to at most 1032.
         if (u64::from(width) * 3 + 1) * u64::from(height) > bytes.saturating_mul(1032) {
             return Err(bad(path, format!("{bytes} bytes cannot hold {width}×{height} pixels")));
         }
@@ -264,29 +286,33 @@ impl PngRows {
             reader,
             read,
             bytes,
-            left: height,
+            rows_left: height,
             whole: size,
             window: Window::whole(size),
         };
         if let Some(crop) = rows.text(CROP_TEXT) {
             let parsed = parse_crop(&crop).filter(|(window, _)| [window.width, window.height] == size);
-            (rows.window, rows.whole) = parsed
-                .ok_or_else(|| bad(path, format!("the text taki.crop = {crop:?} is not true of it")))?;
+            (rows.window, rows.whole) = parsed.ok_or_else(|| {
+                bad(path, format!("the text taki.crop = {crop:?} does not fit the picture"))
+            })?;
         }
         Ok(rows)
     }
 
-    /// A text that has been read so far.
+    /// Returns a text, if it has been read so far.
     pub fn text(&self, key: &str) -> Option<String> {
         let chunks = &self.reader.info().utf8_text;
         chunks.iter().find(|chunk| chunk.keyword == key).and_then(|chunk| chunk.get_text().ok())
     }
 
     /// Reads the next row into `row`: R, G, B bytes of the window's width.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is damaged or has no more rows, [`Error::Io`] where it cannot be read.
     pub fn read_row(&mut self, row: &mut [u8]) -> Result<()> {
         match self.reader.read_row(row) {
             Ok(Some(_)) => {
-                self.left = self.left.saturating_sub(1);
+                self.rows_left = self.rows_left.saturating_sub(1);
                 Ok(())
             }
             Ok(None) => Err(bad(&self.path, "the pixels end too early")),
@@ -294,29 +320,36 @@ impl PngRows {
         }
     }
 
-    /// Reads the rows that are left.
+    /// Reads the remaining rows.
+    ///
+    /// # Errors
+    /// The errors of [`PngRows::read_row`].
     pub fn skip_rows(&mut self) -> Result<()> {
         let mut row = vec![0; 3 * self.window.width as usize];
-        (0..self.left).try_for_each(|_| self.read_row(&mut row))
+        (0..self.rows_left).try_for_each(|_| self.read_row(&mut row))
     }
 
-    /// Reads what comes after the pixels, to the file's last byte; the figures, if it has some.
+    /// Reads the rest of the file, to its last byte. Returns the figures, if the file has them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is damaged or its figures do not fit it, [`Error::Io`] where it cannot
+    /// be read.
     pub fn finish(mut self) -> Result<Option<Figures>> {
         self.reader.finish().map_err(|e| decoding(&self.path, e))?;
         if self.read.load(Ordering::Relaxed) != self.bytes {
-            return Err(bad(&self.path, "bytes follow its end"));
+            return Err(bad(&self.path, "there are bytes after its end"));
         }
         let Some(text) = self.text(FIGURES_TEXT) else { return Ok(None) };
         let figures: Figures = serde_json::from_str(&text)
             .map_err(|e| bad(&self.path, format!("the text taki.figures: {e}")))?;
         if figures.pixels != self.window.pixels() {
-            return Err(bad(&self.path, "the text taki.figures is of another picture"));
+            return Err(bad(&self.path, "the text taki.figures belongs to another picture"));
         }
         Ok(Some(figures))
     }
 }
 
-/// The text of a part of an image: `X,Y,W,H of WxH`.
+/// Formats a part of an image: `X,Y,W,H of WxH`.
 pub fn crop_text(window: Window, [width, height]: [u32; 2]) -> String {
     format!("{window} of {width}x{height}")
 }

@@ -1,4 +1,4 @@
-//! Whether a picture's file is whole.
+//! Check that a picture file is complete.
 
 use std::fs::File;
 use std::io::Read;
@@ -10,32 +10,35 @@ use super::{Figures, SCENE_TEXT};
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
-/// What a file says of itself.
+/// Contents of a verified file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verified {
     /// Width and height of the whole image, pixels.
     pub size: [u32; 2],
-    /// The part of it that the file holds.
+    /// Part of the image in the file.
     pub window: Window,
-    /// The scene that made it, as a scene file.
+    /// Scene of the picture, as a scene file.
     pub scene: Option<String>,
-    /// Channels of an EXR, in the file's order; none of a PNG.
+    /// Channels of an EXR, in the file's order; empty for a PNG.
     pub channels: Vec<String>,
     /// Figures of a PNG that this program made.
     pub figures: Option<Figures>,
 }
 
-/// What a file is by its first bytes.
+/// Format of a picture file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// sRGB, 8 bits.
+    /// PNG: sRGB, 8 bits.
     Png,
-    /// Float32, layers.
+    /// EXR: float32, with layers.
     Exr,
 }
 
 impl Kind {
-    /// Of a file that exists.
+    /// Detects the format of a file by its first bytes.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is neither, [`Error::Io`] where it cannot be read.
     pub fn of(path: &Path) -> Result<Kind> {
         let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
         let foreign =
@@ -54,15 +57,16 @@ impl Kind {
     }
 }
 
-/// Decodes the whole of a file that this program wrote, in constant memory.
+/// Decodes a whole file that this program wrote, in constant memory.
 ///
-/// A PNG has checksums over everything: a missing, changed or added byte is always seen. An EXR has none:
-/// missing and added bytes are seen, and so is a change of the header's structure, of the table of lines,
-/// of a line's place, length or run lengths. A change of a sample's value, or inside a text, is not.
+/// A PNG has checksums over everything, so a missing, changed or added byte is always detected. An EXR has
+/// none. Missing and added bytes are detected, and changes to the structure of the header, to the table of
+/// lines, and to the position, length or run lengths of a line. A change to the value of a sample or inside a
+/// text is not detected.
 ///
 /// # Errors
-/// [`Error::Input`] where the file is not whole or not of this program's kind, [`Error::Io`] where it
-/// cannot be read.
+/// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it cannot be
+/// read.
 pub fn verify(path: &Path) -> Result<Verified> {
     match Kind::of(path)? {
         Kind::Png => {

@@ -1,4 +1,4 @@
-//! Animated PNG: a PNG whose first frame is shown where only stills are known.
+//! Animated PNG. Programs that do not know animation show its first frame.
 
 use std::fs::File;
 
@@ -16,7 +16,8 @@ impl ApngWriter {
         let [width, height] = options.size;
         let path = output.path().to_owned();
         let mut open = || -> std::result::Result<_, png::EncodingError> {
-            // Unbuffered: the encoder writes whole chunks, and no error can hide in a buffer's drop.
+            // The file is unbuffered: the encoder writes whole chunks, and the drop of a buffer would hide
+            // errors.
             let file = output.file().try_clone()?;
             let mut encoder = png::Encoder::new(file, width, height);
             encoder.set_color(png::ColorType::Rgb);
@@ -45,9 +46,9 @@ impl ApngWriter {
     }
 }
 
-/// 1 / `fps` as a fraction of two 16-bit numbers: the last convergent of its continued fraction that fits.
-/// Whole rates, 23.976 and 30000/1001 are exact; a rate of many digits is off by less than 1/65535 of itself,
-/// ten milliseconds in eleven minutes.
+/// Returns 1 / `fps` as a fraction of two 16-bit numbers: the last convergent of its continued fraction that
+/// fits. Whole rates, 23.976 and 30000/1001 are exact. The relative error of a rate with many digits is less
+/// than 1/65535, which is ten milliseconds in eleven minutes.
 fn delay(fps: f64) -> [u16; 2] {
     let ([mut n, mut d], [mut n_before, mut d_before]) = ([1u64, 0u64], [0u64, 1u64]);
     let mut x = 1.0 / fps;
@@ -58,7 +59,7 @@ fn delay(fps: f64) -> [u16; 2] {
             break;
         }
         ([n_before, d_before], [n, d]) = ([n, d], next);
-        // What is left of a fraction such as 125/2997 is rounding.
+        // A smaller remainder is rounding, as after 125/2997.
         if x - whole < 1e-9 {
             break;
         }

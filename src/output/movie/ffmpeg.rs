@@ -1,4 +1,4 @@
-//! MP4 and WebM by the program ffmpeg: frames go to its stdin, the file comes out of its stdout.
+//! MP4 and WebM by the program ffmpeg: it reads frames from its stdin and writes the file to its stdout.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -12,19 +12,19 @@ use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// Bytes kept of what ffmpeg says.
-const WORDS: usize = 4096;
+/// Bytes that are kept of ffmpeg's stderr.
+const STDERR_BYTES: usize = 4096;
 
-/// Longest wait for ffmpeg's last words after it ended: a child of its own may hold its stderr open.
-const LAST_WORDS: Duration = Duration::from_secs(2);
+/// Longest wait for the end of stderr after ffmpeg ended: a child process of ffmpeg may keep it open.
+const STDERR_WAIT: Duration = Duration::from_secs(2);
 
 pub(super) struct VideoWriter {
-    /// Before the output: the process ends first, then its file goes.
+    /// Declared before the output, so that the process ends before its file is removed.
     encoder: Encoder,
     output: Output,
     size: [u32; 2],
     frames: u64,
-    /// A frame with even sides, where the movie's are not.
+    /// Buffer of a frame with even sides, used where the movie's sides are odd.
     padded: Vec<u8>,
 }
 
@@ -70,8 +70,8 @@ impl VideoWriter {
     }
 }
 
-/// ffmpeg without questions, banner or progress; in a process group of its own, so that the terminal's
-/// Ctrl-C comes to us alone.
+/// Makes a command for ffmpeg without questions, banner or progress. It has its own process group, so that
+/// Ctrl-C in the terminal reaches only this program.
 fn quiet(program: &Path) -> Command {
     let mut command = Command::new(program);
     command.args(["-nostdin", "-hide_banner", "-nostats", "-loglevel", "error"]);
@@ -80,19 +80,19 @@ fn quiet(program: &Path) -> Command {
     command
 }
 
-/// The encoder's name in ffmpeg.
+/// Returns the encoder's name in ffmpeg.
 fn codec(kind: MovieKind) -> &'static str {
     if kind == MovieKind::Webm { "libvpx-vp9" } else { "libx264" }
 }
 
-/// Refuses an ffmpeg that is not there or cannot encode this kind.
+/// Checks that ffmpeg exists and can encode this format.
 fn has_encoder(kind: MovieKind, program: &Path) -> Result<()> {
     let run = quiet(program).arg("-encoders").stdin(Stdio::null()).output();
     let list = run.map_err(|e| absent(program, &e))?;
     let codec = codec(kind);
-    let words = String::from_utf8_lossy(&list.stdout);
-    // A line of the list: flags, name, what it is.
-    if words.lines().any(|line| line.split_whitespace().nth(1) == Some(codec)) {
+    let encoders = String::from_utf8_lossy(&list.stdout);
+    // A line of the list has flags, name and description.
+    if encoders.lines().any(|line| line.split_whitespace().nth(1) == Some(codec)) {
         return Ok(());
     }
     Err(Error::NoFfmpeg(format!("{} has no encoder {codec}", program.display())))
@@ -105,7 +105,7 @@ fn absent(program: &Path, e: &std::io::Error) -> Error {
     }
 }
 
-/// What follows [`quiet`]: frames in on stdin, the file out.
+/// Returns the arguments after those of [`quiet`]: frames on stdin, the file on stdout.
 fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions) -> Vec<String> {
     let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), options.fps.to_string());
     let comment = format!("comment={}", options.mark_text());
@@ -122,16 +122,16 @@ fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions)
         "-i",
         "pipe:0",
     ]);
-    // ffmpeg would convert with BT.601's matrix and say nothing; players take untagged video for BT.709.
+    // By default ffmpeg converts with the matrix of BT.601 and does not tag it; players assume BT.709.
     let convert = "scale=in_range=full:out_range=limited:out_color_matrix=bt709:\
                    flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p";
     all.extend(["-vf", convert, "-color_range", "tv", "-colorspace", "bt709", "-color_primaries", "bt709"]);
     all.extend(["-color_trc", "bt709", "-c:v", codec]);
-    // The number of threads is fixed: the file is then the same on any machine with the same ffmpeg.
+    // With a fixed number of threads the file is the same on every machine with the same ffmpeg.
     all.extend(["-threads", "4", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]);
     all.extend(["-metadata", &comment]);
     all.extend(match kind {
-        // Water is fine grain: at ffmpeg's own 23 it turns to mud.
+        // Water has fine grain, which ffmpeg's default of 23 blurs.
         MovieKind::Webm => &["-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "3"][..],
         _ => &["-crf", "16", "-preset", "medium", "-profile:v", "high"],
     });
@@ -143,56 +143,57 @@ fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions)
     all.into_iter().map(String::from).collect()
 }
 
-/// The output is open already, as ffmpeg's stdout: no name has to pass through its syntax. On Linux
-/// /dev/stdout opens the file itself anew, so that it can be sought in and the index moved to its start.
-/// Elsewhere it is written in one go, an MP4 in fragments.
+/// Output of ffmpeg. The file is already open as its stdout, so no name has to pass through ffmpeg's syntax.
+/// On Linux, /dev/stdout opens the file itself again; ffmpeg can then seek in it and move the index to its
+/// start. Elsewhere the file is written sequentially, an MP4 in fragments.
 const OUT: &str = if cfg!(target_os = "linux") { "/dev/stdout" } else { "pipe:1" };
 const MOVFLAGS: &str =
     if cfg!(target_os = "linux") { "+faststart" } else { "+frag_keyframe+empty_moov+default_base_moof" };
 
-/// A running ffmpeg. Dropped it is killed.
+/// A running ffmpeg. Dropping it kills the process.
 struct Encoder {
     child: Child,
-    /// Open while frames come. If we are killed the system closes it, and ffmpeg ends.
+    /// Open while frames arrive. If this process is killed, the system closes it and ffmpeg ends.
     stdin: Option<ChildStdin>,
-    /// The end of what it said, sent when it stopped speaking.
-    words: Receiver<VecDeque<u8>>,
+    /// The end of stderr, sent once stderr is closed.
+    stderr_tail: Receiver<VecDeque<u8>>,
     path: PathBuf,
 }
 
 impl Encoder {
     fn start(mut command: Command, program: &Path, path: &Path) -> Result<Encoder> {
         let mut child = command.stderr(Stdio::piped()).spawn().map_err(|e| absent(program, &e))?;
-        let (sender, words) = channel();
+        let (sender, stderr_tail) = channel();
         let stdin = child.stdin.take();
         if let Some(mut stderr) = child.stderr.take() {
-            // It ends when ffmpeg does: an unread stderr would stop an ffmpeg with much to say.
+            // Reads until ffmpeg ends. If nobody read stderr, a full pipe would block ffmpeg.
             std::thread::spawn(move || {
                 let (mut tail, mut bytes) = (VecDeque::new(), [0; 1024]);
                 while let Ok(n @ 1..) = stderr.read(&mut bytes) {
                     tail.extend(&bytes[..n]);
-                    tail.drain(..tail.len().saturating_sub(WORDS));
+                    tail.drain(..tail.len().saturating_sub(STDERR_BYTES));
                 }
                 let _ = sender.send(tail);
             });
         }
-        Ok(Encoder { child, stdin, words, path: path.to_owned() })
+        Ok(Encoder { child, stdin, stderr_tail, path: path.to_owned() })
     }
 
-    /// Gives it a frame. Rust's programs ignore SIGPIPE: an ffmpeg that ended is an error here.
+    /// Sends a frame to ffmpeg. Rust programs ignore SIGPIPE, so an ffmpeg that ended is reported as an error
+    /// here.
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         let Some(stdin) = &mut self.stdin else { return Err(self.failed("it has ended")) };
         match stdin.write_all(bytes) {
             Ok(()) => Ok(()),
             Err(e) => {
                 self.stdin = None;
-                // It closed its end: it is about to end, and to say why.
+                // ffmpeg closed its end of the pipe: it is about to end and to print the reason.
                 Err(self.failed(&e.to_string()))
             }
         }
     }
 
-    /// Ends its input and waits until it has encoded everything.
+    /// Ends the input and waits until ffmpeg has encoded everything.
     fn finish(mut self, frames: u64, monitor: &dyn Monitor) -> Result<()> {
         self.stdin = None;
         let status = loop {
@@ -203,15 +204,15 @@ impl Encoder {
             }
             std::thread::sleep(Duration::from_millis(5));
         };
-        // ffmpeg 5 ends with 0 where the disk is full just when it writes its last bytes, but says so: at this
-        // log level a word is an error.
+        // ffmpeg 5 exits with 0 if the disk is full when it writes its last bytes, but prints an error. At
+        // this log level it prints nothing else.
         match self.last_line() {
             None if status.success() => Ok(()),
             line => Err(self.error(line.as_deref().unwrap_or(&status.to_string()))),
         }
     }
 
-    /// The error with ffmpeg's last line, or `otherwise` if it said nothing.
+    /// Returns an error with ffmpeg's last line, or with `otherwise` if it printed nothing.
     fn failed(&mut self, otherwise: &str) -> Error {
         let line = self.last_line();
         self.error(line.as_deref().unwrap_or(otherwise))
@@ -226,19 +227,19 @@ impl Encoder {
         }
     }
 
-    /// What ffmpeg said last, once it has ended.
+    /// Returns the last line that ffmpeg printed, once it has ended.
     fn last_line(&mut self) -> Option<String> {
-        let words = Vec::from(self.words.recv_timeout(LAST_WORDS).unwrap_or_default());
-        let words = String::from_utf8_lossy(&words);
-        let said = |line: &&str| !line.trim().is_empty() && !line.contains("Last message repeated");
-        words.lines().rfind(said).map(|line| line.trim().to_owned())
+        let tail = Vec::from(self.stderr_tail.recv_timeout(STDERR_WAIT).unwrap_or_default());
+        let tail = String::from_utf8_lossy(&tail);
+        let has_text = |line: &&str| !line.trim().is_empty() && !line.contains("Last message repeated");
+        tail.lines().rfind(has_text).map(|line| line.trim().to_owned())
     }
 }
 
 impl Drop for Encoder {
     fn drop(&mut self) {
         self.stdin = None;
-        // It may have ended; waiting takes its entry from the process table.
+        // The process may have ended already; `wait` removes its entry from the process table.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,5 +1,6 @@
-//! GIF: one palette for the whole movie and a dither that stands still, so that nothing flickers that
-//! does not move. The palette needs all frames: they wait in a nameless file beside the target.
+//! GIF, with one palette for the whole movie and a dither that is the same in all frames, so that parts at
+//! rest do not flicker. The palette needs all frames; until then they are stored in an unnamed file beside
+//! the target.
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, Write};
@@ -12,12 +13,12 @@ use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// The index that keeps what was there before.
+/// Index of a pixel that does not change.
 const SAME: u8 = 255;
 
 pub(super) struct GifWriter {
     output: Output,
-    /// Frames as they came; the system removes it whatever happens to the process.
+    /// File of the raw frames. The system removes it even if the process is killed.
     waiting: File,
     sample: PaletteSample,
     options: MovieOptions,
@@ -78,14 +79,15 @@ impl GifWriter {
     }
 }
 
-/// Hundredths of a second of frame `i`: to the hundredth nearest to its end from the one nearest to its
-/// start.
+/// Returns the duration of frame `i` in hundredths of a second. Its start and end are each rounded to a
+/// hundredth.
 fn delay(i: u64, fps: f64) -> u16 {
     let at = |i: u64| (i as f64 * 100.0 / fps).round();
     (at(i + 1) - at(i)) as u16
 }
 
-/// The part of a frame that differs from the one `before`, with [`SAME`] where a pixel does not.
+/// Returns the part of a frame that differs from the frame `before`, with [`SAME`] for pixels that do not
+/// change.
 fn changes(before: &[u8], now: &[u8], width: usize) -> gif::Frame<'static> {
     let height = now.len() / width;
     let [mut left, mut right, mut top, mut bottom] = [width, 0, height, 0];
@@ -100,7 +102,7 @@ fn changes(before: &[u8], now: &[u8], width: usize) -> gif::Frame<'static> {
     if before.is_empty() {
         [left, right, top, bottom] = [0, width, 0, height];
     } else if bottom == 0 {
-        // A frame that changes nothing is one pixel that stays: a GIF has no empty ones.
+        // GIF has no empty frames, so a frame without changes is one unchanged pixel.
         [left, right, top, bottom] = [0, 1, 0, 1];
     }
     let mut buffer = Vec::with_capacity((right - left) * (bottom - top));

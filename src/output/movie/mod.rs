@@ -1,7 +1,7 @@
-//! Moving pictures from frames: GIF and animated PNG by themselves, MP4 and WebM by the program ffmpeg.
+//! Movies: GIF and animated PNG are written here, MP4 and WebM by the program ffmpeg.
 //!
-//! Frames come one after another and are not kept: memory stays flat however many there are. The file
-//! appears under its name when it is whole, and not before.
+//! Frames arrive one after another and are not kept, so the memory does not grow with their number. The file
+//! appears under its name only once it is complete.
 
 mod apng_file;
 mod ffmpeg;
@@ -14,12 +14,12 @@ use super::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::{Monitor, Unwatched};
 
-/// The file's format.
+/// Format of a movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MovieKind {
-    /// 255 colours for the whole movie, at most 50 frames a second. Plays everywhere.
+    /// GIF: 255 colours for the whole movie, at most 50 frames per second. Plays everywhere.
     Gif,
-    /// Animated PNG: every frame as it is, without loss.
+    /// Animated PNG: lossless.
     Apng,
     /// H.264 in MP4, 4:2:0, BT.709. Needs ffmpeg.
     Mp4,
@@ -28,8 +28,8 @@ pub enum MovieKind {
 }
 
 impl MovieKind {
-    /// The kind that a file's extension says: `.gif`, `.apng`, `.mp4` or `.webm`, in any case. A `.png` may
-    /// be an animated one; that is the caller's to say.
+    /// Returns the format of a file extension: `.gif`, `.apng`, `.mp4` or `.webm`, in upper or lower case.
+    /// For `.png`, which may be animated or not, the caller decides.
     pub fn of(path: &Path) -> Option<MovieKind> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {
@@ -41,7 +41,7 @@ impl MovieKind {
         })
     }
 
-    /// Its name in messages.
+    /// Returns the name for messages.
     pub fn name(self) -> &'static str {
         match self {
             MovieKind::Gif => "GIF",
@@ -51,7 +51,7 @@ impl MovieKind {
         }
     }
 
-    /// Most pixels a side. GIF's are 16 bits; the encoders of the two videos stop at 2¹⁴.
+    /// Returns the largest side, pixels. GIF stores 16 bits; the encoders of both videos stop at 2¹⁴.
     fn longest_side(self) -> u32 {
         match self {
             MovieKind::Gif => 65_535,
@@ -60,8 +60,8 @@ impl MovieKind {
         }
     }
 
-    /// Slowest and fastest frames a second. A GIF shows a frame for 1 to 65535 hundredths of a second, and
-    /// viewers take 1 for 10; an animated PNG for up to 65535 s.
+    /// Returns the lowest and highest number of frames per second. A GIF shows a frame for 1 to 65535
+    /// hundredths of a second, and viewers treat 1 as 10. An animated PNG shows a frame for up to 65535 s.
     fn rates(self) -> [f64; 2] {
         match self {
             MovieKind::Gif => [0.01, 50.0],
@@ -70,30 +70,30 @@ impl MovieKind {
     }
 }
 
-/// What is known of a movie before its first frame.
+/// Properties of a movie that are known before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovieOptions {
-    /// Width and height of a frame, pixels. MP4 and WebM hold even sides only: an odd one gets one pixel
-    /// more, the last column or row again.
+    /// Width and height of a frame, pixels. MP4 and WebM need even sides: an odd side is extended by
+    /// repeating its last column or row.
     pub size: [u32; 2],
-    /// Frames a second. GIF counts hundredths of a second: what a frame is shown too long or too short is
-    /// made good by the next ones, so that the whole lasts as long as it should.
+    /// Frames per second. GIF counts in hundredths of a second; later frames compensate the rounding, so that
+    /// the whole movie has the right length.
     pub fps: f64,
     /// Number of frames.
     pub frames: u64,
-    /// Whether GIF and animated PNG start anew for ever, or play once. Videos leave that to the player.
+    /// Whether a GIF or animated PNG repeats for ever or plays once. For videos the player decides.
     pub repeat: bool,
-    /// Tells movies apart: it stands in the file, and [`mark_of`] finds it.
+    /// Number that identifies the movie. It is stored in the file, and [`mark_of`] reads it.
     pub mark: u64,
 }
 
-/// Stands before the mark in a file.
+/// Text that precedes the mark in a file.
 const MARK: &str = "taki-movie-";
 
-/// As far as a mark is looked for: the index of an MP4 comes before it.
+/// Bytes of a file in which the mark is searched. The index of an MP4 stands before the mark.
 const MARK_WITHIN: u64 = 64 << 20;
 
-/// The mark of a movie that this program made.
+/// Returns the mark of a movie that this program made.
 pub fn mark_of(path: &Path) -> Option<u64> {
     let file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
     let mut bytes = Vec::new();
@@ -104,18 +104,18 @@ pub fn mark_of(path: &Path) -> Option<u64> {
 }
 
 impl MovieOptions {
-    /// What stands in the file for the mark.
+    /// Returns the text that stores the mark in the file.
     fn mark_text(&self) -> String {
         format!("{MARK}{:016x}", self.mark)
     }
 
-    /// Bytes of one frame.
+    /// Returns the size of a frame, bytes.
     fn frame_bytes(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize * 3
     }
 }
 
-/// A movie being written. Dropped without [`Movie::finish`] it leaves nothing.
+/// A movie that is being written. If it is dropped without [`Movie::finish`], no file remains.
 pub struct Movie {
     writer: Writer,
     path: std::path::PathBuf,
@@ -130,14 +130,20 @@ enum Writer {
 }
 
 impl Movie {
-    /// Opens the movie. What can be known before the work is known here: whether the file can be made
-    /// (exit 73), whether the format can hold the frames (73), whether ffmpeg and its encoder are there
-    /// (69, [`Error::NoFfmpeg`]).
+    /// Opens a movie, and checks everything that can be checked before the first frame.
+    ///
+    /// # Errors
+    /// [`Error::CannotCreate`] (exit 73) where the file cannot be created or the format cannot store the
+    /// frames, [`Error::NoFfmpeg`] (exit 69) where ffmpeg or its encoder is missing.
     pub fn create(path: &Path, kind: MovieKind, options: &MovieOptions) -> Result<Movie> {
         Movie::create_with(path, kind, options, Path::new("ffmpeg"))
     }
 
-    /// As [`Movie::create`] with an ffmpeg of one's own; a name without a folder is looked for on PATH.
+    /// Opens a movie as [`Movie::create`] does, with the given ffmpeg. A name without a folder is searched on
+    /// PATH.
+    ///
+    /// # Errors
+    /// The errors of [`Movie::create`].
     pub fn create_with(path: &Path, kind: MovieKind, options: &MovieOptions, ffmpeg: &Path) -> Result<Movie> {
         check(path, kind, options)?;
         let output = Output::create(path)?;
@@ -151,8 +157,11 @@ impl Movie {
         Ok(Movie { writer, path: path.to_owned(), options: *options, pushed: 0 })
     }
 
-    /// Adds a frame: sRGB bytes R, G, B, row by row from the top left. Fails with 74 where the disk is full
-    /// or ffmpeg gave up; the movie can then only be dropped.
+    /// Adds a frame: sRGB bytes R, G, B, row by row from the top left. After an error the movie can only be
+    /// dropped.
+    ///
+    /// # Errors
+    /// [`Error::Io`] (exit 74) where the disk is full, ffmpeg failed, or the frame does not fit the options.
     pub fn push(&mut self, rgb: &[u8]) -> Result<()> {
         let expected = self.options.frame_bytes();
         if rgb.len() != expected {
@@ -171,12 +180,18 @@ impl Movie {
     }
 
     /// Completes the file and gives it its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where frames are missing or the file cannot be written.
     pub fn finish(self) -> Result<()> {
         self.finish_watched(&Unwatched)
     }
 
-    /// As [`Movie::finish`], with a monitor that may stop it: a GIF is made from its frames here, and a
-    /// video encoder has many frames in hand. Stages told: `encoding`.
+    /// Completes the file as [`Movie::finish`] does, with a monitor that may stop it. A GIF is encoded only
+    /// here, and a video encoder still has many frames to encode. The stage is `encoding`.
+    ///
+    /// # Errors
+    /// The errors of [`Movie::finish`] and of `monitor`.
     pub fn finish_watched(self, monitor: &dyn Monitor) -> Result<()> {
         let Movie { writer, path, options, pushed } = self;
         if pushed != options.frames {
@@ -190,7 +205,7 @@ impl Movie {
     }
 }
 
-/// Refuses what the format cannot hold.
+/// Refuses a movie that the format cannot store.
 fn check(path: &Path, kind: MovieKind, options: &MovieOptions) -> Result<()> {
     let fail = |why: String, fix: String| Err(Error::CannotCreate { path: path.to_owned(), why, fix });
     let MovieOptions { size: [width, height], fps, frames, .. } = *options;
@@ -209,7 +224,7 @@ fn check(path: &Path, kind: MovieKind, options: &MovieOptions) -> Result<()> {
         let why = format!("{name} cannot show {fps} frames a second");
         return fail(why, format!("choose {slow} to {fast}"));
     }
-    // 2³¹ frames are the animated PNG's limit, and more than a year of any video.
+    // An animated PNG has at most 2³¹ − 1 frames, which is more than a year of any video.
     if frames > i32::MAX as u64 {
         return fail(
             format!("{frames} frames are more than {name} holds"),

@@ -1,31 +1,33 @@
-//! 255 colours for a movie, and a dither with them that depends on nothing but colour and place.
+//! A palette of 255 colours for a movie, and a dither that depends only on the colour and position of a
+//! pixel.
 
 use std::collections::BTreeSet;
 
 use color_quant::NeuQuant;
 
-/// The palette holds 256 entries; the last is left for pixels that stay.
+/// Colours of the palette. It has 256 entries; the last marks pixels that do not change.
 const COLOURS: usize = 255;
 
-/// Pixels that the palette is made from, spread evenly over all frames: 2 MiB. Twice as many change no
-/// colour by more than a step or two.
+/// Number of pixels from which the palette is made, spread evenly over all frames; they take 2 MiB. Twice as
+/// many change no colour by more than a step or two.
 const SAMPLE: u64 = 1 << 19;
 
-/// What is kept of frames to choose the palette.
+/// Sample of the frames' pixels, from which the palette is chosen.
 pub(super) struct PaletteSample {
-    /// R, G, B, 255.
+    /// Sampled pixels: R, G, B, 255.
     pixels: Vec<u8>,
-    /// Every how many-eth pixel is kept, counted through the frames.
+    /// Distance between sampled pixels, counted through all frames.
     step: u64,
+    /// Pixels to skip before the next sampled one.
     until_next: u64,
-    /// All colours, as long as the palette can hold them.
+    /// All colours, as long as they fit into the palette.
     exact: Option<BTreeSet<[u8; 3]>>,
 }
 
 impl PaletteSample {
-    /// For `frames` frames of `pixels` pixels.
+    /// Makes a sample for `frames` frames of `pixels` pixels.
     pub(super) fn new(pixels: u64, frames: u64) -> Self {
-        // Odd and no divisor of common widths' multiples, so that the sample is no column of the picture.
+        // An odd step shares few factors with common widths, so the sample does not fall into a few columns.
         let step = (pixels as u128 * frames as u128).div_ceil(SAMPLE as u128) as u64 | 1;
         PaletteSample { pixels: Vec::new(), step, until_next: step / 2, exact: Some(BTreeSet::new()) }
     }
@@ -50,15 +52,15 @@ impl PaletteSample {
         self.until_next -= count;
     }
 
-    /// The colours themselves where there are few; else those of a self-organising map of the sample
-    /// (Dekker 1994), which follows smooth runs of colour such as water's well.
+    /// Returns all colours if they fit into the palette, otherwise those of a self-organising map of the
+    /// sample (Dekker 1994). Such a map follows smooth gradients, as in water, well.
     pub(super) fn palette(self) -> Vec<[u8; 3]> {
         match self.exact {
             Some(exact) => exact.into_iter().collect(),
             None => {
                 let map = NeuQuant::new(1, COLOURS, &self.pixels);
                 let mut colours: Vec<[u8; 3]> = map.color_map_rgb().as_chunks::<3>().0.to_vec();
-                // Neighbours in brightness are neighbours in number: it compresses better.
+                // Sorted by brightness, similar colours have similar indices, which compress better.
                 colours.sort_by_key(|c| (luma(c), *c));
                 colours
             }
@@ -66,18 +68,18 @@ impl PaletteSample {
     }
 }
 
-/// Steps of the dither.
+/// Number of steps of the dither.
 const LEVELS: usize = 16;
 
-/// Entries of the table of colours dithered before.
+/// Entries of the cache of dithered colours.
 const CACHE: usize = 1 << 16;
 
-/// Dithers with a palette.
+/// Dither with a palette.
 pub(super) struct Ditherer {
     palette: Vec<[u8; 3]>,
-    /// The palette by channel, for the search.
+    /// Palette by channel, for the search.
     planes: [Vec<i32>; 3],
-    /// Colour (top bit: filled) and its mixture.
+    /// Colours and their mixtures. The top bit of a colour marks a filled entry.
     cache: Vec<(u32, [u8; LEVELS])>,
 }
 
@@ -87,41 +89,41 @@ impl Ditherer {
         Ditherer { palette, planes, cache: vec![(0, [0; LEVELS]); CACHE] }
     }
 
-    /// R, G, B of all entries in turn.
+    /// Returns R, G, B of all entries in turn.
     pub(super) fn palette(&self) -> &[u8] {
         self.palette.as_flattened()
     }
 
-    /// Indices of a picture.
+    /// Dithers a picture. Returns its indices into the palette.
     pub(super) fn dither(&mut self, rgb: &[u8], width: usize) -> Vec<u8> {
         let pixels = rgb.as_chunks::<3>().0;
         let at = |(i, colour): (usize, &[u8; 3])| self.mixture(*colour)[threshold(i % width, i / width)];
         pixels.iter().enumerate().map(at).collect()
     }
 
-    /// The colours that mix to `colour`, from dark to bright, each as often as its share: Knoll's pattern
-    /// dither. Each is the one nearest to what the ones before left undone.
+    /// Returns the palette colours that mix to `colour`, from dark to bright, each as often as its share
+    /// (Knoll's pattern dither). Each is chosen nearest to `colour` plus the error of those before.
     fn mixture(&mut self, colour: [u8; 3]) -> [u8; LEVELS] {
         let key = u32::from_be_bytes([128, colour[0], colour[1], colour[2]]);
-        // Fibonacci hashing: the top bits of a product with 2³² over the golden ratio.
+        // Fibonacci hashing takes the top bits of the product with 2³² / golden ratio.
         let slot = (key.wrapping_mul(0x9E37_79B9) >> 16) as usize % CACHE;
         if self.cache[slot].0 == key {
             return self.cache[slot].1;
         }
         let wanted = colour.map(i32::from);
-        let mut undone = [0; 3];
+        let mut error = [0; 3];
         let mut mixture = [0; LEVELS];
         for index in &mut mixture {
-            *index = self.nearest([0, 1, 2].map(|c| wanted[c] + undone[c]));
+            *index = self.nearest([0, 1, 2].map(|c| wanted[c] + error[c]));
             let taken = self.palette[*index as usize];
-            undone = [0, 1, 2].map(|c| undone[c] + wanted[c] - taken[c] as i32);
+            error = [0, 1, 2].map(|c| error[c] + wanted[c] - taken[c] as i32);
         }
         mixture.sort_by_key(|&i| (luma(&self.palette[i as usize]), i));
         self.cache[slot] = (key, mixture);
         mixture
     }
 
-    /// The nearest colour; channels weigh as the eye sees them, roughly.
+    /// Returns the index of the nearest colour. Channels are weighted roughly as the eye sees them.
     fn nearest(&self, [r, g, b]: [i32; 3]) -> u8 {
         let [reds, greens, blues] = &self.planes;
         let distance = |i: usize| {
@@ -132,13 +134,13 @@ impl Ditherer {
     }
 }
 
-/// Brightness as the eye sees it, to sort by.
+/// Returns the perceived brightness, for sorting.
 fn luma(c: &[u8; 3]) -> u32 {
     299 * c[0] as u32 + 587 * c[1] as u32 + 114 * c[2] as u32
 }
 
-/// The step of the dither at a pixel: interleaved gradient noise (Jimenez 2014). It stands still in all
-/// frames, and its grain is finer to the eye than a Bayer matrix of as many steps.
+/// Returns the step of the dither at a pixel, from interleaved gradient noise (Jimenez 2014). It is the same
+/// in all frames, and its grain looks finer than that of a Bayer matrix with as many steps.
 fn threshold(x: usize, y: usize) -> usize {
     let noise = (52.982_918_9 * (0.067_110_56 * x as f64 + 0.005_837_15 * y as f64).fract()).fract();
     (noise * LEVELS as f64) as usize % LEVELS

@@ -1,22 +1,23 @@
-//! Fields on a patch's points: midpoint displacement, and how hollow a field is.
+//! Fields on the points of a patch: midpoint displacement, and the hollows of a field.
 
 use rand_distr::{Distribution, StandardNormal};
 
 use super::MAX_LEVELS;
 use crate::util::random::{Family, Stream};
 
-/// Channels after the first two share the numbers of a stream.
+/// Number of channels that share the numbers of a stream, for channels after the first two.
 const CHANNELS: u64 = 8;
 
-/// A fractal field on (2^levels + 1)² points, deviation 1 at the first level, 0 at the corners.
+/// Makes a fractal field on (2^levels + 1)² points. Its deviation is 1 at the first level, and its corners
+/// are 0.
 ///
-/// Each level sets the middle of every square from its four corners, then the middle of every edge
-/// from its neighbours (two on the border), each plus g·2^(−(n−1)·h).
+/// Each level sets the middle of every square to the mean of its four corners, then the middle of every edge
+/// to the mean of its neighbours (two of them on the border), and adds g·2^(−(n−1)·h) to each.
 pub fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
     let n = 1usize << levels;
     let side = n + 1;
     let family = Family::new(seed, if channel < 2 { Stream::Rock } else { Stream::RockForm });
-    // A point keeps its number, and so its g, when finer levels are added: the shape stays.
+    // A point keeps its number and its g when finer levels are added, so the shape stays.
     let finest = |c: usize| (c as u64) << (MAX_LEVELS - levels);
     let g = |x: usize, y: usize| -> f32 {
         let number = finest(y) * ((1 << MAX_LEVELS) + 1) + finest(x);
@@ -57,7 +58,7 @@ pub fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
                     add(x, y + half);
                 }
                 let i = y * side + x;
-                // √½: an edge's middle comes half a level after its square's.
+                // 2^(−h/2): the middle of an edge comes half a level after that of its square.
                 field[i] = sum / count + g(x, y) * scale * (-0.5 * h).exp2();
             }
         }
@@ -66,8 +67,8 @@ pub fn displace(levels: u32, h: f32, seed: u64, channel: u64) -> Vec<f32> {
     field
 }
 
-/// How hollow the field is around each point, 0 (ridge) to 1 (deep hollow), over a neighbourhood of
-/// about a sixteenth of the side.
+/// Returns how deep each point lies below its neighbourhood, from 0 (ridge) to 1 (deep hollow). The
+/// neighbourhood extends by a sixteenth of the side.
 pub fn hollows(height: &[f32], side: usize) -> Vec<f32> {
     let radius = (side / 16).max(1);
     let mean = box_mean(&box_mean(height, side, radius, false), side, radius, true);
@@ -83,7 +84,8 @@ pub fn hollows(height: &[f32], side: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Mean over 2·radius + 1 points along x, or along y if `vertical`, shorter at the border.
+/// Returns the mean over 2·radius + 1 points along x, or along y if `vertical`. At the border it is over
+/// fewer points.
 fn box_mean(field: &[f32], side: usize, radius: usize, vertical: bool) -> Vec<f32> {
     let at = |line: usize, i: usize| if vertical { field[i * side + line] } else { field[line * side + i] };
     let mut out = vec![0.0; field.len()];

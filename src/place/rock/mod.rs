@@ -1,5 +1,5 @@
-//! Fractal rock: a height field by midpoint displacement (Fournier, Fussell and Carpenter 1982),
-//! raised on a four-cornered patch as a real mesh, with ridges, layers and ragged borders.
+//! Fractal rock: a height field by midpoint displacement (Fournier, Fussell and Carpenter 1982) on a patch of
+//! four corners. It becomes a mesh, with ridges, beds and ragged borders.
 
 mod field;
 pub mod shade;
@@ -13,35 +13,35 @@ use super::Vertex;
 use field::{displace, hollows};
 use strata::Strata;
 
-/// Most subdivisions of a rock: a mesh of a million points.
+/// Largest number of subdivisions of a rock: a mesh of a million points.
 pub const MAX_LEVELS: u32 = 10;
 
-/// What a rock is made from.
+/// Parameters of a rock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rock {
-    /// The scene's name for it.
+    /// Name in the scene.
     pub name: String,
     /// Patch corners (u,v) = (0,0) (1,0) (1,1) (0,1), counter-clockwise seen from the outside; metres.
     pub corners: [Vec3; 4],
-    /// 2^levels squares a side.
+    /// Number of subdivisions: the mesh has 2^levels squares a side.
     pub levels: u32,
-    /// Roughness as in the curves: displacement at level n has deviation amplitude·2^(−(n−1)·h).
+    /// Roughness as in the curves: the displacement at level n has the deviation amplitude·2^(−(n−1)·h).
     pub h: f32,
-    /// Metres.
+    /// Standard deviation of the displacement at the first level, metres.
     pub amplitude: f32,
-    /// Height of the middle over the border, metres.
+    /// Height of the patch's middle above its border, metres.
     pub bulge: f32,
-    /// Seed.
+    /// Seed of the rock's randomness.
     pub seed: u64,
-    /// Mean albedo.
+    /// Mean albedo, linear RGB.
     pub color: Vec3,
     /// Relative variation of the albedo.
     pub color_noise: f32,
     /// Darkening of hollows, 0 to 1.
     pub cavity: f32,
-    /// How much of the height is a second field's −|f|, which is sharp where f passes 0; 0 to 1.
+    /// Share of the height that is −|f| of a second field f, which is sharp where f passes 0; 0 to 1.
     pub ridges: f32,
-    /// How far its beds step out and back, in bed heights.
+    /// Distance by which beds step out and back, in bed heights.
     pub strata: f32,
     /// Mean height of a bed, metres.
     pub strata_height: f32,
@@ -49,26 +49,26 @@ pub struct Rock {
     pub strata_tilt: f32,
     /// Relative variation of the albedo from bed to bed.
     pub strata_color: f32,
-    /// Deviation of the displacement of points inside the patch, and so of its border; metres.
+    /// Standard deviation of the displacement of points within the patch, border included; metres.
     pub border: f32,
-    /// How wet it is where water is, 0 to 1.
+    /// Wetness of the rock where water is, 0 to 1.
     pub wet: f32,
-    /// Metres from water to where it is dry.
+    /// Distance from the water at which the rock is dry, metres.
     pub wet_reach: f32,
-    /// How much of the light from the surroundings rock takes from it where it sees nothing else, 0 to 1.
+    /// Share of the surroundings' light that this rock loses where it sees nothing but rock, 0 to 1.
     pub occlusion: f32,
-    /// How much of the sun's light rock takes from it in full shadow, 0 to 1.
+    /// Share of the sun's light that this rock loses in full shadow, 0 to 1.
     pub shadow: f32,
 }
 
 impl Rock {
-    /// Vertices the mesh will have.
+    /// Returns the number of vertices of the mesh.
     pub fn vertex_count(&self) -> u64 {
         let side = (1u64 << self.levels) + 1;
         side * side
     }
 
-    /// This rock's vertices, dry and without the shade of others.
+    /// Builds the vertices, dry and without shade from other rock.
     pub(super) fn vertices(&self) -> Vec<Vertex> {
         let n = 1usize << self.levels;
         let side = n + 1;
@@ -80,7 +80,7 @@ impl Rock {
         let mut height = field(0);
         if self.ridges > 0.0 {
             for (h, r) in height.iter_mut().zip(field(2)) {
-                // E|g| of a unit normal: ridges leave the mean height alone.
+                // √(2/π) is E|g| of a unit normal g, so ridges keep the mean height.
                 *h += self.ridges * ((2.0 / std::f32::consts::PI).sqrt() - r.abs() - *h);
             }
         }
@@ -109,8 +109,8 @@ impl Rock {
             height.par_iter_mut().zip(&mut tone).enumerate().for_each(|(i, (height, tone))| {
                 // Beds wave, end in rough edges, and are worn down in places.
                 let bed = strata.at(base[i], 0.6 * bend[i]);
-                let kept = 0.55 + 0.45 * weather[i] / (1.0 + weather[i] * weather[i]).sqrt();
-                *height += size * kept * bed.out;
+                let relief = 0.55 + 0.45 * weather[i] / (1.0 + weather[i] * weather[i]).sqrt();
+                *height += size * relief * bed.out;
                 *tone = bed.tone * self.strata_color;
             });
         }
@@ -131,7 +131,8 @@ impl Rock {
         (0..side * side).map(vertex).collect()
     }
 
-    /// Adds the triangles between every `step`-th of this rock's vertices, which begin at `first`.
+    /// Appends the triangles between every `step`-th vertex of this rock. The rock's vertices begin at
+    /// `first`.
     pub(super) fn add_triangles(&self, first: u32, step: u32, indices: &mut Vec<u32>) {
         let n = 1u32 << self.levels;
         let index = |x: u32, y: u32| first + (y * (n + 1) + x) * step;

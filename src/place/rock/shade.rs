@@ -1,6 +1,6 @@
-//! What rock takes of the light of rock: depth maps seen along a direction (Williams 1978), looked up at every
-//! vertex. One towards the sun gives its shadow, many over the upper half of the sphere how much of the
-//! surroundings a vertex does not see (Pharr and Green 2004).
+//! Shade of rock on rock: depth maps along a direction (Williams 1978), looked up at every vertex. A map
+//! towards the sun gives the shadow. Many maps over the upper half of the sphere give the share of the
+//! surroundings that a vertex does not see (Pharr and Green 2004).
 
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -11,30 +11,33 @@ use rayon::prelude::*;
 use super::Rock;
 use crate::place::Vertex;
 
-/// Directions that stand for the surroundings: twice as many change the occlusion by some hundredths.
+/// Number of directions that stand for the surroundings. Twice as many change the occlusion by a few
+/// hundredths.
 const DIRECTIONS: u32 = 48;
-/// Cells on a side of the map for one of them; it sees the mesh with a sixteenth of its triangles.
+/// Cells on a side of the map for one of these directions. It shows the mesh with a sixteenth of its
+/// triangles.
 const SIDE: usize = 224;
 /// Cells on a side of the sun's map: 2 cm for rocks of 20 m.
 const SUN_SIDE: usize = 1024;
 
-/// How far along a direction the rocks reach, over a plane across it.
+/// Farthest extent of the rocks along a direction, on a grid of cells across it.
 struct DepthMap {
     x: Vec3,
     y: Vec3,
     to_light: Vec3,
     origin: [f32; 2],
-    /// Metres.
+    /// Side of a cell, metres.
     cell: f32,
     side: usize,
+    /// Extent towards the light in each cell, metres; −∞ where there is no rock.
     depth: Vec<f32>,
 }
 
-/// Vertices that are shaded, and by how much where nothing arrives.
-pub type Taker = (f32, Range<usize>);
+/// A range of vertices that are shaded, and the share of the light that they lose where no light arrives.
+pub type ShadedRange = (f32, Range<usize>);
 
-/// Sets the vertices' occlusion by the rocks that have one.
-pub fn occlude(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut [Vertex]) {
+/// Sets the vertices' occlusion. The rocks whose `occlusion` is above 0 block the surroundings' light.
+pub fn occlude(rocks: &[(&Rock, Range<usize>)], shaded: &[ShadedRange], vertices: &mut [Vertex]) {
     let casters = triangles(rocks, |rock| rock.occlusion, 4);
     if casters.is_empty() {
         return;
@@ -43,7 +46,7 @@ pub fn occlude(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut
         .into_par_iter()
         .map(|i| DepthMap::new(&casters, vertices, direction(i), SIDE))
         .collect();
-    for (amount, own) in takers {
+    for (amount, own) in shaded {
         if *amount == 0.0 {
             continue;
         }
@@ -62,21 +65,27 @@ pub fn occlude(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut
     }
 }
 
-/// Sets the vertices' shadow from a light infinitely far off, by the rocks that have one.
-pub fn shadow(rocks: &[(&Rock, Range<usize>)], takers: &[Taker], vertices: &mut [Vertex], to_light: Vec3) {
+/// Sets the vertices' shadow from a light at infinity. The rocks whose `shadow` is above 0 cast it.
+pub fn shadow(
+    rocks: &[(&Rock, Range<usize>)],
+    shaded: &[ShadedRange],
+    vertices: &mut [Vertex],
+    to_light: Vec3,
+) {
     let casters = triangles(rocks, |rock| rock.shadow, 1);
     if casters.is_empty() {
         return;
     }
     let map = DepthMap::new(&casters, vertices, to_light, SUN_SIDE);
-    for (amount, own) in takers {
+    for (amount, own) in shaded {
         vertices[own.clone()].par_iter_mut().for_each(|vertex| {
             vertex.shadow = amount * (1.0 - map.lit(vertex.position.into(), vertex.normal.into()));
         });
     }
 }
 
-/// Highest point of the rocks above or below each of the vertices in `own`; −∞ where there is none.
+/// Returns the greatest height of the rocks at the column of each vertex in `own`, metres; −∞ where there is
+/// no rock.
 pub fn heights(rocks: &[(&Rock, Range<usize>)], vertices: &[Vertex], own: Range<usize>) -> Vec<f32> {
     let casters = triangles(rocks, |_| 1.0, 1);
     if casters.is_empty() {
@@ -86,7 +95,7 @@ pub fn heights(rocks: &[(&Rock, Range<usize>)], vertices: &[Vertex], own: Range<
     vertices[own].iter().map(|vertex| map.at(vertex.position.into())).collect()
 }
 
-/// The `i`-th direction of a spiral over the upper half of the sphere, all with the same solid angle.
+/// Returns the `i`-th direction of a spiral over the upper half of the sphere. All have the same solid angle.
 fn direction(i: u32) -> Vec3 {
     let y = (i as f32 + 0.5) / DIRECTIONS as f32;
     let (sin, cos) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();
@@ -94,10 +103,10 @@ fn direction(i: u32) -> Vec3 {
     Vec3::new(r * cos, y, r * sin)
 }
 
-/// Every `step`-th vertex's triangles of the rocks that have `what`.
-fn triangles(rocks: &[(&Rock, Range<usize>)], what: fn(&Rock) -> f32, step: u32) -> Vec<u32> {
+/// Returns the triangles between every `step`-th vertex of the rocks whose `amount` is above 0.
+fn triangles(rocks: &[(&Rock, Range<usize>)], amount: fn(&Rock) -> f32, step: u32) -> Vec<u32> {
     let mut indices = Vec::new();
-    for (rock, own) in rocks.iter().filter(|(rock, _)| what(rock) > 0.0) {
+    for (rock, own) in rocks.iter().filter(|(rock, _)| amount(rock) > 0.0) {
         rock.add_triangles(own.start as u32, step.min(1 << rock.levels), &mut indices);
     }
     indices
@@ -132,12 +141,13 @@ impl DepthMap {
         map
     }
 
-    /// In cells across, and metres along.
+    /// Projects a point: cells across the direction in x and y, metres along it in z.
     fn project(&self, p: Vec3) -> Vec3 {
         let [left, low] = self.origin;
         Vec3::new((p.dot(self.x) - left) / self.cell, (p.dot(self.y) - low) / self.cell, p.dot(self.to_light))
     }
 
+    /// Draws a triangle: each cell keeps its largest depth.
     fn draw(&mut self, corners: [Vec3; 3]) {
         let [a, b, c] = corners.map(|p| self.project(p));
         let (ab, ac) = (b - a, c - a);
@@ -154,7 +164,7 @@ impl DepthMap {
             for column in columns.clone() {
                 let (x, y) = (column as f32 + 0.5 - a.x, row as f32 + 0.5 - a.y);
                 let (u, v) = ((x * ac.y - y * ac.x) / area, (ab.x * y - ab.y * x) / area);
-                // A little more than the triangle, so that neighbours leave no gap.
+                // The triangle is drawn slightly larger, so that neighbours leave no gap.
                 if u >= -1e-4 && v >= -1e-4 && u + v <= 1.0 + 1e-4 {
                     let depth = &mut self.depth[row * self.side + column];
                     *depth = depth.max(a.z + u * ab.z + v * ac.z);
@@ -163,7 +173,7 @@ impl DepthMap {
         }
     }
 
-    /// The depth in the cell of a point.
+    /// Returns the depth in the cell of a point.
     fn at(&self, point: Vec3) -> f32 {
         let p = self.project(point);
         let inside = |c: f32| c >= 0.0 && c < self.side as f32;
@@ -174,9 +184,10 @@ impl DepthMap {
         }
     }
 
-    /// Share of the light that reaches a point of a surface with normal `n`: of the four cells around it, those
-    /// that nothing nearer to the light covers (Reeves, Salesin and Cook 1987). The point is taken two cells off
-    /// the surface, for a cell has one depth, and a surface aslant many.
+    /// Returns the share of the light that reaches a point of a surface with normal `n`: the share of the
+    /// four cells around it that nothing nearer to the light covers (Reeves, Salesin and Cook 1987). The
+    /// point is moved off the surface by 1.5 cells along `n` and towards the light, because a cell has a
+    /// single depth and an oblique surface has many in it.
     fn lit(&self, point: Vec3, n: Vec3) -> f32 {
         let p = self.project(point + (n + self.to_light) * (1.5 * self.cell));
         let (x, y) = (p.x - 0.5, p.y - 0.5);

@@ -1,5 +1,5 @@
-//! Layers of rock: beds of uneven height, broken by joints into blocks that step back or stand out, with ledges
-//! where one bed ends and the next begins; in each bed thinner ones.
+//! Beds of rock. They have uneven heights, are broken by joints into blocks that step back or stand out, have
+//! ledges between them, and contain thinner beds.
 
 use glam::Vec3;
 use rand::RngExt;
@@ -7,35 +7,37 @@ use rand::RngExt;
 use super::Rock;
 use crate::util::random::{Family, Stream};
 
-/// Share of a block's side over which it meets its neighbour: less makes steps finer than a mesh can show.
+/// Share of a block's side over which it blends into its neighbour. A smaller share makes steps finer than
+/// the mesh can show.
 const JOINT: f32 = 0.2;
-/// A block's mean length in bed heights.
+/// Mean length of a block, in bed heights.
 const LENGTH: f32 = 3.1;
-/// How far the bounds of beds and blocks lie off the even spacing; below ½ they keep their order.
+/// Largest offset of the bounds of beds and blocks from even spacing. Below ½ the bounds keep their order.
 const UNEVEN: f32 = 0.44;
-/// Thinner beds in each bed, and how far they step relative to it.
+/// Number of thinner beds in each bed, and the size of their steps relative to those of the bed.
 const THIN: (f32, f32) = (3.3, 0.3);
 
 /// The beds of one rock.
 pub struct Strata {
-    /// Unit, across the beds.
+    /// Unit vector across the beds.
     up: Vec3,
-    /// Unit, along them and along the patch.
+    /// Unit vector along the beds and along the patch.
     along: Vec3,
+    /// Mean height of a bed, metres.
     height: f32,
     family: Family,
 }
 
-/// What a point of a bed has.
+/// Properties of a bed at a point.
 pub struct Bed {
-    /// How far the rock stands out, in bed heights; the mean is about 0.
+    /// Distance by which the rock stands out, in bed heights; the mean is about 0.
     pub out: f32,
-    /// The bed's own brightness, −1 to 1.
+    /// Brightness of the bed, −1 to 1.
     pub tone: f32,
 }
 
 impl Strata {
-    /// The beds of a rock whose patch faces `out`.
+    /// Makes the beds of a rock whose patch faces `out`.
     pub fn new(rock: &Rock, out: Vec3) -> Strata {
         let level = Vec3::Y.cross(out).normalize_or(Vec3::X);
         let (sin, cos) = rock.strata_tilt.to_radians().sin_cos();
@@ -47,7 +49,7 @@ impl Strata {
         }
     }
 
-    /// The bed at a point, whose bounds bend by `bend` bed heights there.
+    /// Returns the bed at a point. Its bounds bend by `bend` bed heights there.
     pub fn at(&self, point: Vec3, bend: f32) -> Bed {
         let (s, t) = (point.dot(self.up) / self.height + bend, point.dot(self.along) / self.height + bend);
         let thick = self.octave(s, t, 0);
@@ -55,13 +57,14 @@ impl Strata {
         Bed { out: thick.out + THIN.1 * thin.out, tone: 0.7 * thick.tone + 0.3 * thin.tone }
     }
 
-    /// −1 to 1, of block `j` in bed `i`.
+    /// Returns a random number of block `j` in bed `i`, −1 to 1.
     fn random(&self, octave: i64, i: i64, j: i64) -> f32 {
         let index = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(2 * j as u64 + octave as u64);
         self.family.member(index).random_range(-1.0..1.0)
     }
 
-    /// Beds of height 1, `s` across and `t` along.
+    /// Returns the bed at a point of one octave. Beds have height 1; the point lies at `s` across and `t`
+    /// along them.
     fn octave(&self, s: f32, t: f32, octave: i64) -> Bed {
         const BOUND: i64 = 1 << 40;
         const FACE: i64 = BOUND + 1;
@@ -70,7 +73,7 @@ impl Strata {
         let random = |i, j| self.random(octave, i, j);
         let (i, low, high) = cell(s, |i| random(i, BOUND));
         let f = (s - low) / (high - low);
-        // Joints do not go through: each bed has its own.
+        // Each bed has its own joints: none runs through several beds.
         let t = t / LENGTH + 8.0 * random(i, SHIFT);
         let (j, left, right) = cell(t, |j| random(i, BOUND + 8 + 2 * j));
         let block = |j: i64| 0.5 * random(i, BOUND + 9 + 2 * j);
@@ -86,7 +89,7 @@ impl Strata {
     }
 }
 
-/// The cell that holds `x`, and its bounds, which lie off whole numbers by random amounts.
+/// Returns the cell that contains `x`, and its bounds. Bounds differ from whole numbers by random amounts.
 fn cell(x: f32, random: impl Fn(i64) -> f32) -> (i64, f32, f32) {
     let bound = |i: i64| i as f32 + UNEVEN * random(i);
     let mut i = x.floor() as i64;
@@ -101,6 +104,7 @@ fn cell(x: f32, random: impl Fn(i64) -> f32) -> (i64, f32, f32) {
     (i, low, high)
 }
 
+/// Smoothstep from 0 at x = 0 to 1 at x = 1.
 fn step(x: f32) -> f32 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)

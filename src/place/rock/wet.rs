@@ -1,4 +1,4 @@
-//! Rock that water wets: where it is near falling water, below it, or in a pool.
+//! Wet rock: near falling water, below it, and in pools.
 
 use std::ops::Range;
 
@@ -8,45 +8,45 @@ use rayon::prelude::*;
 use super::Rock;
 use crate::place::{Pool, Vertex};
 
-/// Water runs down this many times as far as it spreads.
+/// Ratio of the distance that water runs down to the distance that it spreads sideways.
 const RUN: f32 = 4.0;
-/// Share of light that a film sends back before it reaches the rock, n = 1.33, at normal incidence.
+/// Share of light that the film reflects before it reaches the rock, with n = 1.33 at normal incidence.
 const OUTSIDE: f32 = 0.02;
-/// Share of diffuse light that the film sends back to the rock: 1 − (1 − 0.066)/n², 0.066 being what water reflects
-/// of light from all sides (Lekner and Dorf 1988).
+/// Share of diffuse light from the rock that the film reflects back to it: 1 − (1 − 0.066)/n². Water reflects
+/// 0.066 of light that falls from all sides (Lekner and Dorf 1988).
 const INSIDE: f32 = 0.474;
 
-/// Albedo of rock under a film of water, from that of dry rock: what comes through the film, is reflected, and gets
-/// out again after any number of reflections between the two (Ångström 1925; Lekner and Dorf 1988, without the
+/// Returns the albedo of rock under a film of water. Light passes the film, is reflected by the rock, and
+/// leaves after any number of reflections between the two (Ångström 1925; Lekner and Dorf 1988, without the
 /// smaller reflection of the rock itself against water).
 pub fn wet_albedo(dry: Vec3) -> Vec3 {
     (1.0 - OUTSIDE) * (1.0 - INSIDE) * dry / (1.0 - INSIDE * dry.min(Vec3::ONE))
 }
 
-/// How wet a point is at `metres` from the water: 1 on it, 0 at `reach`.
+/// Returns the wetness of a point at a distance of `metres` from the water: 1 in it, 0 at `reach`.
 pub fn wetness(metres: f32, reach: f32) -> f32 {
     let x = (1.0 - metres / reach).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }
 
-/// A quad as two triangles, and a ball around all that can be wet from it.
-struct Source {
+/// A quad that wets rock, with its bounding sphere.
+struct WettingQuad {
     corners: [Vec3; 4],
     middle: Vec3,
     radius: f32,
 }
 
-/// A pool wets the rock above it this share as far as falling water does.
+/// Height to which a pool wets rock, as a share of the reach of falling water.
 const SPLASH: f32 = 0.5;
 
-/// Wets the vertices of rocks near the quads `water`, and in and over pools.
+/// Wets the vertices of rocks near the quads `water`, and in and above pools.
 pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[Vec3; 4]], pools: &[Pool]) {
-    let sources: Vec<Source> = water
+    let sources: Vec<WettingQuad> = water
         .iter()
         .map(|&corners| {
             let middle = corners.iter().sum::<Vec3>() / 4.0;
             let radius = corners.iter().map(|c| c.distance(middle)).fold(0.0, f32::max);
-            Source { corners, middle, radius }
+            WettingQuad { corners, middle, radius }
         })
         .collect();
     for (rock, own) in rocks {
@@ -67,8 +67,9 @@ pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[V
     }
 }
 
-/// Metres from the nearest source, those down from it divided by [`RUN`]; at least `reach` where it is that far.
-fn distance(sources: &[Source], point: Vec3, reach: f32) -> f32 {
+/// Returns the distance to the nearest source, metres, but at most `reach`. Downward parts of the distance
+/// count 1/[`RUN`].
+fn distance(sources: &[WettingQuad], point: Vec3, reach: f32) -> f32 {
     let mut best = reach;
     for source in sources {
         let away = point - source.middle;
@@ -89,7 +90,8 @@ fn distance(sources: &[Source], point: Vec3, reach: f32) -> f32 {
     best
 }
 
-/// The point of a triangle nearest to `p` (Ericson 2005, Real-Time Collision Detection, 5.1.5: by Voronoi regions).
+/// Returns the point of a triangle nearest to `p` by Voronoi regions (Ericson 2005, Real-Time Collision
+/// Detection, 5.1.5).
 pub fn nearest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     let (ab, ac) = (b - a, c - a);
     let n = ab.cross(ac);

@@ -3,6 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::light::{AngleFrame, LightKind, ReflectionKind, Scattering, Visibility};
 
 pub(super) const LIGHT: Group = Group {
     title: "Light",
@@ -10,7 +11,7 @@ pub(super) const LIGHT: Group = Group {
             cell reflects a part of it to the eye. These parameters choose the models of both. The defaults \
             are the paper's, except for `light.frame`.",
     params: &[
-        p("light.frame", "", "", Choice(&["world", "texture"]), Uniform)
+        p("light.frame", "", "", Choice(AngleFrame::WORDS), Uniform)
             .doc(
                 "Space in which angles are measured: `world`, or `texture`, the volume's own space as in the \
                  paper.",
@@ -19,7 +20,7 @@ pub(super) const LIGHT: Group = Group {
                 "Choose `texture` only to reproduce the paper; `world` keeps highlights right where the \
                  volume is stretched.",
             ),
-        p("light.visibility", "V", "", Choice(&["march", "cached", "none"]), Uniform)
+        p("light.visibility", "V", "", Choice(Visibility::WORDS), Uniform)
             .doc(
                 "Attenuation between a cell and a light: `march` walks from one to the other for every cell \
                  of every ray; `cached` makes that walk once for every cell of the volume and keeps the \
@@ -40,7 +41,7 @@ pub(super) const LIGHT: Group = Group {
                 "Raise it when taki refuses a scene because of it, or when shadows look doubled; lower it to \
                  save memory.",
             ),
-        p("light.reflection", "Ψ", "", Choice(&["kajiya-kay", "strand"]), Uniform)
+        p("light.reflection", "Ψ", "", Choice(ReflectionKind::WORDS), Uniform)
             .doc(
                 "Reflection of a cell: `kajiya-kay` takes the paper's fibres, with k_d, k_s and p; `strand` \
                  takes strands of water with air between them.",
@@ -49,7 +50,7 @@ pub(super) const LIGHT: Group = Group {
                 "Choose `strand` when light should shine through the water, as that of a low sun behind a \
                  fall.",
             ),
-        p("light.scattering", "", "", Choice(&["single", "multiple"]), Uniform)
+        p("light.scattering", "", "", Choice(Scattering::WORDS), Uniform)
             .doc(
                 "Scattering in the volume: `single` follows light that is scattered once, `multiple` any \
                  number of times. `multiple` excludes `light.visibility=none`.",
@@ -113,7 +114,7 @@ pub(super) const LIGHTS: Group = Group {
     about: "Each light has a name of your choice. A white surface that faces a directional light of colour 1 \
             and intensity 1 has a radiance of 1.",
     params: &[
-        p("lights.*.kind", "", "", Choice(&["directional", "point", "spot"]), Uniform)
+        p("lights.*.kind", "", "", Choice(LightKind::WORDS), Uniform)
             .doc(
                 "Kind of light: `directional` comes from infinitely far, `point` from one place into all \
                  directions, `spot` from one place into a cone.",

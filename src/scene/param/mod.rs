@@ -1,7 +1,8 @@
-//! The parameter table: every number, choice, colour and file a scene can set, once.
+//! The parameter table: every number, choice, colour and file that a scene can set.
 //!
-//! It feeds the scene file, `--set`, the resolved print, docs/parameters.md and the viewer's sliders.
-//! A `*` in a key stands for a name the scene chooses, or for the number of a quad or track.
+//! The reader of scene files, `--set`, the printed scene, docs/parameters.md and the viewer's sliders all use
+//! it. A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The
+//! words of a choice stand at its enum (see `src/util/words.rs`).
 
 mod light;
 mod picture;
@@ -14,19 +15,19 @@ mod volume;
 use Cost::*;
 use Kind::*;
 
-/// What a change of a parameter costs an interactive renderer.
+/// Work that a change of a parameter causes in an interactive renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {
     /// The volume texture is built again from its curves.
     Volume,
-    /// Something already built is packed or uploaded again.
+    /// Existing data is packed or uploaded again.
     Upload,
-    /// A few bytes of uniforms.
+    /// A few bytes of uniforms are written.
     Uniform,
 }
 
 impl Cost {
-    /// The word in tables and files.
+    /// Returns the word in tables and files.
     pub fn word(self) -> &'static str {
         match self {
             Volume => "volume",
@@ -49,13 +50,13 @@ pub enum Kind {
     Color([f64; 3]),
     /// A point or direction, each component −1e7 to 1e7.
     Point([f64; 3]),
-    /// A path or name; empty means none.
+    /// A path or name; empty for none. The text is the default.
     Text(&'static str),
-    /// Four points A, B, C, D; there is no default.
+    /// Four points A, B, C, D, without a default.
     Corners,
-    /// Numbers of frames, each larger than the one before; empty by default.
+    /// Frame numbers, each larger than the one before; empty by default.
     Frames,
-    /// A list of numbers, of triples or of four corners, all alike; empty by default.
+    /// A list of numbers, of triples or of four corners, all of one kind; empty by default.
     Series,
 }
 
@@ -64,30 +65,30 @@ pub enum Kind {
 pub struct Param {
     /// Dotted key in the scene file and for `--set`.
     pub key: &'static str,
-    /// The paper's symbol, if it has one.
+    /// Symbol in the paper, or empty.
     pub symbol: &'static str,
     /// Unit, or empty.
     pub unit: &'static str,
     /// Type, range and default.
     pub kind: Kind,
-    /// What a change costs.
+    /// Cost of a change.
     pub cost: Cost,
-    /// What it is; begins with a noun. Markdown, of which only backticks are used.
+    /// Meaning; begins with a noun. Markdown, of which only backticks are used.
     pub doc: &'static str,
-    /// When one would turn it, and which way; begins with a verb. Markdown as in `doc`.
+    /// Advice on when to change it, and in which direction; begins with a verb. Markdown as in `doc`.
     pub when: &'static str,
-    /// Where a slider runs, if that is not the whole of the allowed range.
+    /// Range of the slider, if it is not the whole allowed range.
     pub slider: Option<(f64, f64)>,
 }
 
-/// A part of the table that has a heading of its own.
+/// A part of the table with its own heading.
 #[derive(Clone, Copy, Debug)]
 pub struct Group {
     /// Heading.
     pub title: &'static str,
-    /// What its parameters are about, in a few sentences. Markdown, of which only backticks are used.
+    /// Introduction of a few sentences. Markdown, of which only backticks are used.
     pub about: &'static str,
-    /// The parameters.
+    /// Parameters of the group.
     pub params: &'static [Param],
 }
 
@@ -95,19 +96,19 @@ pub struct Group {
 pub const COLOR_MAX: f64 = 1.0e4;
 /// Largest coordinate, metres.
 pub const POINT_MAX: f64 = 1.0e7;
-/// Most keyframes of a track.
+/// Largest number of keyframes in a track.
 pub const MAX_KEYFRAMES: usize = 10_000;
-/// Largest number of a frame.
+/// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
-/// Longest line of text in docs/parameters.md.
+/// Longest line of text in docs/parameters.md, characters.
 const COLUMNS: usize = 110;
 
-/// A parameter that still needs its [`Param::doc`] and [`Param::when`].
+/// Makes a parameter that still lacks its [`Param::doc`] and [`Param::when`].
 const fn p(key: &'static str, symbol: &'static str, unit: &'static str, kind: Kind, cost: Cost) -> Param {
     Param { key, symbol, unit, kind, cost, doc: "", when: "", slider: None }
 }
 
-/// The table by groups, in the order of the method.
+/// Groups of the table, in the order of the method.
 pub const GROUPS: &[Group] = &[
     volume::CURVES,
     volume::VOLUME,
@@ -127,7 +128,7 @@ pub const GROUPS: &[Group] = &[
     picture::ANIMATION,
 ];
 
-/// The table, group by group.
+/// All parameters, group by group.
 pub const PARAMS: &[Param] = &joined();
 
 const fn count() -> usize {
@@ -139,7 +140,7 @@ const fn count() -> usize {
     sum
 }
 
-/// Does not compile where a group or a parameter has not been given its words.
+/// Joins the groups. A group or parameter without its texts does not compile.
 const fn joined() -> [Param; count()] {
     let mut all = [GROUPS[0].params[0]; count()];
     let (mut at, mut group) = (0, 0);
@@ -149,7 +150,7 @@ const fn joined() -> [Param; count()] {
         let mut i = 0;
         while i < params.len() {
             if params[i].doc.is_empty() || params[i].when.is_empty() {
-                // The compiler shows the key, all that a constant's message can hold.
+                // The compiler shows the key; the panic of a constant cannot format more.
                 panic!("{}", params[i].key);
             }
             all[at] = params[i];
@@ -160,6 +161,7 @@ const fn joined() -> [Param; count()] {
     all
 }
 
+/// Whether a concrete key fits a pattern in which `*` stands for any part that is not empty.
 fn matches(pattern: &str, key: &str) -> bool {
     let mut parts = key.split('.');
     pattern
@@ -168,7 +170,7 @@ fn matches(pattern: &str, key: &str) -> bool {
         && parts.next().is_none()
 }
 
-/// Known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
+/// Returns the known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
 pub fn nearest(key: &str) -> Option<String> {
     let parts: Vec<&str> = key.split('.').collect();
     PARAMS
@@ -183,7 +185,7 @@ pub fn nearest(key: &str) -> Option<String> {
             named.join(".")
         })
         .map(|candidate| {
-            // A bare last word (`sigma` for `trace.sigma`) is the commonest slip.
+            // The commonest slip is a bare last part, such as `sigma` for `trace.sigma`.
             let last = candidate.rsplit('.').next().unwrap_or("").to_owned();
             let score = strsim::jaro_winkler(key, &candidate).max(strsim::jaro_winkler(key, &last));
             (score, candidate)
@@ -206,17 +208,17 @@ impl Param {
         Param { when, ..self }
     }
 
-    /// Whether it holds a list, which only a scene file or `--set` can give.
+    /// Whether the value is a list, which only a scene file or `--set` can give.
     pub fn is_list(&self) -> bool {
         matches!(self.kind, Frames | Series)
     }
 
-    /// The entry a concrete key such as `lights.sun.color` belongs to.
+    /// Returns the parameter of a concrete key such as `lights.sun.color`.
     pub fn find(key: &str) -> Option<&'static Param> {
         PARAMS.iter().find(|param| matches(param.key, key))
     }
 
-    /// Range in words, for messages and tables.
+    /// Formats the range for messages and tables.
     pub fn range(&self) -> String {
         match self.kind {
             Float(min, max, _) => format!("{} to {}", number(min), number(max)),
@@ -234,7 +236,7 @@ impl Param {
         }
     }
 
-    /// Default in words.
+    /// Formats the default for tables.
     pub fn default_words(&self) -> String {
         match self.kind {
             Float(.., d) => number(d),
@@ -248,7 +250,7 @@ impl Param {
         }
     }
 
-    /// Its row in [`parameters_markdown`].
+    /// Formats the parameter's row in [`parameters_markdown`].
     fn markdown_row(&self) -> String {
         let Param { key, symbol, unit, doc, when, .. } = self;
         let (default, range, cost) = (self.default_words(), self.range(), self.cost.word());
@@ -256,12 +258,13 @@ impl Param {
     }
 }
 
-/// A number as people write it.
+/// Formats a number, with an exponent if it is very large or very small.
 fn number(x: f64) -> String {
     if x != 0.0 && (x.abs() >= 1e5 || x.abs() < 1e-3) { format!("{x:e}") } else { format!("{x}") }
 }
 
-/// The table as Markdown, for docs/parameters.md: links to the groups, then each with its parameters.
+/// Formats the table as the Markdown of docs/parameters.md: links to the groups, then each group with its
+/// parameters.
 pub fn parameters_markdown() -> String {
     let anchor = |title: &str| title.to_lowercase().replace(' ', "-");
     let links: Vec<String> = GROUPS.iter().map(|g| format!("[{}](#{})", g.title, anchor(g.title))).collect();

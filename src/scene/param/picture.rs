@@ -3,6 +3,8 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::picture::{AutoExposure, Filter, Tone};
+use crate::scene::keyframes::Interpolation;
 
 pub(super) const IMAGE: Group = Group {
     title: "Image",
@@ -22,7 +24,7 @@ pub(super) const IMAGE: Group = Group {
             .slider(1.0, 256.0)
             .doc("Number of jittered samples in a pixel. A single one lies in the pixel's centre.")
             .when("Raise it when edges are jagged or strands flicker; the time grows with it."),
-        p("image.filter", "", "", Choice(&["box", "gaussian", "blackman-harris"]), Uniform)
+        p("image.filter", "", "", Choice(Filter::WORDS), Uniform)
             .doc(
                 "Spread of a pixel's samples: `box` is even over the pixel; `gaussian` and `blackman-harris` \
                  are three pixels wide and denser in the middle. A single sample is not spread.",
@@ -42,7 +44,7 @@ pub(super) const IMAGE: Group = Group {
             .slider(-8.0, 8.0)
             .doc("Exposure: the radiance is multiplied by 2^exposure.")
             .when("Raise it when the picture is too dark; lower it when bright water burns out."),
-        p("image.auto_exposure", "", "", Choice(&["none", "average", "highlights"]), Uniform)
+        p("image.auto_exposure", "", "", Choice(AutoExposure::WORDS), Uniform)
             .doc(
                 "Stops added to the exposure, measured on frame 0: `average` brings the logarithmic mean to \
                  middle grey; `highlights` lets the brightest hundredth of the pixels begin at 1.",
@@ -76,7 +78,7 @@ pub(super) const IMAGE: Group = Group {
                  light is greener, and the picture turns magenta.",
             )
             .when("Raise it against a green cast; lower it against a magenta one."),
-        p("image.tone", "", "", Choice(&["filmic", "agx", "none"]), Uniform)
+        p("image.tone", "", "", Choice(Tone::WORDS), Uniform)
             .doc(
                 "Tone curve: `filmic` is Narkowicz's fit of ACES, `agx` is Sobotka's AgX, `none` cuts off \
                  what is brighter than 1.",
@@ -155,7 +157,7 @@ pub(super) const ANIMATION: Group = Group {
         p("animate.tracks.*.values", "", "", Series, Uniform)
             .doc("Values at the keyframes, one for each frame.")
             .when("Set the same value at two keyframes in a row to let the parameter rest between them."),
-        p("animate.tracks.*.interpolation", "", "", Choice(&["linear", "smooth", "hold"]), Uniform)
+        p("animate.tracks.*.interpolation", "", "", Choice(Interpolation::WORDS), Uniform)
             .doc(
                 "Course between keyframes: `linear` is straight, `smooth` is a curve that never overshoots, \
                  `hold` keeps the value until the next keyframe.",

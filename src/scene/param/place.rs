@@ -1,8 +1,9 @@
-//! What the water is in: rock, pools, camera and surroundings.
+//! Rock, pools, camera and surroundings.
 
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::scene::build::EnvironmentKind;
 
 pub(super) const ROCKS: Group = Group {
     title: "Rocks",
@@ -233,7 +234,7 @@ pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
             rock and water and is seen in place of the background. Set the scene's own sun and \
             `light.ambient` to 0 with it, unless you want both.",
     params: &[
-        p("environment.kind", "", "", Choice(&["none", "sky", "file"]), Upload)
+        p("environment.kind", "", "", Choice(EnvironmentKind::WORDS), Upload)
             .doc(
                 "Source of the environment: `none`, the clear `sky` of the parameters below, or a map from a \
                  `file`.",

@@ -1,8 +1,9 @@
-//! The quads the volume is mapped onto, and the walk through it.
+//! Materials, the quads that the volume is mapped onto, and the walk through it.
 
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::trace::{AttenuationKind, Lookup, Prefilter};
 
 pub(super) const MATERIALS_AND_QUADS: Group = Group {
     title: "Materials and quads",
@@ -46,7 +47,7 @@ pub(super) const TRACE: Group = Group {
             another. These parameters set how much light a cell takes away, and how far and how finely rays \
             look.",
     params: &[
-        p("trace.attenuation", "", "", Choice(&["path-length", "per-cell"]), Uniform)
+        p("trace.attenuation", "", "", Choice(AttenuationKind::WORDS), Uniform)
             .doc(
                 "Attenuation of a cell: `path-length` is τ_k = σ·ρ·Δs over the metres Δs of the ray inside \
                  it; `per-cell` is τ_k = τ·ρ, however short the way.",
@@ -82,7 +83,7 @@ pub(super) const TRACE: Group = Group {
         p("trace.layers", "", "sheets", Int(1, 16, 4), Uniform)
             .doc("Most quads that one view ray goes through, the nearest first. Those behind are left out.")
             .when("Raise it when water behind other water disappears; lower it to save time."),
-        p("trace.filter", "", "", Choice(&["none", "pyramid"]), Upload)
+        p("trace.filter", "", "", Choice(Prefilter::WORDS), Upload)
             .doc(
                 "Filter against aliasing: `pyramid` walks coarser levels of the volume where a pixel sees \
                  many cells; `none` always walks the volume's own cells.",
@@ -91,7 +92,7 @@ pub(super) const TRACE: Group = Group {
                 "Choose `pyramid` when distant water flickers or looks grainy; it takes more memory and \
                  time.",
             ),
-        p("trace.lookup", "", "", Choice(&["nearest", "trilinear"]), Uniform)
+        p("trace.lookup", "", "", Choice(Lookup::WORDS), Uniform)
             .doc(
                 "Values that a ray finds in a cell: `nearest` takes the cell's own, `trilinear` interpolates \
                  ρ, k and v between eight cells.",

@@ -3,6 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::volume::StorageChoice;
 
 pub(super) const CURVES: Group = Group {
     title: "Curves",
@@ -100,7 +101,7 @@ pub(super) const VOLUME: Group = Group {
                 "Lower it for thin sheets, for which 10 to 14 are enough; raise it for thick water, and \
                  `trace.max_cells` with it.",
             ),
-        p("volume.storage", "", "", Choice(&["auto", "dense", "sparse"]), Volume)
+        p("volume.storage", "", "", Choice(StorageChoice::WORDS), Volume)
             .doc(
                 "Storage of the cells: `dense` keeps all of them, `sparse` only the blocks that strands \
                  pass. `auto` is sparse only where dense does not fit into `--memory`. Pictures do not \

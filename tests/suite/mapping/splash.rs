@@ -135,7 +135,7 @@ fn faulty_splashes_are_refused_with_their_name() {
         let error = read(&format!("[splashes.a]\n{text}\n")).map(|_| ()).expect_err(text);
         assert!(words.iter().all(|word| error.contains(word)), "{text}: {error}");
     };
-    bad("toward = [0, 1, 0]", &["splash a", "splashes.a.toward", "not plumb"]);
+    bad("toward = [0, 1, 0]", &["splash a", "splashes.a.toward", "not vertical"]);
     bad("toward = [0, 0, 0]", &["splash a", "splashes.a.toward"]);
     bad("material = \"mud\"", &["splash a", "splashes.a.material", "mud", "water"]);
     bad("count = 1024\nsegments = 64", &["splash a makes 131072 quads", "splashes.a.count", "at most 65536"]);

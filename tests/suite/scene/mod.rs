@@ -119,6 +119,39 @@ fn every_parameter_can_be_set_and_is_printed() {
 }
 
 #[test]
+fn every_word_of_a_choice_gives_the_variant_of_its_name() {
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("one.toml");
+    fs::write(&file, ONE_OF_EACH).unwrap();
+    for param in PARAMS {
+        // The scene keeps neither the kind of its environment nor the animation.
+        let is_kept = !["environment.kind", "animate.tracks.*.interpolation"].contains(&param.key);
+        let Kind::Choice(words) = param.kind else { continue };
+        for word in words.iter().filter(|_| is_kept) {
+            let setting = format!("{} = {word}", concrete(param));
+            let scene = Scene::load(&file, std::slice::from_ref(&setting), &Limits::default())
+                .unwrap_or_else(|e| panic!("{setting}: {e}"));
+            let variant = match param.key {
+                "image.auto_exposure" => scene.image.look.auto_exposure.word(),
+                "image.filter" => scene.image.filter.word(),
+                "image.tone" => scene.image.look.tone.word(),
+                "light.frame" => scene.angles.word(),
+                "light.reflection" => scene.reflection.kind().word(),
+                "light.scattering" => scene.scattering.word(),
+                "light.visibility" => scene.visibility.word(),
+                "lights.*.kind" => scene.lights[0].kind().word(),
+                "trace.attenuation" => scene.trace.attenuation.kind().word(),
+                "trace.filter" => scene.trace.filter.word(),
+                "trace.lookup" => scene.trace.lookup.word(),
+                "volume.storage" => scene.asked_storage.word(),
+                other => panic!("the variant of {other} is not compared"),
+            };
+            assert_eq!(variant, *word, "{setting}");
+        }
+    }
+}
+
+#[test]
 fn ranges_include_their_ends_and_nothing_outside() {
     let set = |key: &str, raw: Raw| Values::default().set(key, &raw, &Place("here:7".into()));
     for param in PARAMS {
