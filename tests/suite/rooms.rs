@@ -21,7 +21,7 @@ const FLOORS: &[&[&str]] = &[
     &["job", "farm"],
     &["viewer"],
     &["cli"],
-    &["lib", "main"],
+    &["guide", "lib", "main"],
 ];
 
 /// Floor and name of the room of a file or module, given as a path below `src/`: the longest that holds it.

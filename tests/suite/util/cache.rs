@@ -213,3 +213,21 @@ fn renders_with_a_new_a_used_a_damaged_and_no_cache_make_the_same_file() {
         assert!(fs::read(at(name)).unwrap() == plain, "{name}");
     }
 }
+
+/// Checksums of a volume with all that its spec can hold, and of a mesh of rock and pools.
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
+#[test]
+fn the_versions_of_the_builders_stand_for_what_they_make() {
+    let scene = |name: &str, sets: &[&str]| Scene::preset(name).unwrap().with(sets).unwrap();
+    let water = scene(
+        "waterfall",
+        &["volume.nx=24", "volume.ny=20", "volume.nz=12", "volume.coherence=0.5", "volume.coverage=0.5"],
+    );
+    let volume = build_water(&water.water, &Unwatched).unwrap();
+    let place = scene("waterfall", &crate::engine::gpu::COARSE_PLACE);
+    let vertices = crc32fast::hash(bytemuck::cast_slice(&place.mesh().vertices));
+    let made = format!("{:08x} {vertices:08x}", volume.checksum());
+    let versions = [taki::volume::BUILDER_VERSION, taki::place::BUILDER_VERSION];
+    // A new checksum without a new version would give users their old volumes and meshes.
+    assert_eq!((versions, made.as_str()), ([1, 1], ""));
+}
