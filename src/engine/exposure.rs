@@ -31,7 +31,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
         return Ok(0.0);
     }
     let mut small = scene.clone();
-    let image = &mut small.image;
+    let image = &mut small.edit().image;
     let longest = image.width.max(image.height).max(SIDE);
     let side = |n: u32| ((u64::from(n) * u64::from(SIDE)).div_ceil(u64::from(longest)) as u32).max(1);
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);

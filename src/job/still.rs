@@ -66,7 +66,8 @@ impl Still {
         let about = About {
             whole: [scene.image.width, scene.image.height],
             window,
-            scene: Some(metadata(scene, volume)),
+            // What describes no scene would only mislead: an edited one has no values.
+            scene: scene.values().is_some().then(|| metadata(scene, volume)),
             channels: channel_names(layers),
         };
         let sinks = self.0.into_iter().map(|(kind, output)| Sink::begin(kind, output, &about));
@@ -108,9 +109,9 @@ pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
 pub(crate) fn scene_text(scene: &Scene) -> String {
     let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
     let map = map.map(|e| format!("# environment map: crc32 {:08x}\n", e.map.checksum()));
-    let mut scene = scene.clone();
-    REFERENCES.iter().for_each(|key| scene.values.clear_under(key));
-    map.unwrap_or_default() + &scene.to_toml()
+    let mut values = scene.written().clone();
+    REFERENCES.iter().for_each(|key| values.clear_under(key));
+    map.unwrap_or_default() + &values.to_toml()
 }
 
 fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Output)> {

@@ -12,6 +12,7 @@ mod quads;
 mod read;
 mod value;
 
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
@@ -44,13 +45,30 @@ use crate::volume::{
 /// more lights even the smallest tile of a picture would run into the driver's timeout.
 pub const MAX_LIGHTS: usize = 4096;
 
-/// A complete, valid scene.
+/// A complete, valid scene: the values that were written, and the [`Parts`] they resolve to.
+///
+/// It dereferences to its parts. They change only with the values, by [`Scene::with`]; or by [`Scene::edit`], which
+/// gives up the values. So the two never disagree.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// None after the parts were edited.
+    values: Option<Values>,
+    parts: Parts,
+}
+
+impl Deref for Scene {
+    type Target = Parts;
+
+    fn deref(&self) -> &Parts {
+        &self.parts
+    }
+}
+
+/// The resolved parts of a scene.
+#[derive(Clone, Debug)]
+pub struct Parts {
     /// Name: the preset's, or the stem of the file.
     pub name: String,
-    /// Values that the scene was made from.
-    pub values: Values,
     /// Recipe of the volume, used where there is no `volume_file`.
     pub water: WaterSpec,
     /// Path of the volume's `.npz` file, resolved and inside the allowed folders.
@@ -123,10 +141,15 @@ impl Default for Limits {
     }
 }
 
+/// Returns an exposure with more stops, within the range of `image.exposure`.
+fn exposure_with(exposure: f32, stops: f32) -> f32 {
+    (exposure + stops).clamp(-32.0, 32.0)
+}
+
 /// Replaces an automatic exposure by `stops` added to `image.exposure`. Returns the resulting exposure, in
 /// stops.
 fn expose(values: &mut Values, stops: f32) -> f32 {
-    let exposure = (values.float("image.exposure") + stops).clamp(-32.0, 32.0);
+    let exposure = exposure_with(values.float("image.exposure"), stops);
     let place = Place("image.auto_exposure".into());
     let none = AutoExposure::None.word();
     for (key, raw) in
@@ -172,7 +195,7 @@ impl Scene {
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
-        Ok(Scene {
+        let parts = Parts {
             name: name.into(),
             water,
             volume_file,
@@ -197,15 +220,38 @@ impl Scene {
             background: build::background(v),
             haze: build::haze(v),
             image,
-            values,
-        })
+        };
+        Ok(Scene { values: Some(values), parts })
+    }
+
+    /// Returns the values that the scene was made from; `None` after [`Scene::edit`].
+    pub fn values(&self) -> Option<&Values> {
+        self.values.as_ref()
+    }
+
+    /// Returns the parts to change them freely, as no scene file could. The scene has no values from then on, and the
+    /// pictures made of it do not tell a scene.
+    pub fn edit(&mut self) -> &mut Parts {
+        self.values = None;
+        &mut self.parts
+    }
+
+    /// Returns the values of a scene that only files and [`Scene::with`] have changed.
+    ///
+    /// # Panics
+    /// After [`Scene::edit`].
+    pub(crate) fn written(&self) -> &Values {
+        self.values.as_ref().expect("the scene was not edited by code")
     }
 
     /// Replaces the automatic exposure by `stops` added to the scene's exposure.
     pub fn exposed(mut self, stops: f32) -> Scene {
-        let look = &mut self.image.look;
-        look.exposure = expose(&mut self.values, stops);
+        let look = &mut self.parts.image.look;
         look.auto_exposure = AutoExposure::None;
+        match &mut self.values {
+            Some(values) => look.exposure = expose(values, stops),
+            None => look.exposure = exposure_with(look.exposure, stops),
+        }
         self
     }
 

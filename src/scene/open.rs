@@ -26,7 +26,10 @@ impl Scene {
     /// [`Error::Usage`] for a text without `=`; [`Error::Input`] for an unknown key, a value outside its range, or a
     /// scene that does not fit together; [`Error::Memory`] where it is larger than the limits allow.
     pub fn with(&self, sets: &[&str]) -> Result<Scene> {
-        let mut values = self.values.clone();
+        let Some(mut values) = self.values.clone() else {
+            let what = "the scene was edited by code, and has no values that parameters could be changed in";
+            return Err(Error::input(what, "change parameters first, and edit afterwards"));
+        };
         // Relative paths were resolved in the folder of the scene's file, which is not known any more.
         for (key, path) in self.references() {
             values.set(key, &Raw::Text(path.to_string_lossy().into_owned()), &Place(key.into()))?;

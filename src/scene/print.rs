@@ -6,9 +6,9 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value as Json, json};
 
-use super::Scene;
 use super::param::{PARAMS, Param};
 use super::read::VERSION;
+use super::{Scene, Values};
 use crate::light::Light;
 use crate::light::environment::{ANGULAR_RADIUS, Environment};
 use crate::mapping::Quad;
@@ -16,15 +16,15 @@ use crate::picture::camera::sample_offset;
 use crate::picture::{Camera, Image};
 use crate::place::{Mesh, Vertex};
 
-impl Scene {
-    /// Returns every concrete key of this scene, in the table's order.
+impl Values {
+    /// Returns every concrete key of the values, in the table's order.
     pub fn keys(&self) -> Vec<String> {
         let mut keys = Vec::new();
         for param in PARAMS {
             match param.key.split_once(".*.") {
                 None => keys.push(param.key.to_owned()),
                 Some((section, rest)) => {
-                    let mut names = self.values.names(section);
+                    let mut names = self.names(section);
                     if section == "materials" && !names.iter().any(|n| n == "water") {
                         names.push("water".into());
                     }
@@ -33,11 +33,11 @@ impl Scene {
             }
         }
         // An absent list has no value to print.
-        keys.retain(|key| self.values.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
+        keys.retain(|key| self.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
         keys
     }
 
-    /// Prints the scene as a scene file with every default filled in.
+    /// Prints the values as a scene file with every default filled in.
     pub fn to_toml(&self) -> String {
         let mut text = format!("version = {VERSION}\n");
         let mut keys = self.keys();
@@ -65,20 +65,41 @@ impl Scene {
                 open = own_table;
             }
             let name = key.rsplit('.').next().unwrap_or(key);
-            let _ = writeln!(text, "{name} = {}", self.values.get(key).to_toml());
+            let _ = writeln!(text, "{name} = {}", self.get(key).to_toml());
         }
         text
+    }
+}
+
+impl Scene {
+    /// Returns every concrete key of this scene, in the table's order.
+    ///
+    /// # Panics
+    /// After [`Scene::edit`], as no keys describe it.
+    pub fn keys(&self) -> Vec<String> {
+        self.written().keys()
+    }
+
+    /// Prints the scene as a scene file with every default filled in.
+    ///
+    /// # Panics
+    /// After [`Scene::edit`], as no scene file describes it.
+    pub fn to_toml(&self) -> String {
+        self.written().to_toml()
     }
 
     /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed
     /// from them (camera basis, unit vectors to lights, the opaque mesh with normals and albedo).
+    ///
+    /// # Panics
+    /// After [`Scene::edit`], as no parameters describe it.
     pub fn to_json(&self) -> Json {
         let mut root = Map::new();
         root.insert("taki".into(), json!(env!("CARGO_PKG_VERSION")));
         root.insert("version".into(), json!(VERSION));
         root.insert("name".into(), json!(self.name));
         for key in self.keys() {
-            insert(&mut root, &key, self.values.get(&key).to_json());
+            insert(&mut root, &key, self.written().get(&key).to_json());
         }
         if let Some(Json::Object(quads)) = root.remove("quads") {
             root.insert("quads".into(), numbered_list(quads));

@@ -51,8 +51,8 @@ impl Document {
             path: (!is_preset).then(|| source.to_owned()),
             folder: (!by_hand).then_some(found.folder),
             limits: limits.clone(),
-            values: scene.values.clone(),
-            saved: plain.values,
+            values: scene.written().clone(),
+            saved: plain.written().clone(),
             undo: Vec::new(),
             redo: Vec::new(),
             gesture: None,
@@ -269,9 +269,9 @@ impl Document {
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
         // A reference is relative to the scene's folder: in another folder it must lead to the same file.
-        let mut scene = (*self.scene).clone();
+        let mut values = self.scene.written().clone();
         let moved = self.folder.as_ref() != Some(&folder);
-        for (key, file) in scene.references().into_iter().filter(|_| moved) {
+        for (key, file) in self.scene.references().into_iter().filter(|_| moved) {
             let whole = file.canonicalize().map_err(|e| Error::read(&file, e))?;
             let inside =
                 folder.canonicalize().ok().and_then(|f| whole.strip_prefix(f).ok().map(Path::to_owned));
@@ -282,13 +282,13 @@ impl Document {
                 ));
             };
             let raw = Raw::Text(inside.display().to_string());
-            scene.values.set(key, &raw, &Place("viewer".into()))?;
+            values.set(key, &raw, &Place("viewer".into()))?;
         }
-        crate::output::frame::Output::create(path)?.finish_with(scene.to_toml().as_bytes())?;
+        crate::output::frame::Output::create(path)?.finish_with(values.to_toml().as_bytes())?;
         self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         self.path = Some(path.to_owned());
         self.folder = Some(folder);
-        self.values = scene.values;
+        self.values = values;
         self.saved = self.values.clone();
         self.check();
         Ok(())

@@ -72,7 +72,8 @@ impl Probe {
 fn trace(question: &Question) -> RayReport {
     let Question { picture, size, place: [x, y], .. } = question;
     let mut scene = (*picture.scene).clone();
-    [scene.image.width, scene.image.height] = *size;
+    let image = &mut scene.edit().image;
+    [image.width, image.height] = *size;
     let pixel = [(x * size[0] as f32) as u32, (y * size[1] as f32) as u32];
     inspect(&scene, &picture.volume, &picture.mesh, pixel)
 }

@@ -302,12 +302,15 @@ fn lines_of_the_house() -> Vec<(String, String)> {
 
 #[test]
 fn no_line_is_wider_than_110_columns() {
-    let allowed = |line: &str| line.trim_start().starts_with('|') || line.contains("](") || line.contains("://");
+    let allowed =
+        |line: &str| line.trim_start().starts_with('|') || line.contains("](") || line.contains("://");
     let files = lines_of_the_house();
     assert!(files.len() > 200, "{} files", files.len());
     let mut wide = Vec::new();
     for (file, text) in &files {
-        for (i, line) in text.lines().enumerate().filter(|(_, line)| line.chars().count() > 110 && !allowed(line)) {
+        for (i, line) in
+            text.lines().enumerate().filter(|(_, line)| line.chars().count() > 110 && !allowed(line))
+        {
             wide.push(format!("{file}:{}: {} columns", i + 1, line.chars().count()));
         }
     }

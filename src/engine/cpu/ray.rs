@@ -119,8 +119,8 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
     // Its cells are the volume's own.
     let mut plain = scene.clone();
-    plain.trace.filter = Prefilter::None;
-    plain.trace.lookup = Lookup::Nearest;
+    plain.edit().trace.filter = Prefilter::None;
+    plain.edit().trace.lookup = Lookup::Nearest;
     let traced = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
     RayReport {
         pixel,

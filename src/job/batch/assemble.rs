@@ -238,7 +238,8 @@ impl Batch {
 
     fn row(&self, number: usize, watcher: &dyn Watcher) -> Result<Row> {
         watcher.progress("manifest", number as u64, self.count() as u64)?;
-        let values = self.scene(number)?.values;
+        let scene = self.scene(number)?;
+        let values = scene.written();
         let parameters = self.sweeps.iter().map(|s| (s.key.clone(), values.get(&s.key).to_json())).collect();
         let files = self.files(number);
         // A PNG's text knows all; an EXR's layers know some.

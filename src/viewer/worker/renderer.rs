@@ -255,7 +255,7 @@ impl Renderer {
             && old.scene.image.filter == request.scene.image.filter
             && old.scene.image.rock_error == request.scene.image.rock_error
             && old.samples <= request.samples.max(1)
-            && changed_keys(&old.scene.values, &request.scene.values)
+            && changed_keys(old.scene.written(), request.scene.written())
                 .iter()
                 .all(|key| key.starts_with("image."))
             && old.scene.name == request.scene.name;
@@ -296,8 +296,8 @@ impl Renderer {
 
     fn show(&self, job: &Job, frame: Arc<Frame>, scale: u32, samples: u32, first: bool) {
         let mut scene = (*job.request.scene).clone();
-        (scene.image.width, scene.image.height) = (frame.width, frame.height);
-        scene.image.look = job.look;
+        let shown = &mut scene.edit().image;
+        (shown.width, shown.height, shown.look) = (frame.width, frame.height, job.look);
         let layer = job.request.layer;
         let drawn = layer_image(&frame, layer, samples);
         let size = [frame.width as usize, frame.height as usize];
@@ -331,13 +331,13 @@ impl Renderer {
     ) -> Result<Frame> {
         let [width, height] = job.request.size.map(|n| n.div_ceil(scale).max(1));
         let mut scene = (*job.request.scene).clone();
-        scene.image.width = width;
-        scene.image.height = height;
-        scene.image.samples = job.request.samples.max(1);
-        scene.image.look = job.look;
         let coarse = scale >= COARSE_SCALE;
+        let image = &mut scene.edit().image;
+        (image.width, image.height) = (width, height);
+        image.samples = job.request.samples.max(1);
+        image.look = job.look;
         if coarse {
-            scene.image.rock_error = scene.image.rock_error.max(COARSE_ROCK);
+            image.rock_error = image.rock_error.max(COARSE_ROCK);
         }
         let patience = if what == "preview" { PATIENCE } else { Duration::ZERO };
         let watch = self.watch(what, job.request.serial, patience);
@@ -428,12 +428,13 @@ impl Renderer {
             let of_image = key.starts_with("image.") && !OF_SIZE_AND_WAY.contains(&key.as_str());
             of_image || key.starts_with("animate.") || key == "volume.flow"
         };
-        let known = self.exposed.as_ref().filter(|(of, _)| changed_keys(of, &scene.values).iter().all(same));
+        let known =
+            self.exposed.as_ref().filter(|(of, _)| changed_keys(of, scene.written()).iter().all(same));
         let stops = match known {
             Some((_, stops)) => *stops,
             None => exposure::measure(scene, volume, mesh, &self.watch("exposure", serial, PATIENCE))?,
         };
-        self.exposed = Some((scene.values.clone(), stops));
+        self.exposed = Some((scene.written().clone(), stops));
         Ok(scene.clone().exposed(stops))
     }
 }

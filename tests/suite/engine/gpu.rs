@@ -254,9 +254,9 @@ fn tiles_do_not_change_a_single_bit_and_the_grid_no_more_than_rounding() {
 fn scenes_without_quads_are_drawn_by_both_engines() {
     let Some(mut renderer) = renderer("scenes without quads") else { return };
     let mut rocks = scene("waterfall", &[&COARSE_PLACE[..], &["image.width=96", "image.height=54"]].concat());
-    rocks.quads.clear();
+    rocks.edit().quads.clear();
     let mut nothing = rocks.clone();
-    nothing.rocks.clear();
+    nothing.edit().rocks.clear();
     for (name, scene) in [("rocks", rocks), ("nothing", nothing)] {
         assert_parity(name, &both(&mut renderer, &scene));
     }
@@ -314,8 +314,9 @@ fn a_destroyed_device_is_an_error_and_the_engine_recovers_on_a_new_one() {
         let lost = renderer.render(&scene, &volume, &mesh, &SURFACE, &Unwatched);
         assert!(matches!(lost, Err(Error::DeviceLost(_))), "{lost:?}");
     }
-    let frame =
-        engine.render_volume(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame on the new device");
+    let frame = engine
+        .render_volume(&scene, &volume, &mesh, &SURFACE, &Unwatched)
+        .expect("a frame on the new device");
     assert!(frame.covered_pixels() > 0);
 }
 

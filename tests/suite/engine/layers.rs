@@ -46,13 +46,13 @@ fn upright(low: [f32; 2], high: [f32; 2], z: f32) -> Quad {
 fn sheets(quads: Vec<Quad>) -> Scene {
     let sets = ["image.width=64", "image.height=48", "volume.nx=12", "volume.ny=10", "volume.nz=8"];
     let mut scene = preset("front", &sets);
-    scene.quads = quads;
-    scene.trace.layers = 16;
-    scene.trace.attenuation = Attenuation::PathLength { sigma: 4.0 };
+    scene.edit().quads = quads;
+    scene.edit().trace.layers = 16;
+    scene.edit().trace.attenuation = Attenuation::PathLength { sigma: 4.0 };
     let position = Vec3::new(0.5, 0.8, 1.5);
-    scene.lights.push(Light::Point { position, intensity: Vec3::splat(0.7) });
-    scene.background.zenith = Vec3::new(0.2, 0.5, 0.9);
-    scene.background.horizon = Vec3::new(0.9, 0.7, 0.3);
+    scene.edit().lights.push(Light::Point { position, intensity: Vec3::splat(0.7) });
+    scene.edit().background.zenith = Vec3::new(0.2, 0.5, 0.9);
+    scene.edit().background.horizon = Vec3::new(0.9, 0.7, 0.3);
     scene
 }
 
@@ -247,14 +247,14 @@ fn uniform_sheets_transmit_the_product_of_what_each_does_and_a_shared_edge_count
     let pixel = 2.0 * (scene.camera.tan_half_fov / 48.0);
     let at = |x: f32, y: f32| [(x - 31.5) * pixel, (y - 23.5) * pixel];
     let (low, middle, high) = (at(8.0, 8.0), at(30.0, 21.0), at(58.0, 40.0));
-    scene.quads = vec![
+    scene.edit().quads = vec![
         upright(low, middle, 2.5),
         upright([middle[0], low[1]], [high[0], middle[1]], 2.5),
         upright([low[0], middle[1]], [middle[0], high[1]], 2.5),
         upright(middle, high, 2.5),
     ];
     assert_eq!(overlap::sheets(&scene), 1, "side by side");
-    scene.quads.push(upright([-2.0, -2.0], [2.0, 2.0], 1.0));
+    scene.edit().quads.push(upright([-2.0, -2.0], [2.0, 2.0], 1.0));
     assert_eq!(overlap::sheets(&scene), 2);
     let volume = uniform();
     let frame = on_cpu(&scene, &volume, &no_rock());
@@ -287,7 +287,7 @@ fn faces_of_equal_depth_come_in_the_order_of_the_quads() {
 #[test]
 fn with_one_layer_the_nearest_sheet_is_traced_alone_to_the_bit() {
     let mut scene = heap(6, 3);
-    scene.trace.layers = 1;
+    scene.edit().trace.layers = 1;
     let volume = curves(&scene);
     let mesh = rock([-0.3, -0.2], [0.6, 0.6], -0.2);
     let frame = on_cpu(&scene, &volume, &mesh);
@@ -303,7 +303,7 @@ fn with_one_layer_the_nearest_sheet_is_traced_alone_to_the_bit() {
         wet += 1;
     }
     assert!(wet > 500);
-    scene.trace.layers = 16;
+    scene.edit().trace.layers = 16;
     assert_ne!(frame.radiance, on_cpu(&scene, &volume, &mesh).radiance);
 }
 
@@ -313,7 +313,7 @@ fn of_more_sheets_than_layers_the_farthest_are_left_out() {
     let volume = curves(&scene);
     let all = gbuffer::run(&scene, &no_rock(), 0);
     for layers in [1, 2, 3] {
-        scene.trace.layers = layers;
+        scene.edit().trace.layers = layers;
         let some = gbuffer::run(&scene, &no_rock(), 0);
         assert!((0..64 * 48).all(|i| some.faces(i).eq(all.faces(i).take(layers as usize))));
         let frame = on_cpu(&scene, &volume, &no_rock());
@@ -330,16 +330,16 @@ fn an_early_end_ends_all_sheets_and_max_cells_counts_for_each() {
     let middle = 24 * 64 + 32;
     let cells = |scene: &Scene| on_cpu(scene, &volume, &no_rock()).counts[middle][0];
     assert_eq!(cells(&scene), 15);
-    scene.trace.max_cells = 2;
+    scene.edit().trace.max_cells = 2;
     assert_eq!(cells(&scene), 6);
-    scene.trace.max_cells = 512;
+    scene.edit().trace.max_cells = 512;
     // Each sheet lets e^(−0.48) = 0.62 through: 0.5 is passed in the second cell of the second.
-    scene.trace.early_end = 0.5;
+    scene.edit().trace.early_end = 0.5;
     let ended = on_cpu(&scene, &volume, &no_rock());
     assert_eq!(ended.counts[middle][0], 7 + 1);
     let [radiance @ .., transmittance] = ended.radiance[middle];
     assert!(transmittance < 0.5);
-    scene.background.horizon += 1.0;
+    scene.edit().background.horizon += 1.0;
     let brighter = on_cpu(&scene, &volume, &no_rock()).radiance[middle];
     // What is left still shows what is behind.
     assert!(close((brighter[0] - radiance[0]).into(), transmittance.into(), 1e-5, 0.0));
@@ -356,7 +356,7 @@ fn layers_are_as_many_as_quads_overlap_and_never_fewer() {
             (0..64 * 48).filter_map(|i| Some(met(&scene, i, 0.0)?.len())).max().expect("pixels") as u32;
         let got = overlap::sheets(&scene);
         assert!((deepest..=deepest + 1).contains(&got), "heap {seed}: {got}, {deepest} are seen");
-        scene.trace.layers = 2;
+        scene.edit().trace.layers = 2;
         assert_eq!(overlap::sheets(&scene), got.min(2));
     }
     // Many more than can be looked at one by one: the most is taken.

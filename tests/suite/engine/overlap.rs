@@ -23,10 +23,11 @@ fn no_square_under_water_is_left_out_wherever_the_eye_is() {
             };
             let (eye, forward) = (place(&mut rng), place(&mut rng).normalize());
             // Also eyes among the quads, so that some are cut by the near plane.
-            scene.camera.eye = base.camera.eye.lerp(eye, rng.random_range(0.0..1.0));
-            scene.camera.forward = base.camera.forward.lerp(forward, rng.random_range(0.0..1.0)).normalize();
-            scene.camera.right = scene.camera.forward.cross(Vec3::Y).normalize();
-            scene.camera.up = scene.camera.right.cross(scene.camera.forward);
+            scene.edit().camera.eye = base.camera.eye.lerp(eye, rng.random_range(0.0..1.0));
+            scene.edit().camera.forward =
+                base.camera.forward.lerp(forward, rng.random_range(0.0..1.0)).normalize();
+            scene.edit().camera.right = scene.camera.forward.cross(Vec3::Y).normalize();
+            scene.edit().camera.up = scene.camera.right.cross(scene.camera.forward);
             let window = Window { x: 5, y: 3, width: 80, height: 45 };
             let squares = covered(&scene, [window.x, window.y], [10, 6], 8);
             for sample in 0..4 {

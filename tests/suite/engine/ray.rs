@@ -40,7 +40,7 @@ fn scenes() -> [(&'static str, Scene); 3] {
     };
     let mut lit = small("front", 33, 41, &["light.visibility=march"]);
     let position = Vec3::new(1.0, 1.0, 2.0);
-    lit.1.lights.push(Light::Point { position, intensity: Vec3::splat(3.0) });
+    lit.1.edit().lights.push(Light::Point { position, intensity: Vec3::splat(3.0) });
     [small("fig5", 67, 107, &FIG5_ROCKS), small("waterfall", 96, 54, &WATERFALL_ROCKS), lit]
 }
 
@@ -70,7 +70,7 @@ fn a_filtered_pictures_report_is_of_the_volumes_own_cells_and_says_so() {
     let mesh = scene.mesh();
     let report = |scene: &Scene| inspect(scene, &volume, &mesh, [40, 30]);
     let plain = report(&scene);
-    scene.trace.filter = Prefilter::Pyramid;
+    scene.edit().trace.filter = Prefilter::Pyramid;
     let filtered = report(&scene);
     assert!(!plain.filtered && filtered.filtered && !plain.steps.is_empty());
     assert_eq!((filtered.radiance, &filtered.steps), (plain.radiance, &plain.steps));

@@ -55,10 +55,10 @@ fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     let mut moved = two.quads[0];
     moved.corners = moved.corners.map(|c| c + Vec3::new(3.0, 1.0, -2.0));
     moved.map.a_world = moved.corners[0];
-    two.quads.push(moved);
+    two.edit().quads.push(moved);
     let volumes = two.light_volumes(size, 1.0, u64::MAX).expect("they fit");
     assert_eq!((volumes.volumes.len(), volumes.patches.len()), (1, 2));
-    two.quads[1].material.thickness_m *= 2.0;
+    two.edit().quads[1].material.thickness_m *= 2.0;
     assert_eq!(two.light_volumes(size, 1.0, u64::MAX).expect("they fit").volumes.len(), 2);
     let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4"]);
     assert_eq!(elsewhere, one, "camera, exposure and flow leave light volumes as they are");
@@ -125,7 +125,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
     for (towards, cosine) in
         [(Vec3::Z, 1.0), (Vec3::new(0.6, 0.0, 0.8), 0.8), (Vec3::new(0.0, -0.8, -0.6), 0.6)]
     {
-        front.lights = vec![Light::Directional { to_light: towards, intensity: Vec3::ONE }];
+        front.edit().lights = vec![Light::Directional { to_light: towards, intensity: Vec3::ONE }];
         let volumes = front.light_volumes(uniform.size, 1.0, u64::MAX).expect("they fit");
         for z in [0, 7, 39] {
             let cell = IVec3::new(3, 5, z);

@@ -269,13 +269,13 @@ fn through(
     let mut scene = plumb("segments = 1");
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let rectangle = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];
-    scene.quads = vec![quad(Quad::new(rectangle, scene.quads[0].material).unwrap())];
-    scene.quads[0].material.thickness_m = 0.4;
-    scene.trace.attenuation = Attenuation::PathLength { sigma: 5.0 };
-    scene.trace.early_end = 0.0;
-    scene.ambient = Vec3::ZERO;
-    scene.visibility = visibility;
-    scene.lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
+    scene.edit().quads = vec![quad(Quad::new(rectangle, scene.quads[0].material).unwrap())];
+    scene.edit().quads[0].material.thickness_m = 0.4;
+    scene.edit().trace.attenuation = Attenuation::PathLength { sigma: 5.0 };
+    scene.edit().trace.early_end = 0.0;
+    scene.edit().ambient = Vec3::ZERO;
+    scene.edit().visibility = visibility;
+    scene.edit().lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
     Integrator::new(&scene, volume).trace(0, Vec3::NEG_Z, [uv[0], uv[1], 3.0], Vec3::ZERO, &mut ())
 }
 

@@ -340,7 +340,7 @@ fn the_engines_agree_on_pools_and_on_wet_and_shaded_rock() {
         // Near the water, and far off without foam: there a pixel holds several of the triangles it is mixed over,
         // and the engines' interpolations differ by more than their shading may.
         let mut scene = small(more);
-        scene.pools[0].foam = 0.0;
+        scene.edit().pools[0].foam = 0.0;
         assert_parity(more, &both(&mut renderer, &scene));
         let scene = small_seen_from("[0.3,1.5,0.6]", "[0,0,-1]", more);
         assert!(scene.pools[0].foam > 0.0);
@@ -365,8 +365,8 @@ fn where_only_waves_move_the_kept_place_has_the_bits_of_one_drawn_anew() {
             [(0.0, 1.0), (0.1, 1.0), (0.2, 1.0), (0.2, 1.0), (0.3, 1.0), (0.3, 2.0), (0.0, 1.0)]
         {
             let mut scene = scene.clone();
-            scene.flow = flow;
-            scene.pools[0].height *= height;
+            scene.edit().flow = flow;
+            scene.edit().pools[0].height *= height;
             let kept = keeping.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
             let drawn = fresh.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
             assert!(kept.radiance == drawn.radiance && kept.surface == drawn.surface, "{more} {flow}");
@@ -392,9 +392,9 @@ fn no_rock_in_view_is_left_out_wherever_the_eye_is() {
     for (eye, target, fov) in views {
         let mut scene = small_seen_from(eye, target, "");
         // 32,768 triangles, 97 parts, in the larger of the two.
-        scene.rocks.iter_mut().for_each(|rock| rock.levels = 7);
-        scene.camera.tan_half_fov = (0.5 * f32::to_radians(fov)).tan();
-        scene.image.samples = 1;
+        scene.edit().rocks.iter_mut().for_each(|rock| rock.levels = 7);
+        scene.edit().camera.tan_half_fov = (0.5 * f32::to_radians(fov)).tan();
+        scene.edit().image.samples = 1;
         let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
         let mesh = scene.mesh();
         let on_gpu = renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
@@ -413,7 +413,7 @@ fn parity_can_fail_where_a_pool_is_another_on_one_engine() {
     let Some(mut renderer) = renderer("place") else { return };
     let [a, _] = both(&mut renderer, &small(""));
     let mut other = small("");
-    other.pools[0].seed = 2;
+    other.edit().pools[0].seed = 2;
     let [_, b] = both(&mut renderer, &other);
     assert!(std::panic::catch_unwind(|| assert_parity("another", &[a, b])).is_err());
 }

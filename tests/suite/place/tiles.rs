@@ -108,16 +108,16 @@ fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
     let loss = |s: f64| h * (s / (2.0 * (s + 1.0))).sqrt();
     let mesh = grid(16, 1.0, |x, _| if x % 2 == 1 { h as f32 } else { 0.0 });
     let mut scene = cliff(&[]);
-    (scene.image.height, scene.image.samples, scene.image.rock_error) = (1000, 1, 1.0);
+    (scene.edit().image.height, scene.edit().image.samples, scene.edit().image.rock_error) = (1000, 1, 1.0);
     // Far off and along the grid: f·loss/distance pixels.
     let distance = 1e4;
-    scene.camera.eye = glam::Vec3::new(0.5 - distance as f32, 0.5, 0.0);
-    scene.camera.forward = glam::Vec3::X;
+    scene.edit().camera.eye = glam::Vec3::new(0.5 - distance as f32, 0.5, 0.0);
+    scene.edit().camera.forward = glam::Vec3::X;
     let mut step = |lost_pixels: f64, samples: u32, error: f32| {
         // A step of 2 moves points by so many pixels.
         let focal = lost_pixels * distance / loss(2.0);
-        scene.camera.tan_half_fov = (500.0 / focal) as f32;
-        (scene.image.samples, scene.image.rock_error) = (samples, error);
+        scene.edit().camera.tan_half_fov = (500.0 / focal) as f32;
+        (scene.edit().image.samples, scene.edit().image.rock_error) = (samples, error);
         chosen(&scene, &mesh)[0]
     };
     let of = |s: f64| loss(2.0) / loss(s);
@@ -131,13 +131,13 @@ fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
     assert_eq!((step(0.99, 4, 1.0), step(0.505, 4, 1.0), step(0.495, 4, 1.0)), (1, 1, 2));
     assert_eq!((step(1.98, 1, 2.0), step(2.02, 1, 2.0), step(0.99, 1, 0.0)), (2, 1, 1));
     // Seen from straight above nothing of it moves.
-    (scene.image.samples, scene.image.rock_error) = (1, 1.0);
-    scene.camera.eye = glam::Vec3::new(0.5, 0.5, distance as f32);
-    scene.camera.forward = glam::Vec3::NEG_Z;
-    scene.camera.tan_half_fov = (500.0 * loss(2.0) / (4.0 * distance)) as f32;
+    (scene.edit().image.samples, scene.edit().image.rock_error) = (1, 1.0);
+    scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, distance as f32);
+    scene.edit().camera.forward = glam::Vec3::NEG_Z;
+    scene.edit().camera.tan_half_fov = (500.0 * loss(2.0) / (4.0 * distance)) as f32;
     assert_eq!(chosen(&scene, &mesh), [16]);
     // What the eye is in, or beside, is whole.
-    scene.camera.eye = glam::Vec3::new(0.5, 0.5, 0.005);
+    scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, 0.005);
     assert_eq!(chosen(&scene, &mesh), [1]);
 }
 
@@ -146,11 +146,11 @@ fn one_stone_that_stands_out_alone_is_kept() {
     // Of 289 vertices one is 0.3 m out: the mean square is small, a third of the most is not.
     let mesh = grid(16, 1.0, |x, y| if (x, y) == (7, 7) { 0.3 } else { 0.0 });
     let mut scene = cliff(&[]);
-    scene.camera.eye = glam::Vec3::new(-1e4, 0.5, 0.0);
-    scene.camera.forward = glam::Vec3::X;
-    (scene.image.height, scene.image.rock_error) = (1000, 1.0);
+    scene.edit().camera.eye = glam::Vec3::new(-1e4, 0.5, 0.0);
+    scene.edit().camera.forward = glam::Vec3::X;
+    (scene.edit().image.height, scene.edit().image.rock_error) = (1000, 1.0);
     for (pixels, step) in [(2.0, 16), (4.0, 1)] {
-        scene.camera.tan_half_fov = 500.0 * 0.3 / (pixels * 1e4);
+        scene.edit().camera.tan_half_fov = 500.0 * 0.3 / (pixels * 1e4);
         assert_eq!(chosen(&scene, &mesh), [step], "{pixels}");
     }
 }
@@ -162,12 +162,13 @@ fn triangles_grow_with_distance_and_all_are_drawn_for_many_samples() {
     let count = |scene: &Scene| mesh.triangles(&chosen(scene, &mesh)).len();
     let all = mesh.triangles(&vec![1; mesh.tiles.len()]).len();
     let mut far = near.clone();
-    far.camera.eye += far.camera.forward * -200.0;
+    let back = far.camera.forward * -200.0;
+    far.edit().camera.eye += back;
     let small = cliff(&[]);
     let counts = [&small, &far, &near].map(count);
     assert!(counts[0] < counts[2] && counts[1] < counts[2] && counts[2] <= all, "{counts:?} of {all}");
     let mut many = small.clone();
-    many.image.samples = 4096;
+    many.edit().image.samples = 4096;
     assert_eq!(count(&many), all);
     assert_eq!(count(&cliff(&["image.rock_error=0"])), all);
     // Neighbours are one step apart at most, and pools are whole.

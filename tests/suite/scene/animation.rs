@@ -19,7 +19,7 @@ fn animation(animate: &str) -> Result<Animation, String> {
 }
 
 fn float(animation: &Animation, frame: u32, key: &str) -> f32 {
-    animation.at(frame).unwrap().values.float(key)
+    animation.at(frame).unwrap().values().unwrap().float(key)
 }
 
 fn track(interpolation: &str, more: &str) -> Animation {
@@ -73,8 +73,8 @@ fn every_kind_of_number_can_move() {
     )
     .unwrap();
     let scene = a.at(1).unwrap();
-    assert_eq!(scene.values.get("trace.max_cells"), Value::Int(2));
-    assert_eq!(scene.values.get("lights.sun.color"), Value::Triple([0.25, 0.5, 1.0]));
+    assert_eq!(scene.values().unwrap().get("trace.max_cells"), Value::Int(2));
+    assert_eq!(scene.values().unwrap().get("lights.sun.color"), Value::Triple([0.25, 0.5, 1.0]));
     assert_eq!(scene.quads[0].corners[2], Vec3::new(1.0, 1.0, 1.0));
 }
 
@@ -121,7 +121,8 @@ fn a_track_of_a_loop_comes_round() {
 fn a_turntable_goes_round_its_target_at_one_distance() {
     let a = animation("[animate]\nturn = 24\n").unwrap();
     let place = |frame: u32| {
-        let v = a.at(frame).unwrap().values;
+        let scene = a.at(frame).unwrap();
+        let v = scene.values().unwrap();
         v.triple("camera.eye") - v.triple("camera.target")
     };
     assert_eq!(place(0), place(24));
@@ -143,7 +144,7 @@ const PATH: &str = "[animate.path]\neyes = [[0, 0, 10], [10, 0, 0], [0, 0, -10],
 #[test]
 fn a_path_goes_through_its_points_smoothly() {
     let a = animation(&format!("[animate]\nframes = 91\n{PATH}")).unwrap();
-    let eye = |frame: u32| a.at(frame).unwrap().values.triple("camera.eye");
+    let eye = |frame: u32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
     let points = [[0, 0, 10], [10, 0, 0], [0, 0, -10], [-10, 0, 0]];
     for (i, p) in points.into_iter().enumerate() {
         let want = Vec3::from_array(p.map(|x: i32| x as f32));
@@ -161,7 +162,7 @@ fn a_path_goes_through_its_points_smoothly() {
 fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
     let targets = "targets = [[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 1, 0]]\n";
     let a = animation(&format!("[animate]\nloop = 80\n{PATH}{targets}")).unwrap();
-    let eye = |frame: u32| a.at(frame).unwrap().values.triple("camera.eye");
+    let eye = |frame: u32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
     let steps: Vec<Vec3> = (0..80).map(|f| eye(f + 1) - eye(f)).collect();
     let turn = |a: Vec3, b: Vec3| a.angle_between(b).to_degrees();
     for f in 0..80 {
@@ -170,7 +171,7 @@ fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
         assert!(angle < 15.0, "{f}: {angle}");
         assert!((8.5..10.1).contains(&eye(f as u32).length()), "{f}: {}", eye(f as u32));
     }
-    assert_eq!(a.at(40).unwrap().values.triple("camera.target"), Vec3::new(0.0, 2.0, 0.0));
+    assert_eq!(a.at(40).unwrap().values().unwrap().triple("camera.target"), Vec3::new(0.0, 2.0, 0.0));
 }
 
 #[test]

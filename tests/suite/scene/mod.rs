@@ -108,13 +108,14 @@ fn every_parameter_can_be_set_and_is_printed() {
         let (key, text) = (concrete(param), another(param));
         let scene = Scene::load(&file, &[format!("{key} = {text}")], &Limits::default())
             .unwrap_or_else(|e| panic!("{key} = {text}: {e}"));
-        assert!(scene.values.is_set(&key), "{key}");
-        assert_ne!(scene.values.get(&key), before.values.get(&key), "{key} = {text}");
-        let line = format!("{} = {}", key.rsplit('.').next().unwrap(), scene.values.get(&key).to_toml());
+        assert!(scene.values().unwrap().is_set(&key), "{key}");
+        assert_ne!(scene.values().unwrap().get(&key), before.values().unwrap().get(&key), "{key} = {text}");
+        let line =
+            format!("{} = {}", key.rsplit('.').next().unwrap(), scene.values().unwrap().get(&key).to_toml());
         assert!(scene.to_toml().lines().any(|l| l == line), "{line} is not in {}", scene.to_toml());
         assert_ne!(scene.to_toml(), before.to_toml());
         let printed = Values(source(&scene.to_toml()).values().unwrap().0);
-        assert_eq!(printed.get(&key), scene.values.get(&key), "{key}");
+        assert_eq!(printed.get(&key), scene.values().unwrap().get(&key), "{key}");
     }
 }
 
@@ -316,7 +317,7 @@ fn set_makes_no_new_names() {
 #[test]
 fn tables_without_keys_are_defaults_or_mistakes() {
     let scene = read("version = 1\n[curves]\n[lights.a]\n[lights]\n[materials.m]\n").unwrap();
-    assert_eq!((scene.lights.len(), scene.values.names("materials")), (1, vec!["m".into()]));
+    assert_eq!((scene.lights.len(), scene.values().unwrap().names("materials")), (1, vec!["m".into()]));
     // Over a base it changes nothing.
     let base = "version = 1\nbase = \"fig5\"\n";
     let same = read(&format!("{base}[lights.sun]\n[rocks.wall]\n")).unwrap();
@@ -341,9 +342,12 @@ fn a_scene_replaces_its_bases_quads_and_merges_its_lights() {
     let scene = read(text).unwrap();
     let base = preset("fig5", &[]).unwrap();
     assert_eq!((base.quads.len(), scene.quads.len()), (8, 1));
-    assert_eq!(scene.values.names("lights"), ["moon", "sun"]);
-    assert_eq!(scene.values.float("lights.sun.intensity"), 3.0);
-    assert_eq!(scene.values.get("lights.sun.direction"), base.values.get("lights.sun.direction"));
+    assert_eq!(scene.values().unwrap().names("lights"), ["moon", "sun"]);
+    assert_eq!(scene.values().unwrap().float("lights.sun.intensity"), 3.0);
+    assert_eq!(
+        scene.values().unwrap().get("lights.sun.direction"),
+        base.values().unwrap().get("lights.sun.direction")
+    );
     assert_eq!(scene.rocks, base.rocks);
     for wrong in ["\"fig55\"", "5", "\"s.toml\"", "[\"fig5\"]"] {
         refused(read(&format!("version = 1\nbase = {wrong}\n")), &["s.toml:2: base is no preset", "fig5"]);
@@ -436,10 +440,10 @@ fn the_printed_scene_is_the_same_scene() {
         let again = read(&scene.to_toml()).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(scene.keys(), again.keys(), "{name}");
         for key in scene.keys() {
-            assert_eq!(scene.values.get(&key), again.values.get(&key), "{name}: {key}");
+            assert_eq!(scene.values().unwrap().get(&key), again.values().unwrap().get(&key), "{name}: {key}");
         }
         assert_eq!(scene.to_toml(), again.to_toml(), "{name}");
-        assert_eq!((scene.quads, scene.lights), (again.quads, again.lights), "{name}");
+        assert_eq!((&scene.quads, &scene.lights), (&again.quads, &again.lights), "{name}");
     }
     assert_eq!(read(odd).unwrap().lights.len(), 5);
 }
@@ -480,7 +484,7 @@ fn scenes_that_contradict_themselves_are_refused() {
 
 #[test]
 fn the_paper_figures_differ_in_one_value_each() {
-    let values = |name: &str| preset(name, &[]).unwrap().values;
+    let values = |name: &str| preset(name, &[]).unwrap().values().unwrap().clone();
     for (name, key) in [("fig6", "volume.alpha"), ("fig7", "curves.h")] {
         let (fig5, mut other) = (values("fig5"), values(name));
         assert_ne!(fig5.get(key), other.get(key), "{name}");
@@ -516,4 +520,23 @@ fn the_scene_as_json_has_all_that_an_independent_program_needs() {
     let last =
         mesh("triangles").iter().flat_map(|t| t.as_array().unwrap().clone()).filter_map(|i| i.as_u64()).max();
     assert_eq!(last, Some(vertices as u64 - 1));
+}
+
+#[test]
+fn a_scene_that_code_has_edited_has_no_written_values() {
+    let mut scene = Scene::preset("fig5").unwrap().with(&["trace.sigma=7", "curves.h=1.1"]).unwrap();
+    assert_eq!(scene.values().unwrap().float("trace.sigma"), 7.0);
+    assert_eq!(scene.trace.attenuation, taki::trace::Attenuation::PathLength { sigma: 7.0 });
+    scene.edit().p = 3.0;
+    assert_eq!((scene.p, scene.values()), (3.0, None));
+    assert_eq!(scene.with(&["trace.sigma=8"]).unwrap_err().exit_code(), 65);
+}
+
+#[test]
+fn what_code_asks_of_a_preset_is_checked_as_set_is() {
+    assert_eq!(Scene::preset("fig8").unwrap_err().exit_code(), 65);
+    let fig5 = Scene::preset("fig5").unwrap();
+    for (set, code) in [("trace.sigma", 2), ("trace.sigma=-1", 65), ("trace.sgima=1", 65)] {
+        assert_eq!(fig5.with(&[set]).unwrap_err().exit_code(), code, "{set}");
+    }
 }

@@ -91,7 +91,8 @@ const PLACES: [&str; 4] = ["cascade", "curtain", "spout", "night"];
 
 /// A preset whose place is coarse, as `COARSE_PLACE` is the default's and for its reason.
 fn coarse(name: &str, more: &[&str]) -> Scene {
-    let values = &scene(name, &[]).values;
+    let scene_of_all = scene(name, &[]);
+    let values = scene_of_all.values().expect("a preset has values");
     // The film's lobe is a 32nd power: it magnifies what is left.
     let rock = |rock: String| [format!("rocks.{rock}.levels=1"), format!("rocks.{rock}.wet=0")];
     let rocks = values.names("rocks").into_iter().flat_map(rock);

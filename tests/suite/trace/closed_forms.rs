@@ -16,12 +16,12 @@ use taki::volume::{Cell, VolumeTexture};
 /// The benchmark scene with one quad of our own, no lights, no ambient, every cell walked.
 fn scene(corners: [Vec3; 4], material: Material) -> Scene {
     let mut scene = Scene::load(Path::new("front"), &[], &Limits::default()).unwrap();
-    scene.quads = vec![Quad::new(corners, material).unwrap()];
-    scene.lights.clear();
-    scene.ambient = Vec3::ZERO;
-    scene.visibility = Visibility::None;
-    scene.trace.max_cells = 65536;
-    scene.trace.early_end = 0.0;
+    scene.edit().quads = vec![Quad::new(corners, material).unwrap()];
+    scene.edit().lights.clear();
+    scene.edit().ambient = Vec3::ZERO;
+    scene.edit().visibility = Visibility::None;
+    scene.edit().trace.max_cells = 65536;
+    scene.edit().trace.early_end = 0.0;
     scene
 }
 
@@ -70,8 +70,8 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: Vec3, uv: [f32; 2], behind: V
 #[test]
 fn an_empty_volume_shows_what_is_behind_unchanged() {
     let mut scene = rectangle(material(0.4, 2.0, 3.0));
-    scene.ambient = Vec3::ONE;
-    scene.lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
+    scene.edit().ambient = Vec3::ONE;
+    scene.edit().lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
     let behind = Vec3::new(0.1, 0.7, 12.5);
     // Without directions, and with directions but without density.
     for volume in [uniform([5, 7, 3], Vec3::ZERO, 0.0, 0.0, 0.0), uniform([5, 7, 3], Vec3::Y, 0.0, 1.0, 1.0)]
@@ -91,7 +91,7 @@ fn a_uniform_medium_transmits_by_the_length_of_the_ray_alone() {
         [([40, 40, 40], 1.0, 1.0), ([5, 7, 3], 2.5, 1.0), ([16, 64, 48], 0.3, 4.0), ([1, 1, 1], 1.0, 1.0)]
     {
         let mut scene = rectangle(material(thickness, repeat_u, repeat_v));
-        scene.trace.attenuation = Attenuation::PathLength { sigma };
+        scene.edit().trace.attenuation = Attenuation::PathLength { sigma };
         let volume = uniform(size, Vec3::new(0.1, 1.0, 0.2), 0.3, 0.5, 0.5);
         let rho = volume.cells[0].rho() as f64;
         for degrees in (0..=80).step_by(4).chain([82, 84, 85]) {
@@ -115,7 +115,7 @@ fn a_uniform_medium_transmits_by_the_length_of_the_ray_alone() {
 #[test]
 fn transmittance_does_not_depend_on_where_the_volume_is_seen_from() {
     let mut scene = rectangle(material(0.45, 1.0, 1.0));
-    scene.trace.attenuation = Attenuation::PathLength { sigma: 3.7 };
+    scene.edit().trace.attenuation = Attenuation::PathLength { sigma: 3.7 };
     let volume = uniform([8, 8, 8], Vec3::Y, 1.0, 0.5, 0.5);
     for degrees in [0.0, 40.0, 80.0] {
         let d = slanted(degrees, 1.3);
@@ -129,7 +129,7 @@ fn transmittance_does_not_depend_on_where_the_volume_is_seen_from() {
 fn per_cell_attenuation_counts_cells_and_not_metres() {
     let tau = 0.13f32;
     let mut scene = rectangle(material(5.0, 1.0, 1.0));
-    scene.trace.attenuation = Attenuation::PerCell { tau };
+    scene.edit().trace.attenuation = Attenuation::PerCell { tau };
     let volume = uniform([6, 6, 9], Vec3::Y, 1.0, 0.5, 0.5);
     for degrees in [0.0, 20.0, 55.0] {
         let traced = trace(&scene, &volume, slanted(degrees, 0.3), [0.413, 0.377], Vec3::ONE);
@@ -145,7 +145,7 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
         [Attenuation::PathLength { sigma: 9.0 }, Attenuation::PerCell { tau: 0.4 }].into_iter().enumerate()
     {
         let mut scene = rectangle(material(0.4, 1.5, 2.0));
-        scene.trace.attenuation = attenuation;
+        scene.edit().trace.attenuation = attenuation;
         for seed in 0..200 {
             // Fibres along the flow, light across them: Ψ is k_d = 1 in every cell, so that the light
             // adds the bare weights up one by one.
@@ -156,14 +156,14 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
             });
             let d = slanted(seed as f64 * 0.4, seed as f64);
             let uv = [0.37, 0.005 * seed as f32];
-            scene.ambient = Vec3::ZERO;
-            scene.lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
+            scene.edit().ambient = Vec3::ZERO;
+            scene.edit().lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
             let lit = trace(&scene, &volume, d, uv, Vec3::ZERO);
             let sum = lit.radiance.x as f64 + lit.transmittance as f64;
             assert!(close(sum, 1.0, 2e-6, 0.0), "{i}, seed {seed}: the weights and T sum to {sum}");
             // Ambient light alone sees the same weights.
-            scene.lights.clear();
-            scene.ambient = Vec3::ONE;
+            scene.edit().lights.clear();
+            scene.edit().ambient = Vec3::ONE;
             let ambient = trace(&scene, &volume, d, uv, Vec3::ZERO);
             assert_eq!(ambient.transmittance, lit.transmittance);
             assert!(close(ambient.radiance.x as f64, 1.0 - lit.transmittance as f64, 1e-6, 1e-7));
@@ -177,9 +177,9 @@ fn light_reaches_a_uniform_slab_by_the_depth_of_each_cells_centre() {
     // Light along the normal, fibres across it: the sum is known in closed form.
     let (sigma, thickness, nz) = (4.0f64, 0.5f64, 20);
     let mut scene = rectangle(material(thickness as f32, 1.0, 1.0));
-    scene.trace.attenuation = Attenuation::PathLength { sigma: sigma as f32 };
-    scene.visibility = Visibility::March;
-    scene.lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::new(2.0, 1.0, 0.5) }];
+    scene.edit().trace.attenuation = Attenuation::PathLength { sigma: sigma as f32 };
+    scene.edit().visibility = Visibility::March;
+    scene.edit().lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::new(2.0, 1.0, 0.5) }];
     let volume = uniform([4, 4, nz], Vec3::Y, 1.0, 1.0, 0.0);
     let layer = sigma * thickness / nz as f64;
     for degrees in [0.0, 35.0, 70.0] {
@@ -200,18 +200,18 @@ fn light_reaches_a_uniform_slab_by_the_depth_of_each_cells_centre() {
 #[test]
 fn max_cells_ends_a_ray_and_a_light_ray() {
     let mut scene = rectangle(material(1.0, 1.0, 1.0));
-    scene.trace.attenuation = Attenuation::PerCell { tau: 0.2 };
+    scene.edit().trace.attenuation = Attenuation::PerCell { tau: 0.2 };
     let volume = uniform([4, 4, 30], Vec3::Y, 1.0, 1.0, 0.0);
     for most in [1, 3, 29, 30, 31, 1000] {
-        scene.trace.max_cells = most;
+        scene.edit().trace.max_cells = most;
         let traced = trace(&scene, &volume, Vec3::NEG_Z, [0.4, 0.4], Vec3::ONE);
         assert_eq!(traced.cells[0], most.min(30));
         let want = (-0.2f32 as f64 * most.min(30) as f64).exp();
         assert!(close(traced.transmittance as f64, want, CLOSED_FORM_RELATIVE, 0.0));
     }
-    scene.trace.max_cells = 3;
-    scene.visibility = Visibility::March;
-    scene.lights = vec![Light::Directional { to_light: Vec3::NEG_Z, intensity: Vec3::ONE }];
+    scene.edit().trace.max_cells = 3;
+    scene.edit().visibility = Visibility::March;
+    scene.edit().lights = vec![Light::Directional { to_light: Vec3::NEG_Z, intensity: Vec3::ONE }];
     // The light comes from behind the slab: each of the three cells looks through three.
     assert_eq!(trace(&scene, &volume, Vec3::NEG_Z, [0.4, 0.4], Vec3::ONE).cells, [3, 9]);
 }
@@ -219,11 +219,11 @@ fn max_cells_ends_a_ray_and_a_light_ray() {
 #[test]
 fn early_end_stops_a_dark_ray_and_zero_turns_it_off() {
     let mut scene = rectangle(material(1.0, 1.0, 1.0));
-    scene.trace.attenuation = Attenuation::PerCell { tau: 0.5 };
+    scene.edit().trace.attenuation = Attenuation::PerCell { tau: 0.5 };
     let volume = uniform([4, 4, 100], Vec3::Y, 1.0, 1.0, 0.0);
     let walk = |early_end: f32| {
         let mut scene = scene.clone();
-        scene.trace.early_end = early_end;
+        scene.edit().trace.early_end = early_end;
         trace(&scene, &volume, Vec3::NEG_Z, [0.4, 0.4], Vec3::ONE)
     };
     let whole = walk(0.0);
@@ -242,7 +242,7 @@ fn the_frame_of_a_quads_corner_is_as_good_as_its_middle() {
     let corners =
         [Vec3::ZERO, Vec3::new(2.0, 0.0, 0.3), Vec3::new(1.7, 2.0, 0.255), Vec3::new(0.2, 1.5, 0.03)];
     let mut scene = scene(corners, material(0.4, 2.0, 2.0));
-    scene.trace.attenuation = Attenuation::PathLength { sigma: 2.0 };
+    scene.edit().trace.attenuation = Attenuation::PathLength { sigma: 2.0 };
     let volume = uniform([5, 7, 3], Vec3::Y, 1.0, 1.0, 0.0);
     let d = Vec3::new(0.3, -0.2, -1.0).normalize();
     let cos = -(d.dot(scene.quads[0].map.n_world)) as f64;

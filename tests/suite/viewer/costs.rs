@@ -76,7 +76,7 @@ fn the_picture_is_what_the_library_renders_of_the_same_values() {
     window.settle();
     let mut scene = (**window.viewer().document().scene()).clone();
     let frame = &window.picture().frame;
-    [scene.image.width, scene.image.height] = [frame.width, frame.height];
+    [scene.edit().image.width, scene.edit().image.height] = [frame.width, frame.height];
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let want = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame");
     assert!(frame.radiance == want.radiance && frame.picture == want.picture);

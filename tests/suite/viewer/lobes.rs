@@ -164,7 +164,7 @@ fn load(sets: &[&str]) -> Scene {
 }
 
 fn of(scene: &Scene, selected: Option<&str>) -> Incidence {
-    incidence(scene, &scene.values, selected).expect("a light")
+    incidence(scene, scene.values().unwrap(), selected).expect("a light")
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn the_inclination_is_that_to_the_first_quads_flow() {
 #[test]
 fn the_light_is_the_selected_one_or_the_first_that_shines() {
     let dark = load(&["lights.sun.intensity=0"]);
-    let mut two = dark.values.clone();
+    let mut two = dark.values().unwrap().clone();
     two.set("lights.z.kind", &Raw::Text("point".into()), &taki::scene::Place("test".into()))
         .expect("a value");
     let name = |selected| incidence(&dark, &two, selected).expect("a light").light;

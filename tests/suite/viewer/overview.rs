@@ -10,7 +10,7 @@ use taki::scene::Scene;
 
 fn of(sets: &[String]) -> Environment {
     let scene = Scene::load(Path::new("front"), sets, &Limits::default()).expect("a valid scene");
-    scene.environment.expect("an environment")
+    scene.environment.clone().expect("an environment")
 }
 
 fn sky(more: &[&str]) -> Environment {

@@ -4,6 +4,7 @@ use super::*;
 use rand::{RngExt, SeedableRng};
 use taki::engine::cpu;
 use taki::picture::Layer;
+use taki::trace::Attenuation;
 use taki::util::monitor::Unwatched;
 use taki::viewer::layer_image::Legend;
 
@@ -36,7 +37,7 @@ fn a_layer_is_the_layer_of_a_render() {
     window.settle();
     let mut scene = (**window.viewer().document().scene()).clone();
     let frame = &window.picture().frame;
-    [scene.image.width, scene.image.height] = [frame.width, frame.height];
+    [scene.edit().image.width, scene.edit().image.height] = [frame.width, frame.height];
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let want = cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame");
     assert!(frame.surface == want.surface && frame.surface.is_some());
@@ -113,7 +114,8 @@ fn a_lost_device_is_replaced_and_after_four_in_a_minute_the_cpu_takes_over() {
         assert_eq!(window.viewer().worker().state().devices_lost, loss as usize);
         assert!(window.viewer().worker().state().fault.is_none());
         let picture = window.picture();
-        assert_eq!(f64::from(picture.scene.values.float("trace.sigma")), sigma, "a picture of the new value");
+        let shown = picture.scene.trace.attenuation;
+        assert_eq!(shown, Attenuation::PathLength { sigma: sigma as f32 }, "a picture of the new value");
         assert_eq!(picture.scale, 1);
         let mut want = before;
         want.set("trace.sigma", &Raw::Float(sigma), &taki::scene::Place("test".into())).expect("a value");

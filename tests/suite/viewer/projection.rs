@@ -98,7 +98,7 @@ fn nothing_behind_the_eye_has_a_place() {
 #[test]
 fn a_place_unprojects_onto_the_ray_that_the_renderer_sends_through_it() {
     let scene = Scene::load(Path::new("fig5"), &[], &Limits::default()).expect("a preset");
-    let pose = Pose::of(&scene.values);
+    let pose = Pose::of(scene.values().unwrap());
     let (width, height) = (scene.image.width, scene.image.height);
     let view = View::new(&pose, DVec2::ZERO, DVec2::new(f64::from(width), f64::from(height)));
     for pixel in [[0, 0], [17, 300], [265, 425], [133, 213]] {

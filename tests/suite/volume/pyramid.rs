@@ -190,8 +190,8 @@ fn radiance(
     lookup: Lookup,
     distance: f32,
 ) -> [Vec3; 9] {
-    scene.trace.filter = filter;
-    scene.trace.lookup = lookup;
+    scene.edit().trace.filter = filter;
+    scene.edit().trace.lookup = lookup;
     let integrator = Integrator::new(&scene, volume);
     std::array::from_fn(|i| {
         let uv = [0.1 + 0.37 * (i % 3) as f32, 0.15 + 0.31 * (i / 3) as f32];
@@ -240,7 +240,7 @@ fn a_view_that_magnifies_every_cell_is_not_filtered() {
         cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame").radiance
     };
     let plain = render(&scene);
-    scene.trace.filter = Prefilter::Pyramid;
+    scene.edit().trace.filter = Prefilter::Pyramid;
     // Ψ of moments is Ψ of their one direction but for rounding and `powf`.
     for (a, b) in plain.iter().zip(render(&scene)) {
         assert!((0..4).all(|c| close(a[c].into(), b[c].into(), 1e-4, 1e-5)), "{a:?}, {b:?}");
@@ -313,8 +313,8 @@ fn a_distant_fall_has_a_third_of_the_error_at_one_sample() {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let render = |samples: u32, filter: Prefilter| {
         let mut scene = scene.clone();
-        scene.image.samples = samples;
-        scene.trace.filter = filter;
+        scene.edit().image.samples = samples;
+        scene.edit().trace.filter = filter;
         luminances(&cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame"))
     };
     let truth = render(256, Prefilter::None);

@@ -141,7 +141,8 @@ fn a_lost_device_is_replaced_once_with_a_warning() {
     let volume = scene.volume(1 << 30, &Unwatched).unwrap();
     let (mut engine, _) = Engine::open(EngineChoice::Gpu, &DeviceOptions::default()).unwrap();
     let (options, warnings) = (RenderOptions::default(), Warnings::default());
-    let mut picture = || engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
+    let mut picture =
+        || engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
     let before = picture();
     assert!(warnings.0.lock().unwrap().is_empty());
     if let Engine::Gpu(renderer, _) = &engine {

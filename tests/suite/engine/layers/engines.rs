@@ -26,8 +26,8 @@ fn the_order_of_the_quads_in_the_scene_does_not_matter() {
             };
             let first = frame(&scene);
             for _ in 0..2 {
-                scene.quads.rotate_left(1);
-                scene.quads.swap(0, 1);
+                scene.edit().quads.rotate_left(1);
+                scene.edit().quads.swap(0, 1);
                 let other = frame(&scene);
                 assert!(first.radiance == other.radiance && first.counts == other.counts);
             }
@@ -44,7 +44,7 @@ fn a_quad_that_snapping_folds_over_itself_comes_once() {
     let saddle =
         [corner(-1.0, low, 1.0), corner(1.0, high, 1.0), corner(1.0, low, -1.0), corner(-1.0, high, -1.0)];
     let mut scene = sheets(vec![quad(saddle, 0.2), upright([-1.0, -1.0], [1.0, 1.0], -2.0)]);
-    scene.camera = preset("front", &["camera.fov=0.01"]).camera;
+    scene.edit().camera = preset("front", &["camera.fov=0.01"]).camera;
     let volume = uniform();
     let targets = gbuffer::run(&scene, &no_rock(), 0);
     let mut frames = vec![on_cpu(&scene, &volume, &no_rock())];
@@ -76,9 +76,9 @@ fn the_engines_agree_on_scenes_of_several_sheets() {
         [("heap", heap(8, 6)), ("crossing", crossing()), ("folded", folded()), ("coplanar", coplanar)]
     {
         for (layers, early_end, max_cells) in [(16, 0.0, 512), (3, 0.3, 512), (2, 0.0, 6)] {
-            scene.trace.layers = layers;
-            scene.trace.early_end = early_end;
-            scene.trace.max_cells = max_cells;
+            scene.edit().trace.layers = layers;
+            scene.edit().trace.early_end = early_end;
+            scene.edit().trace.max_cells = max_cells;
             let volume = curves(&scene);
             for mesh in [&no_rock(), &mesh] {
                 let on_gpu = renderer.render(&scene, &volume, mesh, &SURFACE, &Unwatched).expect("a frame");
@@ -124,7 +124,7 @@ fn parts_tiles_and_kept_rasters_of_several_sheets_change_no_bit() {
         assert_eq!(part(&whole), some.radiance);
         // Drawn, kept, used again; and other layers in between.
         for layers in [2, 16, 16, 2, 3, 16] {
-            scene.trace.layers = layers;
+            scene.edit().trace.layers = layers;
             let [first, again] =
                 [&options, &SURFACE].map(|o| frame(&scene, &RenderOptions { grid, ..o.clone() }));
             assert!(first.radiance == again.radiance && first.counts == again.counts, "{layers}");

@@ -107,8 +107,8 @@ fn a_white_surface_under_even_light_is_as_bright_as_the_light_and_the_background
     ];
     sets.extend(white);
     let mut scene = scene("fig5", &sets);
-    scene.rocks.retain(|rock| rock.name == "wall");
-    scene.quads.clear();
+    scene.edit().rocks.retain(|rock| rock.name == "wall");
+    scene.edit().quads.clear();
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let frame = cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame");
     let depth = &frame.surface.as_ref().expect("asked for").depth;

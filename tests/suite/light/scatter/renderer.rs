@@ -59,14 +59,14 @@ fn the_renderers_radiance_is_the_path_tracers() {
         let mean = medium.sigma.iter().sum::<f64>() / medium.sigma.len() as f64;
         // The cube is 1 m deep, the tracer's 24 m.
         let rho = volume.cells.iter().map(|c| c.rho() as f64).sum::<f64>() / volume.cells.len() as f64;
-        multiple.trace.attenuation = Attenuation::PathLength { sigma: (24.0 * mean / rho) as f32 };
+        multiple.edit().trace.attenuation = Attenuation::PathLength { sigma: (24.0 * mean / rho) as f32 };
         let (l, e) = (toward(degrees, 0.3, side), toward(35.0, 2.0, -1.0));
         let to_light = (l * DVec3::new(1.0, 1.0, -1.0)).as_vec3();
-        multiple.lights = vec![Light::Directional { to_light, intensity: Vec3::ONE }];
+        multiple.edit().lights = vec![Light::Directional { to_light, intensity: Vec3::ONE }];
         let mut single = multiple.clone();
-        single.scattering = taki::light::Scattering::Single;
+        single.edit().scattering = taki::light::Scattering::Single;
         let mut cached = multiple.clone();
-        cached.visibility = Visibility::Cached;
+        cached.edit().visibility = Visibility::Cached;
 
         let truth = medium.render([e, l], 1.0, Phase::HenyeyGreenstein(g), PIXELS, PATHS);
         let whole = truth.iter().map(|p| p.single + p.multiple).sum::<f64>();
@@ -94,10 +94,10 @@ fn a_deep_slab_that_absorbs_nothing_sends_back_nearly_all_light() {
     let air = ["light.reflection=strand", "strand.aeration=1", "strand.g=0", "light.scattering=multiple"];
     let mut deep = scene(&air);
     let volume = deep.volume(1 << 30, &taki::util::monitor::Unwatched).expect("a volume");
-    deep.trace.attenuation = Attenuation::PathLength { sigma: 150.0 };
+    deep.edit().trace.attenuation = Attenuation::PathLength { sigma: 150.0 };
     let l = toward(30.0, 0.3, -1.0);
     let to_light = (l * DVec3::new(1.0, 1.0, -1.0)).as_vec3();
-    deep.lights = vec![Light::Directional { to_light, intensity: Vec3::ONE }];
+    deep.edit().lights = vec![Light::Directional { to_light, intensity: Vec3::ONE }];
     // Midpoints in μ² weigh eyes as a white wall does.
     let mut out = 0.0;
     for i in 0..6 {

@@ -13,7 +13,7 @@ use taki::util::monitor::Unwatched;
 use taki::volume::{Cell, VolumeTexture};
 
 fn small(mut scene: Scene) -> Scene {
-    (scene.image.width, scene.image.height, scene.image.samples) = (120, 90, 1);
+    (scene.edit().image.width, scene.edit().image.height, scene.edit().image.samples) = (120, 90, 1);
     scene
 }
 
@@ -24,7 +24,9 @@ fn engines(what: &str) -> Vec<Engine> {
 }
 
 fn frame(engine: &mut Engine, scene: &Scene, volume: &VolumeTexture) -> Frame {
-    engine.render_volume(scene, volume, &scene.mesh(), &RenderOptions::default(), &Unwatched).expect("a frame")
+    engine
+        .render_volume(scene, volume, &scene.mesh(), &RenderOptions::default(), &Unwatched)
+        .expect("a frame")
 }
 
 fn volume(scene: &Scene) -> VolumeTexture {
@@ -47,9 +49,10 @@ fn the_engines_agree_on_eroded_sheets_and_mist() {
                     continue;
                 }
                 let mut scene = small(scene(text));
-                (scene.trace.layers, scene.visibility, scene.scattering) = (layers, visibility, scattering);
+                (scene.edit().trace.layers, scene.edit().visibility, scene.edit().scattering) =
+                    (layers, visibility, scattering);
                 if strand {
-                    scene.reflection = super::scene("[light]\nreflection = \"strand\"\n").reflection;
+                    scene.edit().reflection = super::scene("[light]\nreflection = \"strand\"\n").reflection;
                     assert!(matches!(scene.reflection, Reflection::Strand(_)));
                 }
                 let volume = volume(&scene);
@@ -65,12 +68,12 @@ fn the_engines_agree_on_eroded_sheets_and_mist() {
 #[test]
 fn a_flat_even_sheet_is_one_quad() {
     let mut whole = small(plumb("segments = 1\nstretch = 0.0"));
-    whole.camera = scene("[camera]\neye = [1, 0, 6]\n").camera;
+    whole.edit().camera = scene("[camera]\neye = [1, 0, 6]\n").camera;
     let volume = volume(&whole);
     for engine in &mut engines("flat sheet") {
         let one = frame(engine, &whole, &volume);
         let mut cut = whole.clone();
-        cut.quads = plumb("segments = 7\ncolumns = 3\nstretch = 0.0").quads;
+        cut.edit().quads = plumb("segments = 7\ncolumns = 3\nstretch = 0.0").quads.clone();
         let many = frame(engine, &cut, &volume);
         let rgb = |frame: &Frame| frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect::<Vec<_>>();
         let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
@@ -78,7 +81,7 @@ fn a_flat_even_sheet_is_one_quad() {
         // Where a ray grazes a corner of a cell, one ulp of its place chooses another.
         assert!(outside < 0.01, "{outside}");
         // A quad that lies elsewhere in the texture is seen as such.
-        cut.quads[10].offset.y += 0.5;
+        cut.edit().quads[10].offset.y += 0.5;
         let moved = frame(engine, &cut, &volume);
         assert!(Difference::new(120, &rgb(&one), &rgb(&moved), tolerance).share_outside() > outside + 0.005);
     }
@@ -91,11 +94,12 @@ fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
     let mut with = plain.clone();
     let away = Quad { erosion: [0.5; 4], ..plain.quads[0] };
     let corners = away.corners.map(|c| c + glam::Vec3::new(0.0, 0.0, 500.0));
-    with.quads.push(Quad { erosion: [0.5; 4], ..Quad::new(corners, away.material).unwrap() });
+    with.edit().quads.push(Quad { erosion: [0.5; 4], ..Quad::new(corners, away.material).unwrap() });
     for engine in &mut engines("beside") {
         for visibility in [Visibility::March, Visibility::Cached] {
             let mut frames = [&plain, &with].map(|scene| {
-                let scene = Scene { visibility, ..scene.clone() };
+                let mut scene = scene.clone();
+                scene.edit().visibility = visibility;
                 frame(engine, &scene, &volume)
             });
             let [a, b] = &mut frames;
@@ -112,22 +116,23 @@ fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
 fn the_flow_falls_with_gravity_and_loops() {
     // One layer of the volume, 1 of 64, is dense: a bar across the sheet.
     let mut scene = plumb("segments = 40\nv0 = 1.0");
-    (scene.image.width, scene.image.height, scene.image.samples) = (16, 400, 1);
-    scene.camera = super::scene("[camera]\neye = [0, 0.5, 10]\ntarget = [0, 0.5, 0]\nfov = 40\n").camera;
-    scene.visibility = Visibility::None;
+    let image = &mut scene.edit().image;
+    (image.width, image.height, image.samples) = (16, 400, 1);
+    scene.edit().camera = super::scene("[camera]\neye = [0, 0.5, 10]\ntarget = [0, 0.5, 0]\nfov = 40\n").camera;
+    scene.edit().visibility = Visibility::None;
     let dense = Cell::from_direction(glam::Vec3::Y).with_density(1.0, 0.5, 0.5);
     let cells = (0..64).map(|y| if y == 8 { dense } else { Cell::default() }).collect::<Vec<_>>();
     let volume = VolumeTexture { size: [1, 64, 1], alpha: 1.0, cells: cells.into() };
-    for quad in &mut scene.quads {
+    for quad in &mut scene.edit().quads {
         quad.material.thickness_m = 1e-3;
     }
-    scene.trace.attenuation = taki::trace::Attenuation::PathLength { sigma: 1e4 };
+    scene.edit().trace.attenuation = taki::trace::Attenuation::PathLength { sigma: 1e4 };
     let whole = ((1.0 + 2.0 * GRAVITY * 5.0).sqrt() - 1.0) / GRAVITY;
     let fallen = |time: f64| time + 0.5 * GRAVITY * time * time;
     let mut last = f64::INFINITY;
     for engine in &mut engines("falling bar") {
         for flow in [0.0f32, 0.25, 0.5, 0.75] {
-            scene.flow = flow;
+            scene.edit().flow = flow;
             let picture = frame(engine, &scene, &volume);
             let (mut sum, mut weight) = (0.0, 0.0);
             for (i, r) in picture.radiance.iter().enumerate() {
@@ -145,7 +150,11 @@ fn the_flow_falls_with_gravity_and_loops() {
             assert!((got - want).abs() < metres + 0.01, "flow {flow}: {got} {want}");
             last = got.min(last);
         }
-        let mut at = |flow: f32| frame(engine, &Scene { flow, ..scene.clone() }, &volume).radiance;
+        let mut at = |flow: f32| {
+            let mut scene = scene.clone();
+            scene.edit().flow = flow;
+            frame(engine, &scene, &volume).radiance
+        };
         assert!(at(0.25) == at(3.25));
     }
     assert!(last < 0.0);

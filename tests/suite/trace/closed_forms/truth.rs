@@ -134,11 +134,11 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
             |x: f32, y: f32| turn * Vec3::new(x + span(-0.2, 0.2), y + span(-0.2, 0.2), 0.0) + place;
         let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.6), corner(0.0, 1.6)];
         let mut scene = scene(corners, material(span(0.1, 0.6), span(0.5, 3.0), span(0.5, 3.0)));
-        scene.trace.attenuation = attenuation;
-        scene.visibility = visibility;
-        scene.angles = frame;
-        scene.p = [1.0, 8.0, 20.0, 7.5][i % 4];
-        scene.ambient = Vec3::new(0.1, 0.2, 0.05);
+        scene.edit().trace.attenuation = attenuation;
+        scene.edit().visibility = visibility;
+        scene.edit().angles = frame;
+        scene.edit().p = [1.0, 8.0, 20.0, 7.5][i % 4];
+        scene.edit().ambient = Vec3::new(0.1, 0.2, 0.05);
         let volume = noise([5, 7, 3], seed + i as u64);
         let n = scene.quads[0].map.n_world;
         for ray in 0..20 {
@@ -151,11 +151,11 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
             let (uv, distance) = ([span(0.0, 1.0), span(0.0, 1.0)], span(0.5, 4.0));
             let map = scene.quads[0].map;
             let x = map.point_world(uv[0], uv[1]);
-            scene.camera.eye = x - d * distance;
+            scene.edit().camera.eye = x - d * distance;
             // The point light stands off the plane, on either side.
             let above = n * span(0.6, 2.0) * if ray % 2 == 0 { 1.0 } else { -1.0 };
             let position = x + above + map.e1_world * span(-1.0, 1.0);
-            scene.lights = vec![
+            scene.edit().lights = vec![
                 Light::Directional { to_light, intensity: Vec3::new(0.9, 0.7, 0.5) },
                 Light::Point { position, intensity: Vec3::new(0.2, 0.9, 1.4) },
             ];
