@@ -41,6 +41,7 @@ mod splash;
 mod strand;
 mod tiles;
 mod tolerance;
+mod tutorial;
 #[cfg(feature = "viewer")]
 mod viewer;
 mod visibility;
