@@ -7,6 +7,7 @@ macro_rules! pages {
 }
 
 pages! {
+    tutorial "tutorial.md"
     method "method.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"

@@ -18,6 +18,7 @@ mod rooms;
 mod scene;
 mod tolerance;
 mod trace;
+mod tutorial;
 mod util;
 #[cfg(feature = "viewer")]
 mod viewer;
