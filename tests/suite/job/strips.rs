@@ -341,7 +341,7 @@ fn parts_that_make_no_whole_are_refused() {
 
         // The same scene by its text, but another picture: one that was tampered with.
         let mut wrong = Subject::small();
-        wrong.scene.edit().ambient *= 2.0;
+        wrong.mesh = Default::default();
         let window = Window { x: 30, y: 10, width: 50, height: 40 };
         wrong.write(&file, window, &[61]);
         refused(&[whole.clone(), file], &["whole.", "other.", "differ at the pixel ("]);

@@ -524,9 +524,9 @@ fn the_scene_as_json_has_all_that_an_independent_program_needs() {
 
 #[test]
 fn a_scene_that_code_has_edited_has_no_written_values() {
-    let mut scene = Scene::preset("fig5").unwrap().with(&["trace.sigma=7", "curves.h=1.1"]).unwrap();
-    assert_eq!(scene.values().unwrap().float("trace.sigma"), 7.0);
-    assert_eq!(scene.trace.attenuation, taki::trace::Attenuation::PathLength { sigma: 7.0 });
+    let mut scene = Scene::preset("fig5").unwrap().with(&["trace.tau=7", "curves.h=1.1"]).unwrap();
+    assert_eq!(scene.values().unwrap().float("trace.tau"), 7.0);
+    assert_eq!(scene.trace.attenuation, taki::trace::Attenuation::PerCell { tau: 7.0 });
     scene.edit().p = 3.0;
     assert_eq!((scene.p, scene.values()), (3.0, None));
     assert_eq!(scene.with(&["trace.sigma=8"]).unwrap_err().exit_code(), 65);
