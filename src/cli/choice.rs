@@ -12,9 +12,7 @@ use crate::viewer::WindowChoice;
 type Choices<T> = [(&'static str, &'static str, T)];
 
 /// Parses the words of `choices`. Help, completions and error messages list them.
-fn choice<T: Copy + Send + Sync + 'static>(
-    choices: &'static Choices<T>,
-) -> impl TypedValueParser<Value = T> {
+fn choice<T: Copy + Send + Sync + 'static>(choices: &'static Choices<T>) -> impl TypedValueParser<Value = T> {
     let words = choices.iter().map(|(word, help, _)| PossibleValue::new(*word).help(*help));
     PossibleValuesParser::new(words).try_map(|word| {
         let chosen = choices.iter().find(|(known, ..)| *known == word);
@@ -48,9 +46,8 @@ pub fn window() -> impl TypedValueParser<Value = WindowChoice> {
 /// Parser of one word of `--layers`.
 pub fn layer() -> impl TypedValueParser<Value = Layer> {
     let words = Layer::ALL.map(|layer| PossibleValue::new(layer.name()).help(layer_help(layer)));
-    PossibleValuesParser::new(words).try_map(|word| {
-        Layer::ALL.into_iter().find(|layer| layer.name() == word).ok_or("unknown layer")
-    })
+    PossibleValuesParser::new(words)
+        .try_map(|word| Layer::ALL.into_iter().find(|layer| layer.name() == word).ok_or("unknown layer"))
 }
 
 fn layer_help(layer: Layer) -> &'static str {
