@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
+use super::choice::layer;
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
 use crate::engine::Engine;
@@ -90,7 +91,7 @@ pub struct BatchArgs {
     #[command(flatten)]
     engine: EngineOptions,
     /// Layers of EXR files.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "A,B,…")]
+    #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
     layers: Option<Vec<Layer>>,
     /// Prints what happens on stdout, one JSON object a line.
     #[arg(long, value_enum, value_name = "FORMAT")]

@@ -2,6 +2,7 @@
 
 mod batch;
 mod bench;
+mod choice;
 mod compare;
 mod devices;
 mod farm;
@@ -138,7 +139,7 @@ impl CacheOptions {
 #[derive(Args, Clone)]
 struct EngineOptions {
     /// auto takes a GPU adapter if there is one, else the CPU.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = choice::engine(), default_value = "auto")]
     engine: EngineChoice,
     /// Takes the adapter whose name contains this (see `taki devices`).
     #[arg(long, value_name = "NAME")]

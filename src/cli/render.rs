@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::json;
 
+use super::choice::layer;
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
 use crate::engine::exposure::exposed;
@@ -44,7 +45,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     cache: CacheOptions,
     /// Layers of the EXR file.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "A,B,…")]
+    #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
     layers: Option<Vec<Layer>>,
     /// Prints what was done as one JSON object on stdout.
     #[arg(long)]

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, EngineOptions, SceneOptions, seconds};
+use super::{CacheOptions, EngineOptions, SceneOptions, choice, seconds};
 use crate::util::error::Result;
 use crate::viewer::settings::Settings;
 use crate::viewer::{self, Options, WindowChoice};
@@ -20,7 +20,7 @@ pub struct ViewArgs {
     #[command(flatten)]
     engine: EngineOptions,
     /// What draws the window: auto takes Vulkan, Metal or Direct3D on a GPU, else OpenGL.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = choice::window(), default_value = "auto")]
     window: WindowChoice,
     /// Closes the window after this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]

@@ -20,7 +20,7 @@ use crate::volume::VolumeTexture;
 use gpu::{DeviceOptions, Gpu, GpuRenderer};
 
 /// The user's choice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineChoice {
     /// A GPU adapter if there is one, else the CPU.
     #[default]

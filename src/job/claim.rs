@@ -1,10 +1,14 @@
 //! Exclusive claims on work, for any number of processes that share a folder.
 //!
-//! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it, which only one process
-//! can create. Its owner touches it now and then. Where the owner is dead (on this machine that is known), or has
-//! not touched it for the stale time (by the watcher's own clock, for clocks differ), the next one claims `-1`,
-//! which again only one can create: so a claim is never taken by two. The highest number owns the work. Claims are
-//! removed once the work is done: who claims after that finds it done.
+//! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it. Only one process can
+//! create that file. Its owner updates the file's modification time four times within the stale time. A
+//! claim is stale if its owner is known to be dead (only processes of the same machine can tell) or if the
+//! modification time has not changed for the stale time. The observer measures that time with its own clock,
+//! because clocks of machines differ.
+//!
+//! The next process then creates `.fall.0007.exr.taki-claim-1`. Again only one process can, so two never
+//! hold the same claim. The highest number owns the work. Claims are removed once the work is done; a
+//! process that claims it after that finds the finished file.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -16,16 +20,16 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::output::frame::{Life, Owner, folder_of};
 use crate::util::error::{Error, Result};
 
-/// A claim that still does not say whose it is after so long is stale.
+/// A claim file that does not name its owner within this time is stale.
 const NAMELESS: Duration = Duration::from_secs(5);
 
-/// Takes claims, and keeps them fresh.
+/// Takes claims and keeps their modification times fresh.
 pub struct Claims {
     stale: Duration,
-    /// Others' claims: the time stamp of each, and since when it is seen.
+    /// Claims of other processes: the last modification time seen, and when it was first seen.
     watched: HashMap<PathBuf, (Option<SystemTime>, Instant)>,
     held: Arc<Mutex<Vec<Held>>>,
-    /// Dropped to end the thread that touches what is held.
+    /// Dropping it ends the thread that touches the held claims.
     _stop: mpsc::Sender<()>,
 }
 
@@ -34,20 +38,20 @@ struct Held {
     file: File,
 }
 
-/// What came of asking for a claim.
+/// The answer to a request for a claim.
 pub enum Asked {
-    /// It is ours.
+    /// This process holds the claim.
     Ours(Claim),
-    /// Someone works on it: who, as far as is known.
+    /// Another process works on it: its name, or "someone" if unknown.
     Theirs(String),
 }
 
-/// A claim that is held. Dropping it lets others have the work.
+/// A claim that this process holds. Dropping it lets others take the work.
 pub struct Claim {
     target: PathBuf,
     generation: u32,
     held: Arc<Mutex<Vec<Held>>>,
-    /// Machines whose work was taken over: their temporary files for it are stale.
+    /// Owners of the stale claims that this one replaces; their temporary files are stale too.
     pub taken_from: Vec<Owner>,
 }
 
@@ -55,7 +59,7 @@ fn lock(held: &Mutex<Vec<Held>>) -> std::sync::MutexGuard<'_, Vec<Held>> {
     held.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-/// The claim file of a target.
+/// Path of a target's claim file. Each takeover has the next generation.
 fn claim_path(target: &Path, generation: u32) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
     name.push(target.file_name().unwrap_or_default());
@@ -64,17 +68,18 @@ fn claim_path(target: &Path, generation: u32) -> PathBuf {
 }
 
 impl Claims {
-    /// Claims of others are stale when their owner has died, or has not touched them for `stale`.
+    /// Starts a thread that keeps held claims fresh. Claims of other processes are stale if their owner has
+    /// died or has not touched them for `stale`.
     pub fn new(stale: Duration) -> Self {
         let held: Arc<Mutex<Vec<Held>>> = Arc::default();
         let (stop, stopped) = mpsc::channel();
-        let kept = held.clone();
-        // Four chances to be seen alive, even where one touch is late.
+        let fresh = held.clone();
+        // Four touches within the stale time, so one late touch does no harm.
         let pause = (stale / 4).max(Duration::from_millis(50));
         std::thread::spawn(move || {
             while stopped.recv_timeout(pause) == Err(mpsc::RecvTimeoutError::Timeout) {
-                for held in lock(&kept).iter() {
-                    // A claim that cannot be touched is taken over at worst, and made twice.
+                for held in lock(&fresh).iter() {
+                    // At worst another process takes the claim over, and the picture is made twice.
                     let _ = held.file.set_modified(SystemTime::now());
                 }
             }
@@ -83,13 +88,16 @@ impl Claims {
     }
 
     /// Asks for the work on `target`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the disk is full, [`Error::CannotCreate`] if the claim file cannot be created.
     pub fn ask(&mut self, target: &Path) -> Result<Asked> {
         let mut taken_from = Vec::new();
         for generation in 0..u32::MAX {
             let path = claim_path(target, generation);
             match File::options().write(true).create_new(true).open(&path) {
                 Ok(mut file) => {
-                    // A full disk leaves it empty: then it says by its time alone that someone is here.
+                    // On a full disk the file stays empty; its modification time alone tells that it is held.
                     let _ = file.write_all(serde_json::json!(Owner::me()).to_string().as_bytes());
                     for older in 0..generation {
                         self.watched.remove(&claim_path(target, older));
@@ -125,7 +133,7 @@ impl Claims {
         Ok(Asked::Theirs("someone".into()))
     }
 
-    /// Removes the claims that dead processes of this machine left on finished work.
+    /// Removes the claims that dead processes of this machine left on a finished target.
     pub fn clear_dead(target: &Path) {
         for path in (0..).map(|generation| claim_path(target, generation)) {
             let owner =
@@ -136,16 +144,16 @@ impl Claims {
         }
     }
 
-    /// Who owns another's claim, and whether it is stale.
+    /// Returns the owner of another process's claim, if known, and whether the claim is stale.
     fn watch(&mut self, path: &Path) -> (Option<Owner>, bool) {
         let Ok(meta) = std::fs::symlink_metadata(path) else {
-            // Gone by now: its owner has finished, or given up. Asked again later, it tells.
+            // The owner has just finished or given up. The next request finds out which.
             self.watched.remove(path);
             return (None, false);
         };
         let touched = meta.modified().ok();
         let mut text = String::new();
-        // A pipe of this name would never open.
+        // Opening a named pipe would block for ever.
         let read =
             meta.is_file().then(|| File::open(path).and_then(|f| f.take(4096).read_to_string(&mut text)));
         let owner: Option<Owner> = read.and_then(|_| serde_json::from_str(&text).ok());
@@ -154,14 +162,14 @@ impl Claims {
         if *seen != touched {
             (*seen, *since) = (touched, Instant::now());
         }
-        // Without a name its process was killed between two calls, or is about to write it.
+        // The owner of a nameless claim was killed before it could write its name, or is about to write it.
         let patience = if owner.is_some() { self.stale } else { self.stale.min(NAMELESS) };
         (owner, dead || since.elapsed() > patience)
     }
 }
 
 impl Claim {
-    /// The work is done, under its final name: every claim on it goes.
+    /// Removes every claim on the target. Call it once the finished file has its final name.
     pub fn done(mut self) {
         let last = self.generation;
         self.release();
@@ -182,7 +190,7 @@ impl Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        // Only our own: one that was stale before us stays, so that who has claimed after it keeps that.
+        // Only this claim goes. Older stale ones stay, so that a newer claim keeps its number.
         self.release();
     }
 }

@@ -1,4 +1,4 @@
-//! The volume of the last scene, so that the next one makes anew only what it does not share with it.
+//! The volume of the last scene, so that the next scene rebuilds only what differs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,34 +12,37 @@ use crate::volume::{
     Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, set_density_and_reflection,
 };
 
-/// Keeps one volume texture.
+/// Keeps the volume texture of the last scene.
 #[derive(Default)]
 pub struct VolumeStock {
     last: Option<(Source, Arc<VolumeTexture>)>,
     cache: Option<Cache>,
 }
 
-/// What a volume was made from.
+/// The input that a volume was made from.
 #[derive(Clone, PartialEq)]
 enum Source {
     Water(WaterSpec, Storage),
-    /// Path, how it is to be stored, and what tells one version of the file from the next.
+    /// Path, requested storage, and modification time and size in bytes of the file, to notice changes.
     File(PathBuf, StorageChoice, Option<SystemTime>, u64),
 }
 
 impl VolumeStock {
-    /// Takes what it has not from a cache, and leaves it there.
+    /// A stock that looks volumes up in `cache` and adds new ones to it.
     pub fn with(cache: Option<Cache>) -> VolumeStock {
         VolumeStock { last: None, cache }
     }
 
-    /// No more from now on: values that a hand tries out are not asked for again.
+    /// Stops using the cache. Values that a user tries out by hand would only fill it.
     pub fn forget_cache(&mut self) {
         self.cache = None;
     }
 
-    /// The scene's volume, and what making it cost; no cost where it is the one in stock. If making it
-    /// fails or is given up, the old one stays.
+    /// Returns the scene's volume and how much work it took: `None` if the volume in stock fits unchanged.
+    /// `memory` is the budget for building it, bytes.
+    ///
+    /// # Errors
+    /// Any error of building or reading the volume, or of the monitor. The volume in stock stays.
     pub fn volume(
         &mut self,
         scene: &Scene,
@@ -81,7 +84,7 @@ impl VolumeStock {
     }
 }
 
-/// Whether the two only differ in what [`set_density_and_reflection`] does, or in α.
+/// Whether two specs differ only in α and in what [`set_density_and_reflection`] can change.
 fn same_curves(a: &WaterSpec, b: &WaterSpec) -> bool {
     let structure = Structure { crest: b.structure.crest, ..a.structure };
     WaterSpec { alpha: b.alpha, k_d: b.k_d, k_s: b.k_s, k_noise: b.k_noise, structure, ..*a } == *b

@@ -1,4 +1,4 @@
-//! How long work is run, watched and stopped.
+//! Long-running work: stills rendered in strips, batches of pictures, claims on shared folders, stitching.
 
 pub mod batch;
 mod claim;

@@ -1,4 +1,4 @@
-//! A still's files: opened before the work, written while it goes on, whole or not at all.
+//! The files of a still: opened before the work, written row by row, named only when complete.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -18,16 +18,16 @@ use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
-/// The program that wrote a file.
+/// Name and version of the program, as files store it.
 pub(crate) const SOFTWARE: &str = concat!("taki ", env!("CARGO_PKG_VERSION"));
 
-/// Lines of an EXR made at a time, on all cores.
+/// Lines of an EXR that are prepared at a time, on all cores.
 const LINES: usize = 8;
 
-/// The outputs of one still, open.
+/// The open outputs of one still.
 pub struct Still(Vec<(Kind, Output)>);
 
-/// How an output is written.
+/// The format of an output.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Png,
@@ -35,27 +35,38 @@ enum Kind {
 }
 
 impl Still {
-    /// Opens every output, so that a folder that is not there is known before any work.
+    /// Opens every output, so that a missing folder is noticed before any work. Removes temporary files that
+    /// dead processes left in the folders.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a path ends with neither .png nor .exr, [`Error::CannotCreate`] if a file cannot
+    /// be created.
     pub fn create(paths: &[PathBuf]) -> Result<Still> {
         paths.iter().map(|path| open(path, Output::create)).collect::<Result<Vec<_>>>().map(Still)
     }
 
-    /// As [`Still::create`], but looks at no other file of the folders.
+    /// Does as [`Still::create`], but leaves other files of the folders alone.
+    ///
+    /// # Errors
+    /// As [`Still::create`].
     pub fn open(paths: &[PathBuf]) -> Result<Still> {
         paths.iter().map(|path| open(path, Output::open)).collect::<Result<Vec<_>>>().map(Still)
     }
 
-    /// Whether one of them holds layers.
+    /// Whether an output is an EXR, which holds layers.
     pub fn has_exr(&self) -> bool {
         self.0.iter().any(|(kind, _)| *kind == Kind::Exr)
     }
 
-    /// Whether one of them is a picture as it is seen.
+    /// Whether an output is a PNG, which holds the picture as displayed.
     pub fn has_png(&self) -> bool {
         self.0.iter().any(|(kind, _)| *kind == Kind::Png)
     }
 
-    /// Starts the files of the part `window` of a scene's image; EXR files get `layers`.
+    /// Writes the heads of the files for the part `window` of a scene's image. EXR files get `layers`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
     pub fn begin(
         self,
         scene: &Scene,
@@ -80,7 +91,10 @@ impl Still {
         })
     }
 
-    /// Writes the frame of a scene's whole image; EXR files get `layers`.
+    /// Writes the frame of a scene's whole image and returns its figures. EXR files get `layers`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
     pub fn save(
         self,
         frame: &Frame,
@@ -94,18 +108,19 @@ impl Still {
     }
 }
 
-/// What a file says of the scene that made it: a scene file, with the volume's checksum in front.
+/// The text that a file stores about its scene: the volume's checksum, then the scene file.
 fn metadata(scene: &Scene, volume: &VolumeTexture) -> String {
     format!("{}\n{}", volume_line(volume), scene_text(scene))
 }
 
-/// The first line of a picture's scene: equal volumes have equal ones.
+/// The first line of that text, with the volume's checksum. Equal volumes have equal lines.
 pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
     format!("# volume texture: crc32 {:08x}", volume.checksum())
 }
 
-/// The scene that made a picture, as a scene file. A volume or environment from a file stands in a picture by
-/// its contents, not by its path: equal pictures are equal files, and nobody's folders are published.
+/// The scene that made a picture, as a scene file. A volume or environment that was read from a file is
+/// identified by its checksum, not by its path: equal pictures give equal files, and no folder names are
+/// published.
 pub(crate) fn scene_text(scene: &Scene) -> String {
     let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
     let map = map.map(|e| format!("# environment map: crc32 {:08x}\n", e.map.checksum()));
@@ -127,15 +142,15 @@ fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Ou
     Ok((kind, open(path)?))
 }
 
-/// What stands in a file besides its pixels.
+/// Description of a file besides its pixels.
 pub(crate) struct About {
-    /// Size of the whole image.
+    /// Width and height of the whole image, pixels.
     pub whole: [u32; 2],
-    /// The part in the file.
+    /// The part of the image that the file holds.
     pub window: Window,
-    /// The scene that made it.
+    /// The scene's text, if known.
     pub scene: Option<String>,
-    /// Channels of an EXR.
+    /// Names of an EXR's channels.
     pub channels: Vec<String>,
 }
 
@@ -150,14 +165,14 @@ impl About {
     }
 }
 
-/// One file that is being written.
+/// A file that is being written.
 pub(crate) enum Sink {
     Png(Output, PngWriter),
     Exr(Output, Box<ExrWriter<BufWriter<File>>>),
 }
 
 impl Sink {
-    /// Opens an output of the kind its name tells, and starts it.
+    /// Opens an output in the format that its extension names, and writes the file's head.
     pub fn create(path: &Path, about: &About) -> Result<Sink> {
         let (kind, output) = open(path, Output::create)?;
         Sink::begin(kind, output, about)
@@ -181,8 +196,8 @@ impl Sink {
         }
     }
 
-    /// Writes the next rows as the file holds them: R, G, B bytes of any number of rows, or one line of
-    /// native float32, channel by channel.
+    /// Writes the next rows in the file's own layout. A PNG takes R, G, B bytes of any number of rows; an
+    /// EXR takes one line of float32 in native byte order, channel by channel.
     pub fn push(&mut self, rows: Vec<u8>) -> Result<()> {
         match self {
             Sink::Png(output, writer) => writer.push(rows).map_err(|e| Error::write(output.path(), e)),
@@ -190,11 +205,11 @@ impl Sink {
         }
     }
 
-    /// Ends the file, with figures if it is a PNG and they are known, and gives it its name.
+    /// Completes the file and gives it its name. A PNG also gets `figures`, if given.
     pub fn finish(self, figures: Option<&Figures>) -> Result<()> {
         let output = match self {
             Sink::Png(output, writer) => {
-                // Whole numbers only: they always are JSON.
+                // Figures are whole numbers, so this serialisation cannot fail.
                 let text = figures.and_then(|figures| serde_json::to_string(figures).ok());
                 let texts = text.map(|text| (FIGURES_TEXT.to_owned(), text));
                 writer.finish(texts.into_iter().collect()).map_err(|e| Error::write(output.path(), e))?;
@@ -209,21 +224,25 @@ impl Sink {
     }
 }
 
-/// The files of a still while its rows come. Dropped before [`StillWriter::finish`] it leaves nothing.
+/// The files of a still while rows are written. Dropping it before [`StillWriter::finish`] leaves no file.
 pub struct StillWriter {
     sinks: Vec<Sink>,
     window: Window,
     layers: Vec<Layer>,
-    /// Rows written.
+    /// Number of rows written.
     rows: u32,
     figures: Figures,
 }
 
 impl StillWriter {
-    /// Writes the next rows of the window at its full width, from the top; any number of them.
+    /// Writes the next rows of the window, from the top. A strip has the window's full width and any number
+    /// of rows.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing fails.
     ///
     /// # Panics
-    /// If the strip is not as wide as the window, or has more rows than are left.
+    /// If the strip is not as wide as the window, or has more rows than remain.
     pub fn push(&mut self, strip: &Frame) -> Result<()> {
         assert_eq!(strip.width, self.window.width, "whole rows");
         assert!(strip.height <= self.window.height - self.rows, "no more rows than the window has");
@@ -231,7 +250,7 @@ impl StillWriter {
             match sink {
                 Sink::Png(..) => sink.push(rgb_rows(strip))?,
                 Sink::Exr(..) => {
-                    // Few at a time: they take as much memory as the frame.
+                    // All lines at once would take as much memory as the frame itself.
                     for first in (0..strip.height).step_by(LINES) {
                         let rows = first..strip.height.min(first + LINES as u32);
                         lines_of(strip, &self.layers, rows)
@@ -246,8 +265,11 @@ impl StillWriter {
         Ok(())
     }
 
-    /// Renders strips with `render` and writes them; the seconds of all. Progress is told over the whole,
-    /// in pixels times `samples`.
+    /// Renders the strips with `render` and writes them. Returns the seconds of each stage, summed over the
+    /// strips. Progress counts pixels times `samples`, over all strips.
+    ///
+    /// # Errors
+    /// An error of `render`, or [`Error::Io`] if writing fails.
     pub fn fill(
         &mut self,
         strips: &[Window],
@@ -270,12 +292,16 @@ impl StillWriter {
         Ok(seconds)
     }
 
-    /// The figures of what has been written.
+    /// Figures of the rows written so far.
     pub fn figures(&self) -> &Figures {
         &self.figures
     }
 
-    /// Ends the files, syncs them and gives them their names; the figures of the window.
+    /// Completes the files, syncs them to the disk and gives them their names. Returns the figures of the
+    /// window.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if writing, syncing or renaming fails.
     ///
     /// # Panics
     /// If rows are missing.
@@ -287,10 +313,12 @@ impl StillWriter {
     }
 }
 
-/// Tells the progress of a part as that of the whole.
+/// Reports the progress of one strip as progress of the whole picture.
 struct Share<'a> {
     monitor: &'a dyn Monitor,
+    /// Rays of the strips before this one.
     before: u64,
+    /// Rays of all strips.
     total: u64,
 }
 

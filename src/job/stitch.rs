@@ -1,5 +1,6 @@
-//! Parts of an image joined to the file of the whole.
+//! Joins crops of a picture to the file of the whole picture.
 
+use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
 use super::{About, Sink};
@@ -11,18 +12,94 @@ use crate::util::window::Window;
 /// Bytes of rows handed to the PNG encoder at a time.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// A part's file while its rows are read.
+/// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
+/// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
+/// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
+/// crop, plus the rows that wait for the PNG encoder (about 1 MiB).
+///
+/// Returns the figures of a PNG: the sum of its crops' figures, without crops that lie wholly inside another.
+/// If the remaining crops overlap, or one carries no figures, the sum is unknown: the file gets none and the
+/// result is `None`. An EXR never carries figures.
+///
+/// # Errors
+/// [`Error::Input`] if the crops belong to different pictures, leave a gap, or differ where they overlap.
+/// [`Error::Usage`] if `parts` is empty or the extension of `output` does not match the crops.
+/// Otherwise an error of reading, of creating or writing `output`, or of the monitor.
+pub fn stitch(parts: &[PathBuf], output: &Path, monitor: &dyn Monitor) -> Result<Option<Figures>> {
+    let parts =
+        parts.iter().map(|path| Part::open(path).map(|(part, _)| part)).collect::<Result<Vec<_>>>()?;
+    let Some(first) = parts.first() else {
+        return Err(Error::Usage("nothing to stitch; give the files that taki render --crop wrote".into()));
+    };
+    let (kind, whole) = (first.kind, first.whole);
+    check_parts(first, &parts)?;
+    check_extension(output, kind)?;
+    let about = About {
+        whole,
+        window: Window::whole(whole),
+        scene: first.scene.clone(),
+        channels: first.channels.clone(),
+    };
+    let mut sink = RowSink { sink: Sink::create(output, &about)?, kind, piece: Vec::new() };
+    let mut sum = FigureSum::new(kind, whole, &parts);
+    let mut canvas = Canvas::new(kind, whole[0], about.channels.len());
+    let mut readers = Readers::new(&parts);
+    for y in 0..whole[1] {
+        monitor.progress("rows", u64::from(y), u64::from(whole[1]))?;
+        readers.open_at(y)?;
+        canvas.clear();
+        readers.draw_row(y, &mut canvas)?;
+        sink.push(&canvas.row)?;
+        readers.close_after(y, &mut sum)?;
+    }
+    if kind == Kind::Png && sum.total.is_none() {
+        monitor.warn("some crops overlap or carry no figures: the whole picture gets no figures");
+    }
+    sink.finish(sum.total.as_ref())?;
+    Ok(sum.total)
+}
+
+/// Refuses parts of different pictures, and parts that do not cover the whole picture.
+fn check_parts(first: &Part, parts: &[Part]) -> Result<()> {
+    parts.iter().try_for_each(|part| first.check(part))?;
+    let windows: Vec<Window> = parts.iter().map(|part| part.window).collect();
+    match gap(first.whole, &windows) {
+        Some(gap) => Err(Error::input(
+            format!("the crops leave a gap: no file holds the pixels {gap} (column, row, width, height)"),
+            format!("render them with --crop {gap} and add the file"),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses an output whose extension is not that of the parts.
+fn check_extension(output: &Path, kind: Kind) -> Result<()> {
+    let extension = match kind {
+        Kind::Png => "png",
+        Kind::Exr => "exr",
+    };
+    let given = output.extension().map(|e| e.to_string_lossy().to_lowercase());
+    if given.as_deref() == Some(extension) {
+        return Ok(());
+    }
+    let what = format!("-o {}: the crops are .{extension} files, so name a .{extension}", output.display());
+    Err(Error::Usage(what))
+}
+
+/// The reader of a part's pixels.
 enum Rows {
     Png(Box<PngRows>),
     Exr(Box<ExrLines>),
 }
 
-/// A part, known by what stands before its pixels.
+/// A part's description, read from the head of its file.
 struct Part {
     path: PathBuf,
     window: Window,
+    /// Width and height of the whole picture, pixels.
     whole: [u32; 2],
     scene: Option<String>,
+    /// Channels of an EXR; empty for a PNG.
     channels: Vec<String>,
     kind: Kind,
 }
@@ -51,17 +128,19 @@ impl Part {
     /// Refuses a part that cannot belong to the same picture as `self`.
     fn check(&self, other: &Part) -> Result<()> {
         let names = format!("{} and {}", self.path.display(), other.path.display());
-        let refuse = |why: String| Err(Error::input(format!("{names} {why}"), "stitch parts of one picture"));
+        let refuse = |why: String| Err(Error::input(format!("{names} {why}"), "stitch crops of one picture"));
         let [[w, h], [other_w, other_h]] = [self.whole, other.whole];
         if self.kind != other.kind {
-            return refuse("are a PNG and an EXR".into());
+            return refuse("are a PNG and an EXR file".into());
         }
         if self.whole != other.whole {
-            return refuse(format!("are parts of pictures of {w}×{h} and {other_w}×{other_h} pixels"));
+            return refuse(format!(
+                "are crops of pictures of different sizes ({w}×{h} and {other_w}×{other_h} pixels)"
+            ));
         }
         if self.channels != other.channels {
             return refuse(format!(
-                "have other layers: {} and {}",
+                "have different layers ({} and {})",
                 self.channels.join(" "),
                 other.channels.join(" ")
             ));
@@ -76,145 +155,158 @@ impl Part {
     }
 }
 
+/// Describes how two scene texts differ: the first pair of lines that are not equal.
 fn first_difference(a: &Option<String>, b: &Option<String>) -> String {
     match (a, b) {
         (Some(a), Some(b)) => {
             let lines = a.lines().zip(b.lines()).find(|(a, b)| a != b);
-            lines.map_or("one is longer".into(), |(a, b)| format!("{a:?} and {b:?}"))
+            lines.map_or("one has more lines".into(), |(a, b)| format!("{a:?} and {b:?}"))
         }
-        _ => "one does not tell its scene".into(),
+        _ => "one file does not name its scene".into(),
     }
 }
 
-/// A part being read: its number, its rows, and the row in hand.
-struct Open {
-    number: usize,
+/// Parts that are open for reading, from a part's first row to its last.
+struct Readers<'a> {
+    parts: &'a [Part],
+    /// Indices of parts that are not open yet, sorted by first row.
+    waiting: Peekable<std::vec::IntoIter<usize>>,
+    open: Vec<Reader>,
+}
+
+/// An open part: its index, its rows, and the row read last.
+struct Reader {
+    index: usize,
     rows: Rows,
     row: Vec<u8>,
 }
 
-/// Joins crops of one picture, which must cover it and may overlap where their pixels are equal, to
-/// `output`: byte for byte the file of the whole. Holds a few rows at a time and the files that meet them.
-///
-/// The figures of a PNG are added up from those of its parts, without parts that lie wholly in another;
-/// where others overlap they cannot be known, and the file has none.
-///
-/// # Errors
-/// [`Error::Input`] for parts of different pictures, gaps, and overlaps that differ.
-pub fn stitch(parts: &[PathBuf], output: &Path, monitor: &dyn Monitor) -> Result<Option<Figures>> {
-    let parts =
-        parts.iter().map(|path| Part::open(path).map(|(part, _)| part)).collect::<Result<Vec<_>>>()?;
-    let Some(first) = parts.first() else {
-        return Err(Error::Usage("there is nothing to stitch: give the files of the parts".into()));
-    };
-    parts.iter().try_for_each(|part| first.check(part))?;
-    let windows: Vec<Window> = parts.iter().map(|part| part.window).collect();
-    if let Some(gap) = gap(first.whole, &windows) {
-        return Err(Error::input(
-            format!("the parts leave a gap: no file has the pixels {gap} (column, row, width, height)"),
-            format!("render them with --crop {gap} and add the file"),
-        ));
+impl<'a> Readers<'a> {
+    fn new(parts: &'a [Part]) -> Self {
+        let mut order: Vec<usize> = (0..parts.len()).collect();
+        order.sort_by_key(|&i| parts[i].window.y);
+        Readers { parts, waiting: order.into_iter().peekable(), open: Vec::new() }
     }
-    let kind = first.kind;
-    let of_kind = output.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let extension = match kind {
-        Kind::Png => "png",
-        Kind::Exr => "exr",
-    };
-    if of_kind.as_deref() != Some(extension) {
-        let what = format!("-o {}: the parts make a .{extension}", output.display());
-        return Err(Error::Usage(what));
-    }
-    let about = About {
-        whole: first.whole,
-        window: Window::whole(first.whole),
-        scene: first.scene.clone(),
-        channels: first.channels.clone(),
-    };
-    let mut sink = Sink::create(output, &about)?;
-    let counted = counted(first.whole, &windows);
-    let mut figures = (kind == Kind::Png && counted.is_some()).then(Figures::default);
-    let counts = counted.unwrap_or_default();
 
-    let mut canvas = Canvas::new(kind, first.whole[0], about.channels.len());
-    let mut order: Vec<usize> = (0..parts.len()).collect();
-    order.sort_by_key(|&i| windows[i].y);
-    let mut waiting = order.into_iter().peekable();
-    let mut open: Vec<Open> = Vec::new();
-    let mut piece = Vec::new();
-    for y in 0..first.whole[1] {
-        monitor.progress("rows", u64::from(y), u64::from(first.whole[1]))?;
-        while let Some(number) = waiting.next_if(|&i| windows[i].y == y) {
-            let (part, rows) = Part::open(&parts[number].path)?;
-            if part.window != windows[number] {
+    /// Opens the parts whose first row is `y`.
+    fn open_at(&mut self, y: u32) -> Result<()> {
+        while let Some(index) = self.waiting.next_if(|&i| self.parts[i].window.y == y) {
+            let (part, rows) = Part::open(&self.parts[index].path)?;
+            if part.window != self.parts[index].window {
                 let what = format!("{} changed while it was read", part.path.display());
                 return Err(Error::input(what, "run the command again"));
             }
-            open.push(Open { number, rows, row: Vec::new() });
+            self.open.push(Reader { index, rows, row: Vec::new() });
         }
-        canvas.clear();
-        for Open { number, rows, row } in &mut open {
+        Ok(())
+    }
+
+    /// Reads row `y` of every open part and draws it on the canvas.
+    fn draw_row(&mut self, y: u32, canvas: &mut Canvas) -> Result<()> {
+        for Reader { index, rows, row } in &mut self.open {
+            let part = &self.parts[*index];
             match rows {
                 Rows::Png(rows) => {
-                    row.resize(3 * windows[*number].width as usize, 0);
+                    row.resize(3 * part.window.width as usize, 0);
                     rows.read_row(row)?;
                 }
                 Rows::Exr(lines) => lines.read_line(row)?,
             }
-            canvas.draw(*number, windows[*number], row).map_err(|(x, other)| {
+            canvas.draw(*index, part.window, row).map_err(|(x, other)| {
                 Error::input(
                     format!(
                         "{} and {} differ at the pixel ({x}, {y})",
-                        parts[other].path.display(),
-                        parts[*number].path.display()
+                        self.parts[other].path.display(),
+                        part.path.display()
                     ),
-                    "they are not of one picture: render one of them again, with the same engine",
+                    "they are crops of different pictures: render one of them again, with the same engine",
                 )
             })?;
         }
-        match kind {
-            Kind::Png => {
-                piece.extend_from_slice(&canvas.row);
-                if piece.len() >= PIECE_BYTES {
-                    sink.push(std::mem::take(&mut piece))?;
-                }
-            }
-            Kind::Exr => sink.push(canvas.row.clone())?,
-        }
-        let (ended, rest): (Vec<Open>, Vec<Open>) =
-            open.into_iter().partition(|part| windows[part.number].bottom() == y + 1);
-        open = rest;
-        for Open { number, rows, .. } in ended {
-            let own = match rows {
+        Ok(())
+    }
+
+    /// Closes the parts whose last row is `y` and adds their figures to the sum.
+    fn close_after(&mut self, y: u32, sum: &mut FigureSum) -> Result<()> {
+        let ended = |reader: &Reader| self.parts[reader.index].window.bottom() == y + 1;
+        let (ended, open): (Vec<Reader>, Vec<Reader>) =
+            std::mem::take(&mut self.open).into_iter().partition(ended);
+        self.open = open;
+        for Reader { index, rows, .. } in ended {
+            let figures = match rows {
                 Rows::Png(rows) => rows.finish()?,
                 Rows::Exr(lines) => lines.finish().map(|()| None)?,
             };
-            if counts.get(number) == Some(&true) {
-                match (&mut figures, own) {
-                    (Some(sum), Some(own)) => sum.add(&own),
-                    _ => figures = None,
-                }
+            sum.add(index, figures.as_ref());
+        }
+        Ok(())
+    }
+}
+
+/// The figures of the whole picture, added up from its parts.
+struct FigureSum {
+    /// By index of the part, whether its figures count.
+    counts: Vec<bool>,
+    /// `None` where the sum is unknown.
+    total: Option<Figures>,
+}
+
+impl FigureSum {
+    fn new(kind: Kind, whole: [u32; 2], parts: &[Part]) -> FigureSum {
+        let windows: Vec<Window> = parts.iter().map(|part| part.window).collect();
+        let counts = disjoint_cover(whole, &windows);
+        let total = (kind == Kind::Png && counts.is_some()).then(Figures::default);
+        FigureSum { counts: counts.unwrap_or_default(), total }
+    }
+
+    fn add(&mut self, index: usize, figures: Option<&Figures>) {
+        if self.counts.get(index) == Some(&true) {
+            match (&mut self.total, figures) {
+                (Some(total), Some(figures)) => total.add(figures),
+                _ => self.total = None,
             }
         }
     }
-    if !piece.is_empty() {
-        sink.push(piece)?;
-    }
-    if kind == Kind::Png && figures.is_none() {
-        monitor.warn("the parts overlap or have no figures: the figures of the whole are not known");
-    }
-    sink.finish(figures.as_ref())?;
-    Ok(figures)
 }
 
-/// The row that is put together.
+/// The output file. Rows of a PNG reach it in pieces of about [`PIECE_BYTES`], lines of an EXR one by one.
+struct RowSink {
+    sink: Sink,
+    kind: Kind,
+    /// Rows of a PNG that are not yet with the encoder.
+    piece: Vec<u8>,
+}
+
+impl RowSink {
+    fn push(&mut self, row: &[u8]) -> Result<()> {
+        if self.kind == Kind::Exr {
+            return self.sink.push(row.to_owned());
+        }
+        self.piece.extend_from_slice(row);
+        if self.piece.len() >= PIECE_BYTES {
+            self.sink.push(std::mem::take(&mut self.piece))?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self, figures: Option<&Figures>) -> Result<()> {
+        if !self.piece.is_empty() {
+            self.sink.push(self.piece)?;
+        }
+        self.sink.finish(figures)
+    }
+}
+
+/// The row of the whole picture that is being assembled.
 struct Canvas {
+    /// Pixels of a row.
     width: usize,
-    /// Bytes of a pixel that lie together, and how often a row has such.
+    /// Bytes that a pixel has in one plane: 3 in a PNG, 4 in an EXR.
     item: usize,
+    /// Planes of a row: 1 in a PNG, one per channel in an EXR.
     planes: usize,
     row: Vec<u8>,
-    /// The part each pixel came from, plus 1; 0: none yet.
+    /// By column, the index of the part that the pixel came from, plus 1; 0 where no part has drawn.
     owner: Vec<u32>,
 }
 
@@ -232,56 +324,62 @@ impl Canvas {
         self.owner.fill(0);
     }
 
-    /// Draws the row of part `number`; the column and the other part where they differ.
-    fn draw(&mut self, number: usize, window: Window, row: &[u8]) -> std::result::Result<(), (usize, usize)> {
+    /// Draws a row of the part `index`.
+    ///
+    /// # Errors
+    /// If a pixel differs from what another part drew there: its column, and the index of that part.
+    fn draw(&mut self, index: usize, window: Window, row: &[u8]) -> std::result::Result<(), (usize, usize)> {
         let (item, count, first) = (self.item, window.width as usize, window.x as usize);
-        let mut at = 0;
-        while at < count {
-            let owner = self.owner[first + at];
-            // Pixels with one owner are drawn or compared together.
-            let run = self.owner[first + at..first + count].iter().take_while(|&&o| o == owner).count();
+        let mut done = 0;
+        while done < count {
+            let owner = self.owner[first + done];
+            // A run of pixels with the same owner is copied or compared at once.
+            let run = self.owner[first + done..first + count].iter().take_while(|&&o| o == owner).count();
             for plane in 0..self.planes {
-                let target = item * (plane * self.width + first + at)..;
+                let target = item * (plane * self.width + first + done)..;
                 let target = &mut self.row[target][..item * run];
-                let source = &row[item * (plane * count + at)..][..item * run];
+                let source = &row[item * (plane * count + done)..][..item * run];
                 if owner == 0 {
                     target.copy_from_slice(source);
                 } else if let Some(byte) = (0..item * run).find(|&i| target[i] != source[i]) {
-                    return Err((first + at + byte / item, owner as usize - 1));
+                    return Err((first + done + byte / item, owner as usize - 1));
                 }
             }
             if owner == 0 {
-                self.owner[first + at..][..run].fill(number as u32 + 1);
+                self.owner[first + done..][..run].fill(index as u32 + 1);
             }
-            at += run;
+            done += run;
         }
         Ok(())
     }
 }
 
-/// Which parts count for the figures of the whole, if these together have each pixel once.
-fn counted(whole: [u32; 2], windows: &[Window]) -> Option<Vec<bool>> {
+/// Leaves out windows that lie inside another. If the rest cover every pixel exactly once, returns by window
+/// whether it is one of them.
+fn disjoint_cover(whole: [u32; 2], windows: &[Window]) -> Option<Vec<bool>> {
+    // Of equal windows the first one stays.
     let inside = |i: usize, j: usize| windows[j].holds(&windows[i]) && (windows[i] != windows[j] || j < i);
     let counts: Vec<bool> =
         (0..windows.len()).map(|i| !(0..windows.len()).any(|j| j != i && inside(i, j))).collect();
     let pixels: u64 =
         windows.iter().zip(&counts).filter(|(_, counts)| **counts).map(|(w, _)| w.pixels()).sum();
+    // The windows cover the picture, so an equal number of pixels means that none is covered twice.
     (pixels == Window::whole(whole).pixels()).then_some(counts)
 }
 
-/// The first rectangle, from the top left, that no window covers.
+/// Returns the first rectangle, from the top left, that no window covers; `None` if there is no gap.
 fn gap([width, height]: [u32; 2], windows: &[Window]) -> Option<Window> {
     let mut edges: Vec<u32> = windows.iter().flat_map(|w| [w.y, w.bottom()]).chain([0, height]).collect();
     edges.sort_unstable();
     edges.dedup();
-    let mut found: Option<Window> = None;
+    let mut gap: Option<Window> = None;
     for rows in edges.windows(2) {
         let (y, bottom) = (rows[0], rows[1]);
         let mut spans: Vec<(u32, u32)> =
             windows.iter().filter(|w| w.y <= y && w.bottom() >= bottom).map(|w| (w.x, w.right())).collect();
         spans.sort_unstable();
         let free = |first: u32, last: u32| spans.iter().all(|s| s.1 <= first || s.0 >= last);
-        match &mut found {
+        match &mut gap {
             None => {
                 let mut x = 0;
                 for &(left, right) in &spans {
@@ -292,12 +390,12 @@ fn gap([width, height]: [u32; 2], windows: &[Window]) -> Option<Window> {
                 }
                 if x < width {
                     let next = spans.iter().map(|s| s.0).filter(|&left| left > x).min().unwrap_or(width);
-                    found = Some(Window { x, y, width: next - x, height: bottom - y });
+                    gap = Some(Window { x, y, width: next - x, height: bottom - y });
                 }
             }
             Some(gap) if free(gap.x, gap.right()) => gap.height = bottom - gap.y,
             Some(_) => break,
         }
     }
-    found
+    gap
 }

@@ -1,4 +1,4 @@
-//! How a large picture is rendered in parts that fit the memory.
+//! Cuts a large picture into strips that fit the memory.
 
 use crate::engine::overlap;
 use crate::picture::{Grid, PIXEL_BYTES, SURFACE_BYTES, canvas, check_image};
@@ -9,34 +9,44 @@ use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use crate::volume::{Storage, dense_bytes, expected_cells, sparse_bytes};
 
-/// More on the host for the pyramid of bloom: a third of 12 bytes, of a picture that may be widened to whole multiples
-/// of the largest level.
+/// Bytes per pixel that bloom adds on the host. Its pyramid takes a third of 12 bytes per pixel, of a
+/// picture that may be widened to a whole multiple of the coarsest level; 12 bytes leave room for that.
 const BLOOM_BYTES: u64 = 12;
-/// What both engines and the encoders need besides, whatever the size: staging for read-back (at most 2 × 16
+/// Bytes that engines and encoders need at any picture size: staging buffers for read-back (at most 2 × 16
 /// MiB), lines of an EXR before and after compression (3 × 8 MiB), and small buffers.
 const WORK_BYTES: u64 = 64 << 20;
-/// What the program and the driver themselves take: libraries, compiled shaders. Lavapipe and its compiler
-/// take some 150 MiB. Of a small budget at most a quarter is set aside for it.
+/// Bytes for the program and the driver: libraries and compiled shaders. Lavapipe with its compiler takes
+/// about 150 MiB. At most a quarter of the budget is set aside for this.
 const PROGRAM_BYTES: u64 = 256 << 20;
-/// Strips are not larger than this without need: more memory would gain no time.
+/// Most pixels of a strip, unless one row of raster windows or bloom needs more. Larger strips would take
+/// more memory and save no time.
 const STRIP_PIXELS: u64 = 1 << 23;
-/// Fewer rows are not rendered at once: for every strip the whole window is drawn again.
+/// Least rows of a strip: every strip rasterises its whole window again, so thin strips waste time.
 const LEAST_ROWS: u64 = 64;
 
-/// Cuts a part of a scene's image into strips of its full width, from the top, that can be rendered within
-/// `memory` bytes together with the device's targets, the scene's volume and its rocks: whole rows of the
-/// windows that are drawn (see [`Grid`]) where they fit, else even parts of one.
+/// Cuts the part `window` of a scene's image into strips of its full width, from the top. Each strip can be
+/// rendered within `memory` bytes, together with the device's targets, the scene's volume, its rocks and its
+/// environment. Strips end between raster windows (see [`Grid`]) where that fits; else they divide one
+/// raster window evenly.
 ///
-/// A pixel of a strip takes 34 bytes, with `surface_layers` 62, 12 more with bloom, which wants one strip; a pixel of the window that is drawn 84, or
-/// where n quads lie over one another 88 + 4·n, and there are at most 2²¹ of those. 64 MiB more are for read-back and encoders, and a quarter of `memory`,
-/// at most 256 MiB, for the program and the driver. These make strips smaller, down to an eighth of
-/// `memory`; only a single row and window that do not fit are an [`Error::Memory`].
+/// Bytes counted:
+/// - per pixel of a strip 34; with `surface_layers` 28 more; with bloom 12 more, and one strip if it fits;
+/// - per pixel of the raster window, at most 2²¹ pixels, 88; where n > 1 quads overlap, the larger of 88 +
+///   4·n and 28 + 16·n;
+/// - 64 MiB for read-back and encoders;
+/// - a quarter of `memory`, at most 256 MiB, for the program and the driver. This share only makes strips
+///   smaller; it does not cause an error.
+///
+/// # Errors
+/// [`Error::Memory`] if 64 rows of the part (all rows, if it has fewer) do not fit with the rest.
 pub fn strips(scene: &Scene, window: Window, surface_layers: bool, memory: u64) -> Result<Vec<Window>> {
     memory_of(scene, window, surface_layers, memory).map(|(_, strips)| strips)
 }
 
-/// The bytes that [`strips`] counts with for the work on host and device, the program itself left out; and
-/// the strips.
+/// Returns the bytes that the work takes on host and device, without the program itself, and the [`strips`].
+///
+/// # Errors
+/// As [`strips`].
 pub fn memory_of(
     scene: &Scene,
     window: Window,
@@ -47,10 +57,10 @@ pub fn memory_of(
     check_image(image, memory)?;
     let water = &scene.water;
     let volume = match (&scene.volume_file, scene.storage) {
-        // Read by now, and checked against the whole budget.
+        // A volume file has been read by now, and was checked against the whole budget then.
         (Some(_), _) => 0,
         (None, Storage::Dense) => dense_bytes(water.size, scene.trace.filter == Prefilter::Pyramid),
-        // Building it, which takes more, has been checked by now.
+        // Building takes more than storing, and has been checked by now.
         (None, Storage::Sparse) => sparse_bytes(water.size, expected_cells(water), 0),
     };
     let volume = u64::try_from(volume).unwrap_or(u64::MAX);
@@ -83,8 +93,11 @@ pub fn memory_of(
     Ok((parts.saturating_add(WORK_BYTES + tallest * row), strips))
 }
 
-/// Refuses to make the picture of a part of an image, or of one in several `strips`, where bloom would need all of it at
-/// once. An EXR has no bloom, and needs no check.
+/// Refuses bloom on a part of an image, or on an image that is rendered in several `strips`: bloom needs the
+/// whole picture at once. An EXR has no bloom and needs no check.
+///
+/// # Errors
+/// [`Error::Input`] if the scene has bloom and the picture is not rendered in one piece.
 pub fn check_bloom(scene: &Scene, window: Window, strips: usize) -> Result<()> {
     let image = &scene.image;
     let bloom = image.look.bloom;
@@ -94,14 +107,14 @@ pub fn check_bloom(scene: &Scene, window: Window, strips: usize) -> Result<()> {
     let fix = |first: &str| format!("{first}, set image.bloom = 0, or write only .exr, which has no bloom");
     if window != Window::whole([image.width, image.height]) {
         let what = format!(
-            "image.bloom = {bloom} spreads light over the whole picture, and {window} is a part of it"
+            "image.bloom = {bloom} spreads light over the whole picture, but {window} is only a part of it"
         );
         return Err(Error::input(what, fix("render the whole")));
     }
     if strips > 1 {
         let what = format!(
-            "image.bloom = {bloom} needs the whole picture at once, and the memory only holds {}×{} pixels in {strips} \
-             strips",
+            "image.bloom = {bloom} needs the whole picture at once, but {}×{} pixels fit the memory only in \
+             {strips} strips",
             image.width, image.height
         );
         return Err(Error::input(what, fix("raise --memory, lower the size")));
@@ -109,19 +122,20 @@ pub fn check_bloom(scene: &Scene, window: Window, strips: usize) -> Result<()> {
     Ok(())
 }
 
-/// Bytes for results of the raster pass that later frames may use again (`RenderOptions::keep_rasters`), where
-/// the work itself takes `needed` of `memory` bytes. Four samples of 1280×720 pixels take 197 MiB.
+/// Bytes that may hold results of the raster pass for reuse by later frames (`RenderOptions::keep_rasters`),
+/// if the work itself takes `needed` of `memory` bytes. Four samples of 1280×720 pixels take 197 MiB.
 pub fn spare_for_rasters(memory: u64, needed: u64) -> u64 {
     (memory.saturating_sub(needed).saturating_sub(PROGRAM_BYTES) / 2).min(256 << 20)
 }
 
-/// Strips of at most `most` rows; those that can end between windows of `drawn` rows.
+/// Cuts a window into strips of at most `most` rows. Where possible, strips end between raster windows,
+/// which have `drawn` rows each; else they divide one raster window evenly.
 fn cut(window: Window, drawn: u32, most: u32) -> Vec<Window> {
     let mut strips = Vec::new();
     let mut y = window.y;
     while y < window.bottom() {
         let left = window.bottom() - y;
-        // Rows to the end of the window that is drawn here.
+        // Rows to the end of the current raster window.
         let here = (drawn - y % drawn).min(left);
         let height = if most >= left {
             left

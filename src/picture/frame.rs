@@ -144,7 +144,7 @@ impl Frame {
 }
 
 /// A layer of the EXR file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Linear radiance: channels R, G, B.
     Rgb,

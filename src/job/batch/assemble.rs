@@ -1,4 +1,4 @@
-//! What is made of all pictures: movies, the contact sheet, manifests.
+//! Makes the files that need all pictures: movies, the contact sheet, manifests.
 
 use std::path::{Path, PathBuf};
 
@@ -18,16 +18,16 @@ use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
-/// A file of all frames of a point of the sweep.
+/// A movie that the user asked for; each point of the sweep's grid gets one.
 #[derive(Clone, Debug)]
 pub struct MovieFile {
-    /// Its name.
+    /// Pattern of its name.
     pub pattern: Pattern,
-    /// Its format.
+    /// Format.
     pub kind: MovieKind,
 }
 
-/// What a manifest says of a picture.
+/// A manifest's entry about one picture.
 #[derive(Serialize)]
 struct Row {
     number: usize,
@@ -43,17 +43,17 @@ struct Row {
 }
 
 impl Batch {
-    /// Points of the sweep's grid.
+    /// Number of points of the sweep's grid.
     fn points(&self) -> usize {
         self.count() / self.frames.len()
     }
 
-    /// The file of a movie of a point.
+    /// Path of a movie at a point of the grid.
     pub(super) fn movie_path(&self, movie: &MovieFile, point: usize) -> PathBuf {
         movie.pattern.at(0, &self.words(point * self.frames.len()))
     }
 
-    /// A movie of the pictures that `scene` has.
+    /// Options of a movie whose pictures have the size of `scene`'s.
     pub(super) fn movie_options(&self, scene: &Scene) -> MovieOptions {
         let window = self.window(scene);
         MovieOptions {
@@ -65,8 +65,8 @@ impl Batch {
         }
     }
 
-    /// Movies without pictures are made while the frames are rendered: those whose first frame is picture
-    /// `number`.
+    /// Movies to start with picture `number`. Without picture files, movies are encoded while the frames are
+    /// rendered; with them, [`Batch::assemble`] makes the movies.
     pub(super) fn movies_starting(
         &self,
         number: usize,
@@ -83,16 +83,16 @@ impl Batch {
         missing.map(|(path, kind)| (path, kind, MovieOptions { mark, ..options })).collect()
     }
 
-    /// Movies that can be made, and that replace nothing but what may be replaced. Those that are there and show
-    /// just these frames stay.
+    /// Checks that movies can be made, and that they replace only files that may be replaced. Existing
+    /// movies of exactly these frames stay.
     pub(super) fn check_movies(&mut self) -> Result<()> {
         if self.movies.is_empty() {
             return Ok(());
         }
         if self.request.shard.is_some() {
             return Err(Error::Usage(
-                "a movie needs all frames, a shard has a part of them; leave the movie out of the shards, and make it \
-                 when they are done by the same command without --shard"
+                "a movie needs all frames, but a shard renders only some; leave the movie out of the \
+                 shards, and when all are done, run the command with the movie and without --shard"
                     .into(),
             ));
         }
@@ -108,8 +108,10 @@ impl Batch {
                             self.fresh.insert(path);
                             continue;
                         }
-                        Some(_) => "it is there, a movie of other frames, another scene, size or rate",
-                        None => "it is there, and no movie of taki",
+                        Some(_) => {
+                            "the movie exists with other frames, or of another scene, size or frame rate"
+                        }
+                        None => "it exists and is not a movie that taki wrote",
                     };
                     return Err(Error::CannotCreate {
                         path,
@@ -118,19 +120,19 @@ impl Batch {
                     });
                 }
                 if point == 0 {
-                    // Opened and dropped: the folder, ffmpeg, what the format can hold.
+                    // Opening and dropping it checks the folder, ffmpeg and the format's limits.
                     drop(Movie::create(&path, movie.kind, &options)?);
                 }
             }
         }
         if self.pictures.is_empty() && self.movies.len() * self.points() == self.fresh.len() {
-            // Nothing is missing, so no frame is either.
+            // Every movie exists, and no pictures are asked for, so no frame is needed.
             self.whole.fill(true);
         }
         Ok(())
     }
 
-    /// What tells a movie of a point from every other: the scenes of all its frames, its size and its rate.
+    /// Mark that identifies a movie: a hash of the scenes of all its frames, its size and its frame rate.
     fn mark(&self, point: usize, options: &MovieOptions) -> Result<u64> {
         let numbers = point * self.frames.len()..(point + 1) * self.frames.len();
         let scenes: Vec<u32> = numbers
@@ -142,7 +144,7 @@ impl Batch {
         Ok(halves[0] << 32 | halves[1])
     }
 
-    /// Makes movies, sheet and manifests of pictures that are all there.
+    /// Makes the movies, the sheet and the manifests, once all pictures exist.
     pub(super) fn assemble(&self, watcher: &dyn Watcher) -> Result<()> {
         if self.request.shard.is_some() {
             return Ok(());
@@ -191,7 +193,7 @@ impl Batch {
         movie.finish_watched(watcher)
     }
 
-    /// A picture as it is seen, from its file.
+    /// Reads a picture as displayed, from its PNG if there is one, else from its EXR.
     fn picture(&self, number: usize) -> Result<RgbImage> {
         let files = self.files(number);
         let png = self.pictures.iter().position(|p| !p.is_exr());
@@ -223,8 +225,8 @@ impl Batch {
             if samples == 1 { "sample" } else { "samples" }
         );
         let sheet = Sheet::of(self.base.name(), &subtitle, &axes, [window.width, window.height]);
-        // The first sweep goes across; the sheet's rows are the others, the last of them fastest. Among the
-        // points of the grid the first is slowest.
+        // The first sweep runs across the sheet; the others run down, the last one fastest. Points are
+        // ordered with the first sweep slowest, so a column's points are consecutive.
         let rows = self.points() / self.sweeps[0].values.len();
         draw(&sheet, |row, column| {
             watcher.progress(
@@ -242,7 +244,7 @@ impl Batch {
         let values = scene.written();
         let parameters = self.sweeps.iter().map(|s| (s.key.clone(), values.get(&s.key).to_json())).collect();
         let files = self.files(number);
-        // A PNG's text knows all; an EXR's layers know some.
+        // A PNG carries all figures in its text; an EXR's layers yield only some.
         let png = self.pictures.iter().position(|p| !p.is_exr()).unwrap_or(0);
         let figures = figures_of(&files[png])?;
         Ok(Row {
@@ -278,7 +280,7 @@ impl Batch {
             let float = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
             let count = |x: Option<u64>| x.map_or(String::new(), |x| x.to_string());
             let mut record = vec![row.number.to_string(), row.frame.to_string()];
-            // In the order of the head, which the map does not keep.
+            // The columns follow the head's order, which the map does not keep.
             let parameters = self.sweeps.iter().map(|s| &row.parameters[&s.key]);
             record.extend(parameters.map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned)));
             record.extend(row.files.iter().cloned());
@@ -291,7 +293,7 @@ impl Batch {
     }
 }
 
-/// The sheet's file, with the program's name, by which it is known again.
+/// Encodes the sheet as a PNG with the program's name, by which [`check_replaced`] recognises it.
 fn png_of(sheet: &RgbImage) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, sheet.width(), sheet.height());
@@ -304,7 +306,7 @@ fn png_of(sheet: &RgbImage) -> std::result::Result<Vec<u8>, png::EncodingError> 
     Ok(bytes)
 }
 
-/// Refuses to replace what is no sheet or manifest of this program.
+/// Refuses to replace a file that is not a sheet or manifest written by this program.
 pub(super) fn check_replaced(path: &Path) -> Result<()> {
     if path.symlink_metadata().is_err() {
         return Ok(());
@@ -321,12 +323,12 @@ pub(super) fn check_replaced(path: &Path) -> Result<()> {
     }
     Err(Error::CannotCreate {
         path: path.to_owned(),
-        why: "a file of another kind has this name".into(),
-        fix: "choose another with --sheet or --manifest, or replace it with --overwrite".into(),
+        why: "a file that taki did not write has this name".into(),
+        fix: "choose another name with --sheet or --manifest, or replace the file with --overwrite".into(),
     })
 }
 
-/// Whether a manifest is a table; else it is JSON.
+/// Whether a manifest is CSV; otherwise it is JSON.
 pub(super) fn is_csv(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
 }
@@ -334,10 +336,11 @@ pub(super) fn is_csv(path: &Path) -> bool {
 fn picture_of_png(path: &Path) -> Result<RgbImage> {
     let (width, height, pixels) = read_png(path)?;
     let bytes = pixels.iter().flatten().map(|x| (x * 255.0).round() as u8).collect();
-    RgbImage::from_raw(width, height, bytes).ok_or_else(|| Error::read(path, "its size is not its pixels'"))
+    RgbImage::from_raw(width, height, bytes)
+        .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
 }
 
-/// Tone and 8 bits as the PNG would have them.
+/// Develops the EXR's colour into the 8-bit picture that a PNG would hold.
 fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
@@ -354,5 +357,5 @@ fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
     frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
     develop(&mut frame, look, whole);
     RgbImage::from_raw(width, height, rgb_rows(&frame))
-        .ok_or_else(|| Error::read(path, "its size is not its pixels'"))
+        .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
 }

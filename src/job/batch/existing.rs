@@ -1,4 +1,4 @@
-//! What is there already: whole, broken, or another's.
+//! Examines files that already exist: complete, damaged, or another picture.
 
 use std::io::Read;
 use std::path::Path;
@@ -13,46 +13,47 @@ use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// What a file's name holds.
+/// State of a picture's file.
 #[derive(Debug, PartialEq)]
-pub enum Found {
+pub enum FileState {
+    /// There is no file.
     Nothing,
-    /// Just this picture, every byte of it decoded.
+    /// Exactly this picture; all of it was decoded.
     Whole,
-    /// No picture: what is wrong with it.
+    /// A damaged picture: description of the damage.
     Broken(String),
-    /// Another picture: what tells it from this one.
+    /// Another picture: description of the difference.
     Other(String),
 }
 
-/// The first bytes of a regular file.
+/// The first 4096 bytes of a regular file; `None` if it is not a readable one.
 pub(super) fn start_of(path: &Path) -> Option<Vec<u8>> {
-    // A pipe would never open.
+    // Opening a named pipe would block for ever.
     let file = path.is_file().then(|| std::fs::File::open(path).ok())??;
     let mut start = Vec::new();
     file.take(4096).read_to_end(&mut start).ok()?;
     Some(start)
 }
 
-/// Whether a file that begins so is a PNG or EXR that this program wrote: its name stands near the start.
+/// Whether a file with this start is a PNG or EXR of this program, whose name then stands near the start.
 pub(super) fn is_ours(start: &[u8]) -> bool {
     let picture = start.starts_with(b"\x89PNG") || start.starts_with(b"\x76\x2f\x31\x01");
-    // Whatever its version.
+    // Other versions of the program count too.
     let name = &SOFTWARE.as_bytes()[..SOFTWARE.find(' ').map_or(SOFTWARE.len(), |space| space + 1)];
     picture && start.windows(name.len()).any(|w| w == name)
 }
 
-/// A name that another picture has.
+/// The error for a name that another picture has.
 fn taken(file: &Path, what: &str) -> Error {
     Error::CannotCreate {
         path: file.to_owned(),
-        why: format!("another file has this name: {what}"),
-        fix: "choose other names with -o, or replace it with --overwrite".into(),
+        why: format!("another picture has this name: {what}"),
+        fix: "choose other names with -o, or replace the file with --overwrite".into(),
     }
 }
 
 impl Batch {
-    /// Decodes what is there. Files of other scenes are refused unless they may be replaced.
+    /// Decodes the existing files. Refuses files of other pictures unless they may be replaced.
     pub(super) fn look(&mut self, monitor: &dyn Monitor) -> Result<()> {
         let own: Vec<usize> = self.own().collect();
         let there: Vec<usize> = own
@@ -62,26 +63,26 @@ impl Batch {
             .collect();
         for (part, numbers) in there.chunks(16).enumerate() {
             monitor.progress("verifying", part as u64 * 16, there.len() as u64)?;
-            let found: Vec<Result<Vec<Found>>> = if self.request.overwrite {
+            let examined: Vec<Result<Vec<FileState>>> = if self.request.overwrite {
                 numbers.iter().map(|_| Ok(Vec::new())).collect()
             } else {
-                numbers.par_iter().map(|&n| self.found(n)).collect()
+                numbers.par_iter().map(|&n| self.states(n)).collect()
             };
-            for (&number, found) in numbers.iter().zip(found) {
+            for (&number, states) in numbers.iter().zip(examined) {
                 let files = self.files(number);
-                let found = found?;
-                for (file, found) in files.iter().zip(&found) {
-                    match found {
-                        Found::Other(what) => {
+                let states = states?;
+                for (file, state) in files.iter().zip(&states) {
+                    match state {
+                        FileState::Other(what) => {
                             return Err(taken(file, what));
                         }
-                        Found::Broken(why) => {
+                        FileState::Broken(why) => {
                             monitor.warn(&format!("{}: {why}; it is rendered again", file.display()));
                         }
-                        Found::Whole | Found::Nothing => {}
+                        FileState::Whole | FileState::Nothing => {}
                     }
                 }
-                if !found.is_empty() && found.iter().all(|f| *f == Found::Whole) {
+                if !states.is_empty() && states.iter().all(|f| *f == FileState::Whole) {
                     self.whole[number] = true;
                     files.iter().take(1).for_each(|file| Claims::clear_dead(file));
                     continue;
@@ -103,34 +104,34 @@ impl Batch {
         Ok(())
     }
 
-    /// Whether another process has made the picture since this one has looked. One of another scene is
-    /// refused as at first.
+    /// Whether another process has made the picture since [`Batch::look`]. Refuses a picture of another
+    /// scene, as [`Batch::look`] does.
     pub(super) fn made_meanwhile(&self, number: usize) -> Result<bool> {
         let files = self.files(number);
         let new = |file: &Path| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
         if !files.iter().any(|file| new(file)) {
             return Ok(false);
         }
-        let found = self.found(number)?;
-        for (file, found) in files.iter().zip(&found) {
-            if let Found::Other(what) = found
+        let states = self.states(number)?;
+        for (file, state) in files.iter().zip(&states) {
+            if let FileState::Other(what) = state
                 && new(file)
             {
                 return Err(taken(file, what));
             }
         }
-        Ok(files.iter().all(|file| new(file)) && found.iter().all(|f| *f == Found::Whole))
+        Ok(files.iter().all(|file| new(file)) && states.iter().all(|f| *f == FileState::Whole))
     }
 
-    /// What the names of a picture's files hold.
-    fn found(&self, number: usize) -> Result<Vec<Found>> {
+    /// State of each file of a picture.
+    fn states(&self, number: usize) -> Result<Vec<FileState>> {
         let scene = self.scene(number)?;
-        self.files(number).iter().map(|file| self.found_in(file, &scene)).collect()
+        self.files(number).iter().map(|file| self.state_of(file, &scene)).collect()
     }
 
-    fn found_in(&self, file: &Path, scene: &Scene) -> Result<Found> {
+    fn state_of(&self, file: &Path, scene: &Scene) -> Result<FileState> {
         if file.symlink_metadata().is_err() {
-            return Ok(Found::Nothing);
+            return Ok(FileState::Nothing);
         }
         if file.is_dir() {
             return Err(Error::CannotCreate {
@@ -142,27 +143,28 @@ impl Batch {
         let verified = match verify(file) {
             Ok(verified) => verified,
             Err(Error::Input { what, .. }) => {
-                // What was not ours is nobody's to replace; of ours a part may be left.
+                // A file of another program must stay. A damaged one of ours, or an empty one, may be the
+                // rest of an interrupted run.
                 let start = start_of(file).unwrap_or_default();
                 let ours = file.is_file() && (start.is_empty() || is_ours(&start));
                 return Ok(if ours {
-                    Found::Broken(what)
+                    FileState::Broken(what)
                 } else {
-                    Found::Other("it is no picture of taki".into())
+                    FileState::Other("it is not a picture that taki wrote".into())
                 });
             }
             Err(e) => return Err(e),
         };
         Ok(match self.difference(file, &verified, scene)? {
-            None => Found::Whole,
-            Some(what) => Found::Other(what),
+            None => FileState::Whole,
+            Some(what) => FileState::Other(what),
         })
     }
 
-    /// What tells the picture in a file from the one of `scene`.
+    /// Describes how the picture in a file differs from the one of `scene`; `None` if it does not.
     fn difference(&self, file: &Path, verified: &Verified, scene: &Scene) -> Result<Option<String>> {
         let Some(text) = &verified.scene else {
-            return Ok(Some("it does not say what scene it shows".into()));
+            return Ok(Some("it does not name its scene".into()));
         };
         let (line, text) = text.split_once('\n').unwrap_or((text, ""));
         let wanted = scene_text(scene);
@@ -170,12 +172,14 @@ impl Batch {
             let lines = text.lines().map(Some).chain(std::iter::repeat(None));
             let differ = wanted.lines().zip(lines).find(|(want, have)| *have != Some(want));
             return Ok(Some(match differ {
-                Some((want, have)) => format!("it has {:?}, this has {want:?}", have.unwrap_or("")),
+                Some((want, have)) => {
+                    format!("it has {:?}, but this picture has {want:?}", have.unwrap_or(""))
+                }
                 None => "its scene has more parameters".into(),
             }));
         }
         if scene.volume_file.is_some() {
-            // A built volume follows from its parameters; one from a file may have changed since.
+            // A built volume follows from its parameters, but a volume file may have changed.
             let memory = self.base.limits().memory;
             let (volume, _) =
                 VolumeStock::default().volume(scene, memory, &crate::util::monitor::Unwatched)?;
@@ -184,7 +188,7 @@ impl Batch {
             }
         }
         if verified.window != self.window(scene) {
-            return Ok(Some("it is another part of the picture".into()));
+            return Ok(Some("it shows another part of the picture".into()));
         }
         if Kind::of(file)? == Kind::Exr {
             let mut wanted: Vec<&str> =

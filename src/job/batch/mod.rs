@@ -1,12 +1,14 @@
-//! Many pictures from one scene: the frames of an animation, the grid of a sweep, or both.
+//! Batches: many pictures of one scene, as frames of an animation, points of a sweep's grid, or both.
 //!
-//! 1. [`Batch::plan`] checks everything before any work: the scene of every frame, every output's folder
-//!    and name, and what is there already, by decoding it.
-//! 2. [`Batch::run`] renders what is missing. It claims each picture, so that any number of processes may
-//!    share a folder, and hands finished strips to a thread that encodes while the next are rendered.
-//! 3. What is made of all pictures (movies, a sheet, manifests) is made at the end, from the files.
+//! 1. [`Batch::plan`] checks everything before any work: the scenes of the frames, the folder and name of
+//!    every output, and the files that already exist, by decoding them.
+//! 2. [`Batch::run`] renders the missing pictures. It claims each picture, so that any number of processes
+//!    can share a folder. Finished strips go to a thread that encodes them while the next strips are
+//!    rendered.
+//! 3. Files that need all pictures (movies, contact sheet, manifests) are made last, from the pictures'
+//!    files.
 //!
-//! A picture's bytes depend on the scene and the frame's number alone.
+//! The bytes of a picture depend on the scene and the frame's number alone.
 
 mod assemble;
 mod existing;
@@ -42,43 +44,43 @@ use crate::util::window::Window;
 
 /// Most pictures of one batch.
 const MAX_PICTURES: usize = 1_000_000;
-/// The scenes of so many frames, evenly chosen, are checked before the work; of more it would take longer
-/// than people wait for a first picture.
+/// Most scenes that are checked before the work starts, spread evenly over the pictures. Checking more would
+/// keep the user waiting for the first picture.
 const CHECKED_FRAMES: usize = 2000;
 
-/// What is asked for.
+/// A request for a batch.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// Numbers of frames; none: the animation's, or with a sweep frame 0.
+    /// Frames to render. `None`: all frames of the animation, or frame 0 if there is a sweep.
     pub frames: Option<Vec<u32>>,
-    /// `KEY=VALUES`.
+    /// Sweeps, as `KEY=VALUES`; see [`Sweep::parse`].
     pub sweeps: Vec<String>,
-    /// Patterns of the pictures' files and of movies.
+    /// Name patterns of pictures and movies; see [`Pattern`].
     pub outputs: Vec<PathBuf>,
-    /// The contact sheet of a sweep; none: beside the pictures.
+    /// File of a sweep's contact sheet. `None`: a file beside the pictures.
     pub sheet: Option<PathBuf>,
-    /// Tables of all pictures, .csv or .json; none given: beside the pictures of a sweep.
+    /// Tables of all pictures, .csv or .json. If empty, a sweep writes both beside its pictures.
     pub manifests: Vec<PathBuf>,
-    /// (i, n): of the pictures, numbered from 0, those whose number leaves i when divided by n.
+    /// (i, n): renders only pictures whose number modulo n is i. Numbers start at 0.
     pub shard: Option<(u32, u32)>,
-    /// Whether files that are there are replaced.
+    /// Whether to replace existing files.
     pub overwrite: bool,
-    /// Whether the others go on when one picture fails.
+    /// Whether to go on with other pictures after one fails.
     pub keep_going: bool,
-    /// How often a picture is tried again after a lost device.
+    /// Number of times a picture is tried again after the GPU device was lost.
     pub retries: u32,
-    /// Only this part of every picture.
+    /// The part of every picture to render; `None`: all of it.
     pub crop: Option<Window>,
     /// Layers of EXR files.
     pub layers: Vec<Layer>,
-    /// Claims of other machines not touched for so long are taken over.
+    /// Claims that their owner has not touched for this time are taken over.
     pub stale: Duration,
 }
 
 /// A batch that has been checked.
 pub struct Batch {
     base: Animation,
-    /// Stops of an automatic exposure, the same for all pictures.
+    /// Automatic exposure in stops, the same for all pictures; `None` if it is off.
     measured: Option<f32>,
     request: Request,
     sweeps: Vec<Sweep>,
@@ -87,17 +89,19 @@ pub struct Batch {
     movies: Vec<MovieFile>,
     sheet: Option<PathBuf>,
     manifests: Vec<PathBuf>,
-    /// By number of the picture, whether it is there whole.
+    /// By picture number, whether its files exist and are complete.
     whole: Vec<bool>,
-    /// Files that were there before and are to be replaced.
+    /// Existing files that will be replaced.
     replaced: HashMap<PathBuf, Stamp>,
-    /// Movies that are there, as new as their pictures.
+    /// Existing movies that show exactly these frames.
     fresh: BTreeSet<PathBuf>,
-    /// By point of the grid, what tells its movies from others.
+    /// By point of the grid, the mark that identifies its movies; see [`MovieOptions`].
+    ///
+    /// [`MovieOptions`]: crate::output::movie::MovieOptions
     marks: Vec<u64>,
 }
 
-/// Tells one version of a file from the next.
+/// Modification time and size in bytes, which tell one version of a file from the next.
 type Stamp = (Option<SystemTime>, u64);
 
 fn stamp(path: &Path) -> Option<Stamp> {
@@ -106,7 +110,12 @@ fn stamp(path: &Path) -> Option<Stamp> {
 }
 
 impl Batch {
-    /// Checks what is asked for and what is there.
+    /// Plans a batch: checks the request, the scenes, the output names and folders, and the existing files.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a request that contradicts itself, [`Error::Input`] for an invalid scene,
+    /// [`Error::CannotCreate`] for outputs that cannot be written or are other pictures, [`Error::Memory`]
+    /// for pictures that do not fit, or an error of the monitor.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
         let (base, measured) = exposed(base, monitor)?;
         let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
@@ -118,15 +127,15 @@ impl Batch {
             .collect::<Result<Vec<Sweep>>>()?;
         if sweeps.iter().any(|sweep| sweep.key == "image.auto_exposure") {
             return Err(Error::Usage(
-                "--sweep image.auto_exposure: a batch has one exposure, measured on its first frame; sweep \
-                 image.exposure"
+                "--sweep image.auto_exposure: a batch measures one exposure, on its first frame; sweep \
+                 image.exposure instead"
                     .into(),
             ));
         }
         for (i, sweep) in sweeps.iter().enumerate() {
             if sweeps[..i].iter().any(|other| other.key == sweep.key) {
                 return Err(Error::Usage(format!(
-                    "--sweep {} is given twice; list all values in one",
+                    "--sweep {} is given twice; list all its values in one --sweep",
                     sweep.key
                 )));
             }
@@ -140,7 +149,7 @@ impl Batch {
         let count = points.and_then(|n| n.checked_mul(frames.len())).filter(|&n| n <= MAX_PICTURES);
         let Some(count) = count else {
             return Err(Error::Usage(format!(
-                "the sweep's grid times the frames is more than {MAX_PICTURES} pictures; split it"
+                "the sweep's grid times the frames makes more than {MAX_PICTURES} pictures; split the batch"
             )));
         };
         let names: Vec<Vec<String>> = sweeps.iter().map(Sweep::names).collect();
@@ -161,7 +170,7 @@ impl Batch {
                 }
             }
         }
-        let (sheet, manifests) = about_all(&request, &base, &sweeps, &pictures)?;
+        let (sheet, manifests) = sheet_and_manifests(&request, &base, &sweeps, &pictures)?;
         let mut batch = Batch {
             base,
             measured,
@@ -186,24 +195,24 @@ impl Batch {
         Ok(batch)
     }
 
-    /// Stops that the automatic exposure has chosen, where there is one.
+    /// Exposure that was measured automatically, in stops; `None` if automatic exposure is off.
     pub fn measured(&self) -> Option<f32> {
         self.measured
     }
 
-    /// How many pictures there are, of all shards.
+    /// Number of pictures, over all shards.
     pub fn count(&self) -> usize {
         self.whole.len()
     }
 
-    /// The numbers of this run's pictures.
+    /// Numbers of the pictures of this run's shard.
     fn own(&self) -> impl Iterator<Item = usize> + use<> {
         let (shard, of) = self.request.shard.unwrap_or((0, 1));
         (shard as usize..self.count()).step_by(of as usize)
     }
 
-    /// The values of the sweeps, by number, at a picture: the last sweep changes fastest, and within each
-    /// point of the grid the frames.
+    /// By sweep, the index of its value at a picture. Pictures are ordered by point of the grid, then by
+    /// frame; from point to point, the last sweep changes fastest.
     fn choice(&self, number: usize) -> Vec<usize> {
         let mut point = number / self.frames.len();
         let mut choice: Vec<usize> = self
@@ -221,29 +230,33 @@ impl Batch {
         choice
     }
 
+    /// The sweeps' values at a picture, as text.
     fn words(&self, number: usize) -> Vec<String> {
         self.choice(number).iter().zip(&self.sweeps).map(|(&v, sweep)| sweep.values[v].1.clone()).collect()
     }
 
-    /// The frame's number of a picture.
+    /// Frame number of a picture.
     pub fn frame(&self, number: usize) -> u32 {
         self.frames[number % self.frames.len()]
     }
 
-    /// What a picture is called in messages.
+    /// Name of a picture for messages.
     pub fn name(&self, number: usize) -> Name {
         let sweep =
             self.words(number).iter().zip(&self.sweeps).map(|(v, s)| format!("{}={v}", s.key)).collect();
         Name { frame: self.frame(number), sweep }
     }
 
-    /// The files of a picture.
+    /// Paths of a picture's files, one for each pattern.
     pub fn files(&self, number: usize) -> Vec<PathBuf> {
         let words = self.words(number);
         self.pictures.iter().map(|p| p.at(self.frame(number), &words)).collect()
     }
 
-    /// The scene of a picture.
+    /// Scene of a picture.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the scene is not valid at this frame and these values.
     pub fn scene(&self, number: usize) -> Result<Scene> {
         if self.sweeps.is_empty() {
             return self.base.at(self.frame(number));
@@ -257,8 +270,8 @@ impl Batch {
         self.base.with(&changes)?.at(self.frame(number))
     }
 
-    /// No two outputs have one name: values of a sweep may run into one another, or differ in what no file's
-    /// name can hold; one file may be written in two ways.
+    /// Refuses outputs that share a name. Values of two sweeps can run into one another, values can differ
+    /// only in characters that a file name cannot hold, and one path can be written in two ways.
     fn check_names(&self) -> Result<()> {
         let alone = self.sweeps.is_empty() && self.pictures.len() + self.movies.len() == 1;
         if alone && self.manifests.is_empty() {
@@ -268,8 +281,8 @@ impl Batch {
         let mut add = |file: PathBuf, what: String| match names.insert(plain(&file), what.clone()) {
             None => Ok(()),
             Some(other) => Err(Error::Usage(format!(
-                "{} would be {other} and {what}; give them different names, such as {{h}}-{{alpha}} for values that \
-                 run into one another",
+                "{} would be both {other} and {what}; give them different names, such as {{h}}-{{alpha}} to \
+                 separate two values",
                 file.display()
             ))),
         };
@@ -288,14 +301,15 @@ impl Batch {
             .try_for_each(|n| self.files(n).into_iter().try_for_each(|f| add(f, self.name(n).to_string())))
     }
 
-    /// Every frame's scene is valid, or the first that is not says so.
+    /// Checks the scenes of up to [`CHECKED_FRAMES`] pictures, spread evenly, and of the last one.
     fn check_scenes(&self, monitor: &dyn Monitor) -> Result<()> {
         let own: Vec<usize> = self.own().collect();
         let step = own.len().div_ceil(CHECKED_FRAMES).max(1);
         let mut some: Vec<usize> = own.iter().copied().step_by(step).collect();
         some.extend(own.last());
         let total = some.len() as u64;
-        // In parts, each on all cores: a signal is heard between them, and the first fault is always the same.
+        // Each chunk runs on all cores. Signals are noticed between chunks, and the first fault in order is
+        // the one reported, whichever thread finds its fault first.
         for (part, numbers) in some.chunks(256).enumerate() {
             monitor.progress("checking", part as u64 * 256, total)?;
             let faults: Vec<Error> = numbers.par_iter().filter_map(|&n| self.scene(n).err()).collect();
@@ -306,16 +320,17 @@ impl Batch {
         Ok(())
     }
 
-    /// Every folder is there and can be written; what dead processes left in it goes.
+    /// Checks that every folder exists and can be written. Removes temporary files that dead processes left
+    /// there.
     fn check_folders(&self) -> Result<()> {
-        // A shard may have no picture of its own: the first of all tells for it.
+        // A shard may have no pictures; the batch's first picture then stands in.
         let mut files = self.files(self.own().next().unwrap_or(0));
         drop(Still::open(&files)?);
         let colour = self.request.layers.contains(&Layer::Rgb) || self.pictures.iter().any(|p| !p.is_exr());
         let shown = self.sheet.is_some() || !self.movies.is_empty() && !self.pictures.is_empty();
         if !colour && shown && self.request.shard.is_none() {
             return Err(Error::Usage(
-                "a sheet or a movie needs colour; add rgb to --layers, or PNG files with -o".into(),
+                "a sheet or a movie needs colour; add rgb to --layers, or write PNG files too with -o".into(),
             ));
         }
         files.extend(self.movies.iter().map(|movie| self.movie_path(movie, 0)));
@@ -329,8 +344,8 @@ impl Batch {
     }
 }
 
-/// The format of a movie that a name asks for. A .png of many frames without a place for their numbers is an
-/// animated one.
+/// Format of the movie that a pattern asks for; `None` for pictures. A .png without #### is an animated PNG
+/// if there are several frames.
 fn movie_kind(pattern: &Pattern, frames: usize) -> Option<MovieKind> {
     let path = pattern.given();
     let png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
@@ -340,8 +355,8 @@ fn movie_kind(pattern: &Pattern, frames: usize) -> Option<MovieKind> {
     }
 }
 
-/// Where the sheet and the manifests go, if there are any.
-fn about_all(
+/// Paths of the contact sheet and the manifests, if there are any.
+fn sheet_and_manifests(
     request: &Request,
     base: &Animation,
     sweeps: &[Sweep],
@@ -357,7 +372,7 @@ fn about_all(
         return Ok((None, Vec::new()));
     };
     if sweeps.is_empty() && sheet.is_some() {
-        return Err(Error::Usage("--sheet shows a sweep; add --sweep KEY=VALUES".into()));
+        return Err(Error::Usage("--sheet needs a sweep; add --sweep KEY=VALUES".into()));
     }
     if !sweeps.is_empty() {
         let beside = |what: &str| first.given().with_file_name(format!("{}.{what}", base.name()));
@@ -376,7 +391,7 @@ fn about_all(
     {
         return Err(Error::Usage(format!("--sheet {}: use .png", path.display())));
     }
-    // Opened and dropped: a folder that is not there is known before the work.
+    // Opening and dropping each output finds a missing folder before the work starts.
     if request.shard.is_none() {
         for path in sheet.iter().chain(&manifests) {
             if !request.overwrite {
@@ -388,23 +403,24 @@ fn about_all(
     Ok((sheet, manifests))
 }
 
-/// A path without `.` in it.
+/// A path without its `.` components.
 fn plain(path: &Path) -> PathBuf {
     path.components().filter(|part| *part != std::path::Component::CurDir).collect()
 }
 
-/// Different pictures have different names.
+/// Checks that a pattern gives different names to different frames and to different values of each sweep.
 fn check_pattern(pattern: &Pattern, sweeps: &[Sweep], frames: usize) -> Result<()> {
     let given = pattern.given().display();
     if frames > 1 && !pattern.has_frame() {
         return Err(Error::Usage(format!(
-            "-o {given}: {frames} frames would have one name; put #### where the frame's number goes, such as fall.####.png"
+            "-o {given}: {frames} frames would share one name; put #### where the frame's number goes, \
+             such as fall.####.png"
         )));
     }
     for (i, sweep) in sweeps.iter().enumerate() {
         if sweep.values.len() > 1 && !pattern.has_sweep(i) {
             return Err(Error::Usage(format!(
-                "-o {given}: all values of {name} would have one name; put {{{name}}} where the value goes",
+                "-o {given}: all values of {name} would share one name; put {{{name}}} where the value goes",
                 name = sweep.name
             )));
         }

@@ -1,4 +1,4 @@
-//! What a batch would do and what it takes, without doing it.
+//! Estimates what a batch would render and need, without rendering.
 
 use serde::Serialize;
 
@@ -9,33 +9,36 @@ use crate::job::{check_bloom, memory_of, spare_for_rasters};
 use crate::picture::canvas_bytes;
 use crate::util::error::{Result, human_bytes};
 
-/// What a run would render, and what it needs for it.
+/// The work and needs of a run, as `--dry-run` prints them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Needs {
-    /// Pictures of the run.
+    /// Number of pictures of the run.
     pub pictures: u64,
-    /// Those that are not there whole.
+    /// Number of pictures that are missing or incomplete.
     pub to_render: u64,
-    /// Files of the first and of the last picture.
+    /// Files of the first picture.
     pub first: Vec<String>,
     /// Files of the last picture.
     pub last: Vec<String>,
-    /// Pixels of each, and samples a pixel.
+    /// Width and height of each picture, pixels.
     pub size: [u32; 2],
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Stops of the automatic exposure, where there is one.
+    /// Automatic exposure in stops, if it is on.
     pub auto_exposure: Option<f32>,
-    /// Parts that a picture is rendered in.
+    /// Number of strips that each picture is rendered in.
     pub strips: u64,
-    /// Memory of the work on host and device, bytes, beside the program's own.
+    /// Memory of the work on host and device, without the program itself, bytes.
     pub memory_bytes: u64,
-    /// The most that what is missing may take on the disk, bytes: pictures and movies before compression.
+    /// Upper bound of the disk space of missing pictures and movies, bytes: their size before compression.
     pub disk_bytes: u64,
 }
 
 impl Batch {
-    /// What [`Batch::run`] would do and needs.
+    /// Estimates what [`Batch::run`] would do and need.
+    ///
+    /// # Errors
+    /// If the scene is not valid or does not fit the memory.
     pub fn needs(&self) -> Result<Needs> {
         let own: Vec<usize> = self.own().collect();
         let to_render = own.iter().filter(|&&n| !self.whole[n]).count() as u64;
@@ -58,7 +61,8 @@ impl Batch {
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
         let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
         let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();
-        // A GIF keeps its frames beside it until it is made; other movies are smaller than their frames.
+        // While a GIF is made, its frames wait uncompressed in a file beside it. Other movies are smaller
+        // than their frames.
         let movies = (self.movies.len() * (self.count() / self.frames.len()) - self.fresh.len()) as u64;
         let movie_bytes = movies * self.frames.len() as u64 * window.pixels() * 3;
         Ok(Needs {
@@ -75,7 +79,7 @@ impl Batch {
         })
     }
 
-    /// Pictures that are seen as they are have their bloom whole.
+    /// Refuses bloom if a PNG or movie cannot be rendered in one piece.
     pub(super) fn check_bloom(&self) -> Result<()> {
         let seen = self.pictures.iter().any(|p| !p.is_exr()) || !self.movies.is_empty();
         let Some(number) = self.own().next().filter(|_| seen) else { return Ok(()) };
@@ -85,7 +89,7 @@ impl Batch {
         check_bloom(&scene, window, strips.len())
     }
 
-    /// Whether pictures are written with layers.
+    /// Whether EXR files, which hold layers, are written.
     pub(super) fn has_exr(&self) -> bool {
         self.pictures.iter().any(super::Pattern::is_exr)
     }
@@ -97,7 +101,7 @@ impl std::fmt::Display for Needs {
         let samples = if self.samples == 1 { "1 sample".into() } else { format!("{} samples", self.samples) };
         writeln!(
             f,
-            "{} pictures of {width}×{height} pixels, {samples} each: {} to render, {} there and whole",
+            "{} pictures of {width}×{height} pixels, {samples} each: {} to render, {} already complete",
             self.pictures,
             self.to_render,
             self.pictures - self.to_render

@@ -1,4 +1,4 @@
-//! What a batch tells while it works.
+//! Events and results that a batch reports.
 
 use std::path::{Path, PathBuf};
 
@@ -7,91 +7,92 @@ use serde::Serialize;
 use crate::picture::Seconds;
 use crate::util::monitor::Monitor;
 
-/// Something that happened, as `--events json` prints it: one object with `event` and what belongs to it.
+/// An event, as `--events json` prints it: one JSON object with the key `event` and the fields of the
+/// variant.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event<'a> {
-    /// The plan stands.
+    /// The batch has been planned and rendering begins.
     Started {
-        /// Pictures of this run: its shard's.
+        /// Number of pictures of this run's shard.
         pictures: u64,
-        /// Of these, whole already.
+        /// Number of them that already exist and are complete.
         kept: u64,
-        /// Engine and adapter.
+        /// Name of the GPU adapter, or `cpu`.
         engine: &'a str,
     },
     /// A picture is being rendered.
     Rendering {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
     },
-    /// So much of it is done.
+    /// A picture is partly rendered.
     Progress {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
-        /// 0 to 1.
+        /// Share that is done, 0 to 1.
         share: f64,
     },
-    /// A picture's files have their names.
+    /// A picture's files are complete and have their names.
     Saved {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
-        /// Its files.
+        /// Paths of its files.
         files: Vec<String>,
-        /// From its begin to its files, seconds.
+        /// Time from the start of rendering to the finished files, seconds.
         elapsed: f64,
-        /// Seconds of each stage.
+        /// Time of each stage, seconds.
         seconds: Seconds,
     },
     /// Another process has made a picture.
     Elsewhere {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
     },
-    /// A picture is tried again.
+    /// A picture failed and is tried again.
     Retry {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
-        /// Why.
+        /// The error.
         error: String,
     },
     /// A picture failed for good.
     Failed {
-        /// Which.
+        /// The picture.
         #[serde(flatten)]
         picture: &'a Name,
-        /// Why.
+        /// The error.
         error: String,
-        /// The exit code of that error.
+        /// Exit code of that error.
         exit_code: u8,
     },
-    /// All that is left is claimed by others.
+    /// Other processes have claimed all remaining pictures.
     Waiting {
-        /// How many pictures.
+        /// Number of remaining pictures.
         pictures: u64,
-        /// One who has claimed one.
+        /// One of the processes that hold claims.
         on: &'a str,
     },
-    /// A file made of all pictures is written: a movie, a sheet, a manifest.
+    /// A file that needs all pictures has been written: a movie, the sheet or a manifest.
     Assembled {
-        /// The file.
+        /// Path of the file.
         file: String,
     },
-    /// The end, good or bad.
+    /// The run has ended, with or without errors.
     Done(&'a Summary),
 }
 
-/// Which picture: a frame of a point of the sweep.
+/// Identity of a picture: a frame at a point of the sweep's grid.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Name {
-    /// The frame's number.
+    /// Frame number.
     pub frame: u32,
-    /// The sweep's values, `KEY=VALUE`.
+    /// Values of the sweeps, each as `KEY=VALUE`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sweep: Vec<String>,
 }
@@ -105,43 +106,43 @@ impl std::fmt::Display for Name {
     }
 }
 
-/// What a run did.
+/// Result of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Pictures of this run.
+    /// Number of pictures of this run's shard.
     pub pictures: u64,
-    /// Found whole and kept.
+    /// Number of pictures that were already complete.
     pub kept: u64,
-    /// Rendered.
+    /// Number of pictures that this run rendered.
     pub rendered: u64,
-    /// Made meanwhile by other processes.
+    /// Number of pictures that other processes rendered during the run.
     pub elsewhere: u64,
-    /// Failed.
+    /// Number of pictures that failed.
     pub failed: u64,
-    /// Neither: the run ended before.
+    /// Number of pictures that the run did not reach.
     pub left: u64,
-    /// Stops of the automatic exposure, where there is one.
+    /// Automatic exposure in stops, if it is on.
     pub auto_exposure: Option<f32>,
-    /// Whole run, seconds.
+    /// Time of the whole run, seconds.
     pub elapsed: f64,
-    /// Sum over the rendered pictures of their stages' seconds.
+    /// Time of each stage, summed over the rendered pictures, seconds.
     pub seconds: Seconds,
-    /// The exit code that stands for the run.
+    /// Exit code of the run.
     pub exit_code: u8,
 }
 
-/// Watches a batch.
+/// Observer of a batch.
 pub trait Watcher: Monitor {
-    /// Something happened.
+    /// Called at each event.
     fn event(&self, event: &Event);
 }
 
-/// Paths for people and events.
+/// Paths as text, for messages and events.
 pub fn words(files: &[PathBuf]) -> Vec<String> {
     files.iter().map(|f| word(f)).collect()
 }
 
-/// A path for people and events.
+/// A path as text, for messages and events.
 pub fn word(file: &Path) -> String {
     file.display().to_string()
 }

@@ -1,4 +1,4 @@
-//! The work: claim, render, hand over, until nothing is left.
+//! Renders a batch: claims each picture, renders it and hands it to the writer.
 
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,10 @@ use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 
-/// Between two looks at what others have claimed.
+/// Pause before pictures that other processes had claimed are tried again.
 const WAIT: Duration = Duration::from_millis(200);
 
-/// What the pictures of a run share.
+/// State that the pictures of a run share.
 struct Work<'a> {
     batch: &'a Batch,
     engine: &'a mut Engine,
@@ -25,27 +25,29 @@ struct Work<'a> {
     volumes: VolumeStock,
     mesh: Option<(Ground, Mesh)>,
     watcher: &'a dyn Watcher,
-    /// Whether the scene's warnings were told.
+    /// Whether the scene's warnings have been shown.
     warned: bool,
     summary: Summary,
-    /// The first error of a picture.
+    /// The first error of a picture that did not end the run.
     failure: Option<Error>,
 }
 
-/// What came of trying a picture.
+/// Result of trying a picture.
 enum Tried {
-    /// Its strips are with the writer.
+    /// All its strips were handed to the writer.
     Handed,
     /// Another process has made it.
     Elsewhere,
-    /// Another process is making it.
+    /// Another process is making it: the name of that process.
     Theirs(String),
 }
 
 impl Batch {
-    /// Renders what is missing of this run's pictures, and waits for what others have claimed. The summary
-    /// is told in any case; the error is the one that ended the run, or with `keep_going` the first of those
-    /// that did not.
+    /// Renders the missing pictures of this run's shard and waits for pictures that other processes have
+    /// claimed. The watcher gets the summary even if the run fails.
+    ///
+    /// # Errors
+    /// The error that ended the run. With `keep_going`, if none did, the first error of a picture.
     pub fn run(&self, engine: &mut Engine, watcher: &dyn Watcher) -> Result<Summary> {
         let clock = Instant::now();
         let numbers: Vec<usize> = self.own().filter(|&n| !self.whole[n]).collect();
@@ -69,7 +71,7 @@ impl Batch {
             let ended = work.all(numbers, &writer);
             (ended, writer.finish())
         });
-        // The scope has ended, and with it the thread: all outcomes are there.
+        // The end of the scope has joined the writer's thread, so all outcomes are known.
         let (ended, outcomes) = ended;
         let last = std::mem::take(&mut *outcomes.lock().unwrap_or_else(|e| e.into_inner()));
         let ended = ended.and(work.note(last));
@@ -87,21 +89,22 @@ impl Batch {
         result.map(|()| summary)
     }
 
-    /// The part of the image that is rendered.
+    /// The part of the image that the batch renders.
     pub(super) fn window(&self, scene: &Scene) -> Window {
         self.request.crop.unwrap_or(Window::whole([scene.image.width, scene.image.height]))
     }
 }
 
 impl Work<'_> {
-    /// Every picture of the list, in order; then, again and again, those that others had claimed.
+    /// Tries the pictures in order, then repeats with those that other processes had claimed, until none is
+    /// left.
     fn all(&mut self, mut numbers: Vec<usize>, writer: &Writer) -> Result<()> {
         let mut round = 0;
         while !numbers.is_empty() {
             let mut theirs = Vec::new();
             let mut who = String::new();
             for number in numbers {
-                // Signals are heard even where every picture is another's.
+                // Notices signals even if other processes hold every picture.
                 self.watcher.progress("pictures", 0, 1)?;
                 match self.attempts(number, writer) {
                     Ok(Tried::Handed) => {}
@@ -129,7 +132,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Tries a picture until it is handed over; a lost device is replaced.
+    /// Tries a picture, again after each lost device as long as retries remain.
     fn attempts(&mut self, number: usize, writer: &Writer) -> Result<Tried> {
         let mut retries = self.batch.request.retries;
         loop {
@@ -148,7 +151,7 @@ impl Work<'_> {
     fn attempt(&mut self, number: usize, writer: &Writer) -> Result<Tried> {
         let files = self.batch.files(number);
         if files.is_empty() {
-            // Frames of a movie alone are nobody else's.
+            // Without picture files there is nothing to share with other processes, so nothing to claim.
             self.render(number, None, writer)?;
             return Ok(Tried::Handed);
         }
@@ -215,15 +218,16 @@ impl Work<'_> {
             };
             if frame.non_finite_pixels() > 0 {
                 let count = frame.non_finite_pixels();
-                self.watcher
-                    .warn(&format!("{name}: {count} pixels are not finite: please report this scene"));
+                self.watcher.warn(&format!(
+                    "{name}: {count} pixels are not finite; please report this scene as a bug"
+                ));
             }
             if let Some(start) = start.take() {
                 writer.begin(start);
             }
             writer.strip(frame);
             if several {
-                // Strips take what memory there is: the next one only when this one is written.
+                // Strips are as large as memory allows, so the next one must wait until this one is written.
                 writer.settle();
             }
         }
@@ -244,7 +248,7 @@ impl Work<'_> {
         }
     }
 
-    /// Counts what has become of pictures; the error that ends the run.
+    /// Counts outcomes of pictures. Returns the error that ends the run, if there is one.
     fn note(&mut self, outcomes: Outcomes) -> Result<()> {
         let mut end = Ok(());
         for (_, name, outcome) in outcomes {
@@ -258,7 +262,7 @@ impl Work<'_> {
                     self.summary.failed += 1;
                     let (error, exit_code) = (e.to_string(), e.exit_code());
                     self.watcher.event(&Event::Failed { picture: &name, error, exit_code });
-                    // A hung device hangs every picture after this one too.
+                    // A hung device would hang at every later picture too.
                     let hopeless = matches!(e, Error::Watchdog { .. });
                     if hopeless || !self.batch.request.keep_going {
                         end = end.and(Err(e));
@@ -272,11 +276,11 @@ impl Work<'_> {
     }
 }
 
-/// Tells how far one picture is, while one of its strips is rendered.
+/// Reports progress within one strip as progress of its picture.
 struct Share<'a> {
     watcher: &'a dyn Watcher,
     name: &'a Name,
-    /// Rows of the picture before the strip, of the strip, and of all.
+    /// Number of rows before the strip, in the strip, and in the picture.
     rows: [u32; 3],
 }
 

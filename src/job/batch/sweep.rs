@@ -1,33 +1,38 @@
-//! Values to try: `alpha=0.25:1:0.25`, `h=0.6,1,1.4`.
+//! Sweeps: a parameter and the values to try, such as `alpha=0.25:1:0.25` or `h=0.6,1,1.4`.
 
 use crate::scene::{PARAMS, Param, Raw, Values, check_names, parse_value};
 use crate::util::error::{Error, Result};
 
-/// Most values of one sweep.
+/// Most values in one sweep.
 const MAX_VALUES: usize = 1000;
 
 /// A parameter and the values it takes.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// Dotted key.
+    /// The parameter's full dotted key.
     pub key: String,
-    /// As the user called it: the key or its last part.
+    /// The key as the user wrote it, in full or only its last part.
     pub name: String,
-    /// The values, and each in words.
+    /// The values, each with its text.
     pub values: Vec<(Raw, String)>,
 }
 
 impl Sweep {
-    /// Reads `KEY=VALUES`. The key may be short where its last part is one parameter's alone; `keys` are all
-    /// the keys of the scene.
+    /// Parses `KEY=VALUES`. The last part of the key is enough if only one parameter has it. `keys` are all
+    /// keys of the scene, `values` its values.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] or [`Error::Input`] if the key is unknown or cannot be swept, or if the values are
+    /// malformed, too many or given twice.
     pub fn parse(text: &str, keys: &[String], values: &Values) -> Result<Sweep> {
         let usage = |why: String| Error::Usage(format!("--sweep {text}: {why}"));
         let how = "write KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,…, such as alpha=0.25:1:0.25";
-        let (name, list) = text.split_once('=').ok_or_else(|| usage(format!("it has no values; {how}")))?;
+        let (name, list) =
+            text.split_once('=').ok_or_else(|| usage(format!("the values are missing; {how}")))?;
         let (name, list) = (name.trim(), list.trim());
         let key = full_key(name, keys).map_err(&usage)?;
         let Some(param) = Param::find(&key) else {
-            // Setting it says what is wrong with it.
+            // Setting an unknown key gives the error that names similar keys.
             let place = crate::scene::Place("--sweep".into());
             return Err(match values.clone().set(&key, &Raw::Int(0), &place) {
                 Err(e) => e,
@@ -37,14 +42,14 @@ impl Sweep {
         check_names(values, &key)
             .map_err(|(what, fix)| Error::input(format!("--sweep {key}: {what}"), fix))?;
         if key.starts_with("animate.") || key == "image.width" || key == "image.height" || param.is_list() {
-            return Err(usage(format!("{key} cannot be swept: all pictures share it")));
+            return Err(usage(format!("{key} cannot be swept, because all pictures share it")));
         }
         let values = match range(list) {
             Some(range) => range.map_err(&usage)?,
             None => listed(list),
         };
         if values.is_empty() || values.len() > MAX_VALUES {
-            return Err(usage(format!("{} values; a sweep has 1 to {MAX_VALUES}; {how}", values.len())));
+            return Err(usage(format!("{} values, but a sweep has 1 to {MAX_VALUES}; {how}", values.len())));
         }
         for (i, (_, word)) in values.iter().enumerate() {
             if values[..i].iter().any(|(_, other)| other == word) {
@@ -54,13 +59,13 @@ impl Sweep {
         Ok(Sweep { key, name: name.into(), values })
     }
 
-    /// All it may be called in the name of a file.
+    /// Every name that the sweep may have in a file's name.
     pub fn names(&self) -> Vec<String> {
         let last = self.key.rsplit('.').next().unwrap_or(&self.key);
         vec![self.name.clone(), self.key.clone(), last.into()]
     }
 
-    /// Symbol or key, and unit: for an axis.
+    /// Label of the sweep's axis: symbol, key and unit.
     pub fn axis(&self) -> String {
         let param = Param::find(&self.key);
         let name = match param {
@@ -74,8 +79,8 @@ impl Sweep {
     }
 }
 
-/// The key that `name` stands for: itself, or the one key that ends with it. Parameters that are there once
-/// go before those of lights, rocks and materials.
+/// The full key that `name` stands for: `name` itself, or the one key that ends with it. Parameters that a
+/// scene has once take precedence over those of lights, rocks and materials.
 fn full_key(name: &str, keys: &[String]) -> std::result::Result<String, String> {
     if name.contains('.') {
         return Ok(name.into());
@@ -86,28 +91,28 @@ fn full_key(name: &str, keys: &[String]) -> std::result::Result<String, String> 
     let once: Vec<&String> = all.iter().copied().filter(single).collect();
     match (once.as_slice(), all.as_slice()) {
         ([key], _) | ([], [key]) => Ok((*key).clone()),
-        // Setting it will say what it may have meant.
+        // Setting an unknown key gives the error that names similar keys.
         ([], []) => Ok(name.into()),
         (_, several) => {
             let several: Vec<&str> = several.iter().map(|k| k.as_str()).collect();
-            Err(format!("{name} may be {}; write one in full", several.join(", ")))
+            Err(format!("{name} can mean {}; write one of them in full", several.join(", ")))
         }
     }
 }
 
-/// `FIRST:LAST:STEP`, if it is that.
+/// Parses `FIRST:LAST:STEP`. `None` if the text has another form.
 fn range(text: &str) -> Option<std::result::Result<Vec<(Raw, String)>, String>> {
     let parts: Vec<&str> = text.split(':').map(str::trim).collect();
     let [first, last, step] = parts.as_slice() else { return None };
     let numbers = [first, last, step].map(|n| n.parse::<f64>().ok().filter(|x| x.is_finite()));
     let [Some(a), Some(b), Some(step_size)] = numbers else { return None };
     if step_size == 0.0 || (b - a) / step_size < 0.0 {
-        return Some(Err(format!("no steps of {step} lead from {first} to {last}")));
+        return Some(Err(format!("steps of {step} do not lead from {first} to {last}")));
     }
-    // A last step that rounding has put a little past the end still counts.
+    // Rounding may put the last step slightly past the end; it still counts.
     let count = ((b - a) / step_size + 1e-9).floor() + 1.0;
     if count > MAX_VALUES as f64 {
-        return Some(Err(format!("{count} values; at most {MAX_VALUES}")));
+        return Some(Err(format!("{count} values, but a sweep has at most {MAX_VALUES}")));
     }
     let exact = [first, last, step].map(|n| n.parse::<i128>().ok());
     let value = |i: usize| {
@@ -116,14 +121,14 @@ fn range(text: &str) -> Option<std::result::Result<Vec<(Raw, String)>, String>> 
             return (Raw::Int(x), x.to_string());
         }
         let x = a + step_size * i as f64;
-        // Twelve digits: 0.1 + 0.2 is 0.3.
+        // Rounding to twelve digits makes 0.1 + 0.2 equal 0.3.
         let x: f64 = format!("{x:.12e}").parse().unwrap_or(x);
         (Raw::Float(x), format!("{x}"))
     };
     Some(Ok((0..count as usize).map(value).collect()))
 }
 
-/// Values between commas, each as `--set` takes it. Commas in brackets and quotes are the value's own.
+/// Splits a list at its commas, except those inside brackets or quotes. Each value is parsed as by `--set`.
 fn listed(text: &str) -> Vec<(Raw, String)> {
     let mut words = vec![String::new()];
     let (mut depth, mut quote) = (0, None);

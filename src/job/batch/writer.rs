@@ -1,4 +1,4 @@
-//! The thread that encodes and writes pictures while the next ones are rendered.
+//! A thread that encodes and writes pictures while the next ones are rendered.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -16,23 +16,23 @@ use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
-/// A picture to write, once its first strip is there.
+/// A picture to write. It is sent when its first strip has been rendered.
 pub struct Start {
     pub number: usize,
     pub name: Name,
     pub files: Vec<PathBuf>,
-    /// Taken when it is begun.
+    /// The open files; taken when the picture begins.
     pub still: Option<Still>,
     pub claim: Option<Claim>,
     pub scene: Scene,
     pub volume: Arc<VolumeTexture>,
     pub window: Window,
     pub layers: Vec<Layer>,
-    /// Movies that begin with it.
+    /// Movies whose first frame this is.
     pub movies: Vec<(PathBuf, MovieKind, MovieOptions)>,
-    /// Whether movies end with it.
+    /// Whether this is the last frame of the open movies.
     pub last: bool,
-    /// When its rendering began.
+    /// Start of its rendering.
     pub began: Instant,
 }
 
@@ -40,28 +40,28 @@ enum Message {
     Start(Box<Start>),
     Strip(Box<Frame>),
     End,
-    /// Nothing: it is taken when all before it is written.
+    /// Does nothing. It is received once all earlier messages have been handled.
     Settle,
-    /// What has been started is not wanted any more.
+    /// Discards the picture in progress.
     Drop,
 }
 
-/// What became of pictures: their numbers, and the error of those that failed.
+/// Outcomes of pictures: number, name, and the time of each stage in seconds or the error.
 pub type Outcomes = Vec<(usize, Name, Result<Seconds>)>;
 
-/// The renderer's end of the thread.
+/// The renderer's handle of the thread.
 pub struct Writer {
     send: SyncSender<Message>,
     outcomes: Arc<Mutex<Outcomes>>,
 }
 
 impl Writer {
-    /// Starts the thread in `scope`. It ends when the writer is dropped and all is written.
+    /// Starts the thread in `scope`. It ends when the writer has been dropped and everything is written.
     pub fn start<'scope>(
         scope: &'scope std::thread::Scope<'scope, '_>,
         watcher: &'scope dyn Watcher,
     ) -> Writer {
-        // No queue: while one strip is encoded the next is rendered, and no third takes memory.
+        // No queue: one strip is encoded while the next is rendered, and no third strip takes memory.
         let (send, receive) = sync_channel(0);
         let outcomes: Arc<Mutex<Outcomes>> = Arc::default();
         let tell = outcomes.clone();
@@ -74,38 +74,39 @@ impl Writer {
         self.tell(Message::Start(Box::new(start)));
     }
 
-    /// The next rows of the picture.
+    /// Writes the next rows of the picture.
     pub fn strip(&self, frame: Frame) {
         self.tell(Message::Strip(Box::new(frame)));
     }
 
-    /// Waits until all strips are written.
+    /// Waits until all strips so far are written.
     pub fn settle(&self) {
         self.tell(Message::Settle);
     }
 
-    /// The picture is complete.
+    /// Completes the picture.
     pub fn end(&self) {
         self.tell(Message::End);
     }
 
-    /// The picture will not be complete.
+    /// Discards the picture; it will not be completed.
     pub fn drop_picture(&self) {
         self.tell(Message::Drop);
     }
 
-    /// What has become of pictures since this was last asked.
+    /// Takes the outcomes of pictures since the last call.
     pub fn outcomes(&self) -> Outcomes {
         std::mem::take(&mut *self.outcomes.lock().unwrap_or_else(|e| e.into_inner()))
     }
 
-    /// Waits until all is written; what has become of it.
+    /// Closes the channel, which lets the thread end, and returns the list of outcomes. The list is complete
+    /// once the scope has ended.
     pub fn finish(self) -> Arc<Mutex<Outcomes>> {
         self.outcomes
     }
 
     fn tell(&self, message: Message) {
-        // The thread only ends before this end is dropped if it panics, and then the scope does.
+        // Sending fails only after the thread has panicked, and then the scope panics too.
         let _ = self.send.send(message);
     }
 }
@@ -113,11 +114,11 @@ impl Writer {
 /// A picture being written.
 struct Open {
     start: Start,
-    /// None once writing has failed.
+    /// `None` once writing has failed.
     writer: Option<StillWriter>,
     error: Option<Error>,
     seconds: Seconds,
-    /// R, G, B of the rows so far, for movies.
+    /// R, G, B bytes of the rows so far, for movies.
     rgb: Vec<u8>,
 }
 
@@ -175,7 +176,7 @@ fn push(open: &mut Open, strip: &Frame, movies: bool) {
     if let Some(writer) = &mut open.writer
         && let Err(e) = writer.push(strip)
     {
-        // What is written of it goes at once: a full disk needs the room.
+        // Dropping the writer deletes the partial files at once: the disk may be full.
         open.writer = None;
         open.error = Some(e);
     }
@@ -217,7 +218,7 @@ fn end(
             (start.number, start.name, Ok(seconds))
         }
         Err(e) => {
-            // A movie that misses a frame is none.
+            // A movie cannot go on without this frame.
             movies.clear();
             (start.number, start.name, Err(e))
         }

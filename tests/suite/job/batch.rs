@@ -145,7 +145,7 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
         let ended = run(&mut batch(place.path(), ["--frames", "0-2", "-o", "f.####.png"]));
         match foreign {
             b"" => drop(ended.done()),
-            _ => ended.refused(73, &["f.0001.png", "no picture of taki"]),
+            _ => ended.refused(73, &["f.0001.png", "not a picture that taki wrote"]),
         }
     }
     let sheets = folder();
@@ -171,7 +171,7 @@ fn faults_are_known_before_any_picture() {
     let cases: [(&[&str], i32, &[&str]); 16] = [
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),
-        (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would have one name", "fall.####.png"]),
+        (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would share one name", "fall.####.png"]),
         (&["--frames", "0-3", "-o", "f.####.jpg"], 2, &["unknown kind"]),
         (&["--frames", "3-0", "-o", "f.####.png"], 2, &["ends before it begins"]),
         (&["--frames", "x", "-o", "f.####.png"], 2, &["0-239"]),

@@ -65,7 +65,8 @@ fn a_movie_that_is_there_is_kept_if_it_shows_these_frames_and_never_replaced_una
         run(batch(dir.path(), other).args(["-o", "f.gif"])).refused(73, &["f.gif", "other frames"]);
     }
     fs::write(dir.path().join("g.gif"), "hello").unwrap();
-    run(&mut batch(dir.path(), ["--loop", "3", "-o", "g.gif"])).refused(73, &["g.gif", "no movie of taki"]);
+    run(&mut batch(dir.path(), ["--loop", "3", "-o", "g.gif"]))
+        .refused(73, &["g.gif", "not a movie that taki wrote"]);
     for kind in ["mp4", "webm", "apng"] {
         let movie = format!("x.{kind}");
         let alone = ["--loop", "3", "-o", &movie];

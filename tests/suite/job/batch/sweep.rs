@@ -29,10 +29,10 @@ fn every_point_of_the_grid_is_the_single_render_of_its_values() {
 fn sweeps_that_cannot_be_are_refused_with_the_reason() {
     let dir = folder();
     let cases = [
-        ("alpha", 2, "it has no values"),
+        ("alpha", 2, "the values are missing"),
         ("alpha=", 2, "0 values"),
-        ("alpha=0:1:0", 2, "no steps of 0"),
-        ("alpha=1:0:0.1", 2, "no steps of 0.1"),
+        ("alpha=0:1:0", 2, "steps of 0 do not lead"),
+        ("alpha=1:0:0.1", 2, "steps of 0.1 do not lead"),
         ("alpha=0:1:0.00001", 2, "at most 1000"),
         ("alpha=0.5,0.5", 2, "given twice"),
         ("alpha=0.5:2:0.5", 65, "allowed: 0 to 1"),
@@ -58,7 +58,7 @@ fn two_pictures_of_one_name_are_refused_before_the_work() {
     let run_on = ["--sweep", "curves.h=1,1.1", "--sweep", "alpha=1,0.1", "-o"];
     refused(
         &["--sweep", "max_cells=1,11", "--sweep", "across=1,11", "-o", "{max_cells}{across}.png"],
-        &["111.png", "trace.max_cells=1", "trace.max_cells=11", "run into one another"],
+        &["111.png", "trace.max_cells=1", "trace.max_cells=11", "to separate two values"],
     );
     refused(&["--sweep", "volume.file=a/b.npz,a_b.npz", "-o", "{file}.png"], &["a_b.npz.png"]);
     run(batch(dir.path(), run_on).arg("{h}-{alpha}.png")).done();

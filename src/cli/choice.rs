@@ -1,0 +1,63 @@
+//! Options that take one of a few words. The words and their help stand here, so that the library's own types
+//! need no derive for the command line.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use crate::engine::EngineChoice;
+use crate::picture::Layer;
+#[cfg(feature = "viewer")]
+use crate::viewer::WindowChoice;
+
+/// Word, help and value of each choice of an option.
+type Choices<T> = [(&'static str, &'static str, T)];
+
+/// Parses the words of `choices`. Help, completions and error messages list them.
+fn choice<T: Copy + Send + Sync + 'static>(choices: &'static Choices<T>) -> impl TypedValueParser<Value = T> {
+    let words = choices.iter().map(|(word, help, _)| PossibleValue::new(*word).help(*help));
+    PossibleValuesParser::new(words).try_map(|word| {
+        let chosen = choices.iter().find(|(known, ..)| *known == word);
+        chosen.map(|(.., value)| *value).ok_or("unknown word")
+    })
+}
+
+/// Parser of `--engine`.
+pub fn engine() -> impl TypedValueParser<Value = EngineChoice> {
+    choice(&[
+        ("auto", "A GPU adapter if there is one, else the CPU", EngineChoice::Auto),
+        ("gpu", "A GPU adapter, or exit 69", EngineChoice::Gpu),
+        ("cpu", "The CPU", EngineChoice::Cpu),
+    ])
+}
+
+/// Parser of `--window`.
+#[cfg(feature = "viewer")]
+pub fn window() -> impl TypedValueParser<Value = WindowChoice> {
+    choice(&[
+        (
+            "auto",
+            "Vulkan, Metal or Direct3D on a GPU; OpenGL where they would be software",
+            WindowChoice::Auto,
+        ),
+        ("wgpu", "Vulkan, Metal or Direct3D", WindowChoice::Wgpu),
+        ("opengl", "OpenGL", WindowChoice::Opengl),
+    ])
+}
+
+/// Parser of one word of `--layers`.
+pub fn layer() -> impl TypedValueParser<Value = Layer> {
+    let words = Layer::ALL.map(|layer| PossibleValue::new(layer.name()).help(layer_help(layer)));
+    PossibleValuesParser::new(words)
+        .try_map(|word| Layer::ALL.into_iter().find(|layer| layer.name() == word).ok_or("unknown layer"))
+}
+
+fn layer_help(layer: Layer) -> &'static str {
+    match layer {
+        Layer::Rgb => "Linear radiance: channels R, G, B",
+        Layer::Depth => "Metres to the first surface; 0: none",
+        Layer::Uv => "Texture coordinates on the quad",
+        Layer::Quad => "Quad number plus 1; 0: none",
+        Layer::Transmittance => "Transmittance of the volume",
+        Layer::Cells => "Cells walked by the view rays",
+        Layer::Normal => "Normal on the seen side",
+    }
+}
