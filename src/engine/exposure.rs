@@ -1,8 +1,8 @@
 //! Automatic exposure.
 //!
-//! It is measured once, on a small picture of frame 0: so it is the same for every frame, shard, crop and strip, for
-//! every size of picture and on both engines, and nothing flickers. What is chosen is written into the scene as an
-//! ordinary `image.exposure`.
+//! It is measured once, on a small picture of frame 0. It is therefore the same for every frame, shard, crop
+//! and strip, for every picture size and on both engines, and nothing flickers. The chosen exposure is
+//! written into the scene as an ordinary `image.exposure`.
 
 use super::cpu::{self, LightVolumeCache};
 use crate::picture::AutoExposure;
@@ -13,18 +13,24 @@ use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
-/// Longest side of the picture that is measured, pixels: enough for shares of a hundredth.
+/// Longest side of the measured picture, pixels: enough pixels to count one in a hundred.
 const SIDE: u32 = 96;
-/// The mean's luminance in the picture: the reflectance of middle grey (Reinhard et al. 2002).
+/// Luminance that `Average` gives the logarithmic mean: the reflectance of middle grey (Reinhard et al.
+/// 2002).
 pub const MIDDLE_GREY: f64 = 0.18;
-/// Darkness counts as this share of the mean luminance, so that the logarithm of black does not rule.
+/// Offset that is added to every luminance, as a share of the mean: it keeps the logarithm of black pixels
+/// from dominating.
 const DARKEST: f64 = 1e-3;
-/// The share of the pixels that may be brighter than 1.
+/// Share of the pixels that `Highlights` lets be brighter than 1.
 const BRIGHTEST: f64 = 0.01;
-/// Steps of a stop.
+/// Steps per stop to which the result is rounded.
 const STEPS: f64 = 64.0;
 
-/// Stops that suit a scene, measured on its whole image by the CPU engine; 0 where it asks for none or all is black.
+/// Measures the exposure of a scene, in stops, on its whole image with the CPU engine. Returns 0 if the scene
+/// asks for no automatic exposure or if every pixel is black.
+///
+/// # Errors
+/// Errors of [`cpu::render_samples`], including those of `monitor`.
 pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn Monitor) -> Result<f32> {
     let method = scene.image.look.auto_exposure;
     if method == AutoExposure::None {
@@ -37,16 +43,17 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
     let window = Window::whole([image.width, image.height]);
     let watch = Quiet(monitor);
-    let kept = &mut LightVolumeCache::default();
-    let frame = cpu::render_samples(&small, volume, mesh, window, 0..1, false, kept, &watch)?;
+    let light_volumes = &mut LightVolumeCache::default();
+    let frame = cpu::render_samples(&small, volume, mesh, window, 0..1, false, light_volumes, &watch)?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }
 
-/// An animation with its automatic exposure, if it has one, measured on frame 0 and the same for every frame from
-/// now on; and the stops that it chose.
+/// Applies automatic exposure to an animation that asks for it. The exposure is measured on frame 0 and holds
+/// for every frame. Returns the animation, and the measured stops (`None` if it asks for no automatic
+/// exposure).
 ///
 /// # Errors
-/// Those of [`Animation::at`], of its volume, and of [`measure`].
+/// Errors of [`Animation::at`], of building frame 0's volume, and of [`measure`].
 pub fn exposed(animation: Animation, monitor: &dyn Monitor) -> Result<(Animation, Option<f32>)> {
     let scene = animation.at(0)?;
     if scene.image.look.auto_exposure == AutoExposure::None {
@@ -59,8 +66,9 @@ pub fn exposed(animation: Animation, monitor: &dyn Monitor) -> Result<(Animation
     Ok((animation.exposed(stops), Some(stops)))
 }
 
-/// Stops for pixels of these radiances: `Average` brings the mean of the logarithm of luminance to
-/// [`MIDDLE_GREY`], `Highlights` the brightest hundredth to 1. In 64ths of a stop, within ±32.
+/// Returns the exposure in stops for pixels of these linear radiances: a multiple of 1/64 within ±32.
+/// `Average` brings the logarithmic mean of luminance to [`MIDDLE_GREY`]; `Highlights` brings the brightest
+/// hundredth of the pixels to 1.
 pub fn stops(method: AutoExposure, pixels: impl Iterator<Item = [f32; 3]>) -> f32 {
     let luminance = |[r, g, b]: [f32; 3]| {
         let y = 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
@@ -81,17 +89,16 @@ pub fn stops(method: AutoExposure, pixels: impl Iterator<Item = [f32; 3]>) -> f3
         }
         AutoExposure::Highlights => {
             luminances.sort_by(f64::total_cmp);
-            let place = (luminances.len() - 1) - (BRIGHTEST * count) as usize;
-            // Where fewer pixels shine than that, the brightest counts.
-            let bright =
-                if luminances[place] > 0.0 { luminances[place] } else { luminances[luminances.len() - 1] };
+            let i = (luminances.len() - 1) - (BRIGHTEST * count) as usize;
+            // If fewer pixels than that are lit, the brightest one counts.
+            let bright = if luminances[i] > 0.0 { luminances[i] } else { luminances[luminances.len() - 1] };
             -bright.log2()
         }
     };
     ((wanted * STEPS).round() / STEPS).clamp(-32.0, 32.0) as f32
 }
 
-/// Passes on what may stop the work, not how far this small part of it is.
+/// A monitor that can stop the work but hides the progress of this small part of it.
 struct Quiet<'a>(&'a dyn Monitor);
 
 impl Monitor for Quiet<'_> {

@@ -1,4 +1,4 @@
-//! §1 to §5 put together: the frame, on a GPU or on the CPU.
+//! The engines: §1 to §5 combined into a frame, on a GPU or on the CPU.
 
 pub mod cpu;
 pub mod exposure;
@@ -19,36 +19,40 @@ use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 use gpu::{DeviceOptions, Gpu, GpuRenderer};
 
-/// The user's choice.
+/// The engine a user asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineChoice {
-    /// A GPU adapter if there is one, else the CPU.
+    /// A GPU adapter if there is one, otherwise the CPU.
     #[default]
     Auto,
-    /// A GPU adapter, or exit 69.
+    /// A GPU adapter; exit code 69 if there is none.
     Gpu,
     /// The CPU.
     Cpu,
 }
 
-/// An engine ready to render.
+/// An engine that is ready to render.
 pub enum Engine {
-    /// On a device.
+    /// The GPU engine, and the options that opened its device.
     Gpu(Box<GpuRenderer>, DeviceOptions),
-    /// On all cores.
+    /// The CPU engine, which uses all cores.
     Cpu(cpu::LightVolumeCache),
 }
 
-/// Pixels a submission after a device was lost: small enough for the shortest watchdog known.
+/// Pixels per submission after a device was lost: small enough for the shortest watchdog known.
 const CAREFUL_TILE_PIXELS: u32 = 4096;
 
 impl Engine {
-    /// The CPU engine.
+    /// Returns a CPU engine without cached light volumes.
     pub fn cpu() -> Engine {
         Engine::Cpu(cpu::LightVolumeCache::default())
     }
 
-    /// Opens the engine; says in one line what was taken and why.
+    /// Opens the chosen engine. Returns it with one line that says which engine was opened and why.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if the choice is [`EngineChoice::Gpu`], or `device` names an adapter, and no
+    /// such adapter can be opened.
     pub fn open(choice: EngineChoice, device: &DeviceOptions) -> Result<(Engine, String)> {
         let cpu = |why: &str| {
             (Engine::cpu(), format!("engine cpu on {} threads{why}", rayon::current_num_threads()))
@@ -58,7 +62,7 @@ impl Engine {
             EngineChoice::Gpu => Engine::open_gpu(device),
             EngineChoice::Auto => match Engine::open_gpu(device) {
                 Ok(opened) => Ok(opened),
-                // A named adapter that is not there is a mistake, not a reason to fall back.
+                // A named adapter that is missing is a user error, not a reason to fall back.
                 Err(e) if device.adapter.is_some() => Err(e),
                 Err(Error::NoAdapter(why)) => Ok(cpu(&format!(
                     ": {why}; a Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine"
@@ -75,14 +79,17 @@ impl Engine {
         Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
     }
 
-    /// Compiles what a scene will need, as far as that can be told without its volume.
+    /// Compiles the passes that a scene needs, as far as they are known without its volume.
     pub fn prepare(&mut self, scene: &Scene) {
         if let Engine::Gpu(renderer, _) = self {
             renderer.prepare(scene);
         }
     }
 
-    /// Opens the device anew, after it was lost.
+    /// Opens a new device after the old one was lost.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if no device can be opened.
     pub fn renew(&mut self) -> Result<()> {
         if let Engine::Gpu(renderer, device) = self {
             **renderer = GpuRenderer::new(Gpu::open(device)?);
@@ -90,7 +97,7 @@ impl Engine {
         Ok(())
     }
 
-    /// `gpu` or `cpu`.
+    /// Returns `gpu` or `cpu`.
     pub fn word(&self) -> &'static str {
         match self {
             Engine::Gpu(..) => "gpu",
@@ -98,7 +105,7 @@ impl Engine {
         }
     }
 
-    /// The adapter's name, on the GPU engine.
+    /// Returns the adapter's name; `None` on the CPU engine.
     pub fn adapter(&self) -> Option<String> {
         match self {
             Engine::Gpu(renderer, _) => Some(renderer.gpu.name()),
@@ -106,8 +113,11 @@ impl Engine {
         }
     }
 
-    /// Renders. After a lost device or exhausted device memory it tries once more on a new device
+    /// Renders a frame. After a lost device or exhausted device memory, it tries once more on a new device
     /// with smaller tiles.
+    ///
+    /// # Errors
+    /// Errors of [`cpu::render_samples`] or [`GpuRenderer::render`], and those of `monitor`.
     pub fn render_volume(
         &mut self,
         scene: &Scene,
@@ -117,16 +127,17 @@ impl Engine {
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
         match self {
-            Engine::Cpu(kept) => {
+            Engine::Cpu(light_volumes) => {
                 let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
                 let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
-                cpu::render_samples(scene, volume, mesh, window, samples, options.surface, kept, monitor)
+                let surface = options.surface;
+                cpu::render_samples(scene, volume, mesh, window, samples, surface, light_volumes, monitor)
             }
             Engine::Gpu(renderer, device) => {
                 let result = renderer.render(scene, volume, mesh, options, monitor);
                 let again = match &result {
                     Err(Error::DeviceLost(_)) => true,
-                    // What was refused before the device was asked would be refused again.
+                    // A budget that refused the frame before the device was used would refuse it again.
                     Err(Error::Memory { .. }) => renderer.gpu.check().is_err(),
                     _ => false,
                 };

@@ -1,4 +1,4 @@
-//! How to render.
+//! Options of a rendering.
 
 use std::ops::Range;
 
@@ -7,24 +7,25 @@ use crate::picture::Grid;
 use crate::util::window::Window;
 use crate::volume::Leaps;
 
-/// How to render.
+/// Options of a rendering that do not belong to the scene.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
-    /// Whether to bring back depth, texture coordinates, quads and normals too.
+    /// Whether the frame also holds depth, texture coordinates, quads and normals.
     pub surface: bool,
-    /// Only these of the scene's samples; the radiance is their mean.
+    /// The scene's samples to render; `None` renders all. The radiance is their mean.
     pub samples: Option<Range<u32>>,
-    /// About this many pixels a submission, instead of what the clock suggests.
+    /// Approximate pixels per submission; `None` chooses them by measured time.
     pub tile_pixels: Option<u32>,
-    /// Only this part of the image, which it must lie in: the frame has its size, and the same bits as this
-    /// part of the whole image's frame.
+    /// Part of the image to render, in pixels; `None` renders the whole image. It must lie inside the image.
+    /// The frame has the window's size and equals the same part of the whole image's frame bit for bit.
     pub window: Option<Window>,
-    /// Bytes on the device for results of the raster pass that later frames may use again.
+    /// Bytes of device memory for results of the raster pass that later frames may reuse.
     pub keep_rasters: u64,
-    /// Whether rays leap over empty cells.
+    /// Whether rays leap over boxes of empty cells.
     pub leaps: Leaps,
-    /// Where light volumes are filled.
+    /// Whether the GPU engine fills light volumes on the device or on the host.
     pub filling: Filling,
-    /// How the GPU engine cuts the image; another grid rounds the rock's radiance otherwise.
+    /// Grid by which the GPU engine cuts the image into windows. Another grid rounds the rock's radiance
+    /// differently.
     pub grid: Grid,
 }

@@ -1,43 +1,44 @@
-//! How many volume quads lie over one another in the image: so many sheets a ray may have to go through,
-//! and so many layers the raster pass keeps. Scenes whose quads stand side by side need one.
+//! Overlap of the volume quads in the image. It bounds the sheets a ray may cross, and thus the layers that
+//! the raster pass keeps. A scene whose quads stand side by side needs one layer.
 
 use glam::{DVec2, DVec3};
 
 use crate::scene::Scene;
 
-/// Quads whose images share less than a strip of this width, pixels, stand side by side: half the grid of
-/// 1/256 pixel that rasterisers snap corners to, and far more than the rounding of corners two quads share.
+/// Width of a strip in pixels: quads whose images share a narrower one count as side by side. It is half a
+/// step of the 1/256 pixel grid that rasterisers snap corners to, and far more than the rounding of shared
+/// corners.
 const LEAST_WIDTH: f64 = 1.0 / 512.0;
-/// Pairs of quads that are looked at, and polygons that are cut, before the most is taken for granted: some
-/// milliseconds.
+/// Pairs of quads that are compared before [`sheets`] gives up and returns `trace.layers`: some milliseconds.
 const MOST_PAIRS: usize = 1 << 21;
-/// See [`MOST_PAIRS`].
+/// Polygons that are cut before [`sheets`] gives up, as for [`MOST_PAIRS`].
 const MOST_CUTS: usize = 1 << 14;
 
-/// Most of a scene's volume quads that a ray of its image meets: at least 1, at most `trace.layers`. Opaque
-/// geometry in front is left out of account, so the number may be too large, but it is never too small by
-/// more than what a part of an image narrower than 1/512 pixel shows. The same for any part and sample.
+/// Returns the largest number of volume quads that any ray of the scene's image meets: at least 1, at most
+/// `trace.layers`. Opaque geometry in front of them is ignored, so the result may be too large. It is too
+/// small only where the overlap in the image is narrower than 1/512 pixel. Every window and sample gets the
+/// same result.
 pub fn sheets(scene: &Scene) -> u32 {
     let most = scene.trace.layers;
     if most < 2 || scene.quads.len() < 2 {
         return 1;
     }
-    let mut images: Vec<Polygon> = images(scene);
+    let mut images = images(scene);
     images.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
     let mut search = Search { images: &images, cuts: 0, best: 1, most: most as usize };
     let mut pairs = 0;
     for (i, image) in images.iter().enumerate() {
-        let mut met = Vec::new();
+        let mut candidates = Vec::new();
         for (j, other) in images.iter().enumerate().skip(i + 1) {
             pairs += 1;
             if other.low.x >= image.high.x || pairs > MOST_PAIRS {
                 break;
             }
             if other.low.y < image.high.y && image.low.y < other.high.y {
-                met.push(j);
+                candidates.push(j);
             }
         }
-        search.go(image, &met, 1);
+        search.descend(image, &candidates, 1);
         if search.best >= search.most || search.cuts > MOST_CUTS || pairs > MOST_PAIRS {
             return most;
         }
@@ -45,7 +46,7 @@ pub fn sheets(scene: &Scene) -> u32 {
     search.best as u32
 }
 
-/// A convex polygon in the image, pixels, counter-clockwise in its axes, and the box around it.
+/// A convex polygon in pixels of the image, counter-clockwise in its axes, with its bounding box.
 #[derive(Clone)]
 struct Polygon {
     corners: Vec<DVec2>,
@@ -53,44 +54,47 @@ struct Polygon {
     high: DVec2,
 }
 
-/// Looks for the most polygons that have a part in common.
+/// Depth-first search for the largest set of polygons that share an area.
 struct Search<'a> {
     images: &'a [Polygon],
+    /// Polygons cut so far.
     cuts: usize,
+    /// Size of the largest set found so far.
     best: usize,
+    /// Size at which the search may stop.
     most: usize,
 }
 
 impl Search<'_> {
-    /// `common` is the common part of `deep` polygons; `met` are those that may cover more of it.
-    fn go(&mut self, common: &Polygon, met: &[usize], deep: usize) {
-        self.best = self.best.max(deep);
-        for (n, &i) in met.iter().enumerate() {
+    /// Extends a set of `depth` polygons whose common area is `common` by polygons of `candidates`.
+    fn descend(&mut self, common: &Polygon, candidates: &[usize], depth: usize) {
+        self.best = self.best.max(depth);
+        for (n, &i) in candidates.iter().enumerate() {
             let enough = self.best >= self.most || self.cuts > MOST_CUTS;
-            if enough || deep + met.len() - n <= self.best {
+            if enough || depth + candidates.len() - n <= self.best {
                 return;
             }
             self.cuts += 1;
             if let Some(part) = common.cut(&self.images[i]) {
-                self.go(&part, &met[n + 1..], deep + 1);
+                self.descend(&part, &candidates[n + 1..], depth + 1);
             }
         }
     }
 }
 
-/// The quads' images, cut at the near plane and at the edge of the image.
+/// Projects the quads into the image and clips them at the near plane and the image's edge.
 fn images(scene: &Scene) -> Vec<Polygon> {
     let size = DVec2::new(scene.image.width.into(), scene.image.height.into());
-    // A pixel more on every side: samples lie anywhere in the pixels.
+    // One pixel is added on every side because samples lie anywhere in their pixels.
     let [a, d] = [DVec2::splat(-1.0), size + 1.0];
     let Some(frame) = Polygon::new(vec![a, DVec2::new(d.x, a.y), d, DVec2::new(a.x, d.y)]) else {
         return Vec::new();
     };
-    // Corners may leave the plane by 1e-4: seen from its edge such a quad is not convex.
+    // Corners may leave their plane by 1e-4, so a quad seen edge-on may not be convex.
     outlines(scene).filter_map(|points| Polygon::new(hull(points))?.cut(&frame)).collect()
 }
 
-/// Corners of the quads' images in pixels, cut at the near plane: as many as are left in front of it.
+/// Projects the quads' corners to pixels after clipping at the near plane. A quad behind it has no corners.
 fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
     let camera = &scene.camera;
     let [width, height] = [scene.image.width, scene.image.height];
@@ -99,8 +103,8 @@ fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
     let [eye, right, up, forward] = [camera.eye, right, up, camera.forward].map(|v| v.as_dvec3());
     let near = f64::from(camera.near);
     scene.quads.iter().map(move |quad| {
-        // x and y in units of the image plane, and the distance along the view axis.
-        let seen = quad.corners.map(|corner| {
+        // x and y are in units of the image plane; z is the distance along the view axis.
+        let in_view = quad.corners.map(|corner| {
             let away = corner.as_dvec3() - eye;
             let along = |axis: DVec3| away.dot(axis) / axis.length_squared();
             DVec3::new(along(right), along(up), along(forward))
@@ -110,7 +114,7 @@ fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
             points.push((DVec2::new(p.x, -p.y) / p.z * 0.5 + 0.5) * size);
         };
         for i in 0..4 {
-            let (p, q) = (seen[i], seen[(i + 1) % 4]);
+            let (p, q) = (in_view[i], in_view[(i + 1) % 4]);
             if p.z >= near {
                 add(p);
             }
@@ -124,12 +128,13 @@ fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
     })
 }
 
-/// Pixels by which a quad's image may be drawn larger than it is: samples lie within a pixel and a half of where it is
-/// reckoned, and float32 rounds.
+/// Pixels by which a quad's image may exceed its outline here: samples lie within a pixel and a half of it,
+/// and float32 rounds.
 const MARGIN: f64 = 3.0;
 
-/// Which of `count` squares, `side` pixels wide, row by row from pixel `corner` of the image, a volume quad may be seen in. None
-/// that one is seen in is left out.
+/// Marks the squares of a grid that a volume quad may appear in, row by row. The grid has `count` squares
+/// along x and y, each `side` pixels wide, and begins at pixel `corner` of the image. Every square in which a
+/// quad appears is marked; a few others may be.
 pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> Vec<bool> {
     let [across, down] = count.map(|n| n as usize);
     let corner = DVec2::new(corner[0].into(), corner[1].into());
@@ -146,11 +151,11 @@ pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> V
                 if q.y < top || p.y > bottom {
                     continue;
                 }
-                // Where the edge is level it lies in the row whole.
-                let at = |y: f64| {
+                let x_at = |y: f64| {
                     if q.y > p.y { p.lerp(q, ((y - p.y) / (q.y - p.y)).clamp(0.0, 1.0)).x } else { p.x }
                 };
-                let ends = if q.y > p.y { [at(top), at(bottom)] } else { [p.x, q.x] };
+                // A level edge lies wholly in the row.
+                let ends = if q.y > p.y { [x_at(top), x_at(bottom)] } else { [p.x, q.x] };
                 low = low.min(ends[0]).min(ends[1]);
                 high = high.max(ends[0]).max(ends[1]);
             }
@@ -165,40 +170,42 @@ pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> V
 }
 
 impl Polygon {
-    /// None without an area.
+    /// Returns the polygon; `None` for fewer than three corners.
     fn new(corners: Vec<DVec2>) -> Option<Self> {
         let low = corners.iter().copied().reduce(DVec2::min)?;
         let high = corners.iter().copied().reduce(DVec2::max)?;
         (corners.len() > 2).then_some(Polygon { corners, low, high })
     }
 
-    /// Each corner and the next.
+    /// Iterates over the edges: each corner with the next.
     fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> {
         let next = self.corners.iter().cycle().skip(1);
         self.corners.iter().copied().zip(next.copied())
     }
 
-    /// What it has in common with another, if that is wide enough to count (Sutherland and Hodgman 1974).
+    /// Returns the intersection with another polygon (Sutherland and Hodgman 1974); `None` if it is not wider
+    /// than [`LEAST_WIDTH`].
     fn cut(&self, other: &Polygon) -> Option<Polygon> {
-        let mut rest = self.clone();
+        let mut common = self.clone();
         for (a, b) in other.edges() {
             let side = |p: DVec2| (b - a).perp_dot(p - a);
-            let mut corners = Vec::with_capacity(rest.corners.len() + 1);
-            for (p, q) in rest.edges() {
-                let (at_p, at_q) = (side(p), side(q));
-                if at_p >= 0.0 {
+            let mut corners = Vec::with_capacity(common.corners.len() + 1);
+            for (p, q) in common.edges() {
+                let (side_p, side_q) = (side(p), side(q));
+                if side_p >= 0.0 {
                     corners.push(p);
                 }
-                if (at_p > 0.0 && at_q < 0.0) || (at_p < 0.0 && at_q > 0.0) {
-                    corners.push(p.lerp(q, at_p / (at_p - at_q)));
+                if (side_p > 0.0 && side_q < 0.0) || (side_p < 0.0 && side_q > 0.0) {
+                    corners.push(p.lerp(q, side_p / (side_p - side_q)));
                 }
             }
-            rest = Polygon::new(corners)?;
+            common = Polygon::new(corners)?;
         }
-        (rest.width() > LEAST_WIDTH).then_some(rest)
+        (common.width() > LEAST_WIDTH).then_some(common)
     }
 
-    /// The distance of the two closest parallel lines it fits between: one of them lies along an edge.
+    /// Returns the distance between the two closest parallel lines that enclose the polygon. One of them lies
+    /// along an edge.
     fn width(&self) -> f64 {
         let across = |(a, b): (DVec2, DVec2)| {
             let along = (b - a).normalize_or_zero();
@@ -209,7 +216,7 @@ impl Polygon {
     }
 }
 
-/// The convex hull of points, counter-clockwise (Andrew 1979).
+/// Returns the convex hull of points, counter-clockwise (Andrew 1979).
 fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

@@ -1,5 +1,5 @@
-//! The whole frame on the CPU, on all cores: the reference of the GPU engine, and the engine where
-//! there is no GPU.
+//! The CPU engine: renders the whole frame on all cores. It is the reference for the GPU engine, and the
+//! engine of machines without a GPU.
 
 pub mod gbuffer;
 pub mod integrate;
@@ -25,7 +25,10 @@ use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
-/// Renders a scene. With `surface` the raster pass's layers are kept.
+/// Renders a scene. With `surface` the frame also holds depth, texture coordinates, quads and normals.
+///
+/// # Errors
+/// Errors of [`render_samples`].
 pub fn render(
     scene: &Scene,
     volume: &VolumeTexture,
@@ -34,16 +37,22 @@ pub fn render(
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let window = Window::whole([scene.image.width, scene.image.height]);
-    let kept = &mut LightVolumeCache::default();
-    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, kept, monitor)
+    let light_volumes = &mut LightVolumeCache::default();
+    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, light_volumes, monitor)
 }
 
-/// Pixels rendered at once: 28 bytes each and 16 for every layer of quads, besides the frame.
+/// Pixels rendered at once. Each takes 28 bytes, and 16 for every layer of quads, besides the frame.
 const BAND_PIXELS: u64 = 1 << 21;
 
-/// Renders a part of the image with only some of a scene's samples; the radiance is their mean. The pixels
-/// have the same bits whatever the part is. Light volumes are left in `kept` for later frames.
-#[expect(clippy::too_many_arguments, reason = "what is drawn, which part of it, and what watches")]
+/// Renders a part of the image with some of the scene's samples; the radiance is their mean. A pixel has the
+/// same bits in every window. Light volumes stay in `light_volumes` for later frames.
+///
+/// # Errors
+/// Errors of `monitor`, which may stop the work. With cached visibility, [`Error::Memory`] if the light
+/// volumes do not fit into the scene's budget for them.
+///
+/// [`Error::Memory`]: crate::util::error::Error::Memory
+#[expect(clippy::too_many_arguments, reason = "the inputs, the part, the cache and the monitor")]
 pub fn render_samples(
     scene: &Scene,
     volume: &VolumeTexture,
@@ -51,7 +60,7 @@ pub fn render_samples(
     window: Window,
     samples: Range<u32>,
     surface: bool,
-    kept: &mut LightVolumeCache,
+    light_volumes: &mut LightVolumeCache,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;
@@ -59,7 +68,7 @@ pub fn render_samples(
     let mut frame = Frame::new(window.width, window.height, surface);
     let mut seconds = Seconds::default();
     let clock = Instant::now();
-    let integrator = integrate::Integrator::prepared(scene, volume, kept, monitor)?;
+    let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;
     seconds.visibility = clock.elapsed().as_secs_f64();
     let total = window.pixels() * samples.len() as u64;
     let done = AtomicU64::new(0);
@@ -96,10 +105,10 @@ pub fn render_samples(
                 .try_for_each(|((radiance, counts), y)| {
                     for x in 0..width {
                         let pixel = [band.x + x as u32, y];
-                        let traced = integrator.pixel(&gbuffer, pixel, sample, &mut ());
-                        let new = traced.radiance.extend(traced.transmittance).to_array();
+                        let result = integrator.pixel(&gbuffer, pixel, sample, &mut ());
+                        let new = result.radiance.extend(result.transmittance).to_array();
                         radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
-                        counts[x] = [0, 1].map(|c| counts[x][c] + traced.cells[c]);
+                        counts[x] = [0, 1].map(|c| counts[x][c] + result.cells[c]);
                     }
                     let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
                     monitor.progress("pixels", pixels, total)

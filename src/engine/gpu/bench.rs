@@ -1,23 +1,29 @@
 //! Single passes on a prepared frame, for `taki bench`.
 
+use std::rc::Rc;
+
+use super::gbuffer::Redraw;
 use super::groups::GroupList;
 use super::integrate::{Integrate, Sums, Tiler, Variant};
-use super::layout::{self, Tile};
-use super::targets::Targets;
-use super::visibility::{FilledVolumes, VisibilityPass};
-use super::{BoundReflection, GpuRenderer, Inputs, Redraw, Reflections, Resident, Uploaded, readback};
-use crate::engine::overlap;
-use crate::light::visibility::LightVolumes;
+use super::layout::{FrameUniforms, Tile};
+use super::prepared::PreparedScene;
+use super::reflection::Reflections;
+use super::renderer::GpuRenderer;
+use super::targets::{TargetShape, Targets};
+use super::upload::Resident;
+use super::visibility::{FilledVolumes, VisibilityInputs, VisibilityPass};
+use super::{Gpu, Inputs, readback};
 use crate::place::Mesh;
 use crate::scene::Scene;
+use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::window::Window;
 use crate::volume::{Leaps, VolumeTexture};
 
-/// Volumes of more than that are not measured in more than one form: 320³.
+/// Largest volume in bytes that is measured in more than one form: 320³ cells.
 const LARGE_BYTES: u64 = 8 * 320 * 320 * 320;
 
-/// A renderer with scenes on its device that differ in their light alone.
+/// A renderer with scenes on its device that differ only in their light.
 pub struct GpuBench {
     renderer: GpuRenderer,
     prepared: Option<Prepared>,
@@ -31,31 +37,36 @@ struct Prepared {
     passes: Vec<(&'static str, Pass)>,
 }
 
-/// What can be measured, and what it works on.
+/// A pass to measure, with its inputs.
 struct Pass {
     work: Work,
-    up: Uploaded,
-    frame: layout::FrameUniforms,
+    scene: Rc<PreparedScene>,
+    frame: FrameUniforms,
     filled: FilledVolumes,
-    reflection: BoundReflection,
 }
 
 enum Work {
     Gbuffer,
-    /// Light volumes, walked anew.
-    Visibility(LightVolumes, crate::trace::Lookup),
-    /// The walk, with the cells that it once took.
+    /// Fills the scene's light volumes anew.
+    Visibility(Lookup),
+    /// Runs an integrate pass; the number of cells it walks, once known.
     Integrate(Box<Integrate>, Tiler, Option<u64>),
 }
 
 impl GpuBench {
-    /// From an open renderer.
+    /// Wraps an open renderer.
     pub fn new(renderer: GpuRenderer) -> Self {
         GpuBench { renderer, prepared: None }
     }
 
-    /// Uploads scenes with the names of their integrate passes, and compiles these. The raster pass and the walks
-    /// without light (`shaders/bare.wgsl`), cell by cell and leaping, are the first scene's.
+    /// Uploads scenes, each with the name of its integrate pass, and compiles these passes. The first scene also gets
+    /// the raster pass and the walks without light (`shaders/engine/bare.wgsl`), cell by cell and leaping.
+    ///
+    /// # Errors
+    /// Errors of uploading the scenes and filling their light volumes, as in [`GpuRenderer::render`].
+    ///
+    /// # Panics
+    /// If `scenes` is empty.
     pub fn prepare(
         &mut self,
         scenes: &[(&'static str, &Scene)],
@@ -65,65 +76,57 @@ impl GpuBench {
         let GpuRenderer { gpu, timer, .. } = &self.renderer;
         let first = scenes[0].1;
         let window = Window::whole([first.image.width, first.image.height]);
-        let layers = overlap::sheets(first);
-        let mut resident = Resident::default();
-        let mut passes = Vec::new();
+        let (mut resident, mut reflections) = (Resident::default(), Reflections::default());
+        let mut passes: Vec<(&'static str, Pass)> = Vec::new();
+        let mut layers = 1;
+        let mut light_volumes_measured = false;
         for (number, &(name, scene)) in scenes.iter().enumerate() {
-            let frame = layout::FrameUniforms::new(scene, volume, window, &(0..1), 0, layers);
-            let mut up = || Uploaded::new(gpu, &mut resident, scene, volume, mesh);
-            let light_volumes = match scene.visibility {
-                crate::light::Visibility::Cached => {
-                    Some(scene.light_volumes(volume.size, volume.alpha, scene.light_cache)?)
-                }
-                _ => None,
-            };
-            let variant =
-                Variant::of(scene, layers, light_volumes.as_ref(), [up()?.levels.leaps, volume.is_sparse()]);
-            let integrate = |pass| {
-                Work::Integrate(Box::new(pass), Tiler::new(None, None, scene.volume_lights().len()), None)
-            };
+            let prepared =
+                Rc::new(PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volume, mesh)?);
+            layers = prepared.layers;
+            let frame = FrameUniforms::new(scene, volume, window, &(0..1), 0, layers);
+            let lights = scene.volume_lights().len();
+            let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, lights), None);
             let mut visibility = VisibilityPass::new(gpu);
-            let (mut work, mut bare) = (Vec::new(), Vec::new());
+            let none = visibility.none();
+            let mut filled = none.clone();
+            let lookup = scene.trace.lookup;
+            if let Some(plan) = &prepared.light_volumes {
+                let inputs = VisibilityInputs { gpu, timer, up: &prepared.up, frame: &frame, plan, lookup };
+                filled = visibility.get(&inputs, |_, _| Ok(()))?.0;
+            }
+            let mut add = |name, work, scene: &Rc<PreparedScene>, filled: &FilledVolumes| {
+                let (scene, filled) = (scene.clone(), filled.clone());
+                passes.push((name, Pass { work, scene, frame, filled }));
+            };
             if number == 0 {
-                work.push(("gbuffer", Work::Gbuffer));
-                // A large volume is on the device once.
+                add("gbuffer", Work::Gbuffer, &prepared, &filled);
+                // A large volume is on the device only once.
                 let is_large = volume.cells.bytes() > LARGE_BYTES || volume.is_sparse();
                 let walks = [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)];
                 for (name, leaps) in walks.into_iter().take(if is_large { 1 } else { 2 }) {
-                    let mut own = Resident::default();
-                    own.levels.leaps = leaps;
-                    let up = match is_large {
-                        true => up()?,
-                        false => Uploaded::new(gpu, &mut own, scene, volume, mesh)?,
+                    let scene_of_walk = if is_large {
+                        prepared.clone()
+                    } else {
+                        let mut own = Resident::default();
+                        own.levels.leaps = leaps;
+                        Rc::new(PreparedScene::new(gpu, &mut own, &mut reflections, scene, volume, mesh)?)
                     };
-                    let variant =
-                        Variant::of(scene, layers, None, [leaps == Leaps::Always, volume.is_sparse()]);
-                    let work = integrate(Integrate::bare(gpu, variant));
-                    let (filled, reflection) =
-                        (visibility.none(), Reflections::default().bind(gpu, scene, volume));
-                    bare.push((name, Pass { work, up, frame, filled, reflection }));
+                    let storage = [leaps == Leaps::Always, volume.is_sparse()];
+                    let variant = Variant::of(scene, layers, None, storage);
+                    add(name, integrate(Integrate::bare(gpu, variant)), &scene_of_walk, &none);
                 }
             }
-            let mut filled = visibility.none();
-            if let Some(light_volumes) = light_volumes {
-                let up = up()?;
-                let volumes = light_volumes.clone();
-                filled =
-                    visibility.get(gpu, timer, &up, &frame, volumes, scene.trace.lookup, |_, _| Ok(()))?.0;
-                if !passes.iter().any(|(name, _)| *name == "light volumes") {
-                    work.push(("light volumes", Work::Visibility(light_volumes, scene.trace.lookup)));
-                }
+            if prepared.light_volumes.is_some() && !light_volumes_measured {
+                light_volumes_measured = true;
+                add("light volumes", Work::Visibility(lookup), &prepared, &filled);
             }
-            work.push((name, integrate(Integrate::new(gpu, variant))));
-            for (name, work) in work {
-                let reflection = Reflections::default().bind(gpu, scene, volume);
-                let filled = filled.clone();
-                passes.push((name, Pass { work, up: up()?, frame, filled, reflection }));
-                passes.append(&mut bare);
-            }
+            add(name, integrate(Integrate::new(gpu, prepared.variant)), &prepared, &filled);
         }
+        let shape =
+            TargetShape { size: [window.width, window.height], layers, pools: !first.pools.is_empty() };
         self.prepared = Some(Prepared {
-            targets: Targets::new(gpu, window.width, window.height, layers, !first.pools.is_empty()),
+            targets: Targets::new(gpu, shape),
             sums: Sums::new(gpu, window.pixels()),
             groups: GroupList::new(gpu, first, window, Tile::whole(window)),
             window,
@@ -132,28 +135,43 @@ impl GpuBench {
         self.run(0).map(drop)
     }
 
-    /// The passes' names, in their order.
+    /// Returns the names of the passes, in the order of [`GpuBench::run`]'s indices.
     pub fn names(&self) -> Vec<&'static str> {
         self.prepared.iter().flat_map(|p| &p.passes).map(|(name, _)| *name).collect()
     }
 
-    /// Runs one pass by its place in [`GpuBench::names`]: seconds on the device, and the cells it walked.
+    /// Runs the pass at an index of [`GpuBench::names`]. Returns its seconds on the device and the cells it walked.
+    ///
+    /// # Errors
+    /// Errors of the device: see [`Gpu::run`].
     ///
     /// # Panics
-    /// Before [`GpuBench::prepare`].
+    /// If [`GpuBench::prepare`] has not been called.
     pub fn run(&mut self, number: usize) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
-        let Pass { work, up, frame, filled, reflection } = &mut p.passes[number].1;
-        let (window, area) = (p.window, Tile::whole(p.window));
-        let (targets, groups) = (&p.targets, &p.groups);
-        let inputs = Inputs { gpu, timer, up, targets, window, area, frame, groups, filled, reflection };
+        let Pass { work, scene, frame, filled } = &mut p.passes[number].1;
+        let window = p.window;
+        let inputs = Inputs {
+            gpu,
+            timer,
+            up: &scene.up,
+            targets: &p.targets,
+            window,
+            area: Tile::whole(window),
+            frame,
+            groups: &p.groups,
+            filled,
+            reflection: &scene.reflection,
+        };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, Redraw::All, || Ok(()))?, 0)),
-            Work::Visibility(volumes, lookup) => {
+            Work::Visibility(lookup) => {
                 let mut pass = VisibilityPass::new(gpu);
-                let found = pass.get(gpu, timer, up, frame, volumes.clone(), *lookup, |_, _| Ok(()))?;
-                Ok((found.1, 0))
+                let (up, lookup) = (&scene.up, *lookup);
+                let plan = scene.light_volumes.as_ref().expect("the pass was made for light volumes");
+                let inputs = VisibilityInputs { gpu, timer, up, frame, plan, lookup };
+                Ok((pass.get(&inputs, |_, _| Ok(()))?.1, 0))
             }
             Work::Integrate(integrate, tiler, cells) => {
                 let seconds = integrate.run(&inputs, &p.sums, tiler, |_| Ok(()))?;
@@ -167,7 +185,8 @@ impl GpuBench {
     }
 }
 
-fn cells_walked(gpu: &super::Gpu, sums: &Sums, window: Window) -> Result<u64> {
+/// Sums the cells of view rays and light rays over a window.
+fn cells_walked(gpu: &Gpu, sums: &Sums, window: Window) -> Result<u64> {
     let mut sum = 0;
     readback::read_rows(gpu, &sums.counts, 8, window.width, Tile::whole(window), |_, bytes| {
         let counts = bytes.chunks_exact(4).map(|c| bytemuck::pod_read_unaligned::<u32>(c) as u64);

@@ -1,5 +1,5 @@
-//! Results of the raster pass, kept for later frames: while only the water moves, or a parameter of the walk,
-//! rock and quads stay where they are.
+//! Results of the raster pass that later frames reuse: rock and quads stay the same while only the water moves or a
+//! parameter of the walk changes.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -7,42 +7,42 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::device::Gpu;
 use super::layout::FrameUniforms;
-use super::targets::Targets;
+use super::targets::{TargetShape, Targets};
 use crate::picture::target_bytes;
 
-/// Keys of passes that are remembered: what was drawn twice is kept the second time.
+/// Number of keys that are remembered. A pass is kept only when its key comes up a second time.
 const REMEMBERED: usize = 1024;
 
-/// Kept targets.
+/// The kept targets, by the key of their pass.
 #[derive(Default)]
 pub struct Rasters {
-    kept: Vec<Kept>,
-    /// The latest last.
+    kept: Vec<KeptRaster>,
+    /// Keys of passes that were not kept, the latest first.
     seen: VecDeque<Key>,
-    /// Counts frames.
+    /// Number of the current frame.
     turn: u64,
 }
 
-/// All that the raster pass of one sample of one window depends on but the pools' waves, as two hashes of 64 bits.
+/// Everything the raster pass of one sample of one window depends on, except the pools' waves, as two 64-bit hashes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key([u64; 2]);
 
-/// Targets, and whether they hold what their key says.
-pub struct Kept {
+/// Targets, and whether they hold the pass that their key describes.
+pub struct KeptRaster {
     key: Key,
     /// The targets.
     pub targets: Targets,
-    /// Set once the pass has filled them: hash of the pools' waves.
+    /// Hash of the pools' waves that are drawn; `None` until the pass has filled the targets.
     pub waves: Cell<Option<[u64; 2]>>,
     bytes: u64,
-    /// The last frame that used them.
+    /// Number of the last frame that used them.
     used: u64,
 }
 
 impl Key {
-    /// Of a pass with these uniforms over geometry and lights that have this `geometry` hash.
+    /// Returns the key of a pass with the uniforms `frame`; `geometry` is the hash of geometry and lights.
     pub fn new(frame: &FrameUniforms, geometry: &[u64; 2]) -> Key {
-        // What the pass does not read; shaders/gbuffer.wgsl.
+        // shaders/engine/gbuffer.wgsl does not read these fields.
         let frame = FrameUniforms {
             sample_index: 0,
             samples: 0,
@@ -61,7 +61,7 @@ impl Key {
     }
 }
 
-/// Two hashes that start differently.
+/// Returns two hashes of a value with different seeds.
 pub fn hash_twice(value: &impl Hash) -> [u64; 2] {
     [0u8, 1].map(|start| {
         let mut hasher = DefaultHasher::new();
@@ -72,22 +72,15 @@ pub fn hash_twice(value: &impl Hash) -> [u64; 2] {
 }
 
 impl Rasters {
-    /// A new frame begins.
+    /// Begins a new frame.
     pub fn begin(&mut self) {
         self.turn += 1;
     }
 
-    /// The place for a pass of `size` pixels and `layers` layers: kept targets, filled or to be filled; none if the pass is new, or
-    /// there is no room in `most` bytes. Targets that neither this frame nor the last has used make room.
-    pub fn place(
-        &mut self,
-        gpu: &Gpu,
-        key: Key,
-        size: [u32; 2],
-        layers: u32,
-        pools: bool,
-        most: u64,
-    ) -> Option<&Kept> {
+    /// Returns the kept targets of a pass, filled or still to be filled. Returns `None` if the pass is new, or if its
+    /// targets do not fit into `most` bytes. Targets that neither this frame nor the last one has used are dropped
+    /// to make room.
+    pub fn get(&mut self, gpu: &Gpu, key: Key, shape: TargetShape, most: u64) -> Option<&KeptRaster> {
         if let Some(i) = self.kept.iter().position(|kept| kept.key == key) {
             self.kept[i].used = self.turn;
             return Some(&self.kept[i]);
@@ -97,8 +90,8 @@ impl Rasters {
             self.seen.push_front(key);
             return None;
         }
-        let bytes = u64::from(size[0]) * u64::from(size[1]) * target_bytes(layers);
-        let total = |kept: &[Kept]| kept.iter().map(|k| k.bytes).sum::<u64>();
+        let bytes = u64::from(shape.size[0]) * u64::from(shape.size[1]) * target_bytes(shape.layers);
+        let total = |kept: &[KeptRaster]| kept.iter().map(|k| k.bytes).sum::<u64>();
         if total(&self.kept) + bytes > most {
             let turn = self.turn;
             self.kept.retain(|kept| kept.used + 1 >= turn);
@@ -106,8 +99,8 @@ impl Rasters {
         if total(&self.kept) + bytes > most {
             return None;
         }
-        let targets = Targets::new(gpu, size[0], size[1], layers, pools);
-        self.kept.push(Kept { key, targets, waves: Cell::new(None), bytes, used: self.turn });
+        let targets = Targets::new(gpu, shape);
+        self.kept.push(KeptRaster { key, targets, waves: Cell::new(None), bytes, used: self.turn });
         self.kept.last()
     }
 }

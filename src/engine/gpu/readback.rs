@@ -1,14 +1,17 @@
-//! From the device to the host.
+//! Copies from the device to the host.
 
 use super::device::Gpu;
 use super::layout::Tile;
+use super::targets::Targets;
+use crate::picture::Surface;
+use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 
-/// Maps a finished `MAP_READ` buffer and hands its bytes to `read`.
+/// Maps a `MAP_READ` buffer and hands its bytes to `read`. The copies into it must have been submitted.
 pub fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, read: impl FnOnce(&[u8]) -> T) -> Result<T> {
     let (send, receive) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-        // The receiver is gone only if waiting failed, and that is reported.
+        // The receiver is dropped only if waiting failed, and that error is returned.
         let _ = send.send(result);
     });
     gpu.run(gpu.encoder("map"))?;
@@ -23,11 +26,11 @@ pub fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, read: impl FnOnce(&[u8]) -> T) -
     Ok(result)
 }
 
-/// Bytes brought back at once: the staging buffer of a whole window would be a good part of its targets.
+/// Bytes copied at once: a staging buffer for a whole window would be large compared with the window's targets.
 const STAGING_BYTES: u64 = 16 << 20;
 
-/// Hands the rows of `area` in a storage buffer, which has `width` items of `item` bytes a row, to `read`
-/// with their numbers in the area.
+/// Reads the rows of `area` from a storage buffer whose rows have `width` items of `item` bytes. Calls `read` with each
+/// row's number in the area and its bytes.
 pub fn read_rows(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
@@ -57,7 +60,7 @@ pub fn read_rows(
     Ok(())
 }
 
-/// Reads an area of a 2-D texture, tightly packed: copies pad every row to 256 bytes.
+/// Reads an area of a 2-D texture. The result is tightly packed; the padding of rows to 256 bytes is removed.
 pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, area: Tile) -> Result<Vec<u8>> {
     let texel = texture.format().block_copy_size(None).unwrap_or(4);
     let row = area.width * texel;
@@ -88,4 +91,43 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, area: Tile) -> Result<Ve
         let rows = bytes.chunks(padded as usize).map(|line| &line[..row as usize]);
         rows.collect::<Vec<_>>().concat()
     })
+}
+
+/// Pixels of the raster pass's targets copied at once: 52 bytes each, in the staging buffers and unpacked.
+const SURFACE_PIXELS: u32 = 1 << 17;
+
+/// Copies the targets of `area` into `surface`, whose rows have `width` pixels. The area's first pixel goes to index
+/// `first`.
+pub fn read_surface(
+    gpu: &Gpu,
+    scene: &Scene,
+    targets: &Targets,
+    area: Tile,
+    surface: &mut Surface,
+    first: usize,
+    width: usize,
+) -> Result<()> {
+    let rows = (SURFACE_PIXELS / area.width).max(1);
+    for y in (0..area.height).step_by(rows as usize) {
+        let band = Tile { y: area.y + y, height: rows.min(area.height - y), ..area };
+        let read = |texture| read_texture(gpu, texture, band);
+        let (opaque, normal, hit) = (read(&targets.opaque)?, read(&targets.normal)?, read(&targets.surface)?);
+        let quads = read(&targets.quad_id)?;
+        let floats = |bytes: &[u8], i: usize| -> [f32; 4] {
+            bytemuck::pod_read_unaligned(&bytes[16 * i..16 * i + 16])
+        };
+        for i in 0..band.width as usize * band.height as usize {
+            let quad: u32 = bytemuck::pod_read_unaligned(&quads[4 * i..4 * i + 4]);
+            let behind = (floats(&opaque, i)[3], glam::Vec3::from_slice(&floats(&normal, i)));
+            let (row, column) = (y as usize + i / band.width as usize, i % band.width as usize);
+            surface.set(
+                first + row * width + column,
+                (&scene.quads, scene.camera.eye),
+                quad,
+                floats(&hit, i),
+                behind,
+            );
+        }
+    }
+    Ok(())
 }

@@ -1,4 +1,4 @@
-//! The picture from the linear sums.
+//! The resolve pass: develops the picture from the linear sums.
 
 use super::device::Gpu;
 use super::integrate::Sums;
@@ -9,7 +9,22 @@ use super::{compute_pipeline, shader};
 use crate::picture::Develop;
 use crate::util::error::Result;
 
-/// The pass.
+/// Inputs of the resolve pass.
+#[derive(Clone, Copy)]
+pub struct ResolveInputs<'a> {
+    /// Sums of all samples.
+    pub sums: &'a Sums,
+    /// The developed picture: one word per pixel of the window.
+    pub picture: &'a wgpu::Buffer,
+    /// The part of the window that is developed, pixels.
+    pub area: Tile,
+    /// Uniforms of the window; those of any sample will do.
+    pub frame: &'a FrameUniforms,
+    /// Exposure, tone curve and white balance.
+    pub develop: &'a Develop,
+}
+
+/// The resolve pass.
 pub struct Resolve {
     pipeline: wgpu::ComputePipeline,
 }
@@ -22,18 +37,12 @@ impl Resolve {
         Resolve { pipeline }
     }
 
-    /// Turns the sums of an area of a window into `picture`; seconds on the device.
-    #[expect(clippy::too_many_arguments, reason = "where from, where to, and how")]
-    pub fn run(
-        &self,
-        gpu: &Gpu,
-        timer: &Timer,
-        sums: &Sums,
-        picture: &wgpu::Buffer,
-        area: Tile,
-        frame: &FrameUniforms,
-        develop: &Develop,
-    ) -> Result<f64> {
+    /// Develops the sums of a window's area into `inputs.picture`. Returns the seconds on the device.
+    ///
+    /// # Errors
+    /// Errors of the device: see [`Gpu::run`].
+    pub fn run(&self, gpu: &Gpu, timer: &Timer, inputs: &ResolveInputs) -> Result<f64> {
+        let ResolveInputs { sums, picture, area, frame, develop } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let develop = gpu.buffer_with("develop", bytemuck::bytes_of(develop), wgpu::BufferUsages::UNIFORM);
         let tile = gpu.buffer_with("tile", bytemuck::bytes_of(&area), wgpu::BufferUsages::UNIFORM);

@@ -1,30 +1,44 @@
-//! §3 What the raster pass writes.
+//! §3 The render targets of the raster pass.
 
 use super::device::Gpu;
 
-/// Of the z-buffers.
+/// Format of the z-buffers.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Of radiance, normals and points.
+/// Format of radiance, normals and surface points.
 pub const FLOATS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Shape of a window's targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TargetShape {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Layers of volume quads per pixel.
+    pub layers: u32,
+    /// Whether the scene has pools, which may be redrawn alone.
+    pub pools: bool,
+}
 
 /// The targets of one window.
 pub struct Targets {
-    /// Radiance of the opaque scene or the background; metres from the eye (0: background).
+    /// Linear radiance of the opaque scene or the background, and metres from the eye (0: background).
     pub opaque: wgpu::Texture,
-    /// Normal of the opaque scene (0: background).
+    /// Unit normal of the opaque scene (0: background).
     pub normal: wgpu::Texture,
-    /// u, v and metres from the eye of the nearest volume quad; before it is drawn, where on the mesh the rock is that is seen.
+    /// u, v and metres from the eye of the nearest volume quad. Until the quads are drawn it holds the visible rock's
+    /// position on the mesh.
     pub surface: wgpu::Texture,
-    /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no more.
+    /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no further quad.
     pub quad_id: wgpu::Texture,
-    /// The z-buffer, and last that of the opaque scene, where layers behind the nearest or other waves may be
-    /// drawn; with several layers the first and the second hold that of the even and of the odd ones in turn.
+    /// The z-buffers. One layer and no pools need one. Otherwise the last is a copy of the opaque scene's z-buffer,
+    /// from which further layers or other waves are drawn. With several layers, the first two hold the depth of the
+    /// even and the odd layers in turn.
     pub(super) depth: Vec<wgpu::Texture>,
 }
 
 impl Targets {
-    /// Targets for a window of `width` × `height` pixels under which `layers` quads may lie, and perhaps pools.
-    pub fn new(gpu: &Gpu, width: u32, height: u32, layers: u32, pools: bool) -> Self {
+    /// Allocates the targets of a window.
+    pub fn new(gpu: &Gpu, shape: TargetShape) -> Self {
+        let TargetShape { size: [width, height], layers, pools } = shape;
         let texture = |label, format, usage, layers| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -52,7 +66,7 @@ impl Targets {
         }
     }
 
-    /// The quads' numbers in some of the layers.
+    /// Returns a view of the quads' numbers in a range of layers.
     pub fn ids(&self, layers: std::ops::Range<u32>) -> wgpu::TextureView {
         self.quad_id.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -62,7 +76,7 @@ impl Targets {
         })
     }
 
-    /// The quads' numbers in one layer.
+    /// Returns a view of the quads' numbers in one layer.
     pub fn layer(&self, layer: u32) -> wgpu::TextureView {
         self.quad_id.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2),

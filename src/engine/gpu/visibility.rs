@@ -1,8 +1,10 @@
-//! §5 Light volumes: the compute pass that fills them, and what is kept of them. CPU twin:
-//! `src/cpu/visibility.rs`; why and in which units: `src/visibility.rs`.
+//! §5 Light volumes on the GPU: the compute pass that fills them, and the cache that keeps them from frame to frame.
+//! CPU twin: `src/engine/cpu/visibility.rs`. Reasons and units: `src/light/visibility.rs`.
+
+mod atlas;
+mod host;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::compute_pipeline;
 use super::device::Gpu;
@@ -10,61 +12,73 @@ use super::layout::{FrameUniforms, LightVolume};
 use super::shader::resolve;
 use super::specialise::Source;
 use super::timing::Timer;
-use super::upload::{SLAB_BYTES, Uploaded};
-use crate::light::fill::{Numbers, Rows};
+use super::upload::Uploaded;
 use crate::light::visibility::{CELLS_A_WORD, Form, LightVolumes};
 use crate::trace::Lookup;
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 use crate::volume::{LevelAtlas, Levels};
+use atlas::{LightVolumeAtlas, light_places, texture};
+use host::fill_on_host;
 
-/// The stage's shader.
+/// Returns the stage's shader with everything it imports.
 pub fn source() -> String {
     resolve("#import light::visibility")
 }
 
-/// Columns of the first submission, and most of any: its time is learned as for tiles.
+/// Columns of cells in the first submission. The size of later ones follows the measured time, as for tiles.
 const FIRST_COLUMNS: u32 = 1 << 12;
-/// One dimension of a dispatch: 65535 workgroups of 64.
+/// Largest number of columns in a submission: 65535 workgroups of 64 along one dimension of a dispatch.
 const MOST_COLUMNS: u32 = 65535 * 64;
-/// A submission aims at this many seconds, as tiles of the integrate pass.
+/// Target time of a submission in seconds, as for tiles of the integrate pass.
 const SECONDS: f64 = 0.03;
 
-/// Where light volumes are filled. They are the same but for the rounding of codes.
+/// Where light volumes are filled. The results differ only in the rounding of codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Filling {
-    /// On the device, but on the host where the device is the host: shaders cannot add up rows of cells side by side
-    /// ([`crate::light::fill`]).
+    /// On the device. On software Vulkan, on the host: the host sums rows of cells side by side
+    /// ([`crate::light::fill`]), which a shader cannot. Sparse volumes are always filled on the device.
     #[default]
     Auto,
-    /// By the pass.
+    /// On the device, by the compute pass.
     Device,
-    /// By the CPU engine.
+    /// On the host, by the CPU engine's code.
     Host,
 }
 
 /// The pass, and the light volumes of the last frame that had any.
 pub struct VisibilityPass {
-    /// Where they are filled.
+    /// Where light volumes are filled.
     pub filling: Filling,
-    pipelines: Vec<(Kind, wgpu::ComputePipeline)>,
-    occupied: Option<(Levels, bool, wgpu::Buffer, u32)>,
-    kept: Option<Kept>,
+    pipelines: Vec<(Variant, wgpu::ComputePipeline)>,
+    columns: Option<Columns>,
+    cache: Option<FilledCache>,
+    /// One texel and no places, for scenes without light volumes.
     none: FilledVolumes,
 }
 
-/// What the pipeline is specialised to.
+/// Constants that a pipeline is specialised to.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Kind {
+struct Variant {
     per_cell: bool,
     form: Form,
     pyramid: bool,
     leaps: bool,
     sparse: bool,
-    /// Of empty cells too.
+    /// Whether empty cells are filled too: trilinear lookup reads them.
     everywhere: bool,
 }
 
-struct Kept {
+/// Columns of [`CELLS_A_WORD`] cells that are filled.
+struct Columns {
+    levels: Levels,
+    everywhere: bool,
+    /// Linear indices of the columns in the volume's texture, `array<u32>`.
+    buffer: wgpu::Buffer,
+    count: u32,
+}
+
+/// The last frame's light volumes, and the inputs they were filled from.
+struct FilledCache {
     levels: Levels,
     everywhere: bool,
     plan: LightVolumes,
@@ -74,100 +88,80 @@ struct Kept {
 /// Light volumes on the device, as the integrate pass reads them.
 #[derive(Clone)]
 pub struct FilledVolumes {
-    /// All light volumes, side by side in one `r32uint` texture: words of four codes, or the bits of optical depths.
+    /// All light volumes side by side in one `r32uint` texture: words of four codes, or the bits of optical depths.
     pub texture: wgpu::TextureView,
-    /// `array<vec4<i32>>`: of every quad and light where its numbers begin, patches along u and v, whether they are
-    /// cornered; then for every number where its light volume begins in the texture.
+    /// `array<vec4<i32>>`. First one entry per quad and light: index of its first light volume in this array, patches
+    /// along u and v, and whether light volumes stand at the patches' corners. Then one entry per light volume: its
+    /// origin in the texture.
     pub places: wgpu::Buffer,
 }
 
-/// Where the light volumes lie in their texture: as many as fit along x, then y, then z.
-struct LightVolumeAtlas {
-    size: [u32; 3],
-    along: [u32; 3],
-}
-
-impl LightVolumeAtlas {
-    fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
-        let most = gpu.device.limits().max_texture_dimension_3d;
-        // Along z first: the order of the volume's own slices.
-        let mut along = [1; 3];
-        let mut left = count;
-        for axis in [2, 1, 0] {
-            along[axis] = left.clamp(1, (most / size[axis]).max(1));
-            left = left.div_ceil(along[axis]);
-        }
-        if left > 1 {
-            let [nx, ny, nz] = size;
-            return Err(Error::input(
-                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too many for {}", gpu.name()),
-                "use light.visibility=march, or --engine cpu",
-            ));
-        }
-        Ok(LightVolumeAtlas { size, along })
-    }
-
-    fn extent(&self) -> [u32; 3] {
-        [0, 1, 2].map(|axis| self.size[axis] * self.along[axis])
-    }
-
-    fn place(&self, number: u32) -> [i32; 3] {
-        let [kx, _, kz] = self.along;
-        let steps = [number / kz % kx, number / kz / kx, number % kz];
-        [0, 1, 2].map(|axis| (steps[axis] * self.size[axis]) as i32)
-    }
+/// Inputs of the visibility pass.
+#[derive(Clone, Copy)]
+pub struct VisibilityInputs<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// Times the submissions.
+    pub timer: &'a Timer,
+    /// The scene on the device.
+    pub up: &'a Uploaded,
+    /// Uniforms of the frame, with the plan's limit of cells per walk.
+    pub frame: &'a FrameUniforms,
+    /// The light volumes to fill.
+    pub plan: &'a LightVolumes,
+    /// How the view rays look up cells.
+    pub lookup: Lookup,
 }
 
 impl VisibilityPass {
-    /// Nothing is compiled before it is needed.
+    /// Creates the pass. Pipelines are compiled when they are first needed.
     pub fn new(gpu: &Gpu) -> Self {
         let none = FilledVolumes {
             texture: texture(gpu, [1; 3]),
             places: gpu.buffer_with("light places", &[], wgpu::BufferUsages::STORAGE),
         };
-        VisibilityPass { filling: Filling::Auto, pipelines: Vec::new(), occupied: None, kept: None, none }
+        VisibilityPass { filling: Filling::Auto, pipelines: Vec::new(), columns: None, cache: None, none }
     }
 
-    /// What the integrate pass binds where no light volumes are asked for.
+    /// Returns what the integrate pass binds for a scene without light volumes.
     pub fn none(&self) -> FilledVolumes {
         self.none.clone()
     }
 
-    /// Lets go of what the last frame had.
+    /// Drops the light volumes of the last frame.
     pub fn forget(&mut self) {
-        self.kept = None;
+        self.cache = None;
     }
 
-    /// The light volumes that are planned, walked unless they are those of the last call; and the device's seconds
-    /// for it. `between` is called with the columns of cells done and all there are, and may stop the work.
-    #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
+    /// Returns the planned light volumes, and the seconds it took to fill them: 0 if they are those of the last call.
+    /// The time is that of the device, or of the host where it fills them. Calls `between` after each submission or
+    /// light volume with the work done so far and in total; its error stops the work.
+    ///
+    /// # Errors
+    /// Errors of `between` and of the device (see [`Gpu::run`]); [`Error::Input`] if the device's largest texture cannot
+    /// hold the light volumes.
+    ///
+    /// [`Error::Input`]: crate::util::error::Error::Input
     pub fn get(
         &mut self,
-        gpu: &Gpu,
-        timer: &Timer,
-        up: &Uploaded,
-        frame: &FrameUniforms,
-        plan: LightVolumes,
-        lookup: Lookup,
+        inputs: &VisibilityInputs,
         between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<(FilledVolumes, f64)> {
+        let VisibilityInputs { gpu, up, plan, lookup, .. } = *inputs;
         let everywhere = lookup == Lookup::Trilinear;
-        if let Some(kept) = &self.kept
-            && Arc::ptr_eq(&kept.levels, &up.levels)
-            && kept.everywhere == everywhere
-            && kept.plan == plan
+        if let Some(cache) = &self.cache
+            && Arc::ptr_eq(&cache.levels, &up.levels)
+            && cache.everywhere == everywhere
+            && cache.plan == *plan
         {
-            return Ok((kept.filled.clone(), 0.0));
+            return Ok((cache.filled.clone(), 0.0));
         }
-        // The old ones go first: both might not fit.
-        self.kept = None;
-        let shelf = LightVolumeAtlas::new(
-            gpu,
-            plan.words(LevelAtlas::new(&up.levels).extent()),
-            plan.volumes.len() as u32,
-        )?;
+        // The old ones are dropped first, because both might not fit.
+        self.cache = None;
+        let size = plan.words(LevelAtlas::new(&up.levels).extent());
+        let atlas = LightVolumeAtlas::new(gpu, size, plan.volumes.len() as u32)?;
         let filled =
-            FilledVolumes { texture: texture(gpu, shelf.extent()), places: places(gpu, &plan, &shelf) };
+            FilledVolumes { texture: texture(gpu, atlas.extent()), places: light_places(gpu, plan, &atlas) };
         gpu.check()?;
         let on_host = match self.filling {
             Filling::Auto => gpu.is_software() && !up.levels[0].is_sparse(),
@@ -175,33 +169,29 @@ impl VisibilityPass {
             Filling::Host => true,
         };
         let seconds = if on_host {
-            fill_on_host(gpu, &up.levels, &plan, lookup, &shelf, &filled, between)?
+            fill_on_host(inputs, &atlas, &filled, between)?
         } else {
-            self.fill(gpu, timer, up, frame, &plan, everywhere, &shelf, &filled, between)?
+            self.fill(inputs, &atlas, &filled, between)?
         };
-        let kept = Kept { levels: up.levels.clone(), everywhere, plan, filled: filled.clone() };
-        self.kept = Some(kept);
+        let (levels, plan) = (up.levels.clone(), plan.clone());
+        self.cache = Some(FilledCache { levels, everywhere, plan, filled: filled.clone() });
         Ok((filled, seconds))
     }
 
-    /// Runs the pass; the device's seconds.
-    #[expect(clippy::too_many_arguments, reason = "the device, its clock, and what the light volumes are of")]
+    /// Fills the light volumes on the device. Returns the device's seconds.
     fn fill(
         &mut self,
-        gpu: &Gpu,
-        timer: &Timer,
-        up: &Uploaded,
-        frame: &FrameUniforms,
-        plan: &LightVolumes,
-        everywhere: bool,
-        shelf: &LightVolumeAtlas,
+        inputs: &VisibilityInputs,
+        atlas: &LightVolumeAtlas,
         filled: &FilledVolumes,
         mut between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<f64> {
-        let (occupied, count) = self.occupied(gpu, &up.levels, everywhere);
+        let VisibilityInputs { gpu, timer, up, frame, plan, lookup } = *inputs;
+        let everywhere = lookup == Lookup::Trilinear;
+        let (occupied, count) = self.columns(gpu, &up.levels, everywhere);
         let pipeline = self.pipeline(
             gpu,
-            Kind {
+            Variant {
                 per_cell: plan.medium.per_cell,
                 form: plan.form,
                 pyramid: up.levels.len() > 1,
@@ -224,7 +214,7 @@ impl VisibilityPass {
             entry(3, occupied.as_entire_binding()),
             entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
         ];
-        // The pipeline's layout has what is left in its shader.
+        // The pipeline's layout holds only the bindings that its specialised shader uses.
         if up.levels[0].is_sparse() {
             entries.push(entry(5, wgpu::BindingResource::TextureView(&up.bricks)));
         }
@@ -242,7 +232,7 @@ impl VisibilityPass {
                 let uniform = LightVolume {
                     direction: light_volume.direction.to_array(),
                     first_column,
-                    offset: shelf.place(number as u32),
+                    offset: atlas.origin(number as u32),
                     column_count,
                     bits: light_volume.bits,
                     pad: [0; 3],
@@ -268,20 +258,21 @@ impl VisibilityPass {
         Ok(seconds)
     }
 
-    /// Linear indices of the columns of cells with density, and their number.
-    fn occupied(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
-        if let Some((old, all, buffer, count)) = &self.occupied
-            && Arc::ptr_eq(old, levels)
-            && *all == everywhere
+    /// Returns the linear indices of the columns that are filled, and their number: columns with density, or all of
+    /// them if `everywhere`.
+    fn columns(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
+        if let Some(known) = &self.columns
+            && Arc::ptr_eq(&known.levels, levels)
+            && known.everywhere == everywhere
         {
-            return (buffer.clone(), *count);
+            return (known.buffer.clone(), known.count);
         }
-        let stack = LevelAtlas::new(levels);
-        let [width, height, _] = stack.extent();
+        let atlas = LevelAtlas::new(levels);
+        let [width, height, _] = atlas.extent();
         let mut indices: Vec<u32> = Vec::new();
         for (level, number) in levels.iter().zip(0..) {
             let [nx, ny, nz] = level.size;
-            let [_, y0, z0] = stack.place(number);
+            let [_, y0, z0] = atlas.place(number);
             let occupied = |x: u32, y: u32, z: u32| {
                 everywhere || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cell(x, y, z).rho_code() > 0)
             };
@@ -291,132 +282,28 @@ impl VisibilityPass {
                 indices.extend((0..ny).flat_map(row));
             }
         }
-        let buffer =
-            gpu.buffer_with("occupied columns", bytemuck::cast_slice(&indices), wgpu::BufferUsages::STORAGE);
-        self.occupied = Some((levels.clone(), everywhere, buffer.clone(), indices.len() as u32));
-        (buffer, indices.len() as u32)
+        let (bytes, count) = (bytemuck::cast_slice(&indices), indices.len() as u32);
+        let buffer = gpu.buffer_with("occupied columns", bytes, wgpu::BufferUsages::STORAGE);
+        self.columns = Some(Columns { levels: levels.clone(), everywhere, buffer: buffer.clone(), count });
+        (buffer, count)
     }
 
-    fn pipeline(&mut self, gpu: &Gpu, kind: Kind) -> wgpu::ComputePipeline {
-        if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == kind) {
+    fn pipeline(&mut self, gpu: &Gpu, variant: Variant) -> wgpu::ComputePipeline {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|p| p.0 == variant) {
             return pipeline.clone();
         }
         let number = |on: bool| f64::from(u8::from(on));
         let constants = [
-            ("PER_CELL", number(kind.per_cell)),
-            ("CODES", number(kind.form == Form::Codes)),
-            ("PYRAMID", number(kind.pyramid)),
-            ("LEAPS", number(kind.leaps)),
-            ("SPARSE", number(kind.sparse)),
-            ("EVERYWHERE", number(kind.everywhere)),
+            ("PER_CELL", number(variant.per_cell)),
+            ("CODES", number(variant.form == Form::Codes)),
+            ("PYRAMID", number(variant.pyramid)),
+            ("LEAPS", number(variant.leaps)),
+            ("SPARSE", number(variant.sparse)),
+            ("EVERYWHERE", number(variant.everywhere)),
         ];
         let source = Source::read("visibility", &source());
         let pipeline = compute_pipeline(gpu, None, &source, "visibility", &constants);
-        self.pipelines.push((kind, pipeline.clone()));
+        self.pipelines.push((variant, pipeline.clone()));
         pipeline
     }
-}
-
-/// Fills them on the host and uploads them one by one; seconds.
-fn fill_on_host(
-    gpu: &Gpu,
-    levels: &Levels,
-    plan: &LightVolumes,
-    lookup: Lookup,
-    shelf: &LightVolumeAtlas,
-    filled: &FilledVolumes,
-    mut between: impl FnMut(u64, u64) -> Result<()>,
-) -> Result<f64> {
-    let clock = Instant::now();
-    let (rows, stack) = (Rows::new(levels, lookup), LevelAtlas::new(levels));
-    let texture = filled.texture.texture();
-    let mut staged = 0;
-    for (number, light_volume) in plan.volumes.iter().enumerate() {
-        between(number as u64, plan.volumes.len() as u64)?;
-        let [x, y, z] = shelf.place(number as u32).map(|c| c as u32);
-        let of_levels = rows.fill(light_volume, plan.medium, plan.form);
-        for ((level, numbers), at) in levels.iter().zip(of_levels).zip(0..) {
-            let [_, y_level, z_level] = stack.place(at);
-            let z_level = match plan.form {
-                Form::Codes => z_level / CELLS_A_WORD,
-                Form::Depths => z_level,
-            };
-            let words = words(level.size, &numbers);
-            upload_words(gpu, texture, [x, y + y_level, z + z_level], plan.words(level.size), &words);
-            staged += size_of_val(words.as_slice());
-        }
-        // The queue stages what it is given.
-        if staged > SLAB_BYTES {
-            gpu.run(gpu.encoder("upload light volumes"))?;
-            staged = 0;
-        }
-    }
-    gpu.run(gpu.encoder("upload light volumes"))?;
-    Ok(clock.elapsed().as_secs_f64())
-}
-
-/// As the shader reads them: codes of cells that follow one another along z are in one word.
-fn words([nx, ny, nz]: [u32; 3], numbers: &Numbers) -> Vec<u32> {
-    match numbers {
-        Numbers::Depths(depths) => depths.iter().map(|depth| depth.to_bits()).collect(),
-        Numbers::Codes(codes) => {
-            let slice = nx as usize * ny as usize;
-            let mut words = vec![0; slice * nz.div_ceil(CELLS_A_WORD) as usize];
-            for (z, codes) in codes.chunks(slice).enumerate() {
-                let (first, shift) = (z / CELLS_A_WORD as usize * slice, 8 * (z as u32 % CELLS_A_WORD));
-                for (word, &code) in words[first..].iter_mut().zip(codes) {
-                    *word |= u32::from(code) << shift;
-                }
-            }
-            words
-        }
-    }
-}
-
-fn upload_words(
-    gpu: &Gpu,
-    texture: &wgpu::Texture,
-    [x, y, z]: [u32; 3],
-    [nx, ny, nz]: [u32; 3],
-    words: &[u32],
-) {
-    gpu.queue.write_texture(
-        wgpu::TexelCopyTextureInfo {
-            texture,
-            mip_level: 0,
-            origin: wgpu::Origin3d { x, y, z },
-            aspect: wgpu::TextureAspect::All,
-        },
-        bytemuck::cast_slice(words),
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(nx * 4), rows_per_image: Some(ny) },
-        wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: nz },
-    );
-}
-
-fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("light volumes"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: depth },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D3,
-        format: wgpu::TextureFormat::R32Uint,
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    texture.create_view(&Default::default())
-}
-
-fn places(gpu: &Gpu, plan: &LightVolumes, shelf: &LightVolumeAtlas) -> wgpu::Buffer {
-    let before = plan.patches.len() as u32;
-    let patches = plan.patches.iter().map(|p| {
-        let [nu, nv] = p.count.map(|n| n as i32);
-        [(before + p.first) as i32, nu, nv, i32::from(p.cornered)]
-    });
-    let numbers = plan.numbers.iter().map(|&number| {
-        let [x, y, z] = shelf.place(number);
-        [x, y, z, 0]
-    });
-    let all: Vec<[i32; 4]> = patches.chain(numbers).collect();
-    gpu.buffer_with("light places", bytemuck::cast_slice(&all), wgpu::BufferUsages::STORAGE)
 }

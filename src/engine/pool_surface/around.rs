@@ -1,5 +1,5 @@
-//! What a pool mirrors besides the sky: rock and falling water, as seen from its middle, in cells of equal solid
-//! angle over the upper half of the sphere. Coarse, for waves blur it.
+//! The surroundings that a pool mirrors besides the sky: rock and falling water as seen from its centre, in
+//! cells of equal solid angle over the upper hemisphere. The map is coarse because waves blur it.
 
 use glam::Vec3;
 
@@ -8,16 +8,19 @@ use crate::mapping::Quad;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 
-/// Every so many vertices are looked at.
+/// Step between the mesh vertices that are sampled.
 const STRIDE: usize = 5;
-/// What is this much farther than the nearest in a cell is behind it.
+/// Distance relative to a cell's nearest vertex beyond which a vertex counts as hidden behind it.
 const BEHIND: f32 = 1.4;
-/// Points on a side of a quad.
+/// Points sampled along each side of a quad.
 const POINTS: u32 = 6;
-/// Share of the lights' radiance that white water sends back, and how much of a cell it covers at most.
-const WATER: (f32, f32) = (0.35, 0.75);
+/// Share of the lights' irradiance that white water reflects.
+const WATER_REFLECTANCE: f32 = 0.35;
+/// Largest share of a cell that white water covers.
+const WATER_COVER: f32 = 0.75;
 
-/// The cell of a unit direction. Twin of its lookup, which is between cells: `around` of `shaders/pool.wgsl`.
+/// Returns the cell of a unit direction; `None` below the horizon. The lookup, which interpolates between
+/// cells, is `around` of `shaders/engine/pool.wgsl`.
 fn cell(d: Vec3) -> Option<usize> {
     if d.y < 0.0 {
         return None;
@@ -27,10 +30,11 @@ fn cell(d: Vec3) -> Option<usize> {
     Some(row * AROUND[0] + column)
 }
 
-/// Mean distance of what is around, and the cells.
+/// Returns the mean distance of the surrounding rock from the point `middle` in metres, and the cells of the
+/// map ([`Surface::around`](super::Surface::around)).
 pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROUND[0] * AROUND[1]]) {
     const CELLS: usize = AROUND[0] * AROUND[1];
-    let seen = || {
+    let sampled = || {
         let rock = mesh.vertices.iter().filter(|v| v.pool == 0).step_by(STRIDE);
         rock.filter_map(|vertex| {
             let away = Vec3::from(vertex.position) - middle;
@@ -39,12 +43,12 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
         })
     };
     let mut nearest = [f32::INFINITY; CELLS];
-    for (_, distance, cell) in seen() {
+    for (_, distance, cell) in sampled() {
         nearest[cell] = nearest[cell].min(distance);
     }
     let mut sums = [Vec3::ZERO; CELLS];
     let mut counts = [0.0f32; CELLS];
-    for (vertex, distance, cell) in seen() {
+    for (vertex, distance, cell) in sampled() {
         if distance < BEHIND * nearest[cell] {
             sums[cell] += radiance(scene, vertex);
             counts[cell] += 1.0;
@@ -52,7 +56,7 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
     }
     let mut cells = [[0.0; 4]; CELLS];
     for column in 0..AROUND[0] {
-        // Rock stands on the ground: below its highest cell there is no sky.
+        // Rock stands on the ground, so no sky shows below its highest cell.
         let mut above: Option<Vec3> = None;
         for row in (0..AROUND[1]).rev() {
             let i = row * AROUND[0] + column;
@@ -70,7 +74,7 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
     (radius, cells)
 }
 
-/// Lambert, as of [`shade_opaque`](crate::engine::cpu::opaque::shade_opaque).
+/// Returns the radiance of a vertex of rock: Lambert, as in `shade_opaque` of `src/engine/cpu/opaque.rs`.
 fn radiance(scene: &Scene, vertex: &Vertex) -> Vec3 {
     let n = Vec3::from(vertex.normal);
     let surroundings = scene.environment.as_ref().map_or(Vec3::ZERO, |e| e.irradiance.at(n));
@@ -83,14 +87,14 @@ fn radiance(scene: &Scene, vertex: &Vertex) -> Vec3 {
     Vec3::from(vertex.albedo) * irradiance
 }
 
-/// Puts falling water in front.
+/// Composites falling water over the cells.
 fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
     let solid_angle = std::f32::consts::TAU / cells.len() as f32;
     let mut cover = vec![0.0f32; cells.len()];
     for quad in scene.quads.iter().filter(|quad| quad.mist == 0.0) {
         let Quad { corners: [a, b, c, d], erosion, .. } = quad;
         let area = (*c - *a).cross(*d - *b).length() * 0.5 / (POINTS * POINTS) as f32;
-        let kept = (1.0 - erosion.iter().sum::<f32>() / 4.0).clamp(0.0, 1.0);
+        let share_left = (1.0 - erosion.iter().sum::<f32>() / 4.0).clamp(0.0, 1.0);
         for i in 0..POINTS * POINTS {
             let u = ((i % POINTS) as f32 + 0.5) / POINTS as f32;
             let v = ((i / POINTS) as f32 + 0.5) / POINTS as f32;
@@ -98,7 +102,7 @@ fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
             let distance = away.length().max(1e-3);
             if let Some(cell) = cell(away / distance) {
                 let facing = away.dot(quad.map.n_world).abs() / distance;
-                cover[cell] += kept * area * facing / (distance * distance * solid_angle);
+                cover[cell] += share_left * area * facing / (distance * distance * solid_angle);
             }
         }
     }
@@ -107,12 +111,12 @@ fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
         white += environment.irradiance.at(Vec3::Y);
     }
     for light in &scene.lights {
-        white += light.at(middle).1 * WATER.0;
+        white += light.at(middle).1 * WATER_REFLECTANCE;
     }
     for (cell, cover) in cells.iter_mut().zip(cover) {
-        let cover = cover.min(WATER.1);
-        let [r, g, b, under] = *cell;
+        let cover = cover.min(WATER_COVER);
+        let [r, g, b, behind] = *cell;
         let mixed = Vec3::new(r, g, b) * (1.0 - cover) + white * cover;
-        *cell = mixed.extend(under + (1.0 - under) * cover).to_array();
+        *cell = mixed.extend(behind + (1.0 - behind) * cover).to_array();
     }
 }

@@ -1,10 +1,11 @@
-//! The surface of a pool for each pixel: waves, what they mirror, what is seen below, and foam.
-//! Each pixel is shaded by `shaders/pool.wgsl` and its twin `src/cpu/pool.rs`.
+//! The surface of a pool: its waves, the surroundings it mirrors, and its colours. This is computed once per
+//! picture; `shaders/engine/pool.wgsl` and its twin `src/engine/cpu/pool.rs` shade the pixels.
 //!
-//! The surface is a sum of waves as in Fournier and Reeves 1986 (Gerstner 1802): at rest at x₀, a point is moved
-//! round a circle, by A·sin along the vertical and A·cos along the wave. Amplitudes are centimetres, so the normal
-//! of this surface is drawn on the level patch. ω² = g·k of deep water, to the nearest whole number of turns in
-//! the pool's period: moving pictures close. Rings run out from where water falls in.
+//! The surface is a sum of waves as in Fournier and Reeves 1986 (Gerstner 1802): a point that rests at x₀
+//! moves on a circle, by A·sin along the vertical and by A·cos along the wave. Amplitudes are centimetres, so
+//! the level patch is drawn with the normal of this surface. The dispersion ω² = g·k of deep water is rounded
+//! to a whole number of turns in the pool's period, so that moving pictures loop. Rings spread from the
+//! points where water falls in.
 
 mod around;
 
@@ -18,60 +19,60 @@ use crate::place::{Mesh, Pool};
 use crate::scene::Scene;
 use crate::util::random::{Family, Stream};
 
-/// Waves along straight lines.
+/// Number of straight waves.
 pub const STRAIGHT: usize = 20;
-/// Rings: each place where water falls in has two of them.
+/// Number of ring waves: two for each point where water falls in.
 const RINGS: usize = 12;
-/// Waves of a pool.
+/// Number of waves of a pool.
 pub const WAVES: usize = STRAIGHT + RINGS;
-/// Cells of what is around a pool: about its vertical, and upwards.
+/// Cells of the surroundings' map: columns about the vertical, and rows upwards.
 pub const AROUND: [usize; 2] = [64, 12];
-/// Shortest straight wave relative to the longest.
+/// Length of the shortest straight wave relative to the longest.
 const SHORTEST: f32 = 0.09;
 
-/// One wave.
+/// One wave, straight or ring-shaped.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Wave {
-    /// Unit direction, or the middle of rings: x and z.
+    /// x and z of a straight wave's unit direction, or of a ring's centre in metres.
     pub toward: [f32; 2],
-    /// Waves in a metre.
+    /// Waves per metre.
     pub k: f32,
-    /// Turns at the origin or the middle.
+    /// Phase in turns, at the origin or at the ring's centre.
     pub phase: f32,
-    /// 2π·k·A: the steepest slope.
+    /// Steepest slope, 2π·k·A.
     pub slope: f32,
-    /// 1: rings.
+    /// 1 for a ring, 0 for a straight wave.
     pub ring: f32,
-    /// Share by which rings fall off, 1/m.
+    /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)².
     pub decay: f32,
-    /// Nothing.
+    /// Padding.
     pub pad: f32,
 }
 
-/// A pool as both engines draw it.
+/// A pool's surface as both engines read it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Surface {
-    /// Albedo of deep water.
+    /// Linear albedo of deep water.
     pub color: [f32; 3],
-    /// Radius of the ball that what is around lies on; metres.
+    /// Radius in metres of the sphere that the surroundings are projected on.
     pub radius: f32,
-    /// Albedo of the ground.
+    /// Linear albedo of the ground.
     pub bottom: [f32; 3],
-    /// Nothing.
+    /// Padding.
     pub pad_a: f32,
-    /// 1/m.
+    /// Absorption of the water, 1/m.
     pub absorption: [f32; 3],
-    /// Nothing.
+    /// Padding.
     pub pad_b: f32,
-    /// The middle.
+    /// Centre of the pool, metres.
     pub middle: [f32; 3],
-    /// Nothing.
+    /// Padding.
     pub pad_c: f32,
-    /// The waves.
+    /// The straight waves, then the rings; unused rings have slope 0.
     pub waves: [Wave; WAVES],
-    /// Radiance of what is around × its cover, and that cover.
+    /// Map of the surroundings, row by row upwards: linear radiance × cover, and the cover (0 to 1).
     pub around: [[f32; 4]; AROUND[0] * AROUND[1]],
 }
 
@@ -81,26 +82,28 @@ impl Default for Surface {
     }
 }
 
-/// The pools of a scene with this mesh.
+/// Returns the surface of each pool of a scene; `mesh` is the scene's opaque mesh.
 pub fn surfaces(scene: &Scene, mesh: &Mesh) -> Vec<Surface> {
     scene.pools.iter().map(|pool| Surface::new(scene, mesh, pool)).collect()
 }
 
-/// Where a direction lies about the vertical, 0 to 1: of its x and z, x/(|x| + |z|), once forth and once back, which
-/// needs no arc tangent.
+/// Returns the position of a direction about the vertical, 0 to 1. It rises with x/(|x| + |z|) of the
+/// direction, once forth and once back, and so needs no arc tangent. Twin: `turn` of
+/// `shaders/engine/pool.wgsl`.
 pub fn turn(d: Vec3) -> f32 {
     let p = d.x / (d.x.abs() + d.z.abs()).max(1e-20);
     if d.z >= 0.0 { 0.25 * (1.0 - p) } else { 0.25 * (3.0 + p) }
 }
 
-/// Turns that a wave of length λ metres makes in the pool's period: a whole number, at least one.
+/// Returns the turns that a wave of length λ (metres) makes in the pool's period (seconds): a whole number,
+/// at least one.
 pub fn turns(wavelength: f32, period: f32) -> f32 {
     // ω/2π = √(g/(2πλ)).
     (period * (GRAVITY as f32 / (TAU * wavelength)).sqrt()).round().max(1.0)
 }
 
 impl Surface {
-    /// Of one pool.
+    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh.
     pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool) -> Surface {
         let middle = pool.corners.iter().sum::<Vec3>() / 4.0;
         let flow = scene.flow.rem_euclid(1.0);
@@ -120,7 +123,7 @@ impl Surface {
 fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32) -> [Wave; WAVES] {
     let mut waves = [Wave::default(); WAVES];
     let family = Family::new(pool.seed, Stream::Wave);
-    // All equally steep: A = λ·a, so that Σ A²/2 is the variance of the height.
+    // All waves are equally steep: A = λ·a, where Σ A²/2 is the variance of the height.
     let length = |i: usize| pool.wavelength * SHORTEST.powf(i as f32 / (STRAIGHT - 1) as f32);
     let sum: f32 = (0..STRAIGHT).map(|i| length(i) * length(i) * 0.5).sum();
     let a = pool.height / sum.sqrt();
@@ -136,13 +139,12 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32) -> [Wave; WAVES] {
             ..Wave::default()
         };
     }
-    let places = places(pool, falls, RINGS / 2);
-    for (i, place) in places.iter().enumerate() {
+    for (i, centre) in ring_centres(pool, falls, RINGS / 2).iter().enumerate() {
         for (j, wavelength) in [0.45 * pool.wavelength, 0.17 * pool.wavelength].into_iter().enumerate() {
             let mut random = family.member((STRAIGHT + 2 * i + j) as u64);
             let phase: f32 = random.random_range(0.0..1.0);
             waves[STRAIGHT + 2 * i + j] = Wave {
-                toward: place.to_array(),
+                toward: centre.to_array(),
                 k: 1.0 / wavelength,
                 phase: (phase - flow * turns(wavelength, pool.period)).rem_euclid(1.0),
                 slope: TAU * pool.rings / (0.45 * pool.wavelength),
@@ -155,16 +157,17 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32) -> [Wave; WAVES] {
     waves
 }
 
-/// Where water falls in, as at most `most` points: of the nearest two the middle is taken until there are no more.
-fn places(pool: &Pool, falls: &[[Vec3; 4]], most: usize) -> Vec<Vec2> {
+/// Returns the points where water falls in. While there are more than `most`, the nearest two are merged into
+/// their midpoint.
+fn ring_centres(pool: &Pool, falls: &[[Vec3; 4]], most: usize) -> Vec<Vec2> {
     let middle = |[a, b]: [Vec3; 2]| Vec2::new(a.x + b.x, a.z + b.z) * 0.5;
-    let mut places: Vec<Vec2> = pool.impacts(falls).into_iter().map(middle).take(256).collect();
-    while places.len() > most {
-        let pairs = (0..places.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-        let near = |&(i, j): &(usize, usize)| places[i].distance_squared(places[j]);
-        let Some((i, j)) = pairs.min_by(|a, b| near(a).total_cmp(&near(b))) else { break };
-        let one = places.swap_remove(i);
-        places[j] = (places[j] + one) * 0.5;
+    let mut centres: Vec<Vec2> = pool.impacts(falls).into_iter().map(middle).take(256).collect();
+    while centres.len() > most {
+        let pairs = (0..centres.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+        let distance = |&(i, j): &(usize, usize)| centres[i].distance_squared(centres[j]);
+        let Some((i, j)) = pairs.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
+        let removed = centres.swap_remove(i);
+        centres[j] = (centres[j] + removed) * 0.5;
     }
-    places
+    centres
 }

@@ -1,0 +1,50 @@
+//! A scene made ready for the passes, as renderer and benchmark share it.
+
+use super::device::Gpu;
+use super::integrate::Variant;
+use super::reflection::{BoundReflection, Reflections};
+use super::upload::{Resident, Uploaded};
+use crate::engine::overlap;
+use crate::light::Visibility;
+use crate::light::visibility::LightVolumes;
+use crate::place::Mesh;
+use crate::scene::Scene;
+use crate::util::error::Result;
+use crate::volume::VolumeTexture;
+
+/// A scene on the device, with the plan of its light volumes.
+pub struct PreparedScene {
+    /// The scene's buffers and textures.
+    pub up: Uploaded,
+    /// Layers of volume quads: see [`overlap::sheets`].
+    pub layers: u32,
+    /// The light volumes to fill; `None` unless visibility is cached.
+    pub light_volumes: Option<LightVolumes>,
+    /// The reflection model and multiple scattering.
+    pub reflection: BoundReflection,
+    /// The variant of the integrate pass that renders the scene.
+    pub variant: Variant,
+}
+
+impl PreparedScene {
+    /// Plans the light volumes and uploads what is not resident yet.
+    pub fn new(
+        gpu: &Gpu,
+        resident: &mut Resident,
+        reflections: &mut Reflections,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+    ) -> Result<Self> {
+        let layers = overlap::sheets(scene);
+        let light_volumes = match scene.visibility {
+            Visibility::Cached => Some(scene.light_volumes(volume.size, volume.alpha, scene.light_cache)?),
+            _ => None,
+        };
+        let up = Uploaded::new(gpu, resident, scene, volume, mesh)?;
+        let reflection = reflections.bind(gpu, scene, volume);
+        let storage = [up.levels.leaps, volume.is_sparse()];
+        let variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
+        Ok(PreparedScene { up, layers, light_volumes, reflection, variant })
+    }
+}

@@ -1,0 +1,123 @@
+//! The renderer: a device, its compiled passes, and what it keeps from frame to frame.
+
+use super::canvas::{Canvas, lru_get_or_insert};
+use super::device::Gpu;
+use super::frame_run::FrameRun;
+use super::gbuffer::Gbuffer;
+use super::integrate::{Integrate, Variant};
+use super::rasters::Rasters;
+use super::reflection::Reflections;
+use super::resolve::Resolve;
+use super::timing::Timer;
+use super::upload::Resident;
+use super::visibility::VisibilityPass;
+use crate::engine::options::RenderOptions;
+use crate::engine::overlap;
+use crate::light::Visibility;
+use crate::picture::Frame;
+use crate::place::Mesh;
+use crate::scene::Scene;
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
+use crate::util::window::Window;
+use crate::volume::{Storage, VolumeTexture};
+
+/// A device with its compiled passes.
+pub struct GpuRenderer {
+    /// The device.
+    pub gpu: Gpu,
+    pub(super) timer: Timer,
+    pub(super) gbuffer: Gbuffer,
+    pub(super) resolve: Resolve,
+    /// Most recently used first.
+    pub(super) integrate: Vec<Integrate>,
+    pub(super) resident: Resident,
+    pub(super) visibility: VisibilityPass,
+    pub(super) reflections: Reflections,
+    /// Most recently used first.
+    pub(super) canvases: Vec<Canvas>,
+    pub(super) rasters: Rasters,
+    /// Pixels of a tile that suited the last frame, and what that frame was.
+    pub(super) learned: Option<(TileHint, f64)>,
+}
+
+/// What two frames have in common whose tiles take equally long: the variant of the integrate pass, the address of
+/// the volume's cells, and the image's size.
+pub(super) type TileHint = (Variant, usize, [u32; 2]);
+
+/// Specialised pipelines that are kept, so that a slider that moves back finds its pipeline again.
+pub(super) const KEPT_PIPELINES: usize = 16;
+/// Canvases that are kept: an interactive renderer alternates between its preview sizes.
+pub(super) const KEPT_CANVASES: usize = 5;
+
+impl GpuRenderer {
+    /// Compiles the passes that do not depend on the scene.
+    pub fn new(gpu: Gpu) -> Self {
+        let (timer, gbuffer, resolve) = (Timer::new(&gpu), Gbuffer::new(&gpu), Resolve::new(&gpu));
+        let visibility = VisibilityPass::new(&gpu);
+        GpuRenderer {
+            gpu,
+            timer,
+            gbuffer,
+            resolve,
+            integrate: Vec::new(),
+            resident: Resident::default(),
+            visibility,
+            reflections: Reflections::default(),
+            canvases: Vec::new(),
+            rasters: Rasters::default(),
+            learned: None,
+        }
+    }
+
+    /// Compiles the passes that a scene needs, as far as they are known without its volume.
+    pub fn prepare(&mut self, scene: &Scene) {
+        let layers = overlap::sheets(scene);
+        let GpuRenderer { gpu, gbuffer, integrate, .. } = self;
+        std::thread::scope(|scope| {
+            scope.spawn(|| gbuffer.compile(gpu, scene, layers));
+            if scene.visibility != Visibility::Cached {
+                // Most volumes are too full for leaps.
+                let variant = Variant::of(scene, layers, None, [false, scene.storage == Storage::Sparse]);
+                let matches = |pass: &Integrate| pass.variant == variant;
+                lru_get_or_insert(integrate, KEPT_PIPELINES, matches, || Integrate::new(gpu, variant));
+            }
+        });
+    }
+
+    /// Drops the light volumes of the last frame, so that the next one fills its own.
+    pub fn forget_light_volumes(&mut self) {
+        self.visibility.forget();
+    }
+
+    /// Renders a scene, or the part of it that `options.window` names.
+    ///
+    /// # Errors
+    /// - Errors of `monitor`, which may stop the work.
+    /// - [`Error::Input`] if the scene is too large for the device, or the device ends walks early.
+    /// - [`Error::Memory`] if light volumes or textures do not fit into memory.
+    /// - [`Error::DeviceLost`] or [`Error::Watchdog`] if the device fails.
+    ///
+    /// [`Error::Input`]: crate::util::error::Error::Input
+    /// [`Error::Memory`]: crate::util::error::Error::Memory
+    /// [`Error::DeviceLost`]: crate::util::error::Error::DeviceLost
+    /// [`Error::Watchdog`]: crate::util::error::Error::Watchdog
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+        options: &RenderOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Frame> {
+        let whole = [scene.image.width, scene.image.height];
+        let part = options.window.unwrap_or(Window::whole(whole));
+        let mut run = FrameRun::prepare(self, scene, volume, mesh, options, monitor)?;
+        let mut frame = Frame::new(part.width, part.height, options.surface);
+        for window in options.grid.windows(whole, part) {
+            run.window(window, &mut frame)?;
+        }
+        self.learned = run.finish(&mut frame);
+        Ok(frame)
+    }
+}

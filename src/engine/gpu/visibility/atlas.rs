@@ -1,0 +1,82 @@
+//! The texture that holds all light volumes of a frame.
+
+use crate::engine::gpu::device::Gpu;
+use crate::light::visibility::LightVolumes;
+use crate::util::error::{Error, Result};
+
+/// Arrangement of the light volumes in their texture: as many as fit along z, then along x, then along y.
+pub struct LightVolumeAtlas {
+    /// Texels of one light volume.
+    size: [u32; 3],
+    /// Light volumes along x, y and z.
+    along: [u32; 3],
+}
+
+impl LightVolumeAtlas {
+    /// Arranges `count` light volumes of `size` texels.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if they do not fit into the device's largest 3-D texture.
+    pub fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
+        let most = gpu.device.limits().max_texture_dimension_3d;
+        // z comes first: it is the order of the volume's own slices.
+        let mut along = [1; 3];
+        let mut unplaced = count;
+        for axis in [2, 1, 0] {
+            along[axis] = unplaced.clamp(1, (most / size[axis]).max(1));
+            unplaced = unplaced.div_ceil(along[axis]);
+        }
+        if unplaced > 1 {
+            let [nx, ny, nz] = size;
+            return Err(Error::input(
+                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too many for {}", gpu.name()),
+                "use light.visibility=march, or --engine cpu",
+            ));
+        }
+        Ok(LightVolumeAtlas { size, along })
+    }
+
+    /// Returns the size of the texture, texels.
+    pub fn extent(&self) -> [u32; 3] {
+        [0, 1, 2].map(|axis| self.size[axis] * self.along[axis])
+    }
+
+    /// Returns the origin of a light volume in the texture, texels.
+    pub fn origin(&self, number: u32) -> [i32; 3] {
+        let [kx, _, kz] = self.along;
+        let steps = [number / kz % kx, number / kz / kx, number % kz];
+        [0, 1, 2].map(|axis| (steps[axis] * self.size[axis]) as i32)
+    }
+}
+
+/// Allocates the texture of all light volumes.
+pub fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView {
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("light volumes"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: depth },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::R32Uint,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    texture.create_view(&Default::default())
+}
+
+/// Uploads the table that tells where the light volumes of each quad and light are: [`FilledVolumes::places`].
+///
+/// [`FilledVolumes::places`]: super::FilledVolumes::places
+pub fn light_places(gpu: &Gpu, plan: &LightVolumes, atlas: &LightVolumeAtlas) -> wgpu::Buffer {
+    let before = plan.patches.len() as u32;
+    let patches = plan.patches.iter().map(|p| {
+        let [nu, nv] = p.count.map(|n| n as i32);
+        [(before + p.first) as i32, nu, nv, i32::from(p.cornered)]
+    });
+    let numbers = plan.numbers.iter().map(|&number| {
+        let [x, y, z] = atlas.origin(number);
+        [x, y, z, 0]
+    });
+    let all: Vec<[i32; 4]> = patches.chain(numbers).collect();
+    gpu.buffer_with("light places", bytemuck::cast_slice(&all), wgpu::BufferUsages::STORAGE)
+}
