@@ -71,7 +71,7 @@ pub struct Options {
 const MAX_WINDOWS: usize = 8;
 
 /// What draws the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WindowChoice {
     /// Vulkan, Metal or Direct3D on a GPU; OpenGL where they would be software.
     #[default]

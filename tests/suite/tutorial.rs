@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use taki::engine::cpu;
 use taki::Unwatched;
+use taki::engine::cpu;
 use taki::scene::{Limits, Scene};
 use toml::{Table, Value};
 
@@ -93,7 +93,7 @@ fn every_step_renders_water_in_light() {
         let load = |sets: &[String]| {
             Scene::load(&file, sets, &Limits::default()).unwrap_or_else(|e| panic!("step {i}: {e}"))
         };
-        let rocks = load(&[]).values.names("rocks").into_iter();
+        let rocks = load(&[]).values().expect("as written").names("rocks").into_iter();
         let mut sets: Vec<String> = rocks.map(|rock| format!("rocks.{rock}.levels=4")).collect();
         // For a few pixels it is quicker to walk to the lights from each than to fill light volumes.
         let small = ["image.width=64", "image.height=36", "image.samples=1", "light.visibility=march"];

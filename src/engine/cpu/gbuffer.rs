@@ -15,7 +15,7 @@ use crate::mapping::Quad;
 use crate::picture::Image;
 use crate::picture::camera::sample_offset;
 use crate::place::{Mesh, tiles};
-use crate::scene::Scene;
+use crate::scene::{Parts, Scene};
 use crate::util::window::Window;
 use raster::{Covered, Rasteriser, ScreenTriangle};
 
@@ -141,7 +141,7 @@ impl<'a> WindowFrame<'a> {
 
     /// Projects a triangle and hands on the parts that may cover a pixel's centre.
     fn project(&self) -> impl Fn([Vec3; 3], u32, [u16; 3], &mut Vec<ScreenTriangle>) {
-        let Scene { camera, image, .. } = self.scene;
+        let Parts { camera, image, .. } = &**self.scene;
         let window = self.window;
         let clip_from_world = camera.clip_from_world(image.width, image.height, self.offset);
         let size = [image.width as usize, image.height as usize];

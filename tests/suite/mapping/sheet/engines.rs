@@ -118,7 +118,8 @@ fn the_flow_falls_with_gravity_and_loops() {
     let mut scene = plumb("segments = 40\nv0 = 1.0");
     let image = &mut scene.edit().image;
     (image.width, image.height, image.samples) = (16, 400, 1);
-    scene.edit().camera = super::scene("[camera]\neye = [0, 0.5, 10]\ntarget = [0, 0.5, 0]\nfov = 40\n").camera;
+    scene.edit().camera =
+        super::scene("[camera]\neye = [0, 0.5, 10]\ntarget = [0, 0.5, 0]\nfov = 40\n").camera;
     scene.edit().visibility = Visibility::None;
     let dense = Cell::from_direction(glam::Vec3::Y).with_density(1.0, 0.5, 0.5);
     let cells = (0..64).map(|y| if y == 8 { dense } else { Cell::default() }).collect::<Vec<_>>();
