@@ -7,7 +7,7 @@ use super::{Limits, Place, Raw, Scene, presets};
 use crate::util::error::{Error, Result};
 
 impl Scene {
-    /// Opens a preset by its name, such as `fig5`. [`presets`](super::presets) lists the names.
+    /// Opens a preset by its name, such as `fig5`. [`presets`](super::presets()) lists the names.
     ///
     /// # Errors
     /// [`Error::Input`] where there is no preset of that name.

@@ -220,8 +220,6 @@ pub struct Groups {
     pub pad_b: u32,
 }
 
-/// `tone` of [`Develop`]: Narkowicz's curve.
-pub const TONE_FILMIC: u32 = 1;
 /// Constants of multiple scattering.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -5,8 +5,8 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use taki::engine::gpu::layout::{
-    Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Strand, Tile, VertexMaterial,
-    WORKGROUP,
+    Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Reflection, Similarity, Strand,
+    Tile, VertexMaterial, WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
@@ -167,6 +167,9 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
+    let similarity = fields!(Similarity: extinction g albedo pad_0 reduced pad_1 isotropic pad_2);
+    assert_eq!(members(&module, "Similarity"), similarity);
+    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity));
     let module = validate(&stage("resolve")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
     let module = validate(&stage("visibility")).expect("valid");
@@ -216,7 +219,55 @@ fn constants_are_the_same_on_both_sides() {
     let gbuffer = validate(&stage("gbuffer")).expect("valid");
     let wide = |name: &str| of(&gbuffer, name) as usize;
     assert_eq!(wide("WAVES"), WAVES);
+    assert_eq!(wide("TILE_ROW"), taki::place::tiles::SIDE as usize + 1);
     assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::light::strand::table::SIZE);
+}
+
+/// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
+const COMPARED: [&str; 15] = [
+    "Develop",
+    "Environment",
+    "FrameUniforms",
+    "Groups",
+    "Light",
+    "LightVolume",
+    "MeshTile",
+    "Quad",
+    "Reflection",
+    "Similarity",
+    "Strand",
+    "Surface",
+    "Tile",
+    "VertexMaterial",
+    "Wave",
+];
+
+#[test]
+fn every_struct_of_a_buffer_is_compared() {
+    let mut seen = std::collections::BTreeSet::new();
+    for (stage, text) in stages() {
+        let module = validate(&text).expect("valid");
+        for (_, variable) in module.global_variables.iter() {
+            if !matches!(variable.space, naga::AddressSpace::Uniform | naga::AddressSpace::Storage { .. }) {
+                continue;
+            }
+            let mut open = vec![variable.ty];
+            while let Some(handle) = open.pop() {
+                let ty = &module.types[handle];
+                match &ty.inner {
+                    naga::TypeInner::Array { base, .. } => open.push(*base),
+                    naga::TypeInner::Struct { members, .. } => {
+                        let name = ty.name.clone().expect("a name");
+                        assert!(COMPARED.contains(&name.as_str()), "{stage}: nobody compares {name}");
+                        seen.insert(name);
+                        open.extend(members.iter().map(|member| member.ty));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    assert_eq!(seen.iter().map(String::as_str).collect::<Vec<_>>(), COMPARED);
 }
