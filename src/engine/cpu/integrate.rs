@@ -119,8 +119,8 @@ impl LevelResult {
 }
 
 impl<'a> Integrator<'a> {
-    /// For a scene and its volume, and many rays: light volumes are walked now if there are to be any and `kept`
-    /// has not got them; if there are to be none it lets go of the old ones.
+    /// For a scene and its volume, and many rays: light volumes are walked now if there are to be any and
+    /// `kept` has not got them; if there are to be none it lets go of the old ones.
     pub fn prepared(
         scene: &'a Scene,
         volume: &VolumeTexture,
@@ -140,8 +140,8 @@ impl<'a> Integrator<'a> {
         Ok(integrator)
     }
 
-    /// For a scene and its volume, and few rays: with cached visibility they walk to the lights as those would
-    /// from whom the light volumes are made.
+    /// For a scene and its volume, and few rays: with cached visibility they walk to the lights as those
+    /// would from whom the light volumes are made.
     pub fn new(scene: &'a Scene, volume: &VolumeTexture) -> Self {
         Integrator::with_levels(scene, volume, levels_of(volume, scene.pyramid_spec(volume)))
     }
@@ -222,8 +222,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// One of the sheets of a ray, composited face by face: the ray comes with T = `before` to the face and
-    /// goes through the whole slab, though that may reach behind the face of the next. The radiance is that of
-    /// this sheet, and what is left of `behind` if the ray ends here: `is_last`, or early.
+    /// goes through the whole slab, though that may reach behind the face of the next. The radiance is that
+    /// of this sheet, and what is left of `behind` if the ray ends here: `is_last`, or early.
     #[allow(clippy::too_many_arguments)]
     fn sheet<O: Observer>(
         &self,
