@@ -1,5 +1,5 @@
-//! A volume in sparse storage on the device: a texture of its bricks, and one of the cells that are stored, one after the
-//! other. `shaders/cells.wgsl` reads them.
+//! A volume in sparse storage on the device: a texture of its bricks, and one of the cells that are stored,
+//! one after the other. `shaders/cells.wgsl` reads them.
 
 use super::device::Gpu;
 use super::upload::{SLAB_BYTES, write_layers};

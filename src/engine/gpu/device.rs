@@ -86,7 +86,8 @@ impl Gpu {
             ..wgpu::Limits::downlevel_defaults()
         };
         // Software Vulkan writes the first time stamp of a compute pass when it gets round to it: after a
-        // submission that drew nothing lavapipe tells 0.03 ms of 40. The host's clock is right to 0.4 ms there.
+        // submission that drew nothing lavapipe tells 0.03 ms of 40. The host's clock is right to 0.4 ms
+        // there.
         let software = is_software(&info);
         let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) && !software;
         let required_features =

@@ -16,7 +16,8 @@ use crate::util::error::Result;
 /// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
 const TILE_SECONDS: f64 = 0.03;
 /// Pixels of the first tile, when nothing is known about the scene's cost; with many lights fewer. With every
-/// pixel at the cap of 512 cells and a full walk to one light from each, software Vulkan takes about a second for it.
+/// pixel at the cap of 512 cells and a full walk to one light from each, software Vulkan takes about a second
+/// for it.
 const FIRST_TILE_PIXELS: f64 = 1024.0;
 /// A tile grows at most this much over the one before.
 const TILE_GROWTH: f64 = 4.0;
@@ -198,8 +199,8 @@ impl Integrate {
         Integrate { pipeline: pipeline("integrate"), dry, group_layout, variant }
     }
 
-    /// Adds one sample of a window's area to `sums`, some workgroups at a time; seconds on the device. `between` is called
-    /// after each submission with the pixels done so far, and may stop the work.
+    /// Adds one sample of a window's area to `sums`, some workgroups at a time; seconds on the device.
+    /// `between` is called after each submission with the pixels done so far, and may stop the work.
     pub fn run(
         &self,
         inputs: &Inputs,

@@ -24,8 +24,8 @@ pub fn imports(text: &str) -> impl Iterator<Item = String> {
     text.lines().filter_map(|line| line.strip_prefix("#import ")).map(|path| path.trim().replace("::", "/"))
 }
 
-/// The text of a stage with all that it imports, directly or not: each file once, before the file that names it first.
-/// Files may import one another, since the order of declarations means nothing in WGSL.
+/// The text of a stage with all that it imports, directly or not: each file once, before the file that names
+/// it first. Files may import one another, since the order of declarations means nothing in WGSL.
 ///
 /// # Panics
 /// Where an import names no file. The shaders are part of the program, and tests resolve each of them.

@@ -1,7 +1,8 @@
 //! Shaders specialised before they reach a driver: what their `override` constants rule out is left out.
 //!
-//! A driver would find it too, after it has read, inlined and optimised all of it: for the integrate pass that takes software
-//! Vulkan several times as long as for what is left, and nothing keeps it from one process to the next.
+//! A driver would find it too, after it has read, inlined and optimised all of it: for the integrate pass
+//! that takes software Vulkan several times as long as for what is left, and nothing keeps it from one
+//! process to the next.
 
 use wgpu::naga;
 

@@ -1,7 +1,8 @@
 //! §3 The opaque mesh in tiles: those out of view are not drawn, the nearest are drawn first.
 //!
-//! Software Vulkan shades vertices for 1023 indices at a time and knows in them the last vertex of each of 256 places.
-//! So vertices have numbers in their tile, of which two rows never share a place, and the shader finds where they are.
+//! Software Vulkan shades vertices for 1023 indices at a time and knows in them the last vertex of each of
+//! 256 places. So vertices have numbers in their tile, of which two rows never share a place, and the shader
+//! finds where they are.
 
 use std::ops::Range;
 
