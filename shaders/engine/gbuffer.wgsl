@@ -53,7 +53,7 @@ const TILE_ROW: u32 = 17u;
 // One light stands at a constant place, which software Vulkan reads once for eight samples, and lane by lane in a loop.
 override ONE_LIGHT: bool = false;
 
-struct PlaceVarying {
+struct RockSurfaceVarying {
     @builtin(position) clip: vec4<f32>,
     // In the tile, in squares.
     @location(0) place: vec2<f32>,
@@ -76,11 +76,11 @@ struct OpaqueTargets {
 }
 
 @vertex
-fn place_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> PlaceVarying {
+fn rock_surface_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> RockSurfaceVarying {
     let row = corner / TILE_ROW;
     let column = corner - row * TILE_ROW;
     let vertex = tiles[number].first + row * tiles[number].pitch + column;
-    var out: PlaceVarying;
+    var out: RockSurfaceVarying;
     out.clip = frame.clip_from_world * vec4<f32>(positions[vertex].xyz, 1.0);
     out.place = vec2<f32>(f32(column), f32(row));
     out.tile = number;
@@ -88,7 +88,7 @@ fn place_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) num
 }
 
 @fragment
-fn place_fragment(in: PlaceVarying) -> @location(0) vec4<f32> {
+fn rock_surface_fragment(in: RockSurfaceVarying) -> @location(0) vec4<f32> {
     return vec4<f32>(in.place, f32(in.tile), in.clip.z);
 }
 

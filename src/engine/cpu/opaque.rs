@@ -1,4 +1,4 @@
-//! §3 What the raster pass makes of a point of opaque geometry. Twin: `shaders/opaque.wgsl`.
+//! §3 Shading of a point of rock in the raster pass. Twin: `shaders/engine/opaque.wgsl`.
 
 use glam::{Vec2, Vec3};
 
@@ -7,24 +7,25 @@ use crate::place::tiles::Tile;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 
-/// A point of the mesh: its vertices' values, mixed.
+/// A point of the opaque mesh, with values interpolated between its vertices.
 pub struct Opaque {
-    /// World, metres.
+    /// Position in the world, metres.
     pub position: Vec3,
-    /// Of any length.
+    /// Normal, not normalised.
     pub normal: Vec3,
     /// Linear albedo.
     pub albedo: Vec3,
-    /// Occlusion, shadow, film of water.
+    /// Occlusion, shadow and film of water, 0 to 1 each.
     pub shade: Vec3,
-    /// Number of the pool plus 1; 0: rock.
+    /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
 }
 
 impl Opaque {
-    /// A place in a tile of the mesh, in squares, that is drawn at `position`. Twin: `opaque_point`.
-    pub fn at(mesh: &Mesh, tile: &Tile, place: Vec2, position: Vec3) -> Opaque {
-        let (corners, weights) = tile.around(place);
+    /// Interpolates the vertices around `in_tile`, a position in a tile in squares of its grid. `position` is
+    /// the point in the world. Twin: `opaque_point`.
+    pub fn at(mesh: &Mesh, tile: &Tile, in_tile: Vec2, position: Vec3) -> Opaque {
+        let (corners, weights) = tile.around(in_tile);
         let corners = corners.map(|number| &mesh.vertices[number as usize]);
         let mix = |get: fn(&Vertex) -> [f32; 3]| {
             (0..3).map(|c| Vec3::from(get(corners[c])) * weights[c]).sum::<Vec3>()
@@ -39,8 +40,8 @@ impl Opaque {
     }
 }
 
-/// Lambert, two-sided, with the gloss of a film of water: (radiance and metres from the eye, normal).
-/// `shadow_light` is [`Scene::shadow_light`].
+/// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance with the
+/// metres from the eye, and the unit normal. `shadow_light` is [`Scene::shadow_light`].
 pub fn shade_opaque(scene: &Scene, shadow_light: Option<usize>, point: &Opaque) -> ([f32; 4], Vec3) {
     let to_eye = scene.camera.eye - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
@@ -52,7 +53,7 @@ pub fn shade_opaque(scene: &Scene, shadow_light: Option<usize>, point: &Opaque) 
     let mirrored = n * (2.0 * n.dot(e)) - e;
     let (ambient, sky) = match &scene.environment {
         None => (scene.ambient, scene.background.radiance(mirrored)),
-        // On rough rock a film sends back what comes from all around the mirrored view.
+        // A film on rough rock reflects the light from all around the mirrored view.
         Some(environment) => {
             (scene.ambient + environment.irradiance.at(n), environment.irradiance.at(mirrored))
         }
@@ -76,7 +77,8 @@ pub fn shade_opaque(scene: &Scene, shadow_light: Option<usize>, point: &Opaque) 
     (radiance.extend(distance).to_array(), n)
 }
 
-/// π times the reflection of a film on rough rock: Blinn 1977 with the exponent 32, which (s + 8)/8π normalises.
+/// Returns π times the reflectance of a film of water on rough rock: Blinn 1977 with the exponent s = 32,
+/// normalised by (s + 8)/8π. All directions are unit vectors away from the point.
 pub fn film_lobe(n: Vec3, l: Vec3, e: Vec3) -> f32 {
     let sum = l + e;
     let h = sum / sum.dot(sum).max(1e-12).sqrt();
@@ -88,7 +90,7 @@ pub fn film_lobe(n: Vec3, l: Vec3, e: Vec3) -> f32 {
     5.0 * fresnel(l.dot(h)) * (c16 * c16)
 }
 
-/// Fresnel's reflection of water for light at an angle to the normal (Schlick 1994).
+/// Returns the Fresnel reflectance of water for light at an angle to the normal (Schlick 1994).
 pub fn fresnel(cos_angle: f32) -> f32 {
     let m = 1.0 - cos_angle.clamp(0.0, 1.0);
     let m2 = m * m;
@@ -96,7 +98,8 @@ pub fn fresnel(cos_angle: f32) -> f32 {
 }
 
 impl Light {
-    /// Unit direction from a point to the light, and I there.
+    /// Returns the unit direction from a point to the light, and the light's intensity at the point. Twin:
+    /// `light_from` of `shaders/layout.wgsl`.
     pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {
         match *self {
             Light::Directional { to_light, intensity } => (to_light, intensity),
@@ -113,7 +116,7 @@ impl Light {
     }
 }
 
-/// Unit direction from `point` to a light at `position`, and its falloff there.
+/// Returns the unit direction from `point` to a light at `position`, and the falloff 1/d² there.
 fn from_point(position: Vec3, point: Vec3) -> (Vec3, f32) {
     let away = position - point;
     let d2 = away.dot(away).max(1e-12);

@@ -1,4 +1,4 @@
-//! §3 The surface of a pool under a pixel of the raster pass. Twin: `shaders/pool.wgsl`.
+//! §3 Shading of a pool's surface in the raster pass. Twin: `shaders/engine/pool.wgsl`.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -6,7 +6,7 @@ use super::opaque::{Opaque, fresnel};
 use crate::engine::pool_surface::{AROUND, Surface, turn};
 use crate::scene::Scene;
 
-/// sin(2πt), to 3e-5: WGSL leaves the error of its own open.
+/// Returns sin(2πt) with an error below 3e-5. It replaces WGSL's `sin`, whose error the standard leaves open.
 pub fn sin_turns(t: f32) -> f32 {
     let x = t - (t + 0.5).floor();
     let x2 = x * x;
@@ -20,7 +20,7 @@ pub fn sin_turns(t: f32) -> f32 {
     sum * x
 }
 
-/// 0 to 1, of a point with whole coordinates.
+/// Hashes a lattice point to a number from 0 to 1.
 fn lattice(x: u32, y: u32) -> f32 {
     let mut h = x.wrapping_mul(0x8da6_b343) ^ y.wrapping_mul(0xd816_3841);
     h = (h ^ (h >> 13)).wrapping_mul(0x9e37_79b1);
@@ -28,7 +28,7 @@ fn lattice(x: u32, y: u32) -> f32 {
     (h >> 8) as f32 / 16_777_216.0
 }
 
-/// Smooth between the lattice's values.
+/// Value noise: interpolates smoothly between the values of the lattice.
 fn value_noise(p: Vec2) -> f32 {
     let cell = p.floor();
     let f = p - cell;
@@ -40,14 +40,16 @@ fn value_noise(p: Vec2) -> f32 {
     near + (far - near) * s.y
 }
 
-/// Where the ray `d` meets the pool, not where its triangles' corners mix: waves are finer than the difference.
+/// Returns the point where the view ray `d` meets the pool's plane. The position interpolated from the
+/// triangle's corners differs from it by more than the size of waves. Far or parallel rays keep `position`.
 fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, d: Vec3) -> Vec3 {
     let eye = scene.camera.eye;
     let t = (surface.middle[1] - eye.y) / if d.y == 0.0 { 1e-20 } else { d.y };
     if t > 0.0 && t < 1e6 { eye + d * t } else { position }
 }
 
-/// The waves' normal. Waves of which a pixel sees half a length or more fade away, for it sees their mean.
+/// Returns the unit normal of the waves. A wave fades out as the pixel's footprint reaches half its length,
+/// because the pixel then sees the wave's mean.
 pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
     let to_eye = scene.camera.eye - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
@@ -55,7 +57,7 @@ pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
     let pixel = 2.0 * scene.camera.tan_half_fov / scene.image.height as f32;
     let footprint = distance * pixel / e.y.max(0.05);
     let p = Vec2::new(point.position.x, point.position.z);
-    // Where water falls in, the surface is rougher.
+    // The surface is rougher where water falls in.
     let churn = 1.0 + 1.5 * point.albedo.y;
     let mut slope = Vec2::ZERO;
     let mut lift = 0.0;
@@ -81,15 +83,16 @@ pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
     n / n.dot(n).sqrt()
 }
 
-/// The view, mirrored; never into the water, for waves hide that from one another.
+/// Returns the view direction mirrored at `n`. It never points into the water, because other waves would hide
+/// that view.
 fn pool_mirrored(e: Vec3, n: Vec3) -> Vec3 {
     let r = n * (2.0 * n.dot(e)) - e;
     let up = Vec3::new(r.x, r.y.abs().max(0.01), r.z);
     up / up.dot(up).sqrt()
 }
 
-/// What of the surroundings a ray from `position` meets: rays are followed to a ball, on which all lies
-/// (Lagarde and Zanuttini 2012).
+/// Looks up the surroundings that a ray from `position` along `r` meets: radiance × cover, and the cover. The
+/// surroundings are projected on a sphere (Lagarde and Zanuttini 2012).
 fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
     let o = position - Vec3::from(surface.middle);
     let b = o.dot(r);
@@ -110,8 +113,10 @@ fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
     low * (1.0 - g) + high * g
 }
 
-/// Radiance and metres from the eye, and normal, where the view ray `d` meets it: what the surface mirrors, with the glint of lights (Blinn 1977, the
-/// exponent 256), what comes from below through the depth, and foam over both.
+/// Shades a pool's surface under the view ray `d`. Returns the linear radiance with the metres from the eye,
+/// and the unit normal. The radiance adds the mirrored surroundings, the glint of the lights (Blinn 1977 with
+/// the exponent 256) and the light from below through the depth of water; foam covers all of them.
+/// `shadow_light` is [`Scene::shadow_light`].
 pub fn shade_pool(
     scene: &Scene,
     shadow_light: Option<usize>,
@@ -127,7 +132,7 @@ pub fn shade_pool(
     let r = pool_mirrored(e, n);
     let (ambient, sky) = match &scene.environment {
         None => (scene.ambient, scene.background.radiance(r)),
-        // Its sun is a light already: the mean about the ray.
+        // The environment's sun is already a light, so the mean radiance about the ray is used.
         Some(environment) => {
             (scene.ambient + environment.irradiance.at(Vec3::Y), environment.irradiance.at(r))
         }
@@ -149,7 +154,7 @@ pub fn shade_pool(
     }
     let mirrors = around(surface, point.position, r);
     let mirror = mirrors.truncate() + sky * (1.0 - mirrors.w);
-    // log₂e times the way down and, slanted by refraction, up again: 2.2 depths.
+    // log₂e · 2.2: light travels 2.2 depths on its way down and, slanted by refraction, up again.
     let through = (Vec3::from(surface.absorption) * (-3.174 * point.albedo.x)).exp2();
     let body = Vec3::from(surface.color) * (1.0 - through) + Vec3::from(surface.bottom) * through;
     let back = fresnel(n.dot(e).max(0.02));

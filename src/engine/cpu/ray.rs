@@ -1,5 +1,6 @@
-//! One pixel's ray in full: every cell it meets and what each gives, for whoever asks why a pixel looks
-//! as it does. The numbers are those of the frame: an [`Observer`] of the same trace writes them down.
+//! A report of one pixel's ray: every cell it meets and the light that each cell adds. It explains why a
+//! pixel looks as it does. An [`Observer`] records the frame's own trace, so the numbers are those of the
+//! frame.
 
 use glam::Vec3;
 
@@ -13,49 +14,52 @@ use crate::util::window::Window;
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::Crossing;
 
-/// One pixel's ray.
+/// The ray of one pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayReport {
     /// Column and row in the image.
     pub pixel: [u32; 2],
-    /// Where the ray meets water, in order of depth: `trace.layers` quads at most. Where it ends early no
-    /// step belongs to the last of them.
+    /// Points where the ray meets water, in order of depth: at most `trace.layers` quads. If the ray ends
+    /// early, the last of them have no steps.
     pub faces: Vec<RayFace>,
-    /// Radiance of the opaque scene or background behind the water, with its haze.
+    /// Linear radiance of the opaque scene or background behind the water, seen through the scene's haze.
     pub behind: Vec3,
-    /// Where the ray meets the opaque scene, metres; none where it leaves to the background.
+    /// Point where the ray meets the opaque scene, metres; `None` if it leaves to the background.
     pub opaque: Option<Vec3>,
-    /// The cells in the order the ray meets them; none without water. What they send is told without haze.
+    /// Cells in the order in which the ray meets them; empty without water. Their radiance is without haze.
     pub steps: Vec<RayStep>,
-    /// Linear radiance of the pixel: the steps' sum and what is left of `behind`, through the scene's haze.
+    /// Linear radiance of the pixel: the steps' sum and the transmitted share of `behind`, seen through the
+    /// haze.
     pub radiance: Vec3,
     /// T at the end of the walk; 1 without water.
     pub transmittance: f32,
-    /// Cells of the view ray and of its light rays.
+    /// Number of cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
-    /// Whether the picture's pixel comes from coarser levels, or from between cells; the report's own is then another.
+    /// Whether the frame's pixel is looked up in coarser levels or between cells. The report uses the
+    /// volume's own cells, so its radiance then differs from the frame's.
     pub filtered: bool,
 }
 
 impl RayReport {
-    /// The first point the ray meets, water or rock, metres.
+    /// Returns the first point of water or rock that the ray meets, metres.
     pub fn surface_point(&self) -> Option<Vec3> {
         self.face().map(|face| face.point).or(self.opaque)
     }
 
-    /// The nearest face, whose are the frame's layers.
+    /// Returns the nearest face, which is the one in the frame's layers.
     pub fn face(&self) -> Option<RayFace> {
         self.faces.first().copied()
     }
 
-    /// Metres along the ray from the nearest face to where it enters a step's cell, and to where it leaves it.
+    /// Returns the distances along the ray from the nearest face to the points where the ray enters and
+    /// leaves a step's cell, metres.
     pub fn behind_nearest_m(&self, step: &RayStep) -> [f32; 2] {
-        let away = self.faces[step.face].depth_m - self.faces[0].depth_m;
-        [away + step.enter_m, away + step.exit_m]
+        let face_m = self.faces[step.face].depth_m - self.faces[0].depth_m;
+        [face_m + step.enter_m, face_m + step.exit_m]
     }
 }
 
-/// Where a ray meets a quad.
+/// The point where a ray meets a quad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayFace {
     /// Number of the quad in the scene, from 0.
@@ -71,17 +75,17 @@ pub struct RayFace {
 /// One cell of a ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayStep {
-    /// Number of its face in [`RayReport::faces`].
+    /// Index of its face in [`RayReport::faces`].
     pub face: usize,
     /// x, y and z in the volume; x and y inside the tile.
     pub cell: [u32; 3],
-    /// Metres along the ray from its face to where it enters the cell.
+    /// Metres along the ray from its face to the point where it enters the cell.
     pub enter_m: f32,
-    /// Metres along the ray from its face to where it leaves the cell.
+    /// Metres along the ray from its face to the point where it leaves the cell.
     pub exit_m: f32,
-    /// α·ρ, as in a volume file but for what the sheet erodes, or is mist.
+    /// α·ρ after the sheet's erosion or mist. Without them it is the ρ of a volume file.
     pub rho: f32,
-    /// Direction of the flow, unit; zero where there is none.
+    /// Unit direction of the flow; zero without a direction.
     pub v: Vec3,
     /// Diffuse reflection coefficient.
     pub k_d: f32,
@@ -89,17 +93,17 @@ pub struct RayStep {
     pub k_s: f32,
     /// T before the cell.
     pub transmittance: f32,
-    /// Linear radiance the cell adds towards the eye, its share of the ambient light included.
+    /// Linear radiance that the cell adds towards the eye, including its ambient light.
     pub radiance: Vec3,
-    /// V of each light; empty where the cell is.
+    /// V of each light; no values for an empty cell.
     pub visibility: Vec<f32>,
 }
 
-/// Traces the ray through the centre of a pixel (column, row; outside the image the nearest inside).
-/// Where the scene has one sample a pixel, no filter and looks up the nearest cell, radiance, transmittance and cells are the bits of
-/// [`super::render`]'s frame.
+/// Traces the ray through the centre of a pixel (column, row). A pixel outside the image is clamped to its
+/// edge. Radiance, transmittance and cells equal those of [`super::render`]'s frame bit for bit if the scene
+/// has one sample per pixel, no filter and nearest lookup.
 pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 2]) -> RayReport {
-    // The first sample is the centre for any number of samples.
+    // The first sample lies at the pixel's centre for any number of samples.
     const SAMPLE: u32 = 0;
     let image = &scene.image;
     let pixel = [pixel[0].min(image.width - 1), pixel[1].min(image.height - 1)];
@@ -117,28 +121,28 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     };
     let faces = gbuffer.faces(0).map(face).collect();
     let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
-    // Its cells are the volume's own.
+    // Without filter and interpolation, the steps are the volume's own cells.
     let mut plain = scene.clone();
-    plain.edit().trace.filter = Prefilter::None;
-    plain.edit().trace.lookup = Lookup::Nearest;
-    let traced = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
+    let trace = &mut plain.edit().trace;
+    (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
+    let result = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
     RayReport {
         pixel,
         faces,
         behind: Vec3::from_slice(&gbuffer.opaque[0]),
         opaque: (opaque_m > 0.0).then(|| at(opaque_m)),
         steps: recorder.steps,
-        radiance: traced.radiance,
-        transmittance: traced.transmittance,
-        cells: traced.cells,
+        radiance: result.radiance,
+        transmittance: result.transmittance,
+        cells: result.cells,
         filtered: scene.trace.filter != Prefilter::None || scene.trace.lookup != Lookup::Nearest,
     }
 }
 
-/// Writes a ray's cells down.
+/// Records the cells of a ray.
 struct Recorder {
     alpha: f32,
-    /// Met so far.
+    /// Faces met so far.
     faces: usize,
     steps: Vec<RayStep>,
 }

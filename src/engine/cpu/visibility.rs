@@ -1,5 +1,5 @@
-//! §5 What lies between cells and lights, and light volumes on the CPU. Twins: `shaders/optical_depth.wgsl` and
-//! `shaders/visibility.wgsl`.
+//! §5 Light volumes on the CPU, kept from frame to frame. Twin: `shaders/light/visibility.wgsl`. The walk
+//! from a cell to a light is in `src/light/optical_depth.rs`.
 
 use std::sync::Arc;
 
@@ -10,31 +10,36 @@ use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Levels, LevelsCache};
 
-/// Light volumes that are kept from frame to frame.
+/// The light volumes of the last frame, and the volume's levels.
 #[derive(Default)]
 pub struct LightVolumeCache {
-    /// What they are of.
+    /// Levels of the last volume.
     pub levels: LevelsCache,
-    kept: Option<Kept>,
+    last: Option<FilledCache>,
 }
 
-struct Kept {
+/// Light volumes, and the inputs they were filled from.
+struct FilledCache {
     levels: Levels,
     lookup: Lookup,
     plan: LightVolumes,
     filled: Filled,
 }
 
-/// All light volumes, number by number: of every level, in its order of cells.
+/// All light volumes of a plan, by their numbers. Each holds the values of every level, in the level's order
+/// of cells.
 pub type Filled = Arc<Vec<Vec<Numbers>>>;
 
 impl LightVolumeCache {
-    /// Lets go of the light volumes.
+    /// Drops the light volumes.
     pub fn forget(&mut self) {
-        self.kept = None;
+        self.last = None;
     }
 
-    /// The light volumes that are planned, walked unless they are those of the last call.
+    /// Returns the planned light volumes. They are filled unless they are those of the last call.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
     pub fn get(
         &mut self,
         plan: &LightVolumes,
@@ -42,16 +47,16 @@ impl LightVolumeCache {
         lookup: Lookup,
         monitor: &dyn Monitor,
     ) -> Result<Filled> {
-        if let Some(kept) = &self.kept
-            && Arc::ptr_eq(&kept.levels, levels)
-            && kept.lookup == lookup
-            && kept.plan.volumes == plan.volumes
-            && (kept.plan.medium, kept.plan.form) == (plan.medium, plan.form)
+        if let Some(last) = &self.last
+            && Arc::ptr_eq(&last.levels, levels)
+            && last.lookup == lookup
+            && last.plan.volumes == plan.volumes
+            && (last.plan.medium, last.plan.form) == (plan.medium, plan.form)
         {
-            return Ok(kept.filled.clone());
+            return Ok(last.filled.clone());
         }
-        // The old ones go first: both might not fit.
-        self.kept = None;
+        // The old ones are dropped first, because both might not fit.
+        self.last = None;
         let total = plan.volumes.len() as u64;
         let mut all = Vec::with_capacity(plan.volumes.len());
         let rows = Rows::new(levels, lookup);
@@ -61,7 +66,7 @@ impl LightVolumeCache {
         }
         let filled = Arc::new(all);
         let (levels, plan) = (levels.clone(), plan.clone());
-        self.kept = Some(Kept { levels, lookup, plan, filled: filled.clone() });
+        self.last = Some(FilledCache { levels, lookup, plan, filled: filled.clone() });
         Ok(filled)
     }
 }

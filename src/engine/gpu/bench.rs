@@ -59,8 +59,9 @@ impl GpuBench {
         GpuBench { renderer, prepared: None }
     }
 
-    /// Uploads scenes, each with the name of its integrate pass, and compiles these passes. The first scene also gets
-    /// the raster pass and the walks without light (`shaders/engine/bare.wgsl`), cell by cell and leaping.
+    /// Uploads scenes, each with the name of its integrate pass, and compiles these passes. The first scene
+    /// also gets the raster pass and the walks without light (`shaders/engine/bare.wgsl`), cell by cell and
+    /// leaping.
     ///
     /// # Errors
     /// Errors of uploading the scenes and filling their light volumes, as in [`GpuRenderer::render`].
@@ -140,7 +141,8 @@ impl GpuBench {
         self.prepared.iter().flat_map(|p| &p.passes).map(|(name, _)| *name).collect()
     }
 
-    /// Runs the pass at an index of [`GpuBench::names`]. Returns its seconds on the device and the cells it walked.
+    /// Runs the pass at an index of [`GpuBench::names`]. Returns its seconds on the device and the cells it
+    /// walked.
     ///
     /// # Errors
     /// Errors of the device: see [`Gpu::run`].

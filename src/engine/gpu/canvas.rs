@@ -32,8 +32,8 @@ impl Canvas {
     }
 }
 
-/// Returns the first item that `matches`, moved to the front, or inserts a new one there. The least recently used
-/// items beyond `most` are dropped before the new one is made.
+/// Returns the first item that `matches`, moved to the front, or inserts a new one there. The least recently
+/// used items beyond `most` are dropped before the new one is made.
 pub fn lru_get_or_insert<T>(
     items: &mut Vec<T>,
     most: usize,

@@ -1,16 +1,16 @@
-//! The device: one per process, its faults, and waiting for it.
+//! The device: opening it, waiting for it, and reporting its faults.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::util::error::{Error, Result};
 
-/// How to open a device.
+/// Options for opening a device.
 #[derive(Clone, Debug)]
 pub struct DeviceOptions {
-    /// Part of the adapter's name; none takes the fastest.
+    /// Part of the adapter's name, in any case; `None` chooses the fastest adapter.
     pub adapter: Option<String>,
-    /// Longest wait for one submission.
+    /// Longest wait for one submission before it counts as hung.
     pub watchdog: Duration,
 }
 
@@ -26,9 +26,9 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
-    /// What the adapter says of itself.
+    /// Name, kind and driver of the adapter.
     pub info: wgpu::AdapterInfo,
-    /// Whether passes can be timed on the device.
+    /// Whether timestamp queries can time passes on the device.
     pub timestamps: bool,
     watchdog: Duration,
     fault: Arc<Mutex<Option<Fault>>>,
@@ -38,7 +38,7 @@ pub struct Gpu {
 enum Fault {
     Lost(String),
     OutOfMemory(String),
-    /// Validation or internal: this program's mistake.
+    /// A validation or internal error: a bug of this program.
     Bug(String),
 }
 
@@ -52,13 +52,17 @@ fn instance() -> wgpu::Instance {
     wgpu::Instance::new(descriptor)
 }
 
-/// All adapters of this machine.
+/// Returns all adapters of this machine.
 pub fn adapters() -> Vec<wgpu::Adapter> {
     pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY))
 }
 
 impl Gpu {
     /// Opens the fastest adapter, or the first whose name contains `options.adapter`.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if there is no such adapter, or if it lacks a feature or limit that the passes
+    /// need.
     pub fn open(options: &DeviceOptions) -> Result<Gpu> {
         let adapter = match &options.adapter {
             Some(name) => {
@@ -81,12 +85,12 @@ impl Gpu {
             max_texture_dimension_3d: has.max_texture_dimension_3d,
             max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
             max_buffer_size: has.max_buffer_size,
-            // Quads, lights, light places, radiance and counts; WebGPU grants 8 everywhere.
+            // Lights, quads, sums, counts, light places, profiles and workgroups. WebGPU guarantees 8.
             max_storage_buffers_per_shader_stage: has.max_storage_buffers_per_shader_stage.min(8),
             ..wgpu::Limits::downlevel_defaults()
         };
-        // Software Vulkan writes the first time stamp of a compute pass when it gets round to it: after a
-        // submission that drew nothing lavapipe tells 0.03 ms of 40. The host's clock is right to 0.4 ms there.
+        // Software Vulkan may write the first timestamp of a compute pass late: after a submission that drew
+        // nothing, lavapipe reports 0.03 ms of 40 ms. The host's clock is accurate to 0.4 ms there.
         let software = is_software(&info);
         let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) && !software;
         let required_features =
@@ -98,7 +102,7 @@ impl Gpu {
             ..Default::default()
         }))
         .map_err(|e| {
-            Error::NoAdapter(format!("{} cannot do the work: {}", info.name, one_line(&e.to_string())))
+            Error::NoAdapter(format!("{} cannot be used: {}", info.name, one_line(&e.to_string())))
         })?;
 
         let fault: Arc<Mutex<Option<Fault>>> = Arc::default();
@@ -124,21 +128,27 @@ impl Gpu {
         Ok(Gpu { device, queue, info, timestamps, watchdog: options.watchdog, fault })
     }
 
-    /// Name and kind of the adapter for people.
+    /// Returns the adapter's name, kind and backend for messages.
     pub fn name(&self) -> String {
         format!("{} ({:?}, {:?})", self.info.name, self.info.device_type, self.info.backend)
     }
 
-    /// Whether the device is the host's processor.
+    /// Whether the device is software Vulkan on the host's processor.
     pub fn is_software(&self) -> bool {
         is_software(&self.info)
     }
 
-    /// The first fault the device reported, if any.
+    /// Checks whether the device has reported a fault.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`] or [`Error::Memory`] if it has.
+    ///
+    /// # Panics
+    /// If the device refused a command, which is a bug of this program.
     pub fn check(&self) -> Result<()> {
         let fault = || self.fault.lock().unwrap_or_else(|e| e.into_inner()).clone();
         if matches!(fault(), Some(Fault::Bug(_))) {
-            // A lost device refuses commands before it tells of its loss.
+            // A lost device refuses commands before it reports its loss.
             let _ = self.device.poll(wgpu::PollType::Poll);
         }
         match fault() {
@@ -154,13 +164,19 @@ impl Gpu {
         }
     }
 
-    /// Submits and waits, no longer than the watchdog allows.
+    /// Submits commands and waits until they are done.
+    ///
+    /// # Errors
+    /// Errors of [`Gpu::wait`].
     pub fn run(&self, encoder: wgpu::CommandEncoder) -> Result<()> {
         let index = self.queue.submit([encoder.finish()]);
         self.wait(index)
     }
 
-    /// Waits for a submission and what came before it.
+    /// Waits for a submission and all earlier ones.
+    ///
+    /// # Errors
+    /// Errors of [`Gpu::check`]; [`Error::Watchdog`] if the wait takes longer than the watchdog allows.
     pub fn wait(&self, index: wgpu::SubmissionIndex) -> Result<()> {
         let waited = self
             .device
@@ -169,8 +185,8 @@ impl Gpu {
         match waited {
             Ok(_) => Ok(()),
             Err(wgpu::PollError::Timeout) => {
-                // Dropping a queue waits until it is idle, which after a hang may be never: a handle that
-                // is never dropped keeps the device until the process ends.
+                // Dropping a queue waits until it is idle, which may never happen after a hang. A leaked
+                // handle keeps the device until the process ends.
                 std::mem::forget((self.device.clone(), self.queue.clone()));
                 Err(Error::Watchdog { seconds: self.watchdog.as_secs_f64() })
             }
@@ -178,12 +194,12 @@ impl Gpu {
         }
     }
 
-    /// A command encoder.
+    /// Creates a command encoder.
     pub fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }
 
-    /// A buffer of `size` bytes.
+    /// Creates a buffer of `size` bytes.
     pub fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -193,7 +209,7 @@ impl Gpu {
         })
     }
 
-    /// A buffer with contents; at least 16 bytes, for empty bindings are not allowed.
+    /// Creates a buffer with contents. It has at least 16 bytes, because bindings must not be empty.
     pub fn buffer_with(&self, label: &str, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let size = (bytes.len() as u64).next_multiple_of(4).max(16);
         let buffer = self.buffer(label, size, usage | wgpu::BufferUsages::COPY_DST);

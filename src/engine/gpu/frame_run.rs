@@ -1,5 +1,5 @@
-//! One rendering on the GPU: prepare the scene, then draw window by window, sample by sample, and read each window
-//! back.
+//! One rendering on the GPU: prepare the scene, then draw window by window, sample by sample, and read each
+//! window back.
 
 use std::ops::Range;
 use std::time::Instant;

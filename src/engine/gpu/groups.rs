@@ -1,6 +1,8 @@
-//! The workgroups of the integrate pass: those that water may lie under, and the rest, which need no walk.
+//! The workgroups of the integrate pass: wet ones, which volume quads may cover, and dry ones, which need no
+//! walk.
 //!
-//! Software Vulkan goes once through all of a shader even where no lane has anything to do.
+//! They are dispatched apart because software Vulkan runs through the whole shader even if no lane has work
+//! to do.
 
 use super::device::Gpu;
 use super::layout::{Tile, WORKGROUP};
@@ -8,29 +10,29 @@ use crate::engine::overlap;
 use crate::scene::Scene;
 use crate::util::window::Window;
 
-/// Places of all workgroups of an area, in workgroups from its corner.
+/// List of all workgroups of an area, by their position in workgroups from its corner.
 pub struct GroupList {
-    /// `array<u32>`, x | y << 16: first those under water, row by row, then the others.
+    /// `array<u32>` of x | y << 16: first the wet workgroups row by row, then the dry ones.
     pub buffer: wgpu::Buffer,
-    /// How many water may lie under.
+    /// Number of wet workgroups.
     pub wet: u32,
-    /// The others.
+    /// Number of dry workgroups.
     pub dry: u32,
 }
 
 impl GroupList {
-    /// Of a part of a window of a scene's image.
+    /// Lists the workgroups of an area of a window, and uploads the list.
     pub fn new(gpu: &Gpu, scene: &Scene, window: Window, area: Tile) -> Self {
         let [across, down] = [area.width, area.height].map(|n| n.div_ceil(WORKGROUP));
         let corner = [window.x + area.x, window.y + area.y];
-        let under = overlap::covered(scene, corner, [across, down], WORKGROUP);
-        let places = |wet: bool| {
-            let chosen = under.iter().enumerate().filter(move |(_, under)| **under == wet);
+        let covered = overlap::covered(scene, corner, [across, down], WORKGROUP);
+        let positions = |wet: bool| {
+            let chosen = covered.iter().enumerate().filter(move |(_, covered)| **covered == wet);
             chosen.map(move |(i, _)| (i as u32 % across) | ((i as u32 / across) << 16))
         };
-        let mut list: Vec<u32> = places(true).collect();
+        let mut list: Vec<u32> = positions(true).collect();
         let wet = list.len() as u32;
-        list.extend(places(false));
+        list.extend(positions(false));
         let buffer = gpu.buffer_with("workgroups", bytemuck::cast_slice(&list), wgpu::BufferUsages::STORAGE);
         GroupList { buffer, wet, dry: list.len() as u32 - wet }
     }

@@ -1,4 +1,5 @@
-//! §4 and §5: the compute pass that walks the volume under each pixel.
+//! §4 and §5: the compute pass that walks the volume under each pixel. Shader:
+//! `shaders/engine/integrate.wgsl`; twin: `src/engine/cpu/integrate.rs`.
 
 use super::device::Gpu;
 use super::layout::{Groups, WORKGROUP};
@@ -12,29 +13,29 @@ use crate::scene::Scene;
 use crate::trace::{Attenuation, Lookup, Prefilter};
 use crate::util::error::Result;
 
-/// A submission aims at this many seconds: long enough to hide its own cost, short enough that no
-/// driver's watchdog (250 ms and up) and no user waiting for Ctrl-C notices.
+/// Target time of a submission in seconds: long enough to hide its overhead, short enough for every driver's
+/// watchdog (250 ms and up) and for a quick response to Ctrl-C.
 const TILE_SECONDS: f64 = 0.03;
-/// Pixels of the first tile, when nothing is known about the scene's cost; with many lights fewer. With every
-/// pixel at the cap of 512 cells and a full walk to one light from each, software Vulkan takes about a second for it.
+/// Pixels of the first tile with one light, when the scene's cost is unknown. If every pixel walks the cap of
+/// 512 cells, with a full walk to the light from each, software Vulkan takes about a second for it.
 const FIRST_TILE_PIXELS: f64 = 1024.0;
-/// A tile grows at most this much over the one before.
+/// Largest growth of a tile relative to the one before.
 const TILE_GROWTH: f64 = 4.0;
 
-/// Pixels of a workgroup.
+/// Pixels per workgroup.
 const GROUP_PIXELS: u64 = WORKGROUP as u64 * WORKGROUP as u64;
-/// Workgroups along one dimension of a dispatch.
+/// Largest number of workgroups along one dimension of a dispatch.
 const MOST_GROUPS: u32 = 65535;
 
-/// The stage's shader, for pixels under which there may be `many` sheets or one.
+/// Returns the stage's shader with everything it imports, for pixels with `many` sheets or at most one.
 pub fn source(many: bool) -> String {
     resolve(if many { "#import engine::sheets_many" } else { "#import engine::sheets_one" })
 }
 
-/// What the pipeline is specialised to (`override` constants of the shader).
+/// Constants that a pipeline is specialised to: the shader's `override` constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variant {
-    /// None, one, or (2) several.
+    /// Number of lights: 0, 1, or 2 for several.
     lights: u32,
     per_cell: bool,
     march: bool,
@@ -53,8 +54,9 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// For a scene of which at most `layers` sheets lie under a pixel, the light volumes it has if its
-    /// visibility is cached, whether the levels are made for leaps, and whether cells are stored in bricks.
+    /// Returns the variant for a scene with at most `layers` sheets under a pixel. `light_volumes` is the
+    /// plan of its light volumes if visibility is cached. `leaps` tells whether the levels are made for
+    /// leaps, `sparse` whether cells are stored in bricks.
     pub fn of(
         scene: &Scene,
         layers: u32,
@@ -81,19 +83,20 @@ impl Variant {
     }
 }
 
-/// What stands for both numbers of cells where the device ended a walk; `CUT` of the shader.
+/// Marker in place of both numbers of cells if the device ended a walk early. Twin: `CUT` of
+/// `shaders/engine/integrate.wgsl`.
 pub const CUT: u32 = u32::MAX;
 
-/// Sums over samples, per pixel of a window.
+/// Sums over the samples, for each pixel of a window.
 pub struct Sums {
-    /// Radiance rgb and transmittance, `vec4<f32>`.
+    /// Linear radiance (rgb) and transmittance, `vec4<f32>`.
     pub radiance: wgpu::Buffer,
-    /// Cells of view rays and of light rays, `vec2<u32>`.
+    /// Cells walked by view rays and by light rays, `vec2<u32>`.
     pub counts: wgpu::Buffer,
 }
 
 impl Sums {
-    /// Sums for `pixels` pixels.
+    /// Allocates sums for `pixels` pixels.
     pub fn new(gpu: &Gpu, pixels: u64) -> Self {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         Sums {
@@ -103,43 +106,44 @@ impl Sums {
     }
 }
 
-/// The pass: one specialised pipeline.
+/// The integrate pass, specialised to one variant.
 pub struct Integrate {
     pipeline: wgpu::ComputePipeline,
-    /// For workgroups without water.
+    /// Pipeline of the dry workgroups; the bare walk has none and skips them.
     dry: Option<wgpu::ComputePipeline>,
     group_layout: wgpu::BindGroupLayout,
-    /// What it is specialised to.
+    /// The variant that it is specialised to.
     pub variant: Variant,
 }
 
-/// Chooses tile sizes from the time the last one took. The picture does not depend on them.
+/// Chooses the size of a tile by the time the last one took. The picture does not depend on it.
 pub struct Tiler {
     pixels: f64,
     fixed: bool,
-    /// Of the sizes that were found right.
+    /// Smallest size chosen so far.
     smallest: f64,
 }
 
 impl Tiler {
-    /// Learns the size; with `fixed` every tile has about that many pixels. `known` is what the last frame of
-    /// the like has learned; `lights` is their number.
+    /// Creates a tiler. With `fixed`, every tile has about that many pixels. `known` is the size that a
+    /// similar frame has learned, in pixels; `lights` is the number of lights.
     pub fn new(fixed: Option<u32>, known: Option<f64>, lights: usize) -> Self {
         let first = (FIRST_TILE_PIXELS / lights.max(1) as f64).max(64.0);
         let pixels = fixed.map(f64::from).or(known).unwrap_or(first);
         Tiler { pixels, fixed: fixed.is_some(), smallest: f64::INFINITY }
     }
 
-    /// The size that suited the dearest part of the frame; none if no tile was timed.
+    /// Returns the size in pixels that suited the most expensive part of the frame; `None` if no tile was
+    /// timed.
     pub fn learned(&self) -> Option<f64> {
         self.smallest.is_finite().then_some(self.smallest)
     }
 
-    /// How many of `left` workgroups the next submission takes.
-    fn next(&self, left: u32) -> u32 {
+    /// Returns how many of `remaining` workgroups the next submission takes.
+    fn next(&self, remaining: u32) -> u32 {
         let count = (self.pixels.max(1.0) as u64).div_ceil(GROUP_PIXELS).clamp(1, MOST_GROUPS.into()) as u32;
-        // Submissions alike, not large ones and a rest: every one waits for its last workgroup.
-        left.div_ceil(left.div_ceil(count))
+        // Submissions of equal size beat large ones with a small rest: each waits for its last workgroup.
+        remaining.div_ceil(remaining.div_ceil(count))
     }
 
     fn learn(&mut self, groups: u32, seconds: f64) {
@@ -153,7 +157,7 @@ impl Tiler {
 }
 
 impl Integrate {
-    /// Compiles the pipeline for one variant.
+    /// Compiles the pipelines for one variant.
     pub fn new(gpu: &Gpu, variant: Variant) -> Self {
         let number = |on: bool| f64::from(u8::from(on));
         let constants = [
@@ -175,7 +179,7 @@ impl Integrate {
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
     }
 
-    /// The bench's bare walk: the same bindings, no light.
+    /// Compiles the bare walk of `taki bench`: the same bindings, no light.
     pub fn bare(gpu: &Gpu, variant: Variant) -> Self {
         let number = |on: bool| f64::from(u8::from(on));
         let constants = [("LEAPS", number(variant.leaps)), ("SPARSE", number(variant.sparse))];
@@ -198,8 +202,11 @@ impl Integrate {
         Integrate { pipeline: pipeline("integrate"), dry, group_layout, variant }
     }
 
-    /// Adds one sample of a window's area to `sums`, some workgroups at a time; seconds on the device. `between` is called
-    /// after each submission with the pixels done so far, and may stop the work.
+    /// Adds one sample of a window's area to `sums`, some workgroups at a time. Returns the seconds on the
+    /// device. Calls `between` after each submission with the pixels done so far; its error stops the work.
+    ///
+    /// # Errors
+    /// Errors of `between` and of the device: see [`Gpu::run`].
     pub fn run(
         &self,
         inputs: &Inputs,
@@ -279,7 +286,7 @@ impl Integrate {
     }
 }
 
-/// The bindings of `shaders/integrate.wgsl`, in order.
+/// The bindings of `shaders/engine/integrate.wgsl`, in order.
 fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,

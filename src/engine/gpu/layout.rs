@@ -1,5 +1,5 @@
-//! Structs the host shares with the shaders: twins of those in `shaders/frame.wgsl`, checked by a
-//! test through naga (names, offsets, sizes, constants).
+//! Structs that the host shares with the shaders: twins of those in `shaders/layout.wgsl` and beside the
+//! bindings that use them. A test compares names, offsets, sizes and constants through naga.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use crate::trace::{extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
-/// Side of a compute workgroup. 8×8, 16×4 and 64×1 measure alike, 4×4 is twice as slow.
+/// Side of a compute workgroup, pixels. 8×8, 16×4 and 64×1 are equally fast; 4×4 is twice as slow.
 pub const WORKGROUP: u32 = 8;
 
 /// Uniforms of one sample of one window.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[allow(missing_docs)] // The fields are described where the shaders read them.
+#[allow(missing_docs)] // The shaders' structs describe the fields.
 pub struct FrameUniforms {
     pub clip_from_world: [[f32; 4]; 4],
     pub eye_world: [f32; 3],
@@ -59,7 +59,7 @@ pub struct FrameUniforms {
     pub pad_c: f32,
 }
 
-/// What is shaded at a vertex of the opaque mesh; numbers to 1 are halves of words.
+/// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -139,7 +139,7 @@ pub struct Quad {
     pub pad_c: f32,
 }
 
-/// The light volume that one submission fills, or a part of it.
+/// Uniforms of a submission that fills columns of one light volume.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -152,7 +152,7 @@ pub struct LightVolume {
     pub pad: [u32; 3],
 }
 
-/// The reflection model of flowing water, beside its table.
+/// Constants of the strand model; its table is a texture.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -163,7 +163,7 @@ pub struct Strand {
     pub g: f32,
 }
 
-/// The environment of a scene that has one; `shaders/environment.wgsl`.
+/// Uniforms of a scene's environment. Twin: `shaders/light/environment.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -180,7 +180,7 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Of an environment.
+    /// Packs an environment.
     pub fn new(environment: &environment::Environment) -> Self {
         let sun = environment.sun;
         Environment {
@@ -197,7 +197,7 @@ impl Environment {
     }
 }
 
-/// The part of a window that is looked at, pixels.
+/// A part of a window, pixels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -208,7 +208,7 @@ pub struct Tile {
     pub height: u32,
 }
 
-/// The workgroups that one submission of the integrate pass works on.
+/// The workgroups of one submission of the integrate pass.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -235,7 +235,7 @@ pub struct Similarity {
     pub pad_2: f32,
 }
 
-/// What the integrate pass knows of how the volume's matter reflects.
+/// Constants of how the volume reflects and scatters light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -245,7 +245,7 @@ pub struct Reflection {
 }
 
 impl Reflection {
-    /// Of the parts that are asked for.
+    /// Packs the constants of the models that a scene uses; the others stay 0.
     pub fn new(strand: Option<&StrandShading>, similarity: Option<&scatter::Similarity>) -> Self {
         let similarity = similarity.map(|s| Similarity {
             extinction: s.extinction.to_array(),
@@ -268,14 +268,14 @@ impl From<&StrandShading> for Strand {
 }
 
 impl Tile {
-    /// All of a window.
+    /// Returns all of a window.
     pub fn whole(window: Window) -> Tile {
         Tile { x: 0, y: 0, width: window.width, height: window.height }
     }
 }
 
 impl FrameUniforms {
-    /// Sample `sample` of `window`, one of `samples`, which the sums begin and end with; the targets have
+    /// Packs the uniforms of sample `sample` of a window. The sums run over `samples`; the targets have
     /// `layers` layers.
     pub fn new(
         scene: &Scene,
@@ -331,8 +331,8 @@ impl FrameUniforms {
     }
 }
 
-/// The scene's lights, then those that stand for its environment in the volume; a light that shines on
-/// nothing if there are none, for no buffer is empty.
+/// Returns the scene's lights, then those that stand for its environment in the volume. Without any, it
+/// returns one dark light, because no buffer may be empty.
 pub fn lights(scene: &Scene) -> Vec<Light> {
     let mut lights: Vec<Light> = scene.volume_lights().iter().map(Light::new).collect();
     lights.resize(lights.len().max(1), Light::default());
@@ -362,8 +362,9 @@ impl Light {
 }
 
 impl Quad {
-    /// A quad seen by an eye. The eye's place relative to the quad is taken in float64: far eyes
-    /// would lose the digits that texture coordinates need. `profile` is where its material's profile begins.
+    /// Packs a quad for an eye. The eye's position relative to the quad is computed in float64, because a
+    /// distant eye would lose the digits that texture coordinates need. `profile` is the index at which the
+    /// profile of its material begins.
     pub fn new(quad: &crate::mapping::Quad, eye: Vec3, profile: u32) -> Self {
         let map = &quad.map;
         let away: DVec3 = eye.as_dvec3() - map.a_world.as_dvec3();

@@ -1,5 +1,5 @@
-//! Results of the raster pass that later frames reuse: rock and quads stay the same while only the water moves or a
-//! parameter of the walk changes.
+//! Results of the raster pass that later frames reuse: rock and quads stay the same while only the water
+//! moves or a parameter of the walk changes.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -23,7 +23,8 @@ pub struct Rasters {
     turn: u64,
 }
 
-/// Everything the raster pass of one sample of one window depends on, except the pools' waves, as two 64-bit hashes.
+/// Everything the raster pass of one sample of one window depends on, except the pools' waves, as two 64-bit
+/// hashes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key([u64; 2]);
 
@@ -77,9 +78,9 @@ impl Rasters {
         self.turn += 1;
     }
 
-    /// Returns the kept targets of a pass, filled or still to be filled. Returns `None` if the pass is new, or if its
-    /// targets do not fit into `most` bytes. Targets that neither this frame nor the last one has used are dropped
-    /// to make room.
+    /// Returns the kept targets of a pass, filled or still to be filled. Returns `None` if the pass is new,
+    /// or if its targets do not fit into `most` bytes. Targets that neither this frame nor the last one has
+    /// used are dropped to make room.
     pub fn get(&mut self, gpu: &Gpu, key: Key, shape: TargetShape, most: u64) -> Option<&KeptRaster> {
         if let Some(i) = self.kept.iter().position(|kept| kept.key == key) {
             self.kept[i].used = self.turn;

@@ -26,11 +26,12 @@ pub fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, read: impl FnOnce(&[u8]) -> T) -
     Ok(result)
 }
 
-/// Bytes copied at once: a staging buffer for a whole window would be large compared with the window's targets.
+/// Bytes copied at once: a staging buffer for a whole window would be large compared with the window's
+/// targets.
 const STAGING_BYTES: u64 = 16 << 20;
 
-/// Reads the rows of `area` from a storage buffer whose rows have `width` items of `item` bytes. Calls `read` with each
-/// row's number in the area and its bytes.
+/// Reads the rows of `area` from a storage buffer whose rows have `width` items of `item` bytes. Calls `read`
+/// with each row's number in the area and its bytes.
 pub fn read_rows(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
@@ -96,8 +97,8 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, area: Tile) -> Result<Ve
 /// Pixels of the raster pass's targets copied at once: 52 bytes each, in the staging buffers and unpacked.
 const SURFACE_PIXELS: u32 = 1 << 17;
 
-/// Copies the targets of `area` into `surface`, whose rows have `width` pixels. The area's first pixel goes to index
-/// `first`.
+/// Copies the targets of `area` into `surface`, whose rows have `width` pixels. The area's first pixel goes
+/// to index `first`.
 pub fn read_surface(
     gpu: &Gpu,
     scene: &Scene,

@@ -1,4 +1,4 @@
-//! §5 What the integrate pass reads of the reflection model and of multiple scattering.
+//! §5 Bindings of the integrate pass for the reflection model and multiple scattering.
 
 use std::sync::Arc;
 
@@ -11,27 +11,27 @@ use crate::light::strand::table::{StrandShading, StrandTable};
 use crate::scene::Scene;
 use crate::volume::VolumeTexture;
 
-/// Tables that stay on the device.
+/// Tables that stay on the device from frame to frame.
 #[derive(Default)]
 pub struct Reflections {
     strand: Option<(Option<Arc<StrandTable>>, StrandTexture)>,
     profiles: Option<(Vec<Arc<Profile>>, wgpu::Buffer)>,
 }
 
-/// The bindings.
+/// The bindings of one scene.
 pub struct BoundReflection {
-    /// `Reflection`.
+    /// Uniform `Reflection`.
     pub uniform: wgpu::Buffer,
     /// Table of the strand model.
     pub table: wgpu::TextureView,
-    /// Its sampler.
+    /// Trilinear sampler of the table.
     pub sampler: wgpu::Sampler,
-    /// `array<vec4<f32>>`: profiles, one after the other.
+    /// `array<vec4<f32>>`: the profiles of multiple scattering one after the other.
     pub profiles: wgpu::Buffer,
 }
 
 impl Reflections {
-    /// For a scene, uploading what is not there yet.
+    /// Returns the bindings for a scene, and uploads the tables that are not on the device yet.
     pub fn bind(&mut self, gpu: &Gpu, scene: &Scene, volume: &VolumeTexture) -> BoundReflection {
         let strand = match &scene.reflection {
             Reflection::Strand(params) => Some(StrandShading::new(params)),
@@ -40,12 +40,12 @@ impl Reflections {
         let media = scene.media(volume);
         let uniform = layout::Reflection::new(strand.as_ref(), media.as_ref().map(|m| &m.similarity));
         let table = strand.map(|strand| strand.table);
-        let is_there = match (&self.strand, &table) {
+        let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,
             (Some((Some(old), _)), Some(new)) => Arc::ptr_eq(old, new),
             _ => false,
         };
-        if !is_there {
+        if !is_resident {
             let texture = match &table {
                 Some(table) => StrandTexture::new(gpu, table),
                 None => StrandTexture::empty(gpu),

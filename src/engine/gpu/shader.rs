@@ -1,4 +1,4 @@
-//! The shaders' text: each file names what it needs with `#import folder::file`.
+//! The text of the shaders. Each file names the files it needs with `#import folder::file`.
 
 use std::collections::HashSet;
 
@@ -8,7 +8,7 @@ macro_rules! files {
     };
 }
 
-/// Name and text of every file in `shaders/`, without its ending.
+/// Name (without extension) and text of every file in `shaders/`.
 pub const FILES: &[(&str, &str)] = files! {
     "layout" "mapping" "walk" "volume/cells"
     "trace/levels" "trace/lookup" "trace/matter"
@@ -19,21 +19,22 @@ pub const FILES: &[(&str, &str)] = files! {
     "picture/resolve"
 };
 
-/// The names that a line `#import a::b` of a text asks for, as in [`FILES`].
+/// Iterates over the files that the `#import` lines of a text name, written as in [`FILES`].
 pub fn imports(text: &str) -> impl Iterator<Item = String> {
     text.lines().filter_map(|line| line.strip_prefix("#import ")).map(|path| path.trim().replace("::", "/"))
 }
 
-/// The text of a stage with all that it imports, directly or not: each file once, before the file that names it first.
-/// Files may import one another, since the order of declarations means nothing in WGSL.
+/// Returns the text of a stage with everything it imports, directly or indirectly. Each file appears once,
+/// before the first file that imports it. Files may import one another, because WGSL ignores the order of
+/// declarations.
 ///
 /// # Panics
-/// Where an import names no file. The shaders are part of the program, and tests resolve each of them.
+/// If an import names no file. The shaders are part of the program, and tests resolve each of them.
 pub fn resolve(stage: &str) -> String {
     fn add(text: &str, known: &mut HashSet<String>, whole: &mut String) {
         for name in imports(text) {
-            let found = FILES.iter().find(|(file, _)| **file == *name);
-            let (_, imported) = found.unwrap_or_else(|| panic!("no shader {name} to import"));
+            let file = FILES.iter().find(|(file, _)| **file == *name);
+            let (_, imported) = file.unwrap_or_else(|| panic!("no shader {name} to import"));
             if known.insert(name) {
                 add(imported, known, whole);
             }

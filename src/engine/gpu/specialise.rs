@@ -1,7 +1,8 @@
-//! Shaders specialised before they reach a driver: what their `override` constants rule out is left out.
+//! Specialises shaders before they reach a driver: code that their `override` constants rule out is removed.
 //!
-//! A driver would find it too, after it has read, inlined and optimised all of it: for the integrate pass that takes software
-//! Vulkan several times as long as for what is left, and nothing keeps it from one process to the next.
+//! A driver would remove that code too, but only after it has read, inlined and optimised it. For the
+//! integrate pass this takes software Vulkan several times as long as compiling the remaining code, and no
+//! cache keeps the result from one process to the next.
 
 use wgpu::naga;
 
@@ -12,14 +13,17 @@ use naga::front::wgsl;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{Block, Expression, Function, Handle, Literal, Module, ShaderStage, Statement};
 
-/// A stage's shader, read and checked.
+/// The parsed and validated shader of a stage.
 pub struct Source {
     module: Module,
     info: ModuleInfo,
 }
 
 impl Source {
-    /// Reads WGSL. The shaders are the program's own: tests see to it that they are whole.
+    /// Parses and validates WGSL; `name` is for messages.
+    ///
+    /// # Panics
+    /// If the text is not valid. The shaders are part of the program, and tests validate each of them.
     pub fn read(name: &str, text: &str) -> Self {
         let module = wgsl::parse_str(text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(text)));
         let info = Validator::new(ValidationFlags::all(), Capabilities::all())
@@ -28,7 +32,10 @@ impl Source {
         Source { module, info }
     }
 
-    /// One compute entry point, and what is left of it with these constants.
+    /// Returns a module with one compute entry point and only the code that these constants leave.
+    ///
+    /// # Panics
+    /// If the shader has no such entry point or constant.
     pub fn compute(&self, entry_point: &str, constants: &[(&str, f64)]) -> Module {
         let mut values = PipelineConstants::default();
         values.extend(constants.iter().map(|&(name, value)| (name.to_owned(), value)));
@@ -43,7 +50,7 @@ impl Source {
             let mut body = std::mem::take(&mut function.body);
             prune(&module, function, &mut body);
             function.body = body;
-            // Names keep what they name alive.
+            // Named expressions would keep unused code alive.
             function.named_expressions.clear();
         }
         (module.functions, module.entry_points) = (functions, entry_points);
@@ -52,16 +59,16 @@ impl Source {
     }
 }
 
-/// Puts in place of each `if` whose condition is known the branch that is taken.
+/// Replaces each `if` whose condition is constant by the branch that is taken.
 fn prune(module: &Module, function: &Function, block: &mut Block) {
     let mut kept = Block::with_capacity(block.len());
     for (mut statement, span) in std::mem::take(block).span_into_iter() {
         match &mut statement {
             Statement::If { condition, accept, reject } => {
-                if let Some(known) = known(module, function, *condition) {
-                    let mut taken = std::mem::take(if known { accept } else { reject });
+                if let Some(value) = constant_condition(module, function, *condition) {
+                    let mut taken = std::mem::take(if value { accept } else { reject });
                     prune(module, function, &mut taken);
-                    // What follows it is never reached.
+                    // Statements after a terminator are unreachable.
                     let ends = taken.last().is_some_and(Statement::is_terminator);
                     kept.append(&mut taken);
                     if ends {
@@ -89,8 +96,8 @@ fn prune(module: &Module, function: &Function, block: &mut Block) {
     *block = kept;
 }
 
-/// The value of a condition that no longer depends on anything.
-fn known(module: &Module, function: &Function, condition: Handle<Expression>) -> Option<bool> {
+/// Returns the value of a constant condition; `None` if it is not constant.
+fn constant_condition(module: &Module, function: &Function, condition: Handle<Expression>) -> Option<bool> {
     let value = match function.expressions[condition] {
         Expression::Constant(constant) => &module.global_expressions[module.constants[constant].init],
         ref other => other,

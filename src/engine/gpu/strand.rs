@@ -1,13 +1,13 @@
-//! The table of the reflection model of flowing water on the device.
+//! The strand model's table on the device: the reflection of flowing water.
 
 use super::device::Gpu;
 use crate::light::strand::table::{SIZE, StrandTable};
 
-/// A table as `shaders/strand.wgsl` reads it.
+/// The table as `shaders/light/strand.wgsl` reads it.
 pub struct StrandTexture {
     /// `texture_3d<f32>`, `rgb9e5ufloat`.
     pub view: wgpu::TextureView,
-    /// Trilinear.
+    /// Trilinear sampler.
     pub sampler: wgpu::Sampler,
 }
 
@@ -17,7 +17,7 @@ impl StrandTexture {
         Self::with(gpu, SIZE.map(|n| n as u32), &table.texels())
     }
 
-    /// One texel, to be bound where the model is not asked for.
+    /// Uploads one texel, which is bound for scenes without the strand model.
     pub fn empty(gpu: &Gpu) -> Self {
         Self::with(gpu, [1; 3], &[0])
     }

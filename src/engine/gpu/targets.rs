@@ -24,14 +24,14 @@ pub struct Targets {
     pub opaque: wgpu::Texture,
     /// Unit normal of the opaque scene (0: background).
     pub normal: wgpu::Texture,
-    /// u, v and metres from the eye of the nearest volume quad. Until the quads are drawn it holds the visible rock's
-    /// position on the mesh.
+    /// u, v and metres from the eye of the nearest volume quad. Until the quads are drawn it holds the
+    /// visible rock's position on the mesh.
     pub surface: wgpu::Texture,
     /// Numbers plus 1 of the quads under each pixel, the nearest in layer 0; 0: no further quad.
     pub quad_id: wgpu::Texture,
-    /// The z-buffers. One layer and no pools need one. Otherwise the last is a copy of the opaque scene's z-buffer,
-    /// from which further layers or other waves are drawn. With several layers, the first two hold the depth of the
-    /// even and the odd layers in turn.
+    /// The z-buffers. One layer and no pools need one. Otherwise the last is a copy of the opaque scene's
+    /// z-buffer, from which further layers or other waves are drawn. With several layers, the first two hold
+    /// the depth of the even and the odd layers in turn.
     pub(super) depth: Vec<wgpu::Texture>,
 }
 

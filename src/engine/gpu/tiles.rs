@@ -1,7 +1,8 @@
-//! §3 The opaque mesh in tiles: those out of view are not drawn, the nearest are drawn first.
+//! §3 The tiles of the opaque mesh that are drawn: only those in view, the nearest first.
 //!
-//! Software Vulkan shades vertices for 1023 indices at a time and knows in them the last vertex of each of 256 places.
-//! So vertices have numbers in their tile, of which two rows never share a place, and the shader finds where they are.
+//! Software Vulkan shades vertices in batches of 1023 indices, with a cache of 256 slots that each hold one
+//! vertex. Indices therefore number the vertices within their tile, so that no two rows share a slot, and the
+//! shader computes the vertex's index in the mesh.
 
 use std::ops::Range;
 
@@ -10,18 +11,18 @@ use glam::{DVec3, DVec4, Mat4};
 use super::layout::MeshTile;
 use crate::place::tiles::{self, Tile};
 
-/// What is drawn of a tile: its indices, and the box that it lies in.
+/// The drawn triangles of a tile, and the tile's bounding box.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Number of the tile.
     pub tile: u32,
-    /// Of the indices of [`lists`].
+    /// Range of its indices in those of [`lists`].
     pub indices: Range<u32>,
     low: DVec3,
     high: DVec3,
 }
 
-/// The triangles of all kinds of tiles, one list after the other, and where they are.
+/// Returns the indices of all lists of triangles, one list after the other, and the range of each list.
 pub fn lists() -> (Vec<u32>, Vec<Range<u32>>) {
     let mut indices: Vec<u32> = Vec::new();
     let mut ranges = Vec::new();
@@ -33,12 +34,13 @@ pub fn lists() -> (Vec<u32>, Vec<Range<u32>>) {
     (indices, ranges)
 }
 
-/// The tiles as shaders read them.
+/// Returns the tiles as shaders read them.
 pub fn packed(tiles: &[Tile]) -> Vec<MeshTile> {
     tiles.iter().map(|t| MeshTile { first: t.first, pitch: t.pitch, side: t.side, pad: 0 }).collect()
 }
 
-/// What is drawn with these steps: of the rock, and of each pool.
+/// Returns the parts of the rock, and those of each pool, that are drawn with these steps of the tiles'
+/// grids.
 pub fn parts(tiles: &[Tile], steps: &[u32], ranges: &[Range<u32>]) -> (Vec<Part>, Vec<Vec<Part>>) {
     let (mut rock, mut pools) = (Vec::new(), Vec::<Vec<Part>>::new());
     for (i, tile) in tiles.iter().enumerate() {
@@ -59,33 +61,33 @@ pub fn parts(tiles: &[Tile], steps: &[u32], ranges: &[Range<u32>]) -> (Vec<Part>
     (rock, pools)
 }
 
-/// The parts that may be seen in a window, the nearest to the eye first.
+/// Returns the parts that may be visible in a window, the nearest to the eye first.
 pub fn in_view(parts: &[Part], clip_from_world: Mat4, eye: DVec3) -> Vec<&Part> {
-    let mut seen: Vec<(f64, &Part)> = parts
+    let mut visible: Vec<(f64, &Part)> = parts
         .iter()
-        .filter(|part| part.may_be_seen(clip_from_world))
+        .filter(|part| part.may_be_visible(clip_from_world))
         .map(|part| (eye.distance_squared(eye.clamp(part.low, part.high)), part))
         .collect();
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    seen.into_iter().map(|(_, part)| part).collect()
+    visible.sort_by(|a, b| a.0.total_cmp(&b.0));
+    visible.into_iter().map(|(_, part)| part).collect()
 }
 
 impl Part {
-    /// Whether its box reaches into the view, or the rounding of a device might see it there.
-    fn may_be_seen(&self, clip_from_world: Mat4) -> bool {
+    /// Whether the bounding box reaches into the view, or is outside by no more than a device may round.
+    fn may_be_visible(&self, clip_from_world: Mat4) -> bool {
         let [x, y, _, w] = [0, 1, 2, 3].map(|i| clip_from_world.row(i).as_dvec4());
         let near = f64::from(clip_from_world.w_axis.z);
         let far_corner = self.low.abs().max(self.high.abs()).extend(1.0);
-        // A sum of four products is off by less than this share of what their sizes add up to.
+        // The rounding error of a sum of four products is below this share of the sum of their magnitudes.
         const ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
-        // In view where all of them are positive.
+        // A point is in view if it lies on the positive side of all planes.
         let planes = [w + x, w - x, w + y, w - y, w - DVec4::W * near];
         planes.iter().all(|plane| {
-            // Its corner farthest on the plane's inner side.
+            // The corner that lies farthest on the plane's positive side.
             let normal = plane.truncate();
             let corner = DVec3::select(normal.cmpge(DVec3::ZERO), self.high, self.low);
-            let room = ROUNDING * (x.abs() + y.abs() + w.abs()).dot(far_corner);
-            plane.dot(corner.extend(1.0)) >= -room
+            let margin = ROUNDING * (x.abs() + y.abs() + w.abs()).dot(far_corner);
+            plane.dot(corner.extend(1.0)) >= -margin
         })
     }
 }

@@ -1,5 +1,5 @@
-//! Seconds of a pass on the device, by timestamp queries; where there are none, or none to be trusted, by the
-//! host's clock around submission and wait.
+//! Times passes on the device with timestamp queries. If a device has none, or only unreliable ones, the
+//! host's clock times submission and wait.
 
 use std::time::Instant;
 
@@ -18,13 +18,13 @@ struct Queries {
     seconds_per_tick: f64,
 }
 
-/// Begin and end of a pass: where the device writes its time.
+/// A span of device time; its passes write timestamps at its begin and end.
 pub struct Span<'a> {
     set: Option<&'a wgpu::QuerySet>,
 }
 
 impl Span<'_> {
-    /// For a compute pass.
+    /// Returns the timestamp writes of a compute pass that begins and ends the span.
     pub fn compute(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         self.set.map(|query_set| wgpu::ComputePassTimestampWrites {
             query_set,
@@ -33,7 +33,7 @@ impl Span<'_> {
         })
     }
 
-    /// For a render pass that both begins and ends the span, or only does one of them.
+    /// Returns the timestamp writes of a render pass that begins the span, ends it, or both.
     pub fn render(&self, begins: bool, ends: bool) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
         self.set.map(|query_set| wgpu::RenderPassTimestampWrites {
             query_set,
@@ -44,7 +44,7 @@ impl Span<'_> {
 }
 
 impl Timer {
-    /// A timer for `gpu`.
+    /// Creates a timer for a device.
     pub fn new(gpu: &Gpu) -> Self {
         let queries = gpu.timestamps.then(|| Queries {
             set: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -67,7 +67,11 @@ impl Timer {
         Timer { queries }
     }
 
-    /// Records with `record`, submits, waits, and returns the seconds the device spent in the span.
+    /// Records commands with `record`, submits them and waits. Returns the seconds that the device spent in
+    /// the span.
+    ///
+    /// # Errors
+    /// Errors of the device: see [`Gpu::run`].
     pub fn run(
         &self,
         gpu: &Gpu,

@@ -1,4 +1,4 @@
-//! The scene on the device: volume texture, quads, lights, mesh.
+//! The scene on the device: volume texture, quads, lights, mesh and environment.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -19,44 +19,47 @@ use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::volume::{Cell, LevelAtlas, Levels, LevelsCache, VolumeTexture};
 
-/// Bytes handed to the queue at once: the queue stages what it is given, so a volume goes up in slabs.
+/// Bytes handed to the queue at once. The queue keeps a copy of what it is given, so a volume is uploaded in
+/// slabs.
 pub(super) const SLAB_BYTES: usize = 64 << 20;
 
-/// What stays on the device from frame to frame: the volume's cells and the mesh, known again by the
-/// memory they came from.
+/// Data that stays on the device from frame to frame: the volume's cells, the mesh and the environment's map.
+/// They are recognised by the address of their host memory.
 #[derive(Default)]
 pub struct Resident {
-    /// The volume's levels, and whether they are made for leaps.
+    /// Levels of the last volume, and whether they are made for leaps.
     pub levels: LevelsCache,
     volume: Option<(Levels, [wgpu::TextureView; 2])>,
     mesh: Option<ResidentMesh>,
-    /// The environment's map, and its number.
+    /// The environment's map and the number of its upload.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
-    /// Uploads of meshes and maps so far.
+    /// Number of uploads of meshes and maps so far.
     uploads: u64,
 }
 
 /// A mesh on the device.
 #[derive(Clone)]
 struct ResidentMesh {
-    of: Mesh,
+    mesh: Mesh,
     positions: wgpu::Buffer,
     coats: wgpu::Buffer,
     tiles: wgpu::Buffer,
-    /// Of all kinds of tiles, and where each is.
+    /// Indices of all lists of triangles.
     indices: wgpu::Buffer,
+    /// Range of each list in `indices`.
     lists: Arc<Vec<Range<u32>>>,
-    /// Each upload has a number of its own.
+    /// Number of the upload, unique among meshes and maps.
     upload: u64,
 }
 
-/// Everything of a scene that does not change from sample to sample.
+/// A scene on the device: everything that does not change from sample to sample.
 pub struct Uploaded {
     /// The volume's levels.
     pub levels: Levels,
-    /// They as a 3-D storage texture, `rg32uint`; [`LevelAtlas`]. Of sparse storage the stored cells.
+    /// The levels in one 3-D storage texture, `rg32uint`, arranged by [`LevelAtlas`]; for sparse storage the
+    /// stored cells.
     pub volume: wgpu::TextureView,
-    /// Bricks of sparse storage, `rgba32uint`.
+    /// Bricks of sparse storage, `rgba32uint`; one texel for dense storage.
     pub bricks: wgpu::TextureView,
     /// `array<Quad>`.
     pub quads: wgpu::Buffer,
@@ -64,21 +67,21 @@ pub struct Uploaded {
     pub quad_count: u32,
     /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
-    /// Positions of the opaque mesh's vertices, four floats each.
+    /// Positions of the opaque mesh's vertices, metres, four floats each.
     pub positions: wgpu::Buffer,
-    /// What is shaded there, `array<VertexMaterial>`.
+    /// Materials of the vertices, `array<VertexMaterial>`.
     pub coats: wgpu::Buffer,
-    /// Its tiles, `array<MeshTile>`.
+    /// Tiles of the opaque mesh, `array<MeshTile>`.
     pub tiles: wgpu::Buffer,
-    /// The triangles of a tile.
+    /// Indices of the lists of triangles.
     pub indices: wgpu::Buffer,
-    /// What of the rock is drawn.
+    /// Parts of the rock to draw.
     pub rock: Vec<Part>,
-    /// `Surface` of each pool, and what of it is drawn.
+    /// Uniform `Surface` of each pool, and its parts to draw.
     pub pools: Vec<(wgpu::Buffer, Vec<Part>)>,
-    /// The environment, where the scene has one.
+    /// The scene's environment, if it has one.
     pub environment: Option<UploadedEnvironment>,
-    /// Hash of quads, lights, mesh and environment: all that is drawn but the pools' waves.
+    /// Hash of everything drawn except the pools' waves: quads, lights, mesh and environment.
     pub geometry: [u64; 2],
     /// Hash of the pools' surfaces.
     pub waves: [u64; 2],
@@ -86,14 +89,17 @@ pub struct Uploaded {
 
 /// An environment on the device.
 pub struct UploadedEnvironment {
-    /// `Environment`.
+    /// Uniform `Environment`.
     pub uniform: wgpu::Buffer,
-    /// Its map, `rgba32float`.
+    /// Map of the sky, `rgba32float`.
     pub map: wgpu::TextureView,
 }
 
 impl Uploaded {
-    /// Uploads what of a scene is not resident yet.
+    /// Uploads the parts of a scene that are not resident yet.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a part is too large for the device, and errors of [`Gpu::run`].
     pub fn new(
         gpu: &Gpu,
         resident: &mut Resident,
@@ -141,7 +147,7 @@ impl Uploaded {
             volume: cells,
             bricks,
             levels,
-            // A buffer without any would be too small to bind.
+            // A buffer without quads would be too small to bind.
             quads: gpu.buffer_with(
                 "quads",
                 if quads.is_empty() { &[0; size_of::<Quad>()] } else { quad_bytes },
@@ -164,14 +170,14 @@ impl Uploaded {
 }
 
 impl Resident {
-    /// Cells and bricks.
+    /// Returns the textures of cells and bricks, uploaded unless they are resident.
     fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<[wgpu::TextureView; 2]> {
         if let Some((old, views)) = &self.volume
             && Arc::ptr_eq(old, levels)
         {
             return Ok(views.clone());
         }
-        // The old volume goes first: two large ones might not fit.
+        // The old volume is dropped first, because two large ones might not fit.
         self.volume = None;
         let views = match levels[0].cells.bricks() {
             Some(stored) => bricks::upload(gpu, stored)?,
@@ -181,7 +187,7 @@ impl Resident {
         Ok(views)
     }
 
-    /// The map, and its number.
+    /// Returns the environment's map and the number of its upload, uploaded unless it is resident.
     fn map(&mut self, gpu: &Gpu, map: &Arc<Map>) -> Result<(wgpu::TextureView, u64)> {
         if let Some((old, view, upload)) = &self.map
             && Arc::ptr_eq(old, map)
@@ -195,8 +201,9 @@ impl Resident {
         Ok((view, self.uploads))
     }
 
+    /// Returns the mesh on the device, uploaded unless it is resident.
     fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> &ResidentMesh {
-        self.mesh.take_if(|known| !Arc::ptr_eq(&known.of.vertices, &mesh.vertices));
+        self.mesh.take_if(|known| !Arc::ptr_eq(&known.mesh.vertices, &mesh.vertices));
         let uploads = &mut self.uploads;
         self.mesh.get_or_insert_with(|| {
             *uploads += 1;
@@ -204,12 +211,12 @@ impl Resident {
             let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
             let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
             let mut coats: Vec<VertexMaterial> = mesh.vertices.iter().map(VertexMaterial::from).collect();
-            // Bound even where there is none.
+            // The buffer is bound even for a scene without a mesh.
             coats.resize(coats.len().max(1), VertexMaterial::from(&Vertex::default()));
             let (indices, lists) = tiles::lists();
             let storage = wgpu::BufferUsages::STORAGE;
             ResidentMesh {
-                of: mesh.clone(),
+                mesh: mesh.clone(),
                 positions: buffer("positions", bytemuck::cast_slice(&positions), storage),
                 coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
                 tiles: buffer("tiles", bytemuck::cast_slice(&tiles::packed(&mesh.tiles)), storage),
@@ -222,8 +229,8 @@ impl Resident {
 }
 
 fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
-    let stack = LevelAtlas::new(levels);
-    let [nx, ny, nz] = stack.extent();
+    let atlas = LevelAtlas::new(levels);
+    let [nx, ny, nz] = atlas.extent();
     let most = gpu.device.limits().max_texture_dimension_3d;
     if [nx, ny, nz].iter().any(|&n| n > most) {
         return Err(Error::input(
@@ -233,7 +240,7 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
     }
     let texture = bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
     for (number, level) in levels.iter().enumerate() {
-        upload_level(gpu, &texture, stack.place(number as u32), level)?;
+        upload_level(gpu, &texture, atlas.place(number as u32), level)?;
     }
     Ok(texture.create_view(&Default::default()))
 }
@@ -254,7 +261,8 @@ fn upload_level(
     Ok(())
 }
 
-/// Puts whole layers of `width` × `height` texels into a 3-D texture, and waits for it.
+/// Writes whole layers of `width` × `height` texels into a 3-D texture at `[x, y, z]`, and waits for the
+/// copy.
 pub(super) fn write_layers<T: bytemuck::Pod>(
     gpu: &Gpu,
     texture: &wgpu::Texture,
@@ -290,7 +298,7 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
     if width.max(height) > most {
         return Err(Error::input(
             format!("an environment map of {width}×{height} texels is too large for {}", gpu.name()),
-            format!("it has at most {most} on a side there; make it smaller or use --engine cpu"),
+            format!("at most {most} texels on a side fit there; make it smaller or use --engine cpu"),
         ));
     }
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {

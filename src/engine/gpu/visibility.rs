@@ -1,5 +1,5 @@
-//! §5 Light volumes on the GPU: the compute pass that fills them, and the cache that keeps them from frame to frame.
-//! CPU twin: `src/engine/cpu/visibility.rs`. Reasons and units: `src/light/visibility.rs`.
+//! §5 Light volumes on the GPU: the compute pass that fills them, and the cache that keeps them from frame to
+//! frame. CPU twin: `src/engine/cpu/visibility.rs`. Reasons and units: `src/light/visibility.rs`.
 
 mod atlas;
 mod host;
@@ -88,11 +88,12 @@ struct FilledCache {
 /// Light volumes on the device, as the integrate pass reads them.
 #[derive(Clone)]
 pub struct FilledVolumes {
-    /// All light volumes side by side in one `r32uint` texture: words of four codes, or the bits of optical depths.
+    /// All light volumes side by side in one `r32uint` texture: words of four codes, or the bits of optical
+    /// depths.
     pub texture: wgpu::TextureView,
-    /// `array<vec4<i32>>`. First one entry per quad and light: index of its first light volume in this array, patches
-    /// along u and v, and whether light volumes stand at the patches' corners. Then one entry per light volume: its
-    /// origin in the texture.
+    /// `array<vec4<i32>>`. First one entry per quad and light: index of its first light volume in this array,
+    /// patches along u and v, and whether light volumes stand at the patches' corners. Then one entry per
+    /// light volume: its origin in the texture.
     pub places: wgpu::Buffer,
 }
 
@@ -133,13 +134,13 @@ impl VisibilityPass {
         self.cache = None;
     }
 
-    /// Returns the planned light volumes, and the seconds it took to fill them: 0 if they are those of the last call.
-    /// The time is that of the device, or of the host where it fills them. Calls `between` after each submission or
-    /// light volume with the work done so far and in total; its error stops the work.
+    /// Returns the planned light volumes, and the seconds it took to fill them: 0 if they are those of the
+    /// last call. The time is that of the device, or of the host where it fills them. Calls `between` after
+    /// each submission or light volume with the work done so far and in total; its error stops the work.
     ///
     /// # Errors
-    /// Errors of `between` and of the device (see [`Gpu::run`]); [`Error::Input`] if the device's largest texture cannot
-    /// hold the light volumes.
+    /// Errors of `between` and of the device (see [`Gpu::run`]); [`Error::Input`] if the device's largest
+    /// texture cannot hold the light volumes.
     ///
     /// [`Error::Input`]: crate::util::error::Error::Input
     pub fn get(
@@ -258,8 +259,8 @@ impl VisibilityPass {
         Ok(seconds)
     }
 
-    /// Returns the linear indices of the columns that are filled, and their number: columns with density, or all of
-    /// them if `everywhere`.
+    /// Returns the linear indices of the columns that are filled, and their number: columns with density, or
+    /// all of them if `everywhere`.
     fn columns(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
         if let Some(known) = &self.columns
             && Arc::ptr_eq(&known.levels, levels)

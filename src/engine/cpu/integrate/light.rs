@@ -1,4 +1,5 @@
-//! The lights as a ray sees them, and what lies between them and a cell. Twin: `shaders/integrate_light.wgsl`.
+//! §5 Per-ray terms of the lights, and the visibility between a light and a cell. Twin:
+//! `shaders/engine/integrate_light.wgsl`.
 
 use glam::{IVec3, UVec2, Vec2, Vec3};
 
@@ -10,62 +11,69 @@ use crate::light::{AngleFrame, Visibility};
 use crate::trace::lookup::Level;
 use crate::walk::NEVER;
 
-/// One light as a ray sees it.
+/// Terms of one light that are constant along a ray.
 #[derive(Clone, Copy)]
 pub struct RayLight {
     /// Jᵀl, or J⁻¹l normalised.
     pub l_v: Vec3,
     /// J⁻¹l, in the level's cells.
     l_cell: Vec3,
-    places: LightPlaces,
+    corners: PatchCorners,
     pub intensity: Vec3,
+    /// Light sent to the eye so far, in 255ths of `intensity`; for cells without a colour of their own.
     pub sum: f32,
-    /// Where light has a colour of its own in every cell.
+    /// Light sent to the eye so far, relative to `intensity`; for cells with a colour of their own.
     pub colour: Vec3,
     /// Cosine between light and eye, in the frame where angles are measured.
     pub l_dot_e: f32,
+    /// Row of the profile of multiple scattering.
     pub row: Row,
+    /// Forward peaks of the orders of multiple scattering.
     pub peak: [f32; ORDERS - 1],
 }
 
-/// A light's volumes at the corners of a patch, and where in the patch a ray is.
+/// The light volumes at the corners of a patch, and the ray's position in the patch.
 #[derive(Clone, Copy, Default)]
-struct LightPlaces {
-    /// At (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all alike where it has one.
+struct PatchCorners {
+    /// Numbers of the light volumes at (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all equal if it has
+    /// one.
     numbers: [u32; 4],
+    /// Position in the patch, 0 to 1.
     at: Vec2,
 }
 
 impl Integrator<'_> {
-    /// All lights, as a ray sees them from a level of the volume.
+    /// Computes the terms of all lights for a ray in a level of the volume.
     pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> Vec<RayLight> {
         let texture_frame = self.scene.angles == AngleFrame::Texture;
-        let as_seen = |(i, light): (usize, &crate::light::Light)| {
+        let terms = |(i, light): (usize, &crate::light::Light)| {
             let (to_light, intensity) = light.at(ray.point);
             let l_n = to_light.dot(ray.map.n_world) * ray.side;
             let l = Vec3::new(to_light.dot(ray.map.e1_world), to_light.dot(ray.map.e2_world), l_n);
-            let whole = ray.frame.cell_from_plane(l);
-            let l_v = if texture_frame { whole / whole.dot(whole).sqrt() } else { ray.frame.transposed(l) };
-            let places = match &self.light_volumes {
-                Some(volumes) => light_places_of(volumes, ray.quad, i, ray.uv),
-                None => LightPlaces::default(),
+            let l_cell = ray.frame.cell_from_plane(l);
+            let l_v =
+                if texture_frame { l_cell / l_cell.dot(l_cell).sqrt() } else { ray.frame.transposed(l) };
+            let corners = match &self.light_volumes {
+                Some(volumes) => patch_corners(volumes, ray.quad, i, ray.uv),
+                None => PatchCorners::default(),
             };
             let cosine = to_light.dot(ray.d_world);
             let l_dot_e = if texture_frame { l_v.dot(ray.e_v) } else { -cosine };
             let mut slab = l_n;
             if self.per_cell {
-                let c = whole.abs();
-                slab = -whole.z / (c.x + c.y + c.z);
+                let c = l_cell.abs();
+                slab = -l_cell.z / (c.x + c.y + c.z);
             }
             let row = Row::new(slab, self.levels[0].size[2]);
             let peak = forward_peak(self.media.as_ref().map_or(0.0, |m| m.similarity.g), cosine);
             let (sum, colour) = (0.0, Vec3::ZERO);
-            RayLight { l_v, l_cell: whole * level.scale, places, intensity, sum, colour, l_dot_e, row, peak }
+            let l_cell = l_cell * level.scale;
+            RayLight { l_v, l_cell, corners, intensity, sum, colour, l_dot_e, row, peak }
         };
-        self.lights.iter().enumerate().map(as_seen).collect()
+        self.lights.iter().enumerate().map(terms).collect()
     }
 
-    /// V_i(k); and −log₂ of it, which is 0 where codes are kept.
+    /// Returns V_i(k) of a light and a cell, and −log₂ of it, which is 0 if light volumes hold codes.
     pub(super) fn visibility_of(
         &self,
         ray: &SheetHit,
@@ -85,35 +93,37 @@ impl Integrator<'_> {
                 optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked) * extinction
             }
             Visibility::Cached => {
-                let kept = self.kept_of(level, cell, &light.places);
+                let value = self.patch_value(level, cell, &light.corners);
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
-                    let transmittance = kept * kept * (1.0 / 65025.0);
+                    let transmittance = value * value * (1.0 / 65025.0);
                     if matter.left < 1.0 {
                         return ((matter.left * transmittance.max(1e-9).log2()).exp2(), 0.0);
                     }
                     return (transmittance, 0.0);
                 }
-                // What is left of light volumes' ρ, in the mean over the cells that count.
-                kept * (extinction * matter.left * if self.per_cell { 1.0 } else { ray.frame.depth })
+                // Light volumes are filled without the sheet's erosion; `left` is the mean share of ρ it
+                // leaves.
+                value * (extinction * matter.left * if self.per_cell { 1.0 } else { ray.frame.depth })
             }
         };
         ((-depth).exp2(), depth)
     }
 
-    /// From the light volumes at the corners of the ray's patch.
-    fn kept_of(&self, level: &Level, cell: IVec3, places: &LightPlaces) -> f32 {
-        let kept = |number: u32| self.kept_at(level, number as usize, cell);
-        let [p00, p10, p01, p11] = places.numbers;
-        if places.numbers == [p00; 4] {
-            return kept(p00);
+    /// Interpolates a cell's value between the light volumes at the corners of the ray's patch.
+    fn patch_value(&self, level: &Level, cell: IVec3, corners: &PatchCorners) -> f32 {
+        let value = |number: u32| self.volume_value(level, number as usize, cell);
+        let [p00, p10, p01, p11] = corners.numbers;
+        if corners.numbers == [p00; 4] {
+            return value(p00);
         }
         let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
-        let near = mix(kept(p00), kept(p10), places.at.x);
-        let far = mix(kept(p01), kept(p11), places.at.x);
-        mix(near, far, places.at.y)
+        let near = mix(value(p00), value(p10), corners.at.x);
+        let far = mix(value(p01), value(p11), corners.at.x);
+        mix(near, far, corners.at.y)
     }
 
-    fn kept_at(&self, level: &Level, i: usize, cell: IVec3) -> f32 {
+    /// A cell's value in light volume `i`: looked up if it is filled, otherwise walked.
+    fn volume_value(&self, level: &Level, i: usize, cell: IVec3) -> f32 {
         let plan = self.light_volumes.as_ref().expect("visibility is cached");
         let c = cell.as_uvec3();
         match &self.filled {
@@ -123,16 +133,17 @@ impl Integrator<'_> {
     }
 }
 
-fn light_places_of(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> LightPlaces {
+/// Returns the light volumes around the point `uv` of a quad.
+fn patch_corners(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> PatchCorners {
     let patches = volumes.patches[quad * volumes.lights + light];
     let [nu, nv] = patches.count;
     let at = uv * Vec2::new(nu as f32, nv as f32);
     let patch = at.as_uvec2().min(UVec2::new(nu - 1, nv - 1));
     let number = |x: u32, y: u32, row: u32| volumes.numbers[(patches.first + y * row + x) as usize];
     if !patches.cornered {
-        return LightPlaces { numbers: [number(patch.x, patch.y, nu); 4], at: Vec2::ZERO };
+        return PatchCorners { numbers: [number(patch.x, patch.y, nu); 4], at: Vec2::ZERO };
     }
     let [x, y] = patch.to_array();
     let numbers = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| number(x, y, nu + 1));
-    LightPlaces { numbers, at: at - patch.as_vec2() }
+    PatchCorners { numbers, at: at - patch.as_vec2() }
 }

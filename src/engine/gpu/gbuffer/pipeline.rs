@@ -1,45 +1,45 @@
-//! Pipelines of the raster pass.
+//! Render pipelines of the raster pass.
 
 use crate::engine::gpu::device::Gpu;
 use crate::engine::gpu::targets::DEPTH;
 
-/// What a scene is lit by, as far as shaders differ.
+/// Variant of the shaders that shade opaque geometry.
 #[derive(Clone, Copy)]
 pub struct OpaqueVariant {
-    /// Whether there is an environment.
+    /// Whether the scene has an environment.
     pub environment: bool,
-    /// Whether one light is all.
+    /// Whether the scene has exactly one light.
     pub one_light: bool,
 }
 
 impl OpaqueVariant {
-    /// Of so many lights.
+    /// Returns the variant for a number of lights.
     pub fn new(environment: bool, lights: usize) -> OpaqueVariant {
         OpaqueVariant { environment, one_light: lights == 1 }
     }
 }
 
-/// How pipelines differ besides their shaders.
+/// State in which pipelines differ, apart from their shaders.
 pub struct PipelineState {
-    /// Which depths are drawn.
+    /// Depth test.
     pub compare: wgpu::CompareFunction,
-    /// Whether they stay.
+    /// Whether the depth is written.
     pub writes_depth: bool,
-    /// `ONE_LIGHT`.
+    /// Value of the shader's constant `ONE_LIGHT`.
     pub one_light: bool,
 }
 
-/// Draws what is nearer.
+/// Draws nearer fragments and writes their depth.
 pub const NEARER: PipelineState =
     PipelineState { compare: wgpu::CompareFunction::Greater, writes_depth: true, one_light: false };
 
-/// A pipeline without vertex buffers.
+/// Creates a pipeline without vertex buffers.
 pub fn pipeline(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     [vertex, fragment]: [&str; 2],
     targets: &[wgpu::TextureFormat],
-    kind: PipelineState,
+    state: PipelineState,
 ) -> wgpu::RenderPipeline {
     let target =
         |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
@@ -56,8 +56,8 @@ pub fn pipeline(
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
-            depth_write_enabled: Some(kind.writes_depth),
-            depth_compare: Some(kind.compare),
+            depth_write_enabled: Some(state.writes_depth),
+            depth_compare: Some(state.compare),
             stencil: Default::default(),
             bias: Default::default(),
         }),
@@ -66,7 +66,7 @@ pub fn pipeline(
             module,
             entry_point: Some(fragment),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: if kind.one_light { &[("ONE_LIGHT", 1.0)] } else { &[] },
+                constants: if state.one_light { &[("ONE_LIGHT", 1.0)] } else { &[] },
                 ..Default::default()
             },
             targets: &targets,

@@ -64,7 +64,8 @@ pub fn texture(gpu: &Gpu, [width, height, depth]: [u32; 3]) -> wgpu::TextureView
     texture.create_view(&Default::default())
 }
 
-/// Uploads the table that tells where the light volumes of each quad and light are: [`FilledVolumes::places`].
+/// Uploads the table that tells where the light volumes of each quad and light are:
+/// [`FilledVolumes::places`].
 ///
 /// [`FilledVolumes::places`]: super::FilledVolumes::places
 pub fn light_places(gpu: &Gpu, plan: &LightVolumes, atlas: &LightVolumeAtlas) -> wgpu::Buffer {

@@ -11,8 +11,8 @@ use crate::light::visibility::{CELLS_A_WORD, Form};
 use crate::util::error::Result;
 use crate::volume::LevelAtlas;
 
-/// Fills the light volumes on the host and uploads them one by one. Returns the seconds it took. Calls `between` before
-/// each light volume.
+/// Fills the light volumes on the host and uploads them one by one. Returns the seconds it took. Calls
+/// `between` before each light volume.
 pub fn fill_on_host(
     inputs: &VisibilityInputs,
     atlas: &LightVolumeAtlas,
@@ -49,8 +49,8 @@ pub fn fill_on_host(
     Ok(clock.elapsed().as_secs_f64())
 }
 
-/// Packs values as the shader reads them. A word holds one depth, or the codes of [`CELLS_A_WORD`] cells that follow one
-/// another along z.
+/// Packs values as the shader reads them. A word holds one depth, or the codes of [`CELLS_A_WORD`] cells that
+/// follow one another along z.
 fn words([nx, ny, nz]: [u32; 3], numbers: &Numbers) -> Vec<u32> {
     match numbers {
         Numbers::Depths(depths) => depths.iter().map(|depth| depth.to_bits()).collect(),

@@ -1,0 +1,147 @@
+//! §4 and §5: the walk of a ray through the cells of one level. Twin: `walk_level` and `visit` of
+//! `shaders/engine/integrate.wgsl`.
+
+use glam::Vec3;
+
+use super::light::RayLight;
+use super::{Integrator, Observer, SheetHit};
+use crate::light::fibre::{Spread, fibre_angles, specular_power};
+use crate::light::scatter::multiple;
+use crate::trace::Lookup;
+use crate::trace::lookup::{CellSample, Level};
+use crate::volume::large_box;
+use crate::walk::Walk;
+
+/// The result of walking one level.
+pub struct LevelResult {
+    /// T at the end of the walk.
+    pub transmittance: f32,
+    /// The lights, with the light they sent to the eye.
+    pub lights: Vec<RayLight>,
+    /// Number of cells walked by the view ray, and by its light rays.
+    pub cells: [u32; 2],
+}
+
+impl LevelResult {
+    /// Interpolates between two levels; `share` is that of `other`.
+    pub fn mixed(mut self, other: LevelResult, share: f32) -> LevelResult {
+        let own = 1.0 - share;
+        self.transmittance = self.transmittance * own + other.transmittance * share;
+        for (light, next) in self.lights.iter_mut().zip(other.lights) {
+            light.sum = light.sum * own + next.sum * share;
+            light.colour = light.colour * own + next.colour * share;
+        }
+        self.cells = [0, 1].map(|c| self.cells[c] + other.cells[c]);
+        self
+    }
+}
+
+impl Integrator<'_> {
+    /// Walks one level of the volume to the end of the slab or of the ray. T before the sheet is `before`.
+    pub(super) fn walk<O: Observer>(
+        &self,
+        ray: &SheetHit,
+        level: &Level,
+        before: f32,
+        observer: &mut O,
+    ) -> LevelResult {
+        let scene = self.scene;
+        let mut lights = self.ray_lights(ray, level);
+        let matter = ray.matter(level);
+        let extinction = self.extinction_in(level);
+        let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
+        let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
+        let mut transmittance = before;
+        let mut depth = -before.max(1e-30).log2();
+        let mut walked = [0u32; 2];
+        let mut walk = Walk::new(level.size, origin, d_cell, f32::INFINITY);
+        let octant = walk.octant();
+        let leaps = level.leaps && matter.keeps_empty();
+        let most = scene.trace.max_cells;
+        while walked[0] < most && walk.cell().z < level.size.z && transmittance >= scene.trace.early_end {
+            let cell = level.cell(walk.cell());
+            if leaps
+                && cell.rho_code() == 0
+                && let Some(exponents) = large_box(cell, octant)
+            {
+                walked[0] = (walked[0] + walk.leap(exponents) + 1).min(most);
+                walk.next();
+                continue;
+            }
+            let Some(crossing) = walk.next() else { break };
+            walked[0] += 1;
+            let CellSample { rho, k: [k_d, k_s], moments } = match scene.trace.lookup {
+                Lookup::Trilinear => level.between(&crossing, origin, d_cell, matter),
+                Lookup::Nearest => level.found(cell, matter),
+            };
+            observer.enter(&crossing, cell, rho / 65535.0, transmittance);
+            if rho <= 0.0 {
+                continue;
+            }
+            let mut tau_bits = rho * extinction;
+            if !self.per_cell {
+                tau_bits *= crossing.t_exit - crossing.t_enter;
+            }
+            let passed = transmittance * (-tau_bits).exp2();
+            let weight = transmittance - passed;
+            observer.ambient(scene.ambient * weight);
+
+            let v = cell.v_code();
+            let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
+            let t_dot_e = v.dot(ray.e_v);
+            let root = inverse_q.sqrt();
+            let spread = filtered.then(|| {
+                let moments = moments.unwrap_or_else(|| level.moments(cell));
+                Spread::new(&ray.metric, moments, ray.e_v)
+            });
+            for light in &mut lights {
+                let (visibility, light_depth) =
+                    self.visibility_of(ray, level, crossing.cell, light, &mut walked[1]);
+                let fibre = || {
+                    if matter.mist > 0.0 {
+                        return matter.mist;
+                    }
+                    if let Some(spread) = &spread {
+                        return spread.psi(k_d, k_s, scene.p, light.l_v, light.l_dot_e);
+                    }
+                    let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
+                    k_d * sin_l + k_s * specular_power(base.max(0.0), scene.p)
+                };
+                if !self.in_colour() {
+                    let lit = weight * fibre() * visibility;
+                    light.sum += lit;
+                    observer.light(visibility, light.intensity * (lit * (1.0 / 255.0)));
+                    continue;
+                }
+                let mut lit = match &self.strand {
+                    Some(strand) if matter.mist == 0.0 => {
+                        let [t_dot_l, t_dot_e] = match &spread {
+                            Some(spread) => spread.of_one(light.l_v),
+                            None => [v.dot(light.l_v) * root, t_dot_e * root],
+                        };
+                        strand.psi(k_d, k_s, t_dot_l, t_dot_e, light.l_dot_e) * (weight * visibility)
+                    }
+                    _ => Vec3::splat(weight * visibility * fibre() * (1.0 / 255.0)),
+                };
+                if let Some(media) = &self.media {
+                    let profile = &media.profiles[self.profile_of_quad[ray.quad] as usize];
+                    let diffuse = profile.at(&light.row, self.layer_in(level, crossing.cell.z));
+                    lit += multiple(&media.similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
+                }
+                light.colour += lit;
+                observer.light(visibility, light.intensity * lit);
+            }
+            transmittance = passed;
+            depth += tau_bits;
+        }
+        LevelResult { transmittance, lights, cells: walked }
+    }
+
+    /// Returns the volume's own layer at the middle of layer `z` of a level.
+    fn layer_in(&self, level: &Level, z: i32) -> u32 {
+        if level.is_whole {
+            return z as u32;
+        }
+        (((z as f32 + 0.5) * level.deep()) as u32).min(self.levels[0].size[2] - 1)
+    }
+}
