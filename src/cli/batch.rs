@@ -1,4 +1,4 @@
-//! `taki batch`: the frames of an animation, the grid of a sweep.
+//! `taki batch`: renders the frames of an animation or the grid of a sweep.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,16 +19,17 @@ use crate::util::monitor::Monitor;
 
 const EXAMPLES: &str = "\
 Examples:
-  A loop of four seconds, as a movie and as frames that a stopped run goes on from:
+  A loop of four seconds, as a movie and as single frames, from which a stopped run can continue:
     taki batch waterfall --loop 96 -o out/fall.####.png -o fall.mp4
-  Frames 100 to 199 in linear light, every tenth:
+  Every tenth frame from 100 to 199, in linear light:
     taki batch waterfall --frames 100-199:10 -o out/fall.####.exr
-  What density and complexity do, on one sheet:
+  The effect of density and complexity, on one contact sheet:
     taki batch fig5 --sweep alpha=0.25:1:0.25 --sweep h=0.6,1,1.4 -o out/fig5-{alpha}-{h}.png
-  One of eight machines that share a folder (or any number, without --shard):
+  The share of one of eight machines that write to one folder (without --shard, any number of machines
+  divide the work among themselves):
     taki batch waterfall --loop 240 -o out/fall.####.exr --shard 3/8
 
-Run the same command again to go on: pictures that are there are decoded, and kept if they are whole.";
+To continue a stopped batch, run the same command again: complete pictures are kept, the others rendered.";
 
 #[derive(Args)]
 #[command(after_long_help = EXAMPLES)]
@@ -37,89 +38,95 @@ pub struct BatchArgs {
     scene: SceneOptions,
     #[command(flatten)]
     cache: CacheOptions,
-    /// Pattern of the pictures' names, .png or .exr: #### is the frame's number, {NAME} a sweep's value; or a
-    /// movie, .gif, .apng (or .png without ####), .mp4 or .webm. May be given often. Default: PNG files with
-    /// the scene's name in the current folder.
+    /// Files to write. Pictures are .png or .exr; in their names, #### stands for the frame's number and
+    /// {NAME} for a sweep's value, such as `-o out/fall.####.png`. Movies are .gif, .apng (or .png without
+    /// ####), .mp4 or .webm. Can be given more than once. Default: PNG files with the scene's name in the
+    /// current folder.
     #[arg(short, long = "output", value_name = "PATTERN")]
     outputs: Vec<PathBuf>,
-    /// Frames to render, such as 0-239, 7, or 0-239:10 for every tenth. Default: all of the animation; frame 0
-    /// of a sweep.
+    /// Frames to render, such as 0-239, or 0-239:10 for every tenth, or 1,5,9. Default: all frames of the
+    /// animation, or frame 0 if there is a sweep.
     #[arg(long, value_name = "LIST", value_parser = frames)]
     frames: Option<FrameList>,
-    /// Frames a second: short for --set animate.fps=N.
+    /// Frames per second. Short for --set animate.fps=N.
     #[arg(long, value_name = "N")]
     fps: Option<String>,
-    /// A seamless loop of N frames: short for --set animate.loop=N.
+    /// Makes the animation a seamless loop of N frames. Short for --set animate.loop=N.
     #[arg(long = "loop", value_name = "N")]
     period: Option<u32>,
-    /// Tries values of a parameter: KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,…; several make a grid. The key's
-    /// last part will do where it is one parameter's.
+    /// Renders one picture for each of several values of a parameter: KEY=FIRST:LAST:STEP or
+    /// KEY=VALUE,VALUE,…, such as `--sweep alpha=0.25:1:0.25`. Several sweeps make a grid. The last part of a
+    /// key is enough if no other parameter has it.
     #[arg(long = "sweep", value_name = "KEY=VALUES")]
     sweeps: Vec<String>,
-    /// The labelled contact sheet of a sweep, .png. Default: SCENE.sheet.png beside the pictures.
+    /// File of a sweep's labelled contact sheet (.png). Default: SCENE.sheet.png beside the pictures.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
-    /// A table of all pictures with parameters, files and figures, .csv or .json; may be given twice. Default
-    /// of a sweep: SCENE.manifest.csv and .json beside the pictures.
+    /// File of a table that lists every picture with its parameters, files and figures (.csv or .json). Can
+    /// be given more than once. Default for a sweep: SCENE.manifest.csv and SCENE.manifest.json beside the
+    /// pictures.
     #[arg(long = "manifest", value_name = "FILE")]
     manifests: Vec<PathBuf>,
-    /// Renders only every N-th picture, starting with number I (from 0): one of N machines' share.
+    /// Renders only the share of one of N machines: every N-th picture, starting with picture I. Pictures are
+    /// counted from 0, so the first of eight machines gets 0/8.
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(u32, u32)>,
-    /// Renders and replaces pictures that are there.
+    /// Replaces existing files instead of keeping complete pictures and refusing other files.
     #[arg(long)]
     overwrite: bool,
-    /// Goes on with the other pictures when one fails.
+    /// Continues with the other pictures after one fails.
     #[arg(long)]
     keep_going: bool,
-    /// How often a picture is tried again after the GPU device was lost.
+    /// Number of times a picture is tried again after the GPU device was lost.
     #[arg(long, value_name = "N", default_value_t = 2)]
     retries: u32,
-    /// A picture that another process has claimed is taken over when it has not been heard of for so long, or
-    /// is known to have ended.
+    /// Takes over pictures of another process that has shown no sign of life for this number of seconds.
+    /// Pictures of a process that has ended on this machine are taken over at once.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = stale)]
     stale: f64,
-    /// Size of the pictures in pixels.
+    /// Size of the pictures in pixels, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Jittered samples a pixel.
+    /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// Renders this part of every picture only: column and row of its top left pixel, width, height.
+    /// Renders only this part of every picture: column and row of its top left pixel, width and height.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
     #[command(flatten)]
     engine: EngineOptions,
-    /// Layers of EXR files.
+    /// Layers of EXR files, separated by commas. Default: all. Example: --layers rgb,depth
     #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
     layers: Option<Vec<Layer>>,
-    /// Prints what happens on stdout, one JSON object a line.
+    /// Prints events on stdout while the batch runs, for other programs to read.
     #[arg(long, value_enum, value_name = "FORMAT")]
     events: Option<EventFormat>,
-    /// Prints what was done as one JSON object on stdout.
+    /// Prints a summary of the run as one JSON object on stdout at the end.
     #[arg(long, conflicts_with = "events")]
     json: bool,
-    /// Checks everything, tells what would be rendered and what it needs, and ends.
+    /// Checks everything and prints what would be rendered and how much memory and disk space it needs, but
+    /// renders nothing.
     #[arg(long)]
     dry_run: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum EventFormat {
-    /// One object a line.
+    /// One JSON object per line.
     Json,
 }
 
-/// Numbers of frames. A type of its own: clap takes a bare Vec for an option given several times.
+/// Frame numbers. This is a type of its own because clap treats a plain Vec as an option given several times.
 #[derive(Clone, Debug)]
 struct FrameList(Vec<u32>);
 
-/// Most frames of a list.
+/// Most frames in a list.
 const MAX_FRAMES: u64 = 1_000_000;
 
-/// `0-239`, `7`, `0-239:10`, and lists of them.
+/// Parses `0-239`, `7`, `0-239:10` and lists of these, separated by commas. The result is sorted, each frame
+/// once.
 fn frames(text: &str) -> std::result::Result<FrameList, String> {
-    let how = || "frames such as 0-239, 1,5,9 or 0-239:10, from 0 to 999999999".to_owned();
+    let how = || "give frames such as 0-239, 1,5,9 or 0-239:10, from 0 to 999999999".to_owned();
     let mut list = Vec::new();
     for part in text.split(',') {
         let number = |n: &str| n.trim().parse::<u32>().ok().filter(|&n| n <= 999_999_999).ok_or_else(how);
@@ -133,7 +140,7 @@ fn frames(text: &str) -> std::result::Result<FrameList, String> {
             return Err(format!("{part} ends before it begins"));
         }
         if u64::from((last - first) / step) + 1 + list.len() as u64 > MAX_FRAMES {
-            return Err(format!("more than {MAX_FRAMES} frames; split them"));
+            return Err(format!("more than {MAX_FRAMES} frames; split the list"));
         }
         list.extend((first..=last).step_by(step as usize));
     }
@@ -142,21 +149,22 @@ fn frames(text: &str) -> std::result::Result<FrameList, String> {
     Ok(FrameList(list))
 }
 
-/// Seconds, one at least: claims are touched four times in so long.
+/// Parses the stale time, at least one second: an owner touches its claims four times within it.
 fn stale(text: &str) -> std::result::Result<f64, String> {
-    seconds(text).ok().filter(|&s| s >= 1.0).ok_or_else(|| "a number of seconds from 1 to 86400".into())
+    seconds(text).ok().filter(|&s| s >= 1.0).ok_or_else(|| "give a number of seconds from 1 to 86400".into())
 }
 
-/// `I/N`.
+/// Parses `I/N`.
 fn shard(text: &str) -> std::result::Result<(u32, u32), String> {
     let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
     match parts {
         Some((i, n)) if i < n => Ok((i, n)),
-        _ => Err("I/N with I from 0 to N−1, such as 0/8 for the first of eight".into()),
+        _ => Err("give I/N with I from 0 to N−1, such as 0/8 for the first of eight".into()),
     }
 }
 
 impl BatchArgs {
+    /// Settings of the scene that short options stand for.
     fn settings(&self) -> Vec<String> {
         let mut more = Vec::new();
         if let Some([w, h]) = self.size {
@@ -192,7 +200,8 @@ impl BatchArgs {
     }
 }
 
-/// The scene's name with the frame's number, or with the sweeps' values.
+/// The output pattern if -o is not given: the scene's name with the frame's number, or with the sweeps'
+/// values.
 fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
     if sweeps.is_empty() {
         return PathBuf::from(format!("{scene}.####.png"));
@@ -236,7 +245,8 @@ fn dry_run(args: &BatchArgs, batch: &Batch) -> Result<()> {
     Ok(())
 }
 
-/// What the user sees of a batch: a bar on a terminal, else a line a picture; or events.
+/// Shows the progress of a batch: a bar on a terminal, otherwise one line per picture. With --events, prints
+/// events instead of the bar.
 struct Screen<'a> {
     terminal: &'a Terminal,
     events: bool,
@@ -245,13 +255,15 @@ struct Screen<'a> {
 
 struct State {
     begun: Instant,
-    /// Pictures of the run, those that need not be rendered, those that were.
+    /// Number of pictures of the run.
     pictures: u64,
+    /// Number of pictures that need no more work: kept, rendered, failed or rendered elsewhere.
     settled: u64,
+    /// Number of pictures that this run has rendered.
     rendered: u64,
-    /// Of the picture in work.
+    /// Share of the current picture that is done, 0 to 1.
     share: f64,
-    /// When progress was last told.
+    /// Time of the last progress event.
     told: Option<Instant>,
     summary: Option<Summary>,
 }
@@ -285,7 +297,7 @@ impl<'a> Screen<'a> {
 }
 
 impl State {
-    /// Pictures done, their rate, and when the rest will be: by what this run has rendered.
+    /// Formats the number of pictures done and, once this run has rendered one, the rate and the time left.
     fn pace(&self) -> String {
         let seconds = self.begun.elapsed().as_secs_f64();
         let made = self.rendered as f64 + self.share;
@@ -313,7 +325,7 @@ impl Monitor for Screen<'_> {
     }
 }
 
-/// Events of progress of one picture come at most so often.
+/// Least time between progress events.
 const TELL: Duration = Duration::from_millis(500);
 
 impl Watcher for Screen<'_> {
@@ -325,7 +337,7 @@ impl Watcher for Screen<'_> {
                 (state.pictures, state.settled) = (*pictures, *kept);
                 state.begun = Instant::now();
                 if *kept > 0 {
-                    line = Some(format!("{kept} of {pictures} pictures are there and whole"));
+                    line = Some(format!("{kept} of {pictures} pictures are already complete"));
                 }
             }
             Event::Rendering { .. } => state.share = 0.0,
@@ -345,13 +357,15 @@ impl Watcher for Screen<'_> {
                 }
             }
             Event::Elsewhere { .. } => state.settled += 1,
-            Event::Retry { picture, error } => line = Some(format!("{picture}: {error}: once more")),
+            Event::Retry { picture, error } => line = Some(format!("{picture}: {error}; trying again")),
             Event::Failed { picture, error, .. } => {
                 state.settled += 1;
                 line = Some(format!("{picture} failed: {error}"));
             }
             Event::Waiting { pictures, on } => {
-                line = Some(format!("waiting for {pictures} pictures of others, such as {on}"));
+                line = Some(format!(
+                    "waiting for {pictures} pictures that other processes render, such as {on}"
+                ));
             }
             Event::Assembled { file } => line = Some(format!("wrote {file}")),
             Event::Done(summary) => {
@@ -373,12 +387,13 @@ impl Watcher for Screen<'_> {
     }
 }
 
-/// A line of events; whoever reads them wants each at once.
+/// Prints an event and flushes it, so that a reader gets it at once.
 fn print_event(event: &serde_json::Value) {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{event}").and_then(|()| out.flush());
 }
 
+/// Formats the summary as one line.
 fn outcome(s: &Summary) -> String {
     let mut parts = vec![format!("{} of {} pictures rendered", s.rendered, s.pictures)];
     let mut add = |count: u64, what: &str| {
@@ -387,8 +402,8 @@ fn outcome(s: &Summary) -> String {
         }
     };
     add(s.kept, "kept");
-    add(s.elsewhere, "made by others");
+    add(s.elsewhere, "rendered by other processes");
     add(s.failed, "failed");
-    add(s.left, "left: run the same command again to go on");
+    add(s.left, "left (run the same command again to continue)");
     format!("{} in {:.1} s", parts.join(", "), s.elapsed)
 }

@@ -1,8 +1,8 @@
-//! `taki bench`: what the passes cost on this machine, with the work they did.
+//! `taki bench`: measures the passes on this machine, and counts the work they do.
 //!
-//! Times are medians of runs in turn in one process: other programs on the machine disturb all rows
-//! alike, so ratios between rows hold where single times do not. What was predicted and measured, what helped and
-//! what did not: `docs/speed.md`.
+//! Times are medians over rounds, each of which runs every pass once in one process. Other programs on the
+//! machine then disturb all rows alike, so ratios between rows stay true even where single times do not.
+//! `docs/speed.md` tells what was predicted and measured, what helped and what did not.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -23,22 +23,24 @@ use crate::volume::VolumeTexture;
 
 #[derive(Args, Clone)]
 pub struct BenchArgs {
-    /// Measures the `front` scene with this volume file only.
+    /// Measures only the `front` scene with this volume file.
     #[arg(long, value_name = "V.npz")]
     volume: Option<PathBuf>,
-    /// Measures the `front` scene with a cube of so many cells a side only. Beyond 256 it has the strands of 256,
-    /// and is stored sparse where the memory does not hold it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192), conflicts_with = "volume")]
+    /// Measures only the `front` scene with a cube of N cells a side. A cube of more than 256 cells a side
+    /// has the strands of one of 256, and is stored sparse if it does not fit the memory.
+    #[arg(long, value_name = "N", conflicts_with = "volume")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=8192))]
     cells: Option<u32>,
-    /// Measures this image size only.
+    /// Measures only this picture size, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Runs of each row, of which the median counts.
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Number of runs of each row. The table shows their median.
+    #[arg(long, value_name = "N", default_value_t = 9)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
     #[command(flatten)]
     engine: EngineOptions,
-    /// Prints one JSON object with all rows.
+    /// Prints all rows as one JSON object instead of a table.
     #[arg(long)]
     json: bool,
 }
@@ -51,24 +53,24 @@ struct Row {
     size: String,
     engine: &'static str,
     pass: &'static str,
-    /// Median.
+    /// Median time of one run, seconds.
     seconds: f64,
-    /// Fastest run.
+    /// Time of the fastest run, seconds.
     fastest: f64,
-    /// Cells walked in one run, by view and light rays.
+    /// Number of cells that view and light rays walk in one run; 0 if the pass walks none.
     cells: u64,
-    /// Core-nanoseconds per cell: wall seconds × cores / cells.
+    /// Core-nanoseconds per cell: wall time × cores / cells.
     ns_per_cell: f64,
 }
 
-/// Deepest volume that rows with a light walk from every cell are measured on: their cost grows with the
-/// square of the depth, and 256 layers take minutes a frame.
+/// Deepest volume, in cells, for rows that walk towards the light from every cell. Their cost grows with the
+/// square of the depth: 256 layers take minutes per frame.
 const MARCH_LAYERS: u32 = 64;
 
-/// A pass, and what is set for it.
+/// The name of a pass and the settings that it needs.
 type Step = (&'static str, &'static [&'static str]);
 
-/// The integrate passes that are measured on `front`.
+/// Integrate passes that are measured on `front`.
 const PASSES: &[Step] = &[
     ("integrate", &[]),
     ("integrate march", &["light.visibility=march"]),
@@ -77,8 +79,8 @@ const PASSES: &[Step] = &[
     ("integrate trilinear", &["trace.lookup=trilinear"]),
 ];
 
-/// The steps of light in water, on `fig5` with ten times its density: each is the one before and more.
-/// `docs/method.md` shows their pictures.
+/// Steps of light in water, measured on `fig5` with ten times its density. Each step adds its settings to
+/// those of the steps before it. `docs/method.md` shows their pictures.
 const STEPS: &[Step] = &[
     ("no attenuation", &["light.visibility=none"]),
     ("march", &["light.visibility=march"]),
@@ -89,12 +91,13 @@ const STEPS: &[Step] = &[
     ("sky", &["environment.kind=sky", "light.ambient=[0,0,0]", "lights.sun.intensity=0"]),
 ];
 
-/// The scenes whose frames are measured.
+/// Scenes whose frames are measured.
 const SCENES: [&str; 6] = ["waterfall", "cascade", "curtain", "spout", "night", "evening"];
 
-/// The largest cube that is measured unless asked for, at the larger size alone.
+/// Cells a side of the largest cube measured by default. It is measured only at the larger picture size.
 const LARGE: u32 = 512;
 
+/// Picture sizes measured by default, pixels.
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
@@ -153,8 +156,8 @@ fn load(preset: &'static str, sets: &[String]) -> Result<Scene> {
     Scene::load(preset.as_ref(), sets, &direct_limits())
 }
 
-/// A cubic volume with as many strands per face area as 32 × 32 at 40³, up to 256³; a larger one has those of 256³: the same
-/// water, finer.
+/// Settings of a cubic volume of `n` cells a side. Up to 256³ it has as many strands per face area as 32 ×
+/// 32 strands at 40³. A larger one has the strands of 256³: the same water with finer cells.
 fn cube(n: u32) -> Vec<String> {
     let strands = (32.0 * n.min(256) as f64 / 40.0).round();
     let mut sets: Vec<String> = ["nx", "ny", "nz"].map(|axis| format!("volume.{axis}={n}")).to_vec();
@@ -162,20 +165,20 @@ fn cube(n: u32) -> Vec<String> {
     sets
 }
 
-/// The front scene at a size: the quad spans 0.98 of the smaller side of the image.
+/// Settings of the `front` scene at a picture size: the quad spans 0.98 of the picture's smaller side.
 fn front([width, height]: [u32; 2]) -> Vec<String> {
     let half_height = 0.5 / 0.98 * height as f64 / width.min(height) as f64;
     let fov = 2.0 * (half_height / 3.0).atan().to_degrees();
     vec![format!("image.width={width}"), format!("image.height={height}"), format!("camera.fov={fov}")]
 }
 
-/// Median and fastest.
+/// Returns the median and the smallest of `times`.
 fn summary(mut times: Vec<f64>) -> [f64; 2] {
     times.sort_by(f64::total_cmp);
     [times[times.len() / 2], times[0]]
 }
 
-/// Rows of light in water, at the figure's own size with one sample.
+/// Measures the steps of light in water, at the figure's own size with one sample.
 fn steps(
     args: &BenchArgs,
     terminal: &Terminal,
@@ -192,7 +195,7 @@ fn steps(
     passes(args, terminal, gpu, "fig5", &scenes, &volume, rows)
 }
 
-/// Rows of the scenes with a place of their own, with one sample.
+/// Measures frames of [`SCENES`] at 1280×720 pixels with one sample.
 fn scenes(
     args: &BenchArgs,
     terminal: &Terminal,
@@ -209,7 +212,7 @@ fn scenes(
     Ok(())
 }
 
-/// Rows of scenes that differ in their light: all passes in turn, `runs` times.
+/// Measures scenes that differ only in their passes' settings: all passes in turn, `runs` times.
 fn passes(
     args: &BenchArgs,
     terminal: &Terminal,
@@ -231,8 +234,8 @@ fn passes(
         let scenes: Vec<_> = scenes.iter().map(|(name, scene)| (*name, scene)).collect();
         gpu.prepare(&scenes, volume, &mesh)?;
     }
-    let mut kept = cpu::LightVolumeCache::default();
-    // The first round warms caches and tile sizes and is not counted.
+    let mut light_volumes = cpu::LightVolumeCache::default();
+    // The first round warms caches and settles tile sizes, so it does not count.
     for round in 0..=args.runs {
         terminal.progress("rounds", round as u64, args.runs as u64)?;
         let counted = round > 0;
@@ -244,15 +247,23 @@ fn passes(
                 }
             }
         }
-        // `--engine gpu` asks for the device's rows alone.
+        // With `--engine gpu`, only the device is measured.
         let on_cpu = match args.engine.engine {
             EngineChoice::Gpu => 0,
             _ => scenes.len(),
         };
         for (pass, scene) in scenes.iter().take(on_cpu) {
             let (whole, samples) = (Window::whole([scene.image.width, scene.image.height]), 0..1);
-            let frame =
-                cpu::render_samples(scene, volume, &mesh, whole, samples, false, &mut kept, &Unwatched)?;
+            let frame = cpu::render_samples(
+                scene,
+                volume,
+                &mesh,
+                whole,
+                samples,
+                false,
+                &mut light_volumes,
+                &Unwatched,
+            )?;
             if counted {
                 add("cpu", *pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
                 if *pass == scenes[0].0 {
@@ -271,7 +282,7 @@ fn passes(
 fn row(
     scene: &'static str,
     volume: String,
-    of: &Scene,
+    measured: &Scene,
     engine: &'static str,
     pass: &'static str,
     [seconds, fastest]: [f64; 2],
@@ -279,11 +290,11 @@ fn row(
 ) -> Row {
     let cores = rayon::current_num_threads() as f64;
     let ns_per_cell = if cells == 0 { 0.0 } else { seconds * cores / cells as f64 * 1e9 };
-    let size = format!("{}×{}", of.image.width, of.image.height);
+    let size = format!("{}×{}", measured.image.width, measured.image.height);
     Row { scene, volume, size, engine, pass, seconds, fastest, cells, ns_per_cell }
 }
 
-/// Rows for making a picture of its radiance on the host: pixel by pixel, and with bloom.
+/// Measures how long the host takes to turn radiance into a picture, without and with bloom.
 fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
     let sets = |bloom: f32| [front([1280, 720]), vec![format!("image.bloom={bloom}")]].concat();
     let scenes = [("resolve", load("front", &sets(0.0))?), ("resolve bloom", load("front", &sets(0.1))?)];
@@ -306,7 +317,7 @@ fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resul
     Ok(())
 }
 
-/// Rows for building volumes; cells are those of the volume.
+/// Measures how long volumes take to build. The rows' cells are the cells of the volume.
 fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
     for n in [40, 256] {
         let scene = load("front", &cube(n))?;
@@ -327,7 +338,7 @@ fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<
     Ok(())
 }
 
-/// Rows for whole processes, from start to written PNG: a figure, and the default scene's first light.
+/// Measures whole processes, from start to written PNG: a figure, and the default scene with one sample.
 fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e))?;
     let program = std::env::current_exe().map_err(|e| Error::read("taki".as_ref(), e))?;
@@ -353,7 +364,7 @@ fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resu
                 other => {
                     return Err(Error::input(
                         format!("taki render {preset} failed ({other:?})"),
-                        "run it by hand",
+                        "run it by hand to see why",
                     ));
                 }
             }
@@ -387,15 +398,16 @@ fn print(json: bool, line: &str, rows: &[Row]) {
             r.fastest * 1e3
         ));
     }
-    let of_size = |n: u32| {
+    let integrate_of_cube = |n: u32| {
         let volume = format!("{n}×{n}×{n}");
         let is = move |r: &&Row| r.volume == volume && (r.engine, r.pass) == ("gpu", "integrate");
         rows.iter().filter(is)
     };
-    for large in of_size(LARGE) {
-        if let Some(row) = of_size(256).find(|r| r.size == large.size) {
+    for large in integrate_of_cube(LARGE) {
+        if let Some(row) = integrate_of_cube(256).find(|r| r.size == large.size) {
             say(&format!(
-                "\n{LARGE}³ and 256³ with the same strands, {}: {:.2} times the time for {:.2} times the cells",
+                "\n{LARGE}³ and 256³ with the same strands, {}: {:.2} times the time for {:.2} times the \
+                 cells",
                 large.size,
                 large.seconds / row.seconds,
                 large.cells as f64 / row.cells as f64
@@ -404,8 +416,8 @@ fn print(json: bool, line: &str, rows: &[Row]) {
     }
     for bare in rows.iter().filter(|r| ["bare walk", "bare leaping walk"].contains(&r.pass)) {
         let same = |r: &&Row| {
-            let of = (bare.scene, &bare.volume, &bare.size);
-            r.pass == "integrate" && r.engine == "gpu" && (r.scene, &r.volume, &r.size) == of
+            let subject = (bare.scene, &bare.volume, &bare.size);
+            r.pass == "integrate" && r.engine == "gpu" && (r.scene, &r.volume, &r.size) == subject
         };
         if let Some(integrate) = rows.iter().find(same) {
             let ratio = integrate.seconds / bare.seconds;

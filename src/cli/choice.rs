@@ -23,9 +23,9 @@ fn choice<T: Copy + Send + Sync + 'static>(choices: &'static Choices<T>) -> impl
 /// Parser of `--engine`.
 pub fn engine() -> impl TypedValueParser<Value = EngineChoice> {
     choice(&[
-        ("auto", "A GPU adapter if there is one, else the CPU", EngineChoice::Auto),
-        ("gpu", "A GPU adapter, or exit 69", EngineChoice::Gpu),
-        ("cpu", "The CPU", EngineChoice::Cpu),
+        ("auto", "A GPU adapter if there is one, otherwise the CPU", EngineChoice::Auto),
+        ("gpu", "A GPU adapter; without one, taki exits with code 69", EngineChoice::Gpu),
+        ("cpu", "All cores of the CPU", EngineChoice::Cpu),
     ])
 }
 
@@ -35,7 +35,7 @@ pub fn window() -> impl TypedValueParser<Value = WindowChoice> {
     choice(&[
         (
             "auto",
-            "Vulkan, Metal or Direct3D on a GPU; OpenGL where they would be software",
+            "Vulkan, Metal or Direct3D on a GPU; OpenGL if only software drivers exist",
             WindowChoice::Auto,
         ),
         ("wgpu", "Vulkan, Metal or Direct3D", WindowChoice::Wgpu),
@@ -52,12 +52,12 @@ pub fn layer() -> impl TypedValueParser<Value = Layer> {
 
 fn layer_help(layer: Layer) -> &'static str {
     match layer {
-        Layer::Rgb => "Linear radiance: channels R, G, B",
-        Layer::Depth => "Metres to the first surface; 0: none",
-        Layer::Uv => "Texture coordinates on the quad",
-        Layer::Quad => "Quad number plus 1; 0: none",
-        Layer::Transmittance => "Transmittance of the volume",
-        Layer::Cells => "Cells walked by the view rays",
-        Layer::Normal => "Normal on the seen side",
+        Layer::Rgb => "Linear radiance (channels R, G, B)",
+        Layer::Depth => "Distance to the first surface in metres; 0 if there is none",
+        Layer::Uv => "Texture coordinates (u, v) on the quad",
+        Layer::Quad => "Number of the quad plus 1; 0 if there is none",
+        Layer::Transmittance => "Transmittance of the volume, 0 to 1",
+        Layer::Cells => "Number of cells that the view rays walked",
+        Layer::Normal => "Normal of the first surface, on the side that is seen",
     }
 }

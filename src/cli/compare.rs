@@ -1,4 +1,4 @@
-//! `taki compare`: how far two pictures are apart.
+//! `taki compare`: measures how much two pictures differ.
 
 use std::path::{Path, PathBuf};
 
@@ -16,41 +16,43 @@ use crate::util::window::Window;
 
 #[derive(Args)]
 pub struct CompareArgs {
-    /// Two pictures of one size: .png, compared as encoded (0 to 1), or .exr, compared in linear radiance. With --eye
-    /// any number, in the order of time.
+    /// Two pictures of the same size and format. PNG files are compared by encoded values (0 to 1), EXR files
+    /// by linear radiance. With --eye, any number of pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Difference that still counts as the same, as a share of the larger value.
+    /// Relative tolerance: values that differ by at most this share of the larger one count as equal.
     #[arg(long, value_name = "X", default_value_t = 1e-3)]
     relative: f32,
-    /// Difference that still counts as the same. Default: 1e-4 for .exr, two of 255 steps for .png.
+    /// Absolute tolerance: values that differ by at most this count as equal. Default: 1e-4 for .exr, 2/255
+    /// for .png.
     #[arg(long, value_name = "X")]
     absolute: Option<f32>,
-    /// Share of the pixels that may be outside; past it the comparison fails with exit code 1.
+    /// Share of the pixels that may lie outside the tolerances. If more do, taki exits with code 1.
     #[arg(long, value_name = "X", default_value_t = 1e-3)]
     share: f64,
-    /// Fails past this root mean square error too.
+    /// Largest root mean square error. If it is exceeded, taki exits with code 1.
     #[arg(long, value_name = "X")]
     rmse: Option<f64>,
-    /// Writes the absolute difference, brightened so that the largest is white, as a PNG.
+    /// Writes a PNG of the absolute difference, scaled so that the largest difference is white.
     #[arg(long, value_name = "FILE.png")]
     difference: Option<PathBuf>,
-    /// Tells figures for the eye of each picture instead: its streaks, the mean difference of luminance between
-    /// neighbours across the flow over that along it, where the flow goes down the image; and the flicker of three
-    /// pictures or more.
+    /// Instead of comparing, measures how the pictures look to the eye. Streaks: the mean difference of
+    /// luminance between horizontal neighbours, divided by that between vertical neighbours, for water that
+    /// flows down the picture. Flicker: of three pictures or more, how much the luminance flickers in time.
     #[arg(long, conflicts_with_all = ["relative", "absolute", "share", "rmse", "difference"])]
     eye: bool,
-    /// Figures for the eye of this part of the pictures only.
+    /// Measures only this part of the pictures: column and row of its top left pixel, width and height.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop, requires = "eye")]
     region: Option<[u32; 4]>,
-    /// Tells the streaks of so many bands too, from the top of the region to its foot.
+    /// Also prints the streaks of N horizontal bands, from the top of the region to its bottom.
     #[arg(long, value_name = "N", default_value_t = 1, requires = "eye")]
     bands: u32,
-    /// Prints the figures as one JSON object.
+    /// Prints the figures as one JSON object on stdout.
     #[arg(long)]
     json: bool,
 }
 
+/// Width, height, and R, G, B of each pixel.
 type Picture = (u32, u32, Vec<[f32; 3]>);
 
 pub fn run(args: &CompareArgs) -> Result<()> {
@@ -58,14 +60,15 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         return eye(args);
     }
     let [path_a, path_b] = &args.files[..] else {
-        let what = format!("{} pictures; compare two, or look at them with --eye", args.files.len());
+        let what = format!("{} pictures given; compare two, or use --eye for any number", args.files.len());
         return Err(Error::Usage(what));
     };
     let (width, height, a) = read(path_a)?;
     let (other_width, other_height, b) = read(path_b)?;
     if (width, height) != (other_width, other_height) {
         return Err(Error::Comparison(format!(
-            "the pictures differ in size: {width}×{height} and {other_width}×{other_height}; render them at one size"
+            "the pictures differ in size: {width}×{height} and {other_width}×{other_height}; render both at \
+             the same size"
         )));
     }
     one_kind(&args.files)?;
@@ -86,19 +89,20 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     if share > args.share {
         return Err(Error::Comparison(format!(
-            "{share:.6} of the pixels are outside; --share allows {}",
+            "{share:.6} of the pixels lie outside the tolerance; --share allows {}",
             args.share
         )));
     }
     match args.rmse {
-        Some(most) if d.rmse > most || most.is_nan() => {
-            Err(Error::Comparison(format!("the rmse is {:.6}; --rmse allows {most}", d.rmse)))
-        }
+        Some(most) if d.rmse > most || most.is_nan() => Err(Error::Comparison(format!(
+            "the root mean square error is {:.6}; --rmse allows {most}",
+            d.rmse
+        ))),
         _ => Ok(()),
     }
 }
 
-/// Figures for the eye.
+/// Prints how the pictures look to the eye: streaks and flicker.
 fn eye(args: &CompareArgs) -> Result<()> {
     one_kind(&args.files)?;
     let mut first: Option<([u32; 2], Window)> = None;
@@ -107,27 +111,31 @@ fn eye(args: &CompareArgs) -> Result<()> {
     for path in &args.files {
         let (width, height, pixels) = read(path)?;
         let size = [width, height];
-        let (of, part) = match first {
+        let (first_size, part) = match first {
             Some(first) => first,
             None => *first.insert((size, part(args, size)?)),
         };
-        if of != size {
+        if first_size != size {
             return Err(Error::Comparison(format!(
-                "{} has {width}×{height} pixels and {} {}×{}; render them at one size",
+                "{} has {width}×{height} pixels, but {} has {}×{}; render them at the same size",
                 path.display(),
                 args.files[0].display(),
-                of[0],
-                of[1]
+                first_size[0],
+                first_size[1]
             )));
         }
         let linear = |p: &[f32; 3]| luminance(if is_exr(path) { *p } else { p.map(decoded) });
         let luminances: Vec<f32> = pixels.iter().map(linear).collect();
-        let of = |part| streaks(&luminances, width as usize, part);
-        let each: Vec<Streaks> = match args.bands {
+        let streaks_in = |part| streaks(&luminances, width as usize, part);
+        let in_bands: Vec<Streaks> = match args.bands {
             1 => Vec::new(),
-            n => bands(part, n).into_iter().map(of).collect(),
+            n => bands(part, n).into_iter().map(streaks_in).collect(),
         };
-        pictures.push(Looked { file: path.display().to_string(), streaks: of(part), bands: each });
+        pictures.push(EyeFigures {
+            file: path.display().to_string(),
+            streaks: streaks_in(part),
+            bands: in_bands,
+        });
         let rows = (part.y..part.bottom()).flat_map(|y| {
             let row = y as usize * width as usize;
             luminances[row + part.x as usize..row + part.right() as usize].iter().copied()
@@ -140,7 +148,7 @@ fn eye(args: &CompareArgs) -> Result<()> {
         return Ok(());
     }
     let ratio = |s: &Streaks| s.ratio.map_or("–".into(), |ratio| format!("{ratio:.4}"));
-    for Looked { file, streaks, bands } in &pictures {
+    for EyeFigures { file, streaks, bands } in &pictures {
         let down: Vec<String> = bands.iter().map(ratio).collect();
         let down = if down.is_empty() { String::new() } else { format!("  bands {}", down.join(" ")) };
         let (across, along) = (streaks.across, streaks.along);
@@ -152,20 +160,22 @@ fn eye(args: &CompareArgs) -> Result<()> {
     Ok(())
 }
 
-/// What is told of one picture.
+/// Figures of one picture.
 #[derive(Serialize)]
-struct Looked {
+struct EyeFigures {
     file: String,
     streaks: Streaks,
     bands: Vec<Streaks>,
 }
 
-/// The part that is looked at: every band of it has neighbours both ways.
+/// Returns the part of the pictures to measure. Every band must have two columns and two rows, so that its
+/// pixels have neighbours both ways.
 fn part(args: &CompareArgs, size: [u32; 2]) -> Result<Window> {
     let part = window("--region", args.region, size)?;
     if part.width < 2 || args.bands == 0 || part.height / 2 < args.bands {
         return Err(Error::Usage(format!(
-            "--bands {} of {}×{} pixels: a band needs two columns and two rows; take fewer bands or a larger region",
+            "--bands {} of {}×{} pixels: a band needs two columns and two rows; use fewer bands or a larger \
+             region",
             args.bands, part.width, part.height
         )));
     }
@@ -179,7 +189,7 @@ fn is_exr(path: &Path) -> bool {
 fn one_kind(files: &[PathBuf]) -> Result<()> {
     if files.iter().any(|path| is_exr(path) != is_exr(&files[0])) {
         return Err(Error::Usage(
-            "a .png is encoded and an .exr linear: compare pictures of one kind".into(),
+            "PNG values are encoded and EXR values linear; compare files of the same format".into(),
         ));
     }
     Ok(())
@@ -206,6 +216,7 @@ fn read(path: &Path) -> Result<Picture> {
     Ok((width, height, r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect()))
 }
 
+/// Draws the absolute difference of `a` and `b`, scaled so that `max` is 255.
 fn difference_picture(width: u32, height: u32, a: &[[f32; 3]], b: &[[f32; 3]], max: f64) -> Frame {
     let scale = if max > 0.0 { 255.0 / max } else { 0.0 };
     let mut frame = Frame::new(width, height, false);

@@ -1,4 +1,4 @@
-//! `taki devices`: the adapters.
+//! `taki devices`: lists the GPU adapters.
 
 use super::terminal::say;
 use crate::engine::gpu::adapters;
@@ -8,7 +8,8 @@ pub fn run() -> Result<()> {
     let adapters = adapters();
     if adapters.is_empty() {
         say(
-            "no GPU adapter: rendering uses the CPU engine. A Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine.",
+            "no GPU adapter: taki renders on the CPU. A Vulkan driver (Debian: mesa-vulkan-drivers) enables \
+             the GPU engine.",
         );
     }
     for adapter in adapters {

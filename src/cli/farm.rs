@@ -1,4 +1,4 @@
-//! `taki farm`: job files.
+//! `taki farm`: writes job files.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -18,38 +18,40 @@ pub struct FarmArgs {
 }
 
 const SLURM_HELP: &str = "\
-Example, from the folder that the paths start from, on a disk that all nodes share:
+Example. Run it in the folder where relative paths start, on a disk that all nodes share:
 
   taki farm slurm --shards 8 --time 60 --cpus 4 -- fall.toml --frames 0-239 -o 'out/fall.####.exr' | sbatch
 
-A task that ends with 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed, time limit, \
-preemption) is requeued; scontrol show job and sacct tell every other exit code. Finished frames are kept.";
+A task that ends with code 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed, time \
+limit, preemption) is requeued; scontrol show job and sacct show any other code. Finished frames are kept.";
 
 const OPENJD_HELP: &str = "\
-Example; relative paths start from the template's folder (its parameter Folder):
+Example. Relative paths start in the template's folder, which its parameter Folder can change:
 
   taki farm openjd --shards 8 -o fall.yaml -- fall.toml --frames 0-239 -o 'out/fall.####.exr'
   openjd check fall.yaml && openjd run fall.yaml
 
-The specification has no retry by exit code: after 74 (I/O error), 75 (device lost), 124 (driver hang) or 137 \
-(killed) the task itself runs its shard again. Finished frames are kept.";
+The specification has no retry by exit code, so the task itself runs its shard again after code 74 (I/O \
+error), 75 (device lost), 124 (driver hang) or 137 (killed). Finished frames are kept.";
 
 const KUBERNETES_HELP: &str = "\
-Example; relative paths start from the root of the volume claim:
+Example. Relative paths start at the root of the volume claim:
 
-  taki farm kubernetes --shards 8 --image IMAGE --claim scenes -- fall.toml --frames 0-239 -o 'out/fall.####.exr' | kubectl apply -f -
+  taki farm kubernetes --shards 8 --image IMAGE --claim scenes -- \\
+    fall.toml --frames 0-239 -o 'out/fall.####.exr' | kubectl apply -f -
 
-A shard that ends with 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed) is run again; \
-2, 65 and 73 end the job, other codes their shard. Finished frames are kept. Needs Kubernetes 1.29 or newer.";
+A shard that ends with code 74 (I/O error), 75 (device lost), 124 (driver hang), 137 or 143 (killed) is run \
+again. Codes 2, 65 and 73 end the job; any other code ends its shard. Finished frames are kept. Needs \
+Kubernetes 1.29 or newer.";
 
 #[derive(Subcommand)]
 enum Engine {
-    /// Writes a Slurm array job, for sbatch.
+    /// Writes the script of a Slurm array job, for sbatch.
     #[command(after_help = SLURM_HELP)]
     Slurm {
         #[command(flatten)]
         job: JobArgs,
-        /// Partitions to run in, separated by commas.
+        /// Partitions to run in, separated by commas. Default: the site's default partition.
         #[arg(long, value_name = "NAMES")]
         partition: Option<String>,
     },
@@ -64,13 +66,13 @@ enum Engine {
     Kubernetes {
         #[command(flatten)]
         job: JobArgs,
-        /// Container image that holds taki.
+        /// Container image that contains taki.
         #[arg(long)]
         image: String,
-        /// Persistent volume claim with the scenes, and for the frames; all shards write to it.
+        /// Persistent volume claim that holds the scenes and receives the frames. All shards write to it.
         #[arg(long, value_name = "NAME")]
         claim: String,
-        /// Where the claim is mounted in the container; relative paths start here.
+        /// Folder where the claim is mounted in the container. Relative paths start there.
         #[arg(long, value_name = "DIR", default_value = "/work")]
         mount: String,
     },
@@ -78,34 +80,37 @@ enum Engine {
 
 #[derive(Args)]
 struct JobArgs {
-    /// Pieces that the batch is split into; each is a task of the farm.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Number of shards that the batch is split into. Each shard is one task of the farm.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     shards: u32,
-    /// The job file; an old one is replaced. Default: stdout.
+    /// Job file to write; an existing file is replaced. Default: stdout.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Name of the job.
     #[arg(long, default_value = "taki", value_parser = name)]
     name: String,
-    /// The program on the nodes.
+    /// Path of taki on the nodes.
     #[arg(long, value_name = "PATH", default_value = "taki")]
     taki: OsString,
-    /// How often one shard may be run again after a fault that may pass.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    /// Number of times that one shard may be run again after a temporary fault.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=1000))]
     retries: u32,
-    /// Longest time of one run of a shard, minutes.
+    /// Time limit of one run of a shard, in minutes. Default: the site's limit.
     #[arg(long, value_name = "MINUTES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     time: Option<u32>,
-    /// Cores of a shard.
+    /// CPU cores for each shard. Default: the site's default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     cpus: Option<u32>,
-    /// Memory of a shard, MiB. The batch's own --memory goes after --.
+    /// Memory for each shard, in MiB. Default: the site's default. The budget of taki batch is another
+    /// option, --memory after --.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     memory: Option<u32>,
-    /// GPUs of a shard.
+    /// GPUs for each shard. Default: the site's default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     gpus: Option<u32>,
-    /// Scene and options of `taki batch`, passed on as they are; --shard is added.
+    /// Scene and options of `taki batch`. They are passed on unchanged, and --shard is added.
     #[arg(last = true, required = true, value_name = "BATCH ARGUMENTS")]
     batch: Vec<OsString>,
 }
@@ -133,8 +138,8 @@ fn name(text: &str) -> std::result::Result<String, String> {
     check_name(text).map(|()| text.to_string())
 }
 
-/// Reads the arguments as `taki batch` will: a slip of the pen is found here, not on every node. Scenes are
-/// not read; they may be elsewhere.
+/// Parses the arguments as `taki batch` will, so that a typing error is found here and not on every node.
+/// Does not read the scene, which may exist only on the nodes.
 fn check_batch(job: &Job) -> Result<()> {
     let shard = format!("0/{}", job.shards);
     let start = ["taki", "batch", "--shard", &shard].map(OsString::from);
@@ -142,11 +147,9 @@ fn check_batch(job: &Job) -> Result<()> {
         let text = e.render().to_string();
         let line = match e.use_stderr() {
             true => text.lines().next().unwrap_or("").trim_start_matches("error: "),
-            false => "they ask for help",
+            false => "they ask for help or the version",
         };
-        Error::Usage(format!(
-            "taki batch would not take the arguments after --: {line}; see taki batch --help"
-        ))
+        Error::Usage(format!("taki batch would refuse the arguments after --: {line}; see taki batch --help"))
     })?;
     let Some((_, batch)) = matches.subcommand() else { return Ok(()) };
     let whole = |path: &&PathBuf| {
@@ -159,8 +162,8 @@ fn check_batch(job: &Job) -> Result<()> {
     match outputs.find(whole).or_else(|| wholes.next()) {
         None => Ok(()),
         Some(path) => Err(Error::Usage(format!(
-            "{} is one file of all pictures, and a shard has only its own; leave it out, and when the job is done \
-             run the whole taki batch without --shard: it keeps the pictures and makes the rest of them",
+            "{} needs all pictures, but a shard renders only some; leave it out of the job, and when the job \
+             is done, run the whole taki batch without --shard: it keeps the pictures and adds this file",
             path.display()
         ))),
     }
@@ -180,7 +183,7 @@ pub fn run(args: &FarmArgs) -> Result<()> {
     };
     match output {
         Some(path) => Output::create(path)?.finish_with(text.as_bytes()),
-        // Half a job file in a pipe is no job: unlike a line of news, it may not be lost in silence.
+        // Half a job file in a pipe is useless, so unlike other output on stdout a failed write is an error.
         None => {
             let mut out = std::io::stdout();
             let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());

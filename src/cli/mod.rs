@@ -1,4 +1,4 @@
-//! The command line: one file per subcommand.
+//! The command line. Each subcommand has its own file.
 
 mod batch;
 mod bench;
@@ -28,11 +28,15 @@ use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use terminal::{Terminal, say};
 
-const EXIT_CODES: &str = "Exit codes: 0 ok · 1 comparison failed · 2 usage · 33 out of memory · 65 bad input · \
-69 no adapter (only with --engine gpu), no window, or no ffmpeg · 73 cannot create output · 74 I/O error · 75 device lost, try again · \
-124 the GPU did not answer · 130/143 interrupted · 101 a bug.";
+const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
+65 bad input · 69 no GPU adapter (only with --engine gpu), no window or no ffmpeg · 73 cannot create an output \
+· 74 I/O error · 75 GPU device lost, try again · 101 a bug, please report it · 124 the GPU did not answer · \
+130/143 interrupted.";
 
-/// Renders matter too fine for geometry, gushing water first, as volume textures on the GPU.
+/// Renders water, and other matter too fine for geometry, as volume textures on the GPU.
+///
+/// To start, run `taki render` for a first picture, `taki presets` for more scenes, or `taki view` to try out
+/// parameters. `taki COMMAND --help` explains the options of a command.
 #[derive(Parser)]
 #[command(version, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
@@ -42,53 +46,53 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Renders one image.
+    /// Renders one picture.
     Render(render::RenderArgs),
-    /// Renders many images: the frames of an animation, the grid of a sweep.
+    /// Renders many pictures: the frames of an animation or the grid of a parameter sweep.
     Batch(batch::BatchArgs),
-    /// Opens the viewer: turn the parameters and see the picture change.
+    /// Opens the viewer, where you change parameters and see the picture change.
     #[cfg(feature = "viewer")]
     View(view::ViewArgs),
-    /// Checks a scene and prints it fully resolved.
+    /// Checks a scene and prints it with all its parameters.
     Scene(scene::SceneArgs),
     /// Builds a volume texture or prints its statistics.
     Volume(volume::VolumeArgs),
     /// Writes a job file that splits a batch over the machines of a farm.
     Farm(farm::FarmArgs),
-    /// Measures this machine: passes, engines, volumes, with the work each did.
+    /// Measures how long the stages of rendering take on this machine.
     Bench(bench::BenchArgs),
-    /// Joins crops of one picture to the file of the whole.
+    /// Joins crops of one picture to the whole picture.
     Stitch(stitch::StitchArgs),
-    /// Compares two images (PNG or EXR): error figures, a difference image, exit 1 past a threshold.
+    /// Compares two pictures (PNG or EXR) and fails if they differ too much.
     Compare(compare::CompareArgs),
-    /// Lists the scenes that come with the program.
+    /// Lists the preset scenes that come with taki.
     Presets,
     /// Lists the GPU adapters of this machine.
     Devices,
-    /// Prints completions for a shell.
+    /// Prints a script that completes taki's commands and options in a shell.
     Completions {
-        /// The shell.
+        /// The shell to complete for.
         shell: clap_complete::Shell,
     },
 }
 
-/// What every command that reads a scene takes.
+/// Options of every command that reads a scene.
 #[derive(Args, Clone)]
 struct SceneOptions {
-    /// A preset (see `taki presets`) or a scene file.
+    /// Name of a preset (see `taki presets`) or path of a scene file (.toml).
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
-    /// Sets any parameter, such as `--set curves.h=1.4`; may be given often. docs/parameters.md
-    /// lists them all, and so does `taki scene`.
+    /// Sets a parameter of the scene, such as `--set curves.h=1.4`. Can be given more than once.
+    /// docs/parameters.md explains all parameters; `taki scene` prints their values.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Seed of the volume's randomness: short for --set volume.seed=N.
+    /// Seed of the volume's random numbers. Short for --set volume.seed=N.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Lets the scene refer to files in this folder too; may be given often.
+    /// Allows the scene to read files in this folder too. Can be given more than once.
     #[arg(long = "allow-path", value_name = "DIR")]
     allow_paths: Vec<PathBuf>,
-    /// Most memory the work may use, MiB. What needs more is refused before it starts.
+    /// Memory budget in MiB. Work that would need more is refused before it starts.
     #[arg(long, value_name = "MIB", default_value_t = 4096)]
     memory: u64,
 }
@@ -102,12 +106,12 @@ impl SceneOptions {
         }
     }
 
-    /// Loads the scene; `more` are settings of other options, which come last.
+    /// Loads the scene. `more` holds settings from other options; they override --set.
     fn load(&self, more: &[String]) -> Result<Scene> {
         Scene::load(&self.scene, &self.all_sets(more), &self.limits())
     }
 
-    /// Loads the scene as it moves.
+    /// Loads the scene's animation. `more` is as in [`SceneOptions::load`].
     fn animation(&self, more: &[String], limits: &Limits) -> Result<Animation> {
         Animation::load(&self.scene, &self.all_sets(more), limits)
     }
@@ -120,10 +124,10 @@ impl SceneOptions {
     }
 }
 
-/// What commands take that render.
+/// Options of commands that render.
 #[derive(Args, Clone)]
 struct CacheOptions {
-    /// Neither takes volumes and meshes from the cache of earlier runs nor leaves them there.
+    /// Rebuilds volumes and meshes instead of reusing those of earlier runs, and stores none for later runs.
     #[arg(long)]
     no_cache: bool,
 }
@@ -135,16 +139,17 @@ impl CacheOptions {
     }
 }
 
-/// Which engine, on which device.
+/// Options that choose the engine and its device.
 #[derive(Args, Clone)]
 struct EngineOptions {
-    /// auto takes a GPU adapter if there is one, else the CPU.
+    /// Engine that renders. auto uses a GPU adapter if there is one, otherwise the CPU.
     #[arg(long, value_parser = choice::engine(), default_value = "auto")]
     engine: EngineChoice,
-    /// Takes the adapter whose name contains this (see `taki devices`).
+    /// Uses the GPU adapter whose name contains this text, such as `--adapter nvidia`. `taki devices` lists
+    /// all.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Longest wait for one piece of GPU work, seconds; then the program ends with 124.
+    /// Longest wait for one piece of GPU work, in seconds. After that, taki exits with code 124.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
     watchdog: f64,
 }
@@ -155,40 +160,41 @@ impl EngineOptions {
     }
 }
 
+/// Parses a number of seconds, up to one day.
 fn seconds(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
-        _ => Err("a number of seconds from 0 to 86400".into()),
+        _ => Err("give a number of seconds from 0 to 86400".into()),
     }
 }
 
-/// `WIDTHxHEIGHT`.
+/// Parses `WIDTHxHEIGHT`.
 fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parts = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-    parts.ok_or_else(|| "WIDTHxHEIGHT in pixels, such as 1280x720".into())
+    parts.ok_or_else(|| "give WIDTHxHEIGHT in pixels, such as 1280x720".into())
 }
 
-/// `X,Y,W,H`.
+/// Parses `X,Y,W,H`.
 fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
     let numbers = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<Vec<u32>>>();
     numbers
         .and_then(|n| n.try_into().ok())
-        .ok_or_else(|| "column, row, width and height in pixels, such as 0,0,640,360".into())
+        .ok_or_else(|| "give column, row, width and height in pixels, such as 0,0,640,360".into())
 }
 
-/// What an automatic exposure has chosen.
+/// Formats the exposure that was measured automatically.
 fn measured_words(stops: f32) -> String {
     format!("taki: automatic exposure: {stops:+.2} stops")
 }
 
-/// The part of the image that is asked for by `option`.
+/// Returns the part of an image of this size that `option` asks for; all of it without the option.
 fn window(option: &str, crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window> {
     let Some(crop) = crop else { return Ok(Window::whole(size)) };
     let [x, y, width, height] = crop;
     if !Window::fits(size, crop) {
         return Err(Error::Usage(format!(
-            "{option} {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, rows 0 to {}, and \
-             at least one of each",
+            "{option} {x},{y},{width},{height} does not lie in the picture; allowed: columns 0 to {}, \
+             rows 0 to {}, and at least one of each",
             size[0] - 1,
             size[1] - 1
         )));
@@ -196,18 +202,18 @@ fn window(option: &str, crop: Option<[u32; 4]>, size: [u32; 2]) -> Result<Window
     Ok(Window { x, y, width, height })
 }
 
-/// Where a command writes when -o is not given: the scene's name in the current folder.
+/// The output if -o is not given: the scene's name in the current folder.
 fn default_output(scene: &Scene, extension: &str) -> PathBuf {
-    // Not `with_extension`: the scene v1.2 would become v1.png.
+    // `with_extension` would turn the scene v1.2 into v1.png.
     PathBuf::from(format!("{}.{extension}", scene.name))
 }
 
-/// Runs the program; the exit codes are listed in docs/scenes-and-files.md.
+/// Runs the program and returns its exit code. docs/scenes-and-files.md lists the exit codes.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            // Help and version go to stdout and are no error.
+            // Help and version are not errors and go to stdout.
             let text = e.render().to_string();
             if e.use_stderr() {
                 terminal::complain_raw(&text)
@@ -225,8 +231,9 @@ pub fn main() -> ExitCode {
         Err(e) => {
             terminal.error(&e);
             if matches!(e, Error::Watchdog { .. }) {
-                // The driver's threads are still at work: exit handlers would take their memory away under
-                // them, and the process end by a fault. Outputs and temporary files are settled by now.
+                // The driver's threads are still running. Exit handlers would free memory that they use, and
+                // the process would crash. Outputs and temporary files are finished by now, so exit without
+                // handlers.
                 signal_hook::low_level::exit(e.exit_code().into());
             }
             ExitCode::from(e.exit_code())

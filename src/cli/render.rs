@@ -1,4 +1,4 @@
-//! `taki render`: one image.
+//! `taki render`: renders one picture.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -23,31 +23,32 @@ use crate::util::window::Window;
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// The picture: .png (sRGB, 8 bits) or .exr (float32, linear, with layers). May be given twice.
-    /// Default: the scene's name with .png, in the current folder.
+    /// File to write: .png (sRGB, 8 bits) or .exr (linear, float32, with layers). Give -o twice to write
+    /// both. Default: the scene's name with .png, in the current folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Renders only these columns and rows of the picture: the same pixels, bit for bit. `taki stitch`
-    /// joins such parts.
+    /// Renders only a part of the picture: column and row of its top left pixel, width and height. Its
+    /// pixels equal those of the whole picture bit for bit; `taki stitch` joins such parts.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
-    /// Jittered samples a pixel.
+    /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// This frame of the scene's animation.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=999_999_999))]
+    /// Frame of the scene's animation to render.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
     frame: u32,
     #[command(flatten)]
     engine: EngineOptions,
     #[command(flatten)]
     cache: CacheOptions,
-    /// Layers of the EXR file.
+    /// Layers of the EXR file, separated by commas. Default: all. Example: --layers rgb,depth
     #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
     layers: Option<Vec<Layer>>,
-    /// Prints what was done as one JSON object on stdout.
+    /// Prints a report with sizes, figures and times as one JSON object on stdout.
     #[arg(long)]
     json: bool,
 }
@@ -70,12 +71,12 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let still = Still::create(&outputs)?;
     let has_exr = still.has_exr();
     if args.layers.is_some() && !has_exr {
-        return Err(Error::Usage("--layers is for EXR files; add -o FILE.exr".into()));
+        return Err(Error::Usage("--layers needs an EXR file; add -o FILE.exr".into()));
     }
     let layers = args.layers.clone().unwrap_or(Layer::ALL.to_vec());
     let surface = has_exr && layers.iter().any(|l| l.of_surface());
 
-    // What the processor makes, beside the device, which is slow to open.
+    // Opening the device is slow, so the CPU builds the volume and the mesh at the same time.
     let cache = limits.cache.as_ref();
     let (made, (opened, device_seconds)) = std::thread::scope(|scope| {
         let made = scope.spawn(|| {
@@ -111,7 +112,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     })?;
     let not_finite = writer.figures().non_finite_pixels;
     if not_finite > 0 {
-        terminal.warn(&format!("{not_finite} pixels are not finite: please report this scene"));
+        terminal.warn(&format!("{not_finite} pixels are not finite; please report this scene as a bug"));
     }
 
     let clock = Instant::now();

@@ -1,4 +1,4 @@
-//! `taki scene`: check and print.
+//! `taki scene`: checks a scene and prints it.
 
 use clap::Args;
 
@@ -10,16 +10,17 @@ use crate::util::error::Result;
 pub struct SceneArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// Prints this frame of its animation: a scene of its own, which gives the same picture.
+    /// Prints the scene at this frame of its animation, as a scene file without animation that gives the same
+    /// picture.
     #[arg(long, value_name = "N")]
     frame: Option<u32>,
-    /// Prints JSON with all that follows from the parameters too: camera basis, lights, rock mesh.
+    /// Prints JSON, which also has what follows from the parameters: camera basis, lights, rock mesh.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &SceneArgs) -> Result<()> {
-    // The animation is checked even where the scene is printed with it.
+    // Without --frame, the scene is printed together with its animation, so check both.
     let animation = args.scene.animation(&[], &args.scene.limits())?;
     let scene = match args.frame {
         Some(frame) => animation.at(frame)?,

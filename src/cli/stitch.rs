@@ -1,4 +1,4 @@
-//! `taki stitch`: crops joined to the whole picture.
+//! `taki stitch`: joins crops to the whole picture.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -11,10 +11,11 @@ use crate::util::error::Result;
 
 #[derive(Args)]
 pub struct StitchArgs {
-    /// Files that `taki render --crop` wrote: all PNG or all EXR, of one scene at one size.
+    /// Files that `taki render --crop` wrote, all PNG or all EXR. They must show one scene at one size and
+    /// cover the whole picture; overlaps are allowed.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The whole picture: of the parts' kind.
+    /// File of the whole picture, with the same extension as the parts.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
@@ -24,6 +25,6 @@ pub fn run(args: &StitchArgs, terminal: &Terminal) -> Result<()> {
     stitch(&args.parts, &args.output, terminal)?;
     terminal.close();
     let (parts, seconds) = (args.parts.len(), start.elapsed().as_secs_f64());
-    terminal.note(&format!("taki: wrote {} of {parts} parts in {seconds:.2} s", args.output.display()));
+    terminal.note(&format!("taki: wrote {} from {parts} parts in {seconds:.2} s", args.output.display()));
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What the user sees: progress on a terminal, warnings, the error line; and the signals that stop work.
+//! Output for the user (progress bar, warnings, error line) and the signals that stop work.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Arc;
@@ -10,32 +10,36 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// Prints a line on stdout. A closed stdout loses the line and nothing else: files are still written.
+/// Prints a line on stdout. If stdout is closed, the line is lost, but the command goes on to write its
+/// files.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-/// Prints text on stderr as it is; a closed stderr loses it.
+/// Prints text on stderr unchanged. If stderr is closed, the text is lost.
 pub fn complain_raw(text: &str) {
     let _ = write!(std::io::stderr(), "{text}");
 }
 
-/// The terminal of one command.
+/// The terminal, shared by all that one command prints.
 pub struct Terminal {
+    /// The current progress bar and the stage it shows.
     bar: Mutex<Option<(&'static str, ProgressBar)>>,
-    /// 0, or the exit code of the signal that came.
+    /// Exit code of the signal that was received; 0 if there was none.
     signal: Arc<AtomicUsize>,
 }
 
 impl Terminal {
-    /// Takes over Ctrl-C and SIGTERM: the first asks the work to stop, the second ends the process.
+    /// Handles SIGINT (Ctrl-C) and SIGTERM: the first signal asks the work to stop, the second ends the
+    /// process.
     pub fn new() -> Self {
         let signal = Arc::new(AtomicUsize::new(0));
         let again = Arc::new(AtomicBool::new(false));
         use signal_hook::consts::{SIGINT, SIGTERM};
         for (number, code) in [(SIGINT, 130), (SIGTERM, 143)] {
-            // In this order: the shutdown acts only when the flag was already set by a signal before.
-            // Without handlers the system's default ends the process, which is no worse.
+            // The shutdown must be registered before the flag, so that it acts only if an earlier signal has
+            // set the flag. If registering fails, the system's default action ends the process, which is
+            // acceptable.
             let _ = signal_hook::flag::register_conditional_shutdown(number, code, again.clone());
             let _ = signal_hook::flag::register(number, again.clone());
             let _ = signal_hook::flag::register_usize(number, signal.clone(), code as usize);
@@ -43,18 +47,18 @@ impl Terminal {
         Terminal { bar: Mutex::new(None), signal }
     }
 
-    /// 0, or the exit code of the signal that came.
+    /// Exit code of the signal that was received; 0 if there was none.
     #[cfg(feature = "viewer")]
     pub fn signal(&self) -> Arc<AtomicUsize> {
         self.signal.clone()
     }
 
-    /// One line that tells what is being done, on a terminal only.
+    /// Prints a line about the progress of the work.
     pub fn note(&self, line: &str) {
         self.print(line);
     }
 
-    /// The error line.
+    /// Prints the error line.
     pub fn error(&self, e: &Error) {
         self.print(&format!("taki: error: {e}"));
     }
@@ -66,7 +70,8 @@ impl Terminal {
         }
     }
 
-    /// Prints one line. Names of files and keys of scenes may hold what would end it or steer the terminal.
+    /// Prints one line without its control characters: file names and scene keys may contain characters that
+    /// break the line or steer the terminal.
     fn print(&self, line: &str) {
         let line = line.replace(char::is_control, " ");
         let write = || complain_raw(&format!("{line}\n"));
@@ -82,12 +87,12 @@ impl Terminal {
 }
 
 impl Terminal {
-    /// Whether someone may look at it: progress is then drawn, and not told line by line.
+    /// Whether stderr is a terminal. Progress is then drawn as a bar instead of printed line by line.
     pub fn is_interactive(&self) -> bool {
         std::io::stderr().is_terminal()
     }
 
-    /// An error once a signal has come.
+    /// Returns an error once a signal has been received.
     pub fn check(&self) -> Result<()> {
         match self.signal.load(Ordering::Relaxed) {
             0 => Ok(()),
@@ -95,7 +100,7 @@ impl Terminal {
         }
     }
 
-    /// Draws the bar of many pictures, `done` of `total`, and what `pace` says of them.
+    /// Draws the bar of a batch: `done` of `total` pictures, and the text `pace` behind it.
     pub fn bar(&self, done: f64, total: f64, pace: &str) {
         if !self.is_interactive() {
             return;
@@ -112,7 +117,7 @@ impl Terminal {
             *slot = Some((PICTURES, bar));
         }
         if let Some((_, bar)) = &*slot {
-            // In thousandths of a picture.
+            // The bar counts thousandths of a picture.
             bar.set_length((total * 1e3) as u64);
             bar.set_position((done * 1e3) as u64);
             bar.set_message(pace.to_owned());
@@ -120,7 +125,7 @@ impl Terminal {
     }
 }
 
-/// The bar of many pictures.
+/// Name of a batch's progress bar.
 const PICTURES: &str = "pictures";
 
 impl Monitor for Terminal {

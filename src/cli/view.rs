@@ -1,4 +1,4 @@
-//! `taki view`: the viewer.
+//! `taki view`: opens the viewer.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -19,23 +19,24 @@ pub struct ViewArgs {
     cache: CacheOptions,
     #[command(flatten)]
     engine: EngineOptions,
-    /// What draws the window: auto takes Vulkan, Metal or Direct3D on a GPU, else OpenGL.
+    /// Graphics interface that draws the window. auto uses Vulkan, Metal or Direct3D on a GPU, otherwise
+    /// OpenGL.
     #[arg(long, value_parser = choice::window(), default_value = "auto")]
     window: WindowChoice,
-    /// Closes the window after this many seconds.
+    /// Closes the window after this number of seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     exit_after: Option<f64>,
-    /// Writes the window's picture to this PNG before --exit-after closes it.
+    /// Saves a picture of the window to this PNG before --exit-after closes it.
     #[arg(long, value_name = "FILE", requires = "exit_after")]
     screenshot: Option<PathBuf>,
-    /// Measures: changes parameters by itself, draws while it renders, then closes and prints how quickly
-    /// the viewer answered.
+    /// Measures how quickly the viewer responds: changes parameters by itself, draws while it renders, then
+    /// closes the window and prints the times.
     #[arg(long, conflicts_with = "exit_after")]
     measure: bool,
-    /// Takes the window's GPU device away after this many seconds, as a driver's reset does.
+    /// Destroys the window's GPU device after this number of seconds, as a driver reset does.
     #[arg(long, hide = true, value_name = "SECONDS", value_parser = seconds)]
     lose_window_after: Option<f64>,
-    /// At the end prints how quickly the viewer answered, as one JSON object on stdout.
+    /// Prints how quickly the viewer responded as one JSON object on stdout when the window closes.
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! `taki volume`: the volume texture as NumPy arrays.
+//! `taki volume`: writes volume textures as NumPy arrays and prints their statistics.
 
 use std::path::PathBuf;
 
@@ -19,22 +19,22 @@ pub struct VolumeArgs {
 
 #[derive(Subcommand)]
 enum VolumeCommand {
-    /// Builds a scene's volume texture and writes it as .npz: rho, v, k, alpha.
+    /// Builds a scene's volume texture and writes it as an .npz file with the arrays rho, v, k and alpha.
     Build {
         #[command(flatten)]
         scene: SceneOptions,
-        /// The file. Default: the scene's name with .npz, in the current folder.
+        /// File to write. Default: the scene's name with .npz, in the current folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
     },
     /// Prints statistics of a volume file.
     Info {
-        /// The .npz file.
+        /// The .npz file to read.
         file: PathBuf,
-        /// As JSON.
+        /// Prints the statistics as one JSON object.
         #[arg(long)]
         json: bool,
-        /// Most memory the volume may use, MiB.
+        /// Memory budget in MiB. A volume that would need more is refused.
         #[arg(long, value_name = "MIB", default_value_t = 4096)]
         memory: u64,
     },
@@ -66,6 +66,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
     }
 }
 
+/// Formats the statistics as text for people.
 fn in_words(s: &Statistics) -> String {
     let [nx, ny, nz] = s.size;
     let percent = |x: f64| format!("{:.2} %", 100.0 * x);
@@ -78,7 +79,7 @@ fn in_words(s: &Statistics) -> String {
         format!("flow cells      {} ({} of all)", s.flow_cells, share(s.flow_cells)),
         format!("occupied cells  {} ({} of all)", s.occupied_cells, share(s.occupied_cells)),
         format!("alpha           {}", s.alpha),
-        "over the flow cells (theory for a built volume in brackets):".into(),
+        "over the flow cells (in brackets: theory for a built volume):".into(),
         format!("  mean rho      {:.4} (alpha/2 = {:.4})", s.rho_mean, s.alpha / 2.0),
         format!("  rho = 0       {} (30.85 %)", percent(s.rho_share_at_zero)),
         format!("  rho = alpha   {} (30.85 %)", percent(s.rho_share_at_alpha)),

@@ -1,31 +1,35 @@
-//! Kubernetes: an Indexed Job.
+//! Job file for Kubernetes: the manifest of an Indexed Job.
 
 use super::yaml::{Node, document, list};
 use super::{GRACE_SECONDS, HOPELESS, Job, RETRIED, utf8};
 use crate::util::error::{Error, Result};
 
-/// What only Kubernetes has.
+/// Options that only Kubernetes has.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The container image that holds taki.
+    /// Container image that contains taki.
     pub image: String,
-    /// The persistent volume claim with the scenes, and for the frames; all shards write to it.
+    /// Persistent volume claim that holds the scenes and receives the frames. All shards write to it.
     pub claim: String,
-    /// Where the claim is mounted, and where relative paths start.
+    /// Absolute path where the claim is mounted. Relative paths start there.
     pub mount: String,
 }
 
-/// The manifest of a batch/v1 Job, for Kubernetes 1.29 or newer (`backoffLimitPerIndex`).
+/// Writes the manifest of a batch/v1 Job. It needs Kubernetes 1.29 or newer, which has
+/// `backoffLimitPerIndex`.
 ///
-/// [`RETRIED`] codes count against `job.retries` of their shard, [`HOPELESS`] ones end the job, others their
-/// shard. What the cluster itself disrupts (drained or lost nodes, preemption) is run again without counting.
-/// GPUs are the resource `nvidia.com/gpu`.
+/// A shard that ends with a code of [`RETRIED`] is run again, up to `job.retries` times. A code of
+/// [`HOPELESS`] ends the job, any other code ends its shard. Disruptions by the cluster (drained or lost
+/// nodes, preemption) do not count as retries. GPUs are the resource `nvidia.com/gpu`.
+///
+/// # Errors
+/// [`Error::Usage`] if the job, its name or the mount path is not valid for Kubernetes, or an argument is not
+/// UTF-8.
 pub fn manifest(job: &Job, options: &Options) -> Result<String> {
     job.check()?;
     check_label(&job.name)?;
     if !options.mount.starts_with('/') || options.mount.contains(':') {
-        let why =
-            format!("--mount {:?}: an absolute path without ':' is needed, such as /work", options.mount);
+        let why = format!("--mount {:?}: give an absolute path without ':', such as /work", options.mount);
         return Err(Error::Usage(why));
     }
     let mut command: Vec<Node> = vec![argument(utf8(&job.taki, "a manifest")?)];
@@ -46,7 +50,7 @@ pub fn manifest(job: &Job, options: &Options) -> Result<String> {
         ("command", Node::List(command)),
     ];
     if !amounts.is_empty() {
-        // Requests follow from limits.
+        // Kubernetes sets the requests to the limits if none are given.
         container.push(("resources", Node::Map(vec![("limits", Node::Map(amounts))])));
     }
     container.push((
@@ -84,7 +88,7 @@ pub fn manifest(job: &Job, options: &Options) -> Result<String> {
     let rules = list([
         Node::Map(vec![("action", "Ignore".into()), ("onPodConditions", list([disruption]))]),
         exit_codes("FailJob", "In", &HOPELESS),
-        // What no rule names counts against backoffLimitPerIndex.
+        // Codes that no rule names count against backoffLimitPerIndex.
         exit_codes("FailIndex", "NotIn", &RETRIED),
     ]);
     let spec = vec![
@@ -98,9 +102,12 @@ pub fn manifest(job: &Job, options: &Options) -> Result<String> {
     Ok(document(
         &[
             format!("One taki batch in {} shards, written by taki farm kubernetes.", job.shards),
-            "Finished frames are kept: a shard that is run again goes on where it was.".into(),
-            "I/O error, device lost, driver hang, killed, SIGTERM: the shard is run again. Usage, bad input and".into(),
-            "outputs that cannot be created end the job, other faults their shard.".into(),
+            "Finished frames are kept: a shard that is run again continues where it stopped.".into(),
+            "After an I/O error, lost device, driver hang, SIGKILL or SIGTERM, the shard is run again."
+                .into(),
+            "Usage errors, bad input and outputs that cannot be created end the job; any other fault ends"
+                .into(),
+            "only its shard.".into(),
         ],
         vec![
             ("apiVersion", "batch/v1".into()),
@@ -111,19 +118,19 @@ pub fn manifest(job: &Job, options: &Options) -> Result<String> {
     ))
 }
 
-/// One argument of a container's command, where `$(NAME)` would be replaced and `$$` is a `$`.
+/// Escapes an argument of a container's command: Kubernetes would replace `$(NAME)`, and reads `$$` as `$`.
 fn argument(word: &str) -> Node {
     word.replace('$', "$$").into()
 }
 
-/// Names of pods come from the job's: a DNS label.
+/// Checks that `name` is a DNS label, because Kubernetes derives the names of the pods from it.
 fn check_label(name: &str) -> Result<()> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     if name.chars().all(plain) && !name.ends_with('-') {
         Ok(())
     } else {
         let why =
-            "in Kubernetes a name has lower-case letters, digits and '-', and ends with a letter or digit";
+            "a name in Kubernetes has lower-case letters, digits and '-', and ends with a letter or digit";
         Err(Error::Usage(format!("--name {name}: {why}")))
     }
 }

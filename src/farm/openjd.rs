@@ -1,21 +1,27 @@
-//! Open Job Description: a job template of the revision 2023-09.
+//! Job file for Open Job Description: a job template of the revision 2023-09.
 
 use super::yaml::{Node, document, list};
 use super::{GRACE_SECONDS, Job, RETRIED, bash_words, pattern, utf8};
 use crate::util::error::{Error, Result};
 
-/// Seconds before a shard is run again: time for a driver or a file system to come back.
+/// Seconds before a shard is run again, so that a driver or a file system can recover.
 const PAUSE_SECONDS: u32 = 5;
 
-/// The template: a step `Render` with the task parameter `Shard`, 0 to N − 1. The parameters `Folder` (where
-/// relative paths start; the template's own folder), `Taki` (the program) and `Retries` can be set at
-/// submission. The specification leaves it to the scheduler whether a failed task is run again, whatever its
-/// exit code, so the script does it for [`RETRIED`].
+/// Writes the job template. It has one step `Render` with the task parameter `Shard`, 0 to N − 1. Three job
+/// parameters can be set at submission: `Folder` (relative paths start there; default: the template's
+/// folder), `Taki` (the program) and `Retries`.
+///
+/// The specification knows no retry by exit code: the scheduler alone decides whether it runs a failed task
+/// again. The task's script therefore runs the shard again itself after a code of [`RETRIED`], except 143:
+/// SIGTERM is how a task is cancelled.
+///
+/// # Errors
+/// [`Error::Usage`] if the job or the path of the program is not valid for a job template.
 pub fn template(job: &Job) -> Result<String> {
     job.check()?;
     let taki = utf8(&job.taki, "a job template")?;
     if taki.chars().count() > 1024 || taki.chars().any(char::is_control) {
-        let why = "--taki: a job template can hold 1024 printable characters; use a link with a plain name";
+        let why = "--taki: use at most 1024 printable characters, or a link with a plain name";
         return Err(Error::Usage(why.into()));
     }
     let parameter = |name: &str, kind: &str, about: &str, mut more: Vec<(&'static str, Node)>| {
@@ -27,14 +33,14 @@ pub fn template(job: &Job) -> Result<String> {
         parameter(
             "Folder",
             "PATH",
-            "Where relative paths start, on a disk that all workers share.",
+            "Folder where relative paths start, on a disk that all workers share.",
             vec![("objectType", "DIRECTORY".into()), ("dataFlow", "INOUT".into()), ("default", ".".into())],
         ),
-        parameter("Taki", "STRING", "The program on the workers.", vec![("default", taki.into())]),
+        parameter("Taki", "STRING", "Path of taki on the workers.", vec![("default", taki.into())]),
         parameter(
             "Retries",
             "INT",
-            "How often a shard is run again after a fault that may pass.",
+            "Number of times that a shard is run again after a temporary fault.",
             vec![("minValue", 0.into()), ("default", job.retries.into())],
         ),
     ];
@@ -45,7 +51,7 @@ pub fn template(job: &Job) -> Result<String> {
     ]);
     let mut action = vec![
         ("command", "bash".into()),
-        // As arguments: a value inside the script would be read as bash.
+        // Values are passed as arguments, because bash would interpret values inside the script.
         (
             "args",
             list([
@@ -99,7 +105,7 @@ pub fn template(job: &Job) -> Result<String> {
     Ok(document(
         &[
             format!("One taki batch in {} shards, written by taki farm openjd.", job.shards),
-            "Finished frames are kept: a shard that is run again goes on where it was.".into(),
+            "Finished frames are kept: a shard that is run again continues where it stopped.".into(),
         ],
         vec![
             ("specificationVersion", "jobtemplate-2023-09".into()),
@@ -110,11 +116,11 @@ pub fn template(job: &Job) -> Result<String> {
     ))
 }
 
-/// What a task runs, with folder, program, retries and shard as its arguments.
+/// The bash script that a task runs. Its arguments are folder, program, retries and shard.
 fn script(job: &Job) -> Result<String> {
     let shards = job.shards;
     let arguments = bash_words(&job.batch)?;
-    // SIGTERM is how a task is cancelled: what was asked to stop is not started again.
+    // SIGTERM (143) is how a task is cancelled, so the script must not start the shard again.
     let retried = pattern(&RETRIED.into_iter().filter(|&code| code != 143).collect::<Vec<_>>());
     Ok(format!(
         r#"#!/bin/bash
@@ -127,7 +133,7 @@ trap 'signals=$((signals + 1)); [ -z "$taki" ] || kill -TERM "$taki" 2>/dev/null
 run() {{
     "$program" batch --shard "$shard/{shards}"{arguments} &
     taki=$!
-    # A signal ends wait before taki has ended.
+    # A signal interrupts wait before taki has ended, so wait again after each signal.
     local seen=-1
     while [ "$seen" != "$signals" ]; do
         seen=$signals
@@ -138,9 +144,9 @@ run() {{
 }}
 
 run
-# Open Job Description has no retry by exit code: the script runs the shard again itself.
+# Open Job Description has no retry by exit code, so this script runs the shard again itself.
 while [ "$signals" = 0 ] && [ "$retries" -gt 0 ]; do
-    # I/O error, device lost, driver hang, killed: these may pass. Other codes would come again.
+    # I/O error, lost device, driver hang and SIGKILL may be temporary. Other codes would occur again.
     case $code in
     {retried}) ;;
     *) break ;;

@@ -1,11 +1,11 @@
-//! YAML with its keys in the order they are written.
+//! YAML documents whose keys keep the order in which they are given.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// A piece of YAML.
+/// A YAML value.
 pub enum Node {
     Text(String),
-    /// Text as a literal block, to be read by people.
+    /// Text as a literal block, which people can read line by line.
     Block(String),
     Number(u64),
     List(Vec<Node>),
@@ -30,7 +30,7 @@ impl From<u32> for Node {
     }
 }
 
-/// A list of anything that is a [`Node`].
+/// Converts `items` to a list.
 pub fn list<T: Into<Node>>(items: impl IntoIterator<Item = T>) -> Node {
     Node::List(items.into_iter().map(Into::into).collect())
 }
@@ -53,10 +53,10 @@ impl Serialize for Node {
     }
 }
 
-/// The document, after comment lines.
+/// Writes a document: comment lines, then a map of `entries`.
 pub fn document(comments: &[String], entries: Vec<(&'static str, Node)>) -> String {
     let mut text: String = comments.iter().map(|line| format!("# {line}\n")).collect();
-    // Long arguments stay on their line: folded ones are hard to read.
+    // Long arguments stay on one line, because folded ones are hard to read.
     let options = serde_saphyr::ser_options! { prefer_block_scalars: false };
     serde_saphyr::to_fmt_writer_with_options(&mut text, &Node::Map(entries), options)
         .expect("a tree of text and numbers is valid YAML");

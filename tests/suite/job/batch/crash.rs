@@ -94,7 +94,7 @@ fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
         assert!(!left.is_empty() && left.len() < 8, "{left:?}");
         let mut said = String::new();
         std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut said).unwrap();
-        assert!(said.contains("run the same command again to go on"), "{said}");
+        assert!(said.contains("run the same command again to continue"), "{said}");
         let next = run(&mut slow());
         assert_eq!(counts(&next)[..3], [8, left.len() as u64, 8 - left.len() as u64]);
     }
