@@ -79,7 +79,7 @@ enum Command {
 /// Options of every command that reads a scene.
 #[derive(Args, Clone)]
 struct SceneOptions {
-    /// Name of a preset (see `taki presets`) or path of a scene file (.toml).
+    /// Name of a preset (see `taki presets`) or path of a scene file, such as fall.toml.
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
     /// Sets a parameter of the scene, such as `--set curves.h=1.4`. Can be given more than once.
