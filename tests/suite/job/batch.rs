@@ -1,4 +1,4 @@
-//! Many pictures: each depends on its scene and number alone, and none is lost, whatever ends the work.
+//! Batches: a picture depends only on its scene and its number, and none is lost, however the work ends.
 
 mod crash;
 mod moving;
