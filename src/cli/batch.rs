@@ -306,9 +306,12 @@ impl State {
             return counts;
         }
         let rate = made / seconds;
-        let left = (self.pictures as f64 - self.settled as f64 - self.share).max(0.0) / rate;
+        let seconds_left = (self.pictures as f64 - self.settled as f64 - self.share).max(0.0) / rate;
         let pace = if rate >= 1.0 { format!("{rate:.1}/s") } else { format!("{:.1} s each", 1.0 / rate) };
-        format!("{counts} · {pace} · {} left", indicatif::HumanDuration(Duration::from_secs_f64(left)))
+        format!(
+            "{counts} · {pace} · {} left",
+            indicatif::HumanDuration(Duration::from_secs_f64(seconds_left))
+        )
     }
 }
 

@@ -20,11 +20,11 @@ pub struct CompareArgs {
     /// by linear radiance. With --eye, any number of pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Relative tolerance: values that differ by at most this share of the larger one count as equal.
+    /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at
+    /// most the relative plus the absolute tolerance.
     #[arg(long, value_name = "X", default_value_t = 1e-3)]
     relative: f32,
-    /// Absolute tolerance: values that differ by at most this count as equal. Default: 1e-4 for .exr, 2/255
-    /// for .png.
+    /// Absolute tolerance, in the picture's values. Default: 1e-4 for .exr, 2/255 for .png.
     #[arg(long, value_name = "X")]
     absolute: Option<f32>,
     /// Share of the pixels that may lie outside the tolerances. If more do, taki exits with code 1.

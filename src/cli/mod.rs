@@ -29,9 +29,9 @@ use crate::util::window::Window;
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
-65 bad input · 69 no GPU adapter (only with --engine gpu), no window or no ffmpeg · 73 cannot create an output \
-· 74 I/O error · 75 GPU device lost, try again · 101 a bug, please report it · 124 the GPU did not answer · \
-130/143 interrupted.";
+65 bad input · 69 no GPU adapter (only with --engine gpu), no window or no ffmpeg · 73 cannot create an \
+output · 74 I/O error · 75 GPU device lost, try again · 101 a bug, please report it · \
+124 the GPU did not answer · 130/143 interrupted.";
 
 /// Renders water, and other matter too fine for geometry, as volume textures on the GPU.
 ///
@@ -79,7 +79,7 @@ enum Command {
 /// Options of every command that reads a scene.
 #[derive(Args, Clone)]
 struct SceneOptions {
-    /// Name of a preset (see `taki presets`) or path of a scene file (.toml).
+    /// Name of a preset (see `taki presets`) or path of a scene file, such as fall.toml.
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
     /// Sets a parameter of the scene, such as `--set curves.h=1.4`. Can be given more than once.

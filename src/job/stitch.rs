@@ -82,7 +82,10 @@ fn check_extension(output: &Path, kind: Kind) -> Result<()> {
     if given.as_deref() == Some(extension) {
         return Ok(());
     }
-    let what = format!("-o {}: the crops are .{extension} files, so name a .{extension}", output.display());
+    let what = format!(
+        "-o {}: the crops are .{extension} files, so the output must end with .{extension} too",
+        output.display()
+    );
     Err(Error::Usage(what))
 }
 
@@ -357,7 +360,7 @@ impl Canvas {
 /// Leaves out windows that lie inside another. If the rest cover every pixel exactly once, returns by window
 /// whether it is one of them.
 fn disjoint_cover(whole: [u32; 2], windows: &[Window]) -> Option<Vec<bool>> {
-    // Of equal windows the first one stays.
+    // Equal windows lie inside one another; the first one stays.
     let inside = |i: usize, j: usize| windows[j].holds(&windows[i]) && (windows[i] != windows[j] || j < i);
     let counts: Vec<bool> =
         (0..windows.len()).map(|i| !(0..windows.len()).any(|j| j != i && inside(i, j))).collect();

@@ -72,7 +72,7 @@ pub fn memory_of(
         .saturating_add(volume)
         .saturating_add(rocks)
         .saturating_add(environment);
-    let left = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
+    let available = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let blooms = image.look.bloom > 0.0;
     let pixel =
         PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 } + if blooms { BLOOM_BYTES } else { 0 };
@@ -87,7 +87,7 @@ pub fn memory_of(
             format!("a picture of {}×{} pixels with its volume and rocks", window.width, window.height);
         return Err(Error::memory(what, need.into(), memory, "lower the sizes or raise --memory"));
     }
-    let most = (left / row).clamp(least, wanted.max(least)).min(u64::from(u32::MAX)) as u32;
+    let most = (available / row).clamp(least, wanted.max(least)).min(u64::from(u32::MAX)) as u32;
     let strips = cut(window, drawn, most);
     let tallest = strips.iter().map(|s| u64::from(s.height)).max().unwrap_or(0);
     Ok((parts.saturating_add(WORK_BYTES + tallest * row), strips))
@@ -134,15 +134,15 @@ fn cut(window: Window, drawn: u32, most: u32) -> Vec<Window> {
     let mut strips = Vec::new();
     let mut y = window.y;
     while y < window.bottom() {
-        let left = window.bottom() - y;
+        let remaining = window.bottom() - y;
         // Rows to the end of the current raster window.
-        let here = (drawn - y % drawn).min(left);
-        let height = if most >= left {
-            left
-        } else if most >= here {
-            here + (most - here) / drawn * drawn
+        let to_edge = (drawn - y % drawn).min(remaining);
+        let height = if most >= remaining {
+            remaining
+        } else if most >= to_edge {
+            to_edge + (most - to_edge) / drawn * drawn
         } else {
-            here.div_ceil(here.div_ceil(most))
+            to_edge.div_ceil(to_edge.div_ceil(most))
         };
         strips.push(Window { y, height, ..window });
         y += height;

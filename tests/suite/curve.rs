@@ -1,4 +1,4 @@
-//! §1 Spatial fractal curves: what the paper's §2.1 says of them. Reference truth.
+//! §1 Spatial fractal curves against the statements of the paper's §2.1. Reference truth.
 
 use glam::Vec3;
 use proptest::prelude::*;

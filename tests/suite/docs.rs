@@ -1,6 +1,7 @@
-//! The README and docs/parameters.md say what is so: tables come from the code, files and links exist.
+//! README.md and the pages under docs/ are true: generated tables match the code, and files, links, commands
+//! and options exist.
 //!
-//! `TAKI_BLESS=1 tests/run docs` writes the generated parts anew.
+//! `TAKI_BLESS=1 tests/run docs` writes the generated tables anew.
 
 use taki::scene::{GROUPS, Kind, PARAMS, Param, parameters_markdown, presets};
 

@@ -1,5 +1,5 @@
-//! Job files: their words survive bash, YAML and the engines; and the engines themselves run them
-//! (`tests/farm`).
+//! Job files: their words survive bash, YAML and the job engines. The scripts in `tests/farm` run the files
+//! on the engines themselves.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;

@@ -1,7 +1,7 @@
-//! Every test of the project, as one binary: linking one is quicker than linking twelve.
+//! All tests of the project in one binary, because linking one is quicker than linking twelve.
 //!
-//! Reference truth (float64, closed form) and parity of the engines (float32, same order) are two kinds
-//! of test; each module says which it holds. Tolerances stand in `tolerance`.
+//! There are two kinds of tests: reference truth (float64, closed forms) and parity of the engines (float32,
+//! same order of operations). Each module says which kind it holds. `tolerance` defines the tolerances.
 
 mod cli;
 mod curve;

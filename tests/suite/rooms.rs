@@ -1,4 +1,4 @@
-//! The house has one-way rooms: a file imports only rooms that stand below its own.
+//! The modules form rooms in a fixed order: a file imports only from rooms below its own.
 
 use std::path::{Path, PathBuf};
 

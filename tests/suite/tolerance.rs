@@ -1,5 +1,5 @@
-//! The project's only tolerances. Everything else is compared exactly, or with a bound that its test
-//! derives from float32 rounding or from the size of its sample.
+//! The only tolerances of the project. Other comparisons are exact, or have a bound that their test derives
+//! from float32 rounding or from the size of its sample.
 
 /// GPU against CPU, linear radiance: relative difference of a pixel that counts as the same. The two run
 /// the same float32 operations in the same order; what is left is `exp2`, `sqrt`, division and fused

@@ -1,4 +1,4 @@
-//! §4 The walk against a brute-force walker in float64, and its invariants. Reference truth.
+//! §4 The exact walk against a brute-force walker in float64, and its invariants. Reference truth.
 
 use glam::{DVec3, IVec3, Vec3};
 use proptest::prelude::*;

@@ -344,8 +344,8 @@ fn picture_of_png(path: &Path) -> Result<RgbImage> {
 fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
-        let found = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
-        found.ok_or_else(|| {
+        let values = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+        values.ok_or_else(|| {
             Error::input(
                 format!("{} has no colour", path.display()),
                 format!("add {} to --layers, or write PNG files too", Layer::Rgb.name()),

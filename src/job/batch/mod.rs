@@ -207,8 +207,8 @@ impl Batch {
 
     /// Numbers of the pictures of this run's shard.
     fn own(&self) -> impl Iterator<Item = usize> + use<> {
-        let (shard, of) = self.request.shard.unwrap_or((0, 1));
-        (shard as usize..self.count()).step_by(of as usize)
+        let (shard, shards) = self.request.shard.unwrap_or((0, 1));
+        (shard as usize..self.count()).step_by(shards as usize)
     }
 
     /// By sweep, the index of its value at a picture. Pictures are ordered by point of the grid, then by

@@ -52,12 +52,12 @@ impl Batch {
         let (needed, strips) = memory_of(&scene, window, surface, memory)?;
         let rasters =
             canvas_bytes(overlap::sheets(&scene)) * window.pixels() * u64::from(scene.image.samples);
-        let kept = if strips.len() > 1 || to_render < 2 {
+        let kept_rasters = if strips.len() > 1 || to_render < 2 {
             0
         } else {
             spare_for_rasters(memory, needed).min(rasters)
         };
-        let memory_bytes = needed + kept;
+        let memory_bytes = needed + kept_rasters;
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
         let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
         let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();

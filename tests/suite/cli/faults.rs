@@ -1,6 +1,6 @@
-//! What goes wrong outside the program: places that cannot be written, signals, files of the wrong kind,
-//! sizes without measure, devices that are missing or lost. Each is one line on stderr, an exit code, and
-//! no file that is not whole.
+//! Faults from outside the program: folders that cannot be written, signals, files of the wrong kind, huge
+//! sizes, GPU devices that are missing or lost. Each ends with one line on stderr and an exit code, and
+//! leaves no incomplete file.
 
 mod device;
 

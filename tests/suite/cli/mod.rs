@@ -1,3 +1,3 @@
-//! What the command line says and does where things go wrong.
+//! What the command line prints and does when something fails.
 
 pub mod faults;

@@ -1,3 +1,5 @@
+//! Automatic exposure: closed forms of its measurement, and one exposure for all frames and parts.
+
 use std::path::Path;
 use std::process::Command;
 

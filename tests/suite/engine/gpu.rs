@@ -1,4 +1,4 @@
-//! Parity: the GPU engine against the CPU engine, stage by stage, in linear radiance.
+//! Parity of the GPU engine with the CPU engine, stage by stage, in linear radiance.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Several sheets under one pixel: against a reference that meets every quad with the ray in float64, sorts
-//! and composites, and closed forms. What both engines do alike stands in `engines`.
+//! Several sheets under one pixel, against closed forms and a float64 reference that intersects every quad
+//! with the ray, sorts the hits and composites them. `engines` holds what both engines must do alike.
 
 mod engines;
 

@@ -1,4 +1,4 @@
-//! The engines: each against the other, and what they share.
+//! The engines: parity between them, and the parts that they share.
 
 pub mod exposure;
 pub mod gpu;

@@ -1,4 +1,4 @@
-//! Which squares of the image water may lie under: none under water is left out, and few others are in.
+//! Squares of the image that water may cover: none that it covers is left out, and few others are included.
 
 use super::gpu::{COARSE_PLACE, scene};
 use glam::Vec3;

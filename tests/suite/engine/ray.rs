@@ -1,4 +1,4 @@
-//! The report of one pixel's ray is the frame's own pixel, cell by cell.
+//! The report of one pixel's ray equals the frame's own pixel, cell by cell.
 
 use crate::engine::gpu::scene;
 use glam::Vec3;

@@ -1,5 +1,5 @@
-//! The shaders against the host: every file is valid and imports what it uses, and every struct, constant and binding
-//! that both sides share is the same on both.
+//! Shaders against the host: every file is valid and imports what it uses, and every struct, constant and
+//! binding that both sides share is equal on both.
 
 use std::mem::offset_of;
 use std::path::Path;

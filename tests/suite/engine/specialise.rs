@@ -1,4 +1,4 @@
-//! Shaders specialised before a driver sees them.
+//! Specialisation of shaders before the driver compiles them.
 
 use taki::engine::gpu::{Source, integrate_source, visibility_source};
 use wgpu::naga;

@@ -1,4 +1,4 @@
-//! Many pictures: each depends on its scene and number alone, and none is lost, whatever ends the work.
+//! Batches: a picture depends only on its scene and its number, and none is lost, however the work ends.
 
 mod crash;
 mod moving;
@@ -182,7 +182,7 @@ fn faults_are_known_before_any_picture() {
         (
             &["--frames", "1", "-o", "f.#.png", "-o", "./f.1.png"],
             2,
-            &["f.1.png would be frame 1 and frame 1"],
+            &["f.1.png would be both frame 1 and frame 1"],
         ),
         (&["--frames", "1-2", "-o", "f.#.exr", "-o", "f.gif", "--layers", "depth"], 2, &["needs colour"]),
         (&["--frames", "1", "-o", "absent/f.#.png", "--shard", "5/8"], 73, &["make the folder"]),

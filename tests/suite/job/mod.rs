@@ -1,4 +1,4 @@
-//! Long work: batches, and pictures in parts.
+//! Long work: batches, and pictures that are rendered in parts.
 
 pub mod batch;
 pub mod strips;

@@ -1,5 +1,5 @@
-//! Large pictures: parts of an image are that part of the whole bit for bit, files do not depend on how the
-//! rows came, crops stitch to the file of the whole, and damaged files are seen.
+//! Large pictures: a part of an image equals that part of the whole bit for bit, files do not depend on how
+//! their rows arrived, crops stitch to the file of the whole, and damaged files are noticed.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
-//! Environments against closed forms in float64; files and their faults in `file`, the sky in `sky`, both
-//! engines in `scene`.
+//! Environments against closed forms in float64. `file` tests map files and their faults, `sky` the sky,
+//! `scene` both engines.
 
 mod file;
 mod scene;

@@ -1,4 +1,4 @@
-//! §5 The fibre model against angles in float64. Reference truth.
+//! §5 The fibre model against a computation with angles in float64. Reference truth.
 
 use glam::{DMat3, DVec3, Mat3, Vec2, Vec3};
 use proptest::prelude::*;

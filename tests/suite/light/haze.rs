@@ -1,4 +1,4 @@
-//! Haze against closed forms, and both engines against one another.
+//! Haze against closed forms, and parity of the engines.
 
 use crate::engine::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};

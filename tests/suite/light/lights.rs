@@ -1,4 +1,4 @@
-//! Lights: what arrives where.
+//! Spot lights: their cone, falloff and aim. Invalid values of lights are refused with their line.
 
 use glam::Vec3;
 use taki::light::{Cone, Light};

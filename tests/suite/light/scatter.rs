@@ -1,5 +1,5 @@
-//! Light scattered more than once: the model of `taki::light::scatter` against a path tracer, and both against
-//! closed forms.
+//! Multiple scattering: the model of `taki::light::scatter` against a path tracer, and both against closed
+//! forms.
 
 mod closed_forms;
 mod parity;

@@ -1,5 +1,5 @@
-//! The reflection model made for flowing water. Reference truth: closed forms of optics, and the direct model in
-//! float64 for the table. Its shader against the CPU is parity.
+//! The reflection model for flowing water. Reference truth: closed forms of optics, and the direct model in
+//! float64 for the table. The shader against the CPU is parity.
 
 mod lookup;
 mod optics;

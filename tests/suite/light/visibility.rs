@@ -1,4 +1,4 @@
-//! Cached visibility: light volumes say what an exact walk from every cell would.
+//! Cached visibility: light volumes hold the values that an exact walk from every cell gives.
 
 use crate::engine::gpu::renderer;
 use glam::{IVec3, Vec3};

@@ -1,4 +1,4 @@
-//! §3 The map between quad and volume against its own definition in float64. Reference truth.
+//! §3 The mapping between quad and volume against its definition in float64. Reference truth.
 
 pub mod sheet;
 pub mod splash;

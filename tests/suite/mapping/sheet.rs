@@ -1,4 +1,4 @@
-//! Sheets of falling water: where their quads lie, how the texture lies on them, and what is left of it.
+//! Sheets of falling water: position of their quads, layout of the texture on them, and erosion.
 
 mod engines;
 

@@ -1,4 +1,4 @@
-//! Splashes: where their drops fly, against the parabolas of mechanics, and which are refused.
+//! Splashes: paths of their drops against the parabolas of mechanics, and splashes that are refused.
 
 use super::sheet::read;
 use glam::{DVec3, Vec2, Vec3};

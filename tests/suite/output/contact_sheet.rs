@@ -1,4 +1,4 @@
-//! Contact sheets: every label in its own place, every picture where its values say.
+//! Contact sheets: no label overlaps another, and every picture stands where its values belong.
 
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Files: pictures, movies, contact sheets.
+//! Output files: pictures, movies, contact sheets.
 
 pub mod contact_sheet;
 pub mod difference;

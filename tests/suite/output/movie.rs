@@ -1,4 +1,4 @@
-//! Movies decode to the frames they were made from; what stops one leaves nothing behind.
+//! Movies decode to the frames that they were made from. A movie that is interrupted leaves no file.
 
 use std::fs::{self, File};
 use std::io::BufReader;

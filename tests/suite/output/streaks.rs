@@ -1,4 +1,4 @@
-//! Figures for the eye against gratings whose gradients are known.
+//! Streaks and flicker against gratings with known gradients.
 
 use std::f64::consts::PI;
 use std::process::Command;

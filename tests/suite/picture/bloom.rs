@@ -1,3 +1,6 @@
+//! Bloom: its spread against closed forms, conservation of light, parity of the engines, and refusal for
+//! crops.
+
 use std::path::Path;
 use std::process::Command;
 

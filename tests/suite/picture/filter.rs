@@ -1,3 +1,5 @@
+//! The sample filter: density of the samples' offsets, crops bit for bit, and parity of the engines.
+
 use std::f64::consts::PI;
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};

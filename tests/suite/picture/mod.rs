@@ -1,5 +1,5 @@
-//! From radiance to picture: samples' filter, bloom, exposure, white balance and tone curves, against closed forms and
-//! published values.
+//! From radiance to picture: sample filter, bloom, exposure, white balance and tone curves, against closed
+//! forms and published values.
 
 pub mod bloom;
 pub mod filter;

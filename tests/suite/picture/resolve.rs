@@ -1,3 +1,5 @@
+//! Tone curves: grey stays grey, and brighter light is never shown darker.
+
 use crate::engine::gpu::scene;
 use taki::picture::resolve::Resolver;
 use taki::picture::{Look, Tone};

@@ -1,3 +1,5 @@
+//! White balance against standard illuminants, and the matrix that adapts a light's colour to 6500 K.
+
 use glam::{DVec2, DVec3};
 use taki::picture::white_balance::{matrix, white};
 

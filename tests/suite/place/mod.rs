@@ -1,4 +1,4 @@
-//! Rock and pools: closed forms of what shades, wets and mirrors them (float64), and parity of the engines.
+//! Rock and pools: closed forms of how they shade, get wet and mirror (float64), and parity of the engines.
 
 pub mod tiles;
 

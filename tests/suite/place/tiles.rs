@@ -1,4 +1,5 @@
-//! Rock as tiles with steps of their own: closed forms of the choice, watertight borders, agreement of the engines.
+//! Rock in tiles of different resolution: closed forms of the choice, watertight borders, parity of the
+//! engines.
 
 use std::collections::HashMap;
 

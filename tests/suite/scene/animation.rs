@@ -1,4 +1,4 @@
-//! Scenes in time: keyframes, loops, turntables, paths.
+//! Animated scenes: keyframes, loops, turntables, camera paths.
 
 use std::path::PathBuf;
 

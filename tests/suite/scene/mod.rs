@@ -1,5 +1,5 @@
-//! Scene files and `--set`: every key of the parameter table can be reached, every wrong value is refused
-//! with its key, range and line, and no text whatever makes the reader panic.
+//! Scene files and `--set`: every key of the parameter table can be set, every wrong value is refused with
+//! its key, range and line, and no text makes the reader panic.
 
 pub mod animation;
 pub mod presets;

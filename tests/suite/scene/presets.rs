@@ -1,6 +1,6 @@
-//! The scenes that come with the program: what the figures promise, and snapshots, last in trust.
+//! Preset scenes: the figures show what they promise, and pictures match snapshots, the weakest kind of test.
 //!
-//! `TAKI_BLESS=1 tests/run presets` writes the snapshots anew; look at each before keeping it.
+//! `TAKI_BLESS=1 tests/run presets` writes the snapshots anew. Look at each before you keep it.
 
 use std::path::PathBuf;
 

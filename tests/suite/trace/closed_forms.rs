@@ -1,4 +1,4 @@
-//! §4 and §5: rays with a known answer. The whole trace of a ray against float64 stands in `truth`.
+//! §4 and §5: rays with a known answer. `truth` compares the whole trace of a ray with float64.
 
 mod truth;
 

@@ -1,5 +1,5 @@
-//! The volume moves down the flow: whole lengths change nothing, parts are a volume with its layers
-//! moved, and down is where v runs to.
+//! The volume moves down the flow: whole tile lengths change nothing, whole layers equal a volume with its
+//! layers moved, and down is the direction in which v increases.
 
 use crate::engine::gpu::{renderer, scene};
 use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};

@@ -1,4 +1,4 @@
-//! The cache on disk: what it gives is what would have been made, whatever became of its files.
+//! The cache on disk: it returns exactly what would have been built, whatever happened to its files.
 
 use std::cell::Cell;
 use std::convert::Infallible;

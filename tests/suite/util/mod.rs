@@ -1,3 +1,3 @@
-//! What every room needs.
+//! Parts that every other module may use.
 
 pub mod cache;

@@ -1,4 +1,4 @@
-//! What a change costs, and that the picture is the picture of what the document says.
+//! The cost of each change, and that the picture always shows the document's values.
 
 use super::*;
 use taki::engine::cpu;

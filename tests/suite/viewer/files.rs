@@ -1,4 +1,4 @@
-//! Scenes, pictures and settings in files.
+//! Scenes, pictures and settings that the viewer loads and saves.
 
 use std::process::Command;
 

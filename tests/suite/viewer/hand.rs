@@ -1,4 +1,4 @@
-//! Camera, light and time moved by hand.
+//! Camera, light and time, moved with the mouse.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Lights dragged in the picture.
+//! Lights that are dragged in the picture.
 
 use super::*;
 use glam::DVec3;

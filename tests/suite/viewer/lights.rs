@@ -1,4 +1,4 @@
-//! The list of lights: added, removed, copied, renamed, switched.
+//! The list of lights: adding, removing, copying, renaming and switching them.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! The plot of the scattering lobes: its numbers, and what the panel shows of it.
+//! The plot of the scattering lobes: its numbers, and its display in the panel.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 

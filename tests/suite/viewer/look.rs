@@ -1,4 +1,4 @@
-//! How the window looks.
+//! Appearance of the window.
 
 use super::*;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};

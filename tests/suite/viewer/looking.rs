@@ -1,7 +1,7 @@
-//! What the viewer shows of a frame, a volume and its curves. Panels are driven by the labels of their
-//! controls, without a window.
+//! Views of a frame, a volume and its curves. Panels are driven by the labels of their controls, without a
+//! window.
 //!
-//! `TAKI_LOOK=FOLDER cargo test --release -- looking` writes pictures of all of them there, to look at.
+//! `TAKI_LOOK=FOLDER cargo test --release -- looking` writes pictures of all of them to the folder.
 
 use glam::{IVec3, Vec3};
 use taki::curve::CurveShape;

@@ -1,5 +1,5 @@
-//! The viewer, driven without a window: widgets are found by the names that screen readers read, keys and
-//! the pointer are sent as a window sends them, and what follows is read from the document and the picture.
+//! The viewer, driven without a window. Tests find widgets by the names that screen readers read, send keys
+//! and pointer events as a window does, and check the document and the picture.
 
 mod costs;
 mod files;

@@ -1,4 +1,4 @@
-//! The small picture of the environment: its numbers, and where it is shown.
+//! The small picture of the environment: its numbers, and where the panel shows it.
 
 use std::f64::consts::{PI, TAU};
 

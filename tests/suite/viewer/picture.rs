@@ -1,4 +1,4 @@
-//! Layers, pixels, faults, lost devices and windows of every size.
+//! Layers, pixels, faults, lost devices and windows of any size.
 
 use super::*;
 use rand::{RngExt, SeedableRng};

@@ -1,4 +1,4 @@
-//! Reference truth of what drags in the picture mean: closed forms of the pinhole camera and of the dial.
+//! Drags in the picture against closed forms of the pinhole camera and of the dial. Reference truth.
 
 use super::*;
 use glam::{DVec2, DVec3};

@@ -1,4 +1,4 @@
-//! Hours of use in seconds: many changes without waiting, and memory that does not grow with them.
+//! Hours of use in seconds: many changes without pause must not make memory grow.
 
 use std::process::Command;
 

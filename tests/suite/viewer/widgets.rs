@@ -1,4 +1,4 @@
-//! The parameter panel: a widget for every value, and what each does to the document.
+//! The parameter panel: every value has a widget, and each widget changes the document.
 
 use super::*;
 use taki::scene::{Kind, Param, Values};

@@ -1,4 +1,4 @@
-//! A real window on a virtual display, with a real mouse: `taki view` as it is started by hand.
+//! A real window on a virtual display with a real mouse: `taki view` as a user starts it.
 //!
 //! Needs Xvfb and xdotool, which `tests/run` installs.
 

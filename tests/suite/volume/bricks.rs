@@ -1,4 +1,4 @@
-//! Sparse storage: the same volume, cell for cell and picture for picture, in less memory.
+//! Sparse storage: equal to dense storage cell for cell and picture for picture, in less memory.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Volume files: what is written is read back, and nothing else is believed.
+//! Volume files: what is written can be read back, and malformed files are refused.
 
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Write};

@@ -1,5 +1,5 @@
-//! Rays leap over empty boxes and bring home what they would have walked to: boxes against brute force, leaps against the plain
-//! walk crossing by crossing, pictures bit for bit.
+//! Leaps over empty boxes end in states of the plain walk: boxes against brute force, leaps against the
+//! plain walk crossing by crossing, pictures bit for bit.
 
 use crate::engine::gpu::{renderer, scene};
 use glam::{IVec3, Vec3};

@@ -1,4 +1,4 @@
-//! §2 The volume texture: the builder's promises. Packing and files have modules of their own.
+//! §2 The volume texture: promises of its builder. Packing and files have modules of their own.
 
 pub mod bricks;
 pub mod cell;

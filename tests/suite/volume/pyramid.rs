@@ -1,4 +1,5 @@
-//! The volume's coarse levels and the look between cells: closed forms, the errors they take away, and parity.
+//! The volume's coarse levels and the interpolated lookup between cells: closed forms, the errors that they
+//! remove, and parity.
 
 use crate::engine::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use crate::tolerance::close;

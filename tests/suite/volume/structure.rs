@@ -1,4 +1,4 @@
-//! Bundles, coherence, coverage and crests: what the builder has beyond the paper.
+//! Bundles, coherence, coverage and crests: the builder's additions to the paper.
 
 use std::collections::HashSet;
 

@@ -1,4 +1,4 @@
-//! Devices that are missing, lost, slow or out of turn.
+//! GPU devices that are missing, lost, slow or chosen by a wrong name.
 
 use std::fs;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! Several sheets on both engines: parity, and what may not change a bit.
+//! Several sheets on both engines: parity, and changes that must not alter a bit.
 
 use super::{
     assert_composited, crossing, curves, folded, heap, no_rock, on_cpu, preset, quad, rock, sheets, uniform,

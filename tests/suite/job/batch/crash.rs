@@ -1,6 +1,6 @@
-//! Runs that are killed, stopped, or find no room: no file is torn, no finished picture lost, and the next
-//! run makes the rest to the same bytes. `TAKI_LONG` in the environment (`tests/run --long`) asks for more of
-//! each.
+//! Runs that are killed, stopped or out of disk space: no file is torn, no finished picture is lost, and the
+//! next run renders the rest to the same bytes. `TAKI_LONG` in the environment (`tests/run --long`) repeats
+//! each more often.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Movies of a batch: made from its files, or while it renders.
+//! Movies of a batch, made from its picture files or while it renders.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Sweeps: the grid, its names, its sheet and its manifests.
+//! Sweeps: their grid, file names, contact sheet and manifests.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Environment maps from files: what is written is read, and nothing else is believed.
+//! Environment maps in files: what is written can be read back, and malformed files are refused.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Environments in scenes: both engines show the same, everything shares one map, and bad ones are told.
+//! Environments in scenes: both engines agree, all parts share one map, and invalid ones are refused.
 
 use std::path::Path;
 use std::sync::Arc;

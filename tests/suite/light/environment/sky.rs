@@ -1,4 +1,4 @@
-//! The sky against the published coefficients, symmetry, and what daylight is known to be.
+//! The sky model against the published coefficients, its symmetries, and known properties of daylight.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! `shaders/scatter.wgsl` against `taki::light::scatter`: the same numbers in, the same out.
+//! Parity of `shaders/light/scatter.wgsl` with `taki::light::scatter`: equal input gives equal output.
 
 use glam::Vec3;
 use taki::engine::gpu::shader::resolve;

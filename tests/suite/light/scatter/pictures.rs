@@ -1,4 +1,5 @@
-//! The model's pictures against the path tracer's: light scattered twice and more, as a share of the whole.
+//! Pictures of the model against those of the path tracer: light scattered twice or more, as a share of all
+//! light.
 
 use std::f64::consts::{LOG2_E, PI};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The whole renderer against the path tracer: a volume of water and air, lit from in front and from behind.
+//! The whole renderer against the path tracer: a volume of water and air, lit from the front and from behind.
 
 use std::path::Path;
 

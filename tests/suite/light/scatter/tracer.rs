@@ -1,5 +1,6 @@
-//! A brute-force path tracer of the tiled volume, for tests: free flights by the exact walk, every collision
-//! looks at the light. Float64 but for the walk's parameters; nothing of `taki::light::scatter` is in it.
+//! A brute-force path tracer of the tiled volume, for tests. It samples free flights with the exact walk,
+//! and looks at the light from every collision. It computes in float64, except for the walk's parameters,
+//! and uses nothing of `taki::light::scatter`.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! The table against the model, and the shader against the table.
+//! The lookup table against the model, and the shader against the table.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The cylinder, and how its lobes spread: closed forms.
+//! Closed forms of reflection at a cylinder and of how its lobes spread.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

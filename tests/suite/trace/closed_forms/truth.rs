@@ -1,5 +1,5 @@
-//! The whole trace of one ray written again in float64 from the method alone, with the brute-force
-//! walker, and compared on random volumes, quads, rays and lights.
+//! The whole trace of one ray, written again in float64 from the method alone with the brute-force walker,
+//! and compared on random volumes, quads, rays and lights.
 
 use super::{material, noise, scene};
 use crate::tolerance::close;

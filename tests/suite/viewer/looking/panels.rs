@@ -1,4 +1,4 @@
-//! The panels: what their controls do, and pictures of them.
+//! The panels: effects of their controls, and pictures of them.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Layers as pictures.
+//! Layers of a frame as pictures.
 
 use eframe::egui;
 use egui_kittest::Harness;
