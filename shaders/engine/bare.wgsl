@@ -1,5 +1,6 @@
-// The bare walk, for `taki bench` only: the rays and cells of `integrate`, one fetch and one addition a
-// cell, no light; with LEAPS the bare leaping walk. The floor under the integrate pass.
+// The bare walk, for `taki bench` only: the rays and cells of the integrate pass with one fetch and one
+// addition per cell and no light; with LEAPS it leaps. Its time is a lower bound for the integrate pass. No
+// twin.
 
 #import layout
 #import mapping
@@ -20,8 +21,8 @@
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = group_list[listed(groups, group.x)];
-    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    let position = group_list[listed(groups, group.x)];
+    let id = vec2<u32>(position & 0xffffu, position >> 16u) * WORKGROUP + local.xy;
     if id.x >= groups.area.width || id.y >= groups.area.height {
         return;
     }
@@ -57,7 +58,7 @@ fn sheet(
     var walk = walk_new(frame.cells, face_point(quad, hit.xy, frame.cells, frame.flow_cells), d_cell);
     var n = 0u;
     var done = false;
-    // Uniforms read inside the loop would be gathered lane by lane on software Vulkan.
+    // Software Vulkan would gather uniforms read inside the loop lane by lane.
     let layers = frame.cells.z;
     let max_cells = frame.max_cells;
     while !done {
@@ -79,11 +80,11 @@ fn visit(
 ) {
     let texel = cell_words((*walk).cell);
     *sum += select(texel.x + texel.y, 0u, *done);
-    var passed_by = 0u;
+    var skipped = 0u;
     if LEAPS {
-        passed_by = walk_leap(walk, texel, true);
+        skipped = walk_leap(walk, texel, true);
     }
-    *n += select(1u + passed_by, 0u, *done);
+    *n += select(1u + skipped, 0u, *done);
     if LEAPS {
         *n = min(*n, max_cells);
     }

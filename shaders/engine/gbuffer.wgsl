@@ -1,9 +1,11 @@
-// §3 Raster pass: z-buffer, opaque radiance, texture coordinates and quad id.
+// §3 The raster pass: z-buffer, opaque radiance, texture coordinates and quad ids. Twin:
+// src/engine/cpu/gbuffer.rs.
 //
-// Pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `place` finds out where on which tile of
-// the mesh a sample is, and `opaque` shades what rock is seen, once a sample; `volume` finds the point of its quad under the pixel's own ray and maps it by the exact
-// inverse bilinear map (src/mapping.rs, QuadMap::uv), so nothing depends on how a quad is cut into
-// triangles; `peel` finds the sheets behind the nearest, in a pass each. CPU twin: src/cpu/gbuffer.rs.
+// The pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `rock_surface` writes the
+// tile of the mesh that a sample shows and the position in it. `opaque` shades the visible rock once per
+// sample. `volume` intersects the pixel's own ray with the quad and maps the point by the exact inverse
+// bilinear map (src/mapping/mod.rs, QuadMap::uv), so the result does not depend on how a quad is cut into
+// triangles. `peel` finds the sheets behind the nearest, one layer per pass.
 
 #import engine::opaque
 #import engine::pool
@@ -15,7 +17,7 @@
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var<storage, read> quads: array<Quad>;
-// Of the sheets before: the last one's depth, and the numbers of all.
+// Depth of the layer before, and the quads' numbers of all layers before.
 @group(0) @binding(3) var known_depth: texture_depth_2d;
 @group(0) @binding(4) var known_ids: texture_2d_array<u32>;
 @group(0) @binding(5) var<uniform> environment: Environment;
@@ -23,10 +25,11 @@
 @group(0) @binding(8) var<storage, read> positions: array<vec4<f32>>;
 @group(0) @binding(9) var<storage, read> tiles: array<MeshTile>;
 @group(0) @binding(11) var<storage, read> coats: array<VertexMaterial>;
-// Of the sample in its tile, in squares; number of the tile; depth.
-@group(0) @binding(10) var places: texture_2d<f32>;
+// The visible rock: position in its tile in squares of the grid, number of the tile, and depth.
+@group(0) @binding(10) var rock_surface: texture_2d<f32>;
 
-// What is shaded at a vertex. Numbers to 1 are halves of words: the normal (signed), film of water, occlusion and shadow.
+// Material of a vertex. The normal (signed), film of water, occlusion and shadow are packed in pairs into
+// words.
 struct VertexMaterial {
     albedo_r: f32,
     albedo_g: f32,
@@ -36,9 +39,9 @@ struct VertexMaterial {
     occlusion_shadow: u32,
 }
 
-// Twin: src/scene/tiles.rs, Tile.
+// A tile of the opaque mesh: Tile of src/place/tiles.rs.
 struct MeshTile {
-    // Number of its first vertex.
+    // Index of its first vertex.
     first: u32,
     // Vertices in a row of its grid.
     pitch: u32,
@@ -47,16 +50,17 @@ struct MeshTile {
     pad: u32,
 }
 
-// Corners of the largest tile in a row.
+// Vertices in a row of the largest tile.
 const TILE_ROW: u32 = 17u;
 
-// One light stands at a constant place, which software Vulkan reads once for eight samples, and lane by lane in a loop.
+// Whether the scene has exactly one light. It is then read at a constant index, which software Vulkan does
+// once for eight samples; in a loop it reads lane by lane.
 override ONE_LIGHT: bool = false;
 
 struct RockSurfaceVarying {
     @builtin(position) clip: vec4<f32>,
-    // In the tile, in squares.
-    @location(0) place: vec2<f32>,
+    // Position in the tile, in squares of its grid.
+    @location(0) in_tile: vec2<f32>,
     @location(1) @interpolate(flat) tile: u32,
 }
 
@@ -65,7 +69,7 @@ struct OpaquePoint {
     position_world: vec3<f32>,
     normal_world: vec3<f32>,
     albedo: vec3<f32>,
-    // Occlusion, shadow, film of water.
+    // Occlusion, shadow and film of water, 0 to 1 each.
     shade: vec3<f32>,
 }
 
@@ -76,23 +80,26 @@ struct OpaqueTargets {
 }
 
 @vertex
-fn rock_surface_vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) number: u32) -> RockSurfaceVarying {
+fn rock_surface_vertex(
+    @builtin(vertex_index) corner: u32,
+    @builtin(instance_index) number: u32,
+) -> RockSurfaceVarying {
     let row = corner / TILE_ROW;
     let column = corner - row * TILE_ROW;
     let vertex = tiles[number].first + row * tiles[number].pitch + column;
     var out: RockSurfaceVarying;
     out.clip = frame.clip_from_world * vec4<f32>(positions[vertex].xyz, 1.0);
-    out.place = vec2<f32>(f32(column), f32(row));
+    out.in_tile = vec2<f32>(f32(column), f32(row));
     out.tile = number;
     return out;
 }
 
 @fragment
 fn rock_surface_fragment(in: RockSurfaceVarying) -> @location(0) vec4<f32> {
-    return vec4<f32>(in.place, f32(in.tile), in.clip.z);
+    return vec4<f32>(in.in_tile, f32(in.tile), in.clip.z);
 }
 
-// A vertex's share of a point.
+// Adds a vertex's share to a point.
 fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
     let coat = coats[number];
     let normal_z = unpack2x16snorm(coat.normal_z_wet).x;
@@ -104,12 +111,12 @@ fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
     return out;
 }
 
-// Opaque::at; where the ray of the pixel is at the depth that is drawn.
+// The visible point of rock under a pixel, on the pixel's own ray at the drawn depth. Twin: Opaque::at.
 fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
-    let found = textureLoad(places, pixel, 0);
-    let tile = tiles[u32(found.z)];
-    let cell = clamp(floor(found.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
-    let f = clamp(found.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
+    let drawn = textureLoad(rock_surface, pixel, 0);
+    let tile = tiles[u32(drawn.z)];
+    let cell = clamp(floor(drawn.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
+    let f = clamp(drawn.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
     let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
     let low = min(f.x, f.y);
     let high = max(f.x, f.y);
@@ -117,7 +124,7 @@ fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     let near = frame.clip_from_world[3].z;
     var out: OpaquePoint;
     out.pixel = pixel;
-    out.position_world = frame.eye_world + d * (near / (found.w * dot3(d, frame.forward)));
+    out.position_world = frame.eye_world + d * (near / (drawn.w * dot3(d, frame.forward)));
     out = add_coat(out, first, 1.0 - high);
     out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
     return add_coat(out, first + tile.pitch + 1u, low);
@@ -131,7 +138,7 @@ struct VolumeVarying {
 struct VolumeTargets {
     // u, v, metres from the eye.
     @location(0) surface: vec4<f32>,
-    // Number of the quad plus 1; 0 where there is none.
+    // Number of the quad plus 1; 0: none.
     @location(1) quad_id: u32,
 }
 
@@ -154,8 +161,8 @@ fn volume_fragment(in: VolumeVarying) -> VolumeTargets {
     return out;
 }
 
-// The next sheet of each pixel (depth peeling, Everitt 2001): of the quads that come after the last one that
-// is known, the nearest. Equal depths come in the order of the quads, and no quad comes twice.
+// Finds the next sheet of each pixel (depth peeling, Everitt 2001): the nearest quad behind the layers
+// before. Quads of equal depth come in the order of their numbers, and no quad comes twice.
 @fragment
 fn peel_fragment(in: VolumeVarying) -> @location(0) u32 {
     let pixel = vec2<u32>(in.clip.xy);
@@ -179,7 +186,7 @@ fn behind_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<
     return vec4<f32>(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Distance and normal 0 mark that nothing is there.
+// Radiance of the background. Distance and normal 0 mark the absence of opaque geometry.
 @fragment
 fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
@@ -189,7 +196,7 @@ fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     return out;
 }
 
-// Environment::radiance.
+// As `background_fragment`, under an environment. Twin: Environment::radiance.
 @fragment
 fn background_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));

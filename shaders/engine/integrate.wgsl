@@ -1,7 +1,7 @@
-// §4 and §5: the walk through the volume's cells under each pixel, and the light they send to the eye.
+// §4 and §5: the walk through the volume's cells under each pixel, and the light that they send to the eye.
 //
-// One invocation a pixel. Twin: src/cpu/integrate.rs, the same operations in the same order; the reasoning
-// stands there.
+// One invocation per pixel. Twin: src/engine/cpu/integrate.rs and integrate/walk.rs, with the same operations
+// in the same order; they hold the reasoning.
 
 #import engine::integrate_light
 #import layout
@@ -17,21 +17,21 @@
 #import volume::cells
 #import walk
 
-// None, one, or (2) several.
+// Number of lights: 0, 1, or 2 for several.
 override LIGHTS: u32 = 1u;
 override MARCH: bool = false;
 override CACHED: bool = false;
 // Light volumes hold codes of transmittances, not optical depths.
 override CODES: bool = false;
-// Light volumes at the corners of patches.
+// Light volumes stand at the corners of patches.
 override CORNERED: bool = false;
-// The reflection model of flowing water in place of fibres.
+// The strand model of flowing water replaces fibres.
 override STRAND: bool = false;
-// Light that is scattered more than once.
+// Light is scattered more than once.
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
 override IN_COLOUR: bool = STRAND || MULTIPLE;
-// Mist has a walk of its own, in which no cell is empty and all shine alike.
+// Mist has its own walk, in which no cell is empty and all reflect alike.
 override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -42,26 +42,26 @@ override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 @group(0) @binding(5) var surface: texture_2d<f32>;
 @group(0) @binding(6) var quad_id: texture_2d_array<u32>;
 @group(0) @binding(7) var opaque_radiance: texture_2d<f32>;
-// Sum over samples of radiance, and of transmittance.
+// Sums over samples of radiance and transmittance.
 @group(0) @binding(8) var<storage, read_write> radiance: array<vec4<f32>>;
-// Sum over samples of cells walked by view rays, and by light rays.
+// Sums over samples of cells walked by view rays and by light rays.
 @group(0) @binding(9) var<storage, read_write> counts: array<vec2<u32>>;
-// Light volumes, src/gpu/visibility.rs, and where each is.
+// Light volumes, and the table of their origins: FilledVolumes of src/engine/gpu/visibility.rs.
 @group(0) @binding(10) var light_volumes: texture_storage_3d<r32uint, read>;
 @group(0) @binding(11) var<storage, read> light_places: array<vec4<i32>>;
-// Strand model and scattering, src/gpu/reflection.rs.
+// Strand model and scattering: src/engine/gpu/reflection.rs.
 @group(0) @binding(12) var<uniform> reflection: Reflection;
 @group(0) @binding(13) var strand_table: texture_3d<f32>;
 @group(0) @binding(14) var linear: sampler;
-// P of every material, one profile after the other.
+// Profiles of multiple scattering, one after the other.
 @group(0) @binding(15) var<storage, read> profiles: array<vec4<f32>>;
-// Places of workgroups, src/gpu/groups.rs.
+// Positions of workgroups: src/engine/gpu/groups.rs.
 @group(0) @binding(16) var<storage, read> group_list: array<u32>;
-// Of sparse storage, shaders/cells.wgsl.
+// Bricks of sparse storage: shaders/volume/cells.wgsl.
 @group(0) @binding(17) var bricks: texture_storage_3d<rgba32uint, read>;
 
-// Instead of a number of cells, where the device ended a walk before it was done: software Vulkan grants all loops of a
-// pixel 65535 turns.
+// Marker in place of the numbers of cells if the device ended a walk early: software Vulkan limits all loops
+// of a pixel to 65535 turns. Twin: CUT of src/engine/gpu/integrate.rs.
 const CUT: u32 = 0xffffffffu;
 
 struct Reflection {
@@ -71,8 +71,8 @@ struct Reflection {
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = group_list[listed(groups, group.x)];
-    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    let position = group_list[listed(groups, group.x)];
+    let id = vec2<u32>(position & 0xffffu, position >> 16u) * WORKGROUP + local.xy;
     if id.x >= groups.area.width || id.y >= groups.area.height {
         return;
     }
@@ -92,11 +92,11 @@ fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     add_sample(pixel, result, count);
 }
 
-// Where no water lies.
+// Adds a sample of the opaque scene in workgroups without water.
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
 fn dry(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = group_list[groups.first + group.x];
-    let id = vec2<u32>(place & 0xffffu, place >> 16u) * WORKGROUP + local.xy;
+    let position = group_list[groups.first + group.x];
+    let id = vec2<u32>(position & 0xffffu, position >> 16u) * WORKGROUP + local.xy;
     if id.x >= groups.area.width || id.y >= groups.area.height {
         return;
     }
@@ -104,6 +104,7 @@ fn dry(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lo
     add_sample(pixel, vec4<f32>(textureLoad(opaque_radiance, pixel, 0).rgb, 1.0), vec2<u32>(0u));
 }
 
+// Adds a sample to the sums of a pixel; the first sample begins them.
 fn add_sample(pixel: vec2<u32>, sample: vec4<f32>, cells: vec2<u32>) {
     let index = pixel.y * frame.window_width + pixel.x;
     var result = sample;
@@ -117,24 +118,24 @@ fn add_sample(pixel: vec2<u32>, sample: vec4<f32>, cells: vec2<u32>) {
     counts[index] = count;
 }
 
-// One ray on its way: what changes from cell to cell.
+// State of a ray that changes from cell to cell.
 struct Ray {
     transmittance: f32,
     t: f32,
-    // The lights' sum, in colour with more than one of them or where light has a colour of its own in every cell;
-    // else of the one light's share, in x.
+    // Light sent to the eye so far. With several lights, their sum in colour. With one light, relative to its
+    // intensity: in colour if a cell's light has a colour of its own, otherwise in x, in 255ths.
     light: vec3<f32>,
     cells: u32,
     light_cells: u32,
     done: bool,
-    // Whether a light walk was ended by the device.
+    // Whether the device ended a light walk early.
     cut: bool,
-    // Optical depth so far, in bits; only where light is scattered more than once.
+    // Optical depth so far, in bits; only if light is scattered more than once.
     depth: f32,
 }
 
-// What is constant along a ray. The frame's values stand here again because a uniform read inside a loop
-// is gathered lane by lane on software Vulkan, about 25 instructions each time.
+// Values that are constant along a ray. The frame's uniforms are copied here because software Vulkan gathers
+// a uniform that is read inside a loop lane by lane, with about 25 instructions each time.
 struct View {
     extinction: f32,
     // Bits of transmittance in one unit of a light volume's depth.
@@ -142,29 +143,30 @@ struct View {
     early_end: f32,
     p: f32,
     max_cells: u32,
-    // The level that is walked, and where on its face and along which way.
+    // The level that is walked, and the ray's origin on its face and direction in its cells.
     level: Level,
     origin: vec3<f32>,
     d_cell: vec3<f32>,
-    // The model's constants, where they are asked for.
+    // Constants of the strand model and of multiple scattering, if the scene uses them.
     strand: Strand,
     similarity: Similarity,
-    // What the sheet makes of the cells.
+    // The sheet's erosion and mist.
     matter: SheetDensity,
-    // Whether it leaves empty cells empty; mist does not.
+    // Whether the sheet leaves empty cells empty; mist does not.
     leaps: bool,
-    // Where the quad's profile begins.
+    // Index at which the quad's profile begins.
     profile: u32,
-    // (M₀₀, 2M₀₁, M₁₁, M₂₂), see shading.rs, Metric.
+    // (M₀₀, 2M₀₁, M₁₁, M₂₂): Metric of src/light/fibre.rs.
     metric: vec4<f32>,
     e_v: vec3<f32>,
-    // The only light's, or those of any.
+    // Terms of the only light, if there is one.
     light: RayLight,
+    // Number of lights.
     lights: u32,
-    place: Place,
+    hit: SheetHit,
 }
 
-// One sheet: `before` is the radiance of those in front of it, and what they let through.
+// Traces one sheet. `before` is the radiance of the sheets in front of it, and their transmittance.
 fn trace(
     quad: Quad,
     quad_number: u32,
@@ -199,22 +201,22 @@ fn trace(
         view.strand = reflection.strand;
         view.similarity = reflection.similarity;
     }
-    view.place = Place(jacobian, quad.e1, quad.e2, quad.n, side, d_world, frame.eye_world + d_world * hit.z,
+    view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, frame.eye_world + d_world * hit.z,
         view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z);
     view.lights = arrayLength(&lights);
 
-    // The level whose cells are as large as the sample's footprint lies between two; both are walked.
+    // The level whose cells match the sample's footprint lies between two levels; both are walked.
     var finer = 0.0;
     if PYRAMID {
         finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), 0.0, f32(frame.levels - 1u));
     }
     let share = fract(finer);
-    let ways = select(1u, 2u, share > 0.0);
+    let walks = select(1u, 2u, share > 0.0);
     var end = 0.0;
     var light = vec3<f32>(0.0);
-    for (var way = 0u; way < ways; way++) {
-        let weight = select(share, 1.0 - share, way == 0u);
-        view.level = level_new(frame.cells, u32(finer) + way);
+    for (var i = 0u; i < walks; i++) {
+        let weight = select(share, 1.0 - share, i == 0u);
+        view.level = level_new(frame.cells, u32(finer) + i);
         view.origin = face_point(quad, hit.xy, frame.cells, frame.flow_cells);
         view.d_cell = d_cell;
         view.extinction = frame.extinction;
@@ -227,7 +229,7 @@ fn trace(
         }
         view.depth_bits = view.extinction * view.matter.left * select(jacobian.depth, 1.0, PER_CELL);
         if LIGHTS == 1u {
-            view.light = ray_light(0u, view.place, view.level, view.lights);
+            view.light = ray_light(0u, view.hit, view.level, view.lights);
         }
         var ray = ray_new(before.w);
         if MIST_APART {
@@ -247,7 +249,7 @@ fn trace(
         }
     }
 
-    // Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end carries the ambient light.
+    // The weights of the ambient light add up: Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end.
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
     var color = frame.ambient * (before.w - end) + passed;
@@ -261,7 +263,8 @@ fn trace(
     return vec4<f32>(before.rgb + color, end);
 }
 
-// 4^level cells lie across the ray in a sample's footprint, `t` metres away.
+// Level at which one cell fills a sample's footprint across the ray, `t` metres from the eye: 4^level cells
+// of the volume lie in it. Twin: level_at of src/trace/lookup.rs.
 fn level_at(jacobian: CellFrame, d_world: vec3<f32>, d_cell: vec3<f32>, t: f32) -> f32 {
     let c = dot3(d_world, frame.forward);
     let area = frame.footprint * (c * c * c) * (t * t);
@@ -269,6 +272,7 @@ fn level_at(jacobian: CellFrame, d_world: vec3<f32>, d_cell: vec3<f32>, t: f32) 
     return 0.5 * log2(max(across, 1e-30));
 }
 
+// A ray at the face of a sheet, with the transmittance `before`.
 fn ray_new(before: f32) -> Ray {
     var ray: Ray;
     ray.depth = -log2(max(before, 1e-30));
@@ -276,13 +280,13 @@ fn ray_new(before: f32) -> Ray {
     return ray;
 }
 
-// Through one level of the volume, to its end.
+// Walks one level of the volume to the end of the slab or of the ray.
 fn walk_level(view: View, ray: ptr<function, Ray>) {
     var walk = walk_new(view.level.size, view.origin, view.d_cell);
-    // Four cells a turn: the loop's own cost on software Vulkan is a third of a bare step.
+    // Four cells per turn: on software Vulkan the loop itself costs a third of a bare step.
     while !(*ray).done {
         if MARCH {
-            // Rays of one SIMD group meet occupied cells at different steps; those that found one wait
+            // Rays of one SIMD group meet occupied cells at different steps. Those that have found one wait
             // for the others, so that all walk to the light at once.
             var seeking = true;
             while seeking {
@@ -291,7 +295,8 @@ fn walk_level(view: View, ray: ptr<function, Ray>) {
             }
             visit(&walk, ray, view);
         } else if LIGHTS > 1u {
-            // With a loop in it, once: there is little left to gain, and each would be compiled anew.
+            // Once per turn: `visit` contains a loop, so unrolling gains little, and every call is compiled
+            // again.
             visit(&walk, ray, view);
         } else {
             visit(&walk, ray, view);
@@ -302,7 +307,7 @@ fn walk_level(view: View, ray: ptr<function, Ray>) {
     }
 }
 
-// Goes on by one cell if the one it is in is empty; ends the seeking if not.
+// Steps to the next cell if the current one is empty; otherwise ends the seeking.
 fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<function, bool>, view: View) {
     var rho = 0.0;
     var texel = vec2<u32>(0u);
@@ -310,7 +315,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
         texel = cell_words(in_level((*walk).cell, view.level));
     }
     if TRILINEAR {
-        rho = found_between(*walk, *ray, view).rho;
+        rho = sample_between(*walk, *ray, view).rho;
     } else {
         rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
     }
@@ -326,7 +331,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     *seeking = on & !(*ray).done;
 }
 
-// Through mist, to its end.
+// Walks mist to the end of the slab or of the ray.
 fn walk_mist(view: View, ray: ptr<function, Ray>) {
     var walk = walk_new(view.level.size, view.origin, view.d_cell);
     while !(*ray).done {
@@ -337,7 +342,7 @@ fn walk_mist(view: View, ray: ptr<function, Ray>) {
     }
 }
 
-// What `visit` is to a cell of mist.
+// As `visit`, for a cell of mist.
 fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let code = cell_words(in_level((*walk).cell, view.level)).x & 0xffffu;
     let t_exit = walk_exit(*walk);
@@ -365,33 +370,33 @@ fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         | ((*ray).cells >= view.max_cells);
 }
 
-// Half way through the cell the ray is in.
-fn found_between(walk: Walk, ray: Ray, view: View) -> CellSample {
+// Sample between cells, half way along the ray through the current cell.
+fn sample_between(walk: Walk, ray: Ray, view: View) -> CellSample {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
     return between(view.level, view.matter, walk.cell, middle);
 }
 
-// The light of one cell, and the step to the next. Past the end of the walk nothing changes.
+// Adds the light of one cell and steps to the next. After the end of the walk, nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let texel = cell_words(in_level((*walk).cell, view.level));
-    var passed_by = 0u;
+    var skipped = 0u;
     if LEAPS {
-        passed_by = walk_leap(walk, texel, view.leaps);
+        skipped = walk_leap(walk, texel, view.leaps);
     }
     let t_exit = walk_exit(*walk);
-    var found: CellSample;
+    var sample: CellSample;
     if TRILINEAR {
-        found = found_between(*walk, *ray, view);
+        sample = sample_between(*walk, *ray, view);
     } else {
-        found.rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
-        found.k_d = f32((texel.x >> 16u) & 0xffu);
-        found.k_s = f32(texel.x >> 24u);
+        sample.rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
+        sample.k_d = f32((texel.x >> 16u) & 0xffu);
+        sample.k_s = f32(texel.x >> 24u);
         if PYRAMID {
-            // Boxes are no moments: their means need not be finite.
-            found.moments = moments_of(select(texel.y, 0u, LEAPS & ((texel.x & 0xffffu) == 0u)), view.level);
+            // The word of an empty cell holds a box, not moments; means computed from it need not be finite.
+            sample.moments = moments_of(select(texel.y, 0u, LEAPS & ((texel.x & 0xffffu) == 0u)), view.level);
         }
     }
-    let rho = select(found.rho, 0.0, (*ray).done);
+    let rho = select(sample.rho, 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
     if !PER_CELL {
         tau_bits *= t_exit - (*ray).t;
@@ -403,10 +408,10 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     seen.occupied = rho > 0.0;
     seen.tau_bits = tau_bits;
     seen.weight = (*ray).transmittance - passed;
-    seen.k_d = found.k_d;
-    seen.k_s = found.k_s;
+    seen.k_d = sample.k_d;
+    seen.k_s = sample.k_s;
     if MANY_DIRECTIONS {
-        seen.spread = spread_new(view.metric, found.moments, view.e_v);
+        seen.spread = spread_new(view.metric, sample.moments, view.e_v);
     }
     let v = v_code(texel.y);
     let m = view.metric;
@@ -421,11 +426,11 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     } else if LIGHTS == 1u {
         (*ray).light.x += lit(seen, view.light, view, ray);
     } else if LIGHTS > 1u {
-        // What a light is to the ray is worked out again in every cell: arrays indexed in a loop become trees of
-        // selects on software Vulkan, which take seconds to compile.
+        // The terms of a light are recomputed in every cell: on software Vulkan an array indexed in a loop
+        // becomes a tree of selects that takes seconds to compile.
         if seen.occupied {
             for (var i = 0u; i < view.lights; i++) {
-                let light = ray_light(i, view.place, view.level, view.lights);
+                let light = ray_light(i, view.hit, view.level, view.lights);
                 if IN_COLOUR {
                     (*ray).light += light.intensity * lit_in_colour(seen, light, view, ray);
                 } else {
@@ -438,7 +443,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         (*ray).depth += tau_bits;
     }
 
-    (*ray).cells += select(1u + passed_by, 0u, (*ray).done);
+    (*ray).cells += select(1u + skipped, 0u, (*ray).done);
     if LEAPS {
         (*ray).cells = min((*ray).cells, view.max_cells);
     }

@@ -1,5 +1,5 @@
-// The lights as a ray sees them, and what a cell sends on of them: the second half of shaders/integrate.wgsl, which
-// holds the bindings.
+// §5 Per-ray terms of the lights, and the light that a cell sends to the eye. shaders/engine/integrate.wgsl
+// holds the bindings. Twin: src/engine/cpu/integrate/light.rs.
 
 #import engine::integrate
 #import layout
@@ -13,32 +13,34 @@
 #import trace::matter
 #import walk
 
-// One light as a ray sees it: Jᵀl (or J⁻¹l normalised), and J⁻¹l.
+// Terms of one light that are constant along a ray.
 struct RayLight {
+    // Jᵀl, or J⁻¹l normalised.
     l_v: vec3<f32>,
+    // J⁻¹l, in the level's cells.
     l_cell: vec3<f32>,
     intensity: vec3<f32>,
-    places: LightPlaces,
+    corners: PatchCorners,
     // Cosine between light and eye, in the frame where angles are measured.
     l_dot_e: f32,
-    // Of multiple scattering.
+    // Row of the profile and forward peaks of multiple scattering.
     row: Row,
     peak: Peak,
 }
 
-// Where a light's volumes are, at the corners of a patch, and where in the patch the ray is.
-struct LightPlaces {
+// Origins of the light volumes at the corners of a patch, and the ray's position in the patch.
+struct PatchCorners {
     p00: vec3<i32>,
     p10: vec3<i32>,
     p01: vec3<i32>,
     p11: vec3<i32>,
     at: vec2<f32>,
-    // Whether the patch has four; else the first is its own.
+    // Whether the patch has four light volumes; otherwise it has only the first.
     cornered: bool,
 }
 
-// Where a ray meets a quad: all that its lights depend on.
-struct Place {
+// The point where a ray meets a quad: everything the terms of its lights depend on.
+struct SheetHit {
     jacobian: CellFrame,
     e1: vec3<f32>,
     e2: vec3<f32>,
@@ -51,16 +53,16 @@ struct Place {
     quad_number: u32,
     texture_frame: bool,
     g: f32,
-    // Of the volume itself.
+    // Layers of the volume itself.
     layers: i32,
 }
 
-// What a cell is to every light.
+// Values of a cell that all lights share.
 struct CellShading {
     cell: vec3<i32>,
     occupied: bool,
     tau_bits: f32,
-    // T before it less T behind it.
+    // T before the cell minus T behind it.
     weight: f32,
     k_d: f32,
     k_s: f32,
@@ -68,41 +70,42 @@ struct CellShading {
     t_dot_e: f32,
     sin2_e: f32,
     inverse_q: f32,
-    // In place of v, where cells have more than one direction.
+    // Replaces v if cells have more than one direction.
     spread: Spread,
 }
 
-// Light `i` of `count` (the paper maps the light vectors at the point, not in every cell).
-fn ray_light(i: u32, place: Place, level: Level, count: u32) -> RayLight {
+// Terms of light `i` of `count`. As in the paper, the light vectors are mapped at the point, not in every
+// cell.
+fn ray_light(i: u32, hit: SheetHit, level: Level, count: u32) -> RayLight {
     let light = lights[i];
-    let found = light_from(light, place.point);
-    let to_light = found.xyz;
-    let l_n = dot3(to_light, place.n) * place.side;
-    let l = vec3<f32>(dot3(to_light, place.e1), dot3(to_light, place.e2), l_n);
+    let arrives = light_from(light, hit.point);
+    let to_light = arrives.xyz;
+    let l_n = dot3(to_light, hit.n) * hit.side;
+    let l = vec3<f32>(dot3(to_light, hit.e1), dot3(to_light, hit.e2), l_n);
     var out: RayLight;
-    out.intensity = light.intensity * found.w;
-    out.l_cell = cell_from_plane(place.jacobian, l);
-    out.l_v = transposed(place.jacobian, l);
-    if place.texture_frame {
+    out.intensity = light.intensity * arrives.w;
+    out.l_cell = cell_from_plane(hit.jacobian, l);
+    out.l_v = transposed(hit.jacobian, l);
+    if hit.texture_frame {
         out.l_v = out.l_cell / sqrt(dot3(out.l_cell, out.l_cell));
     }
     if CACHED {
-        out.places = light_places_of(place.quad_number * count + i, place.uv);
+        out.corners = patch_corners(hit.quad_number * count + i, hit.uv);
     }
     if IN_COLOUR | MANY_DIRECTIONS {
-        let cosine = dot3(to_light, place.d_world);
+        let cosine = dot3(to_light, hit.d_world);
         out.l_dot_e = -cosine;
         if MULTIPLE {
-            out.peak = scatter_peak(place.g, cosine);
+            out.peak = scatter_peak(hit.g, cosine);
             var slab = l_n;
             if PER_CELL {
                 let c = abs(out.l_cell);
                 slab = -out.l_cell.z / (c.x + c.y + c.z);
             }
-            out.row = scatter_row(slab, u32(place.layers));
+            out.row = scatter_row(slab, u32(hit.layers));
         }
-        if place.texture_frame {
-            out.l_dot_e = dot3(out.l_v, place.e_v);
+        if hit.texture_frame {
+            out.l_dot_e = dot3(out.l_v, hit.e_v);
         }
     }
     if PYRAMID {
@@ -111,8 +114,9 @@ fn ray_light(i: u32, place: Place, level: Level, count: u32) -> RayLight {
     return out;
 }
 
-fn light_places_of(entry: u32, uv: vec2<f32>) -> LightPlaces {
-    var out: LightPlaces;
+// The light volumes around the point `uv` of a quad; `entry` is that of quad and light in the table.
+fn patch_corners(entry: u32, uv: vec2<f32>) -> PatchCorners {
+    var out: PatchCorners;
     let patches = light_places[entry];
     let at = uv * vec2<f32>(patches.yz);
     let patch_at = min(vec2<i32>(at), patches.yz - 1);
@@ -136,23 +140,25 @@ fn is_mist(view: View) -> bool {
     return ERODED && view.matter.mist > 0.0;
 }
 
-// 255·Ψ of strands, or of mist.
+// 255·Ψ of a cell's fibres, or of mist.
 fn psi_of(seen: CellShading, light: RayLight, view: View) -> f32 {
     if MANY_DIRECTIONS {
         let psi = spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
         return select(psi, view.matter.mist, is_mist(view));
     }
-    let strands = psi(view.p, seen.k_d, seen.k_s, seen.v, light.l_v, seen.t_dot_e, seen.sin2_e, seen.inverse_q);
-    return select(strands, view.matter.mist, is_mist(view));
+    let t_dot_e = seen.t_dot_e;
+    let fibre = psi(view.p, seen.k_d, seen.k_s, seen.v, light.l_v, t_dot_e, seen.sin2_e, seen.inverse_q);
+    return select(fibre, view.matter.mist, is_mist(view));
 }
 
-// What a cell sends to the eye of a light of intensity 1, in 255ths.
+// Light that a cell sends to the eye from a light of intensity 1, in 255ths.
 fn lit(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
     let fibre = psi_of(seen, light, view);
     return seen.weight * fibre * visibility_of(seen, light, view, ray).x;
 }
 
-// The same where it has a colour: strands, or light scattered more than once.
+// Light that a cell sends to the eye from a light of intensity 1, in colour: with the strand model or
+// multiple scattering.
 fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
     let visibility = visibility_of(seen, light, view, ray);
     let weight = seen.weight * visibility.x;
@@ -166,19 +172,22 @@ fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
         }
         if !is_mist(view) {
             let k_d = seen.k_d;
+            let k_s = seen.k_s;
             lit = weight
-                * strand_psi(strand_table, linear, view.strand, k_d, seen.k_s, t_dot.x, t_dot.y, light.l_dot_e);
+                * strand_psi(strand_table, linear, view.strand, k_d, k_s, t_dot.x, t_dot.y, light.l_dot_e);
         }
     }
     if MULTIPLE {
         let z = layer_in(view, seen.cell.z) + view.profile;
-        let diffuse = scatter_diffuse(profiles[light.row.near + z].rgb, profiles[light.row.far + z].rgb, light.row);
-        lit += scatter_multiple(view.similarity, light.peak, diffuse, (*ray).depth, seen.tau_bits, visibility.y);
+        let row = light.row;
+        let diffuse = scatter_diffuse(profiles[row.near + z].rgb, profiles[row.far + z].rgb, row);
+        let depth = (*ray).depth;
+        lit += scatter_multiple(view.similarity, light.peak, diffuse, depth, seen.tau_bits, visibility.y);
     }
     return lit;
 }
 
-// V_i(k); and −log₂ of it, which is 0 where codes are kept.
+// V_i(k) of a light and a cell, and −log₂ of it, which is 0 if light volumes hold codes.
 fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec2<f32> {
     var depth = 0.0;
     if (MARCH | CACHED) & ERODED {
@@ -189,7 +198,8 @@ fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
     }
     if MARCH {
         if seen.occupied {
-            let walked = optical_depth(view.level, view.matter, seen.cell, light.l_cell, view.max_cells, NEVER);
+            let l_cell = light.l_cell;
+            let walked = optical_depth(view.level, view.matter, seen.cell, l_cell, view.max_cells, NEVER);
             (*ray).light_cells += walked.cells;
             (*ray).cut |= !walked.done;
             depth = walked.depth * view.extinction;
@@ -197,11 +207,11 @@ fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
     }
     if CACHED {
         var code = 0.0;
-        // Light volumes of many patches are larger than caches: empty cells need not ask for theirs.
+        // Light volumes of many patches exceed the caches, so empty cells do not fetch theirs.
         if seen.occupied {
-            let kept = kept_of(in_level(seen.cell, view.level), light.places);
-            code = kept;
-            depth = kept * view.depth_bits;
+            let value = patch_value(in_level(seen.cell, view.level), light.corners);
+            code = value;
+            depth = value * view.depth_bits;
         }
         if CODES {
             let transmittance = code * code * (1.0 / 65025.0);
@@ -215,39 +225,42 @@ fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
     return vec2<f32>(exp2(-depth), depth);
 }
 
-// The volume's own layer in the middle of layer `z` of the level.
+// The volume's own layer at the middle of layer `z` of the level.
 fn layer_in(view: View, z: i32) -> u32 {
     if PYRAMID && view.level.number > 0u {
-        return u32(min(i32((f32(z) + 0.5) * view.level.deep), view.place.layers - 1));
+        return u32(min(i32((f32(z) + 0.5) * view.level.deep), view.hit.layers - 1));
     }
     return u32(z);
 }
 
-// From the light volumes of the ray's patch, at a place of the volume's texture.
-fn kept_of(cell: vec3<i32>, places: LightPlaces) -> f32 {
-    let kept = kept_at(cell, places.p00);
+// Interpolates a value between the light volumes of the ray's patch; `cell` is a position in the volume's
+// texture.
+fn patch_value(cell: vec3<i32>, corners: PatchCorners) -> f32 {
+    let value = volume_value(cell, corners.p00);
     if CORNERED {
-        if places.cornered {
-            let near = mix(kept, kept_at(cell, places.p10), places.at.x);
-            let far = mix(kept_at(cell, places.p01), kept_at(cell, places.p11), places.at.x);
-            return mix(near, far, places.at.y);
+        if corners.cornered {
+            let near = mix(value, volume_value(cell, corners.p10), corners.at.x);
+            let far = mix(volume_value(cell, corners.p01), volume_value(cell, corners.p11), corners.at.x);
+            return mix(near, far, corners.at.y);
         }
     }
-    return kept;
+    return value;
 }
 
-fn kept_at(cell: vec3<i32>, place: vec3<i32>) -> f32 {
+// Value of a cell in the light volume that begins at `origin`.
+fn volume_value(cell: vec3<i32>, origin: vec3<i32>) -> f32 {
     if CODES {
-        return code_in_word(textureLoad(light_volumes, vec3<i32>(cell.xy, cell.z >> 2u) + place).x, cell.z);
+        return code_in_word(textureLoad(light_volumes, vec3<i32>(cell.xy, cell.z >> 2u) + origin).x, cell.z);
     }
-    return bitcast<f32>(textureLoad(light_volumes, cell + place).x);
+    return bitcast<f32>(textureLoad(light_volumes, cell + origin).x);
 }
 
-// From the middle of a cell in layer `layer` to where the light ray leaves the slab, as through even mist.
+// Optical depth in bits of even mist from the middle of a cell in layer `layer` to the point where the light
+// ray leaves the slab.
 fn mist_depth(layer: i32, direction: vec3<f32>, view: View) -> f32 {
     let z = f32(layer) + 0.5;
-    let way = select(f32(view.level.size.z) - z, z, direction.z < 0.0);
-    let t = way / max(abs(direction.z), 1e-6);
+    let layers_left = select(f32(view.level.size.z) - z, z, direction.z < 0.0);
+    let t = layers_left / max(abs(direction.z), 1e-6);
     let c = abs(direction);
     let length = select(t, t * (c.x + c.y + c.z), PER_CELL);
     return view.matter.even * min(length, 1e9) * view.extinction;

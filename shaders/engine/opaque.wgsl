@@ -1,10 +1,11 @@
-// What a point of rock sends to the eye; put after gbuffer.wgsl. Twin: src/cpu/opaque.rs.
+// §3 Shading of a point of rock in the raster pass. Twin: src/engine/cpu/opaque.rs.
 
 #import engine::gbuffer
 #import layout
 #import light::environment
 #import light::haze
 
+// Unit normal of a point, turned towards the eye.
 fn seen_normal(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
@@ -16,6 +17,7 @@ struct Lit {
     gloss: vec3<f32>,
 }
 
+// Adds light `i` to the light that reaches a point.
 fn lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit {
     let light = lights[i];
     let arrives = light_from(light, in.position_world);
@@ -29,8 +31,8 @@ fn lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit 
     return out;
 }
 
-// Lambert, two-sided, with the gloss of a film of water: `sky` is what the surroundings send along the mirrored
-// view.
+// Shades rock: two-sided Lambert, with the gloss of a film of water. `sky` is the radiance of the
+// surroundings along the mirrored view.
 fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let distance = sqrt(dot3(to_eye, to_eye));
@@ -55,7 +57,8 @@ fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32
     return out;
 }
 
-// π times the reflection of a film on rough rock: Blinn 1977 with the exponent 32, which (s + 8)/8π normalises.
+// π times the reflectance of a film of water on rough rock: Blinn 1977 with the exponent s = 32, normalised
+// by (s + 8)/8π.
 fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
     let sum = l + e;
     let h = sum / sqrt(max(dot3(sum, sum), 1e-12));
@@ -67,14 +70,14 @@ fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
     return 5.0 * fresnel(dot3(l, h)) * (c16 * c16);
 }
 
-// The view against the normal, mirrored.
+// Direction to the eye, mirrored at the normal.
 fn mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye / sqrt(max(dot3(to_eye, to_eye), 1e-12));
     return n * (2.0 * dot3(n, e)) - e;
 }
 
-// Background::radiance.
+// Radiance of the background along a unit direction. Twin: Background::radiance.
 fn background_radiance(d: vec3<f32>) -> vec3<f32> {
     return frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
 }
@@ -86,7 +89,8 @@ fn opaque_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
 }
 
-// Under an environment: on rough rock its film sends back what comes from all around the mirrored view.
+// As `opaque_fragment`, under an environment. A film on rough rock reflects the light from all around the
+// mirrored view.
 @fragment
 fn opaque_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let in = opaque_point(vec2<u32>(clip.xy));

@@ -1,5 +1,5 @@
-// The surface of a pool under a pixel; put after gbuffer.wgsl. Twin: src/cpu/pool.rs, where the reasoning stands;
-// what is made for it once a picture: src/pool.
+// §3 Shading of a pool's surface in the raster pass. Twin: src/engine/cpu/pool.rs, which holds the reasoning.
+// src/engine/pool_surface computes the surface once per picture.
 
 #import engine::gbuffer
 #import engine::opaque
@@ -12,22 +12,23 @@ const AROUND_COLUMNS: u32 = 64u;
 const AROUND_ROWS: u32 = 12u;
 
 struct Wave {
-    // Unit direction, or the middle of rings: x and z.
+    // x and z of a straight wave's unit direction, or of a ring's centre in metres.
     toward: vec2<f32>,
-    // Waves in a metre, and turns at the origin or the middle.
+    // Waves per metre, and phase in turns at the origin or the ring's centre.
     k: f32,
     phase: f32,
-    // The steepest slope.
+    // Steepest slope.
     slope: f32,
+    // 1 for a ring, 0 for a straight wave.
     ring: f32,
-    // Of rings, 1/m.
+    // Decay of a ring with the distance from its centre, 1/m.
     decay: f32,
     pad: f32,
 }
 
 struct Surface {
     color: vec3<f32>,
-    // Of the ball that what is around lies on.
+    // Radius in metres of the sphere that the surroundings are projected on.
     radius: f32,
     bottom: vec3<f32>,
     pad_a: f32,
@@ -36,13 +37,13 @@ struct Surface {
     middle: vec3<f32>,
     pad_c: f32,
     waves: array<Wave, 32>,
-    // Radiance × cover, and cover.
+    // Map of the surroundings: radiance × cover, and the cover.
     around: array<vec4<f32>, 768>,
 }
 
 @group(0) @binding(7) var<uniform> pool: Surface;
 
-// sin(2πt), to 3e-5: WGSL leaves the error of its own open.
+// sin(2πt) with an error below 3e-5. WGSL leaves the error of its own `sin` open.
 fn sin_turns(t: f32) -> f32 {
     let x = t - floor(t + 0.5);
     let x2 = x * x;
@@ -56,6 +57,7 @@ fn sin_turns(t: f32) -> f32 {
     return sum * x;
 }
 
+// Hash of a lattice point, 0 to 1.
 fn lattice(x: u32, y: u32) -> f32 {
     var h = (x * 0x8da6b343u) ^ (y * 0xd8163841u);
     h = (h ^ (h >> 13u)) * 0x9e3779b1u;
@@ -63,6 +65,7 @@ fn lattice(x: u32, y: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
 
+// Value noise between the values of the lattice.
 fn value_noise(p: vec2<f32>) -> f32 {
     let cell = floor(p);
     let f = p - cell;
@@ -74,14 +77,15 @@ fn value_noise(p: vec2<f32>) -> f32 {
     return near + (far - near) * s.y;
 }
 
+// Moves a point to where the view ray meets the pool's plane.
 fn on_pool(in: OpaquePoint) -> OpaquePoint {
     let d = view_ray(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
     let t = (pool.middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
-    var at = in;
+    var out = in;
     if t > 0.0 && t < 1e6 {
-        at.position_world = frame.eye_world + d * t;
+        out.position_world = frame.eye_world + d * t;
     }
-    return at;
+    return out;
 }
 
 fn to_eye_unit(in: OpaquePoint) -> vec3<f32> {
@@ -89,7 +93,8 @@ fn to_eye_unit(in: OpaquePoint) -> vec3<f32> {
     return to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);
 }
 
-// Slopes and lift of one wave; `waves`, put after this, adds up those of all.
+// Slopes and lift of one wave. The host generates `waves`, which adds up those of all
+// (src/engine/gpu/gbuffer.rs).
 fn rise(wave: Wave, toward: vec2<f32>, along: f32, steepest: f32, footprint: f32) -> vec3<f32> {
     let wide = 3.0 * wave.k * footprint;
     let blur = 1.0 + wide * wide;
@@ -109,6 +114,7 @@ fn ring_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> 
     return rise(wave, away / along, along, wave.slope * churn / (fall * fall), footprint);
 }
 
+// Unit normal of the waves.
 fn pool_normal(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye_unit(in);
@@ -121,6 +127,7 @@ fn pool_normal(in: OpaquePoint) -> vec3<f32> {
     return n / sqrt(dot3(n, n));
 }
 
+// View direction mirrored at `n`, never into the water.
 fn pool_mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     let e = to_eye_unit(in);
     let r = n * (2.0 * dot3(n, e)) - e;
@@ -128,11 +135,13 @@ fn pool_mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     return up / sqrt(dot3(up, up));
 }
 
+// Position of a direction about the vertical, 0 to 1. Twin: `turn` of src/engine/pool_surface/mod.rs.
 fn turn(d: vec3<f32>) -> f32 {
     let p = d.x / max(abs(d.x) + abs(d.z), 1e-20);
     return select(0.25 * (3.0 + p), 0.25 * (1.0 - p), d.z >= 0.0);
 }
 
+// Surroundings that a ray from `position` along `r` meets: radiance × cover, and the cover.
 fn around(position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
     let o = position - pool.middle;
     let b = dot3(o, r);
@@ -153,6 +162,7 @@ fn around(position: vec3<f32>, r: vec3<f32>) -> vec4<f32> {
     return low * (1.0 - g) + high * g;
 }
 
+// Adds light `i` to the light that reaches a point of the surface; `gloss` is its glint.
 fn pool_lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit {
     let light = lights[i];
     let arrives = light_from(light, in.position_world);
@@ -174,6 +184,7 @@ fn pool_lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) ->
     return out;
 }
 
+// Shades a point of the surface. `sky` is the radiance of the sky along the mirrored view.
 fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
     let to_eye = frame.eye_world - in.position_world;
     let e = to_eye_unit(in);
@@ -205,7 +216,7 @@ fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>)
     return out;
 }
 
-// In full vectors, for software Vulkan mixes those.
+// Values in full vectors, because software Vulkan interpolates whole vectors.
 struct PoolVarying {
     @builtin(position) clip: vec4<f32>,
     @location(0) position_world_occlusion: vec4<f32>,

@@ -1,11 +1,12 @@
-// All that a pixel sees of the water: its sheets, front to back. Part of the stage integrate. One call of the walk in a
-// loop, for every call is compiled anew.
+// The sheets of water under a pixel, traced front to back. Part of the stage integrate. Twin:
+// `Integrator::pixel` of src/engine/cpu/integrate.rs. A loop with one call of the walk, because every call is
+// compiled again.
 
 #import engine::integrate
 #import layout
 #import mapping
 
-// The nearest sheet is that of quad `nearest` − 1.
+// Radiance and transmittance of all sheets; the nearest sheet belongs to quad `nearest` − 1.
 fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function, vec2<u32>>) -> vec4<f32> {
     var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     var quad_number = nearest;

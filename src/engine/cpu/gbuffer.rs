@@ -94,7 +94,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
     out
 }
 
-/// What all pixels of one sample of a window share.
+/// Everything that the pixels of one sample of a window share.
 struct WindowFrame<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,

@@ -116,7 +116,7 @@ impl<'a> FrameRun<'a> {
             }
         };
         let hint: TileHint = (variant, volume.cells.address(), whole);
-        let known = renderer.learned.filter(|(of, _)| *of == hint).map(|(_, pixels)| pixels);
+        let known = renderer.learned.filter(|(frame, _)| *frame == hint).map(|(_, pixels)| pixels);
         Ok(FrameRun {
             gpu,
             timer,
