@@ -41,8 +41,8 @@ pub struct GpuRenderer {
     pub(super) learned: Option<(TileHint, f64)>,
 }
 
-/// Key of frames whose tiles take equally long: the variant of the integrate pass, the address of the volume's
-/// cells, and the image's size.
+/// Key of frames whose tiles take equally long: the variant of the integrate pass, the address of the
+/// volume's cells, and the image's size.
 pub(super) type TileHint = (Variant, usize, [u32; 2]);
 
 /// Specialised pipelines that are kept, so that a slider that moves back finds its pipeline again.
