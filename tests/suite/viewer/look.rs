@@ -19,7 +19,7 @@ fn every_sign_the_viewer_uses_is_in_the_fonts_it_brings() {
         files.extend(found);
     }
     assert!(files.len() > 20, "{files:?}");
-    files.extend(["job/engine.rs", "error.rs"].map(|file| sources.join(file)));
+    files.extend(["engine/mod.rs", "util/error.rs"].map(|file| sources.join(file)));
     let _ = context.run_ui(egui::RawInput::default(), |ui| {
         for file in &files {
             let text = std::fs::read_to_string(file).expect("text");
