@@ -170,7 +170,7 @@ fn a_name_that_is_taken_or_no_name_is_refused_with_the_reason() {
     add(&mut window, "point");
     let text = toml(&window);
     for (name, why) in
-        [("sun", "another light is named sun"), ("", "a light needs a name"), ("a.b", "no dots")]
+        [("sun", "another light is named sun"), ("", "a light needs a name"), ("a.b", "cannot contain dots")]
     {
         window.press("Rename point");
         window.enter("Name of point", name);
