@@ -1,4 +1,4 @@
-//! The window: menus, panels and status around the picture, and what they ask of the renderer.
+//! The window: menus, panels and status bar around the picture, and their requests to the render thread.
 
 mod input;
 mod life;
@@ -25,10 +25,10 @@ use super::parameters::{Costs, ParameterPanel};
 use super::probe::{Aim, Probe};
 use super::settings::{Settings, Theme};
 use super::transfer::{ExportDialog, PathDialog};
-use super::viewport::{self, Shown, Tool};
+use super::viewport::{self, Content, Tool};
 use super::volume_panel::VolumePanel;
 use super::worker::{Busy, Message, MessageKind, Picture, Worker};
-use super::{Kept, Loss, Options, metrics};
+use super::{Handover, Loss, Options, metrics};
 use crate::engine::cpu::ray::RayReport;
 use crate::picture::Layer;
 use crate::scene::{Raw, Scene};
@@ -42,11 +42,11 @@ pub enum Inspector {
     Pixel,
     /// The volume's cells.
     Volume,
-    /// The curves it was built from.
+    /// The curves that the volume was built from.
     Curves,
 }
 
-/// What is asked before something would be lost.
+/// An action that would lose unsaved changes, so that the user is asked first.
 #[derive(Clone, Debug, PartialEq)]
 enum Leaving {
     Close,
@@ -73,25 +73,27 @@ pub struct Viewer {
     exports_done: usize,
     help: bool,
     leaving: Option<Leaving>,
-    /// Leave once the save that is asked for is done.
+    /// The action to take once the scene is saved.
     leave_after_save: Option<Leaving>,
     closing: bool,
 
     tool: Tool,
     layer: Layer,
     inspector: Inspector,
-    /// The inspected place in the image, and its ray.
+    /// The inspected position in the image, 0 to 1.
     marked: Option<[f32; 2]>,
+    /// The ray through `marked`.
     ray: Option<RayReport>,
     probe: Probe,
     playing: bool,
-    /// When the water was moved last.
-    flowed: Option<Instant>,
-    /// The camera as the scene was opened.
+    /// When the playing water was last moved.
+    last_flow: Option<Instant>,
+    /// The camera when the scene was opened.
     first_pose: Pose,
 
+    /// Number of the last request.
     serial: u64,
-    /// What was asked for last: scene, size, samples, layer.
+    /// The last request: scene, size in pixels, samples, layer.
     asked: Option<(Arc<Scene>, [u32; 2], u32, Layer)>,
     picture: Option<Arc<Picture>>,
     texture: Option<egui::TextureHandle>,
@@ -102,20 +104,20 @@ pub struct Viewer {
     last_frame: Option<Instant>,
     drive: Option<Drive>,
     opened: Instant,
-    shot: Shot,
+    screenshot: Screenshot,
     title: String,
 }
 
-/// The way of the screenshot before the window closes.
+/// State of the screenshot that is taken before the window closes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shot {
-    NotYet,
-    Asked,
+enum Screenshot {
+    NotRequested,
+    Requested,
     Done,
 }
 
 impl Viewer {
-    /// A viewer in a window's context, with what an earlier window left in `loss`.
+    /// Creates a viewer in a window's context. Continues with the scene that a lost window left in `loss`.
     ///
     /// # Errors
     /// If the scene cannot be opened.
@@ -126,13 +128,13 @@ impl Viewer {
         loss: Loss,
     ) -> Result<Viewer> {
         let (mut settings, note) = Settings::load(options.settings.as_deref());
-        let kept = loss.take();
-        let again = kept.as_ref().map(|kept| kept.device_lost);
-        if again.is_some() {
+        let handover = loss.take_handover();
+        let lost_before = handover.as_ref().map(|handover| handover.device_lost);
+        if lost_before.is_some() {
             options.lose_window_after = None;
         }
-        let document = match kept {
-            Some(kept) => kept.document,
+        let document = match handover {
+            Some(handover) => handover.document,
             None => Document::open(&options.scene, &options.sets, &options.limits)?,
         };
         if let Some(path) = &document.path {
@@ -150,7 +152,7 @@ impl Viewer {
         );
         ctx.set_theme(preference(settings.theme));
         ctx.set_zoom_factor(settings.zoom);
-        // Weak text is to be read too.
+        // egui's own weak text is too faint to read.
         ctx.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.8);
         let first_pose = Pose::of(document.values());
         let mut viewer = Viewer {
@@ -181,7 +183,7 @@ impl Viewer {
             ray: None,
             probe: Probe::default(),
             playing: false,
-            flowed: None,
+            last_flow: None,
             first_pose,
             serial: 0,
             asked: None,
@@ -193,26 +195,26 @@ impl Viewer {
             engine: String::new(),
             last_frame: None,
             opened: Instant::now(),
-            shot: Shot::NotYet,
+            screenshot: Screenshot::NotRequested,
             title: String::new(),
         };
         if let Some(note) = note {
             viewer.say(MessageKind::Warning, note);
         }
-        if let Some(device_lost) = again {
+        if let Some(device_lost) = lost_before {
             let why = if device_lost { "the window's GPU device was lost" } else { "a bug ended the window" };
-            let text = format!("{why}; it was opened anew with all of the scene");
+            let text = format!("{why}; the window was reopened with the scene and its history");
             viewer.say(MessageKind::Warning, text);
         }
         Ok(viewer)
     }
 
-    /// The scene under edit.
+    /// The scene being edited.
     pub fn document(&self) -> &Document {
         &self.document
     }
 
-    /// The scene under edit.
+    /// The scene being edited.
     pub fn document_mut(&mut self) -> &mut Document {
         &mut self.document
     }
@@ -227,7 +229,7 @@ impl Viewer {
         self.picture.as_ref()
     }
 
-    /// Whether everything that was asked for is shown.
+    /// Whether the last request is finished, and no ray is being traced.
     pub fn is_settled(&self) -> bool {
         if self.probe.is_busy() {
             return false;
@@ -237,26 +239,27 @@ impl Viewer {
         self.asked.is_some() && settled >= self.serial && (shown || self.fault.is_some())
     }
 
-    /// Whether the picture in the window is of the latest change.
+    /// Whether the picture in the window shows the latest change.
     pub fn shows_latest(&self) -> bool {
         self.picture
             .as_ref()
             .is_some_and(|p| p.serial == self.serial && Arc::ptr_eq(&p.of, self.document.scene()))
     }
 
-    /// The ray that is inspected.
+    /// The inspected ray.
     pub fn ray(&self) -> Option<&RayReport> {
         self.ray.as_ref()
     }
 
+    /// Shows a banner. A banner with the same message moves to the end instead.
     fn say(&mut self, kind: MessageKind, text: impl Into<String>) {
         let message = Message { kind, text: text.into() };
         self.banners.retain(|(known, _)| *known != message);
         self.banners.push((message, Instant::now()));
     }
 
-    /// Tells of a failure, if there was one.
-    fn tell(&mut self, result: Result<()>) {
+    /// Shows the error, if there is one.
+    fn report(&mut self, result: Result<()>) {
         if let Err(e) = result {
             self.say(MessageKind::Error, e.to_string());
         }
@@ -291,7 +294,7 @@ impl eframe::App for Viewer {
 }
 
 impl Viewer {
-    /// One frame of the window.
+    /// Runs one frame of the window.
     pub fn show(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.receive(&ctx);
@@ -299,7 +302,7 @@ impl Viewer {
         let dropped: Vec<PathBuf> =
             ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         dropped.iter().for_each(|path| self.drop_file(path));
-        self.flow(&ctx);
+        self.play(&ctx);
         self.lights.follow(self.document.values());
 
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui));
@@ -313,7 +316,7 @@ impl Viewer {
             });
         }
         if self.settings.inspectors {
-            // A small window keeps room for the picture.
+            // In a small window, leaves room for the picture.
             let most = (ui.available_width() * 0.55).max(200.0);
             egui::Panel::right("inspectors").default_size(480.0).size_range(200.0..=most).show(ui, |ui| {
                 ui.add_space(4.0);
@@ -323,8 +326,8 @@ impl Viewer {
         let central = egui::CentralPanel::no_frame().show(ui, |ui| self.viewport(ui));
         self.show_banners(&ctx, central.response.rect);
         self.windows(&ctx);
-        self.life(&ctx);
-        // A step of the wheel is spread over some frames.
+        self.lifecycle(&ctx);
+        // egui spreads one step of the wheel over several frames.
         let moving =
             |i: &egui::InputState| i.pointer.any_down() || i.smooth_scroll_delta() != egui::Vec2::ZERO;
         if !ctx.input(moving) {
@@ -332,7 +335,7 @@ impl Viewer {
         }
     }
 
-    /// Goes on with measuring, and closes the window at its end.
+    /// Continues `--measure`, and closes the window at its end.
     fn measure(&mut self, ctx: &egui::Context) {
         let Some(mut drive) = self.drive.take() else { return };
         match drive.step(self, ctx) {
@@ -350,13 +353,13 @@ impl Viewer {
 
     fn viewport(&mut self, ui: &mut Ui) {
         let image = &self.document.scene().image;
-        let shown = Shown {
+        let content = Content {
             texture: self.texture.as_ref(),
             aspect: image.width as f32 / image.height as f32,
             marked: self.marked.filter(|_| self.settings.inspectors && self.inspector == Inspector::Pixel),
             tool: self.tool,
         };
-        let (rect, actions) = viewport::show(ui, &shown, self.document.values(), &mut self.lights);
+        let (rect, actions) = viewport::show(ui, &content, self.document.values(), &mut self.lights);
         if let Some(picture) = &self.picture
             && picture.layer != Layer::Rgb
         {
@@ -375,20 +378,20 @@ impl Viewer {
             let edits: Vec<(&str, Raw)> =
                 actions.lights.iter().map(|(k, v)| (k.as_str(), v.clone())).collect();
             let set = self.document.set_all(&edits, Some("light"));
-            self.tell(set);
+            self.report(set);
         }
-        if let Some(place) = actions.inspect {
+        if let Some(position) = actions.inspect {
             if self.tool == Tool::Inspect {
                 self.settings.inspectors = true;
                 self.inspector = Inspector::Pixel;
             }
-            self.marked = Some(place);
+            self.marked = Some(position);
             self.inspect_again();
         }
-        if let Some(place) = actions.focus {
-            self.ask(Aim::Focus, place);
+        if let Some(position) = actions.focus {
+            self.ask(Aim::Focus, position);
         }
-        // After the clicks of this frame: an answer is on its way before the next.
+        // After this frame's clicks, so that their rays are traced before the next frame.
         self.receive_rays(ui.ctx());
         let pixels = rect.size() * ui.ctx().pixels_per_point();
         self.request([pixels.x.round() as u32, pixels.y.round() as u32]);
@@ -399,12 +402,12 @@ impl Drop for Viewer {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let device_lost = self.loss.happened();
-            self.loss.keep(Kept { document: self.document.clone(), device_lost });
+            self.loss.hand_over(Handover { document: self.document.clone(), device_lost });
         }
         if let Some(path) = &self.options.settings
             && let Err(e) = self.settings.save(path)
         {
-            eprintln!("taki: warning: the viewer's settings were not kept: {e}");
+            eprintln!("taki: warning: the viewer's settings could not be saved: {e}");
         }
     }
 }

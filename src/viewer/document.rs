@@ -1,55 +1,59 @@
-//! The scene being edited: its values, where they came from, what was undone.
+//! The scene being edited: its values, its file, and its undo history.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::scene::{
-    Cost, Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
+    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
     set_by_hand,
 };
 use crate::util::error::{Error, Result};
 
-/// Steps that can be undone.
+/// Most steps that can be undone.
 const MAX_UNDO: usize = 500;
 
 /// A scene under edit.
 #[derive(Clone)]
 pub struct Document {
-    /// Its name: the preset's, or the file's stem.
+    /// Name of the preset, or stem of the file name.
     pub name: String,
-    /// The file it was read from or saved to; none for a preset.
+    /// The file it was read from or last saved to. `None` for a preset.
     pub path: Option<PathBuf>,
-    /// References resolve inside it; without one they are trusted.
+    /// The folder that references are relative to and must lie in. `None` once the user has named a file by hand:
+    /// references are then trusted.
     folder: Option<PathBuf>,
     limits: Limits,
     values: Values,
-    /// As last opened or saved.
+    /// The values when the scene was last opened or saved.
     saved: Values,
     undo: Vec<Values>,
     redo: Vec<Values>,
-    /// The gesture whose edits are one step.
+    /// The gesture in progress. Its edits form one step of undo.
     gesture: Option<String>,
-    /// Keys that changed by themselves.
+    /// Keys set by [`Document::set_quietly`] alone. They do not count as changes.
     quiet: BTreeSet<String>,
-    /// The last valid scene of the values.
+    /// The scene of the values when they were last valid.
     scene: Arc<Scene>,
-    /// Why the values make no scene.
+    /// Why the values are not a valid scene, if they are not.
     fault: Option<String>,
 }
 
 impl Document {
-    /// Opens a preset or a file, with `--set`s that count as edits.
+    /// Opens a preset or a file. The `--set` arguments in `sets` count as edits.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the scene is not valid.
     pub fn open(source: &Path, sets: &[String], limits: &Limits) -> Result<Document> {
-        let found = Source::find(source)?;
+        let origin = Source::find(source)?;
         let plain = Scene::load(source, &[], limits)?;
         let scene = if sets.is_empty() { plain.clone() } else { Scene::load(source, sets, limits)? };
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
         let by_hand = REFERENCES.iter().any(|key| set_by_hand(sets, key));
         Ok(Document {
-            name: found.name,
+            name: origin.name,
             path: (!is_preset).then(|| source.to_owned()),
-            folder: (!by_hand).then_some(found.folder),
+            folder: (!by_hand).then_some(origin.folder),
             limits: limits.clone(),
             values: scene.written().clone(),
             saved: plain.written().clone(),
@@ -67,24 +71,24 @@ impl Document {
         &self.scene
     }
 
-    /// The values, valid or not.
+    /// The values, which may not be a valid scene.
     pub fn values(&self) -> &Values {
         &self.values
     }
 
-    /// The memory budget and the folders that references may lead into.
+    /// The memory budget and the folders that references may point into.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// Why the values make no scene, if they do not; [`Document::scene`] is then an older one.
+    /// Why the values are not a valid scene, if they are not. [`Document::scene`] is then an older one.
     pub fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }
 
-    /// Whether there is anything to save; what changed by itself is not.
+    /// Whether there are changes to save. Keys set by [`Document::set_quietly`] do not count.
     pub fn is_changed(&self) -> bool {
-        // Set to its default or left out is the same.
+        // Unequal values may still mean the same: a key set to its default equals a key left out.
         self.values != self.saved
             && changed_keys(&self.saved, &self.values).iter().any(|key| !self.quiet.contains(key))
     }
@@ -94,24 +98,30 @@ impl Document {
         self.saved.get(key)
     }
 
-    /// Whether `key` has another value than when the scene was opened or saved. What belongs to a light that
-    /// was not there then has nothing to differ from.
+    /// Whether the value of `key` differs from when the scene was opened or saved. Always false for a key of a
+    /// light that was added since.
     pub fn differs(&self, key: &str) -> bool {
-        is_of_values(&self.saved, key) && self.values.get(key) != self.saved.get(key)
+        owner_exists(&self.saved, key) && self.values.get(key) != self.saved.get(key)
     }
 
-    /// Whether a section's names or values are others than when the scene was opened or saved.
+    /// Whether a section's names or values differ from when the scene was opened or saved.
     pub fn section_differs(&self, section: &str) -> bool {
-        let of_section = |key: &String| key.split('.').next() == Some(section);
-        self.values != self.saved && changed_keys(&self.saved, &self.values).iter().any(of_section)
+        let in_section = |key: &String| key.split('.').next() == Some(section);
+        self.values != self.saved && changed_keys(&self.saved, &self.values).iter().any(in_section)
     }
 
-    /// Sets one value. Edits of the same `gesture` (one drag of a slider) are one step of undo.
+    /// Sets one value. Edits of the same `gesture`, such as one drag of a slider, are one step of undo.
+    ///
+    /// # Errors
+    /// If the parameter table has no such key, or does not allow the value.
     pub fn set(&mut self, key: &str, raw: &Raw, gesture: Option<&str>) -> Result<()> {
         self.set_all(&[(key, raw.clone())], gesture)
     }
 
-    /// Sets several values as one step.
+    /// Sets several values as one step of undo.
+    ///
+    /// # Errors
+    /// If the parameter table lacks a key, or does not allow a value. Nothing is set then.
     pub fn set_all(&mut self, edits: &[(&str, Raw)], gesture: Option<&str>) -> Result<()> {
         let mut values = self.values.clone();
         for (key, raw) in edits {
@@ -122,7 +132,10 @@ impl Document {
         Ok(())
     }
 
-    /// Sets a value that changes by itself, without a step of undo.
+    /// Sets a value that changes by itself, such as the flow while the water plays. It is no step of undo.
+    ///
+    /// # Errors
+    /// If the parameter table has no such key, or does not allow the value.
     pub fn set_quietly(&mut self, key: &str, raw: &Raw) -> Result<()> {
         self.values.set(key, raw, &Place("viewer".into()))?;
         self.quiet.insert(key.to_owned());
@@ -130,12 +143,18 @@ impl Document {
         Ok(())
     }
 
-    /// Takes the volume from a file that the user gave by hand: it may lie anywhere.
+    /// Takes the volume from a file that the user gave by hand. It may lie in any folder.
+    ///
+    /// # Errors
+    /// If another reference of the scene cannot be resolved.
     pub fn use_volume_file(&mut self, path: &Path) -> Result<()> {
         self.use_files(&[("volume.file", Raw::Text(path.display().to_string()))])
     }
 
-    /// Takes the environment from a file that the user gave by hand: it may lie anywhere.
+    /// Takes the environment from a file that the user gave by hand. It may lie in any folder.
+    ///
+    /// # Errors
+    /// If another reference of the scene cannot be resolved.
     pub fn use_environment_file(&mut self, path: &Path) -> Result<()> {
         let file = Raw::Text(path.display().to_string());
         self.use_files(&[("environment.file", file), ("environment.kind", Raw::Text("file".into()))])
@@ -146,7 +165,7 @@ impl Document {
         for (key, raw) in edits {
             values.set(key, raw, &Place("viewer".into()))?;
         }
-        // What lay in the scene's folder stays there.
+        // The other references are relative to the scene's folder, which is given up below.
         for key in REFERENCES.iter().filter(|key| edits.iter().all(|(edited, _)| edited != *key)) {
             resolve(&mut values, key, self.folder.as_deref(), &self.limits.allow_paths)?;
         }
@@ -155,7 +174,10 @@ impl Document {
         Ok(())
     }
 
-    /// The scene with some other values, which the document does not keep.
+    /// Returns the scene with `edits` applied, without changing the document.
+    ///
+    /// # Errors
+    /// If an edit is not allowed, or the scene is not valid with the edits.
     pub fn variant(&self, edits: &[(&str, Raw)]) -> Result<Scene> {
         let mut values = self.values.clone();
         for (key, raw) in edits {
@@ -164,7 +186,7 @@ impl Document {
         Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
     }
 
-    /// Puts one value back to what it was when the scene was opened or saved.
+    /// Resets the values of `keys` to those of when the scene was opened or saved.
     pub fn reset(&mut self, keys: &[String]) {
         let mut values = self.values.clone();
         for key in keys {
@@ -173,8 +195,8 @@ impl Document {
         self.replace(values, None);
     }
 
-    /// Puts a whole section back to what it was when the scene was opened or saved: what was added goes,
-    /// what was removed comes back.
+    /// Resets a whole section to its state when the scene was opened or saved: removes what was added and
+    /// restores what was removed.
     pub fn reset_section(&mut self, section: &str) {
         let mut values = self.values.clone();
         values.clear_under(section);
@@ -182,24 +204,24 @@ impl Document {
         self.replace(values, None);
     }
 
-    /// Gives a value the table's default.
+    /// Sets a value to the parameter table's default.
     pub fn reset_to_default(&mut self, key: &str) {
         let mut values = self.values.clone();
         values.clear_under(key);
-        if !is_of_values(&values, key) {
-            // A light without a key would be no light.
+        if !owner_exists(&values, key) {
+            // A light exists only while it has a key, so its last key is set to the default instead of removed.
             let default = values.get(key);
             values.0.insert(Key::new(key), default);
         }
         self.replace(values, None);
     }
 
-    /// Takes all values anew, as one step.
+    /// Replaces all values, as one step of undo.
     pub fn edit(&mut self, values: Values) {
         self.replace(values, None);
     }
 
-    /// The drag has ended: the next edit is a step of its own.
+    /// Ends the gesture in progress: the next edit is a step of its own.
     pub fn end_gesture(&mut self) {
         self.gesture = None;
     }
@@ -208,8 +230,8 @@ impl Document {
         if values == self.values {
             return;
         }
-        let goes_on = gesture.is_some() && self.gesture.as_deref() == gesture;
-        if !goes_on {
+        let continues = gesture.is_some() && self.gesture.as_deref() == gesture;
+        if !continues {
             self.undo.push(std::mem::take(&mut self.values));
             if self.undo.len() > MAX_UNDO {
                 self.undo.remove(0);
@@ -221,6 +243,7 @@ impl Document {
         self.check();
     }
 
+    /// Rebuilds the scene from the values, or records why they are not valid.
     fn check(&mut self) {
         match Scene::from_values(&self.name, self.values.clone(), self.folder.as_deref(), &self.limits) {
             Ok(scene) => {
@@ -236,12 +259,12 @@ impl Document {
         !self.undo.is_empty()
     }
 
-    /// Whether there is a step to do again.
+    /// Whether there is a step to redo.
     pub fn can_redo(&self) -> bool {
         !self.redo.is_empty()
     }
 
-    /// Takes the last step back.
+    /// Undoes the last step.
     pub fn undo(&mut self) {
         if let Some(values) = self.undo.pop() {
             self.redo.push(std::mem::replace(&mut self.values, values));
@@ -250,7 +273,7 @@ impl Document {
         }
     }
 
-    /// Does the step again that was undone last.
+    /// Redoes the step that was undone last.
     pub fn redo(&mut self) {
         if let Some(values) = self.redo.pop() {
             self.undo.push(std::mem::replace(&mut self.values, values));
@@ -259,7 +282,11 @@ impl Document {
         }
     }
 
-    /// Writes the scene to a file: whole or not at all.
+    /// Writes the scene to a file, completely or not at all.
+    ///
+    /// # Errors
+    /// If the values are not a valid scene, if a file that the scene uses lies outside the new folder, or if
+    /// the file cannot be written.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         if let Some(fault) = &self.fault {
             return Err(Error::input(
@@ -268,16 +295,16 @@ impl Document {
             ));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
-        // A reference is relative to the scene's folder: in another folder it must lead to the same file.
+        // References are relative to the scene's folder: in another folder they must lead to the same files.
         let mut values = self.scene.written().clone();
         let moved = self.folder.as_ref() != Some(&folder);
         for (key, file) in self.scene.references().into_iter().filter(|_| moved) {
-            let whole = file.canonicalize().map_err(|e| Error::read(&file, e))?;
+            let absolute = file.canonicalize().map_err(|e| Error::read(&file, e))?;
             let inside =
-                folder.canonicalize().ok().and_then(|f| whole.strip_prefix(f).ok().map(Path::to_owned));
+                folder.canonicalize().ok().and_then(|f| absolute.strip_prefix(f).ok().map(Path::to_owned));
             let Some(inside) = inside else {
                 return Err(Error::input(
-                    format!("the scene uses {}, which is not in {}", whole.display(), folder.display()),
+                    format!("the scene uses {}, which is not in {}", absolute.display(), folder.display()),
                     format!("save the scene beside the {} file", key.trim_end_matches(".file")),
                 ));
             };
@@ -294,10 +321,10 @@ impl Document {
         Ok(())
     }
 
-    /// The command that renders this picture: the file or preset, and a `--set` for each change.
+    /// Returns the command that renders this picture: the file or preset, and one `--set` per change.
     ///
     /// # Errors
-    /// If lights were added, removed or renamed: no `--set` does that.
+    /// If lights were added, removed or renamed, because no `--set` does that.
     pub fn command_line(&self) -> Result<String> {
         if self.values.names("lights") != self.saved.names("lights") {
             return Err(Error::input(
@@ -313,15 +340,16 @@ impl Document {
         }
         let quoted = |word: &String| match shlex::try_quote(word) {
             Ok(word) => word.into_owned(),
-            // Only a NUL cannot be quoted, and no path or value holds one.
+            // Only NUL cannot be quoted, and no path or value contains one.
             Err(_) => String::new(),
         };
         Ok(words.iter().map(quoted).collect::<Vec<_>>().join(" "))
     }
 }
 
-/// Whether the light that a key belongs to is there; a light with every default is not the same as none.
-fn is_of_values(values: &Values, key: &str) -> bool {
+/// Whether the light that `key` belongs to exists; true for a key outside `lights`. A light whose values are all
+/// defaults still differs from no light.
+fn owner_exists(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {
         (Some("lights"), Some(name)) => values.has_under(&format!("lights.{name}")),
@@ -329,23 +357,13 @@ fn is_of_values(values: &Values, key: &str) -> bool {
     }
 }
 
-/// The keys whose values differ.
+/// Returns the keys whose values differ between `a` and `b`.
 pub fn changed_keys(a: &Values, b: &Values) -> Vec<String> {
     let keys: BTreeSet<&Key> = a.0.keys().chain(b.0.keys()).collect();
-    // Set to its default or left out is the same.
+    // A key set to its default equals a key left out.
     let value = |values: &Values, key: &str| {
         let has_default = Param::find(key).is_some_and(|p| p.kind != Kind::Corners);
-        (values.is_set(key) || has_default && is_of_values(values, key)).then(|| values.get(key))
+        (values.is_set(key) || has_default && owner_exists(values, key)).then(|| values.get(key))
     };
     keys.iter().map(ToString::to_string).filter(|key| value(a, key) != value(b, key)).collect()
-}
-
-/// The dearest cost among the changes from `a` to `b`; none if nothing changed.
-pub fn cost_of(a: &Values, b: &Values) -> Option<Cost> {
-    let costs = changed_keys(a, b).into_iter().filter_map(|key| Param::find(&key).map(|p| p.cost));
-    costs.max_by_key(|cost| match cost {
-        Cost::Uniform => 0,
-        Cost::Upload => 1,
-        Cost::Volume => 2,
-    })
 }

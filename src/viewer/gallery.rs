@@ -1,4 +1,4 @@
-//! The presets as small pictures, rendered when the gallery is first opened.
+//! The gallery of presets. Its thumbnails are rendered when it is first opened.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,8 +12,10 @@ use crate::light::Visibility;
 use crate::scene::{Limits, Scene, presets};
 use crate::util::monitor::Unwatched;
 
+/// Size of a thumbnail, pixels.
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 108;
+/// Thumbnails in a row.
 const COLUMNS: usize = 3;
 
 /// The gallery window.
@@ -21,12 +23,13 @@ const COLUMNS: usize = 3;
 pub struct Gallery {
     /// Whether it is shown.
     pub open: bool,
-    pictures: HashMap<&'static str, egui::TextureHandle>,
-    coming: Option<Receiver<(&'static str, egui::ColorImage)>>,
+    thumbnails: HashMap<&'static str, egui::TextureHandle>,
+    /// Thumbnails of the thread that renders them; `None` until the gallery is opened.
+    rendering: Option<Receiver<(&'static str, egui::ColorImage)>>,
 }
 
 impl Gallery {
-    /// Shows the window; the preset that was chosen.
+    /// Shows the window. Returns the preset that was chosen.
     pub fn show(&mut self, ctx: &egui::Context) -> Option<&'static str> {
         if !self.open {
             return None;
@@ -40,23 +43,11 @@ impl Gallery {
             let height = (ctx.content_rect().height() - 80.0).max(160.0);
             egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 egui::Grid::new("gallery").num_columns(COLUMNS).spacing([12.0, 12.0]).show(ui, |ui| {
-                    for (i, (preset, what)) in presets().enumerate() {
+                    for (i, (preset, about)) in presets().enumerate() {
                         ui.vertical(|ui| {
-                            ui.set_width(WIDTH as f32);
-                            let size = egui::vec2(WIDTH as f32, HEIGHT as f32);
-                            let response = match self.pictures.get(preset) {
-                                Some(texture) => {
-                                    ui.add_sized(size, egui::Button::image((texture.id(), size)).frame(false))
-                                }
-                                None => ui.add_sized(size, egui::Button::new("…")),
-                            };
-                            name(&response, &format!("Open {preset}"));
-                            let response = response.on_hover_cursor(egui::CursorIcon::PointingHand);
-                            if response.on_hover_text(format!("Open {preset}")).clicked() {
+                            if self.entry(ui, preset, about) {
                                 chosen = Some(preset);
                             }
-                            ui.strong(preset);
-                            ui.weak(what);
                         });
                         if i % COLUMNS == COLUMNS - 1 {
                             ui.end_row();
@@ -69,11 +60,28 @@ impl Gallery {
         chosen
     }
 
+    /// Shows one preset: its thumbnail, name and description. Returns whether it was clicked.
+    fn entry(&self, ui: &mut egui::Ui, preset: &str, about: &str) -> bool {
+        ui.set_width(WIDTH as f32);
+        let size = egui::vec2(WIDTH as f32, HEIGHT as f32);
+        let response = match self.thumbnails.get(preset) {
+            Some(texture) => ui.add_sized(size, egui::Button::image((texture.id(), size)).frame(false)),
+            None => ui.add_sized(size, egui::Button::new("…")),
+        };
+        name(&response, &format!("Open {preset}"));
+        let response = response.on_hover_cursor(egui::CursorIcon::PointingHand);
+        let clicked = response.on_hover_text(format!("Open {preset}")).clicked();
+        ui.strong(preset);
+        ui.weak(about);
+        clicked
+    }
+
+    /// Takes the thumbnails that are ready. Starts the thread that renders them on the first call.
     fn receive(&mut self, ctx: &egui::Context) {
-        let coming = self.coming.get_or_insert_with(|| {
+        let rendering = self.rendering.get_or_insert_with(|| {
             let (send, receive) = channel();
             let wake = ctx.clone();
-            // A thread that cannot start, or a window closed meanwhile, leaves grey boxes.
+            // If the thread cannot start, the gallery shows grey boxes.
             let _ = std::thread::Builder::new().name("thumbnails".into()).spawn(move || {
                 for (preset, _) in presets() {
                     let Some(image) = thumbnail(preset) else { continue };
@@ -85,14 +93,15 @@ impl Gallery {
             });
             receive
         });
-        while let Ok((preset, image)) = coming.try_recv() {
-            self.pictures.insert(preset, ctx.load_texture(preset, image, egui::TextureOptions::LINEAR));
+        while let Ok((preset, image)) = rendering.try_recv() {
+            self.thumbnails.insert(preset, ctx.load_texture(preset, image, egui::TextureOptions::LINEAR));
         }
     }
 }
 
-/// The middle of a preset's picture in the gallery's aspect, rendered on the CPU: small, and beside the
-/// renderer's own work. Light volumes for so few pixels would take longer than the walks they spare.
+/// Renders a preset at the gallery's size and aspect, on the CPU: the picture is small, and the GPU stays free for the
+/// renderer. Light volumes are replaced by light rays: for so few pixels, filling them would take longer than
+/// the rays that they save.
 fn thumbnail(preset: &str) -> Option<egui::ColorImage> {
     let mut sets =
         vec![format!("image.width={WIDTH}"), format!("image.height={HEIGHT}"), "image.samples=3".into()];

@@ -1,63 +1,64 @@
-//! A layer of a frame as a picture people can read, with its legend.
+//! Pictures of a frame's layers in readable colours, with a legend.
 
 use eframe::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Vec2};
 use rayon::prelude::*;
 
 use crate::picture::{Frame, Layer, Surface};
 
-/// A value that is infinite or not a number: a colour that no map holds.
+/// Colour of a value that is infinite or not a number. No colour map contains it.
 const NON_FINITE: [u8; 4] = [255, 0, 255, 255];
-/// The checker where a layer has no value, and its squares' size in pixels.
+/// Colours of the checkerboard drawn where a layer has no value.
 const NOTHING: [[u8; 4]; 2] = [[40, 40, 44, 255], [50, 50, 55, 255]];
+/// Side of a square of the checkerboard, pixels.
 const CHECKER_PIXELS: usize = 8;
-/// Values a range is found from: enough for its hundredths, quick to sort.
+/// Values that a range is estimated from: enough for its percentiles, quick to sort.
 const RANGE_SAMPLES: usize = 1 << 15;
-/// Pixels of a parallel task.
+/// Pixels per parallel task.
 const PIXELS_PER_TASK: usize = 1 << 14;
 
 /// A layer as a picture.
 pub struct LayerImage {
-    /// sRGB bytes R, G, B, A, row by row from the top left.
+    /// sRGB bytes R, G, B, A, in rows from the top left.
     pub pixels: Vec<[u8; 4]>,
-    /// What the colours mean.
+    /// Meaning of the colours.
     pub legend: Legend,
 }
 
-/// What the colours of a layer's picture mean.
+/// Meaning of the colours of a layer's picture.
 #[derive(Clone, Copy, Debug)]
 pub enum Legend {
-    /// The picture itself, or no value anywhere.
+    /// No legend: the layer is the picture itself, or has no value anywhere.
     None,
     /// One number.
     Scale {
-        /// Value at 0 of the map; what lies below is drawn like it.
+        /// Value drawn with the map's colour at 0. Lower values have the same colour.
         low: f32,
-        /// Value at 1 of the map; what lies above is drawn like it.
+        /// Value drawn with the map's colour at 1. Higher values have the same colour.
         high: f32,
-        /// Unit of both; may be empty.
+        /// Unit of `low` and `high`. May be empty.
         unit: &'static str,
-        /// Colour of (value − low)/(high − low), sRGB.
+        /// Colour map: sRGB of (value − low)/(high − low).
         map: fn(f32) -> [u8; 3],
     },
-    /// u red, v green.
+    /// Texture coordinates: u is red, v is green.
     Uv,
-    /// Each component of the unit normal n as n/2 + 1/2, x red, y green, z blue.
+    /// Unit normal n as the colour n/2 + 1/2: x is red, y green, z blue.
     Normal,
-    /// A colour for each quad; how many quads are seen, by the largest number.
+    /// One colour per quad. Holds the largest quad number in the picture, counted from 1.
     Quads(u32),
 }
 
-/// Draws `layer` of `frame`, a frame of `samples` samples a pixel.
+/// Draws `layer` of `frame`, which has `samples` samples per pixel.
 ///
-/// Values that are not finite are magenta, in the picture too; pixels without a value (no quad, no
-/// surface, no cell) are a dark checker, which no map holds.
+/// Values that are not finite are magenta, also in the `rgb` layer. Pixels without a value (no quad, no surface,
+/// no cell) show a dark checkerboard, whose colours no map contains.
 pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     let samples = samples.max(1) as f32;
     let radiance = |i: usize| frame.radiance.get(i).copied().unwrap_or([0.0; 4]);
     if layer == Layer::Rgb {
         let pixels = draw(frame, |i| {
-            let sound = radiance(i).iter().all(|x| x.is_finite());
-            Some(if sound { frame.picture[i] } else { NON_FINITE })
+            let is_finite = radiance(i).iter().all(|x| x.is_finite());
+            Some(if is_finite { frame.picture[i] } else { NON_FINITE })
         });
         return LayerImage { pixels, legend: Legend::None };
     }
@@ -74,7 +75,7 @@ pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
         (Layer::Transmittance, _) => {
             let value = |i: usize| {
                 let t = radiance(i)[3];
-                // Where no cell was walked nothing could be passed on.
+                // Where no cell was walked there is nothing that could transmit light.
                 if frame.counts[i][0] == 0 && t == 1.0 { None } else { Some(t) }
             };
             scale_image(frame, [0.0, 1.0], "", sequential, value)
@@ -104,7 +105,7 @@ pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     }
 }
 
-/// Applies `colour` to each pixel; without one the pixel is the checker.
+/// Applies `colour` to each pixel. A pixel without a colour shows the checkerboard.
 fn draw(frame: &Frame, colour: impl Fn(usize) -> Option<[u8; 4]> + Sync) -> Vec<[u8; 4]> {
     let width = frame.width.max(1) as usize;
     let pixels = frame.picture.len();
@@ -116,6 +117,7 @@ fn draw(frame: &Frame, colour: impl Fn(usize) -> Option<[u8; 4]> + Sync) -> Vec<
         .collect()
 }
 
+/// The colour of a value, or [`NON_FINITE`].
 fn finite<const N: usize>(value: &[f32; N], colour: impl Fn([f32; N]) -> [u8; 3]) -> [u8; 4] {
     if value.iter().all(|x| x.is_finite()) { opaque(colour(*value)) } else { NON_FINITE }
 }
@@ -140,7 +142,7 @@ fn scale_image(
     map: fn(f32) -> [u8; 3],
     value: impl Fn(usize) -> Option<f32> + Sync,
 ) -> LayerImage {
-    // A table: the maps are splines and polynomials, a picture has a million pixels.
+    // The maps are splines and polynomials: too slow for each of a million pixels, so they are tabulated.
     let table: Vec<[u8; 4]> = (0..=1023).map(|i| opaque(map(i as f32 / 1023.0))).collect();
     let to_table = if high > low { 1023.0 / (high - low) } else { 0.0 };
     let pixels = draw(frame, |i| {
@@ -150,13 +152,13 @@ fn scale_image(
         }
         Some(table[((value - low) * to_table + 0.5).clamp(0.0, 1023.0) as usize])
     });
-    // A frame without a value has no range.
+    // A frame without values has no range: then low > high.
     let legend = if low <= high { Legend::Scale { low, high, unit, map } } else { Legend::None };
     LayerImage { pixels, legend }
 }
 
-/// The range of the finite values: all of it, unless a few values lie far outside the others. Then it
-/// ends half the others' spread beyond them. Without values low > high.
+/// The range of the finite values, cut off at outliers. It extends at most half the distance between the 2nd and
+/// the 98th percentile beyond these. Without values low > high.
 fn robust_range(frame: &Frame, value: impl Fn(usize) -> Option<f32> + Sync) -> (f32, f32) {
     let finite = |i: usize| value(i).filter(|v| v.is_finite());
     let pixels = frame.picture.len();
@@ -166,7 +168,7 @@ fn robust_range(frame: &Frame, value: impl Fn(usize) -> Option<f32> + Sync) -> (
         .filter_map(finite)
         .map(|v| (v, v))
         .reduce(|| (f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    // An odd step does not keep to a column.
+    // An odd step does not stay in one column of the picture.
     let mut some: Vec<f32> = (0..pixels).step_by((pixels / RANGE_SAMPLES) | 1).filter_map(finite).collect();
     some.sort_unstable_by(f32::total_cmp);
     let at = |share: f32| some.get(((some.len() as f32 - 1.0) * share).round() as usize).copied();
@@ -184,18 +186,18 @@ fn gradient(gradient: colorous::Gradient, t: f32) -> [u8; 3] {
     [colour.r, colour.g, colour.b]
 }
 
-/// Dark violet over green to yellow, even in lightness.
+/// Colour map from dark violet over green to yellow, with even steps of lightness.
 pub(super) fn sequential(t: f32) -> [u8; 3] {
     gradient(colorous::VIRIDIS, t)
 }
 
-/// Dark violet over red to yellow: what costs much glows.
+/// Colour map from dark violet over red to yellow, for costs.
 pub(super) fn heat(t: f32) -> [u8; 3] {
-    // The darkest tenth is too like the checker.
+    // The darkest tenth of the gradient looks too much like the checkerboard.
     gradient(colorous::INFERNO, 0.1 + 0.9 * t)
 }
 
-/// Light near, dark far.
+/// Colour map for depth: near is light, far is dark.
 fn near_is_bright(t: f32) -> [u8; 3] {
     gradient(colorous::MAGMA, 1.0 - 0.85 * t)
 }
@@ -208,30 +210,33 @@ fn uv_colour([u, v]: [f32; 2]) -> [u8; 3] {
     [byte(u), byte(v), 0]
 }
 
-/// n/2 + 1/2 of each component.
+/// Colour of a unit direction: n/2 + 1/2 of each component.
 pub(super) fn direction_colour(n: [f32; 3]) -> [u8; 3] {
     n.map(|x| byte(0.5 * x + 0.5))
 }
 
-/// Colour of quad number `quad` (from 0). Hues turn by the golden angle, and lightness goes in threes, so
-/// that neither the next quad nor the one in the next row looks alike.
+/// Colour of quad number `quad`, counted from 0. The hue turns by the golden angle and the lightness repeats every
+/// three quads, so that neither the next quad nor the one in the next row looks similar.
 pub fn quad_colour(quad: u32) -> [u8; 3] {
     let hue = (quad as f32 * 0.618_034 + 0.58).fract();
     let (saturation, value) = [(0.62, 0.95), (0.80, 0.62), (0.38, 0.85)][quad as usize % 3];
     let [r, g, b] = egui::ecolor::rgb_from_hsv((hue, saturation, value));
-    // Pleasing hues are spread in the encoded values, so these are taken as sRGB.
+    // HSV hues are evenly spread in encoded values, so the result is taken as sRGB, not as linear RGB.
     [byte(r), byte(g), byte(b)]
 }
 
+/// Text colours on the legend's dark ground.
 const INK: Color32 = Color32::from_gray(235);
 const FAINT_INK: Color32 = Color32::from_gray(175);
+/// Size of the colour bar, points.
 const BAR: Vec2 = Vec2::new(150.0, 12.0);
+/// Side of the uv square and diameter of the normal ball, points.
 const SQUARE: f32 = 36.0;
-/// Quads shown with a swatch each.
+/// Most quads with a swatch of their own.
 const MAX_SWATCHES: u32 = 12;
 
-/// Shows what the colours of `layer` mean, on one line, readable over any picture in either theme.
-/// Nothing is shown for a picture that explains itself.
+/// Shows the meaning of the colours of `layer` on one line, readable over any picture in either theme. Shows
+/// nothing for [`Legend::None`].
 pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
     if let Legend::None = legend {
         return;
@@ -254,7 +259,7 @@ pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
                 Legend::Scale { low, high, unit, map } => {
                     let decimals = decimals(low, high, unit);
                     ui.label(RichText::new(format!("{low:.decimals$}")).color(INK));
-                    colour_bar(ui, BAR, map).on_hover_text("left of the bar and right of it: like its ends");
+                    colour_bar(ui, BAR, map).on_hover_text("values beyond the ends have the colours of the ends");
                     let gap = if unit.is_empty() { "" } else { " " };
                     ui.label(RichText::new(format!("{high:.decimals$}{gap}{unit}")).color(INK));
                 }
@@ -266,7 +271,7 @@ pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
     });
 }
 
-/// Decimals that tell a hundredth of the range.
+/// Number of decimals that resolves a hundredth of the range.
 fn decimals(low: f32, high: f32, unit: &str) -> usize {
     if unit == "cells" {
         return 0;
@@ -275,7 +280,7 @@ fn decimals(low: f32, high: f32, unit: &str) -> usize {
     (-step.log10().floor()).clamp(1.0, 4.0) as usize
 }
 
-/// A bar of the map's colours from 0 at its left to 1 at its right.
+/// A bar of the map's colours from 0 on the left to 1 on the right.
 pub(super) fn colour_bar(ui: &mut egui::Ui, size: Vec2, map: fn(f32) -> [u8; 3]) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let mut mesh = egui::Mesh::default();
@@ -320,7 +325,7 @@ fn uv_square(ui: &mut egui::Ui) {
     });
 }
 
-/// A ball seen from +z, x to the right and y up: each point has the colour of its normal.
+/// A ball seen from +z, with x to the right and y up. Each point has the colour of its normal.
 fn normal_ball(ui: &mut egui::Ui) {
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(SQUARE), Sense::hover());
     let (rings, spokes) = (8u32, 32u32);

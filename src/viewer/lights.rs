@@ -1,6 +1,7 @@
-//! The lights of the scene under edit: which one is selected, and what is done to them as a whole.
+//! The lights of the scene being edited: which one is selected, and the commands that add, copy, rename, switch and
+//! remove them.
 //!
-//! Every change is one step of the document's history.
+//! Each change is one step of undo.
 
 pub mod edit;
 mod handles;
@@ -17,53 +18,57 @@ use super::navigate::Pose;
 use crate::scene::{Raw, Values};
 use crate::util::error::Result;
 
-/// What the viewer knows about lights beside the scene.
+/// State of the lights that is not part of the scene.
 #[derive(Default)]
 pub struct Lights {
-    /// The one with handles in the picture.
+    /// The selected light, which has handles in the picture.
     selected: Option<String>,
-    /// The intensity each had when it last shone: it comes back when the light is switched on again.
-    shone: HashMap<String, f64>,
-    /// The light whose name is being written.
+    /// Last nonzero intensity of each light. A light gets it back when it is switched on again.
+    last_intensity: HashMap<String, f64>,
+    /// The light being renamed.
     pub(super) renaming: Option<Renaming>,
-    /// The light whose entry is to be unfolded.
+    /// The light whose entry in the list is to be unfolded in the next frame.
     pub(super) unfold: Option<String>,
+    /// The handle being dragged.
     grip: Option<handles::Grip>,
-    /// From the selected spot light to the point it is aimed at, metres.
-    reach: Option<f64>,
+    /// Distance from the selected spot light to the point at which it is aimed, metres.
+    aim_distance: Option<f64>,
 }
 
-/// A name being written.
+/// A light being renamed.
 pub(super) struct Renaming {
     pub light: String,
+    /// The name as typed so far.
     pub text: String,
+    /// Why the typed name was refused.
     pub fault: Option<String>,
-    /// Whether its field has the keyboard.
-    pub begun: bool,
+    /// Whether the text field has been given the keyboard.
+    pub focused: bool,
 }
 
-/// Whether a light shines at all.
+/// Whether a light has an intensity above 0 and a colour other than black.
 pub fn shines(values: &Values, name: &str) -> bool {
     values.float(&format!("lights.{name}.intensity")) > 0.0
         && values.triple(&format!("lights.{name}.color")) != Vec3::ZERO
 }
 
 impl Lights {
-    /// The light that is selected.
+    /// The selected light.
     pub fn selected(&self) -> Option<&str> {
         self.selected.as_deref()
     }
 
-    /// Selects a light, or none.
+    /// Selects a light, or with `None` deselects.
     pub fn select(&mut self, name: Option<&str>) {
         if self.selected.as_deref() != name {
             self.grip = None;
-            self.reach = None;
+            self.aim_distance = None;
         }
         self.selected = name.map(str::to_owned);
     }
 
-    /// Takes note of what an undo, a slider or another scene did to the lights.
+    /// Adapts to changes of the lights by an undo, a slider or another scene: forgets lights that are gone, and
+    /// records intensities.
     pub fn follow(&mut self, values: &Values) {
         let gone = |name: &str| !values.has_under(&format!("lights.{name}"));
         if self.selected.as_deref().is_some_and(gone) {
@@ -75,15 +80,15 @@ impl Lights {
         for name in values.names("lights") {
             let intensity = f64::from(values.float(&format!("lights.{name}.intensity")));
             if intensity > 0.0 {
-                self.shone.insert(name, intensity);
+                self.last_intensity.insert(name, intensity);
             }
         }
     }
 
-    /// Adds a light of a kind where the camera sees what it does, and selects it.
+    /// Adds a light of a kind at a position where the camera sees its effect, and selects it.
     ///
     /// # Errors
-    /// If the scene does not take it.
+    /// If there is no such kind, or the position is out of range.
     pub fn add(&mut self, document: &mut Document, kind: &str) -> Result<()> {
         let (values, name) = edit::add(document.values(), kind, &Pose::of(document.values()))?;
         document.edit(values);
@@ -97,20 +102,20 @@ impl Lights {
         self.follow(document.values());
     }
 
-    /// Copies a light, and selects the copy.
+    /// Duplicates a light and selects the copy.
     pub fn duplicate(&mut self, document: &mut Document, name: &str) {
         let (values, copy) = edit::duplicate(document.values(), name);
         document.edit(values);
-        if let Some(intensity) = self.shone.get(name) {
-            self.shone.insert(copy.clone(), *intensity);
+        if let Some(intensity) = self.last_intensity.get(name) {
+            self.last_intensity.insert(copy.clone(), *intensity);
         }
         self.show(&copy);
     }
 
-    /// Gives a light another name.
+    /// Renames a light.
     ///
     /// # Errors
-    /// Why it cannot have this name, in words.
+    /// Why the light cannot have this name, as a sentence for the user.
     pub fn rename(
         &mut self,
         document: &mut Document,
@@ -118,8 +123,8 @@ impl Lights {
         new: &str,
     ) -> std::result::Result<(), String> {
         document.edit(edit::rename(document.values(), name, new)?);
-        if let Some(intensity) = self.shone.get(name) {
-            self.shone.insert(new.to_owned(), *intensity);
+        if let Some(intensity) = self.last_intensity.get(name) {
+            self.last_intensity.insert(new.to_owned(), *intensity);
         }
         if self.selected.as_deref() == Some(name) {
             self.select(Some(new));
@@ -127,31 +132,32 @@ impl Lights {
         Ok(())
     }
 
-    /// Begins to write a light's name.
+    /// Starts renaming a light in the list.
     pub fn begin_renaming(&mut self, name: &str) {
-        self.renaming = Some(Renaming { light: name.into(), text: name.into(), fault: None, begun: false });
+        self.renaming = Some(Renaming { light: name.into(), text: name.into(), fault: None, focused: false });
     }
 
-    /// Switches a light off, or on again as bright as it was.
+    /// Switches a light off, or on again with its last intensity.
     ///
     /// # Errors
-    /// If the scene does not take the intensity.
+    /// If the intensity is out of range.
     pub fn switch(&mut self, document: &mut Document, name: &str) -> Result<()> {
         let key = format!("lights.{name}.intensity");
         self.follow(document.values());
         let on = document.values().float(&key) > 0.0;
-        let intensity = if on { 0.0 } else { self.shone.get(name).copied().unwrap_or(1.0) };
+        let intensity = if on { 0.0 } else { self.last_intensity.get(name).copied().unwrap_or(1.0) };
         document.set(&key, &Raw::Float(intensity), None)
     }
 
+    /// Selects a new light and unfolds its entry.
     fn show(&mut self, name: &str) {
         self.select(Some(name));
         self.unfold = Some(name.into());
     }
 }
 
-/// The light that a drag in the picture turns: the selected one if it has a direction, else the first
-/// directional one that shines.
+/// The light that a drag in the picture turns: the selected light if it has a direction, otherwise the first
+/// directional light that shines.
 pub fn turned(values: &Values, selected: Option<&str>) -> Option<String> {
     let kind = |light: &str| values.text(&format!("lights.{light}.kind"));
     if let Some(light) = selected.filter(|light| edit::takes(&kind(light), "direction")) {

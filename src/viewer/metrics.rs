@@ -1,4 +1,4 @@
-//! How quickly the viewer answers: measured while it is used, printed at its end.
+//! Measures how quickly the viewer answers. The command line prints the report when the window closes.
 
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
@@ -7,24 +7,24 @@ use serde::Serialize;
 
 use crate::scene::Cost;
 
-/// Latencies and frames are kept up to this many of each.
-const KEPT: usize = 20_000;
+/// Most samples kept per measurement.
+const MAX_SAMPLES: usize = 20_000;
 
-/// What was measured, milliseconds.
+/// The measurements. All times are in milliseconds.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
-    /// From the window's first frame to the first picture in it.
+    /// Time from the window's first frame to its first picture.
     pub first_picture_ms: Option<f64>,
-    /// From a change that costs uniforms to its first picture on the window.
+    /// Time from a change that costs uniforms to its first picture in the window.
     pub uniform_preview: Latency,
-    /// From a change that costs an upload.
+    /// Time from a change that costs an upload to its first picture.
     pub upload_preview: Latency,
-    /// From a change that builds the volume.
+    /// Time from a change that builds the volume to its first picture.
     pub volume_preview: Latency,
-    /// The window's own frame: its thread's work from the start of one to its hand-over, in all states.
+    /// Work of the window's thread per frame, from the frame's start until it is handed to the system.
     pub own_frame: Latency,
-    /// From frame to frame while the window drew without pause beside the renderer at work: work,
-    /// hand-over and waiting for the screen.
+    /// Time from frame to frame while the window drew without pause and the renderer was at work. It includes
+    /// work, hand-over and waiting for the screen.
     pub frame_while_rendering: Latency,
     /// Frames drawn.
     pub frames: u64,
@@ -32,39 +32,41 @@ pub struct Report {
     pub pictures: u64,
 }
 
-/// A distribution, milliseconds.
+/// Distribution of a time, milliseconds.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Latency {
-    /// Measurements.
+    /// Number of measurements.
     pub count: usize,
-    /// Half are below it.
+    /// Median.
     pub median: f64,
-    /// 95 in 100 are below it.
+    /// 95th percentile.
     pub p95: f64,
-    /// The longest.
+    /// Longest time.
     pub max: f64,
 }
 
 #[derive(Default)]
 struct Samples {
+    /// When the first frame began.
     start: Option<Instant>,
     first_picture: Option<f64>,
+    /// Latencies of first pictures, by [`Cost`].
     previews: [Vec<f64>; 3],
     own: Vec<f64>,
     intervals: Vec<f64>,
     frames: u64,
     pictures: u64,
-    /// Of a picture that the frame in hand draws.
+    /// Time of request and cost of the picture that the current frame draws.
     drawn: Option<(Instant, Cost)>,
     last_preview: Option<f64>,
 }
 
-/// Shared between the window, which measures, and its caller, who reports.
+/// Measurements shared between the window, which records them, and its caller, which reports them.
 #[derive(Clone, Default)]
 pub struct Shared(Arc<Mutex<Samples>>);
 
 fn push(list: &mut Vec<f64>, x: f64) {
-    if list.len() < KEPT {
+    if list.len() < MAX_SAMPLES {
         list.push(x);
     }
 }
@@ -74,8 +76,8 @@ impl Shared {
         self.0.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// A frame begins. `own` are the seconds of the last one's work; `interval` those since it began, if
-    /// the renderer was at work and the window drew continuously.
+    /// Records the beginning of a frame. `own` is the work of the last frame, seconds. `interval` is the time since
+    /// that frame began, seconds, if the renderer was at work and the window drew without pause.
     pub fn frame(&self, own: Option<f32>, interval: Option<f64>) {
         let mut s = self.lock();
         s.start.get_or_insert_with(Instant::now);
@@ -93,8 +95,8 @@ impl Shared {
         }
     }
 
-    /// A picture is drawn in this frame; it counts as shown when the next one begins. `asked`: when its
-    /// request was made, if it is the first for it.
+    /// Records that this frame draws a new picture, which counts as shown when the next frame begins. `asked` is the
+    /// time of its request, if it is the request's first picture.
     pub fn picture(&self, asked: Option<Instant>, cost: Cost) {
         let mut s = self.lock();
         s.pictures += 1;
@@ -105,18 +107,18 @@ impl Shared {
         }
     }
 
-    /// Median and 95th percentile of the last frames' own work, milliseconds.
+    /// Distribution of the own work of the last 300 frames.
     pub fn recent_frames(&self) -> Latency {
         let s = self.lock();
         latency(&s.own[s.own.len().saturating_sub(300)..])
     }
 
-    /// Milliseconds from the last change to its first picture.
+    /// Time from the last change to its first picture, milliseconds.
     pub fn last_preview(&self) -> Option<f64> {
         self.lock().last_preview
     }
 
-    /// Everything.
+    /// All measurements so far.
     pub fn report(&self) -> Report {
         let s = self.lock();
         Report {

@@ -1,7 +1,7 @@
-//! The viewer: a window in which parameters are turned and the picture follows.
+//! The viewer: a window in which the user changes parameters and watches the picture follow.
 //!
-//! A client of the library like the command line: the same scenes, passes and parameter table. The window's
-//! thread never renders; [`worker`] does, and hands over finished pictures.
+//! Like the command line it is a client of the library, with the same scenes, passes and parameter table.
+//! The window's thread never renders. The render thread ([`worker`]) does, and hands over finished pictures.
 
 mod app;
 pub mod curves_panel;
@@ -37,37 +37,38 @@ use crate::engine::gpu::{DeviceOptions, adapters};
 use crate::scene::Limits;
 use crate::util::error::{Error, Result};
 
-/// How to open the viewer.
+/// Options of the viewer.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A preset or a scene file.
+    /// Name of a preset, or a scene file.
     pub scene: PathBuf,
-    /// `--set`s; they count as changes to the scene.
+    /// `--set` arguments. They count as changes to the scene.
     pub sets: Vec<String>,
     /// Memory budget and allowed folders.
     pub limits: Limits,
     /// What draws the window.
     pub window: WindowChoice,
-    /// Which engine renders.
+    /// The engine that renders.
     pub engine: EngineChoice,
-    /// On which device.
+    /// The device on which the engine renders.
     pub device: DeviceOptions,
-    /// The settings file; none keeps nothing.
+    /// The settings file. With `None` no settings are kept.
     pub settings: Option<PathBuf>,
-    /// Closes the window once this is not 0: the exit code of a signal that came.
+    /// Exit code of a received signal, 0 until one arrives. The window closes when it is no longer 0.
     pub signal: Arc<AtomicUsize>,
     /// Closes the window after this time.
     pub exit_after: Option<Duration>,
-    /// Where the window's picture is written before it closes.
+    /// PNG file of the window's picture, written when `exit_after` has passed.
     pub screenshot: Option<PathBuf>,
-    /// Drives itself through changes, measures how quickly the window answers, and closes it.
+    /// Changes parameters by itself, measures how quickly the window answers, then closes it.
     pub measure: bool,
-    /// Takes the window's own device away after this time, as a driver's reset does. For tests.
+    /// Destroys the window's own device after this time, as a driver reset would. For tests.
     #[doc(hidden)]
     pub lose_window_after: Option<Duration>,
 }
 
-/// The window is opened anew after its own GPU device was lost, but not for ever. A loss takes two tries.
+/// Most windows opened in one run, so that repeated losses of the window's GPU device end. Each loss takes two
+/// attempts: the first window after it closes at once.
 const MAX_WINDOWS: usize = 8;
 
 /// What draws the window.
@@ -83,7 +84,7 @@ pub enum WindowChoice {
 }
 
 impl WindowChoice {
-    /// In the order to try them.
+    /// The renderers to try, in order.
     fn renderers(self) -> Vec<Renderer> {
         match self {
             WindowChoice::Wgpu => vec![Renderer::Wgpu],
@@ -94,7 +95,7 @@ impl WindowChoice {
                 if adapters.is_empty() {
                     vec![Renderer::Glow]
                 } else if adapters.iter().all(software) {
-                    // egui's shader takes software Vulkan four times as long as the one for OpenGL.
+                    // egui's shader takes four times as long on software Vulkan as on software OpenGL.
                     vec![Renderer::Glow, Renderer::Wgpu]
                 } else {
                     vec![Renderer::Wgpu, Renderer::Glow]
@@ -107,31 +108,36 @@ impl WindowChoice {
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// If the scene is not valid, or there is no display or nothing that can draw on it.
+/// If the scene is not valid, if there is no display or nothing that can draw on it, if a signal ended the
+/// viewer, or if the window's GPU device was lost too often.
 pub fn run(options: Options) -> Result<metrics::Report> {
-    // A wrong scene is told on the terminal, before any window.
+    // An invalid scene is reported on the terminal, before a window opens.
     document::Document::open(&options.scene, &options.sets, &options.limits)?;
     let measured = metrics::Shared::default();
-    let mut kept = None;
+    let mut handover = None;
     for _ in 0..MAX_WINDOWS {
-        kept = open_window(&options, &measured, kept)?;
+        handover = open_window(&options, &measured, handover)?;
         let code = options.signal.load(Ordering::Relaxed);
         if code != 0 {
             return Err(Error::Interrupted { code: code as u8 });
         }
-        if kept.is_none() {
+        if handover.is_none() {
             return Ok(measured.report());
         }
     }
-    Err(Error::DeviceLost(match kept.map(rescue) {
-        Some(Ok(path)) => format!("the window was lost again and again; its scene is in {}", path.display()),
-        Some(Err(e)) => format!("the window was lost again and again, and its scene was not kept: {e}"),
-        None => "the window was lost again and again".into(),
+    Err(Error::DeviceLost(match handover.map(rescue) {
+        Some(Ok(path)) => format!("the window failed repeatedly; its scene was saved to {}", path.display()),
+        Some(Err(e)) => format!("the window failed repeatedly, and its scene could not be saved: {e}"),
+        None => "the window failed repeatedly".into(),
     }))
 }
 
-/// One window, until it is closed or its device is lost; then what is to be kept.
-fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>) -> Result<Option<Kept>> {
+/// Opens one window and runs it until it is closed or lost. Returns what a lost window leaves to the next.
+fn open_window(
+    options: &Options,
+    measured: &metrics::Shared,
+    handover: Option<Handover>,
+) -> Result<Option<Handover>> {
     let (settings, _) = settings::Settings::load(options.settings.as_deref());
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("taki")
@@ -143,19 +149,19 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
         viewport = viewport.with_position(position);
     }
     let loss = Loss::default();
-    if let Some(kept) = kept {
-        loss.keep(kept);
+    if let Some(handover) = handover {
+        loss.hand_over(handover);
     }
     let mut opened = Ok(Ok(()));
     let mut first_fault = None;
     for renderer in options.window.renderers() {
-        let (seen, options, measured) = (loss.clone(), options.clone(), measured.clone());
+        let (loss_of_window, options, measured) = (loss.clone(), options.clone(), measured.clone());
         let create: eframe::AppCreator = Box::new(move |context| {
             wake_on_signal(&options.signal, &context.egui_ctx);
             if let Some(state) = &context.wgpu_render_state {
-                seen.watch(&state.device, &context.egui_ctx);
+                loss_of_window.watch(&state.device, &context.egui_ctx);
             }
-            Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, seen)?))
+            Ok(Box::new(Viewer::new(&context.egui_ctx, options, measured, loss_of_window)?))
         });
         let viewport = viewport.clone();
         let native = NativeOptions {
@@ -165,33 +171,33 @@ fn open_window(options: &Options, measured: &metrics::Shared, kept: Option<Kept>
             dithering: false,
             ..Default::default()
         };
-        // Drawing with a lost device ends in a panic inside egui's renderer. The event loop that it went
-        // through takes the next window for one that is open already and ends at once; the one after that
-        // opens. What is kept waits meanwhile.
+        // Drawing with a lost device panics inside egui's renderer. The event loop that this panic unwinds
+        // still counts the window as open: the next call of `run_native` returns at once, the call after it
+        // opens a window. The handover waits in `loss` meanwhile.
         let run = AssertUnwindSafe(|| eframe::run_native("taki", native, create));
-        opened = loss.without_noise(|| std::panic::catch_unwind(run));
+        opened = loss.hush_panics(|| std::panic::catch_unwind(run));
         match &opened {
-            // The next way to draw may do; what keeps all of them from it is told by the first.
+            // Another renderer may work. If none does, the error of the first is reported.
             Ok(Err(e)) => first_fault = first_fault.or_else(|| Some(cause(e))),
             _ => break,
         }
     }
     match opened {
-        Ok(Ok(())) => Ok(loss.take()),
+        Ok(Ok(())) => Ok(loss.take_handover()),
         Ok(Err(e)) => Err(Error::NoWindow(first_fault.unwrap_or_else(|| cause(&e)))),
-        Err(panic) => match loss.take() {
-            Some(kept) => {
-                if kept.device_lost {
-                    eprintln!("taki: warning: the window's GPU device was lost; the window is opened anew");
+        Err(panic) => match loss.take_handover() {
+            Some(handover) => {
+                if handover.device_lost {
+                    eprintln!("taki: warning: the window's GPU device was lost; the window is reopened");
                 }
-                Ok(Some(kept))
+                Ok(Some(handover))
             }
             None => std::panic::resume_unwind(panic),
         },
     }
 }
 
-/// A window at rest draws nothing and notices nothing: a signal wakes it.
+/// Wakes the window when a signal arrives: a window at rest runs no frames and would not notice it.
 fn wake_on_signal(signal: &Arc<AtomicUsize>, ctx: &egui::Context) {
     let (signal, ctx) = (signal.clone(), ctx.clone());
     let watch = move || {
@@ -200,42 +206,42 @@ fn wake_on_signal(signal: &Arc<AtomicUsize>, ctx: &egui::Context) {
         }
         ctx.request_repaint();
     };
-    // Without the thread a signal is noticed when the mouse moves.
+    // Without the thread a signal is noticed at the next input.
     let _ = std::thread::Builder::new().name("signals".into()).spawn(watch);
 }
 
-/// The last part of an error: before it stand the places in libraries that it came through.
+/// Last part of an error's text. The parts before it name the library code that passed the error on.
 fn cause(e: &eframe::Error) -> String {
     let text = e.to_string();
     text.rsplit(": ").next().unwrap_or(&text).trim_end_matches('.').to_owned()
 }
 
-/// Saves what no window could show any more.
-fn rescue(mut kept: Kept) -> Result<PathBuf> {
-    let path = std::env::temp_dir().join(format!("{}-rescued.toml", kept.document.name));
-    kept.document.save(&path)?;
+/// Saves the scene of a window that could not be reopened. Returns the file.
+fn rescue(mut handover: Handover) -> Result<PathBuf> {
+    let path = std::env::temp_dir().join(format!("{}-rescued.toml", handover.document.name));
+    handover.document.save(&path)?;
     Ok(path)
 }
 
-/// What outlives a window that was lost.
+/// State that a lost window leaves to the window opened after it.
 #[derive(Clone)]
-pub struct Kept {
+struct Handover {
     document: document::Document,
-    /// Whether its device was lost; else a bug ended it.
+    /// Whether the window's device was lost. Otherwise a bug ended the window.
     device_lost: bool,
 }
 
-/// The loss of the window's own device, and what was kept.
+/// Watches for the loss of the window's own device, and carries the scene to the next window.
 #[derive(Clone, Default)]
 pub struct Loss {
     lost: Arc<AtomicBool>,
     device: Arc<Mutex<Option<wgpu::Device>>>,
-    /// Until the next window takes it.
-    kept: Arc<Mutex<Option<Kept>>>,
+    /// Set when a window is lost, until the next window takes it.
+    handover: Arc<Mutex<Option<Handover>>>,
 }
 
 impl Loss {
-    /// Notes when `device` is lost, in place of wgpu's own way of ending the process.
+    /// Records when `device` is lost. Without these callbacks wgpu would end the process.
     fn watch(&self, device: &wgpu::Device, ctx: &egui::Context) {
         let note = |lost: &Arc<AtomicBool>| {
             let (lost, ctx) = (lost.clone(), ctx.clone());
@@ -250,12 +256,12 @@ impl Loss {
         device.on_uncaptured_error(Arc::new(move |_| on_error()));
     }
 
-    /// Runs something whose panics are expected, and not printed, once the device is lost.
-    fn without_noise<T>(&self, run: impl FnOnce() -> T) -> T {
+    /// Runs `run` without printing the panics that follow the loss of the device: they are expected.
+    fn hush_panics<T>(&self, run: impl FnOnce() -> T) -> T {
         let usual: Arc<dyn Fn(&PanicHookInfo) + Send + Sync> = std::panic::take_hook().into();
         let (loss, inner) = (self.clone(), usual.clone());
         std::panic::set_hook(Box::new(move |info| {
-            loss.ask_device();
+            loss.poll_device();
             if !loss.happened() {
                 inner(info);
             }
@@ -265,10 +271,10 @@ impl Loss {
         result
     }
 
-    /// Lets a lost device tell of its loss: it does so when it is polled, but refuses work before.
-    fn ask_device(&self) {
+    /// Polls the device, so that a lost one calls its callback. It refuses work before it reports the loss.
+    fn poll_device(&self) {
         if let Some(device) = &*self.device.lock().unwrap_or_else(|e| e.into_inner()) {
-            // Its own answer is what the callback says.
+            // The callback reports a loss, so the result is not needed.
             let _ = device.poll(wgpu::PollType::Poll);
         }
     }
@@ -277,11 +283,11 @@ impl Loss {
         self.lost.load(Ordering::Relaxed)
     }
 
-    fn keep(&self, kept: Kept) {
-        *self.kept.lock().unwrap_or_else(|e| e.into_inner()) = Some(kept);
+    fn hand_over(&self, handover: Handover) {
+        *self.handover.lock().unwrap_or_else(|e| e.into_inner()) = Some(handover);
     }
 
-    fn take(&self) -> Option<Kept> {
-        self.kept.lock().unwrap_or_else(|e| e.into_inner()).take()
+    fn take_handover(&self) -> Option<Handover> {
+        self.handover.lock().unwrap_or_else(|e| e.into_inner()).take()
     }
 }

@@ -1,27 +1,27 @@
-//! Camera and light moved by hand: from drags in the picture to parameters of the scene.
+//! Movements of the camera and of lights: turns drags in the picture into parameters of the scene.
 
 use glam::{DQuat, DVec3};
 
 use crate::scene::{Raw, Scene, Values};
 
-/// The steepest look up or down, radians from the horizon: straight up has no right and left.
+/// Steepest elevation of the camera, radians from the horizon. Straight up, left and right are undefined.
 const STEEPEST: f64 = 1.553;
 
-/// The camera as its parameters give it.
+/// Position, target and field of view of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Metres.
+    /// Position of the eye, metres.
     pub eye: DVec3,
     /// The point in the middle of the image, metres.
     pub target: DVec3,
-    /// Unit, up in the world.
+    /// Unit vector up in the world.
     pub up: DVec3,
     /// Tangent of half the vertical field of view.
     pub tan_half_fov: f64,
 }
 
 impl Pose {
-    /// From a scene's parameters.
+    /// Pose of the camera in a scene's values.
     pub fn of(values: &Values) -> Pose {
         let point = |key| values.triple(key).as_dvec3();
         Pose {
@@ -32,7 +32,7 @@ impl Pose {
         }
     }
 
-    /// The parameters it sets.
+    /// Keys and values of the camera parameters for this pose.
     pub fn edits(&self) -> [(&'static str, Raw); 2] {
         [("camera.eye", raw(self.eye)), ("camera.target", raw(self.target))]
     }
@@ -53,14 +53,14 @@ impl Pose {
         let away = self.eye - self.target;
         let height = away.normalize_or(DVec3::Z).dot(self.up).clamp(-1.0, 1.0).asin();
         let pitch = (height + pitch).clamp(-STEEPEST, STEEPEST) - height;
-        // A camera already past the steepest look only comes back.
+        // A camera beyond the steepest elevation can only come back.
         let tilt = DQuat::from_axis_angle(self.right(), -pitch);
         let turn = DQuat::from_axis_angle(self.up, yaw);
         self.eye = self.target + turn * (tilt * away);
         self
     }
 
-    /// Moves eye and target along the image plane by fractions of the image's height.
+    /// Moves eye and target parallel to the image, by fractions of the image's height.
     pub fn pan(mut self, right: f64, up: f64) -> Pose {
         let away = self.target - self.eye;
         let height = 2.0 * self.tan_half_fov * away.length();
@@ -72,7 +72,7 @@ impl Pose {
         self
     }
 
-    /// Brings the eye to `factor` of its distance from the target.
+    /// Multiplies the eye's distance from the target by `factor`.
     pub fn zoom(mut self, factor: f64) -> Pose {
         let away = self.eye - self.target;
         let length = (away.length() * factor).clamp(1e-2, 1e6);
@@ -80,7 +80,7 @@ impl Pose {
         self
     }
 
-    /// Looks at `point` from the same direction, without coming nearer than it was.
+    /// Looks at `point` from the same direction and distance.
     pub fn focus(mut self, point: DVec3) -> Pose {
         let by = point - self.target;
         self.target = point;
@@ -88,7 +88,7 @@ impl Pose {
         self
     }
 
-    /// Looks from the same direction, so that everything of the scene is in a picture of this aspect.
+    /// Moves the camera so that it sees the whole scene from the same direction, in a picture of this aspect.
     pub fn frame_all(mut self, scene: &Scene, aspect: f64) -> Pose {
         let corners =
             scene.quads.iter().flat_map(|q| q.corners).chain(scene.rocks.iter().flat_map(|r| r.corners));
@@ -103,7 +103,7 @@ impl Pose {
         let forward = -away;
         let right = forward.cross(self.up).normalize_or(DVec3::X);
         let up = right.cross(forward);
-        // The distance at which the outermost corner touches the image's edge.
+        // At this distance the outermost corner touches the image's edge.
         let distance = corners.iter().map(|corner| {
             let d = *corner - centre;
             let wide = (d.dot(right).abs() / aspect.max(1e-3)).max(d.dot(up).abs());
@@ -116,7 +116,7 @@ impl Pose {
     }
 }
 
-/// Turns a direction with the view: `right` and `up` in radians, as seen by the camera.
+/// Turns a light's direction by `right` and `up`, radians, as seen by the camera.
 pub fn turn_light(direction: DVec3, pose: &Pose, right: f64, up: f64) -> DVec3 {
     let turn = DQuat::from_axis_angle(pose.up, right);
     let tilt = DQuat::from_axis_angle(pose.right(), -up);
@@ -129,13 +129,13 @@ pub fn angles(direction: DVec3) -> [f64; 2] {
     [d.x.atan2(d.z).to_degrees(), d.y.clamp(-1.0, 1.0).asin().to_degrees()]
 }
 
-/// The unit direction at these angles, degrees.
+/// Unit direction of an azimuth and elevation, degrees.
 pub fn direction([azimuth, elevation]: [f64; 2]) -> DVec3 {
     let (a, e) = (azimuth.to_radians(), elevation.to_radians());
     DVec3::new(a.sin() * e.cos(), e.sin(), a.cos() * e.cos())
 }
 
-/// A vector as a scene file's value, with the digits a float32 has.
+/// A vector as a value of a scene file, rounded to float32.
 pub fn raw(v: DVec3) -> Raw {
     Raw::List(v.to_array().into_iter().map(|x| Raw::Float(f64::from(x as f32))).collect())
 }

@@ -1,4 +1,4 @@
-//! The parameter panel: every entry of the parameter table as a widget.
+//! The parameter panel, which shows a widget for each parameter of the scene.
 
 pub mod lights;
 mod lobes;
@@ -8,6 +8,7 @@ mod widget;
 use std::collections::HashMap;
 
 use eframe::egui;
+use egui::collapsing_header::CollapsingState;
 use egui::{Align, Color32, Layout, Response, RichText, Ui};
 
 use super::document::Document;
@@ -15,60 +16,90 @@ use super::lights::Lights;
 use crate::scene::{Cost, Kind, Param, Raw, Value};
 use lobes::LobesPlot;
 use overview::Overview;
-use widget::{direction_angles, list, triple, widget};
+use widget::{Field, direction_angles, list, triple};
 
-/// Groups of the panel: title, what it is about, sections of keys.
-const GROUPS: [(&str, &str, &[&str]); 9] = [
-    ("Curves", "The spatial fractal curves that give every cell its flow direction", &["curves"]),
-    ("Volume", "The volume texture: cells, density, reflection", &["volume"]),
-    ("Mapping", "How the volume lies on the quads", &["materials", "sheets", "splashes", "quads"]),
-    ("Light", "Walk, attenuation and reflection", &["trace", "light", "strand"]),
-    ("Lights", "", LIGHTS),
-    (
+/// A group of the panel.
+struct Group {
+    title: &'static str,
+    /// Tooltip of the title.
+    about: &'static str,
+    /// First parts of the keys in the group.
+    sections: &'static [&'static str],
+}
+
+/// The groups of the panel, in order.
+const GROUPS: [Group; 9] = [
+    group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
+    group("Volume", "The volume texture: cells, density, reflection", &["volume"]),
+    group("Mapping", "How the volume is mapped onto the quads", &["materials", "sheets", "splashes", "quads"]),
+    group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
+    group("Lights", "", LIGHTS),
+    group(
         "Surroundings",
-        "Rock, pools, background, haze and the light of the environment",
+        "Rock, pools, background, haze and environment light",
         &["rocks", "pools", "background", "haze", "environment", "sky"],
     ),
-    ("Camera", "Where the picture is seen from", &["camera"]),
-    ("Image", "Size, samples and tone of the picture", &["image"]),
-    ("Animation", "What taki batch makes of the scene in time; ▶ plays the flow alone", &["animate"]),
+    group("Camera", "Position and view of the camera", &["camera"]),
+    group("Image", "Size, samples and tone of the picture", &["image"]),
+    group("Animation", "The animation that taki batch renders; ▶ plays only the flow", &["animate"]),
 ];
 
-/// The group that is a list of its own.
+const fn group(title: &'static str, about: &'static str, sections: &'static [&'static str]) -> Group {
+    Group { title, about, sections }
+}
+
+/// Sections of the group that is shown as a list of lights.
 const LIGHTS: &[&str] = &["lights"];
 
-/// Width of the names.
+/// Width of the names, points.
 const NAME_WIDTH: f32 = 104.0;
-/// Room for the number beside a slider, and for the marks at the end of a row.
+/// Width of the number beside a slider, points.
 const VALUE_WIDTH: f32 = 64.0;
+/// Width of the marks at the end of a row, points.
 const MARKS_WIDTH: f32 = 60.0;
 
-/// The panel's own state.
+/// State of the panel.
 #[derive(Default)]
 pub struct ParameterPanel {
-    /// Only parameters with these words in their key, symbol, description or cost are shown.
+    /// Search text. The panel shows only parameters that have all its words in their key, symbol, descriptions or cost.
     pub search: String,
+    /// Why the last edit was refused.
     fault: Option<String>,
     lobes: LobesPlot,
     overview: Overview,
 }
 
-/// What the panel says about costs.
+/// Measured costs that the panel's tooltips mention.
 #[derive(Clone, Copy, Default)]
 pub struct Costs {
-    /// Seconds the last volume took.
+    /// Time that the last volume took, seconds.
     pub volume_seconds: f64,
 }
 
+/// The scene that the panel edits, and the settings of one frame.
+struct Context<'a> {
+    document: &'a mut Document,
+    lights: &'a mut Lights,
+    costs: Costs,
+    /// The search text, trimmed and in lower case.
+    search: String,
+}
+
+impl Context<'_> {
+    fn is_searching(&self) -> bool {
+        !self.search.is_empty()
+    }
+}
+
 impl ParameterPanel {
-    /// Shows the panel and applies what is changed in it.
+    /// Shows the panel and applies the user's edits.
     pub fn show(&mut self, ui: &mut Ui, document: &mut Document, lights: &mut Lights, costs: Costs) {
         ui.horizontal(|ui| {
             let hint = egui::TextEdit::singleline(&mut self.search).hint_text("Search parameters");
             let field = ui.add(hint.desired_width(ui.available_width() - 44.0));
             name(&field, "Search parameters");
             let clear = ui.add_enabled(!self.search.is_empty(), egui::Button::new("✖"));
-            if clear.on_hover_text("Show all").clicked() {
+            if clear.on_hover_text("Show all parameters").clicked() {
                 self.search.clear();
             }
         });
@@ -77,51 +108,44 @@ impl ParameterPanel {
         }
         let keys = document.scene().keys();
         let search = self.search.trim().to_lowercase();
+        let mut context = Context { document, lights, costs, search };
         let mut shown = 0;
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            // The scroll bar lies over the contents: it is not to hide the marks.
+            // The scroll bar is drawn over the contents, and must not hide the marks.
             ui.set_max_width(ui.available_width() - 8.0);
-            for (title, about, sections) in GROUPS {
-                if sections == LIGHTS {
-                    shown += self.lights(ui, document, lights, costs, &search);
+            for group in &GROUPS {
+                if group.sections == LIGHTS {
+                    shown += self.lights(ui, &mut context);
                     continue;
                 }
-                let of_group = |key: &&String| sections.contains(&key.split('.').next().unwrap_or(""));
-                let mut found: Vec<&String> =
-                    keys.iter().filter(of_group).filter(|key| matches(key, &search)).collect();
-                together(&mut found);
-                shown += found.len();
-                if !found.is_empty() {
-                    self.group(ui, (document, lights), costs, (title, about), &found, !search.is_empty());
+                let in_group = |key: &&String| group.sections.contains(&key.split('.').next().unwrap_or(""));
+                let matching = keys.iter().filter(in_group).filter(|key| matches(key, &context.search));
+                let mut keys: Vec<&String> = matching.collect();
+                sort_by_parent(&mut keys);
+                shown += keys.len();
+                if !keys.is_empty() {
+                    self.group(ui, &mut context, group, &keys);
                 }
             }
             if shown == 0 {
-                ui.label("No parameter has this in its name or description.");
+                ui.label("No parameter matches the search.");
             }
         });
     }
 
-    fn group(
-        &mut self,
-        ui: &mut Ui,
-        (document, lights): (&mut Document, &Lights),
-        costs: Costs,
-        (title, about): (&str, &str),
-        keys: &[&String],
-        searching: bool,
-    ) {
+    fn group(&mut self, ui: &mut Ui, context: &mut Context, group: &Group, keys: &[&String]) {
+        let title = group.title;
         let changed: Vec<String> =
-            keys.iter().filter(|key| document.differs(key)).map(|key| key.to_string()).collect();
+            keys.iter().filter(|key| context.document.differs(key)).map(|key| key.to_string()).collect();
         let id = ui.make_persistent_id(("group", title));
         let open_at_first = matches!(title, "Curves" | "Volume" | "Light");
-        let mut state =
-            egui::collapsing_header::CollapsingState::load_with_default_open(ui.ctx(), id, open_at_first);
-        if searching {
+        let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, open_at_first);
+        if context.is_searching() {
             state.set_open(true);
         }
         let mut reset = false;
         let header = state.show_header(ui, |ui| {
-            ui.strong(title).on_hover_text(about);
+            ui.strong(title).on_hover_text(group.about);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if !changed.is_empty() {
                     let button = ui.small_button("⟲").on_hover_text(format!("Reset {title}"));
@@ -131,75 +155,60 @@ impl ParameterPanel {
                 }
             });
         });
-        header.body_unindented(|ui| {
-            let mut open = String::new();
-            for key in keys {
-                let place = place(key);
-                if place != open && place.contains('.') {
-                    ui.add_space(4.0);
-                    ui.label(RichText::new(place.replace('.', " · ")).italics());
-                }
-                open = place.into();
-                self.row(ui, document, costs, key);
-                let environment = document.scene().environment.as_ref();
-                match (key.as_str(), environment) {
-                    ("environment.kind", Some(environment)) => {
-                        self.overview.show(ui, environment, &document.scene().image);
-                    }
-                    ("environment.lights", Some(environment)) => {
-                        ui.weak(environment.words());
-                    }
-                    _ => {}
-                }
-            }
-            if keys.iter().any(|key| *key == "light.reflection") {
-                self.lobes.show(ui, document.scene(), document.values(), lights.selected());
-            }
-            ui.add_space(6.0);
-        });
+        header.body_unindented(|ui| self.group_body(ui, context, keys));
         if reset {
-            document.reset(&changed);
+            context.document.reset(&changed);
         }
     }
 
-    fn row(&mut self, ui: &mut Ui, document: &mut Document, costs: Costs, key: &str) {
+    /// The rows of a group, with a heading for each light, quad or rock, and the pictures that belong to a row.
+    fn group_body(&mut self, ui: &mut Ui, context: &mut Context, keys: &[&String]) {
+        let mut heading = String::new();
+        for key in keys {
+            let parent = parent(key);
+            if parent != heading && parent.contains('.') {
+                ui.add_space(4.0);
+                ui.label(RichText::new(parent.replace('.', " · ")).italics());
+            }
+            heading = parent.into();
+            self.row(ui, context, key);
+            let scene = context.document.scene();
+            match (key.as_str(), &scene.environment) {
+                ("environment.kind", Some(environment)) => {
+                    self.overview.show(ui, environment, &scene.image);
+                }
+                ("environment.lights", Some(environment)) => {
+                    ui.weak(environment.words());
+                }
+                _ => {}
+            }
+        }
+        if keys.iter().any(|key| *key == "light.reflection") {
+            let document = &context.document;
+            self.lobes.show(ui, document.scene(), document.values(), context.lights.selected());
+        }
+        ui.add_space(6.0);
+    }
+
+    /// One parameter: its name, its widget, and its marks.
+    fn row(&mut self, ui: &mut Ui, context: &mut Context, key: &str) {
         let Some(param) = Param::find(key) else { return };
+        let (document, costs) = (&mut *context.document, context.costs);
         let value = document.values().get(key);
-        let mut edit = None;
         if let Value::Corners(corners) = &value {
             self.corners(ui, document, key, param, corners);
             return;
         }
+        let mut edit = None;
         ui.horizontal(|ui| {
-            let label = egui::Label::new(short(key, param)).truncate().sense(egui::Sense::click());
-            let label = ui
-                .allocate_ui_with_layout(
-                    egui::vec2(NAME_WIDTH, ui.spacing().interact_size.y),
-                    Layout::left_to_right(Align::Center),
-                    |ui| {
-                        ui.set_min_width(NAME_WIDTH);
-                        ui.add(label)
-                    },
-                )
-                .inner;
-            label.on_hover_ui(|ui| tooltip(ui, key, param, costs)).context_menu(|ui| {
-                if ui.button("Copy the key").clicked() {
-                    ui.ctx().copy_text(key.to_owned());
-                }
-                if ui.button("Copy as --set").clicked() {
-                    ui.ctx().copy_text(format!("--set {key}={}", document.values().get(key).to_toml()));
-                }
-                if ui.button("Set to the default").clicked() {
-                    document.reset_to_default(key);
-                }
-            });
-            edit = widget(ui, document, key, param, &value);
+            key_label(ui, document, key, param, costs);
+            edit = Field { document, key, param }.show(ui, &value);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let mark = ui.label(RichText::new("⏺").color(cost_color(ui, param.cost)).small());
-                mark.on_hover_text(cost_words(param.cost, costs));
+                mark.on_hover_text(cost_text(param.cost, costs));
                 if document.differs(key) {
-                    let was = document.saved_value(key).to_toml();
-                    let button = ui.small_button("⟲").on_hover_text(format!("Back to {was}"));
+                    let saved = document.saved_value(key).to_toml();
+                    let button = ui.small_button("⟲").on_hover_text(format!("Reset to {saved}"));
                     name(&button, &format!("Reset {key}"));
                     if button.clicked() {
                         document.reset(&[key.to_owned()]);
@@ -219,6 +228,7 @@ impl ParameterPanel {
         }
     }
 
+    /// The four corners of a quad, under a fold of their own.
     fn corners(
         &mut self,
         ui: &mut Ui,
@@ -229,7 +239,7 @@ impl ParameterPanel {
     ) {
         let mut new = *corners;
         let mut changed = false;
-        let header = egui::CollapsingHeader::new(short(key, param)).id_salt(key).show(ui, |ui| {
+        let header = egui::CollapsingHeader::new(short_name(key, param)).id_salt(key).show(ui, |ui| {
             for (corner, letter) in new.iter_mut().zip(["A", "B", "C", "D"]) {
                 ui.horizontal(|ui| {
                     ui.label(letter);
@@ -245,21 +255,43 @@ impl ParameterPanel {
     }
 }
 
-/// The part of a key before its last: `lights.sun` of `lights.sun.color`.
-fn place(key: &str) -> &str {
-    key.rsplit_once('.').map_or("", |(place, _)| place)
+/// The name of a parameter, with a tooltip and a context menu.
+fn key_label(ui: &mut Ui, document: &mut Document, key: &str, param: &Param, costs: Costs) {
+    let label = egui::Label::new(short_name(key, param)).truncate().sense(egui::Sense::click());
+    let size = egui::vec2(NAME_WIDTH, ui.spacing().interact_size.y);
+    let label = ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(NAME_WIDTH);
+        ui.add(label)
+    });
+    label.inner.on_hover_ui(|ui| tooltip(ui, key, param, costs)).context_menu(|ui| {
+        if ui.button("Copy the key").clicked() {
+            ui.ctx().copy_text(key.to_owned());
+        }
+        if ui.button("Copy as --set").clicked() {
+            ui.ctx().copy_text(format!("--set {key}={}", document.values().get(key).to_toml()));
+        }
+        if ui.button("Set to the default").clicked() {
+            document.reset_to_default(key);
+        }
+    });
 }
 
-/// Brings what belongs to one light, quad or rock together, in the order in which they first appear: the
-/// table goes parameter by parameter.
-fn together(keys: &mut [&String]) {
+/// A key without its last part: `lights.sun` of `lights.sun.color`.
+fn parent(key: &str) -> &str {
+    key.rsplit_once('.').map_or("", |(parent, _)| parent)
+}
+
+/// Sorts the keys of each light, quad or rock together, in the order in which these first appear. The parameter
+/// table lists them parameter by parameter instead.
+fn sort_by_parent(keys: &mut [&String]) {
     let mut first = HashMap::new();
     for (i, key) in keys.iter().enumerate() {
-        first.entry(place(key)).or_insert(i);
+        first.entry(parent(key)).or_insert(i);
     }
-    keys.sort_by_key(|key| first.get(place(key)).copied());
+    keys.sort_by_key(|key| first.get(parent(key)).copied());
 }
 
+/// Whether a parameter has all words of the search text.
 fn matches(key: &str, search: &str) -> bool {
     let Some(param) = Param::find(key) else { return false };
     let words = [param.symbol, param.doc, param.when, param.cost.word()].join(" ");
@@ -267,13 +299,13 @@ fn matches(key: &str, search: &str) -> bool {
     search.split_whitespace().all(|word| text.contains(word))
 }
 
-/// The table's words without the backticks of Markdown.
+/// Text of the parameter table without Markdown's backticks.
 fn plain(words: &str) -> String {
     words.replace('`', "")
 }
 
 /// The last part of a key, with the paper's symbol.
-fn short(key: &str, param: &Param) -> String {
+fn short_name(key: &str, param: &Param) -> String {
     let last = key.rsplit('.').next().unwrap_or(key);
     match param.symbol {
         "" => last.into(),
@@ -282,7 +314,7 @@ fn short(key: &str, param: &Param) -> String {
     }
 }
 
-/// Gives a widget the name that screen readers and tests know it by.
+/// Sets the name by which screen readers and tests find a widget.
 pub fn name(response: &Response, label: &str) {
     response.ctx.accesskit_node_builder(response.id, |node| node.set_label(label.to_owned()));
 }
@@ -294,10 +326,10 @@ fn tooltip(ui: &mut Ui, key: &str, param: &Param, costs: Costs) {
     ui.label(plain(param.when));
     let unit = if param.unit.is_empty() { String::new() } else { format!(" {}", param.unit) };
     ui.weak(format!("{}{unit}; default {}", param.range(), param.default_words()));
-    ui.weak(cost_words(param.cost, costs));
+    ui.weak(cost_text(param.cost, costs));
 }
 
-/// The colour of a cost's mark.
+/// Colour of the mark of a cost.
 pub fn cost_color(ui: &Ui, cost: Cost) -> Color32 {
     let dark = ui.visuals().dark_mode;
     match (cost, dark) {
@@ -310,14 +342,14 @@ pub fn cost_color(ui: &Ui, cost: Cost) -> Color32 {
     }
 }
 
-fn cost_words(cost: Cost, costs: Costs) -> String {
+fn cost_text(cost: Cost, costs: Costs) -> String {
     match cost {
-        Cost::Uniform => "A change costs a few bytes: only the picture is rendered again.".into(),
-        Cost::Upload => "A change costs an upload: what is built is packed again and sent to the GPU.".into(),
+        Cost::Uniform => "A change uploads a few bytes and renders the picture again.".into(),
+        Cost::Upload => "A change packs existing data again and uploads it to the GPU.".into(),
         Cost::Volume if costs.volume_seconds > 0.0 => format!(
-            "A change builds the volume again; the last build took {:.0} ms.",
+            "A change rebuilds the volume. The last build took {:.0} ms.",
             costs.volume_seconds * 1e3
         ),
-        Cost::Volume => "A change builds the volume again.".into(),
+        Cost::Volume => "A change rebuilds the volume.".into(),
     }
 }

@@ -1,4 +1,5 @@
-//! Rays asked for by a click: traced on a thread of their own, for a fine rock takes a tenth of a second.
+//! Traces the ray through a clicked pixel on a thread of its own, because finely subdivided rock takes a tenth of a
+//! second.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -8,25 +9,25 @@ use eframe::egui;
 use super::worker::Picture;
 use crate::engine::cpu::ray::{RayReport, inspect};
 
-/// What the ray is for.
+/// Purpose of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aim {
-    /// The pixel inspector.
+    /// Shows the ray in the pixel inspector.
     Inspect,
-    /// The camera's new target.
+    /// Moves the camera's target to the surface that the ray hits.
     Focus,
 }
 
 struct Question {
     aim: Aim,
     picture: Arc<Picture>,
-    /// Pixels at full resolution.
+    /// Size of the picture at full resolution, pixels.
     size: [u32; 2],
-    /// 0 to 1.
-    place: [f32; 2],
+    /// Position in the image, 0 to 1.
+    position: [f32; 2],
 }
 
-/// Answers the latest question of each kind, one at a time.
+/// Answers the latest question of each [`Aim`], one at a time.
 #[derive(Default)]
 pub struct Probe {
     running: Option<Receiver<(Aim, RayReport)>>,
@@ -34,18 +35,18 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// Asks for the ray through a place (0 to 1) of a picture that has `size` pixels at full resolution.
-    pub fn ask(&mut self, aim: Aim, picture: &Arc<Picture>, size: [u32; 2], place: [f32; 2]) {
+    /// Requests the ray through a position (0 to 1) of a picture that has `size` pixels at full resolution.
+    pub fn ask(&mut self, aim: Aim, picture: &Arc<Picture>, size: [u32; 2], position: [f32; 2]) {
         self.waiting.retain(|question| question.aim != aim);
-        self.waiting.push(Question { aim, picture: picture.clone(), size, place });
+        self.waiting.push(Question { aim, picture: picture.clone(), size, position });
     }
 
-    /// Whether an answer is still to come.
+    /// Whether an answer is pending.
     pub fn is_busy(&self) -> bool {
         self.running.is_some() || !self.waiting.is_empty()
     }
 
-    /// The next answer, if there is one.
+    /// Returns the next answer if it is ready, and starts on the next question.
     pub fn answer(&mut self, ctx: &egui::Context) -> Option<(Aim, RayReport)> {
         let answer = match self.running.as_ref().map(Receiver::try_recv) {
             Some(Err(TryRecvError::Empty)) => return None,
@@ -57,9 +58,9 @@ impl Probe {
             let question = self.waiting.remove(0);
             let (send, receive) = channel();
             let wake = ctx.clone();
-            // Without a thread there is no answer, and the next click asks again.
+            // If the thread cannot start, there is no answer. The next click asks again.
             let _ = std::thread::Builder::new().name("probe".into()).spawn(move || {
-                // The window may have gone meanwhile.
+                // Sending fails if the window was closed meanwhile.
                 let _ = send.send((question.aim, trace(&question)));
                 wake.request_repaint();
             });
@@ -70,7 +71,7 @@ impl Probe {
 }
 
 fn trace(question: &Question) -> RayReport {
-    let Question { picture, size, place: [x, y], .. } = question;
+    let Question { picture, size, position: [x, y], .. } = question;
     let mut scene = (*picture.scene).clone();
     let image = &mut scene.edit().image;
     [image.width, image.height] = *size;

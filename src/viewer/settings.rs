@@ -1,4 +1,4 @@
-//! What the viewer remembers from one run to the next.
+//! Settings that the viewer keeps from one run to the next.
 
 use std::path::{Path, PathBuf};
 
@@ -7,30 +7,30 @@ use serde::{Deserialize, Serialize};
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 
-/// Files that are remembered.
+/// Most recent files kept.
 const MAX_RECENT: usize = 12;
 
-/// The settings file.
+/// Contents of the settings file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Light or dark, or as the system has it.
+    /// Colours of the interface.
     pub theme: Theme,
-    /// The window's inner size, points.
+    /// Inner size of the window, points.
     pub window: Option<[f32; 2]>,
-    /// The window's place on the desktop, points.
+    /// Position of the window on the desktop, points.
     pub position: Option<[f32; 2]>,
-    /// Enlargement of the whole interface.
+    /// Scale of the whole interface, 1 for normal size.
     pub zoom: f32,
-    /// Scene files, the latest first.
+    /// Recent scene files, the latest first.
     pub recent: Vec<PathBuf>,
     /// Whether the parameters are shown.
     pub parameters: bool,
     /// Whether the inspectors are shown.
     pub inspectors: bool,
-    /// Samples a pixel that a picture is refined to, if the scene asks for fewer.
+    /// Samples per pixel to refine a picture to, if the scene asks for fewer.
     pub refine_to: u32,
-    /// Volume lengths a second.
+    /// Speed of the playing water, volume lengths per second.
     pub flow_speed: f64,
 }
 
@@ -38,12 +38,12 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Theme {
-    /// As the system has it.
+    /// The system's theme.
     #[default]
     System,
-    /// Dark text on light ground.
+    /// Dark text on a light background.
     Light,
-    /// Light text on dark ground.
+    /// Light text on a dark background.
     Dark,
 }
 
@@ -64,12 +64,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The user's settings file, if the system has a place for it.
+    /// Path of the user's settings file, if the system has a folder for settings.
     pub fn place() -> Option<PathBuf> {
         dirs::config_dir().map(|folder| folder.join("taki").join("viewer.json"))
     }
 
-    /// Reads settings; a missing file gives the defaults, a damaged one the defaults and a note.
+    /// Reads the settings. A missing file gives the defaults. A damaged one gives the defaults and a note for the user.
     pub fn load(path: Option<&Path>) -> (Settings, Option<String>) {
         let Some(path) = path else { return (Settings::default(), None) };
         let text = match std::fs::read_to_string(path) {
@@ -83,7 +83,7 @@ impl Settings {
         }
     }
 
-    /// Values a hand-edited file may hold and no window can take.
+    /// Limits values that a hand-edited file may contain and that a window cannot take.
     fn bounded(mut self) -> Self {
         let finite = |pair: &[f32; 2]| pair.iter().all(|x| x.is_finite() && x.abs() < 1e5);
         self.window = self.window.filter(finite).map(|w| w.map(|x| x.max(200.0)));
@@ -95,7 +95,10 @@ impl Settings {
         self
     }
 
-    /// Writes the settings, whole or not at all.
+    /// Writes the settings, completely or not at all.
+    ///
+    /// # Errors
+    /// If the file or its folder cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
@@ -104,7 +107,7 @@ impl Settings {
         Output::create(path)?.finish_with(text.as_bytes())
     }
 
-    /// Puts a file first among the recent ones.
+    /// Puts a file first among the recent files.
     pub fn remember(&mut self, file: &Path) {
         let file = file.canonicalize().unwrap_or(file.to_owned());
         self.recent.retain(|known| *known != file);
@@ -113,6 +116,7 @@ impl Settings {
     }
 }
 
+/// Tells the user that the settings could not be read.
 fn note(path: &Path, e: impl std::fmt::Display) -> String {
     format!("the settings in {} could not be read ({e}); the defaults are used", path.display())
 }

@@ -1,4 +1,4 @@
-//! Files in and out: asking for a path, exporting pictures, and what would be lost by closing.
+//! Dialogs for files: the path of a scene, the export of pictures, and unsaved changes.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
@@ -7,29 +7,32 @@ use eframe::egui;
 
 use super::parameters::name;
 
-/// What a path is asked for.
+/// Purpose of the path that a dialog asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// Opening a scene.
+    /// Opens a scene.
     Open,
-    /// Saving the scene.
+    /// Saves the scene.
     Save,
 }
 
-/// A small window that asks for a path: typed, or picked in the system's own dialog. Typing works where
-/// the system has no dialog.
+/// A dialog that asks for a path, which the user types or picks in the system's file dialog. Typing also works where
+/// the system has no file dialog.
 #[derive(Default)]
 pub struct PathDialog {
+    /// Purpose of the open dialog. `None` while it is closed.
     open: Option<Purpose>,
     text: String,
-    /// What the last try said.
+    /// Why the last path could not be used.
     pub fault: Option<String>,
+    /// Answer of the system's file dialog, while that is open.
     picked: Option<Receiver<Option<PathBuf>>>,
+    /// Whether the text field is to get the keyboard in the next frame.
     focus: bool,
 }
 
 impl PathDialog {
-    /// Opens the window with a first guess.
+    /// Opens the dialog with a suggested path.
     pub fn ask(&mut self, purpose: Purpose, guess: &Path) {
         *self = PathDialog {
             open: Some(purpose),
@@ -39,17 +42,18 @@ impl PathDialog {
         };
     }
 
-    /// Closes it.
+    /// Closes the dialog.
     pub fn close(&mut self) {
         *self = PathDialog::default();
     }
 
-    /// Whether it is shown.
+    /// Whether the dialog is open.
     pub fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Shows it; the path that was given. `also` adds to it (recent files).
+    /// Shows the dialog. Returns the path that the user gave. `also` adds contents, such as recent files, and returns
+    /// the path chosen there.
     pub fn show(
         &mut self,
         ctx: &egui::Context,
@@ -110,13 +114,13 @@ impl PathDialog {
     }
 }
 
-/// The system's own file dialog, on a thread of its own: the window goes on drawing.
+/// Opens the system's file dialog on a thread of its own, so that the window continues to draw.
 fn browse(ctx: &egui::Context, purpose: Purpose, guess: &Path) -> Receiver<Option<PathBuf>> {
     let (send, receive) = channel();
     let wake = ctx.clone();
     let folder = guess.parent().filter(|p| !p.as_os_str().is_empty()).map(Path::to_owned);
     let file = guess.file_name().map(|f| f.to_string_lossy().into_owned()).unwrap_or_default();
-    // A dialog that cannot open is a dialog that was cancelled: the path can still be typed.
+    // A dialog that cannot open counts as cancelled. The path can still be typed.
     let _ = std::thread::Builder::new().name("file dialog".into()).spawn(move || {
         let mut dialog = rfd::FileDialog::new().add_filter("taki scenes", &["toml"]);
         if let Some(folder) = folder {
@@ -132,21 +136,21 @@ fn browse(ctx: &egui::Context, purpose: Purpose, guess: &Path) -> Receiver<Optio
     receive
 }
 
-/// The window that exports pictures.
+/// The dialog that exports pictures.
 pub struct ExportDialog {
-    /// Whether it is shown.
+    /// Whether it is open.
     pub open: bool,
-    /// Pixels.
+    /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// File without extension.
+    /// Path of the files without extension.
     pub path: String,
-    /// Which files.
+    /// Whether to write a PNG file.
     pub png: bool,
-    /// Linear, with layers.
+    /// Whether to write an EXR file.
     pub exr: bool,
-    /// Whether the size keeps the picture's aspect.
+    /// Whether a change of width or height keeps the picture's aspect.
     pub keep_aspect: bool,
 }
 
@@ -165,18 +169,18 @@ impl Default for ExportDialog {
 }
 
 impl ExportDialog {
-    /// The files it will write.
+    /// The files to write.
     pub fn paths(&self) -> Vec<PathBuf> {
         let path = self.path.trim();
         let stem = path.strip_suffix(".png").or(path.strip_suffix(".exr")).unwrap_or(path);
         [(self.png, "png"), (self.exr, "exr")]
             .into_iter()
-            .filter(|(wanted, _)| *wanted && !stem.is_empty())
+            .filter(|(chosen, _)| *chosen && !stem.is_empty())
             .map(|(_, extension)| PathBuf::from(format!("{stem}.{extension}")))
             .collect()
     }
 
-    /// Shows the window; true when the export is to start. `exporting`: the share that is done.
+    /// Shows the dialog for a picture of this aspect. `exporting` is the finished share of a running export.
     pub fn show(&mut self, ctx: &egui::Context, aspect: f64, exporting: Option<f32>) -> ExportAnswer {
         let mut answer = ExportAnswer::Nothing;
         let mut open = self.open;
@@ -191,26 +195,13 @@ impl ExportDialog {
                 ui.end_row();
                 ui.label("Kind");
                 ui.horizontal(|ui| {
-                    ui.checkbox(&mut self.png, "PNG").on_hover_text("sRGB, 8 bits, as shown");
+                    ui.checkbox(&mut self.png, "PNG").on_hover_text("sRGB, 8 bits per channel, as shown");
                     ui.checkbox(&mut self.exr, "EXR")
-                        .on_hover_text("float32, linear, with depth, uv, quad, normal and more as layers");
+                        .on_hover_text("Linear float32, with depth, uv, quad, normal and more as layers");
                 });
                 ui.end_row();
                 ui.label("Size");
-                ui.horizontal(|ui| {
-                    let [w, h] = &mut self.size;
-                    let width = ui.add(egui::DragValue::new(w).range(1..=65536).suffix(" px"));
-                    name(&width, "Export width");
-                    ui.label("×");
-                    let height = ui.add(egui::DragValue::new(h).range(1..=65536).suffix(" px"));
-                    name(&height, "Export height");
-                    ui.checkbox(&mut self.keep_aspect, "keep aspect");
-                    if self.keep_aspect && width.changed() {
-                        *h = (f64::from(*w) / aspect).round().max(1.0) as u32;
-                    } else if self.keep_aspect && height.changed() {
-                        *w = (f64::from(*h) * aspect).round().max(1.0) as u32;
-                    }
-                });
+                ui.horizontal(|ui| self.size_fields(ui, aspect));
                 ui.end_row();
                 ui.label("Samples");
                 let samples = ui.add(egui::Slider::new(&mut self.samples, 1..=256).logarithmic(true));
@@ -218,63 +209,82 @@ impl ExportDialog {
                 ui.end_row();
             });
             ui.add_space(6.0);
-            match exporting {
-                Some(share) => {
-                    ui.horizontal(|ui| {
-                        ui.add(egui::ProgressBar::new(share).desired_width(280.0).show_percentage());
-                        if ui.button("Cancel").clicked() {
-                            answer = ExportAnswer::Cancel;
-                        }
-                    });
-                }
-                None => {
-                    let files = self.paths();
-                    let text = match files.as_slice() {
-                        [] => "Name a file and choose a kind.".to_owned(),
-                        files => {
-                            let names: Vec<String> = files.iter().map(|p| p.display().to_string()).collect();
-                            format!("Writes {}", names.join(" and "))
-                        }
-                    };
-                    ui.weak(text);
-                    if ui.add_enabled(!files.is_empty(), egui::Button::new("Export")).clicked() {
-                        answer = ExportAnswer::Start;
-                    }
-                }
-            }
+            answer = match exporting {
+                Some(share) => progress(ui, share),
+                None => self.start_button(ui),
+            };
         });
         self.open = open;
         answer
     }
+
+    fn size_fields(&mut self, ui: &mut egui::Ui, aspect: f64) {
+        let [w, h] = &mut self.size;
+        let width = ui.add(egui::DragValue::new(w).range(1..=65536).suffix(" px"));
+        name(&width, "Export width");
+        ui.label("×");
+        let height = ui.add(egui::DragValue::new(h).range(1..=65536).suffix(" px"));
+        name(&height, "Export height");
+        ui.checkbox(&mut self.keep_aspect, "keep aspect");
+        if self.keep_aspect && width.changed() {
+            *h = (f64::from(*w) / aspect).round().max(1.0) as u32;
+        } else if self.keep_aspect && height.changed() {
+            *w = (f64::from(*h) * aspect).round().max(1.0) as u32;
+        }
+    }
+
+    /// The names of the files to write, and the button that starts the export.
+    fn start_button(&self, ui: &mut egui::Ui) -> ExportAnswer {
+        let files = self.paths();
+        let text = match files.as_slice() {
+            [] => "Enter a file name and choose PNG or EXR.".to_owned(),
+            files => {
+                let names: Vec<String> = files.iter().map(|p| p.display().to_string()).collect();
+                format!("Writes {}", names.join(" and "))
+            }
+        };
+        ui.weak(text);
+        let start = ui.add_enabled(!files.is_empty(), egui::Button::new("Export")).clicked();
+        if start { ExportAnswer::Start } else { ExportAnswer::Nothing }
+    }
 }
 
-/// What the user wants of the export window.
+/// The progress of a running export, with a button that cancels it.
+fn progress(ui: &mut egui::Ui, share: f32) -> ExportAnswer {
+    let cancel = ui.horizontal(|ui| {
+        ui.add(egui::ProgressBar::new(share).desired_width(280.0).show_percentage());
+        ui.button("Cancel").clicked()
+    });
+    if cancel.inner { ExportAnswer::Cancel } else { ExportAnswer::Nothing }
+}
+
+/// The user's action in the export dialog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportAnswer {
-    /// Nothing yet.
+    /// No action.
     Nothing,
-    /// Begin.
+    /// Starts the export.
     Start,
-    /// Stop.
+    /// Cancels the running export.
     Cancel,
 }
 
-/// Asks what to do with changes that are not saved.
+/// Shows the dialog about unsaved changes. Returns the user's answer once it is given.
 pub fn ask_unsaved(ctx: &egui::Context, scene: &str) -> Option<UnsavedAnswer> {
     let mut answer = None;
     let shown = egui::Modal::new(egui::Id::unique("unsaved")).show(ctx, |ui| {
         ui.set_width(360.0);
         ui.heading("Save the changes?");
-        ui.label(format!("The scene {scene} has changes that are not saved."));
+        ui.label(format!("The scene {scene} has unsaved changes."));
         ui.add_space(6.0);
         ui.horizontal(|ui| {
-            for (text, what) in [
+            for (text, choice) in [
                 ("Save", UnsavedAnswer::Save),
                 ("Discard", UnsavedAnswer::Discard),
                 ("Go back", UnsavedAnswer::Stay),
             ] {
                 if ui.button(text).clicked() {
-                    answer = Some(what);
+                    answer = Some(choice);
                 }
             }
         });
@@ -282,13 +292,13 @@ pub fn ask_unsaved(ctx: &egui::Context, scene: &str) -> Option<UnsavedAnswer> {
     if shown.should_close() { Some(UnsavedAnswer::Stay) } else { answer }
 }
 
-/// What to do with changes that are not saved.
+/// What to do with unsaved changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnsavedAnswer {
-    /// Save, then go on.
+    /// Saves the scene, then continues.
     Save,
-    /// Go on without them.
+    /// Continues without saving.
     Discard,
-    /// Do not go on.
+    /// Returns to the scene.
     Stay,
 }

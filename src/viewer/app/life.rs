@@ -1,4 +1,4 @@
-//! The window's life: its title and place, its picture, its end.
+//! The window's title and position, its screenshot, and its end.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -6,21 +6,22 @@ use std::sync::atomic::Ordering;
 
 use eframe::egui;
 
-use super::{Leaving, Shot, Viewer};
+use super::{Leaving, Screenshot, Viewer};
 use crate::util::error::{Error, Result};
-use crate::viewer::Kept;
+use crate::viewer::Handover;
 
 impl Viewer {
-    pub(super) fn life(&mut self, ctx: &egui::Context) {
+    /// Updates the title and the kept position, and closes the window where that is due.
+    pub(super) fn lifecycle(&mut self, ctx: &egui::Context) {
         if self.options.signal.load(Ordering::Relaxed) != 0 {
             self.closing = true;
         }
         if self.loss.happened() && !self.closing {
-            self.loss.keep(Kept { document: self.document.clone(), device_lost: true });
+            self.loss.hand_over(Handover { document: self.document.clone(), device_lost: true });
             self.closing = true;
         }
-        let title =
-            format!("{}{} — taki", if self.document.is_changed() { "• " } else { "" }, self.document.name);
+        let mark = if self.document.is_changed() { "• " } else { "" };
+        let title = format!("{mark}{} — taki", self.document.name);
         if title != self.title {
             ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
             self.title = title;
@@ -53,31 +54,32 @@ impl Viewer {
         }
     }
 
-    /// Asks for the window's picture; true when it is written, or none is wanted.
+    /// Requests the window's picture, and writes it once it has arrived. Returns whether it is written, or none
+    /// is wanted.
     pub(super) fn take_screenshot(&mut self, ctx: &egui::Context) -> bool {
         let Some(path) = &self.options.screenshot else { return true };
         let id = egui::Id::unique("screenshot");
-        match self.shot {
-            Shot::Done => true,
-            Shot::NotYet => {
-                let ctx_of_callback = ctx.clone();
+        match self.screenshot {
+            Screenshot::Done => true,
+            Screenshot::NotRequested => {
+                let callback_ctx = ctx.clone();
                 ctx.request_screenshot(move |image| {
-                    ctx_of_callback.data_mut(|d| d.insert_temp(id, image));
-                    ctx_of_callback.request_repaint();
+                    callback_ctx.data_mut(|d| d.insert_temp(id, image));
+                    callback_ctx.request_repaint();
                 });
-                self.shot = Shot::Asked;
+                self.screenshot = Screenshot::Requested;
                 ctx.request_repaint();
                 false
             }
-            Shot::Asked => {
+            Screenshot::Requested => {
                 let Some(image) = ctx.data_mut(|d| d.remove_temp::<Arc<egui::ColorImage>>(id)) else {
                     ctx.request_repaint();
                     return false;
                 };
                 let written = write_image(&image, path);
-                self.shot = Shot::Done;
+                self.screenshot = Screenshot::Done;
                 if let Err(e) = written {
-                    // There is no one to read a banner any more.
+                    // The window closes, so nobody would read a banner.
                     eprintln!("taki: error: {e}");
                 }
                 true
@@ -86,7 +88,7 @@ impl Viewer {
     }
 }
 
-/// Writes the window's picture.
+/// Writes the window's picture as PNG.
 fn write_image(image: &egui::ColorImage, path: &Path) -> Result<()> {
     let [width, height] = image.size.map(|n| n as u32);
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_array()).collect();

@@ -1,4 +1,4 @@
-//! The panels around the picture.
+//! The menus, toolbar, inspectors and status bar around the picture.
 
 use std::path::Path;
 
@@ -15,113 +15,121 @@ use crate::viewer::ray_panel;
 use crate::viewer::settings::Theme;
 use crate::viewer::transfer::Purpose;
 use crate::viewer::viewport::Tool;
+use crate::viewer::worker::Picture;
 
-/// Of the renderer's progress and its stop.
+/// Width of the renderer's progress bar and its Stop button, points.
 const PROGRESS_WIDTH: f32 = 172.0;
 
 impl Viewer {
     pub(super) fn menus(&mut self, ui: &mut Ui) {
-        let ctx = ui.ctx().clone();
         egui::MenuBar::new().ui(ui, |ui| {
-            ui.menu_button("File", |ui| {
-                if item(ui, "Scenes …", "G") {
-                    self.gallery.open = true;
-                }
-                if item(ui, "Open …", "Ctrl+O") {
-                    self.paths.ask(Purpose::Open, Path::new(""));
-                }
-                ui.menu_button("Open recent", |ui| {
-                    if self.settings.recent.is_empty() {
-                        ui.weak("none yet");
-                    }
-                    for path in self.settings.recent.clone() {
-                        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                        if ui.button(file).on_hover_text(path.display().to_string()).clicked() {
-                            self.open(&path);
-                        }
-                    }
-                });
-                ui.separator();
-                if item(ui, "Save", "Ctrl+S") {
-                    self.save();
-                }
-                if item(ui, "Save as …", "Ctrl+Shift+S") {
-                    self.ask_where_to_save();
-                }
-                ui.separator();
-                if item(ui, "Export …", "Ctrl+E") {
-                    self.open_export();
-                }
-                if item(ui, "Copy as command line", "Ctrl+Shift+C") {
-                    self.copy_command(&ctx);
-                }
-                ui.separator();
-                if item(ui, "Quit", "Ctrl+Q") {
-                    ctx.send_viewport_cmd(egui::ViewportCommand::Close);
-                }
-            });
-            ui.menu_button("Edit", |ui| {
-                let (undo, redo) = (self.document.can_undo(), self.document.can_redo());
-                if ui.add_enabled(undo, egui::Button::new("Undo").shortcut_text("Ctrl+Z")).clicked() {
-                    self.document.undo();
-                }
-                if ui.add_enabled(redo, egui::Button::new("Redo").shortcut_text("Ctrl+Shift+Z")).clicked() {
-                    self.document.redo();
-                }
-                ui.separator();
-                ui.menu_button("Add a light", |ui| {
-                    if let Some(kind) = add_menu(ui) {
-                        self.add_light(kind);
-                    }
-                });
-                for (command, text, keys) in LightCommand::ALL {
-                    let button = egui::Button::new(text).shortcut_text(keys);
-                    if ui.add_enabled(self.lights.selected().is_some(), button).clicked() {
-                        self.with_light(command);
-                    }
-                }
-            });
-            ui.menu_button("View", |ui| {
-                ui.checkbox(&mut self.settings.parameters, "Parameters");
-                ui.checkbox(&mut self.settings.inspectors, "Inspectors");
-                ui.separator();
-                if item(ui, "Frame all", "F") {
-                    self.frame_all();
-                }
-                if item(ui, "Reset the camera", "Home") {
-                    self.move_camera(self.first_pose, None);
-                }
-                ui.separator();
-                for (theme, text) in
-                    [(Theme::System, "As the system"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
-                {
-                    if ui.radio(self.settings.theme == theme, text).clicked() {
-                        self.set_theme(&ctx, theme);
-                    }
-                }
-            });
+            ui.menu_button("File", |ui| self.file_menu(ui));
+            ui.menu_button("Edit", |ui| self.edit_menu(ui));
+            ui.menu_button("View", |ui| self.view_menu(ui));
             if ui.button("Help").clicked() {
                 self.help = !self.help;
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let mark = if self.document.is_changed() { " •" } else { "" };
                 let title = ui.label(RichText::new(format!("{}{mark}", self.document.name)).strong());
-                let place = match &self.document.path {
+                let origin = match &self.document.path {
                     Some(path) => path.display().to_string(),
                     None => "a preset".into(),
                 };
                 let changed = if self.document.is_changed() { ", changed" } else { "" };
-                title.on_hover_text(format!("{place}{changed}"));
+                title.on_hover_text(format!("{origin}{changed}"));
             });
         });
     }
 
+    fn file_menu(&mut self, ui: &mut Ui) {
+        let ctx = ui.ctx().clone();
+        if item(ui, "Scenes …", "G") {
+            self.gallery.open = true;
+        }
+        if item(ui, "Open …", "Ctrl+O") {
+            self.paths.ask(Purpose::Open, Path::new(""));
+        }
+        ui.menu_button("Open recent", |ui| {
+            if self.settings.recent.is_empty() {
+                ui.weak("none yet");
+            }
+            for path in self.settings.recent.clone() {
+                let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                if ui.button(file).on_hover_text(path.display().to_string()).clicked() {
+                    self.open(&path);
+                }
+            }
+        });
+        ui.separator();
+        if item(ui, "Save", "Ctrl+S") {
+            self.save();
+        }
+        if item(ui, "Save as …", "Ctrl+Shift+S") {
+            self.ask_where_to_save();
+        }
+        ui.separator();
+        if item(ui, "Export …", "Ctrl+E") {
+            self.open_export();
+        }
+        if item(ui, "Copy as command line", "Ctrl+Shift+C") {
+            self.copy_command(&ctx);
+        }
+        ui.separator();
+        if item(ui, "Quit", "Ctrl+Q") {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    fn edit_menu(&mut self, ui: &mut Ui) {
+        let (undo, redo) = (self.document.can_undo(), self.document.can_redo());
+        if ui.add_enabled(undo, egui::Button::new("Undo").shortcut_text("Ctrl+Z")).clicked() {
+            self.document.undo();
+        }
+        if ui.add_enabled(redo, egui::Button::new("Redo").shortcut_text("Ctrl+Shift+Z")).clicked() {
+            self.document.redo();
+        }
+        ui.separator();
+        ui.menu_button("Add a light", |ui| {
+            if let Some(kind) = add_menu(ui) {
+                self.add_light(kind);
+            }
+        });
+        for (command, text, keys) in LightCommand::ALL {
+            let button = egui::Button::new(text).shortcut_text(keys);
+            if ui.add_enabled(self.lights.selected().is_some(), button).clicked() {
+                self.apply_to_light(command);
+            }
+        }
+    }
+
+    fn view_menu(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.settings.parameters, "Parameters");
+        ui.checkbox(&mut self.settings.inspectors, "Inspectors");
+        ui.separator();
+        if item(ui, "Frame all", "F") {
+            self.frame_all();
+        }
+        if item(ui, "Reset the camera", "Home") {
+            self.move_camera(self.first_pose, None);
+        }
+        ui.separator();
+        for (theme, text) in
+            [(Theme::System, "System theme"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
+        {
+            if ui.radio(self.settings.theme == theme, text).clicked() {
+                let ctx = ui.ctx().clone();
+                self.set_theme(&ctx, theme);
+            }
+        }
+    }
+
     pub(super) fn toolbar(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            for (tool, text, key, what) in Tool::ALL {
-                let able = tool != Tool::Light || !self.document.values().names("lights").is_empty();
-                let button = ui.add_enabled(able, egui::Button::selectable(self.tool == tool, text));
-                if button.on_hover_text(format!("{what} ({})", key.name())).clicked() {
+            for (tool, text, key, tip) in Tool::ALL {
+                let enabled = tool != Tool::Light || !self.document.values().names("lights").is_empty();
+                let button = ui.add_enabled(enabled, egui::Button::selectable(self.tool == tool, text));
+                if button.on_hover_text(format!("{tip} ({})", key.name())).clicked() {
                     self.tool = tool;
                 }
             }
@@ -135,20 +143,7 @@ impl Viewer {
                 });
             name(&combo.response, "Layer");
             ui.separator();
-            let (text, what) =
-                if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
-            let play = ui.button(text).on_hover_text(format!("{what} (Space)"));
-            name(&play, what);
-            if play.clicked() {
-                self.playing = !self.playing;
-            }
-            ui.spacing_mut().slider_width = 70.0;
-            let speed = egui::Slider::new(&mut self.settings.flow_speed, 0.0..=2.0)
-                .logarithmic(true)
-                .smallest_positive(0.01)
-                .max_decimals(2);
-            let speed = ui.add(speed).on_hover_text("Speed of the flow, lengths of the volume a second");
-            name(&speed, "Flow speed");
+            self.flow_controls(ui);
             ui.separator();
             ui.label("Refine to");
             let combo = egui::ComboBox::from_id_salt("refine")
@@ -160,17 +155,17 @@ impl Viewer {
                 });
             name(&combo.response, "Refine to");
             ui.separator();
-            for (on, text, what) in [
+            for (on, text, tip) in [
                 (&mut self.settings.parameters, "Parameters", "Show or hide the parameters (Tab)"),
                 (&mut self.settings.inspectors, "Inspectors", "Show or hide the inspectors (V)"),
             ] {
-                if ui.selectable_label(*on, text).on_hover_text(what).clicked() {
+                if ui.selectable_label(*on, text).on_hover_text(tip).clicked() {
                     *on = !*on;
                 }
             }
             ui.separator();
-            // It takes no more room while it works than at rest: the picture below would change its size, and
-            // would be rendered anew, for ever.
+            // The room is the same while the renderer works and at rest. Otherwise the picture below would change
+            // its size each time, and be rendered again without end.
             let room = egui::vec2(PROGRESS_WIDTH, ui.spacing().interact_size.y);
             let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
             let layout = egui::Layout::left_to_right(egui::Align::Center);
@@ -178,7 +173,24 @@ impl Viewer {
         });
     }
 
-    /// What the renderer is at, with a stop.
+    /// The button that plays the water, and its speed.
+    fn flow_controls(&mut self, ui: &mut Ui) {
+        let (text, action) = if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
+        let play = ui.button(text).on_hover_text(format!("{action} (Space)"));
+        name(&play, action);
+        if play.clicked() {
+            self.playing = !self.playing;
+        }
+        ui.spacing_mut().slider_width = 70.0;
+        let speed = egui::Slider::new(&mut self.settings.flow_speed, 0.0..=2.0)
+            .logarithmic(true)
+            .smallest_positive(0.01)
+            .max_decimals(2);
+        let speed = ui.add(speed).on_hover_text("Speed of the flow, volume lengths per second");
+        name(&speed, "Flow speed");
+    }
+
+    /// The renderer's progress and its Stop button, or the samples of the picture.
     fn progress(&mut self, ui: &mut Ui) {
         let working = self.busy.is_some_and(|_| !self.is_settled());
         if let Some(busy) = self.busy
@@ -186,7 +198,7 @@ impl Viewer {
         {
             let text = RichText::new(busy.what).small();
             ui.add(egui::ProgressBar::new(busy.share).desired_width(110.0).text(text));
-            let stop = ui.button("Stop").on_hover_text("Stop the work in hand (Esc)");
+            let stop = ui.button("Stop").on_hover_text("Stop rendering and keep the picture (Esc)");
             if stop.clicked() {
                 if self.exporting {
                     self.worker.cancel_exports();
@@ -212,7 +224,7 @@ impl Viewer {
         });
         ui.separator();
         if self.inspector == Inspector::Pixel {
-            // Its table scrolls by itself.
+            // The table of cells scrolls by itself.
             match &self.ray {
                 Some(ray) => ray_panel::show(ui, ray),
                 None => {
@@ -240,36 +252,7 @@ impl Viewer {
             ui.spacing_mut().item_spacing.x = 14.0;
             ui.label(if self.engine.is_empty() { "opening the engine …" } else { &self.engine });
             if let Some(picture) = &self.picture {
-                let frame = &picture.frame;
-                let s = &frame.seconds;
-                let ms = |x: f64| format!("{:.1}", x * 1e3);
-                ui.label(format!(
-                    "{}×{}{}",
-                    frame.width,
-                    frame.height,
-                    if picture.scale > 1 { format!(" (1/{})", picture.scale) } else { String::new() }
-                ));
-                if self.document.scene().image.look.auto_exposure != AutoExposure::None {
-                    let exposure = picture.scene.image.look.exposure;
-                    ui.label(format!("exposure {exposure:+.2}"))
-                        .on_hover_text("Stops: image.exposure and what the automatic exposure adds");
-                }
-                let passes = format!("gbuffer {} · integrate {} ms", ms(s.gbuffer), ms(s.integrate));
-                let all = format!(
-                    "Of one sample: gbuffer {}, integrate {}, resolve {} ms on the device; pipelines {}, \
-                     upload {}, read-back {} ms on the host.\nLast volume {} ms.",
-                    ms(s.gbuffer),
-                    ms(s.integrate),
-                    ms(s.resolve),
-                    ms(s.pipelines),
-                    ms(s.upload),
-                    ms(s.readback),
-                    ms(self.worker.state().volume_seconds),
-                );
-                ui.label(passes).on_hover_text(all);
-                let [view, light] = frame.cells_walked();
-                let cells = ui.label(format!("{} cells", counted(view + light)));
-                cells.on_hover_text(format!("{view} cells walked by view rays, {light} by light rays"));
+                self.picture_status(ui, picture);
             }
             if let Some(bytes) = resident_memory() {
                 ui.label(human_bytes(bytes.into())).on_hover_text("Memory of this process");
@@ -277,24 +260,59 @@ impl Viewer {
             let frames = self.measured.recent_frames();
             let text = format!("window {:.0} ms", frames.median);
             ui.label(text).on_hover_text(format!(
-                "The window's own work a frame: median {:.1} ms, 95 in 100 below {:.1} ms",
+                "The window's own work per frame: median {:.1} ms, 95th percentile {:.1} ms",
                 frames.median, frames.p95
             ));
             if let (Some(ms), Some(picture)) = (self.measured.last_preview(), &self.picture) {
                 let color = cost_color(ui, picture.cost);
                 let text = format!("{}: preview in {ms:.0} ms", picture.cost.word());
                 ui.label(RichText::new(text).color(color))
-                    .on_hover_text("What the last change cost, and the time to its first picture");
+                    .on_hover_text("Cost of the last change, and the time until its first picture");
             }
         });
     }
+
+    /// Size, exposure, times and cells of the picture in the window.
+    fn picture_status(&self, ui: &mut Ui, picture: &Picture) {
+        let frame = &picture.frame;
+        let s = &frame.seconds;
+        let ms = |x: f64| format!("{:.1}", x * 1e3);
+        ui.label(format!(
+            "{}×{}{}",
+            frame.width,
+            frame.height,
+            if picture.scale > 1 { format!(" (1/{})", picture.scale) } else { String::new() }
+        ));
+        if self.document.scene().image.look.auto_exposure != AutoExposure::None {
+            let exposure = picture.scene.image.look.exposure;
+            ui.label(format!("exposure {exposure:+.2}"))
+                .on_hover_text("Stops: image.exposure plus the automatic exposure");
+        }
+        let passes = format!("gbuffer {} · integrate {} ms", ms(s.gbuffer), ms(s.integrate));
+        let all = format!(
+            "Per sample on the device: gbuffer {}, integrate {}, resolve {} ms.\n\
+             On the host: pipelines {}, upload {}, read-back {} ms.\nLast volume: {} ms.",
+            ms(s.gbuffer),
+            ms(s.integrate),
+            ms(s.resolve),
+            ms(s.pipelines),
+            ms(s.upload),
+            ms(s.readback),
+            ms(self.worker.state().volume_seconds),
+        );
+        ui.label(passes).on_hover_text(all);
+        let [view, light] = frame.cells_walked();
+        let cells = ui.label(format!("{} cells", counted(view + light)));
+        cells.on_hover_text(format!("{view} cells walked by view rays, {light} by light rays"));
+    }
 }
 
+/// Shows a menu item with its keys. Returns whether it was clicked.
 fn item(ui: &mut Ui, text: &str, keys: &str) -> bool {
     ui.add(egui::Button::new(text).shortcut_text(keys)).clicked()
 }
 
-/// A count with three digits.
+/// A count in words, with at most three digits before a word.
 fn counted(n: u64) -> String {
     match n {
         0..=9_999 => n.to_string(),
@@ -308,7 +326,7 @@ fn samples_text(samples: u32) -> String {
     if samples == 1 { "1 sample".into() } else { format!("{samples} samples") }
 }
 
-/// Bytes of this process in memory, where the system tells.
+/// Resident memory of this process in bytes, where the system reports it.
 fn resident_memory() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|line| line.starts_with("VmRSS:"))?;

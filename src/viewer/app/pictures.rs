@@ -1,4 +1,4 @@
-//! Pictures and rays: asked for, taken from the render thread, shown.
+//! Requests for pictures and rays, and their results.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,6 +12,7 @@ use crate::viewer::probe::Aim;
 use crate::viewer::worker::Request;
 
 impl Viewer {
+    /// Takes news from the render thread: its state, its messages and its newest picture.
     pub(super) fn receive(&mut self, ctx: &egui::Context) {
         let (picture, messages, exports_done) = {
             let mut state = self.worker.state();
@@ -34,17 +35,17 @@ impl Viewer {
             return;
         }
         let image = picture.image.clone();
-        // Between two quads or two depths there is nothing.
-        let smooth = match picture.layer {
+        // Only colours may be interpolated: between two quads or two depths there is no value.
+        let filter = match picture.layer {
             Layer::Rgb => egui::TextureOptions::LINEAR,
             _ => egui::TextureOptions::NEAREST,
         };
         match &mut self.texture {
-            Some(texture) => texture.set(image, smooth),
-            None => self.texture = Some(ctx.load_texture("picture", image, smooth)),
+            Some(texture) => texture.set(image, filter),
+            None => self.texture = Some(ctx.load_texture("picture", image, filter)),
         }
         if picture.first {
-            // The next frame knows that this one was drawn.
+            // The latency is measured when the next frame begins: only then was this one drawn.
             ctx.request_repaint();
         }
         self.measured.picture(picture.first.then_some(picture.asked), picture.cost);
@@ -52,7 +53,7 @@ impl Viewer {
         self.inspect_again();
     }
 
-    /// Asks for what the window shows now, if that is something new.
+    /// Requests a picture of `size` pixels of the current scene, unless it is the last request again.
     pub(super) fn request(&mut self, size: [u32; 2]) {
         if size.contains(&0) {
             return;
@@ -77,22 +78,24 @@ impl Viewer {
         });
     }
 
+    /// Requests the ray of the marked pixel again, if the pixel inspector is shown.
     pub(super) fn inspect_again(&mut self) {
-        if let Some(place) = self.marked
+        if let Some(position) = self.marked
             && self.settings.inspectors
             && self.inspector == Inspector::Pixel
         {
-            self.ask(Aim::Inspect, place);
+            self.ask(Aim::Inspect, position);
         }
     }
 
-    /// Asks for the ray through a place in the image, at full resolution.
-    pub(super) fn ask(&mut self, aim: Aim, place: [f32; 2]) {
+    /// Requests the ray through a position in the image (0 to 1), at full resolution.
+    pub(super) fn ask(&mut self, aim: Aim, position: [f32; 2]) {
         if let (Some(picture), Some((_, size, ..))) = (&self.picture, &self.asked) {
-            self.probe.ask(aim, picture, *size, place);
+            self.probe.ask(aim, picture, *size, position);
         }
     }
 
+    /// Takes the ray that was traced, if there is one, for the inspector or the camera.
     pub(super) fn receive_rays(&mut self, ctx: &egui::Context) {
         match self.probe.answer(ctx) {
             Some((Aim::Inspect, ray)) => self.ray = Some(ray),

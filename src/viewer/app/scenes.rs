@@ -1,4 +1,4 @@
-//! Scenes opened, saved, exported.
+//! Opening, saving and exporting scenes.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::viewer::transfer::Purpose;
 use crate::viewer::worker::{Export, MessageKind};
 
 impl Viewer {
-    /// Opens a scene, after asking about changes that would be lost.
+    /// Opens a scene, after asking about unsaved changes.
     pub fn open(&mut self, scene: &Path) {
         if self.document.is_changed() {
             self.leaving = Some(Leaving::Open(scene.to_owned()));
@@ -78,25 +78,25 @@ impl Viewer {
         }
     }
 
-    /// A file that was dropped on the window.
+    /// Opens a scene that was dropped on the window, or uses a dropped volume or environment in the scene.
     pub(super) fn drop_file(&mut self, path: &Path) {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("toml") => self.open(path),
             Some("npz") => {
                 let set = self.document.use_volume_file(path);
-                self.tell(set);
+                self.report(set);
             }
             Some("hdr" | "exr") => {
                 let set = self.document.use_environment_file(path);
-                self.tell(set);
+                self.report(set);
             }
             _ => {
-                let what = format!(
-                    "{} is neither a scene (.toml) nor a volume (.npz) nor an environment (.hdr, .exr)",
+                let text = format!(
+                    "{} is neither a scene (.toml), a volume (.npz) nor an environment (.hdr, .exr)",
                     path.display()
                 );
-                self.say(MessageKind::Error, what);
+                self.say(MessageKind::Error, text);
             }
         }
     }
@@ -105,8 +105,8 @@ impl Viewer {
         match self.document.command_line() {
             Ok(line) => {
                 ctx.copy_text(line);
-                let done = "the command line that renders this picture is on the clipboard";
-                self.say(MessageKind::Note, done);
+                let text = "the command line that renders this picture is on the clipboard";
+                self.say(MessageKind::Note, text);
             }
             Err(e) => self.say(MessageKind::Error, e.to_string()),
         }

@@ -1,22 +1,25 @@
-//! Banners and windows over the picture.
+//! Banners and dialogs over the picture.
 
 use std::path::Path;
 use std::time::Duration;
 
 use eframe::egui;
+use egui::Ui;
 
 use super::Viewer;
 use crate::viewer::transfer::{ExportAnswer, Purpose, UnsavedAnswer, ask_unsaved};
 use crate::viewer::worker::MessageKind;
 
-/// Messages shown at once, the newest; older ones come forth as these are closed.
+/// Most messages shown at once. Older ones appear as newer ones are closed.
 const MAX_BANNERS: usize = 4;
-/// Notes vanish after this time, warnings and errors stay until they are closed.
+/// Notes disappear after this time. Warnings and errors stay until they are closed.
 const NOTE_TIME: Duration = Duration::from_secs(8);
 
 impl Viewer {
+    /// Shows the messages over the picture: faults first, then the newest banners.
     pub(super) fn show_banners(&mut self, ctx: &egui::Context, at: egui::Rect) {
         self.banners.retain(|(m, since)| m.kind != MessageKind::Note || since.elapsed() < NOTE_TIME);
+        // Kind, text and number of each banner; a fault has no number, it stays until it is mended.
         let mut lines: Vec<(MessageKind, String, Option<usize>)> = Vec::new();
         let faults = self.document.fault().map(str::to_owned).into_iter().chain(self.fault.clone());
         lines.extend(faults.map(|fault| (MessageKind::Error, fault, None)));
@@ -36,27 +39,15 @@ impl Viewer {
             .order(egui::Order::Middle)
             .show(ctx, |ui| {
                 ui.set_max_width((at.width() - 16.0).max(120.0));
+                let width = (at.width() - 110.0).clamp(80.0, 620.0);
                 for (kind, text, index) in &lines {
-                    let (sign, color) = match kind {
-                        MessageKind::Note => ("ℹ", ui.visuals().hyperlink_color),
-                        MessageKind::Warning => ("⚠", ui.visuals().warn_fg_color),
-                        MessageKind::Error => ("⛔", ui.visuals().error_fg_color),
-                    };
-                    egui::Frame::popup(ui.style()).show(ui, |ui| {
-                        ui.horizontal(|ui| {
-                            ui.colored_label(color, sign);
-                            let width = (at.width() - 110.0).clamp(80.0, 620.0);
-                            ui.scope(|ui| {
-                                ui.set_max_width(width);
-                                ui.add(egui::Label::new(text).wrap());
-                            });
-                            if let Some(i) = index {
-                                let close = ui.small_button("✖").on_hover_text("Close");
-                                closed = close.clicked().then_some(*i).or(closed);
-                            } else if self.document.can_undo() {
-                                undo |= ui.button("Undo").clicked();
-                            }
-                        });
+                    banner(ui, *kind, text, width, |ui| {
+                        if let Some(i) = index {
+                            let close = ui.small_button("✖").on_hover_text("Close");
+                            closed = close.clicked().then_some(*i).or(closed);
+                        } else if self.document.can_undo() {
+                            undo |= ui.button("Undo").clicked();
+                        }
                     });
                 }
             });
@@ -76,9 +67,9 @@ impl Viewer {
             let height = (ctx.content_rect().height() - 90.0).max(120.0);
             egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 egui::Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).striped(true).show(ui, |ui| {
-                    for (keys, what) in HELP {
+                    for (keys, action) in HELP {
                         ui.monospace(*keys);
-                        ui.label(*what);
+                        ui.label(*action);
                         ui.end_row();
                     }
                 });
@@ -87,6 +78,7 @@ impl Viewer {
         self.help = open;
     }
 
+    /// Shows the dialogs that are open, and acts on their answers.
     pub(super) fn windows(&mut self, ctx: &egui::Context) {
         if let Some(preset) = self.gallery.show(ctx) {
             self.open(Path::new(preset));
@@ -119,7 +111,7 @@ impl Viewer {
             Some((Purpose::Save, path)) => self.save_to(&path),
             None => {}
         }
-        // A save that was given up takes what was to follow it along.
+        // A cancelled save also cancels the action that was to follow it.
         if !self.paths.is_open() {
             self.leave_after_save = None;
         }
@@ -139,30 +131,49 @@ impl Viewer {
     }
 }
 
-/// Keys and mouse, for the help window.
+/// One message, at most `width` points wide, with `buttons` after it.
+fn banner(ui: &mut Ui, kind: MessageKind, text: &str, width: f32, buttons: impl FnOnce(&mut Ui)) {
+    let (sign, color) = match kind {
+        MessageKind::Note => ("ℹ", ui.visuals().hyperlink_color),
+        MessageKind::Warning => ("⚠", ui.visuals().warn_fg_color),
+        MessageKind::Error => ("⛔", ui.visuals().error_fg_color),
+    };
+    egui::Frame::popup(ui.style()).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.colored_label(color, sign);
+            ui.scope(|ui| {
+                ui.set_max_width(width);
+                ui.add(egui::Label::new(text).wrap());
+            });
+            buttons(ui);
+        });
+    });
+}
+
+/// Keys and mouse actions listed in the help window, with what they do.
 const HELP: &[(&str, &str)] = &[
-    ("drag", "the tool in hand: orbit, pan, light or inspect"),
+    ("drag", "use the selected tool: orbit, pan, light or inspect"),
     ("Shift+drag, right drag", "pan"),
     ("Ctrl+drag", "turn the selected light, or the first directional one"),
-    ("drag a light's handle", "move it along the image, with Shift along the depth"),
+    ("drag a light's handle", "move it parallel to the image, with Shift in depth"),
     ("wheel, pinch", "zoom"),
     ("click", "inspect the ray of a pixel"),
     ("double click", "focus on the point under the pointer"),
-    ("O  P  L  I", "tools: orbit, pan, light, inspect"),
-    ("1 … 7", "layers: rgb, depth, uv, quad, transmittance, cells, normal"),
+    ("O  P  L  I", "select a tool: orbit, pan, light, inspect"),
+    ("1 … 7", "show a layer: rgb, depth, uv, quad, transmittance, cells, normal"),
     ("F2  Ctrl+D  Del", "rename, duplicate, remove the selected light"),
     ("Space", "play or pause the water"),
-    ("F", "frame all"),
-    ("Home", "the camera as the scene was opened"),
-    ("Esc", "stop the work in hand"),
-    ("Tab", "parameters"),
-    ("V", "inspectors"),
-    ("G", "gallery of scenes"),
-    ("T", "light or dark"),
+    ("F", "frame everything"),
+    ("Home", "reset the camera"),
+    ("Esc", "stop rendering"),
+    ("Tab", "show or hide the parameters"),
+    ("V", "show or hide the inspectors"),
+    ("G", "open the gallery of scenes"),
+    ("T", "light or dark theme"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
     ("Ctrl+O, Ctrl+S", "open, save (Ctrl+Shift+S: save as)"),
     ("Ctrl+E", "export PNG and EXR"),
     ("Ctrl+Shift+C", "copy as command line"),
     ("Ctrl +, Ctrl −, Ctrl 0", "size of the interface"),
-    ("?", "this list"),
+    ("?", "show this list"),
 ];

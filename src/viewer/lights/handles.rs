@@ -1,4 +1,4 @@
-//! Handles over the picture: a light is dragged to its place, or turned on a dial.
+//! Handles over the picture, with which lights are moved and turned.
 
 use eframe::egui;
 use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
@@ -10,44 +10,45 @@ use crate::scene::{Raw, Values};
 use crate::viewer::navigate::{Pose, angles, direction, raw};
 use crate::viewer::parameters::name as label;
 
-/// Half the side of the square in which a handle is taken, points.
-const REACH: f32 = 11.0;
-/// The dial's radius, points, in a large picture.
-const DIAL: f32 = 46.0;
-/// A drag over the image's height multiplies the depth by e to this.
-const PUSH: f64 = 3.0;
-/// No light is moved nearer to the eye or farther from it, metres along the view axis.
+/// Half the side of the square in which the pointer grabs a handle, points.
+const GRAB_RADIUS: f32 = 11.0;
+/// Radius of the dial in a large picture, points.
+const DIAL_RADIUS: f32 = 46.0;
+/// Exponent of the change in depth: a drag over the image's height multiplies the depth by e to this power.
+const DEPTH_EXPONENT: f64 = 3.0;
+/// Depths to which a light can be moved, metres along the view axis.
 const DEPTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
-/// What was done with handles.
+/// Result of showing the handles for one frame.
 #[derive(Debug, Default)]
 pub struct Drawn {
-    /// New values of lights.
+    /// New values of lights, with their keys.
     pub edits: Vec<(String, Raw)>,
-    /// The pointer is over a handle.
+    /// Whether the pointer is over a handle.
     pub hovered: bool,
 }
 
-/// What a drag holds.
+/// A handle being dragged.
 pub(super) struct Grip {
     light: String,
     part: Part,
-    /// Where the handle is, and how far from the pointer it was taken, points of the window.
+    /// Position of the handle, points of the window.
     at: DVec2,
+    /// Offset of the handle from the pointer when it was grabbed, points.
     offset: DVec2,
-    /// Of the handle along the view axis, metres.
+    /// Depth of the handle along the view axis, metres.
     depth: f64,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     /// The light itself.
-    Place,
-    /// The point that a spot light is aimed at.
+    Light,
+    /// The point at which a spot light is aimed.
     Aim,
 }
 
-/// What is drawn and where.
+/// The picture that the handles are drawn over, and the result so far.
 struct Canvas<'a> {
     ui: &'a Ui,
     painter: egui::Painter,
@@ -58,8 +59,8 @@ struct Canvas<'a> {
     done: Drawn,
 }
 
-/// Shows the handles of the selected light; with `tool` in hand those of all lights, and with `turning`
-/// the dial of the light that is turned.
+/// Shows the handles of the selected light. With `tool`, the Light tool, shows those of all lights. With `turning`,
+/// a light being turned by a drag, shows that light's dial.
 pub fn show(
     ui: &Ui,
     image: Rect,
@@ -75,16 +76,16 @@ pub fn show(
         let selected = lights.selected() == Some(light.as_str());
         let kind = values.text(&format!("lights.{light}.kind"));
         if (selected || tool) && edit::takes(&kind, "position") {
-            canvas.place(lights, &light, selected);
+            canvas.light(lights, &light, selected);
             if selected && kind == "spot" {
                 canvas.aim(lights, &light);
             }
         }
     }
     let is_directional = |light: &String| values.text(&format!("lights.{light}.kind")) == "directional";
-    let at_hand = turned(values, lights.selected()).filter(is_directional);
-    // Beside a spot light that is turned the tool still shows the sun's dial.
-    let dial = at_hand.or_else(|| turned(values, None).filter(|_| tool));
+    let by_drag = turned(values, lights.selected()).filter(is_directional);
+    // While a drag would turn a spot light, the Light tool still shows the dial of a directional one.
+    let dial = by_drag.or_else(|| turned(values, None).filter(|_| tool));
     if let Some(light) = dial.filter(|light| tool || turning || lights.selected() == Some(light)) {
         canvas.dial(&light);
     }
@@ -92,55 +93,55 @@ pub fn show(
 }
 
 impl Canvas<'_> {
-    /// The light itself, dragged parallel to the image, or with Shift along the depth.
-    fn place(&mut self, lights: &mut Lights, light: &str, selected: bool) {
+    /// The handle of the light itself, which is dragged parallel to the image, or with Shift in depth.
+    fn light(&mut self, lights: &mut Lights, light: &str, selected: bool) {
         let key = format!("lights.{light}.position");
         let position = self.values.triple(&key).as_dvec3();
-        let (seen, at) = self.seen(position);
+        let (visible, at) = self.handle_position(position);
         let response = self.handle(at, &format!("Handle of {light}"));
         if response.clicked() || response.drag_started() {
             lights.select(Some(light));
         }
-        if let Some(moved) = self.drag(lights, &response, (light, Part::Place), position) {
+        if let Some(moved) = self.drag(lights, &response, (light, Part::Light), position) {
             self.done.edits.push((key, raw(moved)));
         }
         let color = color_of(self.values, light);
         let alpha = if selected || response.hovered() { 1.0 } else { 0.7 };
         bulb(&self.painter, at, color.map(|c| c.gamma_multiply(alpha)), selected);
-        if !seen {
-            // It lies farther that way.
+        if !visible {
+            // An arrow points to where the light lies.
             let out = (at - self.image.center()).normalized();
             let side = out.rot90() * 4.0;
             let tip = vec![at + out * 13.0, at + out * 9.0 + side, at + out * 9.0 - side];
             self.painter.add(egui::Shape::convex_polygon(tip, Color32::WHITE, Stroke::NONE));
         }
-        let held = lights.grip.as_ref().is_some_and(|grip| grip.light == light && grip.part == Part::Place);
+        let held = lights.grip.as_ref().is_some_and(|grip| grip.light == light && grip.part == Part::Light);
         if held || response.hovered() {
             let deep = self.view.project(position).1;
             let [x, y, z] = position.to_array();
-            self.words(at, &format!("{light}: {x:.2}, {y:.2}, {z:.2} m, {deep:.2} m deep"));
+            self.caption(at, &format!("{light}: {x:.2}, {y:.2}, {z:.2} m, {deep:.2} m deep"));
         } else if selected || self.ui.input(|i| i.modifiers.is_none()) {
-            self.words(at, light);
+            self.caption(at, light);
         }
     }
 
-    /// The point that a spot light is aimed at, and its cone.
+    /// The handle of the point at which a spot light is aimed, and the light's cone.
     fn aim(&mut self, lights: &mut Lights, light: &str) {
         let key = |what: &str| format!("lights.{light}.{what}");
         let position = self.values.triple(&key("position")).as_dvec3();
         let to_light = self.values.triple(&key("direction")).as_dvec3().normalize_or(DVec3::Y);
         let far = position.distance(self.pose.target).max(1e-3);
-        let reach = *lights.reach.get_or_insert(far);
-        let aim = position - to_light * reach;
-        let (_, at) = self.seen(aim);
+        let distance = *lights.aim_distance.get_or_insert(far);
+        let aim = position - to_light * distance;
+        let (_, at) = self.handle_position(aim);
         let color = color_of(self.values, light).unwrap_or(Color32::GRAY);
-        self.cone(position, to_light, reach, light, color);
+        self.cone(position, to_light, distance, light, color);
         let response = self.handle(at, &format!("Aim of {light}"));
         if let Some(moved) = self.drag(lights, &response, (light, Part::Aim), aim) {
             let away = position - moved;
-            // A spot light aimed at itself keeps its direction.
+            // A spot light aimed at its own position keeps its direction.
             if away.length() > 1e-6 {
-                lights.reach = Some(away.length());
+                lights.aim_distance = Some(away.length());
                 self.done.edits.push((key("direction"), raw(away.normalize())));
             }
         }
@@ -152,15 +153,16 @@ impl Canvas<'_> {
         }
     }
 
-    /// A spot light's cone: where its light ends, where it is full, and four lines to the light.
-    fn cone(&self, position: DVec3, to_light: DVec3, reach: f64, light: &str, color: Color32) {
+    /// Draws a spot light's cone at a distance from the light: the circle where its light ends, the circle within
+    /// which it is full, and four lines to the light.
+    fn cone(&self, position: DVec3, to_light: DVec3, distance: f64, light: &str, color: Color32) {
         let number = |what: &str| f64::from(self.values.float(&format!("lights.{light}.{what}")));
         let (u, v) = to_light.any_orthonormal_pair();
-        // A wider one has no rim that is near enough to see.
-        let radius = |angle: f64| reach * angle.min(80.0).to_radians().tan();
+        // The rim of a wider cone would be too far away to see.
+        let radius = |angle: f64| distance * angle.min(80.0).to_radians().tan();
         let circle = |radius: f64, i: i32| {
             let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
-            position - to_light * reach + (u * cos + v * sin) * radius
+            position - to_light * distance + (u * cos + v * sin) * radius
         };
         let line = |a: DVec3, b: DVec3, faint: f32| {
             if let (Some(a), Some(b)) = (self.view.project(a).0, self.view.project(b).0) {
@@ -175,12 +177,11 @@ impl Canvas<'_> {
         (0..48).step_by(12).for_each(|i| line(position, circle(edge, i), 0.8));
     }
 
-    /// The dial on which a directional light is turned.
+    /// The dial on which a directional light is turned ([`View::dial_direction`]).
     fn dial(&mut self, light: &str) {
         let key = format!("lights.{light}.direction");
-        let radius = DIAL.min(self.image.height() * 0.2).min(self.image.width() * 0.2);
+        let radius = DIAL_RADIUS.min(self.image.height() * 0.2).min(self.image.width() * 0.2);
         let centre = self.image.right_bottom() - vec2(radius + 12.0, radius + 26.0);
-        let on_dial = |place: DVec2| centre + vec2(place.x as f32, -place.y as f32) * radius;
         let square = Rect::from_center_size(centre, vec2(radius, radius) * 2.0);
         let id = self.ui.scope_id().with(("light dial", light));
         let response = self.ui.interact(square, id, Sense::click_and_drag());
@@ -196,6 +197,13 @@ impl Canvas<'_> {
         }
         response.on_hover_cursor(egui::CursorIcon::Crosshair);
 
+        self.draw_dial(light, centre, radius, to_light);
+    }
+
+    /// Draws the dial with its horizon, the other directional lights, and the light at its tip.
+    fn draw_dial(&self, light: &str, centre: Pos2, radius: f32, to_light: DVec3) {
+        let on_dial = |p: DVec2| centre + vec2(p.x as f32, -p.y as f32) * radius;
+        let square = Rect::from_center_size(centre, vec2(radius, radius) * 2.0);
         let painter = &self.painter;
         let ground = square.expand(6.0).union(square.translate(vec2(0.0, 20.0)));
         painter.rect_filled(ground, 8.0, Color32::from_black_alpha(120));
@@ -232,23 +240,23 @@ impl Canvas<'_> {
         painter.text(below, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
     }
 
-    /// Whether a point of the world is seen in the picture, and where its handle is drawn: what is not seen
-    /// has it at the border.
-    fn seen(&self, point: DVec3) -> (bool, Pos2) {
-        let place = self.view.project(point).0;
-        let at = place.unwrap_or_else(|| self.view.border_towards(point));
-        (place.is_some_and(|at| self.view.contains(at)), at_point(self.view.nearest(at, 14.0)))
+    /// Whether a point of the world is visible in the picture, and the position of its handle. The handle of a point
+    /// outside the picture is at the border.
+    fn handle_position(&self, point: DVec3) -> (bool, Pos2) {
+        let projected = self.view.project(point).0;
+        let at = projected.unwrap_or_else(|| self.view.border_towards(point));
+        (projected.is_some_and(|at| self.view.contains(at)), at_point(self.view.nearest(at, 14.0)))
     }
 
-    fn handle(&mut self, at: Pos2, words: &str) -> Response {
-        let rect = Rect::from_center_size(at, vec2(REACH, REACH) * 2.0);
-        let response = self.ui.interact(rect, self.ui.scope_id().with(words), Sense::click_and_drag());
-        label(&response, words);
+    fn handle(&mut self, at: Pos2, name: &str) -> Response {
+        let rect = Rect::from_center_size(at, vec2(GRAB_RADIUS, GRAB_RADIUS) * 2.0);
+        let response = self.ui.interact(rect, self.ui.scope_id().with(name), Sense::click_and_drag());
+        label(&response, name);
         self.done.hovered |= response.hovered();
         response.on_hover_and_drag_cursor(egui::CursorIcon::Move)
     }
 
-    /// Goes on with a drag of a handle that stands for a point; where the point is moved to.
+    /// Continues a drag of the handle of a point. Returns where the point is moved to.
     fn drag(
         &self,
         lights: &mut Lights,
@@ -264,18 +272,19 @@ impl Canvas<'_> {
         }
         let pointer = point(response.interact_pointer_pos()?);
         if response.drag_started() {
-            let (place, depth) = self.view.project(now);
+            let (projected, depth) = self.view.project(now);
             let pressed = self.ui.input(|i| i.pointer.press_origin()).map_or(pointer, point);
-            // A handle at the border comes to the pointer, and from behind the eye into the scene.
-            let place = place.filter(|at| self.view.contains(*at));
-            let offset = place.map_or(DVec2::ZERO, |at| at - pressed);
+            // The handle of a point outside the picture jumps to the pointer. A point behind the eye gets the depth
+            // of the camera's target.
+            let visible = projected.filter(|at| self.view.contains(*at));
+            let offset = visible.map_or(DVec2::ZERO, |at| at - pressed);
             let depth = if depth > 0.0 { depth } else { self.view.project(self.pose.target).1 };
             lights.grip = Some(Grip { light: light.into(), part, at: pressed + offset, offset, depth });
         }
         let grip = lights.grip.as_mut().filter(|grip| grip.light == light && grip.part == part)?;
         if self.ui.input(|i| i.modifiers.shift) {
             let up = f64::from(-response.drag_delta().y) / f64::from(self.image.height().max(1.0));
-            grip.depth = (grip.depth * (up * PUSH).exp()).clamp(*DEPTHS.start(), *DEPTHS.end());
+            grip.depth = (grip.depth * (up * DEPTH_EXPONENT).exp()).clamp(*DEPTHS.start(), *DEPTHS.end());
             grip.offset = grip.at - pointer;
         } else {
             grip.at = pointer + grip.offset;
@@ -283,8 +292,8 @@ impl Canvas<'_> {
         Some(self.view.unproject(grip.at, grip.depth))
     }
 
-    /// Words beside a handle, inside the picture.
-    fn words(&self, at: Pos2, text: &str) {
+    /// Writes text beside a handle, inside the picture.
+    fn caption(&self, at: Pos2, text: &str) {
         let font = FontId::proportional(12.0);
         let galley = self.painter.layout_no_wrap(text.to_owned(), font, Color32::WHITE);
         let size = galley.size();
@@ -297,7 +306,7 @@ impl Canvas<'_> {
     }
 }
 
-/// A light's colour at full brightness; none if it does not shine.
+/// A light's colour at full brightness. `None` if the light does not shine.
 fn color_of(values: &Values, light: &str) -> Option<Color32> {
     let rgb = values.triple(&format!("lights.{light}.color"));
     let full = rgb.max_element();
@@ -307,7 +316,7 @@ fn color_of(values: &Values, light: &str) -> Option<Color32> {
     })
 }
 
-/// A small lamp that is seen on bright water and on dark rock.
+/// Draws a small lamp, visible on bright water and on dark rock.
 fn bulb(painter: &egui::Painter, at: Pos2, color: Option<Color32>, selected: bool) {
     let dark = Color32::from_black_alpha(170);
     if selected {

@@ -1,21 +1,21 @@
-//! The list of lights: each with a switch, its colour, its name, and the parameters its kind has.
+//! The list of lights. Each has a switch, its colour, its name, and the parameters of its kind.
 
 use eframe::egui;
 use egui::collapsing_header::CollapsingState;
 use egui::{Align, Button, Layout, Rect, Response, Ui};
 
 use super::widget::color_button;
-use super::{Costs, ParameterPanel, matches, name};
+use super::{Context, ParameterPanel, matches, name};
 use crate::scene::{PARAMS, Raw};
 use crate::viewer::document::Document;
-use crate::viewer::lights::{Lights, edit};
+use crate::viewer::lights::{Lights, Renaming, edit};
 
-/// Of more lights than this those that are folded and scrolled away are left out: every frame would lay out
+/// In a longer list, folded entries that are scrolled out of sight are skipped. Otherwise each frame would lay out
 /// thousands of buttons.
-const MANY: usize = 200;
+const MAX_LAID_OUT: usize = 200;
 
-/// What is asked of one light.
-enum Ask {
+/// What the user asks for in the entry of one light.
+enum Command {
     Select,
     Switch,
     Color(Raw),
@@ -27,38 +27,32 @@ enum Ask {
 }
 
 impl ParameterPanel {
-    /// The group of the lights; how many parameters of theirs are shown.
-    pub(super) fn lights(
-        &mut self,
-        ui: &mut Ui,
-        document: &mut Document,
-        lights: &mut Lights,
-        costs: Costs,
-        search: &str,
-    ) -> usize {
-        let names = document.values().names("lights");
-        let found: Vec<(String, Vec<String>)> = names
+    /// Shows the group of the lights. Returns the number of their parameters that are shown, but at least 1 without a
+    /// search.
+    pub(super) fn lights(&mut self, ui: &mut Ui, context: &mut Context) -> usize {
+        let names = context.document.values().names("lights");
+        let entries: Vec<(String, Vec<String>)> = names
             .iter()
-            .map(|light| (light.clone(), keys(document, light, search)))
-            .filter(|(_, keys)| search.is_empty() || !keys.is_empty())
+            .map(|light| (light.clone(), keys(context.document, light, &context.search)))
+            .filter(|(_, keys)| !context.is_searching() || !keys.is_empty())
             .collect();
-        if found.is_empty() && !search.is_empty() {
+        if entries.is_empty() && context.is_searching() {
             return 0;
         }
         let id = ui.make_persistent_id(("group", "Lights"));
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, true);
-        if !search.is_empty() || lights.unfold.is_some() {
+        if context.is_searching() || context.lights.unfold.is_some() {
             state.set_open(true);
         }
         let (mut kind, mut reset) = (None, false);
         let header = state.show_header(ui, |ui| {
-            ui.strong("Lights").on_hover_text("What shines on the water and the rock");
+            ui.strong("Lights").on_hover_text("Lights that shine on the water and the rock");
             ui.weak(names.len().to_string());
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let menu = ui.menu_button("➕", |ui| kind = add_menu(ui));
                 name(&menu.response, "Add a light");
                 menu.response.on_hover_text("Add a light");
-                if document.section_differs("lights") {
+                if context.document.section_differs("lights") {
                     let button = ui.small_button("⟲").on_hover_text("Reset Lights");
                     name(&button, "Reset Lights");
                     reset = button.clicked();
@@ -68,115 +62,103 @@ impl ParameterPanel {
         });
         header.body_unindented(|ui| {
             if names.is_empty() {
-                ui.weak("No light but the surroundings'.");
+                ui.weak("No lights except the surroundings.");
             }
-            for (light, keys) in &found {
-                let to_unfold = lights.unfold.as_ref() == Some(light);
-                if found.len() > MANY && !to_unfold && is_out_of_sight(ui, light) {
+            for (light, keys) in &entries {
+                let to_unfold = context.lights.unfold.as_ref() == Some(light);
+                if entries.len() > MAX_LAID_OUT && !to_unfold && is_out_of_sight(ui, light) {
                     ui.add_space(ui.spacing().interact_size.y);
                     continue;
                 }
-                self.light(ui, document, lights, costs, (light, keys, !search.is_empty(), names.len() == 1));
+                self.light(ui, context, light, keys, names.len() == 1);
             }
             ui.add_space(6.0);
         });
         if reset {
-            document.reset_section("lights");
+            context.document.reset_section("lights");
         }
         if let Some(kind) = kind {
-            self.fault = lights.add(document, kind).err().map(|e| e.to_string());
+            self.fault = context.lights.add(context.document, kind).err().map(|e| e.to_string());
         }
-        found.iter().map(|(_, keys)| keys.len()).sum::<usize>().max(usize::from(search.is_empty()))
+        let shown: usize = entries.iter().map(|(_, keys)| keys.len()).sum();
+        shown.max(usize::from(!context.is_searching()))
     }
 
-    fn light(
-        &mut self,
-        ui: &mut Ui,
-        document: &mut Document,
-        lights: &mut Lights,
-        costs: Costs,
-        (light, keys, searching, alone): (&str, &[String], bool, bool),
-    ) {
-        let id = fold(ui, light);
-        let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, alone);
-        if searching {
+    /// Shows the entry of one light with its parameters, and applies the user's command.
+    fn light(&mut self, ui: &mut Ui, context: &mut Context, light: &str, keys: &[String], only_one: bool) {
+        let id = fold_id(ui, light);
+        let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, only_one);
+        if context.is_searching() {
             state.set_open(true);
         }
-        let unfolded = lights.unfold.take_if(|unfold| unfold == light).is_some();
+        let unfolded = context.lights.unfold.take_if(|unfold| unfold == light).is_some();
         if unfolded {
             state.set_open(true);
         }
-        let mut ask = None;
-        let header = state.show_header(ui, |ui| ask = entry(ui, document, lights, light));
+        let mut command = None;
+        let header =
+            state.show_header(ui, |ui| command = entry(ui, context.document, context.lights, light));
         let (_, header, _) = header.body(|ui| {
             for key in keys {
-                self.row(ui, document, costs, key);
+                self.row(ui, context, key);
             }
             ui.add_space(4.0);
         });
         if unfolded {
             header.response.scroll_to_me(None);
         }
-        let Some(ask) = ask else { return };
-        let open = CollapsingState::load_with_default_open(ui.ctx(), id, alone).is_open();
-        self.fault = match ask {
-            Ask::Select => {
-                let selected = lights.selected() == Some(light);
-                lights.select((!selected).then_some(light));
-                None
-            }
-            Ask::Switch => lights.switch(document, light).err().map(|e| e.to_string()),
-            Ask::Color(raw) => {
-                let key = format!("lights.{light}.color");
-                document.set(&key, &raw, Some(&key)).err().map(|e| e.to_string())
-            }
-            Ask::BeginRenaming => {
-                lights.begin_renaming(light);
-                None
-            }
-            Ask::Rename(new) => match lights.rename(document, light, &new) {
-                Ok(()) => {
-                    lights.renaming = None;
-                    let mut state = CollapsingState::load_with_default_open(ui.ctx(), fold(ui, &new), open);
-                    state.set_open(open);
-                    state.store(ui.ctx());
-                    None
-                }
-                Err(fault) => match lights.renaming.as_mut().filter(|renaming| !renaming.begun) {
-                    Some(renaming) => {
-                        renaming.fault = Some(fault);
-                        None
-                    }
-                    None => {
-                        lights.renaming = None;
-                        Some(fault)
-                    }
-                },
-            },
-            Ask::KeepName => {
-                lights.renaming = None;
-                None
-            }
-            Ask::Duplicate => {
-                lights.duplicate(document, light);
-                None
-            }
-            Ask::Remove => {
-                lights.remove(document, light);
-                None
-            }
-        };
+        if let Some(command) = command {
+            let is_open = CollapsingState::load_with_default_open(ui.ctx(), id, only_one).is_open();
+            self.fault = apply(ui, context, light, command, is_open);
+        }
     }
 }
 
-/// The kinds to choose from; the one that is chosen.
+/// Applies a command to a light, whose entry in the list is open or folded. Returns why it failed, if it did.
+fn apply(ui: &Ui, context: &mut Context, light: &str, command: Command, is_open: bool) -> Option<String> {
+    let (document, lights) = (&mut *context.document, &mut *context.lights);
+    match command {
+        Command::Select => {
+            let selected = lights.selected() == Some(light);
+            lights.select((!selected).then_some(light));
+        }
+        Command::Switch => return lights.switch(document, light).err().map(|e| e.to_string()),
+        Command::Color(raw) => {
+            let key = format!("lights.{light}.color");
+            return document.set(&key, &raw, Some(&key)).err().map(|e| e.to_string());
+        }
+        Command::BeginRenaming => lights.begin_renaming(light),
+        Command::Rename(new) => match lights.rename(document, light, &new) {
+            Ok(()) => {
+                lights.renaming = None;
+                let id = fold_id(ui, &new);
+                let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, is_open);
+                state.set_open(is_open);
+                state.store(ui.ctx());
+            }
+            Err(fault) => match lights.renaming.as_mut().filter(|renaming| !renaming.focused) {
+                Some(renaming) => renaming.fault = Some(fault),
+                None => {
+                    lights.renaming = None;
+                    return Some(fault);
+                }
+            },
+        },
+        Command::KeepName => lights.renaming = None,
+        Command::Duplicate => lights.duplicate(document, light),
+        Command::Remove => lights.remove(document, light),
+    }
+    None
+}
+
+/// Shows a menu of the kinds of light. Returns the kind that was chosen.
 pub fn add_menu(ui: &mut Ui) -> Option<&'static str> {
     let mut chosen = None;
     for kind in edit::kinds() {
         let about = match *kind {
-            "directional" => "From infinitely far, as the sun",
-            "point" => "From a point, to all sides",
-            "spot" => "From a point, in a cone",
+            "directional" => "Parallel light from infinitely far away, like the sun",
+            "point" => "Light from a point in all directions",
+            "spot" => "Light from a point within a cone",
             _ => "",
         };
         let button = ui.button(format!("Add {kind}")).on_hover_text(about);
@@ -188,71 +170,85 @@ pub fn add_menu(ui: &mut Ui) -> Option<&'static str> {
     chosen
 }
 
-/// The line of one light.
-fn entry(ui: &mut Ui, document: &Document, lights: &mut Lights, light: &str) -> Option<Ask> {
-    let mut ask = None;
-    let clicked = |response: Response, words: String| {
-        name(&response, &words);
-        response.on_hover_text(words).clicked()
+/// The line of one light: its switch, colour, name, and buttons. Returns the user's command.
+fn entry(ui: &mut Ui, document: &Document, lights: &mut Lights, light: &str) -> Option<Command> {
+    let mut command = None;
+    let clicked = |response: Response, label: String| {
+        name(&response, &label);
+        response.on_hover_text(label).clicked()
     };
     let key = |what: &str| format!("lights.{light}.{what}");
     let on = document.values().float(&key("intensity")) > 0.0;
     let eye = ui.add(Button::selectable(on, "👁").small());
     if clicked(eye, format!("Switch {light} {}", if on { "off" } else { "on" })) {
-        ask = Some(Ask::Switch);
+        command = Some(Command::Switch);
     }
     let color = document.values().triple(&key("color")).to_array().map(f64::from);
-    let chip = color_button(ui, &format!("Colour of {light}"), color);
+    let picked = color_button(ui, &format!("Colour of {light}"), color);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        for (sign, word, what) in [
-            ("🗑", "Remove", Ask::Remove),
-            ("🗐", "Duplicate", Ask::Duplicate),
-            ("✏", "Rename", Ask::BeginRenaming),
+        for (sign, verb, action) in [
+            ("🗑", "Remove", Command::Remove),
+            ("🗐", "Duplicate", Command::Duplicate),
+            ("✏", "Rename", Command::BeginRenaming),
         ] {
-            if clicked(ui.small_button(sign), format!("{word} {light}")) {
-                ask = Some(what);
+            if clicked(ui.small_button(sign), format!("{verb} {light}")) {
+                command = Some(action);
             }
         }
         ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-            if let Some(renaming) = lights.renaming.as_mut().filter(|renaming| renaming.light == light) {
-                let field = egui::TextEdit::singleline(&mut renaming.text);
-                let mut field = ui.add(field.desired_width(ui.available_width()));
-                name(&field, &format!("Name of {light}"));
-                if !renaming.begun {
-                    renaming.begun = true;
-                    field.request_focus();
-                }
-                if let Some(fault) = &renaming.fault {
-                    field = field.highlight();
-                    field.show_tooltip_text(fault);
-                }
-                if field.changed() {
-                    renaming.fault = None;
-                }
-                if field.lost_focus() {
-                    let pressed = |key| ui.input(|i| i.key_pressed(key));
-                    // A name that is refused is written on, unless something else was clicked.
-                    renaming.begun = !pressed(egui::Key::Enter);
-                    let new = renaming.text.trim().to_owned();
-                    ask = Some(if pressed(egui::Key::Escape) { Ask::KeepName } else { Ask::Rename(new) });
-                }
-                return;
+            let renaming = lights.renaming.as_mut().filter(|renaming| renaming.light == light);
+            let from_name = match renaming {
+                Some(renaming) => name_field(ui, renaming),
+                None => name_button(ui, lights.selected() == Some(light), light),
+            };
+            if from_name.is_some() {
+                command = from_name;
             }
-            let selected = lights.selected() == Some(light);
-            let button = ui.add(Button::selectable(selected, light).truncate());
-            if button.double_clicked() {
-                ask = Some(Ask::BeginRenaming);
-            } else if button.clicked() {
-                ask = Some(Ask::Select);
-            }
-            name(&button, &format!("Light {light}"));
-            button.on_hover_text("Select, to move or turn it in the picture; double click to rename");
         });
     });
-    ask.or(chip.map(Ask::Color))
+    command.or(picked.map(Command::Color))
 }
 
-/// The keys of a light that mean anything for its kind and match the search.
+/// The name of a light as a button that selects the light.
+fn name_button(ui: &mut Ui, selected: bool, light: &str) -> Option<Command> {
+    let button = ui.add(Button::selectable(selected, light).truncate());
+    let command = if button.double_clicked() {
+        Some(Command::BeginRenaming)
+    } else {
+        button.clicked().then_some(Command::Select)
+    };
+    name(&button, &format!("Light {light}"));
+    button.on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
+    command
+}
+
+/// The text field for the name of a light that is being renamed.
+fn name_field(ui: &mut Ui, renaming: &mut Renaming) -> Option<Command> {
+    let field = egui::TextEdit::singleline(&mut renaming.text);
+    let mut field = ui.add(field.desired_width(ui.available_width()));
+    name(&field, &format!("Name of {}", renaming.light));
+    if !renaming.focused {
+        renaming.focused = true;
+        field.request_focus();
+    }
+    if let Some(fault) = &renaming.fault {
+        field = field.highlight();
+        field.show_tooltip_text(fault);
+    }
+    if field.changed() {
+        renaming.fault = None;
+    }
+    if !field.lost_focus() {
+        return None;
+    }
+    let pressed = |key| ui.input(|i| i.key_pressed(key));
+    // After Enter, a refused name stays in the field, which gets the focus again. After a click elsewhere it does not.
+    renaming.focused = !pressed(egui::Key::Enter);
+    let new = renaming.text.trim().to_owned();
+    Some(if pressed(egui::Key::Escape) { Command::KeepName } else { Command::Rename(new) })
+}
+
+/// The keys that a light of its kind has and that match the search.
 fn keys(document: &Document, light: &str, search: &str) -> Vec<String> {
     let kind = document.values().text(&format!("lights.{light}.kind"));
     let parts = PARAMS.iter().filter_map(|param| param.key.strip_prefix("lights.*."));
@@ -260,13 +256,14 @@ fn keys(document: &Document, light: &str, search: &str) -> Vec<String> {
     keys.filter(|key| matches(key, search)).collect()
 }
 
+/// Whether the next row, the folded entry of `light`, is scrolled out of sight.
 fn is_out_of_sight(ui: &Ui, light: &str) -> bool {
     let row = Rect::from_min_size(ui.cursor().min, ui.spacing().interact_size);
-    let open = CollapsingState::load(ui.ctx(), fold(ui, light)).is_some_and(|state| state.is_open());
+    let open = CollapsingState::load(ui.ctx(), fold_id(ui, light)).is_some_and(|state| state.is_open());
     !open && !ui.is_rect_visible(row)
 }
 
-/// What the entry of a light is known by while it is folded and unfolded.
-fn fold(ui: &Ui, light: &str) -> egui::Id {
+/// Id under which egui keeps whether the entry of a light is folded.
+fn fold_id(ui: &Ui, light: &str) -> egui::Id {
     ui.make_persistent_id(("light", light))
 }

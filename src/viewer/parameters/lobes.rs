@@ -1,4 +1,4 @@
-//! The polar plot of the scattering lobes, under a fold of its own.
+//! The polar plot of the scattering lobes, in a fold of its own.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -12,20 +12,20 @@ use crate::light::Reflection;
 use crate::scene::{Scene, Values};
 use crate::viewer::lobes::{Curve, Plane, STEPS, Scale, Setting, alpha, curves, incidence};
 
-/// Widest plot, points.
+/// Largest width of the plot, points.
 const MAX_WIDTH: f32 = 380.0;
-/// Half the side of the plot in radii of its rim: room for the light's arrow and the angles.
+/// Half the side of the plot in radii of its rim. It leaves room for the light's arrow and the angles.
 const EXTENT: f64 = 1.24;
-/// Radians beside the light that have no angle written: its arrow is there, and its name.
+/// Angle on both sides of the light that is kept free of labels, radians: the light's arrow and name are there.
 const ARROW_ROOM: f64 = 0.35;
 
-/// The plot and what it was made from.
+/// The plot, its curves, and the setting that they were computed for.
 #[derive(Default)]
 pub(super) struct LobesPlot {
     plane: Plane,
     shown: Option<(Setting, Vec<Curve>)>,
-    /// What is computed beside the frames.
-    coming: Option<(Setting, Receiver<Vec<Curve>>)>,
+    /// The curves that a thread is computing.
+    computing: Option<(Setting, Receiver<Vec<Curve>>)>,
 }
 
 /// How a curve is drawn.
@@ -36,6 +36,7 @@ struct Pen {
 }
 
 impl Pen {
+    /// The pen of a curve, by the curve's name.
     fn of(curve: &str, visuals: &egui::Visuals) -> Pen {
         let pen = |dark: [u8; 3], light: [u8; 3], style: LineStyle| {
             let [r, g, b] = if visuals.dark_mode { dark } else { light };
@@ -55,11 +56,11 @@ impl Pen {
 }
 
 impl LobesPlot {
-    /// The fold with the plot; nothing is computed while it is closed.
+    /// Shows the fold with the plot. Nothing is computed while it is closed.
     pub fn show(&mut self, ui: &mut Ui, scene: &Scene, values: &Values, selected: Option<&str>) {
         let fold = egui::CollapsingHeader::new("Lobes").id_salt("lobes");
         let fold = fold.show_unindented(ui, |ui| self.body(ui, scene, values, selected));
-        fold.header_response.on_hover_text("How much light a cell of water sends in which direction");
+        fold.header_response.on_hover_text("How a cell of water distributes light over directions");
     }
 
     fn body(&mut self, ui: &mut Ui, scene: &Scene, values: &Values, selected: Option<&str>) {
@@ -69,12 +70,11 @@ impl LobesPlot {
         };
         ui.horizontal_wrapped(|ui| {
             let around = ui.selectable_value(&mut self.plane, Plane::Around, "around the strand");
-            around
-                .on_hover_text("The eye goes round the strand, on the cone that a mirror sends the light to");
+            around.on_hover_text("The eye moves around the strand, on the cone of mirror reflection");
             let along = ui.selectable_value(&mut self.plane, Plane::Along, "along it");
             along.on_hover_text("The eye stays in the plane of strand and light");
         });
-        self.take(ui.ctx(), Setting::new(scene, incidence.theta_i, self.plane));
+        self.update(ui.ctx(), Setting::new(scene, incidence.theta_i, self.plane));
         let Some((setting, curves)) = &self.shown else {
             ui.horizontal(|ui| {
                 ui.spinner();
@@ -84,64 +84,64 @@ impl LobesPlot {
         };
         let theta_i = degrees(setting.theta_i, 1);
         let model = match setting.reflection {
-            Reflection::KajiyaKay => "Kajiya and Kay's fibre, Ψ/π",
-            Reflection::Strand(_) => "A strand of water and its air, Φ",
+            Reflection::KajiyaKay => "Fibre of Kajiya and Kay, Ψ/π",
+            Reflection::Strand(_) => "Strand of water with air bubbles, Φ",
         };
         ui.label(format!("θ_i = {theta_i} of {}", incidence.light)).on_hover_text(
-            "Inclination of the light to the plane across the flow; the flow is v of the first quad, in its middle. \
-             Select a light to see it here.",
+            "Inclination of the light to the plane across the flow. The flow is v at the middle of the first quad. \
+             Select a light to see its lobes.",
         );
         legend(ui, curves);
         let scale = Scale::new(curves);
         plot(ui, setting, curves, scale);
         let angle = match setting.plane {
             Plane::Around => format!("over φ at θ_o = {}", degrees(-setting.theta_i, 1)),
-            Plane::Along => "over θ_o, at φ = 0 left and π right, the flow down".into(),
+            Plane::Along => "over θ_o, with φ = 0 on the left, φ = π on the right, and the flow down".into(),
         };
-        let words = format!(
-            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. Luminance, 1/sr, on a logarithmic radius: {} \
-             or less in the middle, the largest value at the rim.",
+        let caption = format!(
+            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. The radius is the luminance in 1/sr on a \
+             logarithmic scale, from {} or less in the middle to the largest value at the rim.",
             setting.k_d,
             setting.k_s,
             power_of_ten(scale.middle)
         );
-        ui.weak(words);
+        ui.weak(caption);
     }
 
-    /// Keeps what is shown up to date.
-    fn take(&mut self, ctx: &egui::Context, setting: Setting) {
-        if let Some((of, answer)) = &self.coming {
+    /// Takes curves that are ready, and starts computing those of `setting` if they are not shown.
+    fn update(&mut self, ctx: &egui::Context, setting: Setting) {
+        if let Some((computed, answer)) = &self.computing {
             match answer.try_recv() {
-                Ok(curves) => self.shown = Some((*of, curves)),
+                Ok(curves) => self.shown = Some((*computed, curves)),
                 Err(TryRecvError::Empty) => return,
-                // No thread was to be had.
-                Err(TryRecvError::Disconnected) => self.shown = Some((*of, Vec::new())),
+                // The thread could not start.
+                Err(TryRecvError::Disconnected) => self.shown = Some((*computed, Vec::new())),
             }
-            self.coming = None;
+            self.computing = None;
         }
-        if self.shown.as_ref().is_some_and(|(of, _)| *of == setting) {
+        if self.shown.as_ref().is_some_and(|(shown, _)| *shown == setting) {
             return;
         }
         let (send, answer) = channel();
         let ctx = ctx.clone();
         let compute = move || {
-            // Whoever asked may be gone.
+            // Sending fails if the panel is gone.
             let _ = send.send(curves(&setting));
             ctx.request_repaint();
         };
-        // Beside the frames: the strand's balance waits for the pool, which may be rendering for long.
+        // On a thread of its own: the strand's energy balance waits for the thread pool, which may be busy rendering.
         let _ = std::thread::Builder::new().name("lobes".into()).spawn(compute);
-        self.coming = Some((setting, answer));
+        self.computing = Some((setting, answer));
     }
 }
 
-/// The curves' names, each with a piece of its line.
+/// Shows the names of the curves, each with a piece of its line.
 fn legend(ui: &mut Ui, curves: &[Curve]) {
     ui.horizontal_wrapped(|ui| {
         for curve in curves {
             let peak = curve.peak();
-            let words = format!("{}\nat most {}", curve.doc, per_steradian(peak));
-            // One widget: a line does not end between the piece and the name.
+            let tip = format!("{}\nat most {}", curve.doc, per_steradian(peak));
+            // Piece and name are one widget, so that no line break separates them.
             let galley = egui::WidgetText::from(curve.name).into_galley(
                 ui,
                 Some(egui::TextWrapMode::Extend),
@@ -167,13 +167,13 @@ fn legend(ui: &mut Ui, curves: &[Curve]) {
             }
             let at = rect.right_center() - Vec2::new(galley.size().x, 0.5 * galley.size().y);
             ui.painter().galley(at, galley, ui.visuals().text_color());
-            response.on_hover_text(words);
+            response.on_hover_text(tip);
         }
     });
 }
 
-/// Where a direction is drawn: the light comes from the left, and what flows flows down.
-fn place(plane: Plane, alpha: f64, radius: f64) -> [f64; 2] {
+/// Position of a direction in the plot. The light comes from the left, and the flow goes down.
+fn plot_position(plane: Plane, alpha: f64, radius: f64) -> [f64; 2] {
     let up = if plane == Plane::Along { -1.0 } else { 1.0 };
     [-radius * alpha.cos(), up * radius * alpha.sin()]
 }
@@ -183,7 +183,7 @@ fn plot(ui: &mut Ui, setting: &Setting, curves: &[Curve], scale: Scale) {
     let shown: Vec<(&str, Pen, Vec<[f64; 2]>)> = curves
         .iter()
         .map(|curve| {
-            let at = |i: usize| place(setting.plane, alpha(i), scale.radius(curve.values[i % STEPS]));
+            let at = |i: usize| plot_position(setting.plane, alpha(i), scale.radius(curve.values[i % STEPS]));
             (curve.name, Pen::of(curve.name, ui.visuals()), (0..=STEPS).map(at).collect())
         })
         .collect();
@@ -212,7 +212,7 @@ fn plot(ui: &mut Ui, setting: &Setting, curves: &[Curve], scale: Scale) {
     });
 }
 
-/// A ring for each power of ten, and their names.
+/// Draws a labelled ring for each power of ten.
 fn rings(plot: &mut PlotUi<'_>, scale: Scale, faint: Color32) {
     let ring = |plot: &mut PlotUi<'_>, name: &str, radius: f64, strength: f32| {
         let circle = (0..=90).map(|i| (f64::from(i) / 90.0 * TAU).sin_cos());
@@ -223,41 +223,41 @@ fn rings(plot: &mut PlotUi<'_>, scale: Scale, faint: Color32) {
     ring(plot, "rim", 1.0, 0.8);
     for (power, radius) in scale.rings() {
         ring(plot, &format!("ring {power}"), radius, 0.4);
-        // Between two spokes, on the side the light comes from: the strong lobes are on the other.
+        // Labels lie between two spokes, on the side of the light: the strong lobes are on the other side.
         let (sin, cos) = (0.625 * PI).sin_cos();
-        let words = RichText::new(power_of_ten(power)).size(10.0);
+        let label = RichText::new(power_of_ten(power)).size(10.0);
         let at = PlotPoint::new(radius * cos, radius * sin);
-        plot.text(Text::new(format!("scale {power}"), at, words).color(faint).allow_hover(false));
+        plot.text(Text::new(format!("scale {power}"), at, label).color(faint).allow_hover(false));
     }
 }
 
-/// Spokes with their angles, and the light.
+/// Draws spokes with their angles, and an arrow from the light.
 fn frame(plot: &mut PlotUi<'_>, setting: &Setting, faint: Color32, text: Color32) {
     let plane = setting.plane;
     let light = if plane == Plane::Around { 0.0 } else { setting.theta_i };
     for i in 0..12 {
         let a = alpha(i * STEPS / 12);
-        let spoke = PlotPoints::new(vec![place(plane, a, 0.0), place(plane, a, 1.0)]);
+        let spoke = PlotPoints::new(vec![plot_position(plane, a, 0.0), plot_position(plane, a, 1.0)]);
         let spoke = Line::new(format!("spoke {i}"), spoke).allow_hover(false);
         plot.line(spoke.color(faint.gamma_multiply(0.25)).width(1.0));
         if (a - light).cos() > ARROW_ROOM.cos() {
             continue;
         }
         let (theta_o, phi) = plane.direction(setting.theta_i, a);
-        let [x, y] = place(plane, a, 1.12);
-        let words = degrees(if plane == Plane::Around { phi } else { theta_o }, 0);
-        let words = Text::new(format!("angle {i}"), PlotPoint::new(x, y), RichText::new(words).size(10.0));
-        plot.text(words.color(faint).allow_hover(false));
+        let [x, y] = plot_position(plane, a, 1.12);
+        let label = degrees(if plane == Plane::Around { phi } else { theta_o }, 0);
+        let label = Text::new(format!("angle {i}"), PlotPoint::new(x, y), RichText::new(label).size(10.0));
+        plot.text(label.color(faint).allow_hover(false));
     }
-    let [from, to] = [1.22, 1.01].map(|r| PlotPoints::new(vec![place(plane, light, r)]));
+    let [from, to] = [1.22, 1.01].map(|r| PlotPoints::new(vec![plot_position(plane, light, r)]));
     plot.arrows(Arrows::new("light", from, to).color(text).allow_hover(false));
-    let [x, y] = place(plane, light + 0.5 * ARROW_ROOM, 1.14);
-    let words = Text::new("light's name", PlotPoint::new(x, y), RichText::new("light").size(10.0));
-    plot.text(words.color(text).allow_hover(false));
+    let [x, y] = plot_position(plane, light + 0.5 * ARROW_ROOM, 1.14);
+    let label = Text::new("light's name", PlotPoint::new(x, y), RichText::new("light").size(10.0));
+    plot.text(label.color(text).allow_hover(false));
 }
 
 fn degrees(radians: f64, decimals: usize) -> String {
-    // No minus before what is rounded to 0.
+    // Adding 0 turns −0 into 0, so that no minus is written.
     let degrees = radians.to_degrees() + 0.0;
     format!("{degrees:.decimals$}°").replace('-', "−")
 }
@@ -270,7 +270,7 @@ fn per_steradian(value: f64) -> String {
     }
 }
 
-/// A power of ten as it is printed.
+/// A power of ten as text.
 fn power_of_ten(power: i32) -> String {
     if (-4..=4).contains(&power) { format!("{}", 10f64.powi(power)) } else { format!("1e{power}") }
 }

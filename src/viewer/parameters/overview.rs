@@ -1,4 +1,4 @@
-//! A small picture of the environment beside its parameters.
+//! The overview: a small picture of the environment below its parameters.
 
 use std::sync::{Arc, Weak};
 
@@ -10,36 +10,37 @@ use crate::light::environment::{Environment, Map};
 use crate::picture::resolve::Resolver;
 use crate::picture::{Image, Look};
 
-/// Columns and rows.
+/// Columns and rows of the picture.
 const SIZE: [usize; 2] = [256, 128];
 
-/// The picture, and what it was made from.
+/// The overview of the environment, drawn again when the environment or the look of the picture changes.
 #[derive(Default)]
 pub(super) struct Overview {
-    made: Option<Made>,
+    cached: Option<OverviewCache>,
 }
 
-struct Made {
-    of: Of,
+struct OverviewCache {
+    key: OverviewKey,
     texture: TextureHandle,
+    /// Position of the sun or the strongest light, 0 to 1.
     strongest: Option<[f32; 2]>,
 }
 
-/// What the picture depends on.
-struct Of {
-    /// Weak: a large map that is no longer used is to go.
+/// Everything that the picture depends on.
+struct OverviewKey {
+    /// A weak reference does not keep a large unused map alive.
     map: Weak<Map>,
-    numbers: [f32; 2],
+    intensity_and_turn: [f32; 2],
     lights: usize,
     sun: Option<[f32; 3]>,
     look: Look,
 }
 
-impl Of {
-    fn new(environment: &Environment, image: &Image) -> Of {
-        Of {
+impl OverviewKey {
+    fn new(environment: &Environment, image: &Image) -> OverviewKey {
+        OverviewKey {
             map: Arc::downgrade(&environment.map),
-            numbers: [environment.intensity, environment.turn],
+            intensity_and_turn: [environment.intensity, environment.turn],
             lights: environment.volume_lights().len(),
             sun: environment.sun.map(|sun| sun.to_sun.to_array()),
             look: image.look,
@@ -47,19 +48,19 @@ impl Of {
     }
 }
 
-impl PartialEq for Of {
-    fn eq(&self, other: &Of) -> bool {
+impl PartialEq for OverviewKey {
+    fn eq(&self, other: &OverviewKey) -> bool {
         self.map.ptr_eq(&other.map)
-            && (self.numbers, self.lights, self.sun, self.look)
-                == (other.numbers, other.lights, other.sun, other.look)
+            && self.intensity_and_turn == other.intensity_and_turn
+            && (self.lights, self.sun, self.look) == (other.lights, other.sun, other.look)
     }
 }
 
 impl Overview {
-    /// Shows the environment as the background has it, with the picture's exposure and tone.
+    /// Shows the environment as the background shows it, with the picture's exposure and tone.
     pub fn show(&mut self, ui: &mut Ui, environment: &Environment, image: &Image) {
-        let of = Of::new(environment, image);
-        if self.made.as_ref().is_none_or(|made| made.of != of) {
+        let key = OverviewKey::new(environment, image);
+        if self.cached.as_ref().is_none_or(|cached| cached.key != key) {
             let resolver = Resolver::new(&image.look);
             let pixels = environment.overview(SIZE[0], SIZE[1]);
             let pixels = pixels.iter().map(|radiance| {
@@ -68,29 +69,29 @@ impl Overview {
             });
             let picture = ColorImage::new(SIZE, pixels.collect());
             let texture = ui.ctx().load_texture("environment", picture, TextureOptions::LINEAR);
-            self.made = Some(Made { of, texture, strongest: environment.strongest() });
+            self.cached = Some(OverviewCache { key, texture, strongest: environment.strongest() });
         }
-        let Some(made) = &self.made else { return };
+        let Some(cached) = &self.cached else { return };
         let width = ui.available_width().min(SIZE[0] as f32);
         let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 0.5 * width), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Environment"));
         name(&response, "Environment");
         let whole = egui::Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         let painter = ui.painter_at(rect);
-        painter.image(made.texture.id(), rect, whole, Color32::WHITE);
-        if let Some([u, v]) = made.strongest {
+        painter.image(cached.texture.id(), rect, whole, Color32::WHITE);
+        if let Some([u, v]) = cached.strongest {
             let at = rect.lerp_inside(Vec2::new(u, v));
-            // Seen on white and on black.
+            // The ring is visible on white and on black.
             painter.circle_stroke(at, 5.5, Stroke::new(3.0, Color32::from_black_alpha(170)));
             painter.circle_stroke(at, 5.5, Stroke::new(1.5, Color32::WHITE));
         }
-        let mark = match (made.strongest, environment.sun) {
+        let mark = match (cached.strongest, environment.sun) {
             (None, _) => "",
-            (_, Some(_)) => "; the ring is the sun",
-            (_, None) => "; the ring is its strongest light",
+            (_, Some(_)) => ". The ring marks the sun",
+            (_, None) => ". The ring marks the strongest light",
         };
         response.on_hover_text(format!(
-            "{}\nIn the middle what is seen looking along −z, +x to its right{mark}.",
+            "{}\nThe middle is the view along −z, with +x to its right{mark}.",
             environment.words()
         ));
     }

@@ -1,4 +1,4 @@
-//! The widget of one value.
+//! Widgets that show and edit the value of one parameter.
 
 use eframe::egui;
 use egui::{Align, ComboBox, DragValue, Layout, Slider, SliderClamping, Ui};
@@ -9,11 +9,12 @@ use crate::scene::{Kind, Param, Raw, Value};
 use crate::viewer::document::Document;
 use crate::viewer::navigate;
 
+/// A vector as a value of a scene file.
 pub(super) fn list(p: [f64; 3]) -> Raw {
     Raw::List(p.into_iter().map(Raw::Float).collect())
 }
 
-/// Three numbers in one row; whether one changed.
+/// Shows three numbers in one row. Returns whether one of them was changed.
 pub(super) fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bool {
     let mut changed = false;
     let width = ((ui.available_width() - MARKS_WIDTH) / 3.0 - ui.spacing().item_spacing.x).max(36.0);
@@ -26,10 +27,11 @@ pub(super) fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bo
     changed
 }
 
+/// Shows the azimuth and elevation of a direction as sliders. Returns the direction that they were changed to.
 pub(super) fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let mut angles = navigate::angles(t.into());
     let mut changed = false;
-    for (angle, (word, range)) in
+    for (angle, (label, range)) in
         angles.iter_mut().zip([("azimuth", -180.0..=180.0), ("elevation", -89.0..=89.0)])
     {
         ui.horizontal(|ui| {
@@ -39,15 +41,15 @@ pub(super) fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Ra
                 Layout::left_to_right(Align::Center),
                 |ui| {
                     ui.set_min_width(ui.available_width());
-                    ui.weak(word);
+                    ui.weak(label);
                 },
             );
             ui.spacing_mut().slider_width = slider_width(ui);
             let before = *angle;
             let slider = Slider::new(angle, range).suffix("°").max_decimals(1).update_while_editing(false);
             let response = ui.add(slider);
-            name(&response, &format!("{key} {word}"));
-            // A slider rounds what it is given: that alone is no change.
+            name(&response, &format!("{key} {label}"));
+            // A slider rounds its value to one decimal, which alone is no change.
             changed |= response.changed() && (*angle - before).abs() > 0.051;
         });
     }
@@ -58,129 +60,139 @@ fn slider_width(ui: &Ui) -> f32 {
     (ui.available_width() - VALUE_WIDTH - MARKS_WIDTH).max(40.0)
 }
 
-/// The widget of one value; what it was changed to.
-pub(super) fn widget(
-    ui: &mut Ui,
-    document: &Document,
-    key: &str,
-    param: &Param,
-    value: &Value,
-) -> Option<Raw> {
-    let suffix = match param.unit {
-        "" => String::new(),
-        "°" => "°".into(),
-        unit if unit.len() <= 4 => format!(" {unit}"),
-        // Long units stand in the tooltip.
-        _ => String::new(),
-    };
-    ui.spacing_mut().slider_width = slider_width(ui);
-    match (param.kind, value) {
-        (Kind::Float(min, max, default), Value::Float(x)) => {
-            let mut new = *x;
-            let (low, high) = param.slider.unwrap_or((min, max));
-            let slider = Slider::new(&mut new, low..=high)
-                .logarithmic(is_logarithmic(low, high, default))
-                .smallest_positive((high * 1e-4).min(default.abs() * 0.1).max(1e-6))
-                .clamping(SliderClamping::Never)
-                .max_decimals(4)
-                .update_while_editing(false)
-                .suffix(suffix);
-            let response = ui.add(slider);
-            name(&response, key);
-            // Typed numbers may lie beyond the slider, but not beyond what is allowed.
-            (response.changed() && new != *x).then(|| Raw::Float(new.clamp(min, max)))
-        }
-        (Kind::Int(min, max, default), Value::Int(x)) => {
-            let mut new = *x;
-            let response = match param.slider {
-                Some((low, high)) => ui.add(
-                    Slider::new(&mut new, low as i64..=high as i64)
-                        .logarithmic(is_logarithmic(low, high, default as f64))
-                        .clamping(SliderClamping::Never)
-                        .update_while_editing(false)
-                        .suffix(if param.unit == "cells" { "" } else { &suffix }),
-                ),
-                None if max <= 64 => ui.add(Slider::new(&mut new, min..=max).update_while_editing(false)),
-                None => {
-                    let drag = DragValue::new(&mut new).range(min..=max).update_while_editing(false);
-                    ui.add_sized([VALUE_WIDTH, ui.spacing().interact_size.y], drag)
-                }
-            };
-            name(&response, key);
-            if key.ends_with(".seed") {
-                let dice = ui.button("🎲").on_hover_text("Another random seed");
-                name(&dice, &format!("Dice {key}"));
-                if dice.clicked() {
-                    new = i64::from(rand::rng().random::<u32>() >> 4);
-                }
+/// A parameter whose value is shown as a widget.
+pub(super) struct Field<'a> {
+    pub(super) document: &'a Document,
+    pub(super) key: &'a str,
+    pub(super) param: &'a Param,
+}
+
+impl Field<'_> {
+    /// Shows the widget of `value`. Returns the value that it was changed to.
+    pub(super) fn show(&self, ui: &mut Ui, value: &Value) -> Option<Raw> {
+        let key = self.key;
+        ui.spacing_mut().slider_width = slider_width(ui);
+        match (self.param.kind, value) {
+            (Kind::Float(min, max, default), Value::Float(x)) => self.float(ui, [min, max, default], *x),
+            (Kind::Int(min, max, default), Value::Int(x)) => self.int(ui, [min, max, default], *x),
+            (Kind::Choice(options), Value::Text(text)) => {
+                self.choice(ui, options.iter().map(ToString::to_string), text)
             }
-            (new != *x).then(|| Raw::Int(new.clamp(min, max)))
-        }
-        (Kind::Choice(words), Value::Text(word)) => {
-            let mut new = word.clone();
-            let combo = ComboBox::from_id_salt(key).selected_text(word).show_ui(ui, |ui| {
-                for option in words {
-                    ui.selectable_value(&mut new, (*option).to_owned(), *option);
-                }
-            });
-            name(&combo.response, key);
-            (new != *word).then_some(Raw::Text(new))
-        }
-        (Kind::Color(_), Value::Triple(t)) => color(ui, key, *t),
-        (Kind::Point(_), Value::Triple(t)) => {
-            let mut new = *t;
-            let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
-            triple(ui, key, &mut new, (length * 0.005).max(0.005)).then(|| list(new))
-        }
-        (Kind::Text(_), Value::Text(text)) if key.ends_with(".material") => {
-            let mut new = text.clone();
-            let combo = ComboBox::from_id_salt(key).selected_text(text).show_ui(ui, |ui| {
-                let mut names = document.values().names("materials");
-                if !names.iter().any(|n| n == "water") {
-                    names.push("water".into());
-                }
-                for option in names {
-                    ui.selectable_value(&mut new, option.clone(), option);
-                }
-            });
-            name(&combo.response, key);
-            (new != *text).then_some(Raw::Text(new))
-        }
-        (Kind::Text(_), Value::Text(text)) => {
-            // Half a path is no path: the field keeps what is typed until it is left.
-            let id = ui.make_persistent_id(("text", key));
-            let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| text.clone());
-            let width = ui.available_width() - MARKS_WIDTH;
-            let field = egui::TextEdit::singleline(&mut typed)
-                .hint_text(if key == "volume.file" { "built" } else { "" })
-                .desired_width(width);
-            let response = ui.add(field);
-            name(&response, key);
-            if response.has_focus() {
-                ui.data_mut(|d| d.insert_temp(id, typed.clone()));
-                return None;
+            (Kind::Color(_), Value::Triple(t)) => color(ui, key, *t),
+            (Kind::Point(_), Value::Triple(t)) => {
+                let mut new = *t;
+                let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
+                triple(ui, key, &mut new, (length * 0.005).max(0.005)).then(|| list(new))
             }
-            let entered = ui.data_mut(|d| d.remove_temp::<String>(id));
-            entered.filter(|new| new != text).map(Raw::Text)
+            (Kind::Text(_), Value::Text(text)) if key.ends_with(".material") => {
+                let mut materials = self.document.values().names("materials");
+                if !materials.iter().any(|material| material == "water") {
+                    materials.push("water".into());
+                }
+                self.choice(ui, materials.into_iter(), text)
+            }
+            (Kind::Text(_), Value::Text(text)) => self.text(ui, text),
+            (Kind::Frames | Kind::Series, list) => {
+                // Keyframes can be edited only in the scene file.
+                let label = egui::Label::new(egui::RichText::new(list.to_toml()).weak()).truncate();
+                name(&ui.add(label), key);
+                None
+            }
+            _ => None,
         }
-        (Kind::Frames | Kind::Series, list) => {
-            // Keyframes are written in the scene file.
-            let label = egui::Label::new(egui::RichText::new(list.to_toml()).weak()).truncate();
-            name(&ui.add(label), key);
-            None
+    }
+
+    fn float(&self, ui: &mut Ui, [min, max, default]: [f64; 3], x: f64) -> Option<Raw> {
+        let mut new = x;
+        let (low, high) = self.param.slider.unwrap_or((min, max));
+        let slider = Slider::new(&mut new, low..=high)
+            .logarithmic(is_logarithmic(low, high, default))
+            .smallest_positive((high * 1e-4).min(default.abs() * 0.1).max(1e-6))
+            .clamping(SliderClamping::Never)
+            .max_decimals(4)
+            .update_while_editing(false)
+            .suffix(self.suffix());
+        let response = ui.add(slider);
+        name(&response, self.key);
+        // A typed number may exceed the slider's range, but not the parameter's.
+        (response.changed() && new != x).then(|| Raw::Float(new.clamp(min, max)))
+    }
+
+    fn int(&self, ui: &mut Ui, [min, max, default]: [i64; 3], x: i64) -> Option<Raw> {
+        let mut new = x;
+        let response = match self.param.slider {
+            Some((low, high)) => ui.add(
+                Slider::new(&mut new, low as i64..=high as i64)
+                    .logarithmic(is_logarithmic(low, high, default as f64))
+                    .clamping(SliderClamping::Never)
+                    .update_while_editing(false)
+                    .suffix(if self.param.unit == "cells" { String::new() } else { self.suffix() }),
+            ),
+            None if max <= 64 => ui.add(Slider::new(&mut new, min..=max).update_while_editing(false)),
+            None => {
+                let drag = DragValue::new(&mut new).range(min..=max).update_while_editing(false);
+                ui.add_sized([VALUE_WIDTH, ui.spacing().interact_size.y], drag)
+            }
+        };
+        name(&response, self.key);
+        if self.key.ends_with(".seed") {
+            let dice = ui.button("🎲").on_hover_text("Another random seed");
+            name(&dice, &format!("Dice {}", self.key));
+            if dice.clicked() {
+                new = i64::from(rand::rng().random::<u32>() >> 4);
+            }
         }
-        _ => None,
+        (new != x).then(|| Raw::Int(new.clamp(min, max)))
+    }
+
+    fn choice(&self, ui: &mut Ui, options: impl Iterator<Item = String>, text: &str) -> Option<Raw> {
+        let mut new = text.to_owned();
+        let combo = ComboBox::from_id_salt(self.key).selected_text(text).show_ui(ui, |ui| {
+            for option in options {
+                ui.selectable_value(&mut new, option.clone(), option);
+            }
+        });
+        name(&combo.response, self.key);
+        (new != text).then_some(Raw::Text(new))
+    }
+
+    fn text(&self, ui: &mut Ui, text: &str) -> Option<Raw> {
+        // The text is applied when the field is left, because half a path is not a valid path.
+        let id = ui.make_persistent_id(("text", self.key));
+        let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| text.to_owned());
+        let width = ui.available_width() - MARKS_WIDTH;
+        let field = egui::TextEdit::singleline(&mut typed)
+            .hint_text(if self.key == "volume.file" { "built" } else { "" })
+            .desired_width(width);
+        let response = ui.add(field);
+        name(&response, self.key);
+        if response.has_focus() {
+            ui.data_mut(|d| d.insert_temp(id, typed.clone()));
+            return None;
+        }
+        let entered = ui.data_mut(|d| d.remove_temp::<String>(id));
+        entered.filter(|new| new != text).map(Raw::Text)
+    }
+
+    /// The unit after a number, if it is short. The tooltip shows long units.
+    fn suffix(&self) -> String {
+        match self.param.unit {
+            "" => String::new(),
+            "°" => "°".into(),
+            unit if unit.len() <= 4 => format!(" {unit}"),
+            _ => String::new(),
+        }
     }
 }
 
-/// Whether a slider over this range is easier with equal ratios than with equal steps.
+/// Whether a slider over this range is easier to use on a logarithmic scale.
 fn is_logarithmic(low: f64, high: f64, default: f64) -> bool {
     let wide = high / low.max(1.0) >= 64.0;
     let small = default > 0.0 && default < 0.02 * high;
     low >= 0.0 && (wide || small)
 }
 
-/// A linear colour: the button holds its hue, the factor its brightness past 1.
+/// Shows a linear colour as a button and, for a component above 1, a factor. Returns the colour that it was changed to.
 fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let picked = color_button(ui, key, t);
     let factor = brightness(t);
@@ -193,18 +205,19 @@ fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     picked.or((scale != factor).then(|| list(t.map(|x| x / factor * scale))))
 }
 
-/// A button that opens a picker of a linear colour; it keeps the brightness past 1.
+/// A button that opens a picker of a linear colour. The picked colour keeps the factor of the old one.
 pub(super) fn color_button(ui: &mut Ui, label: &str, t: [f64; 3]) -> Option<Raw> {
     let factor = brightness(t);
     let mut rgb = t.map(|x| (x / factor) as f32);
     let button = ui.color_edit_button_rgb(&mut rgb);
     name(&button, label);
-    // The open picker turns the colour into hue and back: what that rounds is no change.
+    // The open picker converts the colour to a hue and back. The rounding of that is no change.
     let moved = |(new, old): (&f32, &f64)| (f64::from(*new) - old / factor).abs() > 1e-5;
     let picked = button.changed() && rgb.iter().zip(&t).any(moved);
     picked.then(|| list(rgb.map(|x| f64::from(x) * factor)))
 }
 
+/// The factor of a colour: its largest component, at least 1.
 fn brightness(t: [f64; 3]) -> f64 {
     t.into_iter().fold(1.0, f64::max)
 }

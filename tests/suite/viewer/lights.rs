@@ -90,7 +90,7 @@ fn the_last_light_is_removed_and_comes_back() {
     window.press("Remove sun");
     window.settle();
     assert!(lights(&window).is_empty() && !toml(&window).contains("[lights"));
-    assert!(window.reads("No light but the surroundings'"));
+    assert!(window.reads("No lights except the surroundings"));
     assert!(window.viewer().document().fault().is_none() && window.viewer().document().is_changed());
     let dark = shown(&window);
     assert!(dark.0.iter().zip(&picture.0).all(|(new, old)| new[1] <= old[1]) && dark.0 != picture.0);
@@ -170,7 +170,7 @@ fn a_name_that_is_taken_or_no_name_is_refused_with_the_reason() {
     add(&mut window, "point");
     let text = toml(&window);
     for (name, why) in
-        [("sun", "another light is named sun"), ("", "a light needs a name"), ("a.b", "no dots")]
+        [("sun", "another light is named sun"), ("", "a light needs a name"), ("a.b", "cannot contain dots")]
     {
         window.press("Rename point");
         window.enter("Name of point", name);

@@ -318,7 +318,7 @@ fn the_search_shows_matches_only() {
     let has = |key: &str| found.iter().any(|name| name == key);
     assert!(has("curves.h") && !has("curves.amplitude"), "when to turn it is searched: {found:?}");
     window.enter("Search parameters", "no such thing");
-    assert!(window.reads("No parameter has this"));
+    assert!(window.reads("No parameter matches"));
     window.press("✖");
     assert!(shown(&window).contains(&"curves.h".to_owned()));
 }

@@ -262,7 +262,7 @@ fn a_window_whose_device_is_lost_is_opened_anew_with_its_scene() {
     let Some(mut desk) = Desk::open(arguments.as_flattened()) else { return };
     let (code, said) = desk.end();
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("opened anew"), "{said}");
+    assert!(said.contains("the window is reopened"), "{said}");
     // The second window's picture: the scene still has the changes of the command line.
     let shot = desk.folder.path().join("shot.png");
     let (width, height, pixels) = taki::output::frame::read_png(&shot).expect("a screenshot");
