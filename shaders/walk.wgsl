@@ -1,11 +1,11 @@
-// The exact 3-D DDA through a tiled grid of unit cells. Twin: src/walk.rs, where the edge cases stand.
+// The exact 3-D DDA through a tiled grid of unit cells. Twin: src/walk.rs, which describes the edge cases.
 
 const NEVER: f32 = 1.0e30;
 const PARALLEL: f32 = 1.0e-20;
-// Of where a ray leaves a box: 1 − 2^−20.
+// Fraction of the parameter where a ray leaves a box at which a leap ends: 1 − 2^−20.
 const LEAP_MARGIN: f32 = 0.99999905;
 
-// Whether empty cells hold boxes to leap over (src/volume/leaps.rs).
+// True if empty cells hold boxes to leap over (src/volume/leaps.rs).
 override LEAPS: bool = false;
 
 struct Walk {
