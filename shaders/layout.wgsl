@@ -42,7 +42,7 @@ struct FrameUniforms {
     haze_color: vec3<f32>,
     // Distance of haze in front of the background, metres.
     haze_far: f32,
-    // Index of the light for which rock casts shadows on rock.
+    // Index of the light for which rock casts shadows on rock; the largest u32 if there is none.
     shadow_light: u32,
     // Number of levels of the volume.
     levels: u32,

@@ -2,8 +2,7 @@
 //!
 //! A quad A(0,0) B(1,0) C(1,1) D(0,1) is handled in its own plane: axes e1 (along AB), e2 (so that
 //! A, B, C, D run counter-clockwise) and n = e1 × e2. Lengths are metres.
-//! `shaders/gbuffer.wgsl` and `shaders/mapping.wgsl` hold the twins of [`QuadMap::uv`] and
-//! [`CellFrame`].
+//! Twins: `quad_hit` ([`QuadMap::uv`]) and `CellFrame` in `shaders/mapping.wgsl`.
 
 mod quad;
 mod sheet;

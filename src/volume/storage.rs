@@ -1,23 +1,23 @@
-//! Which form a volume's cells are stored in, and the memory that either takes.
+//! Choice between dense and sparse storage of a volume's cells, and the memory of each.
 
 use super::{Bricks, Cell, WaterSpec};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 
-/// How the cells of a volume are stored.
+/// Storage of a volume's cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Storage {
-    /// All of them.
+    /// All cells are stored.
     #[default]
     Dense,
-    /// In bricks, those that hold anything.
+    /// Non-empty cells are stored in bricks.
     Sparse,
 }
 
-/// What a scene asks for.
+/// Storage that a scene asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StorageChoice {
-    /// Dense where that fits the memory.
+    /// Dense if that fits into memory.
     #[default]
     Auto,
     /// All cells.
@@ -46,22 +46,23 @@ fn cells(size: [u32; 3]) -> u128 {
     size.iter().map(|&n| u128::from(n)).product()
 }
 
-/// The storage of a water volume within `memory` bytes. Nothing of its size is allocated.
+/// Chooses the storage of a water volume within `memory` bytes. Allocates nothing of the volume's size.
 ///
 /// # Errors
-/// Where it does not fit. What the curves will take is not known yet: [`super::build_sparse_water`] looks again.
+/// An error if it does not fit. The number of cells that the curves pass is not known yet;
+/// [`super::build_sparse_water`] checks again.
 pub fn storage_of(spec: &WaterSpec, asked: StorageChoice, memory: u64) -> Result<Storage> {
     let fits = check_budget(spec.size, spec.strand_bytes(), memory);
     let is_drawn = dense_bytes(spec.size, false) <= u128::from(memory);
     chosen(asked, fits, is_drawn, check_sparse(spec, 0, memory))
 }
 
-/// The storage of a volume file of `size` cells.
+/// Chooses the storage of a volume file of `size` cells.
 pub(super) fn file_storage(size: [u32; 3], asked: StorageChoice, memory: u64) -> Result<Storage> {
     chosen(asked, check_budget(size, 0, memory), true, check_stored(size, 0, 0, memory))
 }
 
-/// Auto is dense where that can be made and drawn, and where sparse storage does not help.
+/// Resolves `Auto`: dense if that can be built and drawn, or if sparse storage does not help.
 fn chosen(asked: StorageChoice, dense: Result<()>, is_drawn: bool, sparse: Result<()>) -> Result<Storage> {
     match asked {
         StorageChoice::Dense => dense.map(|()| Storage::Dense),
@@ -73,7 +74,7 @@ fn chosen(asked: StorageChoice, dense: Result<()>, is_drawn: bool, sparse: Resul
     }
 }
 
-/// Checks, before anything is allocated, that a volume of `size` cells fits into `budget` bytes.
+/// Checks before any allocation that a volume of `size` cells fits into `budget` bytes.
 /// Building needs the packed cells and one vector per cell, and `extra` bytes more per cell.
 pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
     let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>() + extra) as u128;
