@@ -107,8 +107,8 @@ struct Groups {
     pad_b: u32,
 }
 
-// Returns the list entry of workgroup `group`: even entries first. Software Vulkan gives its threads fixed parts
-// of a dispatch; the interleaving evens out the load where the picture's water is uneven.
+// Returns the list entry of workgroup `group`: even entries first. Software Vulkan gives its threads fixed
+// parts of a dispatch; the interleaving evens out the load where the picture's water is uneven.
 fn listed(groups: Groups, group: u32) -> u32 {
     let half = (groups.count + 1u) / 2u;
     return groups.first + select(2u * group, 2u * (group - half) + 1u, group >= half);

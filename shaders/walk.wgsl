@@ -68,8 +68,8 @@ fn walk_exit(walk: Walk) -> f32 {
     return select(select(t_next.z, t_next.y, y), t_next.x, x);
 }
 
-// Advances to the last cell of the box of the ray's cell, if `on` is set and the cell, whose words are `texel`,
-// is empty. Returns the number of cells skipped.
+// Advances to the last cell of the box of the ray's cell, if `on` is set and the cell, whose words are
+// `texel`, is empty. Returns the number of cells skipped.
 fn walk_leap(walk: ptr<function, Walk>, texel: vec2<u32>, on: bool) -> u32 {
     let empty = on & ((texel.x & 0xffffu) == 0u);
     let exponents = (vec3<u32>(texel.y, texel.y, texel.x) >> (*walk).octant) & vec3<u32>(3u);

@@ -140,9 +140,9 @@ impl Walk {
     /// Advances to the last cell of an empty box (or the one before it) without leaving the slab. Returns the
     /// number of cells skipped.
     ///
-    /// The box begins with the ray's cell, extends in the direction of its octant and has sides 2^`exponents`,
-    /// none longer than the tile. The skipped cells yield no crossings: the next crossing's `t_enter` is where
-    /// this leap began.
+    /// The box begins with the ray's cell, extends in the direction of its octant and has sides
+    /// 2^`exponents`, none longer than the tile. The skipped cells yield no crossings: the next crossing's
+    /// `t_enter` is where this leap began.
     #[inline]
     pub fn leap(&mut self, exponents: [u32; 3]) -> u32 {
         let [x, y, z] = exponents.map(|l| ((1i32 << l) - 1) as f32);

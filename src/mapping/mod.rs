@@ -121,8 +121,8 @@ impl QuadMap {
         self.a_world + self.e1_world * p.x + self.e2_world * p.y
     }
 
-    /// Inverse bilinear map of a point `hh` = X − A of the plane. Returns the unclamped (u, v) and the root s,
-    /// which equals det ∂X/∂(u,v). Solves the robust form of the quadratic, method §3.
+    /// Inverse bilinear map of a point `hh` = X − A of the plane. Returns the unclamped (u, v) and the root
+    /// s, which equals det ∂X/∂(u,v). Solves the robust form of the quadratic, method §3.
     pub fn uv_and_det(&self, hh: Vec2) -> (Vec2, f32) {
         let k2 = cross(self.g, self.f);
         let k1 = cross(self.e, self.f) + cross(hh, self.g);

@@ -1,7 +1,7 @@
 //! Sheets of falling water: a profile from over the lip down to the foot, tessellated into quads.
 //!
-//! A point of the sheet is P(s) + w(s)·C(u): the profile plus the width times a cross-section of fixed shape. All
-//! rows are parallel, so every quad is a planar trapezoid, however the profile bends.
+//! A point of the sheet is P(s) + w(s)·C(u): the profile plus the width times a cross-section of fixed shape.
+//! All rows are parallel, so every quad is a planar trapezoid, however the profile bends.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -12,8 +12,8 @@ pub const GRAVITY: f64 = 9.81;
 /// Straight pieces that approximate each span of the spline. In a right-angled bend their total length falls
 /// short of the arc length by 1e-4.
 const PIECES: usize = 64;
-/// Least speed as a fraction of the speed at the first point. The steepest arc of a splash, 87°, keeps 0.052 of
-/// its speed as horizontal speed.
+/// Least speed as a fraction of the speed at the first point. The steepest arc of a splash, 87°, keeps 0.052
+/// of its speed as horizontal speed.
 const SLOWEST: f64 = 0.05;
 
 /// Parameters of a sheet.
@@ -59,8 +59,8 @@ pub struct Ends {
 }
 
 impl Ends {
-    /// Returns the erosion e at `u` across and at the fraction `way` of the profile, both 0 to 1. The remaining
-    /// fractions of sides, break-up, foot and head are multiplied.
+    /// Returns the erosion e at `u` across and at the fraction `way` of the profile, both 0 to 1. The
+    /// remaining fractions of sides, break-up, foot and head are multiplied.
     pub fn erosion(&self, u: f32, way: f32) -> f32 {
         let ramp = |from_end: f32, share: f32| match share > 0.0 {
             true => (from_end / share).clamp(0.0, 1.0),
@@ -102,8 +102,9 @@ pub struct SheetFault {
 }
 
 impl Sheet {
-    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that rises
-    /// higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
+    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that
+    /// rises higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of
+    /// constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
     pub fn stations(&self) -> Vec<Station> {
         let mut stations: Vec<Station> = Vec::new();
         for (point, width) in spline(&self.points, &self.widths) {
@@ -132,8 +133,8 @@ impl Sheet {
         (1.0 - stretch) * at.arc / last.arc + stretch * at.time / last.time
     }
 
-    /// Returns the stations of the rows. They are spaced half by arc length and half by texture position, so that
-    /// neither the bend at the lip nor the long streaks at the foot are tessellated too coarsely.
+    /// Returns the stations of the rows. They are spaced half by arc length and half by texture position, so
+    /// that neither the bend at the lip nor the long streaks at the foot are tessellated too coarsely.
     pub fn rows(&self) -> Vec<Station> {
         let stations = self.stations();
         let last = stations[stations.len() - 1];
@@ -168,8 +169,8 @@ impl Sheet {
         borders
     }
 
-    /// Returns the cross-section at u, in widths: along `across`, and out of the sheet. It is an arc as wide as
-    /// the sheet.
+    /// Returns the cross-section at u, in widths: along `across`, and out of the sheet. It is an arc as wide
+    /// as the sheet.
     fn section(&self, u: f32) -> DVec2 {
         let turn = std::f64::consts::TAU * f64::from(self.round);
         let angle = (f64::from(u) - 0.5) * turn;
@@ -220,9 +221,10 @@ impl Sheet {
     }
 }
 
-/// Samples the centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and Keyser 2011:
-/// no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after the last point it
-/// is continued by their reflections. Widths are splines in the same knots, kept between their neighbours.
+/// Samples the centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and
+/// Keyser 2011: no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after
+/// the last point it is continued by their reflections. Widths are splines in the same knots, kept between
+/// their neighbours.
 fn spline(points: &[Vec3], widths: &[f32]) -> Vec<(DVec3, f64)> {
     let n = points.len();
     let node = |i: usize| points[i].as_dvec3().extend(f64::from(widths[i]));

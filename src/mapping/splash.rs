@@ -1,8 +1,9 @@
 //! Splashes: water thrown up where it hits a ledge or a pool.
 //!
-//! Drops leave the line of impact with a fraction of their impact speed and fly along parabolas. Drag is neglected:
-//! it is small for drops of millimetres at a few m/s. Neighbouring drops of a corona form a sheet, so each parabola
-//! is the profile of a short [`Sheet`] across its own plane, whose borders are eroded to single drops.
+//! Drops leave the line of impact with a fraction of their impact speed and fly along parabolas. Drag is
+//! neglected: it is small for drops of millimetres at a few m/s. Neighbouring drops of a corona form a sheet,
+//! so each parabola is the profile of a short [`Sheet`] across its own plane, whose borders are eroded to
+//! single drops.
 
 use glam::{Vec2, Vec3};
 use rand::RngExt;
@@ -11,18 +12,18 @@ use rand_pcg::Pcg64Mcg;
 use super::{Ends, GRAVITY, Material, Sheet};
 use crate::util::random::{Family, Stream};
 
-/// Points of a parabola. A drop's position deviates by at most 0.6 ‰ of the arc's length, on the steepest arc,
-/// which turns sharply at the top, by 2.5 ‰. Half as many points give 1.5 %.
+/// Points of a parabola. A drop's position deviates by at most 0.6 ‰ of the arc's length, on the steepest
+/// arc, which turns sharply at the top, by 2.5 ‰. Half as many points give 1.5 %.
 const POINTS: usize = 17;
 /// Launch speed of the slowest arc as a fraction of the largest.
 const SLOWEST: f32 = 0.55;
-/// Least and largest fraction of the flight, up and down again, after which an arc has thinned out to nothing.
-/// Whole arcs would look like the jets of a fountain, and their fold at the top like a petal.
+/// Least and largest fraction of the flight, up and down again, after which an arc has thinned out to
+/// nothing. Whole arcs would look like the jets of a fountain, and their fold at the top like a petal.
 const LASTING: [f32; 2] = [0.35, 0.65];
 /// Width at the start of an arc as a fraction of the width at its end.
 const NARROWEST: f32 = 0.35;
-/// Erosion of an arc: it emerges from the foot of the fall and thins out to single drops. With less `fade` the
-/// arcs end in a row; with more, nothing is left at the top.
+/// Erosion of an arc: it emerges from the foot of the fall and thins out to single drops. With less `fade`
+/// the arcs end in a row; with more, nothing is left at the top.
 const ENDS: Ends = Ends { edge: 1.0, breakup: 0.3, fade: 0.7, head: 0.08 };
 /// Steepest launch, degrees. A vertical parabola would not define a plane.
 const STEEPEST: f32 = 87.0;

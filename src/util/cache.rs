@@ -1,8 +1,8 @@
 //! Disk cache of data that is slow to compute: volume textures and opaque meshes.
 //!
 //! A file holds its key (the text of all inputs), the computed values, and a checksum of both. A file that is
-//! incomplete or has another key counts as missing, and so does a folder that cannot be read or written: the values
-//! are then computed again.
+//! incomplete or has another key counts as missing, and so does a folder that cannot be read or written: the
+//! values are then computed again.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -70,8 +70,8 @@ impl Cache {
         Cache { least: Duration::ZERO, ..self }
     }
 
-    /// Returns the `count` values of a `kind` under `key`: read from the cache, or computed by `make`. Values that
-    /// are quicker to compute than to read are not stored.
+    /// Returns the `count` values of a `kind` under `key`: read from the cache, or computed by `make`. Values
+    /// that are quicker to compute than to read are not stored.
     ///
     /// # Errors
     /// The error of `make`; faults of the cache itself are ignored.

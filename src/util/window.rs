@@ -21,7 +21,8 @@ impl Window {
         Window { x: 0, y: 0, width, height }
     }
 
-    /// Returns the index of an image's pixel among the window's pixels, row by row. The pixel lies in the window.
+    /// Returns the index of an image's pixel among the window's pixels, row by row. The pixel lies in the
+    /// window.
     pub fn index(&self, pixel: [u32; 2]) -> usize {
         (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
     }

@@ -94,8 +94,8 @@ impl Cells {
         }
     }
 
-    /// Replaces every stored cell by a function of its linear index, its position among the stored cells and its
-    /// value.
+    /// Replaces every stored cell by a function of its linear index, its position among the stored cells and
+    /// its value.
     pub fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
         match self {
             Cells::Dense(cells) => Arc::make_mut(cells)

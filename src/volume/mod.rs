@@ -81,7 +81,8 @@ impl VolumeTexture {
         hasher.finalize()
     }
 
-    /// Returns the histogram of ρ over the flow cells, with `bins` equal steps between 0 and α (at least one).
+    /// Returns the histogram of ρ over the flow cells, with `bins` equal steps between 0 and α (at least
+    /// one).
     pub fn rho_histogram(&self, bins: usize) -> RhoHistogram {
         let bins = bins.max(1);
         let mut h = RhoHistogram { at_zero: 0, between: vec![0; bins], at_alpha: 0 };
@@ -128,8 +129,8 @@ impl VolumeTexture {
     }
 }
 
-/// Histogram of ρ over the flow cells. A built volume clamps ρ, so many cells lie exactly at 0 or α; both ends
-/// are counted separately.
+/// Histogram of ρ over the flow cells. A built volume clamps ρ, so many cells lie exactly at 0 or α; both
+/// ends are counted separately.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RhoHistogram {
     /// Cells with ρ = 0.
@@ -147,7 +148,8 @@ impl RhoHistogram {
     }
 }
 
-/// Figures of a volume texture. Means and fractions are taken over the flow cells, the cells with a direction.
+/// Figures of a volume texture. Means and fractions are taken over the flow cells, the cells with a
+/// direction.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
     /// nx, ny, nz.

@@ -28,15 +28,16 @@ pub enum StorageChoice {
 
 words! { StorageChoice { Auto => "auto", Dense => "dense", Sparse => "sparse" } }
 
-/// Bytes of a volume of `size` cells, all stored, in a picture: on the host, there again where its empty cells hold boxes to leap
-/// over, and on the device. Coarse levels (`pyramid`) take a seventh on the host, and up to three quarters on the device.
+/// Bytes of a volume of `size` cells, all stored, in a picture: on the host, there again where its empty
+/// cells hold boxes to leap over, and on the device. Coarse levels (`pyramid`) take a seventh on the host,
+/// and up to three quarters on the device.
 pub fn dense_bytes(size: [u32; 3], pyramid: bool) -> u128 {
     let per_cell = size_of::<Cell>() * if pyramid { 4 } else { 3 };
     cells(size) * per_cell as u128
 }
 
-/// Bytes of a volume of `size` cells of which `stored` are stored in bricks: the most of building it, which needs `extra` bytes
-/// for each of those, and of a picture, which needs it on host and device.
+/// Bytes of a volume of `size` cells of which `stored` are stored in bricks: the most of building it, which
+/// needs `extra` bytes for each of those, and of a picture, which needs it on host and device.
 pub fn sparse_bytes(size: [u32; 3], stored: u64, extra: usize) -> u128 {
     let [host, device] = Bricks::bytes_of(size, stored);
     host + device.max(u128::from(stored) * extra as u128)
@@ -92,12 +93,12 @@ pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a water volume of which `stored` cells at least are passed by curves, if they do not fit into `memory` bytes.
+/// Refuses a water volume whose curves pass at least `stored` cells, if these do not fit into `memory` bytes.
 pub(super) fn check_sparse(spec: &WaterSpec, stored: u64, memory: u64) -> Result<()> {
     check_stored(spec.size, stored, size_of::<glam::Vec3>() + spec.strand_bytes(), memory)
 }
 
-/// As [`sparse_bytes`].
+/// Refuses sparse storage that needs more than `memory` bytes; parameters as in [`sparse_bytes`].
 pub(super) fn check_stored(size: [u32; 3], stored: u64, extra: usize, memory: u64) -> Result<()> {
     let need = sparse_bytes(size, stored, extra);
     if need <= u128::from(memory) && stored <= u64::from(u32::MAX) {

@@ -1,5 +1,6 @@
-//! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to the same points of the face
-//! y = ny give every cell they pass its direction. ρ and k are random in each cell, or follow the strands.
+//! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to the same points of the
+//! face y = ny give every cell they pass its direction. ρ and k are random in each cell, or follow the
+//! strands.
 
 use std::sync::Arc;
 
@@ -17,8 +18,8 @@ use crate::util::random::{Family, Stream};
 use crate::volume::WaterSpec;
 
 impl WaterSpec {
-    /// Returns whether ρ and k depend on the packed cells alone. If so, [`set_density_and_reflection`] applies a
-    /// new base of k without walking the curves again.
+    /// Returns whether ρ and k depend on the packed cells alone. If so, [`set_density_and_reflection`]
+    /// applies a new base of k without walking the curves again.
     pub fn density_is_of_cells(&self) -> bool {
         self.structure.coherence == 0.0 && self.structure.coverage == 0.0
     }
@@ -94,8 +95,8 @@ pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut Cells) {
 /// Sets ρ, k_d and k_s of every cell with a direction.
 ///
 /// With coherence c the normal variate of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²). Its variance is 1
-/// again, so the distribution of ρ stays. Coverage then multiplies ρ by 1 − coverage·e^(−l), where l is the length
-/// of the strands in the cell, so that strands end softly.
+/// again, so the distribution of ρ stays. Coverage then multiplies ρ by 1 − coverage·e^(−l), where l is the
+/// length of the strands in the cell, so that strands end softly.
 fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
     let family = Family::new(spec.seed, Stream::Cell);
     let structure = &spec.structure;
