@@ -117,7 +117,7 @@ impl Bricks {
         self.place(x, y, z).map(|place| &mut self.cells[place])
     }
 
-    /// Those of `cells` that are not empty; all nx·ny·nz are given in their order.
+    /// Stores the non-empty ones of `cells`, which holds all nx·ny·nz cells in index order.
     pub fn of(size: [u32; 3], cells: &[Cell]) -> Bricks {
         let area = size[0] as usize * size[1] as usize;
         let mut packer = Packer::new(size);
@@ -141,7 +141,7 @@ impl Bricks {
         starts.iter().zip(ends).map(|(start, end)| end - start).collect()
     }
 
-    /// As [`super::Cells::change`].
+    /// Implements [`super::Cells::change`].
     pub(super) fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
         let area = self.grid[0] as usize * self.grid[1] as usize;
         let [nx, ny, _] = self.size.map(u64::from);
@@ -181,7 +181,7 @@ impl Bricks {
         sums
     }
 
-    /// As [`super::Cells::checksum`].
+    /// Implements [`super::Cells::checksum`].
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         let [nx, ny, nz] = self.size;
         let of_layer = |z: u32| {

@@ -59,7 +59,7 @@ impl Flow {
         Flow::summed(spec, &lengths, place, [0, 1], monitor)
     }
 
-    /// As [`Flow::new`], for the cells that `bricks` will store, in their order: the same sums.
+    /// Computes the sums of [`Flow::new`] for the cells that `bricks` will store, in storage order.
     pub fn packed(spec: &WaterSpec, bricks: &Bricks, monitor: &dyn Monitor) -> Result<Flow> {
         let layers = bricks.layers();
         let layers_per_slab = layers.len().div_ceil(16);

@@ -143,11 +143,11 @@ struct Masks {
 }
 
 impl Masks {
-    /// Of a slab of layers.
+    /// Computes the masks of a slab of layers.
     fn new(size: [u32; 3], full: &[bool], first: usize, layers: usize) -> Self {
         let size @ [nx, ny, nz] = size.map(|n| n as usize);
         let layer = nx * ny;
-        // Of the exponents along each axis, those that are `l`.
+        // Bits of the boxes whose exponent along the axis is `l`.
         let along_x = |l: u32| 0x1111_1111_1111_1111u64 << l;
         let along_y = |l: u32| 0x000f_000f_000f_000fu64 << (4 * l);
         let along_z = |l: u32| 0xffffu64 << (16 * l);
