@@ -1,5 +1,5 @@
-// What every stage shares with the host: put in front of each stage's source.
-// src/gpu/layout.rs holds the twins; a test compares names, offsets and sizes.
+// Types that every stage shares with the host; prepended to each stage's source. Twin:
+// src/engine/gpu/layout.rs; a test compares names, offsets and sizes.
 
 const WORKGROUP: u32 = 8u;
 
@@ -27,24 +27,24 @@ struct FrameUniforms {
     // log₂e · α/65535 · (σ in 1/m, or τ): optical depth in bits per unit of ρ code (and metre).
     extinction: f32,
     texture_frame: u32,
-    // Haze at the eye, 1/m, and how it thins upwards, 1/m. src/haze.rs.
+    // Density of the haze at the eye, 1/m, and its decrease with height, 1/m. See src/light/haze.rs.
     haze_density: f32,
     haze_falloff: f32,
-    // The part of the image in the targets: its first pixel and its size.
+    // Part of the image that the targets hold: its first pixel and its size.
     window_x: u32,
     window_y: u32,
     window_width: u32,
     window_height: u32,
-    // How far the volume has moved down the flow, in cells: 0 to ny.
+    // Distance that the volume has moved along the flow, in cells: 0 to ny.
     flow_cells: f32,
-    // Layers of the quad ids: most sheets one ray goes through.
+    // Layers of the quad ids: the most sheets that one ray passes.
     layers: u32,
     haze_color: vec3<f32>,
-    // Metres of haze before the background.
+    // Distance of haze in front of the background, metres.
     haze_far: f32,
-    // The light that rock keeps from rock.
+    // Index of the light for which rock casts shadows on rock; the largest u32 if there is none.
     shadow_light: u32,
-    // Levels of the volume.
+    // Number of levels of the volume.
     levels: u32,
     // Solid angle of the pixel in the middle of the image, over its number of samples.
     footprint: f32,
@@ -58,7 +58,7 @@ struct Light {
     intensity: vec3<f32>,
     // Cosine at the edge of a spot light's cone, below which it is dark; −2 where there is no cone.
     cos_edge: f32,
-    // Unit, against a spot light's beam.
+    // Unit vector opposite to a spot light's beam.
     axis: vec3<f32>,
     // 1 / (cosine where the full light begins − cos_edge).
     inverse_soft: f32,
@@ -74,23 +74,23 @@ struct Quad {
     repeat_v: f32,
     // The eye relative to corner A, along e1, e2 and n.
     eye_plane: vec3<f32>,
-    // Where the profile of its material begins, of multiple scattering.
+    // Start of the multiple-scattering profile of the quad's material.
     profile: u32,
     e: vec2<f32>,
     f: vec2<f32>,
     g: vec2<f32>,
-    // Where in the texture corner A is, copies of the volume.
+    // Texture position of corner A, in copies of the volume.
     offset: vec2<f32>,
-    // e at A, B, C and D.
+    // Erosion e at A, B, C and D.
     erosion: vec4<f32>,
-    // Ψ of droplets in place of the cells', if above 0.
+    // Ψ of droplets; replaces Ψ of the cells if above 0.
     mist: f32,
     pad_a: f32,
     pad_b: f32,
     pad_c: f32,
 }
 
-// The part of the window that is looked at.
+// Part of the window that a pass works on.
 struct Tile {
     x: u32,
     y: u32,
@@ -98,7 +98,7 @@ struct Tile {
     height: u32,
 }
 
-// The workgroups that one submission works on: of a list, in which x is in the lower half of a word and y in the upper.
+// Workgroups of one submission, a range of a list whose words hold x in the lower half and y in the upper.
 struct Groups {
     area: Tile,
     first: u32,
@@ -107,8 +107,8 @@ struct Groups {
     pad_b: u32,
 }
 
-// Which of the list workgroup `group` takes: even ones first. Software Vulkan deals workgroups out to its threads in fixed
-// parts of a dispatch, and water is not everywhere alike.
+// Returns the list entry of workgroup `group`: even entries first. Software Vulkan gives its threads fixed
+// parts of a dispatch; the interleaving evens out the load where the picture's water is uneven.
 fn listed(groups: Groups, group: u32) -> u32 {
     let half = (groups.count + 1u) / 2u;
     return groups.first + select(2u * group, 2u * (group - half) + 1u, group >= half);
@@ -126,7 +126,8 @@ fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.x + a.y * b.y;
 }
 
-// Unit direction from a point to a light, and how much of its intensity arrives there. Light::at.
+// Returns the unit direction from a point to a light and the fraction of its intensity that arrives there
+// (Light::at).
 fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
     if light.has_position == 0u {
         return vec4<f32>(light.vector, 1.0);
@@ -142,14 +143,14 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(to_light, falloff);
 }
 
-// Fresnel's reflection of water for light at an angle to the normal (Schlick 1994).
+// Fresnel reflectance of water for light at an angle to the normal (Schlick 1994).
 fn fresnel(cos_angle: f32) -> f32 {
     let m = 1.0 - clamp(cos_angle, 0.0, 1.0);
     let m2 = m * m;
     return 0.02 + 0.98 * (m2 * m2 * m);
 }
 
-// Camera::view_ray: unit direction through a pixel of the whole image.
+// Returns the unit direction through a pixel of the whole image (Camera::view_ray).
 fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
     let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
     let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;

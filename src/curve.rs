@@ -5,10 +5,10 @@ use glam::Vec3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal, UnitCircle};
 
-/// What a spatial fractal curve looks like.
+/// Parameters of a spatial fractal curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurveShape {
-    /// Complexity constant h of eq. (1): small is rough, large is smooth.
+    /// Complexity constant h of eq. (1): a small h gives a rough curve, a large one a smooth curve.
     pub h: f32,
     /// Standard deviation of g in cells.
     pub sigma_g_cells: f32,
@@ -23,8 +23,8 @@ impl CurveShape {
     }
 }
 
-/// The smallest recursion depth whose leaf segments span at most half a cell along a flow of `ny`
-/// cells. Half, because the displacement makes a segment longer than its share of the flow.
+/// Returns the smallest recursion depth whose leaf segments span at most half a cell along a flow of `ny`
+/// cells. The limit is half a cell because displacement makes a segment longer than its share of the flow.
 pub fn levels_for(ny: u32) -> u32 {
     (2 * ny.max(1)).next_power_of_two().trailing_zeros()
 }

@@ -9,15 +9,14 @@
 //!
 //! Edge cases:
 //! - A zero (or −0) component never steps: its next boundary lies at [`NEVER`].
-//! - A start on a face belongs to the cell the ray goes into.
-//! - Through an edge or corner exactly one axis steps at a time, x before y before z, so the cells
-//!   always form a 6-connected chain; the cell between has length 0.
+//! - A ray that starts on a face starts in the cell it enters.
+//! - At an edge or a corner one axis steps at a time, x before y before z. The cells therefore always
+//!   form a 6-connected chain; a cell that is only touched has a crossing of length 0.
 //! - Boundaries are whole numbers and each parameter is computed from its boundary afresh, so no
 //!   error adds up along the ray, and parameters never decrease.
-//!
-//! - A leap ([`Walk::leap`]) goes on to the last cell of an empty box without visiting those between. It ends in a state of the walk
-//!   itself, for boundaries that are passed are counted, not parameters added up; the count is rounded down, so that at
-//!   worst the box takes one leap more.
+//! - A leap ([`Walk::leap`]) advances to the last cell of an empty box without visiting the cells between.
+//!   It counts the boundaries it passes instead of accumulating parameters, so it always lands in a state
+//!   that the plain walk would reach. The count is rounded down: at worst the box takes one more leap.
 //!
 //! `shaders/walk.wgsl` is this file's twin: the same operations in the same order.
 
@@ -31,11 +30,12 @@ pub const NEVER: f32 = 1.0e30;
 /// need more than 10^20 units of t to cross one cell.
 pub const PARALLEL: f32 = 1.0e-20;
 
-/// A leap ends before this share of the parameter where the ray leaves the box, 1 − 2^−20: parameters, each a difference, a
-/// reciprocal and a product, are good to 4·2^−24.
+/// Safety factor of a leap, 1 − 2^−20: the leap ends before this fraction of the parameter where the ray
+/// leaves the box. A parameter is a difference, a reciprocal and a product, so its relative error is at most
+/// 4·2^−24.
 pub const LEAP_MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
-/// One cell on the way of a ray.
+/// One cell that a ray crosses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
     /// The cell; x and y wrapped into the tile, z as it is (may lie outside the slab).
@@ -58,28 +58,28 @@ pub struct Walk {
     t_next: Vec3,
     /// Cells crossed in one unit of t, along each axis.
     speed: Vec3,
-    /// Where the ray leaves the slab.
+    /// Parameter where the ray leaves the slab.
     t_slab: f32,
     t: f32,
     t_end: f32,
 }
 
-/// The whole number at or below x, |x| < 2^23. `f32::floor` is a call into the C library on processors the
-/// build may not assume SSE 4.1 of, and a tenth of a volume's build.
+/// Largest integer not above x, |x| < 2^23. Without SSE 4.1, which the build does not assume, `f32::floor`
+/// calls into the C library and takes a tenth of the time to build a volume.
 #[inline]
 pub fn floor_cell(x: f32) -> i32 {
     let whole = x as i32;
     whole - i32::from(x < whole as f32)
 }
 
-/// The cell coordinate a ray starts in: on a face it is the side the ray goes to.
+/// Coordinate of the cell a ray starts in; on a face, the cell on the side the ray goes to.
 #[inline]
 fn start_cell(x: f32, direction: f32) -> i32 {
     if direction < 0.0 { -floor_cell(-x) - 1 } else { floor_cell(x) }
 }
 
 impl Walk {
-    /// A ray from `origin_cell` (cells, finite, |x| < 2^23) along `direction_cell` (cells per unit
+    /// Starts a ray from `origin_cell` (cells, finite, |x| < 2^23) along `direction_cell` (cells per unit
     /// of t) through tiles of `size` cells.
     pub fn new(size: IVec3, origin_cell: Vec3, direction_cell: Vec3, t_end: f32) -> Self {
         let cell = IVec3::new(
@@ -87,7 +87,7 @@ impl Walk {
             start_cell(origin_cell.y, direction_cell.y),
             start_cell(origin_cell.z, direction_cell.z),
         );
-        // A parallel axis stays at boundary 1 of origin 0: its parameter is always NEVER.
+        // A parallel axis keeps boundary 1, origin 0 and inverse NEVER, so its parameter is always NEVER.
         let mut step = IVec3::ZERO;
         let mut origin = Vec3::ZERO;
         let mut inverse = Vec3::splat(NEVER);
@@ -130,16 +130,19 @@ impl Walk {
         self.cell
     }
 
-    /// The octant the ray goes into: bit 0 is set where x goes down, bit 1 for y, bit 2 for z.
+    /// Octant of the ray's direction: bit 0 is set if x decreases, bit 1 if y does, bit 2 if z does.
     #[inline]
     pub fn octant(&self) -> u32 {
         let down = |axis: usize| u32::from(self.step[axis] < 0) << axis;
         down(0) | down(1) | down(2)
     }
 
-    /// Goes on to the last cell inside a box, if not the one before, and inside the slab. The box begins with the ray's cell, goes its octant's way, and has
-    /// sides 2^`exponents`, none longer than the tile. How many cells are left behind, their crossings with them: the next one
-    /// begins where this leap does.
+    /// Advances to the last cell of an empty box (or the one before it) without leaving the slab. Returns the
+    /// number of cells skipped.
+    ///
+    /// The box begins with the ray's cell, extends in the direction of its octant and has sides
+    /// 2^`exponents`, none longer than the tile. The skipped cells yield no crossings: the next crossing's
+    /// `t_enter` is where this leap began.
     #[inline]
     pub fn leap(&mut self, exponents: [u32; 3]) -> u32 {
         let [x, y, z] = exponents.map(|l| ((1i32 << l) - 1) as f32);
@@ -157,14 +160,14 @@ impl Walk {
     }
 }
 
-/// The whole number at or above x, but 0 below that.
+/// Smallest integer not below x, or 0 if that is negative.
 #[inline]
 fn ceil_from_zero(x: f32) -> i32 {
     let whole = x as i32;
     (whole + i32::from(x > whole as f32)).max(0)
 }
 
-/// Less than a tile past either end of 0..n comes in at the other.
+/// Wraps x, which is less than one tile outside 0..n, into 0..n.
 #[inline]
 fn wrap_within_one_tile(x: i32, n: i32) -> i32 {
     if x < 0 {
@@ -186,7 +189,7 @@ impl Iterator for Walk {
         }
         let t_exit = self.t_next.x.min(self.t_next.y).min(self.t_next.z);
         let crossing = Crossing { cell: self.cell, t_enter: self.t, t_exit: t_exit.min(self.t_end) };
-        // One axis steps: x before y before z where several boundaries coincide.
+        // x steps before y before z where boundaries coincide.
         let t_next = self.t_next;
         if t_next.x <= t_next.y && t_next.x <= t_next.z {
             self.boundary.x += self.step.x as f32;
@@ -206,7 +209,7 @@ impl Iterator for Walk {
     }
 }
 
-/// One step past either end of 0..n comes in at the other.
+/// Wraps x, which is at most one step outside 0..n, into 0..n.
 #[inline]
 fn wrap_one_step(x: i32, n: i32) -> i32 {
     if x < 0 {

@@ -1,14 +1,15 @@
-// The volume's cells as walks read them. Shared by the stages visibility and integrate, which bind `volume` and `bricks`.
+// Reads cells of the volume. Stages that use this bind `volume` and `bricks`.
 
-// Whether cells are stored in bricks: src/volume/bricks.rs. `volume` then holds the stored ones, one after the other.
+// True if cells are stored in bricks (twin: src/volume/bricks.rs). `volume` then holds the stored cells in
+// sequence.
 override SPARSE: bool = false;
 
-// The words of a cell; `at` is its place in the dense texture.
+// Returns the words of a cell; `at` is its position in the dense texture.
 fn cell_words(at: vec3<i32>) -> vec2<u32> {
     if !SPARSE {
         return textureLoad(volume, at).xy;
     }
-    // The mask's halves, and the numbers of the first cells of either.
+    // Both halves of the mask, and the index of the first stored cell of each half.
     let brick = textureLoad(bricks, at >> vec3<u32>(2u));
     let bit = u32((at.x & 3) | ((at.y & 3) << 2u) | ((at.z & 1) << 4u));
     let upper = (at.z & 2) != 0;

@@ -2,8 +2,7 @@
 //!
 //! A quad A(0,0) B(1,0) C(1,1) D(0,1) is handled in its own plane: axes e1 (along AB), e2 (so that
 //! A, B, C, D run counter-clockwise) and n = e1 × e2. Lengths are metres.
-//! `shaders/gbuffer.wgsl` and `shaders/mapping.wgsl` hold the twins of [`QuadMap::uv`] and
-//! [`CellFrame`].
+//! Twins: `quad_hit` ([`QuadMap::uv`]) and `CellFrame` in `shaders/mapping.wgsl`.
 
 mod quad;
 mod sheet;
@@ -20,7 +19,7 @@ pub fn cross(a: Vec2, b: Vec2) -> f32 {
     a.x * b.y - a.y * b.x
 }
 
-/// Why a quad cannot be mapped.
+/// Reason why a quad cannot be mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuadFault {
     /// Two corners are the same point, or the area is (next to) zero.
@@ -32,7 +31,7 @@ pub enum QuadFault {
 }
 
 impl QuadFault {
-    /// The fault in words.
+    /// Describes the fault for an error message.
     pub fn words(self) -> &'static str {
         match self {
             QuadFault::Degenerate => "has no area or repeats a corner",
@@ -62,8 +61,11 @@ pub struct QuadMap {
 }
 
 impl QuadMap {
-    /// Checks the corners (world, metres) and builds the map. A quad may leave its plane by 1e-4 of
-    /// its diagonal; corners are then taken as projected onto the plane through A.
+    /// Checks the corners (world, metres) and builds the map. Corners may lie off the plane by up to 1e-4 of
+    /// the diagonal; they are then projected onto the plane through A.
+    ///
+    /// # Errors
+    /// A [`QuadFault`] if the corners do not form a convex planar quad.
     pub fn new([a, b, c, d]: [Vec3; 4]) -> Result<Self, QuadFault> {
         let (ac, bd) = ((c - a).as_dvec3(), (d - b).as_dvec3());
         let size = ac.length().max(bd.length());
@@ -92,7 +94,7 @@ impl QuadMap {
         let (pb, pc, pd) = (plane(b), plane(c), plane(d));
         let pa = glam::DVec2::ZERO;
         for [p, q, r] in [[pa, pb, pc], [pb, pc, pd], [pc, pd, pa], [pd, pa, pb]] {
-            // A corner of 180° is as bad as a reflex one: the map is singular there.
+            // The map is singular at a corner of 180°, so it is rejected like a reflex one.
             if (q - p).perp_dot(r - q) <= 1e-7 * size * size {
                 return Err(QuadFault::NotConvex);
             }
@@ -108,19 +110,19 @@ impl QuadMap {
         })
     }
 
-    /// The point of the plane at (u, v), metres from A.
+    /// Returns the point of the plane at (u, v), metres from A.
     pub fn point(&self, u: f32, v: f32) -> Vec2 {
         self.e * u + self.f * v + self.g * (u * v)
     }
 
-    /// The same in the world.
+    /// Returns the point at (u, v) in the world, metres.
     pub fn point_world(&self, u: f32, v: f32) -> Vec3 {
         let p = self.point(u, v);
         self.a_world + self.e1_world * p.x + self.e2_world * p.y
     }
 
-    /// Inverse bilinear map of a point `hh` = X − A of the plane; unclamped (u, v) and the root s,
-    /// which equals det ∂X/∂(u,v). Robust form of the quadratic, method §3.
+    /// Inverse bilinear map of a point `hh` = X − A of the plane. Returns the unclamped (u, v) and the root
+    /// s, which equals det ∂X/∂(u,v). Solves the robust form of the quadratic, method §3.
     pub fn uv_and_det(&self, hh: Vec2) -> (Vec2, f32) {
         let k2 = cross(self.g, self.f);
         let k1 = cross(self.e, self.f) + cross(hh, self.g);
@@ -139,7 +141,7 @@ impl QuadMap {
     }
 }
 
-/// How a material lays copies of the volume over its quads.
+/// Repetition and depth of the volume on a quad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Depth H of one volume, metres.
@@ -150,8 +152,9 @@ pub struct Material {
     pub repeat_v: f32,
 }
 
-/// The Jacobian world_from_cell at one point of a quad, in the frame (e1, e2, n seen) of its plane:
-/// columns (cx, 0), (cy, 0) and (0, 0, −depth). Block-diagonal, so its inverse is a 2×2 one.
+/// Jacobian world_from_cell at one point of a quad, in the axes of its plane: e1, e2 and the normal on the
+/// visible side. Its columns are (cx, 0), (cy, 0) and (0, 0, −depth). It is block-diagonal, so its inverse
+/// needs only a 2×2 inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellFrame {
     /// Metres of the plane per cell in x.
@@ -165,14 +168,15 @@ pub struct CellFrame {
 }
 
 impl CellFrame {
-    /// At texture coordinates (u, v), for a volume of `size` cells.
+    /// Returns the Jacobian at the quad's coordinates (u, v), for a volume of `size` cells.
     pub fn new(quad: &QuadMap, material: &Material, size: [u32; 3], uv: Vec2) -> Self {
         let cx = (quad.e + quad.g * uv.y) / (material.repeat_u * size[0] as f32);
         let cy = (quad.f + quad.g * uv.x) / (material.repeat_v * size[1] as f32);
         CellFrame { cx, cy, depth: material.thickness_m / size[2] as f32, det: cross(cx, cy) }
     }
 
-    /// d_cell = world_from_cell⁻¹ d, for d in the plane's frame with z along the seen normal.
+    /// d_cell = world_from_cell⁻¹ d, for d in the plane's axes with z along the visible
+    /// side's normal.
     pub fn cell_from_plane(&self, d: Vec3) -> Vec3 {
         let d2 = d.truncate();
         Vec3::new(cross(d2, self.cy) / self.det, cross(self.cx, d2) / self.det, -d.z / self.depth)

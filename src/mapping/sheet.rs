@@ -1,7 +1,7 @@
 //! Sheets of falling water: a profile from over the lip down to the foot, tessellated into quads.
 //!
-//! A point of the sheet is P(s) + w(s)·C(u): the profile, and the width times a cross-section of one shape. All
-//! rows are parallel, so that every quad is a trapezoid and planar, however the profile bends.
+//! A point of the sheet is P(s) + w(s)·C(u): the profile plus the width times a cross-section of fixed shape.
+//! All rows are parallel, so every quad is a planar trapezoid, however the profile bends.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -9,57 +9,58 @@ use super::{Material, Quad, QuadFault, QuadMap};
 
 /// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Straight pieces that each span of the spline is measured by: at a right angle's turn their length is short of
-/// the arc's by 1e-4.
+/// Straight pieces that approximate each span of the spline. In a right-angled bend their total length falls
+/// short of the arc length by 1e-4.
 const PIECES: usize = 64;
-/// Least speed, as a share of that at the first point: the steepest arc of a splash, 87°, keeps 0.052 of it across.
+/// Least speed as a fraction of the speed at the first point. The steepest arc of a splash, 87°, keeps 0.052
+/// of its speed as horizontal speed.
 const SLOWEST: f64 = 0.05;
 
-/// What a sheet is made from.
+/// Parameters of a sheet.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    /// The profile, metres: at least two, no two neighbours the same.
+    /// Points of the profile, metres: at least two, and no two successive ones equal.
     pub points: Vec<Vec3>,
     /// Width at each point, metres.
     pub widths: Vec<f32>,
-    /// Unit, along the rows.
+    /// Unit vector along the rows.
     pub across: Vec3,
     /// Quads along the profile.
     pub segments: u32,
-    /// Quads across, at least; eroded sides have borders of their own.
+    /// Least number of quads across; eroded sides add borders of their own.
     pub columns: u32,
-    /// Share of a full turn that the cross-section bends: 0 flat, 1 a tube.
+    /// Fraction of a full turn that the cross-section bends: 0 is flat, 1 is a tube.
     pub round: f32,
     /// Speed at the first point, m/s.
     pub v0: f32,
-    /// From a texture laid evenly along the profile (0) to one laid by the time of the fall (1).
+    /// Blend between a texture spaced by arc length (0) and one spaced by the time of the fall (1).
     pub stretch: f32,
-    /// Where in the texture it begins, copies along u and v.
+    /// Texture position of the sheet's start, in copies of the volume along u and v.
     pub offset: Vec2,
-    /// How it ends.
+    /// Erosion towards the borders.
     pub ends: Ends,
-    /// On every quad; its copies are those of the whole sheet.
+    /// Material of every quad; its repeats count copies over the whole sheet.
     pub material: Material,
-    /// Of the material: [`Quad::mist`].
+    /// Mist of the material, as [`Quad::mist`].
     pub mist: f32,
 }
 
-/// How far ρ is eroded towards a sheet's borders.
+/// Erosion of ρ towards a sheet's borders.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ends {
-    /// Share of the half width over which the sides are eroded.
+    /// Fraction of the half width over which the sides are eroded.
     pub edge: f32,
-    /// Erosion at the foot; it grows with the square of the way.
+    /// Erosion at the foot; it grows with the square of the distance along the profile.
     pub breakup: f32,
-    /// Share of the way over which the foot fades to nothing.
+    /// Fraction of the profile over which the foot fades to nothing.
     pub fade: f32,
-    /// Share of the way over which the head grows from nothing.
+    /// Fraction of the profile over which the head grows from nothing.
     pub head: f32,
 }
 
 impl Ends {
-    /// e at `u` across and the share `way` of the profile, both 0 to 1: no more is left of ρ than its sides,
-    /// break-up and fading leave each by itself.
+    /// Returns the erosion e at `u` across and at the fraction `way` of the profile, both 0 to 1. The
+    /// remaining fractions of sides, break-up, foot and head are multiplied.
     pub fn erosion(&self, u: f32, way: f32) -> f32 {
         let ramp = |from_end: f32, share: f32| match share > 0.0 {
             true => (from_end / share).clamp(0.0, 1.0),
@@ -70,13 +71,13 @@ impl Ends {
         1.0 - sides * broken * ramp(1.0 - way, self.fade) * ramp(way, self.head)
     }
 
-    /// Places across where e has a corner.
+    /// Values of u at which the erosion has a kink.
     fn borders(&self) -> [f32; 2] {
         [0.5 * self.edge, 1.0 - 0.5 * self.edge]
     }
 }
 
-/// A place on the profile.
+/// A point on the profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
     /// Metres.
@@ -101,8 +102,9 @@ pub struct SheetFault {
 }
 
 impl Sheet {
-    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that rises
-    /// higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
+    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that
+    /// rises higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of
+    /// constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
     pub fn stations(&self) -> Vec<Station> {
         let mut stations: Vec<Station> = Vec::new();
         for (point, width) in spline(&self.points, &self.widths) {
@@ -115,7 +117,7 @@ impl Sheet {
         stations
     }
 
-    /// At the end of the straight piece from `last` to `point`.
+    /// Returns the station at the end of the straight piece from `last` to `point`.
     fn next(&self, last: &Station, point: DVec3, width: f64) -> Station {
         let (v0, top) = (f64::from(self.v0), f64::from(self.points[0].y));
         let least = (SLOWEST * v0).powi(2);
@@ -125,14 +127,14 @@ impl Sheet {
         Station { point, width, arc: last.arc + step, time }
     }
 
-    /// Where along the texture, 0 to 1, a place on a profile that ends at `last` lies.
+    /// Returns the position along the texture, 0 to 1, of station `at` on a profile that ends at `last`.
     pub fn along(&self, at: &Station, last: &Station) -> f64 {
         let stretch = f64::from(self.stretch);
         (1.0 - stretch) * at.arc / last.arc + stretch * at.time / last.time
     }
 
-    /// The rows' places: half by arc and half by texture, so that neither the bend at the lip nor the long
-    /// streaks at the foot are cut too coarsely.
+    /// Returns the stations of the rows. They are spaced half by arc length and half by texture position, so
+    /// that neither the bend at the lip nor the long streaks at the foot are tessellated too coarsely.
     pub fn rows(&self) -> Vec<Station> {
         let stations = self.stations();
         let last = stations[stations.len() - 1];
@@ -153,7 +155,7 @@ impl Sheet {
         (0..=self.segments).map(row).collect()
     }
 
-    /// Borders between the columns, u from 0 to 1.
+    /// Returns the borders of the columns, u from 0 to 1.
     pub fn borders(&self) -> Vec<f32> {
         let mut borders: Vec<f32> = (0..=self.columns).map(|i| i as f32 / self.columns as f32).collect();
         if self.ends.edge > 0.0 {
@@ -167,7 +169,8 @@ impl Sheet {
         borders
     }
 
-    /// The cross-section at u, in widths: along `across`, and out of the sheet. An arc as wide as the sheet.
+    /// Returns the cross-section at u, in widths: along `across`, and out of the sheet. It is an arc as wide
+    /// as the sheet.
     fn section(&self, u: f32) -> DVec2 {
         let turn = std::f64::consts::TAU * f64::from(self.round);
         let angle = (f64::from(u) - 0.5) * turn;
@@ -178,8 +181,11 @@ impl Sheet {
         DVec2::new(angle.sin(), angle.cos() - 1.0) * radius
     }
 
-    /// Its quads, row by row from the lip, each from u = 0. Neighbours share corners, texture coordinates and
-    /// erosion to the last bit.
+    /// Tessellates the sheet: quads row by row from the lip, each row from u = 0. Neighbours share corners,
+    /// texture coordinates and erosion to the last bit.
+    ///
+    /// # Errors
+    /// A [`SheetFault`] if a quad of the sheet cannot be mapped.
     pub fn quads(&self) -> Result<Vec<Quad>, SheetFault> {
         let rows = self.rows();
         let (first, last) = (rows[0], rows[rows.len() - 1]);
@@ -215,9 +221,10 @@ impl Sheet {
     }
 }
 
-/// The centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and Keyser 2011:
-/// no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after the last point it
-/// is continued by their reflections. Widths are splines in the same knots, kept between their neighbours.
+/// Samples the centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and
+/// Keyser 2011: no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after
+/// the last point it is continued by their reflections. Widths are splines in the same knots, kept between
+/// their neighbours.
 fn spline(points: &[Vec3], widths: &[f32]) -> Vec<(DVec3, f64)> {
     let n = points.len();
     let node = |i: usize| points[i].as_dvec3().extend(f64::from(widths[i]));

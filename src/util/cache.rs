@@ -1,8 +1,8 @@
-//! Things that take long to make, kept on disk for the next process: volume textures and opaque meshes.
+//! Disk cache of data that is slow to compute: volume textures and opaque meshes.
 //!
-//! A file holds the text of everything the thing follows from (its key), what was made of it, and a checksum of
-//! both. Whatever is not whole, or of another key, is as if it were not there, and so is a folder that cannot be
-//! read or written: the thing is made anew.
+//! A file holds its key (the text of all inputs), the computed values, and a checksum of both. A file that is
+//! incomplete or has another key counts as missing, and so does a folder that cannot be read or written: the
+//! values are then computed again.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -12,27 +12,27 @@ use std::time::{Duration, Instant, SystemTime};
 use bytemuck::Pod;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-/// Bytes a folder may hold; the files that were used longest ago make room.
+/// Largest size of a folder, bytes. The least recently used files are removed first.
 const MOST_BYTES: u64 = 512 << 20;
-/// The least time worth a file: opening and looking through the folder take about a millisecond.
+/// Least computing time that is worth a file. Opening it and scanning the folder take about a millisecond.
 const LEAST: Duration = Duration::from_millis(10);
-/// Reading takes less time than this for each byte, with its checksum; from a slow disk that is new to the system.
+/// Upper bound of the time to read one byte and add it to the checksum, seconds; for a slow disk, uncached.
 const READ_SECONDS_PER_BYTE: f64 = 2e-9;
-/// Temporary files of dead processes are that old.
+/// Age from which a temporary file counts as left by a dead process.
 const STALE: Duration = Duration::from_secs(3600);
 
 const MAGIC: [u8; 16] = *b"taki cache 1\n\r\n\0";
-/// Of the files.
+/// Extension of cache files.
 const EXTENSION: &str = "made";
 const TEMPORARY: &str = "tmp";
 
-/// Key of a thing of a `kind`: all the values it follows from, as their `Debug` writes them, and its builder's version.
+/// Returns the key of data of a `kind`: the `Debug` text of all its inputs, and the version of its builder.
 pub fn key(kind: &str, builder: u32, values: &impl std::fmt::Debug) -> String {
     let (version, machine) = (env!("CARGO_PKG_VERSION"), std::env::consts::ARCH);
     format!("taki {version} {machine} {kind} {builder}\n{values:?}")
 }
 
-/// Where things are kept.
+/// A disk cache in one folder.
 #[derive(Clone, Debug)]
 pub struct Cache {
     root: PathBuf,
@@ -40,38 +40,41 @@ pub struct Cache {
     least: Duration,
 }
 
-/// What stands before key and contents.
+/// Header of a cache file, before key and contents.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 struct Head {
     magic: [u8; 16],
-    /// Bytes.
+    /// Length of the key, bytes.
     key: u64,
-    /// Bytes.
+    /// Length of the contents, bytes.
     contents: u64,
-    /// Of key and contents.
+    /// Checksum of key and contents.
     checksum: [u64; 2],
 }
 
 impl Cache {
-    /// The user's: `taki` in `$XDG_CACHE_HOME`, or where the system keeps caches.
+    /// Opens the user's cache: `taki` in `$XDG_CACHE_HOME`, or in the system's folder of caches.
     pub fn of_user() -> Option<Cache> {
         Some(Cache::new(dirs::cache_dir()?.join("taki"), MOST_BYTES))
     }
 
-    /// In folders of `root`, each of at most `most` bytes.
+    /// Opens a cache in `root`; each kind has a folder of at most `most` bytes.
     pub fn new(root: impl Into<PathBuf>, most: u64) -> Cache {
         Cache { root: root.into(), most, least: LEAST }
     }
 
-    /// Keeps also what is quick to make. For tests.
+    /// Also stores data that is quick to compute. For tests.
     #[doc(hidden)]
     pub fn keeping_all(self) -> Cache {
         Cache { least: Duration::ZERO, ..self }
     }
 
-    /// `count` values that `make` makes, or once made, of a `kind` from all that `key` says. What takes less time
-    /// to make than to read is not kept.
+    /// Returns the `count` values of a `kind` under `key`: read from the cache, or computed by `make`. Values
+    /// that are quicker to compute than to read are not stored.
+    ///
+    /// # Errors
+    /// The error of `make`; faults of the cache itself are ignored.
     pub fn get<T: Pod, E>(
         &self,
         kind: &str,
@@ -89,18 +92,18 @@ impl Cache {
         Ok(made)
     }
 
-    /// Keeps what took so long to make, where reading it takes less.
+    /// Stores values that took the time `took` to compute, if reading them is quicker.
     pub fn keep_if_slow<T: Pod>(&self, kind: &str, key: &str, made: &[T], took: Duration) {
         let bytes = size_of_val(made) as u64;
         let read = Duration::from_secs_f64(bytes as f64 * READ_SECONDS_PER_BYTE);
         let worth = self.least.is_zero() || took > self.least + read;
         if worth && bytes <= self.most {
-            // Without it the next process makes it anew.
+            // Errors are ignored: the next process computes the values again.
             let _ = self.write(&self.path(kind, key), key, bytemuck::cast_slice(made));
         }
     }
 
-    /// The file of a key.
+    /// Returns the path of the file of a key.
     pub fn path(&self, kind: &str, key: &str) -> PathBuf {
         self.root.join(kind).join(format!("{:032x}.{EXTENSION}", xxh3_128(key.as_bytes())))
     }
@@ -135,11 +138,11 @@ impl Head {
     }
 }
 
-/// The contents of a file, if it is whole and of this key.
+/// Returns the contents of a file if it is complete and has this key.
 fn read<T: Pod>(path: &Path, key: &str, count: usize) -> Option<Vec<T>> {
     let mut file = File::open(path).ok()?;
     let wanted = size_of::<Head>() + key.len() + count * size_of::<T>();
-    // Before room is made for it.
+    // Checked before the buffer is allocated.
     let meta = file.metadata().ok()?;
     if !meta.is_file() || meta.len() != wanted as u64 {
         return None;
@@ -155,12 +158,12 @@ fn read<T: Pod>(path: &Path, key: &str, count: usize) -> Option<Vec<T>> {
     if *head != *bytemuck::bytes_of(&Head::new(key, bytemuck::cast_slice(&contents))) {
         return None;
     }
-    // What was used last goes last.
+    // The modification time orders files by last use.
     let _ = file.set_modified(SystemTime::now());
     Some(contents)
 }
 
-/// Removes what was used longest ago until `more` bytes fit, and what dead processes left.
+/// Removes the least recently used files until `more` bytes fit, and temporary files of dead processes.
 fn make_room(folder: &Path, most: u64, more: u64) -> std::io::Result<()> {
     let mut files = Vec::new();
     let mut total = more;

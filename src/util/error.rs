@@ -11,10 +11,10 @@ pub enum Error {
     /// The command line cannot be understood.
     #[error("{0}")]
     Usage(String),
-    /// The work would need more memory than its budget, or the device had none left.
+    /// The work needs more memory than its budget, or the device is out of memory.
     #[error("{what} needs {need}, the budget is {budget}; {fix}")]
     Memory {
-        /// What needs the memory, with the values that make its size.
+        /// Item that needs the memory, with the values that determine its size.
         what: String,
         /// Bytes needed, for people.
         need: String,
@@ -40,10 +40,10 @@ pub enum Error {
          OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
     )]
     NoWindow(String),
-    /// A video was asked for and the program that encodes it is not there, or cannot.
+    /// A video was asked for, and ffmpeg is missing or cannot encode it.
     #[error("{0}; install ffmpeg (Debian: ffmpeg) or write .gif or .apng, which need none")]
     NoFfmpeg(String),
-    /// An output cannot be created. Known before any work is done.
+    /// An output cannot be created. Reported before any work is done.
     #[error("cannot create {}: {why}; {fix}", path.display())]
     CannotCreate {
         /// The output.
@@ -60,7 +60,7 @@ pub enum Error {
         what: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's word for it.
+        /// Reason given by the system.
         why: String,
         /// What to do.
         fix: &'static str,
@@ -73,27 +73,27 @@ pub enum Error {
         "the GPU did not answer for {seconds} s; raise --watchdog, lower the image size, or use --engine cpu"
     )]
     Watchdog {
-        /// The time-out that passed.
+        /// Time-out that passed, seconds.
         seconds: f64,
     },
     /// The user or the system asked the program to end.
     #[error("interrupted: nothing unfinished was kept; run the same command again")]
     Interrupted {
-        /// 130 after SIGINT, 143 after SIGTERM.
+        /// Exit code: 130 after SIGINT, 143 after SIGTERM.
         code: u8,
     },
 }
 
-/// The crate's result.
+/// Result with the crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// A fault in what the user gave.
+    /// Returns an error of invalid input; exit code 65.
     pub fn input(what: impl Into<String>, fix: impl Into<String>) -> Self {
         Error::Input { what: what.into(), fix: fix.into() }
     }
 
-    /// More memory than allowed. `need` and `budget` in bytes.
+    /// Returns an error of too little memory, `need` and `budget` in bytes; exit code 33.
     pub fn memory(what: impl Into<String>, need: u128, budget: u64, fix: impl Into<String>) -> Self {
         Error::Memory {
             what: what.into(),
@@ -103,7 +103,7 @@ impl Error {
         }
     }
 
-    /// A failed read; exit code 74.
+    /// Returns an error of a failed read; exit code 74.
     pub fn read(path: &Path, why: impl ToString) -> Self {
         Error::Io {
             what: "cannot read",
@@ -113,7 +113,7 @@ impl Error {
         }
     }
 
-    /// A failed write; exit code 74.
+    /// Returns an error of a failed write; exit code 74.
     pub fn write(path: &Path, why: impl ToString) -> Self {
         Error::Io {
             what: "cannot write",
@@ -123,7 +123,7 @@ impl Error {
         }
     }
 
-    /// The exit code of the process, as listed in docs/scenes-and-files.md.
+    /// Returns the exit code of the process, as listed in docs/scenes-and-files.md.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Comparison(_) => 1,
@@ -140,7 +140,7 @@ impl Error {
     }
 }
 
-/// Bytes in binary units with one decimal.
+/// Formats bytes in binary units with one decimal.
 pub fn human_bytes(bytes: u128) -> String {
     const UNITS: [&str; 7] = ["B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
     let mut value = bytes as f64;

@@ -1,4 +1,4 @@
-//! What every room needs: errors, progress, random numbers, the disk cache, and parts of an image.
+//! Shared basics: errors, progress, random numbers, the disk cache, and parts of an image.
 
 pub mod cache;
 pub mod error;

@@ -2,16 +2,18 @@
 
 use super::error::Result;
 
-/// Watches a job: told of progress and warnings, asked between pieces of work whether to go on.
+/// Observer of a job: receives progress and warnings, and can stop the job between pieces of work.
 pub trait Monitor: Sync {
-    /// `done` of `total` pieces of `stage` are finished. An error ends the job at once; nothing
-    /// unfinished is kept.
+    /// Reports that `done` of `total` pieces of `stage` are finished.
+    ///
+    /// # Errors
+    /// An error ends the job at once; nothing unfinished is kept.
     fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()>;
-    /// Something the user should know that does not stop the work.
+    /// Reports a warning that does not stop the work.
     fn warn(&self, text: &str);
 }
 
-/// Watches nothing and never stops.
+/// A monitor that ignores all reports and never stops the job.
 pub struct Unwatched;
 
 impl Monitor for Unwatched {

@@ -1,4 +1,4 @@
-//! Random numbers that depend on what they are for, never on who asks first.
+//! Random numbers that depend on their purpose, never on the order of calls.
 //!
 //! Each curve, cell and mesh vertex has a generator of its own, seeded by (seed, stream, index): the
 //! same volume comes out bit for bit on any number of threads, and a cell keeps its noise when the
@@ -7,7 +7,7 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// What a generator is for.
+/// Purpose of a generator.
 #[derive(Clone, Copy, Debug)]
 pub enum Stream {
     /// One spatial fractal curve; index: its place in the jitter grid.
@@ -37,7 +37,7 @@ pub enum Stream {
 pub struct Family(u64);
 
 impl Family {
-    /// The generators of `stream` under the user's `seed`.
+    /// Returns the generators of `stream` under the user's `seed`.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut mixer = Pcg64Mcg::seed_from_u64(seed);
         let mut key = 0;
@@ -47,7 +47,7 @@ impl Family {
         Family(key)
     }
 
-    /// The generator of one item.
+    /// Returns the generator of one item.
     #[inline]
     pub fn member(self, index: u64) -> Pcg64Mcg {
         Pcg64Mcg::seed_from_u64(self.0.wrapping_add(index))

@@ -16,32 +16,33 @@ pub struct Window {
 }
 
 impl Window {
-    /// The whole of an image of `width` × `height` pixels.
+    /// Returns the window of a whole image of `width` × `height` pixels.
     pub fn whole([width, height]: [u32; 2]) -> Window {
         Window { x: 0, y: 0, width, height }
     }
 
-    /// The place of a pixel of the image, which lies inside, among those of the window, row by row.
+    /// Returns the index of an image's pixel among the window's pixels, row by row. The pixel lies in the
+    /// window.
     pub fn index(&self, pixel: [u32; 2]) -> usize {
         (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
     }
 
-    /// Number of its pixels.
+    /// Returns the number of pixels.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
 
-    /// The column after its last.
+    /// Returns the column after the last.
     pub fn right(&self) -> u32 {
         self.x + self.width
     }
 
-    /// The row after its last.
+    /// Returns the row after the last.
     pub fn bottom(&self) -> u32 {
         self.y + self.height
     }
 
-    /// What two windows share; none if they do not meet.
+    /// Returns the intersection of two windows, or `None` if it is empty.
     pub fn meet(&self, other: &Window) -> Option<Window> {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
         let width = self.right().min(other.right()).checked_sub(x)?;
@@ -49,12 +50,12 @@ impl Window {
         (width > 0 && height > 0).then_some(Window { x, y, width, height })
     }
 
-    /// Whether all of `other` lies in it.
+    /// Returns whether `other` lies inside this window.
     pub fn holds(&self, other: &Window) -> bool {
         self.meet(other) == Some(*other)
     }
 
-    /// Whether it has pixels and all of them lie in an image of this size. Any numbers may be asked.
+    /// Returns whether the rectangle is not empty and lies inside an image of this size, for any numbers.
     pub fn fits([width, height]: [u32; 2], [x, y, w, h]: [u32; 4]) -> bool {
         let within = |first: u32, count: u32, of: u32| {
             count > 0 && u64::from(first) + u64::from(count) <= u64::from(of)

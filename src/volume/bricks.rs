@@ -1,13 +1,14 @@
-//! Sparse storage: bricks of 4×4×4 cells, of which those that hold anything are stored one after the other.
+//! Sparse storage: bricks of 4×4×4 cells, whose non-empty cells are stored in sequence.
 //!
-//! A brick is a mask of 64 bits, bit x + 4y + 16z set where that cell is stored, and a base: the cell is number
-//! base + popcount(mask below its bit) of all that are stored. An empty brick stores none. Bricks follow one another as cells
-//! do, x fastest, then y, then z, and so do their cells.
+//! A brick is a mask of 64 bits, bit x + 4y + 16z set where that cell is stored, and a base: the cell is
+//! number base + popcount(mask below its bit) of all that are stored. An empty brick stores none. Bricks
+//! follow one another as cells do, x fastest, then y, then z, and so do their cells.
 //!
-//! Why cells and not whole bricks: strands through 1024³ cells that fill 2 % of them leave a column of 8×8 cells 1.3 strands each, so
-//! few bricks of 8³ are empty, and whole ones would store most of the 8 GiB. Masks and bases of all bricks take 12 bytes for 64 cells,
-//! 0.2 GiB there, and the stored cells 8 bytes each. A coarser grid above, of 16³ cells, would leave 2 % of that away
-//! (a column of 16×16 has 4 strands), for one more look-up in every step of every walk.
+//! Why cells and not whole bricks: strands through 1024³ cells that fill 2 % of them leave a column of 8×8
+//! cells 1.3 strands each, so few bricks of 8³ are empty, and whole ones would store most of the 8 GiB. Masks
+//! and bases of all bricks take 12 bytes for 64 cells, 0.2 GiB there, and the stored cells 8 bytes each. A
+//! coarser grid above, of 16³ cells, would leave 2 % of that away (a column of 16×16 has 4 strands), for one
+//! more look-up in every step of every walk.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,7 +20,7 @@ use super::Cell;
 /// Cells of a brick along each axis.
 pub const BRICK: u32 = 4;
 
-/// What is read where nothing is stored.
+/// Value of a cell that is not stored.
 static EMPTY: Cell = Cell { x: 0, y: 0 };
 
 /// Bricks of a volume.
@@ -43,7 +44,7 @@ fn bit(x: u32, y: u32, z: u32) -> u32 {
     (x & 3) | (y & 3) << 2 | (z & 3) << 4
 }
 
-/// Numbers of the bits that are set, from the lowest.
+/// Iterates over the indices of the set bits, from the lowest.
 fn bits(mut mask: u64) -> impl Iterator<Item = u32> {
     std::iter::from_fn(move || {
         let bit = (mask != 0).then(|| mask.trailing_zeros())?;
@@ -68,8 +69,8 @@ impl Bricks {
         &self.cells
     }
 
-    /// Mask and base of every brick, as the shader reads them (`rgba32uint`): the mask's low and high half, and the numbers of
-    /// the first cells of either half.
+    /// Mask and base of every brick, as the shader reads them (`rgba32uint`): the mask's low and high half,
+    /// and the numbers of the first cells of either half.
     pub fn texels(&self, bricks: std::ops::Range<usize>) -> Vec<[u32; 4]> {
         let of = |(&mask, &base): (&u64, &u32)| {
             let low = mask as u32;
@@ -96,7 +97,7 @@ impl Bricks {
         (bz * self.grid[1] as usize + by) * self.grid[0] as usize + bx
     }
 
-    /// Place of a cell among the stored ones.
+    /// Returns the index of a cell among the stored cells.
     #[inline]
     pub fn place(&self, x: u32, y: u32, z: u32) -> Option<usize> {
         let brick = self.number(x, y, z);
@@ -116,7 +117,7 @@ impl Bricks {
         self.place(x, y, z).map(|place| &mut self.cells[place])
     }
 
-    /// Those of `cells` that are not empty; all nx·ny·nz are given in their order.
+    /// Stores the non-empty ones of `cells`, which holds all nx·ny·nz cells in index order.
     pub fn of(size: [u32; 3], cells: &[Cell]) -> Bricks {
         let area = size[0] as usize * size[1] as usize;
         let mut packer = Packer::new(size);
@@ -140,7 +141,7 @@ impl Bricks {
         starts.iter().zip(ends).map(|(start, end)| end - start).collect()
     }
 
-    /// As [`super::Cells::change`].
+    /// Implements [`super::Cells::change`].
     pub(super) fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
         let area = self.grid[0] as usize * self.grid[1] as usize;
         let [nx, ny, _] = self.size.map(u64::from);
@@ -180,7 +181,7 @@ impl Bricks {
         sums
     }
 
-    /// As [`super::Cells::checksum`].
+    /// Implements [`super::Cells::checksum`].
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         let [nx, ny, nz] = self.size;
         let of_layer = |z: u32| {
@@ -215,7 +216,7 @@ pub(super) fn parted<'a, T>(mut all: &'a mut [T], lengths: &[usize]) -> Vec<&'a 
     parts
 }
 
-/// Notes which cells a volume will store, from many threads.
+/// Marks the cells that a volume will store, from many threads.
 pub(super) struct Marks {
     size: [u32; 3],
     masks: Vec<AtomicU64>,
@@ -263,13 +264,13 @@ impl Marks {
 }
 
 impl Bricks {
-    /// Puts the stored cells in, in their order.
+    /// Sets the stored cells, in storage order.
     pub(super) fn fill(&mut self, cells: Vec<Cell>) {
         self.cells = cells;
     }
 }
 
-/// Packs a volume that comes four layers at a time.
+/// Packs a volume that arrives four layers at a time.
 pub(super) struct Packer {
     bricks: Bricks,
 }

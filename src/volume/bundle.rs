@@ -9,11 +9,11 @@ use super::spec::WaterSpec;
 use crate::curve::{CurveShape, spatial_fractal_curve};
 use crate::util::random::{Family, Stream};
 
-/// How far into the volume, as a share of its depth, parents keep from either face: around one that starts on a
-/// face half of the children would be lost.
+/// How far into the volume, as a share of its depth, parents keep from either face: around one that starts on
+/// a face half of the children would be lost.
 const MARGIN: f32 = 0.2;
-/// Correlation length of the breathing, a fraction of the flow: a bundle opens and closes two or three times on
-/// its way.
+/// Correlation length of the breathing, a fraction of the flow: a bundle opens and closes two or three times
+/// on its way.
 const BREATH: f32 = 0.12;
 /// Narrowest that breathing makes a bundle: at 0 all its strands would go through one point.
 const NARROWEST: f32 = 0.15;
@@ -24,8 +24,8 @@ const NARROWEST: f32 = 0.15;
 /// The curve is drawn level by level, so a spec with fewer `shape.levels` gives every
 /// 2^(difference)-th point of the same curve.
 ///
-/// With bundles a child's point is its own curve's, moved as its parent is displaced there; its distance from the
-/// parent breathes with the bundle. Both are periodic along the flow.
+/// With bundles a child's point is its own curve's, moved as its parent is displaced there; its distance from
+/// the parent breathes with the bundle. Both are periodic along the flow.
 pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
     let [nx, ny, nz] = spec.size.map(|n| n as f32);
     let mut rng = Family::new(spec.seed, Stream::Curve).member(curve as u64);

@@ -42,17 +42,17 @@ impl Cell {
         Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
     }
 
-    /// The same cell with ρ before α, k_d and k_s, each from 0 to 1.
+    /// Returns the cell with ρ before α, k_d and k_s set, each from 0 to 1.
     pub fn with_density(self, rho: f32, k_d: f32, k_s: f32) -> Self {
         Cell { x: unorm(rho, 65535.0), ..self }.with_reflection(k_d, k_s)
     }
 
-    /// The same cell with k_d and k_s, each from 0 to 1.
+    /// Returns the cell with k_d and k_s set, each from 0 to 1.
     pub fn with_reflection(self, k_d: f32, k_s: f32) -> Self {
         Cell { x: self.rho_code() | unorm(k_d, 255.0) << 16 | unorm(k_s, 255.0) << 24, ..self }
     }
 
-    /// Whether v is set.
+    /// Returns whether v is set.
     pub fn has_direction(self) -> bool {
         self.y != 0
     }

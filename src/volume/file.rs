@@ -90,7 +90,7 @@ fn write_array<W: Write + Seek>(
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(1))
         .large_file(true)
-        // A date would make equal volumes differ.
+        // A date would give equal volumes different bytes.
         .last_modified_time(zip::DateTime::default());
     zip.start_file(npyz::npz::file_name_from_array_name(name), options)?;
     let mut buffered = std::io::BufWriter::with_capacity(1 << 16, zip);
@@ -298,7 +298,7 @@ impl Reader<'_> {
     }
 }
 
-/// Cells that are being read.
+/// Storage of the cells that are being read.
 enum Form {
     Dense(Vec<Cell>),
     Sparse(Bricks),
@@ -313,7 +313,7 @@ impl From<Form> for Cells {
     }
 }
 
-/// Goes through the places of a volume in the order of its cells.
+/// Visits the positions of a volume in the order of its cells.
 struct Places {
     size: [u32; 3],
     at: [u32; 3],
@@ -325,7 +325,7 @@ impl Places {
         Places { size, at: [0; 3], index: 0 }
     }
 
-    /// The next cell, if it is stored.
+    /// Returns the next cell if it is stored.
     #[inline]
     fn next<'a>(&mut self, cells: &'a mut Form) -> Option<&'a mut Cell> {
         let ([x, y, z], index) = (self.at, self.index);

@@ -1,4 +1,4 @@
-//! What the curves leave in the cells they pass: the sums that direction and density are made of.
+//! Sums over the curves in each cell they pass; direction and density are computed from them.
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use crate::walk::{Walk, floor_cell};
 const CURVES_PER_TASK: usize = 64;
 /// Tasks whose contributions are held at once; with 600 cells a curve these are about 40 MB.
 const TASKS_PER_ROUND: usize = 64;
-/// Curves that tell how many cells all will pass.
+/// Number of curves sampled to estimate how many cells all curves pass.
 const SAMPLE_CURVES: usize = 32;
 
 /// Part of a curve inside one cell: index of the cell within its slab, length × direction in cells.
@@ -59,7 +59,7 @@ impl Flow {
         Flow::summed(spec, &lengths, place, [0, 1], monitor)
     }
 
-    /// As [`Flow::new`], for the cells that `bricks` will store, in their order: the same sums.
+    /// Computes the sums of [`Flow::new`] for the cells that `bricks` will store, in storage order.
     pub fn packed(spec: &WaterSpec, bricks: &Bricks, monitor: &dyn Monitor) -> Result<Flow> {
         let layers = bricks.layers();
         let layers_per_slab = layers.len().div_ceil(16);
@@ -78,8 +78,8 @@ impl Flow {
         Flow::summed(spec, &lengths, place, [1, 2], monitor)
     }
 
-    /// Walks all curves. `place` says in which slab a cell is, of those with these `lengths`, and where in it; this is round
-    /// `round` of `rounds`.
+    /// Walks all curves. `place` says in which slab a cell is, of those with these `lengths`, and where in
+    /// it; this is round `round` of `rounds`.
     ///
     /// They are walked in parallel; their contributions are added slab by slab in z, within a slab in
     /// the curves' order, so the sums depend neither on the number of threads nor on the slabs.
@@ -144,7 +144,7 @@ impl Flow {
     }
 }
 
-/// Notes every cell that a curve passes.
+/// Marks every cell that a curve passes.
 pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
     let marks = Marks::new(spec.size);
     let curves = spec.across as usize * spec.deep as usize;
@@ -163,7 +163,8 @@ pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
     Ok(marks)
 }
 
-/// About as many cells as the curves pass: what some of them pass, as if all were strewn independently.
+/// Estimates the number of cells that the curves pass, from a sample and as if all cells were hit
+/// independently.
 pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
     let curves = spec.across as usize * spec.deep as usize;
     let looked: Vec<usize> = (0..curves).step_by(curves.div_ceil(SAMPLE_CURVES)).collect();

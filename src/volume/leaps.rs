@@ -1,9 +1,10 @@
-//! How far rays may leap: every empty cell says which box of cells ahead of it is empty too.
+//! Boxes for leaps: every empty cell stores which box of cells ahead of it is also empty.
 //!
-//! There is a box for each octant of directions. It begins with the cell and is 1, 2, 4 or 8 cells long along each axis, the
-//! way the octant goes; copies of the volume go on in x and y (a side is never longer than a tile), and nothing lies above or
-//! below the slab. Sides are doubled in turn, along y, z and x, as long as the box stays empty: strands lie along y, so
-//! do the gaps between them. The exponents of the sides stand where a cell without density has no use for k and v:
+//! There is a box for each octant of directions. It begins with the cell and is 1, 2, 4 or 8 cells long along
+//! each axis, the way the octant goes; copies of the volume go on in x and y (a side is never longer than a
+//! tile), and nothing lies above or below the slab. Sides are doubled in turn, along y, z and x, as long as
+//! the box stays empty: strands lie along y, so do the gaps between them. The exponents of the sides stand
+//! where a cell without density has no use for k and v:
 //!
 //! | word | bits | what |
 //! |---|---|---|
@@ -12,51 +13,52 @@
 //! | y | 0–15 | along x |
 //! | y | 16–31 | along y |
 //!
-//! The number of an octant has bit 0 set where x goes down, bit 1 for y and bit 2 for z. Only levels as walks read them
-//! ([`super::Pyramid`]) hold boxes; the volume's own cells keep what they are.
+//! The number of an octant has bit 0 set where x goes down, bit 1 for y and bit 2 for z. Only levels as walks
+//! read them ([`super::Pyramid`]) hold boxes; the volume's own cells keep what they are.
 //!
-//! One distance to the nearest occupied cell in any direction, 8 bits, makes view rays through `fig5` and the water of `waterfall`
-//! meet 0.66 and 0.83 of their cells, one for each octant 0.40 and 0.60, these boxes 0.29 and 0.46: behind a strand
-//! the nearest occupied cell is the strand itself, and gaps are long and thin.
+//! One distance to the nearest occupied cell in any direction, 8 bits, makes view rays through `fig5` and the
+//! water of `waterfall` meet 0.66 and 0.83 of their cells, one for each octant 0.40 and 0.60, these boxes
+//! 0.29 and 0.46: behind a strand the nearest occupied cell is the strand itself, and gaps are long and thin.
 
 use rayon::prelude::*;
 
 use super::{Cell, VolumeTexture};
 
-/// Exponents of sides, 0 to 3, of the box of an empty cell for an octant.
+/// Returns the exponents of the sides, 0 to 3, of an empty cell's box for an octant.
 #[inline]
 pub fn box_exponents(cell: Cell, octant: u32) -> [u32; 3] {
     let shift = 2 * octant;
     [cell.y >> shift & 3, cell.y >> (16 + shift) & 3, cell.x >> (16 + shift) & 3]
 }
 
-/// The same where a leap costs a processor less than the steps it saves.
+/// Returns the exponents as [`box_exponents`] if a leap costs a CPU less than the steps it saves.
 #[inline]
 pub fn large_box(cell: Cell, octant: u32) -> Option<[u32; 3]> {
     let exponents = box_exponents(cell, octant);
     (exponents.iter().sum::<u32>() >= LARGE).then_some(exponents)
 }
 
-/// Sum of exponents of boxes that processors leap over: of 4×4×4 cells and the like. A leap waits for the cell and takes
-/// as long as some five steps, which go ahead before it is known.
+/// Sum of exponents of boxes that processors leap over: of 4×4×4 cells and the like. A leap waits for the
+/// cell and takes as long as some five steps, which go ahead before it is known.
 const LARGE: u32 = 6;
 
 /// Layers whose boxes are worked out at once: eight bytes a cell.
 const SLAB: usize = 32;
-/// Layers beside them that their boxes reach into.
+/// Layers on either side that their boxes extend into.
 const REACH: usize = 7;
 
-/// Share of boxes of 2×2×2 cells that have to be empty for leaps to be worth their cost in every turn of a walk.
+/// Share of boxes of 2×2×2 cells that have to be empty for leaps to be worth their cost in every turn of a
+/// walk.
 const WORTH: f64 = 0.9;
-/// About so many boxes are looked at to know it.
+/// Approximate number of boxes sampled to estimate that fraction.
 const LOOKS: usize = 1 << 18;
 
-/// Whether walks through a volume gain by leaping.
+/// Returns whether walks through a volume gain by leaping.
 pub fn worth_leaping(volume: &VolumeTexture) -> bool {
     empty_share(volume) >= WORTH
 }
 
-/// The share of boxes of 2×2×2 cells that are empty, of some rows.
+/// Estimates from some rows the fraction of boxes of 2×2×2 cells that are empty.
 pub fn empty_share(volume: &VolumeTexture) -> f64 {
     let [nx, ny, nz] = volume.size.map(|n| n as usize);
     let rows = ny * nz;
@@ -79,8 +81,8 @@ fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// The volume with boxes in its empty cells. `between`: for rays that look up what lies between cells, to whom a cell is
-/// empty if its neighbours are, too.
+/// The volume with boxes in its empty cells. `between`: for rays that look up what lies between cells, to
+/// whom a cell is empty if its neighbours are, too.
 ///
 /// # Panics
 /// If not all cells are stored: there is no room for boxes in what is not.
@@ -105,7 +107,7 @@ pub fn with_boxes(volume: &VolumeTexture, between: bool) -> VolumeTexture {
     VolumeTexture { cells: cells.into(), ..volume.clone() }
 }
 
-/// Cells that are full or have a full neighbour, of 26.
+/// Marks the cells that are full or have a full one among their 26 neighbours.
 fn widened(size: [u32; 3], mut full: Vec<bool>) -> Vec<bool> {
     let [nx, ny, nz] = size.map(|n| n as usize);
     for (stride, n, wraps) in [(1, nx, true), (nx, ny, true), (nx * ny, nz, false)] {
@@ -132,8 +134,8 @@ fn widened(size: [u32; 3], mut full: Vec<bool>) -> Vec<bool> {
     full
 }
 
-/// Which boxes are empty, of those that begin at a cell and go up along every axis: bit lx + 4·ly + 16·lz of a cell's word
-/// stands for the sides 2^lx, 2^ly and 2^lz.
+/// Which boxes are empty, of those that begin at a cell and go up along every axis: bit lx + 4·ly + 16·lz of
+/// a cell's word stands for the sides 2^lx, 2^ly and 2^lz.
 struct Masks {
     size: [usize; 3],
     /// [`REACH`] layers more than the slab on either side.
@@ -141,11 +143,11 @@ struct Masks {
 }
 
 impl Masks {
-    /// Of a slab of layers.
+    /// Computes the masks of a slab of layers.
     fn new(size: [u32; 3], full: &[bool], first: usize, layers: usize) -> Self {
         let size @ [nx, ny, nz] = size.map(|n| n as usize);
         let layer = nx * ny;
-        // Of the exponents along each axis, those that are `l`.
+        // Bits of the boxes whose exponent along the axis is `l`.
         let along_x = |l: u32| 0x1111_1111_1111_1111u64 << l;
         let along_y = |l: u32| 0x000f_000f_000f_000fu64 << (4 * l);
         let along_z = |l: u32| 0xffffu64 << (16 * l);
@@ -188,8 +190,8 @@ impl Masks {
         Masks { size, words }
     }
 
-    /// Where in `words` a box of each side begins that goes up from place `at` of an axis, and one that goes down; cells are
-    /// `stride` apart. A side longer than the tile is of no box: no bit is set for it.
+    /// Where in `words` a box of each side begins that goes up from place `at` of an axis, and one that goes
+    /// down; cells are `stride` apart. A side longer than the tile is of no box: no bit is set for it.
     fn starts(at: usize, n: usize, stride: usize) -> [[usize; 4]; 2] {
         [
             [at * stride; 4],

@@ -37,18 +37,18 @@ pub struct VolumeTexture {
     pub size: [u32; 3],
     /// Scale of ρ, 0 to 1: the cells hold ρ/α.
     pub alpha: f32,
-    /// nx·ny·nz cells, shared: a copy with another α costs nothing.
+    /// nx·ny·nz cells. They are shared, so a copy with another α costs nothing.
     pub cells: Cells,
 }
 
 impl VolumeTexture {
-    /// Linear index of a cell inside the tile.
+    /// Returns the linear index of a cell inside the tile.
     #[inline]
     pub fn index(&self, x: u32, y: u32, z: u32) -> usize {
         (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
     }
 
-    /// The cell at x, y, z of the tile.
+    /// Returns the cell at x, y, z of the tile.
     #[inline]
     pub fn cell(&self, x: u32, y: u32, z: u32) -> Cell {
         match &self.cells {
@@ -57,22 +57,22 @@ impl VolumeTexture {
         }
     }
 
-    /// The cells with a direction, in the order they are stored in.
+    /// Iterates over the cells with a direction, in storage order.
     pub fn flow_cells(&self) -> impl Iterator<Item = &Cell> {
         self.cells.stored().iter().filter(|cell| cell.has_direction())
     }
 
-    /// Whether its cells are stored in bricks.
+    /// Returns whether the cells are stored in bricks.
     pub fn is_sparse(&self) -> bool {
         self.cells.bricks().is_some()
     }
 
-    /// Layers z of the volume, each the sum of its cells' ρ codes.
+    /// Returns the sum of the ρ codes of each layer z.
     pub fn layer_codes(&self) -> Vec<u64> {
         self.cells.layer_codes(self.size[0] as usize * self.size[1] as usize)
     }
 
-    /// CRC-32 of size, α and cells: equal volumes have equal ones, built or read.
+    /// Returns the CRC-32 of size, α and cells. Equal volumes have equal checksums, whether built or read.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(bytemuck::bytes_of(&self.size));
@@ -81,8 +81,8 @@ impl VolumeTexture {
         hasher.finalize()
     }
 
-    /// How ρ is spread over the flow cells, with `bins` equal steps between 0 and α. At least one step
-    /// is made.
+    /// Returns the histogram of ρ over the flow cells, with `bins` equal steps between 0 and α (at least
+    /// one).
     pub fn rho_histogram(&self, bins: usize) -> RhoHistogram {
         let bins = bins.max(1);
         let mut h = RhoHistogram { at_zero: 0, between: vec![0; bins], at_alpha: 0 };
@@ -96,7 +96,7 @@ impl VolumeTexture {
         h
     }
 
-    /// What `taki volume info` prints.
+    /// Computes the figures that `taki volume info` prints.
     pub fn statistics(&self) -> Statistics {
         let mut s = Statistics { size: self.size, alpha: self.alpha, ..Default::default() };
         let (mut rho, mut k_d, mut k_s) = (0.0f64, 0.0f64, 0.0f64);
@@ -129,7 +129,8 @@ impl VolumeTexture {
     }
 }
 
-/// Flow cells counted by their ρ. A built volume clamps ρ, so its two ends are values of their own.
+/// Histogram of ρ over the flow cells. A built volume clamps ρ, so many cells lie exactly at 0 or α; both
+/// ends are counted separately.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RhoHistogram {
     /// Cells with ρ = 0.
@@ -141,13 +142,14 @@ pub struct RhoHistogram {
 }
 
 impl RhoHistogram {
-    /// All flow cells.
+    /// Returns the number of flow cells.
     pub fn total(&self) -> u64 {
         self.at_zero + self.between.iter().sum::<u64>() + self.at_alpha
     }
 }
 
-/// Figures of a volume texture. Means and shares are over the flow cells (those with v set).
+/// Figures of a volume texture. Means and fractions are taken over the flow cells, the cells with a
+/// direction.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
     /// nx, ny, nz.
@@ -162,9 +164,9 @@ pub struct Statistics {
     pub occupied_cells: u64,
     /// Mean ρ; α/2 in theory.
     pub rho_mean: f64,
-    /// Share with ρ = 0; 0.3085 in theory.
+    /// Fraction of flow cells with ρ = 0; 0.3085 in theory.
     pub rho_share_at_zero: f64,
-    /// Share with ρ = α; 0.3085 in theory.
+    /// Fraction of flow cells with ρ = α; 0.3085 in theory.
     pub rho_share_at_alpha: f64,
     /// Mean k_d.
     pub k_d_mean: f64,
@@ -172,8 +174,8 @@ pub struct Statistics {
     pub k_s_mean: f64,
     /// Mean v (not a unit vector).
     pub v_mean: [f64; 3],
-    /// Cells that are stored; all but in sparse storage.
+    /// Number of stored cells; all cells in dense storage.
     pub stored_cells: u64,
-    /// Size of the stored cells, and of what tells their places.
+    /// Size of the stored cells and of their index (masks and bases of bricks), bytes.
     pub bytes: u64,
 }

@@ -1,14 +1,15 @@
-//! The volume texture prefiltered: levels of half as many cells along each axis, for views that see many cells in
-//! one pixel.
+//! The volume texture prefiltered: levels of half as many cells along each axis, for views that see many
+//! cells in one pixel.
 //!
-//! A coarse cell stands for all cells in its part of the volume (where a number of cells is odd, for parts of them: the
-//! copies of the volume still join without a seam):
+//! A coarse cell stands for all cells in its part of the volume (where a number of cells is odd, for parts of
+//! them: the copies of the volume still join without a seam):
 //!
-//! - **ρ covers as much.** Light goes straight through between strands, so that the mean density would hide too
-//!   much of what is behind. With T the mean transmittance of the finer cells' columns along z, the coarse cell has
-//!   the ρ that lets T pass: −log₂ T over the column's length in [`bits`].
-//! - **Directions stay a distribution.** The second moments Σ w·v·vᵀ/Σ w of the unit directions v, w = ρ, are kept as in
-//!   SGGX (Heitz, Dupuy, Crassin and Dachsbacher 2015), so that strands that cross do not become one between them.
+//! - **ρ covers as much.** Light goes straight through between strands, so that the mean density would hide
+//!   too much of what is behind. With T the mean transmittance of the finer cells' columns along z, the
+//!   coarse cell has the ρ that lets T pass: −log₂ T over the column's length in [`bits`].
+//! - **Directions stay a distribution.** The second moments Σ w·v·vᵀ/Σ w of the unit directions v, w = ρ, are
+//!   kept as in SGGX (Heitz, Dupuy, Crassin and Dachsbacher 2015), so that strands that cross do not become
+//!   one between them.
 //! - k_d and k_s are means weighted by ρ.
 //!
 //! A level is a volume texture of fewer cells, whose second word holds moments in place of v:
@@ -27,13 +28,13 @@ use rayon::prelude::*;
 
 use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
 
-/// Levels as walks read them; shared as a volume's cells are.
+/// Shared levels, as walks read them.
 pub type Levels = Arc<Pyramid>;
 
 /// Levels of a volume, the volume itself first.
 pub struct Pyramid {
     levels: Vec<VolumeTexture>,
-    /// Whether empty cells hold boxes of empty cells ([`with_boxes`]) in place of k and v.
+    /// True if empty cells hold boxes of empty cells ([`with_boxes`]) in place of k and v.
     pub leaps: bool,
 }
 
@@ -45,15 +46,15 @@ impl std::ops::Deref for Pyramid {
     }
 }
 
-/// Whether rays leap over empty cells. Pictures and numbers of cells do not depend on it.
+/// Choice whether rays leap over empty cells. It changes neither pictures nor cell counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Leaps {
-    /// Where it is worth it.
+    /// Leap in volumes where it pays ([`worth_leaping`]).
     #[default]
     Auto,
-    /// In any volume.
+    /// Leap in any volume whose cells are all stored.
     Always,
-    /// Every cell is walked.
+    /// Visit every cell.
     Never,
 }
 
@@ -82,7 +83,7 @@ impl Moments {
         )
     }
 
-    /// The word of a coarse cell; of moments whose trace is 1.
+    /// Packs moments whose trace is 1 into the word of a coarse cell.
     pub fn packed(&self) -> u32 {
         let root = self.diagonal.max(Vec3::ZERO).map(f32::sqrt);
         let over = |product: f32, a: f32, b: f32| (product / (a * b).max(1e-12)).clamp(-1.0, 1.0);
@@ -96,7 +97,7 @@ impl Moments {
         share(root.x) | share(root.z) << 7 | xy << 14 | xz << 20 | yz << 26
     }
 
-    /// Of the word of a coarse cell.
+    /// Unpacks the word of a coarse cell.
     #[inline]
     pub fn unpacked(word: u32) -> Self {
         let share = |shift: u32| (word >> shift & 127) as f32 * (1.0 / 127.0);
@@ -111,13 +112,13 @@ impl Moments {
     }
 }
 
-/// Cells of level `level` of a volume of `size`.
+/// Returns the cells along each axis of level `level` of a volume of `size`.
 pub fn level_size(size: [u32; 3], level: u32) -> [u32; 3] {
     size.map(|n| ((n - 1) >> level) + 1)
 }
 
-/// Levels of a volume of `size` cells, itself included: down to one cell across the face, as far as they fit beside one
-/// another in [`LevelAtlas`].
+/// Returns the number of levels of a volume of `size` cells, including the volume itself. Levels go down to
+/// one cell across the face, as far as they fit side by side in [`LevelAtlas`].
 pub fn level_count(size: [u32; 3]) -> u32 {
     let coarse = size[0].max(size[1]).next_power_of_two().trailing_zeros();
     let mut height = 0;
@@ -128,32 +129,32 @@ pub fn level_count(size: [u32; 3]) -> u32 {
     1 + (1..=coarse).take_while(fits).count() as u32
 }
 
-/// Where levels lie in one texture: the volume itself first, behind it along z the coarse levels, one after the other
-/// along y. Twin: `shaders/levels.wgsl`.
+/// Layout of the levels in one texture: the volume itself first, then, after it along z, the coarse levels
+/// side by side along y. Twin: `shaders/trace/levels.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LevelAtlas {
-    /// Of the volume itself.
+    /// Cells of the volume itself along each axis.
     pub size: [u32; 3],
-    /// Number of levels, 1: the volume alone.
+    /// Number of levels; 1 is the volume alone.
     pub count: u32,
 }
 
 impl LevelAtlas {
-    /// Of levels.
+    /// Returns the layout of `levels`.
     pub fn new(levels: &[VolumeTexture]) -> Self {
         LevelAtlas { size: levels[0].size, count: levels.len() as u32 }
     }
 
-    /// The first cell of a level.
+    /// Returns the first cell of a level.
     pub fn place(&self, level: u32) -> [u32; 3] {
         match level {
             0 => [0; 3],
-            // Words of four codes along z, of light volumes, belong to one level.
+            // A multiple of 4, so that a light volume's word, four codes along z, belongs to one level.
             _ => [0, (1..level).map(|l| level_size(self.size, l)[1]).sum(), self.size[2].next_multiple_of(4)],
         }
     }
 
-    /// Cells of the texture.
+    /// Returns the size of the texture, cells.
     pub fn extent(&self) -> [u32; 3] {
         let [nx, ny, nz] = self.size;
         if self.count == 1 {
@@ -164,30 +165,30 @@ impl LevelAtlas {
     }
 }
 
-/// What the levels of a volume are made for.
+/// Parameters of the levels of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PyramidSpec {
-    /// Bits of transmittance along the depth of one cell, per unit of its ρ code: coarse levels hide as much of what
-    /// is behind as their columns do with these. `None`: there are no coarse levels.
+    /// Bits of transmittance along the depth of one cell, per unit of its ρ code: coarse levels hide as much
+    /// of what is behind as their columns do with these. `None`: there are no coarse levels.
     pub coverage_bits: Option<f32>,
-    /// Whether walks interpolate between cells.
+    /// True if walks interpolate between cells.
     pub interpolated: bool,
 }
 
-/// Levels of a volume without boxes to leap over, for few rays.
+/// Builds the levels of a volume without boxes to leap over, for few rays.
 pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
     LevelsCache { leaps: Leaps::Never, kept: None }.get(volume, spec)
 }
 
-/// Levels that are kept from frame to frame.
+/// Cache of the levels from frame to frame.
 #[derive(Default)]
 pub struct LevelsCache {
-    /// Whether they are made for leaps.
+    /// Choice whether the levels hold boxes for leaps.
     pub leaps: Leaps,
     kept: Option<(Key, Levels)>,
 }
 
-/// What levels depend on.
+/// Inputs of the levels.
 struct Key {
     cells: Cells,
     size: [u32; 3],
@@ -203,7 +204,7 @@ impl PartialEq for Key {
 }
 
 impl LevelsCache {
-    /// The levels of a volume, made unless they are those of the last call.
+    /// Returns the levels of a volume; builds them unless the inputs equal those of the last call.
     pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
         let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };
         if let Some((of, levels)) = &self.kept
@@ -211,14 +212,14 @@ impl LevelsCache {
         {
             return levels.clone();
         }
-        // The old ones go first: both might not fit.
+        // Old levels are freed first: both might not fit into memory.
         self.kept = None;
         let mut levels = vec![volume.clone()];
         if let Some(bits) = spec.coverage_bits {
             levels.extend(coarse_levels(volume, bits));
         }
         let leaps = match key.leaps {
-            // There is no room for boxes in cells that are not stored.
+            // Cells that are not stored have no room for boxes.
             _ if volume.is_sparse() => false,
             Leaps::Auto => worth_leaping(volume),
             Leaps::Always => true,
@@ -233,7 +234,7 @@ impl LevelsCache {
     }
 }
 
-/// Level 1 and on; `bits` as in the function of that name.
+/// Builds the levels from 1 on; `bits` is [`PyramidSpec::coverage_bits`].
 pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
     let mut levels = Vec::new();
     let mut means: Vec<Mean> = Vec::new();
@@ -253,7 +254,7 @@ pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
 /// A cell of any level, before it is packed.
 #[derive(Clone, Copy, Default)]
 struct Mean {
-    /// In codes of the volume's cells.
+    /// ρ in codes of the volume's cells.
     rho: f64,
     k: [f64; 2],
     diagonal: DVec3,
@@ -285,8 +286,8 @@ impl Mean {
     }
 }
 
-/// The part that cell `i` of `coarse` along an axis takes of which cells of `fine`: first one, and its and the following
-/// ones' shares in it.
+/// Returns the fine cells that cell `i` of a coarse axis covers: the first one, and the covered fraction of
+/// it and of the next two.
 fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
     let step = f64::from(fine) / f64::from(coarse);
     let (from, to) = (f64::from(i) * step, f64::from(i + 1) * step);
@@ -295,7 +296,7 @@ fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
     (first as u32, [share(0.0), share(1.0), share(2.0)])
 }
 
-/// `depth`: bits along a fine cell's depth per unit of ρ.
+/// Averages fine cells into coarse ones. `depth`: bits along a fine cell's depth per unit of ρ.
 fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, of: impl Fn(usize) -> Mean + Sync) -> Vec<Mean> {
     let [nx, ny, nz] = coarse.map(|n| n as usize);
     (0..nx * ny * nz)

@@ -1,4 +1,4 @@
-//! Smooth periodic noise of one variable: what a strand of water carries along its length.
+//! Smooth periodic noise of one variable, which a strand of water carries along its length.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,12 +15,12 @@ const MOST: usize = 256;
 /// normal coefficients.
 #[derive(Clone, Debug)]
 pub struct Ripple {
-    /// Of cos 2πms and sin 2πms, from m = 0.
+    /// Coefficients of cos 2πms and sin 2πms, from m = 0.
     coefficients: Vec<[f32; 2]>,
 }
 
 impl Ripple {
-    /// With correlation length `length`, a fraction of the period.
+    /// Draws noise with correlation length `length`, a fraction of the period.
     pub fn new(length: f32, rng: &mut impl Rng) -> Self {
         let weight = |m: usize| (-0.5 * (std::f64::consts::TAU * m as f64 * f64::from(length)).powi(2)).exp();
         let weights: Vec<f64> = (0..MOST)
@@ -34,7 +34,7 @@ impl Ripple {
         Ripple { coefficients }
     }
 
-    /// Appends w at 0, 1/steps, … to `values`, `steps` of them.
+    /// Appends the `steps` values of w at 0, 1/steps, … to `values`.
     pub fn sample(&self, steps: usize, values: &mut Vec<f32>) {
         let step = std::f64::consts::TAU / steps as f64;
         let circle: Vec<[f32; 2]> = (0..steps)

@@ -1,5 +1,6 @@
-//! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to their twins on
-//! y = ny give every cell they pass its direction; ρ and k are random per cell, or follow the strands.
+//! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to the same points of the
+//! face y = ny give every cell they pass its direction. ρ and k are random in each cell, or follow the
+//! strands.
 
 use std::sync::Arc;
 
@@ -17,19 +18,22 @@ use crate::util::random::{Family, Stream};
 use crate::volume::WaterSpec;
 
 impl WaterSpec {
-    /// Whether ρ and k need no more than packed cells ([`set_density_and_reflection`]), so that a change of k's
-    /// base costs a re-packing only.
+    /// Returns whether ρ and k depend on the packed cells alone. If so, [`set_density_and_reflection`]
+    /// applies a new base of k without walking the curves again.
     pub fn density_is_of_cells(&self) -> bool {
         self.structure.coherence == 0.0 && self.structure.coverage == 0.0
     }
 
-    /// Bytes per cell that building needs where ρ follows the strands.
+    /// Returns the extra bytes per cell that building needs if ρ follows the strands, else 0.
     pub fn strand_bytes(&self) -> usize {
         if self.structure.coherence > 0.0 { size_of::<[f32; 2]>() } else { 0 }
     }
 }
 
-/// Builds the volume texture, all cells stored.
+/// Builds the volume texture with dense storage.
+///
+/// # Errors
+/// Any error with which `monitor` stops the work.
 pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let flow = Flow::new(spec, monitor)?;
     let cells: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
@@ -39,11 +43,11 @@ pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeText
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
 }
 
-/// The same cells, stored in bricks. Memory grows with the cells that curves pass: they are walked
-/// once to note which, once more to add up what they leave there.
+/// Builds the same cells as [`build_water`], stored in bricks. Memory grows with the number of cells that the
+/// curves pass. The curves are walked twice: first to mark those cells, then to sum their contributions.
 ///
 /// # Errors
-/// Where the cells that are passed need more than `memory` bytes.
+/// An error if the cells need more than `memory` bytes, or if `monitor` stops the work.
 pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     check_sparse(spec, 0, memory)?;
     let marks = flow::marked(spec, monitor)?;
@@ -57,15 +61,18 @@ pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) 
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
 }
 
-/// About as many cells as a water volume stores in bricks.
+/// Estimates the number of cells that a water volume stores in bricks.
 pub fn expected_cells(spec: &WaterSpec) -> u64 {
     flow::expected_cells(spec)
 }
 
-/// As [`build_water`], or from `cache`.
+/// Reads the volume of `spec` from `cache`, or builds it with [`build_water`].
+///
+/// # Errors
+/// Any error with which `monitor` stops the work.
 pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let count = spec.size.iter().map(|&n| n as usize).product();
-    // α is not in the cells.
+    // The cells do not contain α.
     let key = key("volume", BUILDER_VERSION, &WaterSpec { alpha: 0.0, ..*spec });
     let build = || {
         let volume = build_water(spec, monitor)?;
@@ -75,25 +82,27 @@ pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Res
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
 
-/// Version of the builder: part of the key of volumes on disk. Raise it with every change of the cells that a spec
-/// gives; a test compares their checksums.
+/// Version of the builder, part of the key of cached volumes. Raise it with every change of the cells that a
+/// spec gives; a test compares their checksums.
 pub const BUILDER_VERSION: u32 = 1;
 
 /// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
-/// every cell with a direction. Needs no curves, where [`WaterSpec::density_is_of_cells`].
+/// every cell with a direction. Correct only if [`WaterSpec::density_is_of_cells`]: it uses no curves.
 pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut Cells) {
     set(spec, cells, None);
 }
 
-/// With coherence c the normal number of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²), again one of
-/// variance 1, so that the distribution of ρ stays; coverage then multiplies ρ with
-/// 1 − coverage·e^(−length of the strands in the cell), so that strands end softly.
+/// Sets ρ, k_d and k_s of every cell with a direction.
+///
+/// With coherence c the normal variate of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²). Its variance is 1
+/// again, so the distribution of ρ stays. Coverage then multiplies ρ by 1 − coverage·e^(−l), where l is the
+/// length of the strands in the cell, so that strands end softly.
 fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
     let family = Family::new(spec.seed, Stream::Cell);
     let structure = &spec.structure;
     let (c, d) = (structure.coherence, 1.0 - structure.coherence);
     let root = (c * c + d * d).sqrt();
-    // `place`: in the sums of `flow`. Random numbers are those of the cell's linear index, wherever it is stored.
+    // `place` indexes the sums of `flow`. The random numbers depend on the linear index, not on the storage.
     cells.change(|index, place, cell| {
         if !cell.has_direction() {
             return cell;
