@@ -28,7 +28,7 @@ pub struct Haze {
     pub far: f32,
 }
 
-/// The same as one eye sees it. Twin: `shaders/haze.wgsl`.
+/// The same as one eye sees it. Twin: `shaders/light/haze.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EyeHaze {
     /// β at the eye, 1/m.
