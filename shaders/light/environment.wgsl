@@ -1,5 +1,5 @@
 // The environment: radiance of an equirectangular map, and irradiance from its spherical harmonics. Twins:
-// src/environment/map.rs and irradiance.rs, the same operations in the same order; the convention stands
+// src/light/environment/map.rs and irradiance.rs, the same operations in the same order; the convention stands
 // there.
 
 #import layout

@@ -1,5 +1,5 @@
 // §5 The light of one cell: decoding, and the fibre model of Kajiya and Kay 1989. Twins: src/volume/cell.rs
-// (v_code) and src/shading.rs.
+// (v_code) and src/light/fibre.rs.
 
 #import layout
 

@@ -1,4 +1,4 @@
-// Haze between the eye and what it sees. src/haze.rs, EyeHaze.
+// Haze between the eye and what it sees. src/light/haze.rs, EyeHaze.
 
 #import layout
 

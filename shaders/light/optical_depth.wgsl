@@ -1,5 +1,5 @@
 // §5 V_i(k): what lies between a cell and a light. Shared by the stages visibility and integrate. Twin:
-// src/cpu/visibility.rs, optical_depth.
+// src/light/optical_depth.rs.
 
 #import trace::levels
 #import trace::matter

@@ -1,4 +1,4 @@
-// §5 Light scattered more than once. Twin: src/scatter/mod.rs, where the formula and its reasons stand.
+// §5 Light scattered more than once. Twin: src/light/scatter/mod.rs, where the formula and its reasons stand.
 
 const COSINES: u32 = 12u;
 const LN_2: f32 = 0.693147180559945309;

@@ -1,5 +1,6 @@
 // §5 A reflection model made for flowing water: Ψ of strands from a table, and of air between them. Twin:
-// src/strand/table.rs, where the axes of the table are described; the model stands in src/strand/mod.rs.
+// src/light/strand/table.rs, where the axes of the table are described.
+// Model: src/light/strand/mod.rs.
 
 // Nodes of the table.
 const STRAND_X: f32 = 40.0;

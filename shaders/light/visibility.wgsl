@@ -1,5 +1,6 @@
 // §5 V_i(k) kept: for every occupied cell, what lies between its centre and where a light's ray leaves the slab.
-// One invocation a column of cells along z. Twin: src/cpu/visibility.rs; why and in which form: src/visibility.rs.
+// One invocation a column of cells along z. Twin: src/engine/cpu/visibility.rs.
+// Reasons and form: src/light/visibility.rs.
 
 #import layout
 #import light::optical_depth
@@ -31,7 +32,7 @@ struct LightVolume {
 // Linear indices of the columns in which any cell has density.
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
-// Of sparse storage, shaders/cells.wgsl.
+// Of sparse storage, shaders/volume/cells.wgsl.
 @group(0) @binding(5) var bricks: texture_storage_3d<rgba32uint, read>;
 
 // The level that has cells at (y, z) of the texture.

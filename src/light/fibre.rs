@@ -1,7 +1,7 @@
 //! §5 The fibre reflection model and attenuation: physics only.
 //!
 //! Kajiya and Kay, "Rendering Fur with Three Dimensional Textures", SIGGRAPH 1989. Vectors point
-//! outward from the cell. `shaders/shading.wgsl` holds the twin.
+//! outward from the cell. Twin: `shaders/light/fibre.wgsl`.
 
 use glam::Vec3;
 

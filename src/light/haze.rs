@@ -13,7 +13,7 @@ const SERIES: f32 = 1e-2;
 /// Least x: e⁶⁰ is finite, and of what lies behind nothing is left.
 const LEAST_X: f32 = -60.0;
 
-/// What a scene says of it.
+/// Haze as the scene describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Haze {
     /// β₀, 1/m; 0: there is none.
@@ -28,7 +28,7 @@ pub struct Haze {
     pub far: f32,
 }
 
-/// The same as one eye sees it. Twin: `shaders/haze.wgsl`.
+/// Haze as seen from one eye. Twin: `shaders/light/haze.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EyeHaze {
     /// β at the eye, 1/m.
@@ -42,7 +42,7 @@ pub struct EyeHaze {
 }
 
 impl Haze {
-    /// For an eye.
+    /// Returns the haze as seen from `eye`.
     pub fn seen_from(&self, eye: Vec3) -> EyeHaze {
         let falloff = if self.height > 0.0 { 1.0 / f64::from(self.height) } else { 0.0 };
         let above = (f64::from(eye.y) - f64::from(self.level)) * falloff;

@@ -9,7 +9,7 @@ use crate::util::words::words;
 pub enum Light {
     /// From infinitely far: unit vector towards it, radiance factor I.
     Directional {
-        /// Unit.
+        /// Unit vector towards the light.
         to_light: Vec3,
         /// Colour × intensity.
         intensity: Vec3,
@@ -27,7 +27,7 @@ pub enum Light {
         position: Vec3,
         /// Colour × intensity, at 1 m.
         intensity: Vec3,
-        /// Where it shines.
+        /// Cone that the light fills.
         cone: Cone,
     },
 }
@@ -46,7 +46,7 @@ pub enum LightKind {
 words! { LightKind { Directional => "directional", Point => "point", Spot => "spot" } }
 
 impl Light {
-    /// Returns the kind alone.
+    /// Returns the kind of the light.
     pub fn kind(&self) -> LightKind {
         match self {
             Light::Directional { .. } => LightKind::Directional,

@@ -9,8 +9,8 @@
 //!
 //! What is kept of a cell is a code of its transmittance T to the light, √T in 255ths: a byte, so that many patches
 //! fit into a processor's caches, with no exponential left to the view ray. Where light is scattered more than once
-//! optical depths are kept, for its formula asks for them. Passes: `src/gpu/visibility.rs` with
-//! `shaders/visibility.wgsl`, and `src/cpu/visibility.rs`.
+//! optical depths are kept, for its formula asks for them. Passes: `src/engine/gpu/visibility.rs` with
+//! `shaders/light/visibility.wgsl`, and `src/engine/cpu/visibility.rs`.
 
 use std::collections::HashMap;
 

@@ -43,7 +43,8 @@ pub const ARCTAN: [f32; 9] = [
     0.002_866_225_7,
 ];
 
-/// Angle of (x, y) from the x axis, −π to π; 0 at the origin. Twin: `angle_of` in `shaders/environment.wgsl`.
+/// Angle of (x, y) from the x axis, −π to π; 0 at the origin.
+/// Twin: `angle_of` in `shaders/light/environment.wgsl`.
 pub fn angle_of(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let r = ax.min(ay) / ax.max(ay).max(1e-30);

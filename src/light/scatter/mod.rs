@@ -28,7 +28,7 @@
 //! and Volumetric", SIGGRAPH 2013) were wrong by a third of the light at best; Zinke's dual scattering (2008) is made for
 //! fibres that scatter forward only, and knows nothing of a slab's faces.
 //!
-//! `shaders/scatter.wgsl` is the twin of what works along a ray.
+//! `shaders/light/scatter.wgsl` is the twin of what works along a ray.
 
 pub mod media;
 pub mod slab;

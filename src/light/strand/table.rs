@@ -1,4 +1,5 @@
-//! Ψ of a strand as a table over three angles, for the renderers. `shaders/strand.wgsl` is the twin of the lookup:
+//! Ψ of a strand as a table over three angles, for the renderers. Twin of the lookup:
+//! `shaders/light/strand.wgsl`,
 //! the same operations in the same order.
 //!
 //! | axis | runs over | nodes |
