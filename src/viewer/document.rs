@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::scene::{
-    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
-    set_by_hand,
+    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve, set_by_hand,
 };
 use crate::util::error::{Error, Result};
 

@@ -259,7 +259,8 @@ pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
                 Legend::Scale { low, high, unit, map } => {
                     let decimals = decimals(low, high, unit);
                     ui.label(RichText::new(format!("{low:.decimals$}")).color(INK));
-                    colour_bar(ui, BAR, map).on_hover_text("values beyond the ends have the colours of the ends");
+                    colour_bar(ui, BAR, map)
+                        .on_hover_text("values beyond the ends have the colours of the ends");
                     let gap = if unit.is_empty() { "" } else { " " };
                     ui.label(RichText::new(format!("{high:.decimals$}{gap}{unit}")).color(INK));
                 }

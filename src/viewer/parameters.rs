@@ -31,7 +31,11 @@ struct Group {
 const GROUPS: [Group; 9] = [
     group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
     group("Volume", "The volume texture: cells, density, reflection", &["volume"]),
-    group("Mapping", "How the volume is mapped onto the quads", &["materials", "sheets", "splashes", "quads"]),
+    group(
+        "Mapping",
+        "How the volume is mapped onto the quads",
+        &["materials", "sheets", "splashes", "quads"],
+    ),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
     group("Lights", "", LIGHTS),
     group(
@@ -346,10 +350,9 @@ fn cost_text(cost: Cost, costs: Costs) -> String {
     match cost {
         Cost::Uniform => "A change uploads a few bytes and renders the picture again.".into(),
         Cost::Upload => "A change packs existing data again and uploads it to the GPU.".into(),
-        Cost::Volume if costs.volume_seconds > 0.0 => format!(
-            "A change rebuilds the volume. The last build took {:.0} ms.",
-            costs.volume_seconds * 1e3
-        ),
+        Cost::Volume if costs.volume_seconds > 0.0 => {
+            format!("A change rebuilds the volume. The last build took {:.0} ms.", costs.volume_seconds * 1e3)
+        }
         Cost::Volume => "A change rebuilds the volume.".into(),
     }
 }

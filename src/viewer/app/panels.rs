@@ -114,8 +114,7 @@ impl Viewer {
             self.move_camera(self.first_pose, None);
         }
         ui.separator();
-        for (theme, text) in
-            [(Theme::System, "System theme"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
+        for (theme, text) in [(Theme::System, "System theme"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
         {
             if ui.radio(self.settings.theme == theme, text).clicked() {
                 let ctx = ui.ctx().clone();
@@ -175,7 +174,8 @@ impl Viewer {
 
     /// The button that plays the water, and its speed.
     fn flow_controls(&mut self, ui: &mut Ui) {
-        let (text, action) = if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
+        let (text, action) =
+            if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
         let play = ui.button(text).on_hover_text(format!("{action} (Space)"));
         name(&play, action);
         if play.clicked() {

@@ -96,8 +96,7 @@ impl ParameterPanel {
             state.set_open(true);
         }
         let mut command = None;
-        let header =
-            state.show_header(ui, |ui| command = entry(ui, context.document, context.lights, light));
+        let header = state.show_header(ui, |ui| command = entry(ui, context.document, context.lights, light));
         let (_, header, _) = header.body(|ui| {
             for key in keys {
                 self.row(ui, context, key);
@@ -218,7 +217,8 @@ fn name_button(ui: &mut Ui, selected: bool, light: &str) -> Option<Command> {
         button.clicked().then_some(Command::Select)
     };
     name(&button, &format!("Light {light}"));
-    button.on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
+    button
+        .on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
     command
 }
 
