@@ -1,6 +1,6 @@
 // The environment: radiance of an equirectangular map, and irradiance from its spherical harmonics. Twins:
-// src/light/environment/map.rs and irradiance.rs, the same operations in the same order; the convention stands
-// there.
+// src/light/environment/map.rs and irradiance.rs, the same operations in the same order; the convention
+// stands there.
 
 #import layout
 

@@ -19,9 +19,18 @@ struct Strand {
     g: f32,
 }
 
-// Ψ = π·Φ of a cell with coefficients k, in any unit, from the cosines between unit vectors: t along the flow, l to
-// the light, e to the eye.
-fn strand_psi(table: texture_3d<f32>, linear: sampler, strand: Strand, k_d: f32, k_s: f32, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> vec3<f32> {
+// Ψ = π·Φ of a cell with coefficients k, in any unit, from the cosines between unit vectors: t along the
+// flow, l to the light, e to the eye.
+fn strand_psi(
+    table: texture_3d<f32>,
+    linear: sampler,
+    strand: Strand,
+    k_d: f32,
+    k_s: f32,
+    t_dot_l: f32,
+    t_dot_e: f32,
+    l_dot_e: f32,
+) -> vec3<f32> {
     let sisi = t_dot_l * t_dot_e;
     let coco = sqrt(max(1.0 - t_dot_l * t_dot_l, 0.0) * max(1.0 - t_dot_e * t_dot_e, 0.0));
     let s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));

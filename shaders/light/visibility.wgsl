@@ -1,6 +1,6 @@
-// §5 V_i(k) kept: for every occupied cell, what lies between its centre and where a light's ray leaves the slab.
-// One invocation a column of cells along z. Twin: src/engine/cpu/visibility.rs.
-// Reasons and form: src/light/visibility.rs.
+// §5 V_i(k) kept: for every occupied cell, what lies between its centre and where a light's ray leaves the
+// slab. One invocation a column of cells along z. Twin: src/engine/cpu/visibility.rs. Reasons and form:
+// src/light/visibility.rs.
 
 #import layout
 #import light::optical_depth

@@ -1,5 +1,6 @@
-// Where the levels of the volume lie in its texture: the volume itself first, behind it along z the coarse levels, one
-// after the other along y. Shared by the stages visibility and integrate. Twin: src/volume/pyramid.rs, LevelAtlas.
+// Where the levels of the volume lie in its texture: the volume itself first, behind it along z the coarse
+// levels, one after the other along y. Shared by the stages visibility and integrate. Twin:
+// src/volume/pyramid.rs, LevelAtlas.
 
 // Whether there are coarse levels.
 override PYRAMID: bool = false;

@@ -1,5 +1,5 @@
-// What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; many directions and the light
-// they send on. Part of the stage integrate. Twins: src/cpu/lookup.rs and src/shading.rs, Spread.
+// What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; many directions and
+// the light they send on. Part of the stage integrate. Twins: src/cpu/lookup.rs and src/shading.rs, Spread.
 
 #import layout
 #import light::fibre
@@ -56,7 +56,8 @@ fn moments_of(word: u32, level: Level) -> Moments {
     );
 }
 
-// Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the level's cells.
+// Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the
+// level's cells.
 fn between(
     level: Level,
     matter: SheetDensity,

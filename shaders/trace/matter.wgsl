@@ -1,4 +1,5 @@
-// What a sheet makes of the cells: eroded ρ, and mist. Shared by the stages visibility and integrate. Twin: src/cpu/matter.rs.
+// What a sheet makes of the cells: eroded ρ, and mist. Shared by the stages visibility and integrate. Twin:
+// src/cpu/matter.rs.
 
 #import layout
 

@@ -8,7 +8,8 @@ use crate::util::error::Result;
 use crate::util::monitor::Unwatched;
 
 impl Engine {
-    /// Opens an engine on the first suitable device. [`Engine::open`] chooses a device by name and says what it took.
+    /// Opens an engine on the first suitable device. [`Engine::open`] chooses a device by name and says what
+    /// it took.
     ///
     /// # Errors
     /// [`Error::NoAdapter`](crate::Error::NoAdapter) where [`EngineChoice::Gpu`] finds no GPU adapter.

@@ -62,8 +62,8 @@ pub fn psi(k_d: f32, k_s: f32, p: f32, t_dot_l: f32, t_dot_e: f32, inverse_q: f3
     k_d * sin_l + k_s * specular_power(base.max(0.0), p)
 }
 
-/// Light reflected by fibres of many directions, whose moments are S = Σ w·v·vᵀ: what one direction has as squares and
-/// products of cosines the moments have as means.
+/// Light reflected by fibres of many directions, whose moments are S = Σ w·v·vᵀ: what one direction has as
+/// squares and products of cosines the moments have as means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// S·e / tr(M·S), with the eye as for one direction.
@@ -99,8 +99,8 @@ impl Spread {
         }
     }
 
-    /// How far directions part in the world: (1 − Σ λ²)/2 over the eigenvalues λ of Σ w·t·tᵀ; for a narrow bundle the
-    /// variance of their angle from its axis, in radians squared.
+    /// How far directions part in the world: (1 − Σ λ²)/2 over the eigenvalues λ of Σ w·t·tᵀ; for a narrow
+    /// bundle the variance of their angle from its axis, in radians squared.
     pub fn variance(&self) -> f32 {
         self.variance
     }
@@ -119,9 +119,10 @@ impl Spread {
 
     /// Ψ: the highlight is folded with the directions' spread. `l_dot_e` is the cosine between light and eye.
     ///
-    /// x^p, with x the cosine of an angle δ, is about e^(−pδ²/2); folded with a Gaussian of variance s² it is that of
-    /// p/(1 + p·s²), lower by the root. δ is the sum of the angles that light and eye make with the flow; it turns
-    /// with the direction by the sum of their unit vectors across the flow, whose square is 2 + 2 cos φ.
+    /// x^p, with x the cosine of an angle δ, is about e^(−pδ²/2); folded with a Gaussian of variance s² it is
+    /// that of p/(1 + p·s²), lower by the root. δ is the sum of the angles that light and eye make with the
+    /// flow; it turns with the direction by the sum of their unit vectors across the flow, whose square is 2
+    /// + 2 cos φ.
     pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
         let [cos2_l, product] = self.cosines(l_v);
         let sin2_l = (1.0 - cos2_l).max(0.0);

@@ -1,9 +1,10 @@
 //! §5 Light volumes filled on the host, for both engines.
 //!
-//! Seen from the middle of a cell, the light's way leads through the same cells over the same lengths from all of them, to the bit: what is
-//! rounded along it are differences of boundaries and origin, which are exact. So the way is walked once, and the depths of a
-//! row of cells are summed side by side, cell of the way by cell of the way: the bits of [`optical_depth`](super::optical_depth::optical_depth) for a
-//! twentieth of the work.
+//! Seen from the middle of a cell, the light's way leads through the same cells over the same lengths from
+//! all of them, to the bit: what is rounded along it are differences of boundaries and origin, which are
+//! exact. So the way is walked once, and the depths of a row of cells are summed side by side, cell of the
+//! way by cell of the way: the bits of [`optical_depth`](super::optical_depth::optical_depth) for a twentieth
+//! of the work.
 
 use std::sync::Arc;
 
@@ -62,8 +63,8 @@ impl<'a> Rows<'a> {
         Rows { levels, lookup }
     }
 
-    /// A light volume, level by level. Cells without density, which no view ray asks, have 0, but for rays that look
-    /// between cells.
+    /// A light volume, level by level. Cells without density, which no view ray asks, have 0, but for rays
+    /// that look between cells.
     pub fn fill(&self, light_volume: &LightVolume, medium: Medium, form: Form) -> Vec<Numbers> {
         let of_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
             let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };

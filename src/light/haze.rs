@@ -1,8 +1,9 @@
 //! Haze between the eye and what it sees: mist over the pool, air with distance.
 //!
-//! Its extinction is β(y) = β₀·e^(−(y − y₀)/H), or β₀ everywhere, and it glows by itself in one colour. Along a ray the
-//! optical depth has a closed form (Quílez, "Better Fog", 2010; Wenzel, "Real-Time Atmospheric Effects in Games",
-//! 2006): τ(t) = β(eye)·t·(1 − e^(−x))/x with x = d_y·t/H. What is seen through it is L·e^(−τ) + colour·(1 − e^(−τ)).
+//! Its extinction is β(y) = β₀·e^(−(y − y₀)/H), or β₀ everywhere, and it glows by itself in one colour. Along
+//! a ray the optical depth has a closed form (Quílez, "Better Fog", 2010; Wenzel, "Real-Time Atmospheric
+//! Effects in Games", 2006): τ(t) = β(eye)·t·(1 − e^(−x))/x with x = d_y·t/H. What is seen through it is
+//! L·e^(−τ) + colour·(1 − e^(−τ)).
 
 use glam::Vec3;
 
@@ -70,8 +71,9 @@ impl EyeHaze {
         radiance * transmittance + self.color * (1.0 - transmittance)
     }
 
-    /// Water of which `seen` is all that comes to the eye, `behind`·T of it from behind, where that has its haze
-    /// already: the water's own light dims, and the haze before it shines where the water hides the one behind.
+    /// Water of which `seen` is all that comes to the eye, `behind`·T of it from behind, where that has its
+    /// haze already: the water's own light dims, and the haze before it shines where the water hides the one
+    /// behind.
     pub fn over_water(&self, seen: Vec3, behind: Vec3, through: f32, transmittance: f32) -> Vec3 {
         let passed = behind * through;
         (seen - passed) * transmittance + passed + self.color * ((1.0 - through) * (1.0 - transmittance))

@@ -69,8 +69,8 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// Around the unit vector `axis`, with a half angle in degrees of which the outer share `softness` (0 to 1) is
-    /// the way from full light to none.
+    /// Around the unit vector `axis`, with a half angle in degrees of which the outer share `softness` (0 to
+    /// 1) is the way from full light to none.
     pub fn new(axis: Vec3, angle: f32, softness: f32) -> Self {
         let cosine = |degrees: f64| degrees.to_radians().cos();
         let (edge, full) = (cosine(angle as f64), cosine(angle as f64 * (1.0 - softness as f64)));

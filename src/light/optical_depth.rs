@@ -28,8 +28,9 @@ pub fn light_volume_value(
     }
 }
 
-/// From the middle of the cell `start` of a level to where the light ray leaves the slab: Σ ρ code × length, in units of
-/// `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells. Ends early where the depth is `enough`. `walked` grows by the cells of the way.
+/// From the middle of the cell `start` of a level to where the light ray leaves the slab: Σ ρ code × length,
+/// in units of `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells.
+/// Ends early where the depth is `enough`. `walked` grows by the cells of the way.
 pub fn optical_depth(
     level: &Level,
     matter: &SheetDensity,

@@ -1,16 +1,16 @@
 //! §5 V_i(k) kept: which light volumes a scene needs, and in which units their depths are.
 //!
-//! A light volume has a number for every cell of the volume texture: the optical depth from the cell's centre to
-//! where the light's ray leaves the slab, for one direction of light in cells. The slab's copies go on for ever,
-//! so for a directional light and a parallelogram one light volume says what an exact walk from every cell
-//! would. Where the direction in cells changes over a quad it is cut into patches: a little (the map is no
-//! parallelogram's), and each has a light volume; more (a point light), and they have one at each corner,
+//! A light volume has a number for every cell of the volume texture: the optical depth from the cell's centre
+//! to where the light's ray leaves the slab, for one direction of light in cells. The slab's copies go on for
+//! ever, so for a directional light and a parallelogram one light volume says what an exact walk from every
+//! cell would. Where the direction in cells changes over a quad it is cut into patches: a little (the map is
+//! no parallelogram's), and each has a light volume; more (a point light), and they have one at each corner,
 //! between which is interpolated.
 //!
-//! What is kept of a cell is a code of its transmittance T to the light, √T in 255ths: a byte, so that many patches
-//! fit into a processor's caches, with no exponential left to the view ray. Where light is scattered more than once
-//! optical depths are kept, for its formula asks for them. Passes: `src/engine/gpu/visibility.rs` with
-//! `shaders/light/visibility.wgsl`, and `src/engine/cpu/visibility.rs`.
+//! What is kept of a cell is a code of its transmittance T to the light, √T in 255ths: a byte, so that many
+//! patches fit into a processor's caches, with no exponential left to the view ray. Where light is scattered
+//! more than once optical depths are kept, for its formula asks for them. Passes:
+//! `src/engine/gpu/visibility.rs` with `shaders/light/visibility.wgsl`, and `src/engine/cpu/visibility.rs`.
 
 use std::collections::HashMap;
 
@@ -24,22 +24,22 @@ use crate::util::error::{Error, Result};
 /// Codes in one word of a light volume, of cells that follow one another along z.
 pub const CELLS_A_WORD: u32 = 4;
 
-/// Angles, in degrees, that the light's direction (in cells) may turn by over a patch with one light volume, and
-/// between the corners of a patch with four. With these, pictures of directional lights are within 2 % of exact
-/// walks on quads that fan out; twice as much makes it 3 %. A point light half a quad's width away gives 5 % RMSE, of the
-/// size of single cells.
+/// Angles, in degrees, that the light's direction (in cells) may turn by over a patch with one light volume,
+/// and between the corners of a patch with four. With these, pictures of directional lights are within 2 % of
+/// exact walks on quads that fan out; twice as much makes it 3 %. A point light half a quad's width away
+/// gives 5 % RMSE, of the size of single cells.
 const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 
 /// The same of lights that stand for a part of the environment, which comes from many directions: 14°.
 const ENVIRONMENT_SAME_DIRECTION: f32 = 1.0 / 4.0;
 
-/// Most cells of a walk that is kept: one invocation makes four of them, four cells a turn, and software Vulkan grants
-/// all its loops 65535 turns.
+/// Most cells of a walk that is kept: one invocation makes four of them, four cells a turn, and software
+/// Vulkan grants all its loops 65535 turns.
 const MOST_CELLS: u32 = 65_000;
 
-/// Where the light volumes do not fit into the budget the angles are doubled so many times (once more where quads
-/// share light volumes, for else there would be no picture): at 8 and 32
-/// degrees shadows in the middle of a patch are seen double.
+/// Where the light volumes do not fit into the budget the angles are doubled so many times (once more where
+/// quads share light volumes, for else there would be no picture): at 8 and 32 degrees shadows in the middle
+/// of a patch are seen double.
 const DOUBLINGS: i32 = 3;
 
 /// Most patches of a quad with one light volume each; where it would need more it has fewer and larger ones
@@ -49,8 +49,8 @@ const MOST_PATCHES: u32 = 16;
 /// Most patches with four light volumes along one side of a quad.
 const MOST_CORNERED: u32 = 16;
 
-/// Directions that differ by less, relative to their length, share a light volume: over a slab of 1000 cells they
-/// part by a thousandth of a cell.
+/// Directions that differ by less, relative to their length, share a light volume: over a slab of 1000 cells
+/// they part by a thousandth of a cell.
 const SAME_DIRECTION: f32 = 1e-6;
 
 /// The light volumes of a frame.
@@ -263,8 +263,8 @@ fn direction(quad: &Quad, light: &Light, side: f32, size: [u32; 3], uv: Vec2) ->
     frame.cell_from_plane(plane) * frame.depth
 }
 
-/// Patches along u and v over which the direction turns by no more than the first angle; or cornered ones and the
-/// second.
+/// Patches along u and v over which the direction turns by no more than the first angle; or cornered ones and
+/// the second.
 fn cut(at: &impl Fn(f32, f32) -> Vec3, [whole, cornered]: [f64; 2]) -> ([u32; 2], bool) {
     // The way of the direction along the quad's sides and middles, in eight steps each.
     const STEPS: u32 = 8;

@@ -1,13 +1,14 @@
 //! Bloom: the share of the light that lenses and eyes scatter around bright things.
 //!
-//! Light is spread by a sum of near-Gaussians an octave apart, each with the same share: about a point it falls with
-//! the square of the distance, as the glare of the eye does (Stiles and Holladay 1926; Spencer et al., "Physically-Based
-//! Glare Effects for Digital Images", 1995). Nothing is added and nothing cut off: what a pixel gives others get.
+//! Light is spread by a sum of near-Gaussians an octave apart, each with the same share: about a point it
+//! falls with the square of the distance, as the glare of the eye does (Stiles and Holladay 1926; Spencer et
+//! al., "Physically-Based Glare Effects for Digital Images", 1995). Nothing is added and nothing cut off:
+//! what a pixel gives others get.
 //!
-//! They come from a pyramid (Burt and Adelson 1983). A level is the one below it under the weights 1 3 3 1, at every
-//! second pixel; back up, each pixel mixes the nearest of it by 3 to 1. Both ways together widen a point by a variance
-//! of (4^k − 1)/2 pixels² for level k, wherever it is, so that two neighbouring levels make any variance between theirs.
-//! The picture is continued by its mirror image.
+//! They come from a pyramid (Burt and Adelson 1983). A level is the one below it under the weights 1 3 3 1,
+//! at every second pixel; back up, each pixel mixes the nearest of it by 3 to 1. Both ways together widen a
+//! point by a variance of (4^k − 1)/2 pixels² for level k, wherever it is, so that two neighbouring levels
+//! make any variance between theirs. The picture is continued by its mirror image.
 
 use rayon::prelude::*;
 
@@ -16,7 +17,8 @@ use super::Look;
 /// Near-Gaussians of the spread: σ is the radius for the first, half of it for the next …
 pub const OCTAVES: u32 = 6;
 
-/// Shares of the pyramid's levels, from the picture itself, for a first σ of `radius` pixels. They add up to 1.
+/// Shares of the pyramid's levels, from the picture itself, for a first σ of `radius` pixels. They add up to
+/// 1.
 pub fn shares(radius: f64) -> Vec<f64> {
     let mut shares = vec![0.0; 1];
     for octave in 0..OCTAVES {

@@ -12,8 +12,8 @@ pub(crate) const SURFACE_BYTES: u64 = 28;
 
 /// Most pixels of an image.
 const MAX_PIXELS: u64 = 1 << 36;
-/// Bytes of a pixel of the raster pass's targets under which `layers` quads may lie, at most: three of four floats, the
-/// quads' numbers, depths.
+/// Bytes of a pixel of the raster pass's targets under which `layers` quads may lie, at most: three of four
+/// floats, the quads' numbers, depths.
 pub const fn target_bytes(layers: u32) -> u64 {
     3 * 16 + 4 * layers as u64 + if layers > 1 { 3 * 4 } else { 2 * 4 }
 }
@@ -29,7 +29,8 @@ pub const fn canvas_bytes(layers: u32) -> u64 {
 }
 
 /// Bytes for the window that is drawn, under which `layers` quads may lie: [`canvas_bytes`] a pixel on the
-/// device. The CPU engine's targets have as many pixels, at most, and 28 bytes for each and 16 for each layer.
+/// device. The CPU engine's targets have as many pixels, at most, and 28 bytes for each and 16 for each
+/// layer.
 pub fn canvas(image: &Image, layers: u32) -> u64 {
     let [columns, rows] = Grid::default().size([image.width, image.height]);
     u64::from(columns) * u64::from(rows) * canvas_bytes(layers).max(28 + 16 * u64::from(layers))

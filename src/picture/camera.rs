@@ -73,10 +73,11 @@ pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: 
     (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
 }
 
-/// Where sample `sample` of an image's lies from the top left corner of a pixel: in the centre for one sample, else
-/// by the R2 sequence (Roberts 2018), which fills a square evenly for any number and needs no random numbers. A
-/// filter other than the box bends the square, so that samples lie as densely as it weighs (Ernst, Stamminger and
-/// Greiner, "Filter Importance Sampling", 2006): every pixel has its own samples, and their mean stays plain.
+/// Where sample `sample` of an image's lies from the top left corner of a pixel: in the centre for one
+/// sample, else by the R2 sequence (Roberts 2018), which fills a square evenly for any number and needs no
+/// random numbers. A filter other than the box bends the square, so that samples lie as densely as it weighs
+/// (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006): every pixel has its own samples, and
+/// their mean stays plain.
 pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
     if image.samples == 1 {
         return [0.5, 0.5];

@@ -87,8 +87,8 @@ impl Surface {
         }
     }
 
-    /// Stores pixel `i`: the number plus 1 of the nearest of `quads` with its (u, v, metres), or 0; and the depth and
-    /// normal of what is behind, in metres.
+    /// Stores pixel `i`: the number plus 1 of the nearest of `quads` with its (u, v, metres), or 0; and the
+    /// depth and normal of what is behind, in metres.
     pub fn set(
         &mut self,
         i: usize,

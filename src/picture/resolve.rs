@@ -15,8 +15,9 @@ fn srgb(x: f32) -> f32 {
     if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023: primaries drawn in towards white,
-/// the curve over 16.5 stops about 0.18, and primaries drawn out again. What comes out is encoded for a display.
+/// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023: primaries drawn in
+/// towards white, the curve over 16.5 stops about 0.18, and primaries drawn out again. What comes out is
+/// encoded for a display.
 fn agx(x: [f32; 3]) -> [f32; 3] {
     const LEAST_EV: f32 = -12.47393;
     const MOST_EV: f32 = 4.026069;

@@ -1,18 +1,19 @@
 //! White balance: what a picture looks like to an eye that has adapted to other light.
 //!
-//! The light's place is the black body's of its temperature in the CIE 1960 diagram (Krystek, "An Algorithm to
-//! Calculate Correlated Colour Temperature", Color Research and Application 10, 1985), moved off its curve by the
-//! tint. From there the picture is adapted to 6500 K by von Kries' rule in the cone space of CAT16 (Li et al.,
-//! "Comprehensive color solutions: CAM16, CAT16, and CAM16-UCS", Color Research and Application 42, 2017).
+//! The light's place is the black body's of its temperature in the CIE 1960 diagram (Krystek, "An Algorithm
+//! to Calculate Correlated Colour Temperature", Color Research and Application 10, 1985), moved off its curve
+//! by the tint. From there the picture is adapted to 6500 K by von Kries' rule in the cone space of CAT16 (Li
+//! et al., "Comprehensive color solutions: CAM16, CAT16, and CAM16-UCS", Color Research and Application 42,
+//! 2017).
 
 use glam::{DMat3, DVec2, DVec3};
 
 /// Kelvin, where nothing changes.
 pub const NEUTRAL_K: f32 = 6500.0;
 
-/// Linear RGB (Rec. 709, D65) of a picture in light of `temperature` (kelvin, 1000 to 15000) and `tint` (thousandths
-/// of Duv, above 0 for greener light), as it is in light of 6500 K: the matrix that takes one to the other. White
-/// keeps its luminance.
+/// Linear RGB (Rec. 709, D65) of a picture in light of `temperature` (kelvin, 1000 to 15000) and `tint`
+/// (thousandths of Duv, above 0 for greener light), as it is in light of 6500 K: the matrix that takes one to
+/// the other. White keeps its luminance.
 pub fn matrix(temperature: f32, tint: f32) -> DMat3 {
     let rgb_from_xyz = XYZ_FROM_RGB.inverse();
     let cone_from_xyz = CONE_FROM_XYZ;
@@ -22,8 +23,8 @@ pub fn matrix(temperature: f32, tint: f32) -> DMat3 {
     rgb_from_xyz * adapted * XYZ_FROM_RGB
 }
 
-/// CIE XYZ of the light of a black body, Y = 1, moved by `duv` off its curve in the CIE 1960 diagram, upwards (greener)
-/// for positive ones.
+/// CIE XYZ of the light of a black body, Y = 1, moved by `duv` off its curve in the CIE 1960 diagram, upwards
+/// (greener) for positive ones.
 pub fn white(kelvin: f64, duv: f64) -> DVec3 {
     let step = 0.5;
     let along = (black_body(kelvin + step) - black_body(kelvin - step)).normalize();

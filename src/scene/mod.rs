@@ -47,8 +47,8 @@ pub const MAX_LIGHTS: usize = 4096;
 
 /// A complete, valid scene: the values that were written, and the [`Parts`] they resolve to.
 ///
-/// It dereferences to its parts. They change only with the values, by [`Scene::with`]; or by [`Scene::edit`], which
-/// gives up the values. So the two never disagree.
+/// It dereferences to its parts. They change only with the values, by [`Scene::with`]; or by [`Scene::edit`],
+/// which gives up the values. So the two never disagree.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// None after the parts were edited.
@@ -229,8 +229,8 @@ impl Scene {
         self.values.as_ref()
     }
 
-    /// Returns the parts to change them freely, as no scene file could. The scene has no values from then on, and the
-    /// pictures made of it do not tell a scene.
+    /// Returns the parts to change them freely, as no scene file could. The scene has no values from then on,
+    /// and the pictures made of it do not tell a scene.
     pub fn edit(&mut self) -> &mut Parts {
         self.values = None;
         &mut self.parts

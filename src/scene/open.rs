@@ -19,12 +19,13 @@ impl Scene {
         Scene::load(Path::new(name), &[], &Limits::default())
     }
 
-    /// Returns the scene with changed parameters, each written as for `--set`: `"trace.sigma=20"`. It is checked whole
-    /// with [`Limits::default`].
+    /// Returns the scene with changed parameters, each written as for `--set`: `"trace.sigma=20"`. It is
+    /// checked whole with [`Limits::default`].
     ///
     /// # Errors
-    /// [`Error::Usage`] for a text without `=`; [`Error::Input`] for an unknown key, a value outside its range, or a
-    /// scene that does not fit together; [`Error::Memory`] where it is larger than the limits allow.
+    /// [`Error::Usage`] for a text without `=`; [`Error::Input`] for an unknown key, a value outside its
+    /// range, or a scene that does not fit together; [`Error::Memory`] where it is larger than the limits
+    /// allow.
     pub fn with(&self, sets: &[&str]) -> Result<Scene> {
         let Some(mut values) = self.values.clone() else {
             let what = "the scene was edited by code, and has no values that parameters could be changed in";

@@ -22,8 +22,8 @@ pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> LevelAtlas {
     LevelAtlas { size, count }
 }
 
-/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with. Of
-/// several materials of strands the mean thickness counts, quad by quad.
+/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with.
+/// Of several materials of strands the mean thickness counts, quad by quad.
 fn coverage_bits(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> f32 {
     let extinction = extinction(&trace.attenuation, volume.alpha);
     if matches!(trace.attenuation, Attenuation::PerCell { .. }) {

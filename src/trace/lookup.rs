@@ -70,8 +70,8 @@ impl<'a> Level<'a> {
         CellSample { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
     }
 
-    /// Between the centres of the eight cells around the point in the middle of a ray's way through a cell; the ray starts at
-    /// `origin` and goes along `direction`, in the level's cells.
+    /// Between the centres of the eight cells around the point in the middle of a ray's way through a cell;
+    /// the ray starts at `origin` and goes along `direction`, in the level's cells.
     pub fn between(
         &self,
         crossing: &Crossing,
@@ -123,8 +123,8 @@ pub struct CellSample {
     pub rho: f32,
     /// k_d and k_s, in codes.
     pub k: [f32; 2],
-    /// Of the directions, in any unit, where they are of several cells. Those of one are worked out where they are asked
-    /// for: it would be a third of the walk.
+    /// Of the directions, in any unit, where they are of several cells. Those of one are worked out where
+    /// they are asked for: it would be a third of the walk.
     pub moments: Option<Moments>,
 }
 

@@ -11,9 +11,10 @@ pub const MIST_RHO: f32 = 32768.0;
 
 /// What a sheet makes of the cells' ρ, constant along one ray; ρ in its codes, 0 to 65535.
 ///
-/// Erosion takes e away from every cell. It does not scale what is left up again: 30.85 % of the paper's cells
-/// have ρ = 1, and would stay whole up to e = 1. Light rays lose as much as the view ray: they end near it, and thin
-/// water is thin in every direction. What was walked before, for light volumes, is lessened in the mean. Mist is even, but for what it has of the cells.
+/// Erosion takes e away from every cell. It does not scale what is left up again: 30.85 % of the paper's
+/// cells have ρ = 1, and would stay whole up to e = 1. Light rays lose as much as the view ray: they end near
+/// it, and thin water is thin in every direction. What was walked before, for light volumes, is lessened in
+/// the mean. Mist is even, but for what it has of the cells.
 #[derive(Clone, Copy)]
 pub struct SheetDensity {
     scale: f32,
@@ -45,7 +46,8 @@ impl SheetDensity {
         matter
     }
 
-    /// The same of cells that stand for many: taken away in the mean, for ρ of a coarse cell is not that of any in it.
+    /// The same of cells that stand for many: taken away in the mean, for ρ of a coarse cell is not that of
+    /// any in it.
     pub fn of_coarse(quad: &Quad, uv: Vec2) -> Self {
         let matter = SheetDensity::new(quad, uv);
         match quad.mist > 0.0 {
@@ -81,8 +83,8 @@ impl SheetDensity {
     }
 }
 
-/// E[max(ρ − e, 0)]/E[ρ] of the paper's ρ = clamp(N + ½, 0, 1). It is 2∫_e^1 Φ(½ − x) dx; with Φ taken as straight
-/// from Φ(½) = 0.6915 to Φ(−½) = 0.3085, which it is to 0.002 there, (1 − e)(1 − 0.383 e).
+/// E[max(ρ − e, 0)]/E[ρ] of the paper's ρ = clamp(N + ½, 0, 1). It is 2∫_e^1 Φ(½ − x) dx; with Φ taken as
+/// straight from Φ(½) = 0.6915 to Φ(−½) = 0.3085, which it is to 0.002 there, (1 − e)(1 − 0.383 e).
 fn mean_left(e: f32) -> f32 {
     (1.0 - e) * (1.0 - 0.383 * e)
 }

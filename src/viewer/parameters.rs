@@ -65,7 +65,8 @@ const MARKS_WIDTH: f32 = 60.0;
 /// State of the panel.
 #[derive(Default)]
 pub struct ParameterPanel {
-    /// Search text. The panel shows only parameters that have all its words in their key, symbol, descriptions or cost.
+    /// Search text. The panel shows only parameters that have all its words in their key, symbol,
+    /// descriptions or cost.
     pub search: String,
     /// Why the last edit was refused.
     fault: Option<String>,
@@ -165,7 +166,8 @@ impl ParameterPanel {
         }
     }
 
-    /// The rows of a group, with a heading for each light, quad or rock, and the pictures that belong to a row.
+    /// The rows of a group, with a heading for each light, quad or rock, and the pictures that belong to a
+    /// row.
     fn group_body(&mut self, ui: &mut Ui, context: &mut Context, keys: &[&String]) {
         let mut heading = String::new();
         for key in keys {
@@ -285,8 +287,8 @@ fn parent(key: &str) -> &str {
     key.rsplit_once('.').map_or("", |(parent, _)| parent)
 }
 
-/// Sorts the keys of each light, quad or rock together, in the order in which these first appear. The parameter
-/// table lists them parameter by parameter instead.
+/// Sorts the keys of each light, quad or rock together, in the order in which these first appear. The
+/// parameter table lists them parameter by parameter instead.
 fn sort_by_parent(keys: &mut [&String]) {
     let mut first = HashMap::new();
     for (i, key) in keys.iter().enumerate() {

@@ -167,7 +167,8 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; it opens the engine, and takes the first scene from `cache`. `wake` is called when there is something new to show.
+    /// Starts the thread; it opens the engine, and takes the first scene from `cache`. `wake` is called when
+    /// there is something new to show.
     pub fn new(
         choice: EngineChoice,
         device: DeviceOptions,

@@ -126,7 +126,8 @@ pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<Volume
 fn bad(path: &Path, what: String) -> Error {
     Error::input(
         format!("{}: {what}", path.display()),
-        "a volume file is an .npz with rho float32 [nz,ny,nx], v float32 [nz,ny,nx,3], k float32 [nz,ny,nx,2]",
+        "a volume file is an .npz with rho float32 [nz,ny,nx], v float32 [nz,ny,nx,3], \
+                 k float32 [nz,ny,nx,2]",
     )
 }
 

@@ -86,8 +86,8 @@ pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
             format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)"),
             need,
             budget,
-            "lower volume.nx, volume.ny or volume.nz, or raise --memory; volume.storage=sparse (without trace.filter=pyramid) \
-             takes less where most cells are empty",
+            "lower volume.nx, volume.ny or volume.nz, or raise --memory; volume.storage=sparse \
+             (without trace.filter=pyramid) takes less where most cells are empty",
         ));
     }
     Ok(())

@@ -52,7 +52,8 @@ impl Irradiance {
         Irradiance(terms)
     }
 
-    /// E(n)/π at a unit normal, never negative. Twin: `environment_irradiance` in `shaders/light/environment.wgsl`.
+    /// E(n)/π at a unit normal, never negative. Twin: `environment_irradiance` in
+    /// `shaders/light/environment.wgsl`.
     pub fn at(&self, n: Vec3) -> Vec3 {
         let c = &self.0;
         let mut sum = c[0];

@@ -192,7 +192,8 @@ impl Environment {
         let Map { width, height, .. } = *self.map;
         let count = self.baked.lights(self.lights).lights.len();
         format!(
-            "environment {what} of {width}×{height}: {count} lights in the water, {:.1} % off its irradiance (RMS)",
+            "environment {what} of {width}×{height}: {count} lights in the water, \
+             {:.1} % off its irradiance (RMS)",
             100.0 * self.error()
         )
     }
@@ -209,7 +210,8 @@ impl Environment {
         let Map { width, height, .. } = *self.map;
         if width != 2 * height {
             warnings.push(format!(
-                "environment map {path} has {width}×{height} texels: an equirectangular one is twice as wide as high"
+                "environment map {path} has {width}×{height} texels: \
+                 an equirectangular one is twice as wide as high"
             ));
         }
         warnings

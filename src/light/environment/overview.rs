@@ -9,8 +9,9 @@ use super::{Environment, luminance, uv_of};
 use crate::light::Light;
 
 impl Environment {
-    /// Mean radiance in the texels of a map of `columns` × `rows`, turned, with the factor, without the sun's disc; row
-    /// by row. It is taken from the cells that the lights are chosen from: the same few milliseconds for any map.
+    /// Mean radiance in the texels of a map of `columns` × `rows`, turned, with the factor, without the sun's
+    /// disc; row by row. It is taken from the cells that the lights are chosen from: the same few
+    /// milliseconds for any map.
     ///
     /// Where it has more texels than there are cells, it is no finer than those.
     pub fn overview(&self, columns: usize, rows: usize) -> Vec<Vec3> {
@@ -36,8 +37,8 @@ impl Environment {
         (0..columns * rows).map(texel).collect()
     }
 
-    /// Where its strongest light is in [`Environment::overview`]: u and v from 0 to 1. The sun, or the strongest of
-    /// those that stand for the map.
+    /// Where its strongest light is in [`Environment::overview`]: u and v from 0 to 1. The sun, or the
+    /// strongest of those that stand for the map.
     pub fn strongest(&self) -> Option<[f32; 2]> {
         let directional = |light: Light| match light {
             Light::Directional { to_light, intensity } => Some((luminance(intensity.as_dvec3()), to_light)),

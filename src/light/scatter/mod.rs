@@ -6,27 +6,31 @@
 //! I·[ w·V·Ψ  +  w'·(P(z) + b'·V')  −  w·b·V  +  w·V·ω Σ_{n=2}^{6} h_n (ω τ_l)^(n−1)/(n−1)! ]
 //! ```
 //!
-//! w = T(1 − e^(−τ)) is the cell's weight in the view ray, V = e^(−τ_l) what is left of the light there, Ψ = ωπΦ
-//! the single scattering that is there without this module. The rest is light scattered twice and more:
+//! w = T(1 − e^(−τ)) is the cell's weight in the view ray, V = e^(−τ_l) what is left of the light there, Ψ =
+//! ωπΦ the single scattering that is there without this module. The rest is light scattered twice and more:
 //!
 //! - **Similarity.** A phase function of mean cosine g passes the share g straight on, the rest in all
-//!   directions alike (van de Hulst, "Multiple Light Scattering", 1980, chapter 14; Joseph, Wiscombe and Weinman
-//!   1976, with a delta peak of weight g). So the medium is replaced by one with isotropic scattering, extinction a = 1 − ωg times
-//!   the true one and albedo ω' = ω(1 − g)/a. w' and V' are w and V at that extinction.
-//! - **Slab.** Copies of the volume lie side by side, so on the large scale it is a slab. ω'/4 of its mean diffuse
-//!   intensity is P, from the equation of Schwarzschild and Milne for the layers' mean optical depths ([`slab`]).
-//!   It depends on the layer, the face that is lit and the light's cosine μ₀ alone: a small table ([`Profile`]).
-//! - **Once is once.** b' = ω'/4 is the reduced medium's single scattering; b = ω(1 − g)/4, the isotropic part of the true one,
-//!   is taken off again, for Ψ holds it (as in Nakajima and Tanaka 1988, TMS). With g = 0 the two cancel.
+//!   directions alike (van de Hulst, "Multiple Light Scattering", 1980, chapter 14; Joseph, Wiscombe and
+//!   Weinman 1976, with a delta peak of weight g). So the medium is replaced by one with isotropic
+//!   scattering, extinction a = 1 − ωg times the true one and albedo ω' = ω(1 − g)/a. w' and V' are w and V
+//!   at that extinction.
+//! - **Slab.** Copies of the volume lie side by side, so on the large scale it is a slab. ω'/4 of its mean
+//!   diffuse intensity is P, from the equation of Schwarzschild and Milne for the layers' mean optical depths
+//!   ([`slab`]). It depends on the layer, the face that is lit and the light's cosine μ₀ alone: a small table
+//!   ([`Profile`]).
+//! - **Once is once.** b' = ω'/4 is the reduced medium's single scattering; b = ω(1 − g)/4, the isotropic
+//!   part of the true one, is taken off again, for Ψ holds it (as in Nakajima and Tanaka 1988, TMS). With g =
+//!   0 the two cancel.
 //! - **Forward peak.** n scatterings by small angles make a phase function of mean cosine gⁿ (Goudsmit and
 //!   Saunderson 1940; exact for Henyey and Greenstein's). What it has above its own isotropic part is
 //!   h_n = max(0, π·Φ_HG(gⁿ, cosθ) − (1 − gⁿ)/4), summed up to six scatterings along the light's way.
 //!
 //! Why the *layers'* mean depths and not the depths along the cell's own line: scattered light comes from a
 //! neighbourhood as wide as its free path, which is wider than the strands. Against a path tracer
-//! (`tests/suite/scatter`) the local depths had 1.7 times the error. Attenuation series (Wrenninge, Kulla and Lundqvist, "Oz: The Great
-//! and Volumetric", SIGGRAPH 2013) were wrong by a third of the light at best; Zinke's dual scattering (2008) is made for
-//! fibres that scatter forward only, and knows nothing of a slab's faces.
+//! (`tests/suite/scatter`) the local depths had 1.7 times the error. Attenuation series (Wrenninge, Kulla and
+//! Lundqvist, "Oz: The Great and Volumetric", SIGGRAPH 2013) were wrong by a third of the light at best;
+//! Zinke's dual scattering (2008) is made for fibres that scatter forward only, and knows nothing of a slab's
+//! faces.
 //!
 //! `shaders/light/scatter.wgsl` is the twin of what works along a ray.
 
@@ -80,9 +84,9 @@ impl Scattering {
         Similarity { extinction, albedo: self.albedo, reduced: isotropic / extinction, isotropic, g }
     }
 
-    /// That of Kajiya and Kay's fibres whose directions are spread evenly. Their model reflects more than it receives once
-    /// π·k_d + … passes 1 (at the default k_d = ½ it is 1.6), and what gains light at every scattering has no
-    /// end: the albedo is clamped to `most` < 1.
+    /// That of Kajiya and Kay's fibres whose directions are spread evenly. Their model reflects more than it
+    /// receives once π·k_d + … passes 1 (at the default k_d = ½ it is 1.6), and what gains light at every
+    /// scattering has no end: the albedo is clamped to `most` < 1.
     ///
     /// Averages of Ψ/π over all fibres and all eyes; g from the specular cone, which sends light on
     /// by its angle with the fibre. Quadrature by midpoints, good to 1e-3.
@@ -118,7 +122,8 @@ pub fn layer_depths(volume: &VolumeTexture, attenuation: &Attenuation, depth_m: 
     volume.layer_codes().into_iter().map(mean).collect()
 }
 
-/// P: what the diffuse light of a slab gives to each layer, by the lit face, the light's cosine and the layer.
+/// P: what the diffuse light of a slab gives to each layer, by the lit face, the light's cosine and the
+/// layer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Layers nz.
@@ -199,9 +204,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// For a light whose direction has the cosine `l_n` with the seen face's normal; less than 0: it comes from behind.
-    /// With per-cell attenuation a slanted line meets more cells instead of more metres: −z/(|x| + |y| + |z|) of
-    /// the direction in cells takes the cosine's place.
+    /// For a light whose direction has the cosine `l_n` with the seen face's normal; less than 0: it comes
+    /// from behind. With per-cell attenuation a slanted line meets more cells instead of more metres: −z/(|x|
+    /// + |y| + |z|) of the direction in cells takes the cosine's place.
     pub fn new(l_n: f32, layers: u32) -> Row {
         let place = l_n.abs().min(1.0).sqrt() * (COSINES - 1) as f32;
         let below = (place as u32).min(COSINES - 2);
@@ -225,8 +230,8 @@ pub fn forward_peak(g: f32, cos: f32) -> [f32; ORDERS - 1] {
 
 /// What one cell sends to the eye of one light of I = 1, besides w·V·Ψ.
 ///
-/// Depths are in powers of two (optical depth · log₂e, as the walk has them): `view` from the face to where the ray
-/// enters the cell, `cell` inside it, `light` from its middle to the light. `diffuse` is P.
+/// Depths are in powers of two (optical depth · log₂e, as the walk has them): `view` from the face to where
+/// the ray enters the cell, `cell` inside it, `light` from its middle to the light. `diffuse` is P.
 #[inline]
 pub fn multiple(
     similarity: &Similarity,

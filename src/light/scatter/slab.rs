@@ -17,8 +17,8 @@
 /// a thick slab (∫ s² E₁ ds = 2/3 becomes 2/3 + h²/6): 1.6 % here.
 const THICKEST: f64 = 0.25;
 
-/// Most layers between the two faces' thin ones. Slabs deeper than 60 get thicker ones: what comes through them,
-/// 2 % and less, is then overestimated.
+/// Most layers between the two faces' thin ones. Slabs deeper than 60 get thicker ones: what comes through
+/// them, 2 % and less, is then overestimated.
 const MOST: f64 = 240.0;
 
 /// Thickness of a layer at a face, where J bends, and by how much each next one is thicker.

@@ -69,8 +69,8 @@ impl Azimuth {
         sum
     }
 
-    /// N_p(φ) = ½ ∫ A_p(h)·D(φ − Φ_p(h)) dh, h from −1 to 1, per radian. What has been inside for longer than TRT has
-    /// forgotten where it came from: 1/2π.
+    /// N_p(φ) = ½ ∫ A_p(h)·D(φ − Φ_p(h)) dh, h from −1 to 1, per radian. What has been inside for longer than
+    /// TRT has forgotten where it came from: 1/2π.
     pub fn at(&self, phi: f64) -> [DVec3; LOBES] {
         let mut sum = [DVec3::ZERO; LOBES];
         for (share, passage) in &self.passages {

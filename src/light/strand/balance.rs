@@ -1,8 +1,8 @@
 //! The factor that makes the lobes' sum keep the energy at every inclination.
 //!
-//! M_p is normalised and Σ A_p = 1, but A_p is taken at θ_d, which is not the same for all θ_o of a wide lobe, so
-//! the integral of their product strays from 1. A factor b(θ_i)·b(θ_o) that is the same for both directions
-//! repairs it and keeps Φ reciprocal (Sinkhorn 1964, for a symmetric matrix).
+//! M_p is normalised and Σ A_p = 1, but A_p is taken at θ_d, which is not the same for all θ_o of a wide
+//! lobe, so the integral of their product strays from 1. A factor b(θ_i)·b(θ_o) that is the same for both
+//! directions repairs it and keeps Φ reciprocal (Sinkhorn 1964, for a symmetric matrix).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -12,8 +12,8 @@ pub const ETA: f64 = 1.333;
 /// Number of lobes: R, TT, TRT, and the residual of all longer ways.
 pub const LOBES: usize = 4;
 
-/// Share of the power that a plane interface reflects, polarised across (s) and in (p) the plane of incidence;
-/// `cos_i` outside, `cos_t` inside, `eta` the index inside over that outside (Fresnel 1823).
+/// Share of the power that a plane interface reflects, polarised across (s) and in (p) the plane of
+/// incidence; `cos_i` outside, `cos_t` inside, `eta` the index inside over that outside (Fresnel 1823).
 pub fn fresnel(cos_i: f64, cos_t: f64, eta: f64) -> [f64; 2] {
     let s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);

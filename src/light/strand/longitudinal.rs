@@ -1,5 +1,5 @@
-//! M_p: how the lobes spread along the strand (d'Eon, Francois, Hill, Letteri and Aubry, "An Energy-Conserving
-//! Hair Reflectance Model", EGSR 2011, eq. 7).
+//! M_p: how the lobes spread along the strand (d'Eon, Francois, Hill, Letteri and Aubry, "An
+//! Energy-Conserving Hair Reflectance Model", EGSR 2011, eq. 7).
 
 use super::cylinder::LOBES;
 

@@ -1,19 +1,20 @@
-//! A reflection model made for flowing water: every cell of the volume holds strands of water along the flow, and
-//! air between them.
+//! A reflection model made for flowing water: every cell of the volume holds strands of water along the flow,
+//! and air between them.
 //!
-//! A strand is a dielectric cylinder along the cell's direction t. Light that meets it leaves by reflection (R),
-//! through it (TT), after one reflection inside (TRT, which makes the bow) or later; the sum is a phase function
+//! A strand is a dielectric cylinder along the cell's direction t. Light that meets it leaves by reflection
+//! (R), through it (TT), after one reflection inside (TRT, which makes the bow) or later; the sum is a phase
+//! function
 //!
 //! Φ(l→e) = b(θ_i)·b(θ_o)·Σ_p M_p(θ_i, θ_o)·N_p(θ_d, φ),   θ_d = (θ_o − θ_i)/2
 //!
-//! in 1/sr, whose integral over all directions is the albedo, 1 where nothing is absorbed. Light and eye both point
-//! outward; sin θ_i = t·l, sin θ_o = t·e, φ is the angle between both around t. Exchanging l and e, turning t round,
-//! and φ → −φ change nothing.
+//! in 1/sr, whose integral over all directions is the albedo, 1 where nothing is absorbed. Light and eye both
+//! point outward; sin θ_i = t·l, sin θ_o = t·e, φ is the angle between both around t. Exchanging l and e,
+//! turning t round, and φ → −φ change nothing.
 //!
 //! The frame of lobes is Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light Scattering from Human Hair
 //! Fibers", SIGGRAPH 2003; [`longitudinal`] is from d'Eon et al. 2011, [`azimuthal`] from Chiang et al. 2016,
-//! [`cylinder`] and [`absorption`] are water's, [`balance`] keeps the energy. The air is a Henyey–Greenstein phase
-//! function (1941), mixed in by the cell's own coefficients. [`table`] holds it all for the renderers.
+//! [`cylinder`] and [`absorption`] are water's, [`balance`] keeps the energy. The air is a Henyey–Greenstein
+//! phase function (1941), mixed in by the cell's own coefficients. [`table`] holds it all for the renderers.
 //!
 //! taki's intensities are irradiance over π, so Ψ = π·Φ stands where the fibre model's Ψ stands.
 
@@ -116,8 +117,8 @@ impl Strand {
         }
     }
 
-    /// Φ by lobes for inclinations of light and eye (−π/2 to π/2) and the angle between them around the strand. The
-    /// shares of strand and air are those of a cell with k_d = k_s.
+    /// Φ by lobes for inclinations of light and eye (−π/2 to π/2) and the angle between them around the
+    /// strand. The shares of strand and air are those of a cell with k_d = k_s.
     pub fn lobes(&self, theta_i: f64, theta_o: f64, phi: f64) -> Lobes {
         let ((sin_i, cos_i), (sin_o, cos_o)) = (theta_i.sin_cos(), theta_o.sin_cos());
         let a = self.params.aeration as f64;
@@ -146,8 +147,8 @@ pub fn henyey_greenstein(g: f64, cos: f64) -> f64 {
     0.25 * FRAC_1_PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos).powf(1.5)
 }
 
-/// Share of air in a cell: `aeration` where k_d = k_s, more where diffuse reflection is stronger, so that the noise
-/// of k is noise of the air.
+/// Share of air in a cell: `aeration` where k_d = k_s, more where diffuse reflection is stronger, so that the
+/// noise of k is noise of the air.
 pub fn cell_aeration(aeration: f32, k_d: f32, k_s: f32) -> f32 {
     let sum = k_d + k_s;
     if sum > 0.0 { (aeration * (2.0 * k_d / sum)).clamp(0.0, 1.0) } else { aeration }

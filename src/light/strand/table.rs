@@ -8,13 +8,14 @@
 //! | y | cos θ_d | 48 |
 //! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the light's side, where the bow is, to the far one | 128 |
 //!
-//! All come from the cosines between the directions by square roots alone. A texel holds
-//! Ψ·√(cos θ_i·cos θ_o + v_R/2): near the mirror cone M is inversely proportional to that root, within a factor of
-//! 1.8 over all inclinations, and without it the steps of y would be too coarse where the strand is seen end on.
-//! It is linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half the time of float16.
+//! All come from the cosines between the directions by square roots alone. A texel holds Ψ·√(cos θ_i·cos θ_o
+//! + v_R/2): near the mirror cone M is inversely proportional to that root, within a factor of 1.8 over all
+//! inclinations, and without it the steps of y would be too coarse where the strand is seen end on. It is
+//! linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half the time of float16.
 //!
-//! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in units of
-//! Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones (tests/suite/strand.rs).
+//! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
+//! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones
+//! (tests/suite/strand.rs).
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -189,8 +190,8 @@ fn azimuth_of(z: f64) -> f64 {
     2.0 * (rest.atan2(w) + ((z - rest) / w.hypot(rest)).clamp(-1.0, 1.0).asin())
 }
 
-/// Three numbers of 9 bits with one exponent of 5 (the OpenGL extension EXT_texture_shared_exponent); of 0 to 65408,
-/// good to 0.2 % of the largest.
+/// Three numbers of 9 bits with one exponent of 5 (the OpenGL extension EXT_texture_shared_exponent); of 0 to
+/// 65408, good to 0.2 % of the largest.
 fn pack_rgb9e5(rgb: Vec3) -> u32 {
     let rgb = rgb.clamp(Vec3::ZERO, Vec3::splat(65408.0));
     let largest = rgb.max_element();

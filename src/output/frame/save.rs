@@ -19,8 +19,8 @@ impl Frame {
         output.finish_with(&bytes)
     }
 
-    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all. A layer of the raster pass that
-    /// the frame was rendered without is 0.
+    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all. A layer of the raster
+    /// pass that the frame was rendered without is 0.
     ///
     /// # Errors
     /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.

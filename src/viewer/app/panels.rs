@@ -163,8 +163,8 @@ impl Viewer {
                 }
             }
             ui.separator();
-            // The room is the same while the renderer works and at rest. Otherwise the picture below would change
-            // its size each time, and be rendered again without end.
+            // The room is the same while the renderer works and at rest. Otherwise the picture below would
+            // change its size each time, and be rendered again without end.
             let room = egui::vec2(PROGRESS_WIDTH, ui.spacing().interact_size.y);
             let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
             let layout = egui::Layout::left_to_right(egui::Align::Center);

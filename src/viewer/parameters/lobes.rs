@@ -16,7 +16,8 @@ use crate::viewer::lobes::{Curve, Plane, STEPS, Scale, Setting, alpha, curves, i
 const MAX_WIDTH: f32 = 380.0;
 /// Half the side of the plot in radii of its rim. It leaves room for the light's arrow and the angles.
 const EXTENT: f64 = 1.24;
-/// Angle on both sides of the light that is kept free of labels, radians: the light's arrow and name are there.
+/// Angle on both sides of the light that is kept free of labels, radians: the light's arrow and name are
+/// there.
 const ARROW_ROOM: f64 = 0.35;
 
 /// The plot, its curves, and the setting that they were computed for.
@@ -88,8 +89,8 @@ impl LobesPlot {
             Reflection::Strand(_) => "Strand of water with air bubbles, Φ",
         };
         ui.label(format!("θ_i = {theta_i} of {}", incidence.light)).on_hover_text(
-            "Inclination of the light to the plane across the flow. The flow is v at the middle of the first quad. \
-             Select a light to see its lobes.",
+            "Inclination of the light to the plane across the flow. The flow is v at the middle of the first \
+             quad. Select a light to see its lobes.",
         );
         legend(ui, curves);
         let scale = Scale::new(curves);
@@ -99,8 +100,8 @@ impl LobesPlot {
             Plane::Along => "over θ_o, with φ = 0 on the left, φ = π on the right, and the flow down".into(),
         };
         let caption = format!(
-            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. The radius is the luminance in 1/sr on a \
-             logarithmic scale, from {} or less in the middle to the largest value at the rim.",
+            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. The radius is the luminance in 1/sr on \
+             a logarithmic scale, from {} or less in the middle to the largest value at the rim.",
             setting.k_d,
             setting.k_s,
             power_of_ten(scale.middle)
@@ -129,7 +130,8 @@ impl LobesPlot {
             let _ = send.send(curves(&setting));
             ctx.request_repaint();
         };
-        // On a thread of its own: the strand's energy balance waits for the thread pool, which may be busy rendering.
+        // On a thread of its own: the strand's energy balance waits for the thread pool, which may be busy
+        // rendering.
         let _ = std::thread::Builder::new().name("lobes".into()).spawn(compute);
         self.computing = Some((setting, answer));
     }

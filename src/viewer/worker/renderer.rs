@@ -417,8 +417,8 @@ impl Renderer {
         (mesh, true)
     }
 
-    /// The scene with its automatic exposure, if it has one: measured anew where something has changed that it
-    /// depends on. The flow is not among it, so that nothing flickers while the water plays.
+    /// The scene with its automatic exposure, if it has one: measured anew where something has changed that
+    /// it depends on. The flow is not among it, so that nothing flickers while the water plays.
     fn exposed(&mut self, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, serial: u64) -> Result<Scene> {
         if scene.image.look.auto_exposure == AutoExposure::None {
             return Ok(scene.clone());
