@@ -36,8 +36,8 @@ pub enum Error {
     NoAdapter(String),
     /// The viewer's window cannot be opened.
     #[error(
-        "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) with Vulkan \
-         or OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
+        "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) \
+         with Vulkan or OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
     )]
     NoWindow(String),
     /// A video was asked for, and ffmpeg is missing or cannot encode it.
