@@ -303,8 +303,10 @@ fn lines_of_the_house() -> Vec<(String, String)> {
 
 #[test]
 fn no_line_is_wider_than_110_columns() {
-    let allowed =
-        |line: &str| line.trim_start().starts_with('|') || line.contains("](") || line.contains("://");
+    let allowed = |line: &str| {
+        let told = line.trim_start().trim_start_matches(['/', '!', ' ']);
+        told.starts_with('|') || line.contains("](") || line.contains("://")
+    };
     let files = lines_of_the_house();
     assert!(files.len() > 200, "{} files", files.len());
     let mut wide = Vec::new();
