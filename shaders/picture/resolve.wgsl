@@ -1,5 +1,5 @@
 // The picture from the linear frame: mean of the samples, white balance, exposure, tone curve, encoding, 8
-// bits. CPU twin: src/cpu/resolve.rs.
+// bits. CPU twin: src/picture/resolve.rs.
 
 #import layout
 

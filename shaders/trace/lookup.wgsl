@@ -1,5 +1,5 @@
 // What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; many directions and
-// the light they send on. Part of the stage integrate. Twins: src/cpu/lookup.rs and src/shading.rs, Spread.
+// the light they send on. Part of the stage integrate. Twins: src/trace/lookup.rs and src/light/fibre.rs, Spread.
 
 #import layout
 #import light::fibre

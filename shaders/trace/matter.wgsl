@@ -1,5 +1,5 @@
 // What a sheet makes of the cells: eroded ρ, and mist. Shared by the stages visibility and integrate. Twin:
-// src/cpu/matter.rs.
+// src/trace/matter.rs.
 
 #import layout
 

@@ -49,7 +49,7 @@ impl Camera {
     }
 
     /// Unit direction through a pixel of the whole image, at `offset` from its top left corner.
-    /// Twin: `view_ray` in `shaders/frame.wgsl`.
+    /// Twin: `view_ray` in `shaders/layout.wgsl`.
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
         let (right, up) = self.image_plane(width, height);
         let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;

@@ -9,7 +9,7 @@ pub const TONE_FILMIC: u32 = 1;
 /// `tone` of [`Develop`]: AgX.
 pub const TONE_AGX: u32 = 2;
 
-/// How the resolve pass makes the picture; `shaders/resolve.wgsl`.
+/// How the resolve pass makes the picture; `shaders/picture/resolve.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]

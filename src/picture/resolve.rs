@@ -1,4 +1,4 @@
-//! The picture from linear radiance, on the CPU. Twin: `shaders/resolve.wgsl`.
+//! The picture from linear radiance, on the CPU. Twin: `shaders/picture/resolve.wgsl`.
 
 use rayon::prelude::*;
 

@@ -1,5 +1,5 @@
 //! What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; and which level of
-//! the volume it looks into. Twins: `shaders/levels.wgsl` and `shaders/lookup.wgsl`.
+//! the volume it looks into. Twins: `shaders/trace/levels.wgsl` and `shaders/trace/lookup.wgsl`.
 
 use glam::{IVec3, UVec3, Vec3};
 

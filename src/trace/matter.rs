@@ -1,4 +1,4 @@
-//! What a sheet makes of the cells: eroded ρ, and mist. Twin: `shaders/matter.wgsl`.
+//! What a sheet makes of the cells: eroded ρ, and mist. Twin: `shaders/trace/matter.wgsl`.
 
 use glam::{Vec2, Vec3};
 
