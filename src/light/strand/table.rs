@@ -1,6 +1,5 @@
-//! Ψ of a strand as a table over three angles, for the renderers. Twin of the lookup:
-//! `shaders/light/strand.wgsl`,
-//! the same operations in the same order.
+//! Ψ of a strand as a table over three angles, for the renderers. `shaders/light/strand.wgsl` is the twin of the
+//! lookup: the same operations in the same order.
 //!
 //! | axis | runs over | nodes |
 //! |---|---|---|
@@ -8,10 +7,10 @@
 //! | y | cos θ_d | 48 |
 //! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the light's side, where the bow is, to the far one | 128 |
 //!
-//! All come from the cosines between the directions by square roots alone. A texel holds Ψ·√(cos θ_i·cos θ_o
-//! + v_R/2): near the mirror cone M is inversely proportional to that root, within a factor of 1.8 over all
-//! inclinations, and without it the steps of y would be too coarse where the strand is seen end on. It is
-//! linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half the time of float16.
+//! All come from the cosines between the directions by square roots alone. A texel holds
+//! Ψ·√(cos θ_i·cos θ_o + v_R/2): near the mirror cone M is inversely proportional to that root, within a factor
+//! of 1.8 over all inclinations. Without it the steps of y would be too coarse where the strand is seen end on.
+//! It is linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half the time of float16.
 //!
 //! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
 //! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones
