@@ -121,8 +121,8 @@ impl Spread {
     ///
     /// x^p, with x the cosine of an angle δ, is about e^(−pδ²/2); folded with a Gaussian of variance s² it is
     /// that of p/(1 + p·s²), lower by the root. δ is the sum of the angles that light and eye make with the
-    /// flow; it turns with the direction by the sum of their unit vectors across the flow, whose square is 2
-    /// + 2 cos φ.
+    /// flow; it turns with the direction by the sum of their unit vectors across the flow, whose square
+    /// is 2 + 2 cos φ.
     pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
         let [cos2_l, product] = self.cosines(l_v);
         let sin2_l = (1.0 - cos2_l).max(0.0);

@@ -205,8 +205,8 @@ pub struct Row {
 
 impl Row {
     /// For a light whose direction has the cosine `l_n` with the seen face's normal; less than 0: it comes
-    /// from behind. With per-cell attenuation a slanted line meets more cells instead of more metres: −z/(|x|
-    /// + |y| + |z|) of the direction in cells takes the cosine's place.
+    /// from behind. With per-cell attenuation a slanted line meets more cells instead of more metres:
+    /// −z/(|x| + |y| + |z|) of the direction in cells takes the cosine's place.
     pub fn new(l_n: f32, layers: u32) -> Row {
         let place = l_n.abs().min(1.0).sqrt() * (COSINES - 1) as f32;
         let below = (place as u32).min(COSINES - 2);
