@@ -1,17 +1,19 @@
-//! Progress, warnings, and the way to stop long work.
+//! Progress reports, warnings, and a way to stop long work.
 
 use super::error::Result;
 
-/// Watches a job: told of progress and warnings, asked between pieces of work whether to go on.
+/// Observer of a job: receives progress and warnings, and decides between pieces of work whether to go on.
 pub trait Monitor: Sync {
-    /// `done` of `total` pieces of `stage` are finished. An error ends the job at once; nothing
-    /// unfinished is kept.
+    /// Reports that `done` of `total` pieces of `stage` are finished.
+    ///
+    /// # Errors
+    /// Returns an error to end the job at once; nothing unfinished is kept.
     fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()>;
-    /// Something the user should know that does not stop the work.
+    /// Reports something that the user should know and that does not stop the work.
     fn warn(&self, text: &str);
 }
 
-/// Watches nothing and never stops.
+/// Monitor that ignores every report and never stops the job.
 pub struct Unwatched;
 
 impl Monitor for Unwatched {
