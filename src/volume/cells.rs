@@ -1,4 +1,4 @@
-//! How the cells of a volume are stored: every one of them, or in bricks those that hold anything.
+//! Storage of a volume's cells: dense (all of them) or sparse (the non-empty ones, in bricks).
 
 use std::ops::Index;
 use std::sync::Arc;
@@ -8,19 +8,20 @@ use rayon::prelude::*;
 
 use super::{Bricks, Cell};
 
-/// Cells of a volume, shared: a copy costs nothing, and who keeps cells on a device knows them again.
+/// Cells of a volume. They are shared: a copy costs nothing, and a copy of them on a device can be recognised
+/// by their address.
 ///
-/// Both forms are indexed alike, x fastest, then y, then z, and equal cells are equal volumes in whichever form.
+/// Both forms have the same order, x fastest, then y, then z, and compare equal if their cells are equal.
 #[derive(Clone, Debug)]
 pub enum Cells {
-    /// All of them.
+    /// All cells.
     Dense(Arc<Vec<Cell>>),
-    /// Those that are not empty.
+    /// The cells that are not empty.
     Sparse(Arc<Bricks>),
 }
 
 impl Cells {
-    /// Their number, the empty ones included.
+    /// Number of cells, empty ones included.
     pub fn len(&self) -> usize {
         match self {
             Cells::Dense(cells) => cells.len(),
@@ -28,12 +29,12 @@ impl Cells {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Those that are stored, which all that hold anything are.
+    /// The stored cells. Every non-empty cell is stored.
     pub fn stored(&self) -> &[Cell] {
         match self {
             Cells::Dense(cells) => cells,
@@ -41,7 +42,7 @@ impl Cells {
         }
     }
 
-    /// All cells where all are stored.
+    /// All cells, if the storage is dense.
     pub fn dense(&self) -> Option<&Arc<Vec<Cell>>> {
         match self {
             Cells::Dense(cells) => Some(cells),
@@ -49,7 +50,7 @@ impl Cells {
         }
     }
 
-    /// The bricks where the cells are stored in those.
+    /// The bricks, if the storage is sparse.
     pub fn bricks(&self) -> Option<&Arc<Bricks>> {
         match self {
             Cells::Dense(_) => None,
@@ -57,7 +58,7 @@ impl Cells {
         }
     }
 
-    /// Bytes they take.
+    /// Size of the cells on the host, bytes.
     pub fn bytes(&self) -> u64 {
         match self {
             Cells::Dense(cells) => size_of_val(cells.as_slice()) as u64,
@@ -65,7 +66,7 @@ impl Cells {
         }
     }
 
-    /// All cells in their order, the empty ones included.
+    /// Iterates over all cells in their order, empty ones included.
     pub fn iter(&self) -> impl Iterator<Item = &Cell> {
         match self {
             Cells::Dense(cells) => Either::Left(cells.iter()),
@@ -77,7 +78,7 @@ impl Cells {
         }
     }
 
-    /// Whether the two are one memory.
+    /// Whether both share one piece of memory.
     pub fn same(&self, other: &Cells) -> bool {
         match (self, other) {
             (Cells::Dense(a), Cells::Dense(b)) => Arc::ptr_eq(a, b),
@@ -86,7 +87,7 @@ impl Cells {
         }
     }
 
-    /// Where in memory they are.
+    /// Address of the cells in memory.
     pub fn address(&self) -> usize {
         match self {
             Cells::Dense(cells) => Arc::as_ptr(cells).addr(),
@@ -94,7 +95,7 @@ impl Cells {
         }
     }
 
-    /// Makes every stored cell anew, of its linear index, its place among the stored ones, and what it is.
+    /// Replaces every stored cell by `new(linear index in the volume, index among the stored cells, cell)`.
     pub fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
         match self {
             Cells::Dense(cells) => Arc::make_mut(cells)
@@ -106,7 +107,7 @@ impl Cells {
         }
     }
 
-    /// Σ ρ code of each layer of `area` cells along z.
+    /// Sums the ρ codes of each layer of `area` cells, from z = 0 on.
     pub fn layer_codes(&self, area: usize) -> Vec<u64> {
         match self {
             Cells::Dense(cells) => cells
@@ -117,7 +118,7 @@ impl Cells {
         }
     }
 
-    /// CRC-32 of their bytes in their order.
+    /// CRC-32 of the bytes of all cells in their order.
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         match self {
             Cells::Dense(cells) => {
@@ -151,7 +152,8 @@ impl From<Bricks> for Cells {
 impl Index<usize> for Cells {
     type Output = Cell;
 
-    /// By linear index; of bricks slower than by place ([`super::VolumeTexture::cell`]).
+    /// Returns the cell with this linear index. In bricks this is slower than [`super::VolumeTexture::cell`],
+    /// which takes x, y and z.
     #[inline]
     fn index(&self, index: usize) -> &Cell {
         match self {
