@@ -71,7 +71,7 @@ impl Cache {
         Cache { root: root.into(), max_bytes, min_time: MIN_TIME }
     }
 
-    /// The same cache, but one that also keeps data that are quick to compute. For tests.
+    /// Makes the cache also keep data that are quick to compute. For tests.
     #[doc(hidden)]
     pub fn keeping_all(self) -> Cache {
         Cache { min_time: Duration::ZERO, ..self }

@@ -20,7 +20,7 @@ pub enum Error {
         need: String,
         /// Bytes allowed, formatted by [`human_bytes`].
         budget: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
     /// A scene, parameter, volume or image is not valid.
@@ -28,7 +28,7 @@ pub enum Error {
     Input {
         /// Description of the fault, with its file, line or byte, key and value.
         what: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
     /// The command asks for `--engine gpu` and no adapter can do the work.
@@ -50,7 +50,7 @@ pub enum Error {
         path: PathBuf,
         /// Reason.
         why: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
     /// Reading or writing a file failed.
@@ -62,7 +62,7 @@ pub enum Error {
         path: PathBuf,
         /// Reason that the system gives.
         why: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: &'static str,
     },
     /// The GPU device was lost. Trying again may help.

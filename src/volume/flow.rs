@@ -63,7 +63,8 @@ impl Flow {
         Flow::summed(spec, &lengths, position, [0, 1], monitor)
     }
 
-    /// The same sums as [`Flow::new`], for the cells that `bricks` will store, in the order of `bricks`.
+    /// Sums over all curves for the cells that `bricks` will store, in their order. Each sum equals that of
+    /// [`Flow::new`].
     ///
     /// # Errors
     /// Returns an error if `monitor` ends the work.

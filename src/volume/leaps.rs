@@ -121,7 +121,7 @@ pub fn with_boxes(volume: &VolumeTexture, between: bool) -> VolumeTexture {
 fn widened(size: [u32; 3], mut full: Vec<bool>) -> Vec<bool> {
     let [nx, ny, nz] = size.map(|n| n as usize);
     for (stride, n, wraps) in [(1, nx, true), (nx, ny, true), (nx * ny, nz, false)] {
-        let at = |i: usize| {
+        let is_near_full = |i: usize| {
             let c = i / stride % n;
             let before = if c > 0 {
                 i - stride
@@ -139,7 +139,7 @@ fn widened(size: [u32; 3], mut full: Vec<bool>) -> Vec<bool> {
             };
             full[i] || full[before] || full[after]
         };
-        full = (0..full.len()).into_par_iter().map(at).collect();
+        full = (0..full.len()).into_par_iter().map(is_near_full).collect();
     }
     full
 }
