@@ -1,96 +1,115 @@
-// Types that every stage shares with the host; prepended to each stage's source. Twin:
-// src/engine/gpu/layout.rs; a test compares names, offsets and sizes.
+// Structs that stages share with the host, and functions that several stages use. Twins of the structs:
+// src/engine/gpu/layout.rs. A test compares names, offsets, sizes and constants.
 
+// Side of a workgroup, pixels.
 const WORKGROUP: u32 = 8u;
 
+// Uniforms of one sample of one window.
 struct FrameUniforms {
     clip_from_world: mat4x4<f32>,
     eye_world: vec3<f32>,
+    // Offset of the sample in its pixel, along x.
     jitter_x: f32,
-    // Half the image plane at distance 1: right and up are scaled by the field of view.
+    // Half the width of the image plane at distance 1; `up` is half its height.
     right: vec3<f32>,
+    // Offset of the sample in its pixel, along y.
     jitter_y: f32,
     up: vec3<f32>,
+    // Number of the sample, from 0, among the `samples` that are summed up.
     sample_index: u32,
     forward: vec3<f32>,
     samples: u32,
+    // Radiance of the background straight up; `horizon` is that at the horizon and below.
     zenith: vec3<f32>,
     light_count: u32,
     horizon: vec3<f32>,
+    // Exponent p of the fibre model.
     p: f32,
     ambient: vec3<f32>,
+    // Transmittance below which a ray ends.
     early_end: f32,
+    // nx, ny, nz of the volume.
     cells: vec3<i32>,
+    // Largest number of cells on one walk.
     max_cells: u32,
     image_width: f32,
     image_height: f32,
-    // log₂e · α/65535 · (σ in 1/m, or τ): optical depth in bits per unit of ρ code (and metre).
+    // log₂e · α/65535 · σ (1/m) or τ: optical depth in bits per unit of ρ code, with σ also per metre.
     extinction: f32,
+    // 1: angles are measured in the frame of the texture. 0: in the world.
     texture_frame: u32,
-    // Density of the haze at the eye, 1/m, and its decrease with height, 1/m. See src/light/haze.rs.
+    // Extinction of the haze at the eye, 1/m. See src/light/haze.rs.
     haze_density: f32,
+    // Rate at which the haze thins upwards, 1/m.
     haze_falloff: f32,
     // Part of the image that the targets hold: its first pixel and its size.
     window_x: u32,
     window_y: u32,
     window_width: u32,
     window_height: u32,
-    // Distance that the volume has moved along the flow, in cells: 0 to ny.
+    // Distance that the volume has moved down the flow, 0 to ny cells.
     flow_cells: f32,
-    // Layers of the quad ids: the most sheets that one ray passes.
+    // Layers of the target of quad ids: the largest number of sheets on one ray.
     layers: u32,
+    // Radiance of endless haze.
     haze_color: vec3<f32>,
-    // Distance of haze in front of the background, metres.
+    // Metres of haze in front of the background.
     haze_far: f32,
-    // Index of the light for which rock casts shadows on rock; the largest u32 if there is none.
+    // Number of the light that rock shadows rock from; 0xffffffff if there is none.
     shadow_light: u32,
-    // Number of levels of the volume.
+    // Number of levels of the volume, itself included.
     levels: u32,
-    // Solid angle of the pixel in the middle of the image, over its number of samples.
+    // Solid angle of the pixel in the middle of the image, divided by the number of samples, sr.
     footprint: f32,
     pad_c: f32,
 }
 
 struct Light {
-    // Unit direction towards a directional light, or the position of a light that has one.
+    // Unit direction towards a directional light, or the position of another light, metres.
     vector: vec3<f32>,
     has_position: u32,
+    // Colour × intensity, at 1 m if the light has a position.
     intensity: vec3<f32>,
-    // Cosine at the edge of a spot light's cone, below which it is dark; −2 where there is no cone.
+    // Cosine at the edge of a spot light's cone, outside of which it is dark; −2 for other lights.
     cos_edge: f32,
-    // Unit vector opposite to a spot light's beam.
+    // Unit vector against a spot light's beam.
     axis: vec3<f32>,
-    // 1 / (cosine where the full light begins − cos_edge).
+    // 1 / (cosine inside of which the light is full − cos_edge).
     inverse_soft: f32,
 }
 
 struct Quad {
+    // A, B, C, D in the world, metres.
     corners: array<vec4<f32>, 4>,
+    // Axes of the plane in the world: e1, e2 and the normal n.
     e1: vec3<f32>,
+    // Depth H of one volume, metres.
     thickness: f32,
     e2: vec3<f32>,
+    // Copies of the volume along u; `repeat_v` is the number along v.
     repeat_u: f32,
     n: vec3<f32>,
     repeat_v: f32,
-    // The eye relative to corner A, along e1, e2 and n.
+    // Position of the eye relative to corner A, along e1, e2 and n, metres.
     eye_plane: vec3<f32>,
-    // Start of the multiple-scattering profile of the quad's material.
+    // Index of the first value of the material's multiple-scattering profile.
     profile: u32,
+    // E = B − A, F = D − A and G = A − B + C − D in the plane, metres.
     e: vec2<f32>,
     f: vec2<f32>,
     g: vec2<f32>,
-    // Texture position of corner A, in copies of the volume.
+    // Texture position of corner A, in copies of the volume along u and v.
     offset: vec2<f32>,
     // Erosion e at A, B, C and D.
     erosion: vec4<f32>,
-    // Ψ of droplets; replaces Ψ of the cells if above 0.
+    // Ψ of mist, which replaces that of the cells; 0 if the quad is not mist.
     mist: f32,
     pad_a: f32,
     pad_b: f32,
     pad_c: f32,
 }
 
-// Part of the window that a pass works on.
+// Rectangular part of the window, pixels.
 struct Tile {
     x: u32,
     y: u32,
@@ -98,7 +117,8 @@ struct Tile {
     height: u32,
 }
 
-// Workgroups of one submission, a range of a list whose words hold x in the lower half and y in the upper.
+// Workgroups that one submission works on: `count` entries from `first` of a list. An entry holds a
+// workgroup's x in its lower half and y in its upper half.
 struct Groups {
     area: Tile,
     first: u32,
@@ -107,17 +127,21 @@ struct Groups {
     pad_b: u32,
 }
 
-// Returns the list entry of workgroup `group`: even entries first. Software Vulkan gives its threads fixed
-// parts of a dispatch; the interleaving evens out the load where the picture's water is uneven.
+// Index of the list entry that workgroup `group` takes: first the even ones, then the odd ones. Software
+// Vulkan gives each of its threads a fixed part of a dispatch; interleaving balances their work, because
+// water is not everywhere equally dense.
 fn listed(groups: Groups, group: u32) -> u32 {
     let half = (groups.count + 1u) / 2u;
     return groups.first + select(2u * group, 2u * (group - half) + 1u, group >= half);
 }
 
+// Cross product of two vectors in a plane: its component along the normal.
 fn cross2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.y - a.y * b.x;
 }
 
+// Dot product, summed from left to right as in the CPU twins. The built-in `dot` leaves the order to the
+// device.
 fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
@@ -126,8 +150,8 @@ fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.x + a.y * b.y;
 }
 
-// Returns the unit direction from a point to a light and the fraction of its intensity that arrives there
-// (Light::at).
+// Unit direction from a point to a light, and the factor of its intensity at the point. Twin: Light::at in
+// src/engine/cpu/opaque.rs.
 fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
     if light.has_position == 0u {
         return vec4<f32>(light.vector, 1.0);
@@ -143,14 +167,15 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(to_light, falloff);
 }
 
-// Fresnel reflectance of water for light at an angle to the normal (Schlick 1994).
+// Share of light that water reflects, after Fresnel, by Schlick's approximation (1994). `cos_angle` is the
+// cosine between the light and the normal. Twin: fresnel in src/engine/cpu/opaque.rs.
 fn fresnel(cos_angle: f32) -> f32 {
     let m = 1.0 - clamp(cos_angle, 0.0, 1.0);
     let m2 = m * m;
     return 0.02 + 0.98 * (m2 * m2 * m);
 }
 
-// Returns the unit direction through a pixel of the whole image (Camera::view_ray).
+// Unit direction through a pixel of the whole image. Twin: Camera::view_ray in src/picture/camera.rs.
 fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
     let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
     let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;

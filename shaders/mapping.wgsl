@@ -1,10 +1,11 @@
-// §3 The Jacobian of the map between a quad and the volume's face. Twin: src/mapping/mod.rs,
-// CellFrame.
+// §3 The map between a quad and the volume's face, and its Jacobian. Twins: QuadMap and CellFrame in
+// src/mapping/mod.rs, map_quad in src/engine/cpu/gbuffer.rs, and the start of a ray in
+// src/engine/cpu/integrate.rs.
 
 #import layout
 
-// world_from_cell at one point, in the axes of the quad's plane: e1, e2 and the normal on the visible side.
-// Its columns are (cx, 0), (cy, 0) and (0, 0, −depth).
+// Jacobian J = world_from_cell at one point, in the axes e1, e2 and seen normal of the quad's plane. Its
+// columns are (cx, 0), (cy, 0) and (0, 0, −depth).
 struct CellFrame {
     cx: vec2<f32>,
     cy: vec2<f32>,
@@ -12,14 +13,17 @@ struct CellFrame {
     det: f32,
 }
 
+// J⁻¹·d, where d is given in the plane's axes.
 fn cell_from_plane(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(cross2(d.xy, j.cy) / j.det, cross2(j.cx, d.xy) / j.det, -d.z / j.depth);
 }
 
+// Jᵀ·d, where d is given in the plane's axes.
 fn transposed(j: CellFrame, d: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot2(j.cx, d.xy), dot2(j.cy, d.xy), -j.depth * d.z);
 }
 
+// Jacobian at the texture coordinates `uv`, for a volume of `size` cells.
 fn cell_frame(quad: Quad, uv: vec2<f32>, size: vec3<i32>) -> CellFrame {
     let cells = vec3<f32>(size);
     var j: CellFrame;
@@ -30,25 +34,25 @@ fn cell_frame(quad: Quad, uv: vec2<f32>, size: vec3<i32>) -> CellFrame {
     return j;
 }
 
-// Transforms a world vector to the plane's axes; `side` is −1 if the quad is seen from behind.
+// World vector in the plane's axes. `side` is −1 if the quad is seen from behind, otherwise 1.
 fn plane_from_world(quad: Quad, side: f32, d: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot3(d, quad.e1), dot3(d, quad.e2), dot3(d, quad.n) * side);
 }
 
-// Returns −1 if the direction `d_world` meets the quad from behind, else 1.
+// Returns −1 if the direction `d_world` meets the quad from behind, otherwise 1.
 fn seen_side(quad: Quad, d_world: vec3<f32>) -> f32 {
     return select(1.0, -1.0, dot3(d_world, quad.n) > 0.0);
 }
 
-// Transforms a view direction to the plane's axes. A direction parallel to the plane is tilted into the
-// volume, so that its walk ends.
+// View direction in the plane's axes. A direction along the plane is tilted into the surface, so that its
+// walk ends.
 fn view_in_plane(quad: Quad, side: f32, d_world: vec3<f32>) -> vec3<f32> {
     let d = plane_from_world(quad, side, d_world);
     return vec3<f32>(d.xy, min(d.z, -1e-6));
 }
 
-// Returns the point on the face z = 0 where the walk begins, in cells inside the tile. The volume has moved
-// by `flow_cells` along y.
+// Point on the face z = 0, inside the tile, where the walk begins. The volume has moved by `flow_cells` along
+// y.
 fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> vec3<f32> {
     let cells = vec2<f32>(size.xy);
     let copies = uv * vec2<f32>(quad.repeat_u, quad.repeat_v) + quad.offset;
@@ -56,7 +60,7 @@ fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> ve
     return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
 }
 
-// Intersects the ray `d` from the eye with a quad; returns u, v and the distance in metres (map_quad).
+// Point where the ray `d` from the eye meets a quad: u, v, and the distance in metres.
 fn quad_hit(quad: Quad, d: vec3<f32>) -> vec3<f32> {
     let d_n = dot3(d, quad.n);
     let t = clamp(-quad.eye_plane.z / select(d_n, 1e-20, abs(d_n) < 1e-20), 0.0, 1e9);

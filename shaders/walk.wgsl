@@ -1,29 +1,34 @@
-// The exact 3-D DDA through a tiled grid of unit cells. Twin: src/walk.rs, which describes the edge cases.
+// §4 The exact 3-D DDA walk through a tiled grid of unit cells. Twin: src/walk.rs, which explains the edge
+// cases.
 
+// Parameter of a boundary that is never met.
 const NEVER: f32 = 1.0e30;
+// Smallest direction component that does not count as zero, in cells per unit of t.
 const PARALLEL: f32 = 1.0e-20;
-// Fraction of the parameter where a ray leaves a box at which a leap ends: 1 − 2^−20.
+// Share of a box's exit parameter before which a leap ends, 1 − 2^−20.
 const LEAP_MARGIN: f32 = 0.99999905;
 
-// True if empty cells hold boxes to leap over (src/volume/leaps.rs).
+// Whether empty cells hold boxes to leap over (src/volume/leaps.rs).
 override LEAPS: bool = false;
 
 struct Walk {
+    // The cell that the ray is in; x and y wrapped into the tile.
     cell: vec3<i32>,
     step: vec3<i32>,
     step_f32: vec3<f32>,
-    // A step onto `past`, one cell outside the tile, wraps to `entry`. z does not wrap.
+    // A step onto `past`, one cell outside the tile, wraps around to `entry`. z does not wrap.
     past: vec2<i32>,
     entry: vec2<i32>,
     origin: vec3<f32>,
     inverse: vec3<f32>,
     boundary: vec3<f32>,
     t_next: vec3<f32>,
-    // For leaps: cells crossed per unit of t along each axis and the inverse, the parameter where the ray
-    // leaves the slab, the shifts of the octant's exponents in an empty cell's words, and the tile's size.
+    // For leaps only: boundaries along each axis in one unit of t, and the reciprocal.
     speed: vec3<f32>,
     inverse_abs: vec3<f32>,
+    // Parameter where the ray leaves the slab.
     t_slab: f32,
+    // Shifts of the exponents of the ray's octant in the words of an empty cell (y, y and x).
     octant: vec3<u32>,
     tile: vec2<i32>,
 }
@@ -37,7 +42,7 @@ fn walk_new(size: vec3<i32>, origin: vec3<f32>, direction: vec3<f32>) -> Walk {
     walk.step_f32 = vec3<f32>(walk.step);
     walk.past = select(vec2<i32>(-1), size.xy, forward.xy);
     walk.entry = select(size.xy - 1, vec2<i32>(0), forward.xy);
-    // A parallel axis keeps boundary 1, origin 0 and inverse NEVER, so its parameter is always NEVER.
+    // A parallel axis stays at boundary 1 of origin 0: its parameter is always NEVER.
     walk.origin = select(vec3<f32>(0.0), origin, moves);
     walk.inverse = select(vec3<f32>(NEVER), vec3<f32>(1.0) / direction, moves);
     walk.boundary = select(vec3<f32>(1.0), start + select(vec3<f32>(0.0), vec3<f32>(1.0), forward), moves);
@@ -59,17 +64,18 @@ fn walk_new(size: vec3<i32>, origin: vec3<f32>, direction: vec3<f32>) -> Walk {
     return walk;
 }
 
-// Returns the parameter where the ray leaves its cell.
+// Parameter where the ray leaves its cell.
 fn walk_exit(walk: Walk) -> f32 {
-    // Comparisons: `min` also handles NaN and costs a third more.
+    // Comparisons instead of `min`, which handles NaN and costs a third more.
     let t_next = walk.t_next;
     let x = (t_next.x <= t_next.y) & (t_next.x <= t_next.z);
     let y = !x & (t_next.y <= t_next.z);
     return select(select(t_next.z, t_next.y, y), t_next.x, x);
 }
 
-// Advances to the last cell of the box of the ray's cell, if `on` is set and the cell, whose words are
-// `texel`, is empty. Returns the number of cells skipped.
+// Advances to the last cell inside the box of the ray's cell (or to the one before it) without leaving the
+// slab. Does nothing unless `on` is set and the cell, whose words are `texel`, is empty. Returns the number
+// of cells skipped.
 fn walk_leap(walk: ptr<function, Walk>, texel: vec2<u32>, on: bool) -> u32 {
     let empty = on & ((texel.x & 0xffffu) == 0u);
     let exponents = (vec3<u32>(texel.y, texel.y, texel.x) >> (*walk).octant) & vec3<u32>(3u);
@@ -90,7 +96,7 @@ fn walk_leap(walk: ptr<function, Walk>, texel: vec2<u32>, on: bool) -> u32 {
     return u32(passed.x + passed.y + passed.z);
 }
 
-// Advances to the next cell if `on` is set. One axis steps: x before y before z where boundaries coincide.
+// Advances to the next cell if `on`. One axis steps, x before y before z if several boundaries coincide.
 fn walk_step(walk: ptr<function, Walk>, on: bool) {
     let t_next = (*walk).t_next;
     let x = (t_next.x <= t_next.y) & (t_next.x <= t_next.z);

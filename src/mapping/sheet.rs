@@ -1,7 +1,8 @@
-//! Sheets of falling water: a profile from over the lip down to the foot, tessellated into quads.
+//! Sheets of falling water: profiles from above the lip down to the foot, tessellated into quads.
 //!
-//! A point of the sheet is P(s) + w(s)·C(u): the profile plus the width times a cross-section of fixed shape.
-//! All rows are parallel, so every quad is a planar trapezoid, however the profile bends.
+//! A point of a sheet is P(s) + w(s)·C(u), where P is the profile, w the width and C a cross-section whose
+//! shape is the same everywhere. All rows are parallel, so every quad is a planar trapezoid, however the
+//! profile bends.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -9,61 +10,61 @@ use super::{Material, Quad, QuadFault, QuadMap};
 
 /// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Straight pieces that approximate each span of the spline. In a right-angled bend their total length falls
-/// short of the arc length by 1e-4.
+/// Number of straight pieces that stand for each span of the spline. Where a span turns by a right angle,
+/// their length is 1e-4 shorter than the arc's.
 const PIECES: usize = 64;
-/// Least speed as a fraction of the speed at the first point. The steepest arc of a splash, 87°, keeps 0.052
-/// of its speed as horizontal speed.
-const SLOWEST: f64 = 0.05;
+/// Smallest speed, as a share of the speed at the first point. The steepest arc of a splash, 87°, has 0.052
+/// of it at the top.
+const MIN_SPEED: f64 = 0.05;
 
-/// Parameters of a sheet.
+/// Description of a sheet.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    /// Points of the profile, metres: at least two, and no two successive ones equal.
+    /// Points of the profile, metres. There are at least two, and no two neighbours coincide.
     pub points: Vec<Vec3>,
-    /// Width at each point, metres.
+    /// Width at each point of the profile, metres.
     pub widths: Vec<f32>,
-    /// Unit vector along the rows.
+    /// Unit direction of the rows.
     pub across: Vec3,
-    /// Quads along the profile.
+    /// Number of quads along the profile.
     pub segments: u32,
-    /// Least number of quads across; eroded sides add borders of their own.
+    /// Least number of quads across. Eroded sides add borders of their own.
     pub columns: u32,
-    /// Fraction of a full turn that the cross-section bends: 0 is flat, 1 is a tube.
+    /// Bend of the cross-section, as a share of a full turn: 0 is flat, 1 is a tube.
     pub round: f32,
-    /// Speed at the first point, m/s.
+    /// Speed of the water at the first point, m/s.
     pub v0: f32,
-    /// Blend between a texture spaced by arc length (0) and one spaced by the time of the fall (1).
+    /// Spread of the texture along the profile, from even in length (0) to even in the time of the fall (1).
     pub stretch: f32,
-    /// Texture position of the sheet's start, in copies of the volume along u and v.
+    /// Texture position of the first corner, in copies of the volume along u and v.
     pub offset: Vec2,
     /// Erosion towards the borders.
     pub ends: Ends,
-    /// Material of every quad; its repeats count copies over the whole sheet.
+    /// Material of all quads. Its numbers of copies count over the whole sheet.
     pub material: Material,
-    /// Mist of the material, as [`Quad::mist`].
+    /// [`Quad::mist`] of all quads.
     pub mist: f32,
 }
 
 /// Erosion of ρ towards a sheet's borders.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ends {
-    /// Fraction of the half width over which the sides are eroded.
+    /// Share of the half width over which the sides are eroded.
     pub edge: f32,
-    /// Erosion at the foot; it grows with the square of the distance along the profile.
+    /// Erosion at the foot. It grows with the square of the way along the profile.
     pub breakup: f32,
-    /// Fraction of the profile over which the foot fades to nothing.
+    /// Share of the profile over which the foot fades to nothing.
     pub fade: f32,
-    /// Fraction of the profile over which the head grows from nothing.
+    /// Share of the profile over which the head grows from nothing.
     pub head: f32,
 }
 
 impl Ends {
-    /// Returns the erosion e at `u` across and at the fraction `way` of the profile, both 0 to 1. The
-    /// remaining fractions of sides, break-up, foot and head are multiplied.
+    /// Erosion e at `u` across the sheet and at the share `way` along the profile, both 0 to 1. What is left,
+    /// 1 − e, is the product of what the sides, the break-up and the two ends leave.
     pub fn erosion(&self, u: f32, way: f32) -> f32 {
-        let ramp = |from_end: f32, share: f32| match share > 0.0 {
-            true => (from_end / share).clamp(0.0, 1.0),
+        let ramp = |distance: f32, share: f32| match share > 0.0 {
+            true => (distance / share).clamp(0.0, 1.0),
             false => 1.0,
         };
         let sides = ramp(2.0 * u.min(1.0 - u).max(0.0), self.edge);
@@ -71,40 +72,42 @@ impl Ends {
         1.0 - sides * broken * ramp(1.0 - way, self.fade) * ramp(way, self.head)
     }
 
-    /// Values of u at which the erosion has a kink.
+    /// Values of u at which e has a kink.
     fn borders(&self) -> [f32; 2] {
         [0.5 * self.edge, 1.0 - 0.5 * self.edge]
     }
 }
 
-/// A point on the profile.
+/// Point on the profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
-    /// Metres.
+    /// Position in the world, metres.
     pub point: DVec3,
-    /// Metres.
+    /// Width of the sheet, metres.
     pub width: f64,
     /// Arc length from the first point, metres.
     pub arc: f64,
-    /// Time since the first point, seconds.
+    /// Time of the water's way from the first point, s.
     pub time: f64,
 }
 
-/// Why a sheet cannot be tessellated: which quad along and across, and its fault.
+/// Reason why a sheet cannot be tessellated: one of its quads is invalid.
 #[derive(Clone, Copy, Debug)]
 pub struct SheetFault {
-    /// From the lip.
+    /// Number of the quad along the profile, from 0 at the lip.
     pub segment: usize,
-    /// From u = 0.
+    /// Number of the quad across, from 0 at u = 0.
     pub column: usize,
-    /// Of this quad.
+    /// Fault of this quad.
     pub fault: QuadFault,
 }
 
 impl Sheet {
-    /// The profile's pieces: v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point; water that
-    /// rises higher than its speed allows is taken to keep a twentieth of v0. Along a straight piece of
-    /// constant acceleration ds/v is 2Δs/(v + v′), to the last digit.
+    /// Ends of the profile's straight pieces, with arc length and time.
+    ///
+    /// The speed is v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point. Water that rises
+    /// higher than its speed allows keeps a twentieth of v0. On a straight piece the acceleration is
+    /// constant, so the time ∫ds/v is exactly 2Δs/(v + v′).
     pub fn stations(&self) -> Vec<Station> {
         let mut stations: Vec<Station> = Vec::new();
         for (point, width) in spline(&self.points, &self.widths) {
@@ -117,45 +120,45 @@ impl Sheet {
         stations
     }
 
-    /// Returns the station at the end of the straight piece from `last` to `point`.
+    /// Station at the end `point` of the straight piece that begins at `last`.
     fn next(&self, last: &Station, point: DVec3, width: f64) -> Station {
         let (v0, top) = (f64::from(self.v0), f64::from(self.points[0].y));
-        let least = (SLOWEST * v0).powi(2);
-        let speed = |point: DVec3| (v0 * v0 + 2.0 * GRAVITY * (top - point.y)).max(least).sqrt();
+        let min_square = (MIN_SPEED * v0).powi(2);
+        let speed = |point: DVec3| (v0 * v0 + 2.0 * GRAVITY * (top - point.y)).max(min_square).sqrt();
         let step = point.distance(last.point);
         let time = last.time + 2.0 * step / (speed(last.point) + speed(point));
         Station { point, width, arc: last.arc + step, time }
     }
 
-    /// Returns the position along the texture, 0 to 1, of station `at` on a profile that ends at `last`.
+    /// Texture position, 0 to 1, of the station `at` on a profile that ends at `last`.
     pub fn along(&self, at: &Station, last: &Station) -> f64 {
         let stretch = f64::from(self.stretch);
         (1.0 - stretch) * at.arc / last.arc + stretch * at.time / last.time
     }
 
-    /// Returns the stations of the rows. They are spaced half by arc length and half by texture position, so
-    /// that neither the bend at the lip nor the long streaks at the foot are tessellated too coarsely.
+    /// Stations of the rows. They are even in the mean of arc length and texture position, so that neither
+    /// the bend at the lip nor the long streaks at the foot are cut too coarsely.
     pub fn rows(&self) -> Vec<Station> {
         let stations = self.stations();
         let last = stations[stations.len() - 1];
-        let place = |at: &Station| 0.5 * at.arc / last.arc + 0.5 * self.along(at, &last);
+        let position = |at: &Station| 0.5 * at.arc / last.arc + 0.5 * self.along(at, &last);
         let mut piece = 0;
         let row = |n: u32| {
             if n == self.segments {
                 return last;
             }
             let wanted = f64::from(n) / f64::from(self.segments);
-            while piece + 2 < stations.len() && place(&stations[piece + 1]) <= wanted {
+            while piece + 2 < stations.len() && position(&stations[piece + 1]) <= wanted {
                 piece += 1;
             }
             let (a, b) = (&stations[piece], &stations[piece + 1]);
-            let part = ((wanted - place(a)) / (place(b) - place(a))).clamp(0.0, 1.0);
+            let part = ((wanted - position(a)) / (position(b) - position(a))).clamp(0.0, 1.0);
             self.next(a, a.point.lerp(b.point, part), a.width + (b.width - a.width) * part)
         };
         (0..=self.segments).map(row).collect()
     }
 
-    /// Returns the borders of the columns, u from 0 to 1.
+    /// Values of u, from 0 to 1, at the borders of the columns.
     pub fn borders(&self) -> Vec<f32> {
         let mut borders: Vec<f32> = (0..=self.columns).map(|i| i as f32 / self.columns as f32).collect();
         if self.ends.edge > 0.0 {
@@ -169,8 +172,8 @@ impl Sheet {
         borders
     }
 
-    /// Returns the cross-section at u, in widths: along `across`, and out of the sheet. It is an arc as wide
-    /// as the sheet.
+    /// Cross-section at u, in widths: its coordinates along `across` and out of the sheet. It is an arc as
+    /// wide as the sheet.
     fn section(&self, u: f32) -> DVec2 {
         let turn = std::f64::consts::TAU * f64::from(self.round);
         let angle = (f64::from(u) - 0.5) * turn;
@@ -181,11 +184,11 @@ impl Sheet {
         DVec2::new(angle.sin(), angle.cos() - 1.0) * radius
     }
 
-    /// Tessellates the sheet: quads row by row from the lip, each row from u = 0. Neighbours share corners,
-    /// texture coordinates and erosion to the last bit.
+    /// Quads of the sheet, row by row from the lip, each row from u = 0. Neighbours share corners, texture
+    /// coordinates and erosion to the last bit.
     ///
     /// # Errors
-    /// A [`SheetFault`] if a quad of the sheet cannot be mapped.
+    /// Returns the [`SheetFault`] of the first quad that cannot be mapped.
     pub fn quads(&self) -> Result<Vec<Quad>, SheetFault> {
         let rows = self.rows();
         let (first, last) = (rows[0], rows[rows.len() - 1]);
@@ -198,8 +201,8 @@ impl Sheet {
         };
         let repeat = Vec2::new(self.material.repeat_u, self.material.repeat_v);
         let texture = |row: &Station, u: f32| {
-            let place = DVec2::new(f64::from(u), self.along(row, &last));
-            self.offset.as_dvec2() + place * repeat.as_dvec2()
+            let position = DVec2::new(f64::from(u), self.along(row, &last));
+            self.offset.as_dvec2() + position * repeat.as_dvec2()
         };
         let mut quads = Vec::new();
         for (segment, ends) in rows.windows(2).enumerate() {
@@ -221,10 +224,10 @@ impl Sheet {
     }
 }
 
-/// Samples the centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974; Yuksel, Schaefer and
-/// Keyser 2011: no loops and no cusps), evaluated by Barry and Goldman's pyramid. Before the first and after
-/// the last point it is continued by their reflections. Widths are splines in the same knots, kept between
-/// their neighbours.
+/// Points and widths on the centripetal Catmull–Rom spline through `points` (Catmull and Rom 1974), which has
+/// no loops and no cusps (Yuksel, Schaefer and Keyser 2011). It is evaluated by Barry and Goldman's pyramid.
+/// Beyond either end it is continued by reflecting the second point about the first, and the last but one
+/// about the last. Widths are splines with the same knots, clamped to the widths at both ends of a span.
 fn spline(points: &[Vec3], widths: &[f32]) -> Vec<(DVec3, f64)> {
     let n = points.len();
     let node = |i: usize| points[i].as_dvec3().extend(f64::from(widths[i]));

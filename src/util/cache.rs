@@ -1,8 +1,8 @@
-//! Disk cache of data that is slow to compute: volume textures and opaque meshes.
+//! Disk cache of data that takes long to compute: volume textures and opaque meshes.
 //!
-//! A file holds its key (the text of all inputs), the computed values, and a checksum of both. A file that is
-//! incomplete or has another key counts as missing, and so does a folder that cannot be read or written: the
-//! values are then computed again.
+//! A file holds a key (the text of every value that the data depend on), the data, and a checksum of both. A
+//! file that is incomplete, damaged or of another key counts as missing, and a folder that cannot be read or
+//! written counts as empty. Missing data are computed again.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -12,35 +12,41 @@ use std::time::{Duration, Instant, SystemTime};
 use bytemuck::Pod;
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-/// Largest size of a folder, bytes. The least recently used files are removed first.
-const MOST_BYTES: u64 = 512 << 20;
-/// Least computing time that is worth a file. Opening it and scanning the folder take about a millisecond.
-const LEAST: Duration = Duration::from_millis(10);
-/// Upper bound of the time to read one byte and add it to the checksum, seconds; for a slow disk, uncached.
+/// Largest size of a folder, bytes. The least recently used files are removed to make room.
+const MAX_FOLDER_BYTES: u64 = 512 << 20;
+/// Shortest computation that is worth a file. Opening the file and listing the folder take about a
+/// millisecond.
+const MIN_TIME: Duration = Duration::from_millis(10);
+/// Upper bound on the time to read and verify one byte, s: a slow disk, with nothing in the system's file
+/// cache.
 const READ_SECONDS_PER_BYTE: f64 = 2e-9;
-/// Age from which a temporary file counts as left by a dead process.
+/// Age from which a temporary file counts as left behind by a process that died.
 const STALE: Duration = Duration::from_secs(3600);
 
 const MAGIC: [u8; 16] = *b"taki cache 1\n\r\n\0";
 /// Extension of cache files.
 const EXTENSION: &str = "made";
+/// Extension of files that are being written.
 const TEMPORARY: &str = "tmp";
 
-/// Returns the key of data of a `kind`: the `Debug` text of all its inputs, and the version of its builder.
+/// Builds the key of data of a `kind`: the versions of taki and of the data's builder, the processor
+/// architecture, and all `values` that the data depend on, as `Debug` writes them.
 pub fn key(kind: &str, builder: u32, values: &impl std::fmt::Debug) -> String {
     let (version, machine) = (env!("CARGO_PKG_VERSION"), std::env::consts::ARCH);
     format!("taki {version} {machine} {kind} {builder}\n{values:?}")
 }
 
-/// A disk cache in one folder.
+/// A cache: one folder for each kind of data, below one root.
 #[derive(Clone, Debug)]
 pub struct Cache {
     root: PathBuf,
-    most: u64,
-    least: Duration,
+    /// Largest size of one kind's folder, bytes.
+    max_bytes: u64,
+    /// Shortest computation that is worth a file.
+    min_time: Duration,
 }
 
-/// Header of a cache file, before key and contents.
+/// Header of a file. The key and the contents follow it.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 struct Head {
@@ -49,32 +55,33 @@ struct Head {
     key: u64,
     /// Length of the contents, bytes.
     contents: u64,
-    /// Checksum of key and contents.
+    /// XXH3-128 of key and contents, low half first.
     checksum: [u64; 2],
 }
 
 impl Cache {
-    /// Opens the user's cache: `taki` in `$XDG_CACHE_HOME`, or in the system's folder of caches.
+    /// The user's cache: `taki` in `$XDG_CACHE_HOME`, or in the system's folder for caches. `None` if there
+    /// is no such folder.
     pub fn of_user() -> Option<Cache> {
-        Some(Cache::new(dirs::cache_dir()?.join("taki"), MOST_BYTES))
+        Some(Cache::new(dirs::cache_dir()?.join("taki"), MAX_FOLDER_BYTES))
     }
 
-    /// Opens a cache in `root`; each kind has a folder of at most `most` bytes.
-    pub fn new(root: impl Into<PathBuf>, most: u64) -> Cache {
-        Cache { root: root.into(), most, least: LEAST }
+    /// Cache in folders below `root`, each of at most `max_bytes` bytes.
+    pub fn new(root: impl Into<PathBuf>, max_bytes: u64) -> Cache {
+        Cache { root: root.into(), max_bytes, min_time: MIN_TIME }
     }
 
-    /// Also stores data that is quick to compute. For tests.
+    /// Makes the cache also keep data that are quick to compute. For tests.
     #[doc(hidden)]
     pub fn keeping_all(self) -> Cache {
-        Cache { least: Duration::ZERO, ..self }
+        Cache { min_time: Duration::ZERO, ..self }
     }
 
-    /// Returns the `count` values of a `kind` under `key`: read from the cache, or computed by `make`. Values
-    /// that are quicker to compute than to read are not stored.
+    /// Returns the `count` values of `kind` and `key`: from the disk if they are there, otherwise from
+    /// `make`. Values that take less time to compute than to read are not kept.
     ///
     /// # Errors
-    /// The error of `make`; faults of the cache itself are ignored.
+    /// Returns the error of `make`. Faults of the cache are not errors.
     pub fn get<T: Pod, E>(
         &self,
         kind: &str,
@@ -83,8 +90,8 @@ impl Cache {
         make: impl FnOnce() -> Result<Vec<T>, E>,
     ) -> Result<Vec<T>, E> {
         let path = self.path(kind, key);
-        if let Some(known) = read(&path, key, count) {
-            return Ok(known);
+        if let Some(contents) = read(&path, key, count) {
+            return Ok(contents);
         }
         let clock = Instant::now();
         let made = make()?;
@@ -92,18 +99,18 @@ impl Cache {
         Ok(made)
     }
 
-    /// Stores values that took the time `took` to compute, if reading them is quicker.
+    /// Keeps `made`, which took the time `took` to compute, if reading it takes less.
     pub fn keep_if_slow<T: Pod>(&self, kind: &str, key: &str, made: &[T], took: Duration) {
         let bytes = size_of_val(made) as u64;
         let read = Duration::from_secs_f64(bytes as f64 * READ_SECONDS_PER_BYTE);
-        let worth = self.least.is_zero() || took > self.least + read;
-        if worth && bytes <= self.most {
-            // Errors are ignored: the next process computes the values again.
+        let worth = self.min_time.is_zero() || took > self.min_time + read;
+        if worth && bytes <= self.max_bytes {
+            // A fault costs the next process the computation, nothing else.
             let _ = self.write(&self.path(kind, key), key, bytemuck::cast_slice(made));
         }
     }
 
-    /// Returns the path of the file of a key.
+    /// Path of the file of a key.
     pub fn path(&self, kind: &str, key: &str) -> PathBuf {
         self.root.join(kind).join(format!("{:032x}.{EXTENSION}", xxh3_128(key.as_bytes())))
     }
@@ -112,7 +119,7 @@ impl Cache {
         let folder = path.parent().expect("a folder and a name");
         std::fs::create_dir_all(folder)?;
         let head = Head::new(key, contents);
-        make_room(folder, self.most, (size_of::<Head>() + key.len() + contents.len()) as u64)?;
+        make_room(folder, self.max_bytes, (size_of::<Head>() + key.len() + contents.len()) as u64)?;
         let suffix = format!(".{TEMPORARY}");
         let mut file = tempfile::Builder::new().prefix("").suffix(&suffix).tempfile_in(folder)?;
         for part in [bytemuck::bytes_of(&head), key.as_bytes(), contents] {
@@ -138,13 +145,13 @@ impl Head {
     }
 }
 
-/// Returns the contents of a file if it is complete and has this key.
+/// Reads the contents of a file. Returns `None` if it is missing, damaged, or of another key or size.
 fn read<T: Pod>(path: &Path, key: &str, count: usize) -> Option<Vec<T>> {
     let mut file = File::open(path).ok()?;
-    let wanted = size_of::<Head>() + key.len() + count * size_of::<T>();
-    // Checked before the buffer is allocated.
+    let expected = size_of::<Head>() + key.len() + count * size_of::<T>();
+    // Checked before memory for the contents is allocated.
     let meta = file.metadata().ok()?;
-    if !meta.is_file() || meta.len() != wanted as u64 {
+    if !meta.is_file() || meta.len() != expected as u64 {
         return None;
     }
     let mut head = vec![0; size_of::<Head>() + key.len()];
@@ -158,15 +165,15 @@ fn read<T: Pod>(path: &Path, key: &str, count: usize) -> Option<Vec<T>> {
     if *head != *bytemuck::bytes_of(&Head::new(key, bytemuck::cast_slice(&contents))) {
         return None;
     }
-    // The modification time orders files by last use.
+    // The time of last use decides which file is removed first.
     let _ = file.set_modified(SystemTime::now());
     Some(contents)
 }
 
-/// Removes the least recently used files until `more` bytes fit, and temporary files of dead processes.
-fn make_room(folder: &Path, most: u64, more: u64) -> std::io::Result<()> {
+/// Removes the least recently used files until `new_bytes` fit, and what processes that died left behind.
+fn make_room(folder: &Path, max_bytes: u64, new_bytes: u64) -> std::io::Result<()> {
     let mut files = Vec::new();
-    let mut total = more;
+    let mut total = new_bytes;
     for entry in std::fs::read_dir(folder)?.flatten() {
         let path = entry.path();
         let Ok(meta) = entry.metadata() else { continue };
@@ -184,7 +191,7 @@ fn make_room(folder: &Path, most: u64, more: u64) -> std::io::Result<()> {
     }
     files.sort();
     for (_, bytes, path) in files {
-        if total <= most {
+        if total <= max_bytes {
             break;
         }
         if std::fs::remove_file(path).is_ok() {

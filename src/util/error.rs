@@ -1,8 +1,8 @@
-//! One error type; every variant says what happened and what the user can do.
+//! The crate's error type. Every variant says what happened and what the user can do.
 
 use std::path::{Path, PathBuf};
 
-/// Everything that can end a command. The text is one line: what happened, then what to do.
+/// Error that ends a command. Its text is one line: what happened, then what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A comparison found more difference than its threshold allows.
@@ -11,72 +11,72 @@ pub enum Error {
     /// The command line cannot be understood.
     #[error("{0}")]
     Usage(String),
-    /// The work needs more memory than its budget, or the device is out of memory.
+    /// The work needs more memory than its budget, or the device has none left.
     #[error("{what} needs {need}, the budget is {budget}; {fix}")]
     Memory {
-        /// Item that needs the memory, with the values that determine its size.
+        /// Name of what needs the memory, with the values that determine its size.
         what: String,
-        /// Bytes needed, for people.
+        /// Bytes needed, formatted by [`human_bytes`].
         need: String,
-        /// Bytes allowed, for people.
+        /// Bytes allowed, formatted by [`human_bytes`].
         budget: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
     /// A scene, parameter, volume or image is not valid.
     #[error("{what}; {fix}")]
     Input {
-        /// The fault with its file, line or byte, key and value.
+        /// Description of the fault, with its file, line or byte, key and value.
         what: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
-    /// `--engine gpu` was asked for and no adapter can do the work.
+    /// The command asks for `--engine gpu` and no adapter can do the work.
     #[error("{0}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu")]
     NoAdapter(String),
     /// The viewer's window cannot be opened.
     #[error(
-        "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) \
-         with Vulkan or OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
+        "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) with \
+         Vulkan or OpenGL (Debian: mesa-vulkan-drivers or libgl1-mesa-dri); taki render needs neither"
     )]
     NoWindow(String),
-    /// A video was asked for, and ffmpeg is missing or cannot encode it.
-    #[error("{0}; install ffmpeg (Debian: ffmpeg) or write .gif or .apng, which need none")]
+    /// The program that encodes a video is missing or cannot encode it.
+    #[error("{0}; install ffmpeg (Debian: ffmpeg) or write .gif or .apng, which do not need it")]
     NoFfmpeg(String),
     /// An output cannot be created. Reported before any work is done.
     #[error("cannot create {}: {why}; {fix}", path.display())]
     CannotCreate {
-        /// The output.
+        /// Path of the output.
         path: PathBuf,
-        /// Why not.
+        /// Reason.
         why: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: String,
     },
-    /// Reading or writing failed half-way.
+    /// Reading or writing a file failed.
     #[error("{what} {}: {why}; {fix}", path.display())]
     Io {
         /// `cannot write` or `cannot read`.
         what: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Reason given by the system.
+        /// Reason that the system gives.
         why: String,
-        /// What to do.
+        /// Advice: how to mend it.
         fix: &'static str,
     },
-    /// The device was lost: trying again may help.
+    /// The GPU device was lost. Trying again may help.
     #[error("the GPU device was lost: {0}; run the command again, or use --engine cpu")]
     DeviceLost(String),
-    /// A submission did not finish in time.
+    /// A submission to the GPU did not finish in time.
     #[error(
         "the GPU did not answer for {seconds} s; raise --watchdog, lower the image size, or use --engine cpu"
     )]
     Watchdog {
-        /// Time-out that passed, seconds.
+        /// Length of the time-out that passed, s.
         seconds: f64,
     },
-    /// The user or the system asked the program to end.
+    /// A signal of the user or the system ended the program.
     #[error("interrupted: nothing unfinished was kept; run the same command again")]
     Interrupted {
         /// Exit code: 130 after SIGINT, 143 after SIGTERM.
@@ -84,16 +84,16 @@ pub enum Error {
     },
 }
 
-/// Result with the crate's [`enum@Error`].
+/// Result of the crate's functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// Returns an error of invalid input; exit code 65.
+    /// [`Error::Input`]: a fault in what the user gave.
     pub fn input(what: impl Into<String>, fix: impl Into<String>) -> Self {
         Error::Input { what: what.into(), fix: fix.into() }
     }
 
-    /// Returns an error of too little memory, `need` and `budget` in bytes; exit code 33.
+    /// [`Error::Memory`]: more memory than allowed. `need` and `budget` are bytes.
     pub fn memory(what: impl Into<String>, need: u128, budget: u64, fix: impl Into<String>) -> Self {
         Error::Memory {
             what: what.into(),
@@ -103,7 +103,7 @@ impl Error {
         }
     }
 
-    /// Returns an error of a failed read; exit code 74.
+    /// [`Error::Io`] of a failed read.
     pub fn read(path: &Path, why: impl ToString) -> Self {
         Error::Io {
             what: "cannot read",
@@ -113,7 +113,7 @@ impl Error {
         }
     }
 
-    /// Returns an error of a failed write; exit code 74.
+    /// [`Error::Io`] of a failed write.
     pub fn write(path: &Path, why: impl ToString) -> Self {
         Error::Io {
             what: "cannot write",
@@ -123,7 +123,7 @@ impl Error {
         }
     }
 
-    /// Returns the exit code of the process, as listed in docs/scenes-and-files.md.
+    /// Exit code of the process, as docs/scenes-and-files.md lists them.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Comparison(_) => 1,
@@ -140,7 +140,7 @@ impl Error {
     }
 }
 
-/// Formats bytes in binary units with one decimal.
+/// Formats a number of bytes in binary units with one decimal.
 pub fn human_bytes(bytes: u128) -> String {
     const UNITS: [&str; 7] = ["B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
     let mut value = bytes as f64;

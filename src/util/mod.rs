@@ -1,4 +1,5 @@
-//! Shared basics: errors, progress, random numbers, the disk cache, and parts of an image.
+//! Foundations that every other module builds on: errors, progress, random numbers, the disk cache, unit
+//! vectors, and parts of an image.
 
 pub mod cache;
 pub mod error;

@@ -1,48 +1,48 @@
-//! Parts of an image.
+//! Rectangular parts of an image.
 
 use std::fmt;
 
-/// A rectangle of the image, pixels.
+/// A rectangle of an image, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// First column.
+    /// First column, counted from the left.
     pub x: u32,
-    /// First row.
+    /// First row, counted from the top.
     pub y: u32,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
 }
 
 impl Window {
-    /// Returns the window of a whole image of `width` × `height` pixels.
+    /// Window that covers a whole image of `width` × `height` pixels.
     pub fn whole([width, height]: [u32; 2]) -> Window {
         Window { x: 0, y: 0, width, height }
     }
 
-    /// Returns the index of an image's pixel among the window's pixels, row by row. The pixel lies in the
-    /// window.
+    /// Index of `pixel` (column and row in the image) among the window's pixels, row by row. The pixel must
+    /// lie inside the window.
     pub fn index(&self, pixel: [u32; 2]) -> usize {
         (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
     }
 
-    /// Returns the number of pixels.
+    /// Number of pixels.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
 
-    /// Returns the column after the last.
+    /// First column to the right of the window.
     pub fn right(&self) -> u32 {
         self.x + self.width
     }
 
-    /// Returns the row after the last.
+    /// First row below the window.
     pub fn bottom(&self) -> u32 {
         self.y + self.height
     }
 
-    /// Returns the intersection of two windows, or `None` if it is empty.
+    /// Intersection of two windows, or `None` if they share no pixel.
     pub fn meet(&self, other: &Window) -> Option<Window> {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
         let width = self.right().min(other.right()).checked_sub(x)?;
@@ -50,21 +50,22 @@ impl Window {
         (width > 0 && height > 0).then_some(Window { x, y, width, height })
     }
 
-    /// Returns whether `other` lies inside this window.
+    /// Whether all of `other` lies inside this window.
     pub fn holds(&self, other: &Window) -> bool {
         self.meet(other) == Some(*other)
     }
 
-    /// Returns whether the rectangle is not empty and lies inside an image of this size, for any numbers.
-    pub fn fits([width, height]: [u32; 2], [x, y, w, h]: [u32; 4]) -> bool {
-        let within = |first: u32, count: u32, of: u32| {
-            count > 0 && u64::from(first) + u64::from(count) <= u64::from(of)
+    /// Whether the rectangle [x, y, width, height] has pixels and lies inside an image of `size` [width,
+    /// height]. Any numbers are accepted: nothing overflows.
+    pub fn fits(size: [u32; 2], [x, y, width, height]: [u32; 4]) -> bool {
+        let within = |first: u32, count: u32, available: u32| {
+            count > 0 && u64::from(first) + u64::from(count) <= u64::from(available)
         };
-        within(x, w, width) && within(y, h, height)
+        within(x, width, size[0]) && within(y, height, size[1])
     }
 }
 
-/// `X,Y,W,H`, as `--crop` takes it.
+/// Writes `X,Y,W,H`, the form that `--crop` takes.
 impl fmt::Display for Window {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{},{},{},{}", self.x, self.y, self.width, self.height)

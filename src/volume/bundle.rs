@@ -1,4 +1,4 @@
-//! The curves of the water builder: those of the paper, each by itself, or gathered around parents.
+//! §2 Curves of the water builder: independent ones, as in the paper, or bundles of curves around parents.
 
 use glam::Vec3;
 use rand::{Rng, RngExt};
@@ -9,23 +9,24 @@ use super::spec::WaterSpec;
 use crate::curve::{CurveShape, spatial_fractal_curve};
 use crate::util::random::{Family, Stream};
 
-/// How far into the volume, as a share of its depth, parents keep from either face: around one that starts on
-/// a face half of the children would be lost.
+/// Distance that parents keep from the volume's faces z = 0 and z = nz, as a share of its depth. Around a
+/// parent on a face half of the children would be lost.
 const MARGIN: f32 = 0.2;
-/// Correlation length of the breathing, a fraction of the flow: a bundle opens and closes two or three times
-/// on its way.
-const BREATH: f32 = 0.12;
-/// Narrowest that breathing makes a bundle: at 0 all its strands would go through one point.
-const NARROWEST: f32 = 0.15;
+/// Correlation length of a bundle's width, as a fraction of the flow length. A bundle opens and closes two or
+/// three times along the flow.
+const BREATH_LENGTH: f32 = 0.12;
+/// Smallest factor of a bundle's width. At 0 all its strands would go through one point.
+const MIN_WIDTH: f32 = 0.15;
 
-/// Writes the points of curve number `curve` of the jitter grid (column + row·across) into `points`, in
-/// cells, unwrapped: just the curve the volume is built from. Its ends have the same x and z.
+/// Writes the points of one curve into `points`, in cells and not wrapped around. `curve` is its number in
+/// the jitter grid, column + row·across. The volume is built from exactly these points. The curve's ends have
+/// the same x and z.
 ///
-/// The curve is drawn level by level, so a spec with fewer `shape.levels` gives every
+/// The curve is drawn level by level, so a specification with fewer `shape.levels` gives every
 /// 2^(difference)-th point of the same curve.
 ///
-/// With bundles a child's point is its own curve's, moved as its parent is displaced there; its distance from
-/// the parent breathes with the bundle. Both are periodic along the flow.
+/// In a bundle each point of the curve is moved by the displacement of its parent at that point. The curve's
+/// distance from the parent is scaled by the bundle's width there. Both are periodic along the flow.
 pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
     let [nx, ny, nz] = spec.size.map(|n| n as f32);
     let mut rng = Family::new(spec.seed, Stream::Curve).member(curve as u64);
@@ -39,7 +40,7 @@ pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
     if structure.bundles == 0 {
         return spatial_fractal_curve(&spec.shape, p1, p2, &mut rng, points);
     }
-    // Drawn from a generator of their own: the number of the curve's own draws depends on its levels.
+    // A generator of their own, because the number of the curve's own draws depends on its levels.
     let mut choice = Family::new(spec.seed, Stream::Child).member(curve as u64);
     let parent = choice.random_range(0..structure.bundles);
     let away = Vec3::new(normal(&mut choice), 0.0, normal(&mut choice)) * structure.radius_cells;
@@ -50,7 +51,7 @@ pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
     let mut rng_parent = Family::new(spec.seed, Stream::Bundle).member(u64::from(parent));
     let x = (parent as f32 + rng_parent.random::<f32>()) / structure.bundles as f32 * nx;
     let z = (MARGIN + (1.0 - 2.0 * MARGIN) * rng_parent.random::<f32>()) * nz;
-    let breath = Ripple::new(BREATH, &mut rng_parent);
+    let breath = Ripple::new(BREATH_LENGTH, &mut rng_parent);
     let shape = CurveShape { sigma_g_cells: structure.wander_cells, ..spec.shape };
     let mut parent_points = Vec::new();
     let [q1, q2] = ends(x, z);
@@ -64,11 +65,12 @@ pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
     widths.push(widths[0]);
     for (i, (point, parent)) in points.iter_mut().zip(&parent_points).enumerate() {
         let straight = q1.lerp(q2, i as f32 / steps as f32);
-        let width = (1.0 + structure.breathe * widths[i]).max(NARROWEST);
+        let width = (1.0 + structure.breathe * widths[i]).max(MIN_WIDTH);
         *point += (*parent - straight) + away * (width - 1.0);
     }
 }
 
+/// Draws a normal number of mean 0 and variance 1.
 fn normal(rng: &mut impl Rng) -> f32 {
     StandardNormal.sample(rng)
 }

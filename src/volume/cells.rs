@@ -1,4 +1,4 @@
-//! Storage of a volume's cells: dense, or in bricks that store the non-empty cells.
+//! Storage of a volume's cells: dense (all of them) or sparse (the non-empty ones, in bricks).
 
 use std::ops::Index;
 use std::sync::Arc;
@@ -8,19 +8,20 @@ use rayon::prelude::*;
 
 use super::{Bricks, Cell};
 
-/// Cells of a volume. They are shared: a copy costs nothing, and a cache on a device can recognise them.
+/// Cells of a volume. They are shared: a copy costs nothing, and a copy of them on a device can be recognised
+/// by their address.
 ///
-/// Both forms have the same index order, x fastest, then y, then z. Equal cells are equal in either form.
+/// Both forms have the same order, x fastest, then y, then z, and compare equal if their cells are equal.
 #[derive(Clone, Debug)]
 pub enum Cells {
     /// All cells.
     Dense(Arc<Vec<Cell>>),
-    /// The non-empty cells, in bricks.
+    /// The cells that are not empty.
     Sparse(Arc<Bricks>),
 }
 
 impl Cells {
-    /// Returns the number of cells, including empty ones.
+    /// Number of cells, empty ones included.
     pub fn len(&self) -> usize {
         match self {
             Cells::Dense(cells) => cells.len(),
@@ -28,12 +29,12 @@ impl Cells {
         }
     }
 
-    /// Returns whether there are no cells.
+    /// Whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Returns the stored cells. Every non-empty cell is stored.
+    /// The stored cells. Every non-empty cell is stored.
     pub fn stored(&self) -> &[Cell] {
         match self {
             Cells::Dense(cells) => cells,
@@ -41,7 +42,7 @@ impl Cells {
         }
     }
 
-    /// Returns all cells if the storage is dense.
+    /// All cells, if the storage is dense.
     pub fn dense(&self) -> Option<&Arc<Vec<Cell>>> {
         match self {
             Cells::Dense(cells) => Some(cells),
@@ -49,7 +50,7 @@ impl Cells {
         }
     }
 
-    /// Returns the bricks if the storage is sparse.
+    /// The bricks, if the storage is sparse.
     pub fn bricks(&self) -> Option<&Arc<Bricks>> {
         match self {
             Cells::Dense(_) => None,
@@ -57,7 +58,7 @@ impl Cells {
         }
     }
 
-    /// Returns the size of the storage, bytes.
+    /// Size of the cells on the host, bytes.
     pub fn bytes(&self) -> u64 {
         match self {
             Cells::Dense(cells) => size_of_val(cells.as_slice()) as u64,
@@ -65,7 +66,7 @@ impl Cells {
         }
     }
 
-    /// Iterates over all cells in index order, including empty ones.
+    /// Iterates over all cells in their order, empty ones included.
     pub fn iter(&self) -> impl Iterator<Item = &Cell> {
         match self {
             Cells::Dense(cells) => Either::Left(cells.iter()),
@@ -77,7 +78,7 @@ impl Cells {
         }
     }
 
-    /// Returns whether both share the same memory.
+    /// Whether both share one piece of memory.
     pub fn same(&self, other: &Cells) -> bool {
         match (self, other) {
             (Cells::Dense(a), Cells::Dense(b)) => Arc::ptr_eq(a, b),
@@ -86,7 +87,7 @@ impl Cells {
         }
     }
 
-    /// Returns the address of the shared memory.
+    /// Address of the cells in memory.
     pub fn address(&self) -> usize {
         match self {
             Cells::Dense(cells) => Arc::as_ptr(cells).addr(),
@@ -94,8 +95,7 @@ impl Cells {
         }
     }
 
-    /// Replaces every stored cell by a function of its linear index, its position among the stored cells and
-    /// its value.
+    /// Replaces every stored cell by `new(linear index in the volume, index among the stored cells, cell)`.
     pub fn change(&mut self, new: impl Fn(u64, usize, Cell) -> Cell + Sync) {
         match self {
             Cells::Dense(cells) => Arc::make_mut(cells)
@@ -107,7 +107,7 @@ impl Cells {
         }
     }
 
-    /// Returns the sum of the ρ codes of each layer z of `area` cells.
+    /// Sums the ρ codes of each layer of `area` cells, from z = 0 on.
     pub fn layer_codes(&self, area: usize) -> Vec<u64> {
         match self {
             Cells::Dense(cells) => cells
@@ -118,7 +118,7 @@ impl Cells {
         }
     }
 
-    /// Returns the CRC-32 of all cells' bytes in index order.
+    /// CRC-32 of the bytes of all cells in their order.
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         match self {
             Cells::Dense(cells) => {
@@ -152,7 +152,8 @@ impl From<Bricks> for Cells {
 impl Index<usize> for Cells {
     type Output = Cell;
 
-    /// Returns the cell at a linear index. In bricks [`super::VolumeTexture::cell`] is faster.
+    /// Returns the cell with this linear index. In bricks this is slower than [`super::VolumeTexture::cell`],
+    /// which takes x, y and z.
     #[inline]
     fn index(&self, index: usize) -> &Cell {
         match self {

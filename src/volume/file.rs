@@ -1,8 +1,9 @@
 //! Volume files: NumPy `.npz` with `rho` float32 [nz,ny,nx], `v` float32 [nz,ny,nx,3], `k` float32
 //! [nz,ny,nx,2] and the scalar `alpha`.
 //!
-//! The arrays hold what the renderer uses, after packing: `rho` includes α, `v` is unit or zero.
-//! `alpha` makes reading exact (the cells hold ρ/α); a file without it is read with α = 1.
+//! The arrays hold the values that the renderer uses, as they are after packing. `rho` includes α; `v` is
+//! unit or zero. `alpha` makes reading exact, because the cells hold ρ/α. A file without it is read with α =
+//! 1.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
@@ -17,15 +18,18 @@ use super::storage::{Storage, StorageChoice, check_stored, file_storage};
 use super::{Cell, Cells, VolumeTexture};
 use crate::util::error::{Error, Result};
 
-/// NumPy pads its headers to 128 bytes; a longer one than this is not an array of numbers, and a
-/// bound keeps the header's parser (recursive) from a hostile file.
+/// Longest header of an array, bytes. NumPy pads the headers of arrays of numbers to 128 bytes. The bound
+/// protects the recursive parser of headers from hostile files.
 const MAX_HEADER_BYTES: u64 = 512;
 
-/// Largest distance of |v| from 1 that counts as unit: float32 rounding, with room for files made
-/// by other programs in lower precision.
+/// Largest distance of |v| from 1 at which v counts as a unit vector: float32 rounding, with room for files
+/// that other programs wrote in lower precision.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
 /// Writes `volume` to `out` as `.npz`. The bytes depend on the volume alone.
+///
+/// # Errors
+/// Returns the first error of `out`.
 pub fn write_npz(volume: &VolumeTexture, out: impl Write + Seek) -> std::io::Result<()> {
     let [nx, ny, nz] = volume.size.map(u64::from);
     let mut zip = ZipWriter::new(UntilError { out, position: 0, failed: false });
@@ -40,8 +44,8 @@ pub fn write_npz(volume: &VolumeTexture, out: impl Write + Seek) -> std::io::Res
     zip.finish()?.flush()
 }
 
-/// Passes on what is written until the first error, and takes everything after it as if it were:
-/// [`ZipWriter`] goes on writing when it is dropped, and complains on stderr when it cannot.
+/// Writer that passes everything on until the first error and then pretends to succeed. [`ZipWriter`] goes on
+/// writing when it is dropped, and complains on stderr when that fails.
 struct UntilError<W> {
     out: W,
     position: u64,
@@ -49,6 +53,7 @@ struct UntilError<W> {
 }
 
 impl<W> UntilError<W> {
+    /// Remembers a failure that trying again cannot mend.
     fn note<T>(&mut self, done: std::io::Result<T>) -> std::io::Result<T> {
         self.failed |= done.as_ref().is_err_and(|e| e.kind() != ErrorKind::Interrupted);
         done
@@ -80,6 +85,7 @@ impl<W: Seek> Seek for UntilError<W> {
     }
 }
 
+/// Adds one float32 array to the archive.
 fn write_array<W: Write + Seek>(
     zip: &mut ZipWriter<W>,
     name: &str,
@@ -90,7 +96,7 @@ fn write_array<W: Write + Seek>(
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(1))
         .large_file(true)
-        // A date would give equal volumes different bytes.
+        // A date would make the files of equal volumes differ.
         .last_modified_time(zip::DateTime::default());
     zip.start_file(npyz::npz::file_name_from_array_name(name), options)?;
     let mut buffered = std::io::BufWriter::with_capacity(1 << 16, zip);
@@ -101,10 +107,14 @@ fn write_array<W: Write + Seek>(
     buffered.flush()
 }
 
-/// Reads a volume of at most `budget` bytes. Every value is checked; nothing of the size the file
-/// claims is allocated before it was compared with the budget.
+/// Reads a volume file into at most `budget` bytes. Every value is checked, and nothing of the size that the
+/// file claims is allocated before that size is compared with the budget.
 ///
-/// It is stored as `asked`, or, where that is left open, sparse if all its cells would not fit.
+/// `asked` sets the storage; with [`StorageChoice::Auto`] it is sparse if a dense volume does not fit.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if it is not a valid volume file, and
+/// [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<VolumeTexture> {
     let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
     if !meta.is_file() {
@@ -118,19 +128,21 @@ pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<Volume
         path,
         asked,
         budget,
-        zip: ZipArchive::new(BufReader::new(file)).map_err(|e| bad(path, e.to_string()))?,
+        zip: ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string()))?,
     };
     reader.volume()
 }
 
-fn bad(path: &Path, what: String) -> Error {
+/// Error about the contents of the file.
+fn invalid(path: &Path, what: String) -> Error {
     Error::input(
         format!("{}: {what}", path.display()),
         "a volume file is an .npz with rho float32 [nz,ny,nx], v float32 [nz,ny,nx,3], \
-                 k float32 [nz,ny,nx,2]",
+         k float32 [nz,ny,nx,2]",
     )
 }
 
+/// Reader of one volume file.
 struct Reader<'a> {
     path: &'a Path,
     asked: StorageChoice,
@@ -143,19 +155,22 @@ impl Reader<'_> {
         let alpha = self.alpha()?;
         let shape = self.each("rho", None, |_, _: [f32; 1]| Ok(()))?;
         let &[nz, ny, nx] = shape.as_slice() else {
-            return Err(bad(self.path, format!("rho has shape {shape:?}, not [nz,ny,nx]")));
+            return Err(invalid(self.path, format!("rho has shape {shape:?}, not [nz,ny,nx]")));
         };
         let size = [nx, ny, nz].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         if size.contains(&0) {
-            return Err(bad(self.path, format!("rho has shape {shape:?}: a volume has at least one cell")));
+            return Err(invalid(
+                self.path,
+                format!("rho has shape {shape:?}: a volume has at least one cell"),
+            ));
         }
         let mut cells = match file_storage(size, self.asked, self.budget)? {
             Storage::Dense => self.directions(size)?,
             Storage::Sparse => self.packed_directions(size)?,
         };
-        let mut places = Places::new(size);
+        let mut cursor = CellCursor::new(size);
         self.each("rho", Some(&[nz, ny, nx]), |_, [value]: [f32; 1]| {
-            let cell = places.next(&mut cells);
+            let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{value} is outside 0..=1"));
             }
@@ -171,9 +186,9 @@ impl Reader<'_> {
             }
             Ok(())
         })?;
-        let mut places = Places::new(size);
+        let mut cursor = CellCursor::new(size);
         self.each("k", Some(&[nz, ny, nx, 2]), |_, [k_d, k_s]: [f32; 2]| {
-            let cell = places.next(&mut cells);
+            let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&k_d) || !(0.0..=1.0).contains(&k_s) {
                 return Err(format!("({k_d}, {k_s}) is outside 0..=1"));
             }
@@ -185,19 +200,19 @@ impl Reader<'_> {
         Ok(VolumeTexture { size, alpha, cells: cells.into() })
     }
 
-    /// Cells with directions alone.
-    fn directions(&mut self, size: [u32; 3]) -> Result<Form> {
+    /// Reads the directions into dense cells that hold nothing else yet.
+    fn directions(&mut self, size: [u32; 3]) -> Result<CellBuffer> {
         let count = size.iter().map(|&n| n as usize).product();
         let mut cells = vec![Cell::default(); count];
         self.each_direction(size, |i, cell| {
             cells[i] = cell;
             Ok(())
         })?;
-        Ok(Form::Dense(cells))
+        Ok(CellBuffer::Dense(cells))
     }
 
-    /// The same, packed while they come: four layers at a time are held whole.
-    fn packed_directions(&mut self, size: [u32; 3]) -> Result<Form> {
+    /// Reads the directions into bricks. Four layers at a time are in memory unpacked.
+    fn packed_directions(&mut self, size: [u32; 3]) -> Result<CellBuffer> {
         let area = size[0] as usize * size[1] as usize;
         let (all, slab) = (area * size[2] as usize, area * BRICK as usize);
         let budget = self.budget;
@@ -217,9 +232,10 @@ impl Reader<'_> {
             Ok(())
         });
         too_large.map_or(read, Err)?;
-        Ok(Form::Sparse(packer.finish()))
+        Ok(CellBuffer::Sparse(packer.finish()))
     }
 
+    /// Gives each direction to `take`, packed, with the linear index of its cell.
     fn each_direction(
         &mut self,
         size: [u32; 3],
@@ -238,6 +254,7 @@ impl Reader<'_> {
         .map(drop)
     }
 
+    /// Reads α, or 1 from a file that has none.
     fn alpha(&mut self) -> Result<f32> {
         if self.zip.index_for_name("alpha.npy").is_none() {
             return Ok(1.0);
@@ -250,8 +267,8 @@ impl Reader<'_> {
         Ok(alpha)
     }
 
-    /// Reads array `name` as float32 in rows of N, giving each to `row` with its index; returns the
-    /// shape. Without an expected shape only the header is read.
+    /// Reads the array `name` as float32 in rows of N, gives each row to `row` with its index, and returns
+    /// the array's shape. Without an expected shape it reads the header only.
     fn each<const N: usize>(
         &mut self,
         name: &str,
@@ -259,7 +276,7 @@ impl Reader<'_> {
         mut row: impl FnMut(usize, [f32; N]) -> std::result::Result<(), String>,
     ) -> Result<Vec<u64>> {
         let path = self.path;
-        let fault = |what: String| bad(path, format!("{name}: {what}"));
+        let fault = |what: String| invalid(path, format!("{name}: {what}"));
         let entry = self
             .zip
             .by_name(&npyz::npz::file_name_from_array_name(name))
@@ -291,7 +308,7 @@ impl Reader<'_> {
             }
             row(i, out).map_err(|e| fault(format!("row {i}: {e}")))?;
         }
-        // The archive's checksum is only compared when an entry is read to its end.
+        // The archive compares an entry's checksum only when the entry is read to its end.
         if bytes.read(&mut [0]).map_err(|e| fault(e.to_string()))? != 0 {
             return Err(fault(format!("has more than {rows} rows")));
         }
@@ -299,50 +316,52 @@ impl Reader<'_> {
     }
 }
 
-/// Storage of the cells that are being read.
-enum Form {
+/// Cells that are being read.
+enum CellBuffer {
     Dense(Vec<Cell>),
     Sparse(Bricks),
 }
 
-impl From<Form> for Cells {
-    fn from(form: Form) -> Cells {
-        match form {
-            Form::Dense(cells) => cells.into(),
-            Form::Sparse(bricks) => bricks.into(),
+impl From<CellBuffer> for Cells {
+    fn from(buffer: CellBuffer) -> Cells {
+        match buffer {
+            CellBuffer::Dense(cells) => cells.into(),
+            CellBuffer::Sparse(bricks) => bricks.into(),
         }
     }
 }
 
-/// Visits the positions of a volume in the order of its cells.
-struct Places {
+/// Position in a volume that advances in the order of its cells.
+struct CellCursor {
     size: [u32; 3],
-    at: [u32; 3],
+    /// x, y and z of the next cell.
+    position: [u32; 3],
+    /// Linear index of the next cell.
     index: usize,
 }
 
-impl Places {
-    fn new(size: [u32; 3]) -> Places {
-        Places { size, at: [0; 3], index: 0 }
+impl CellCursor {
+    fn new(size: [u32; 3]) -> CellCursor {
+        CellCursor { size, position: [0; 3], index: 0 }
     }
 
-    /// Returns the next cell if it is stored.
+    /// Returns the next cell, or `None` if it is not stored, and advances.
     #[inline]
-    fn next<'a>(&mut self, cells: &'a mut Form) -> Option<&'a mut Cell> {
-        let ([x, y, z], index) = (self.at, self.index);
+    fn next<'a>(&mut self, cells: &'a mut CellBuffer) -> Option<&'a mut Cell> {
+        let ([x, y, z], index) = (self.position, self.index);
         self.index += 1;
-        self.at[0] += 1;
-        if self.at[0] == self.size[0] {
-            self.at = if y + 1 == self.size[1] { [0, 0, z + 1] } else { [0, y + 1, z] };
+        self.position[0] += 1;
+        if self.position[0] == self.size[0] {
+            self.position = if y + 1 == self.size[1] { [0, 0, z + 1] } else { [0, y + 1, z] };
         }
         match cells {
-            Form::Dense(cells) => cells.get_mut(index),
-            Form::Sparse(bricks) => bricks.at_mut(x, y, z),
+            CellBuffer::Dense(cells) => cells.get_mut(index),
+            CellBuffer::Sparse(bricks) => bricks.at_mut(x, y, z),
         }
     }
 }
 
-/// Opens an array after checking that its header is of a sane length.
+/// Opens an array. Its header is parsed only if it has a sane length.
 fn open_array<R: Read>(mut entry: R) -> std::io::Result<(npyz::NpyHeader, impl Read)> {
     let mut prefix = [0u8; 12];
     entry.read_exact(&mut prefix)?;

@@ -1,4 +1,4 @@
-//! Sums over the curves in each cell they pass; direction and density are computed from them.
+//! §2 Sums over the curves in every cell they pass, from which direction and density follow.
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -12,54 +12,62 @@ use crate::util::monitor::Monitor;
 use crate::util::random::{Family, Stream};
 use crate::walk::{Walk, floor_cell};
 
-/// Curves a task builds before it hands its contributions over.
+/// Number of curves that one task builds before it hands over their contributions.
 const CURVES_PER_TASK: usize = 64;
-/// Tasks whose contributions are held at once; with 600 cells a curve these are about 40 MB.
+/// Number of tasks whose contributions are in memory at once: about 40 MB if a curve passes 600 cells.
 const TASKS_PER_ROUND: usize = 64;
-/// Number of curves sampled to estimate how many cells all curves pass.
+/// Number of curves from which [`expected_cells`] estimates how many cells all of them pass.
 const SAMPLE_CURVES: usize = 32;
 
-/// Part of a curve inside one cell: index of the cell within its slab, length × direction in cells.
+/// Part of a curve inside one cell: index of the cell in its slab, and length × direction, cells.
 type Contribution = (u32, Vec3);
 
 /// Contributions of one task to one slab.
 #[derive(Clone, Default)]
 struct Bucket {
     parts: Vec<Contribution>,
-    /// The strands' noise in each of them; none where ρ does not follow the strands.
+    /// Noise of the strand in each part; empty if ρ does not follow the strands.
     noises: Vec<f32>,
 }
 
-/// Sums over the curves, cell by cell.
+/// Sums over all curves, for each cell.
 pub(super) struct Flow {
-    /// Length inside the cell × direction, cells.
+    /// Sum of length × direction of the parts inside the cell, cells.
     pub directions: Vec<Vec3>,
-    /// Length × noise of the strand, and length²; empty where ρ does not follow the strands.
+    /// Sums of length × noise and of length² of the parts inside the cell; empty if ρ does not follow the
+    /// strands.
     pub strands: Vec<[f32; 2]>,
 }
 
 impl Flow {
-    /// Noise of the strands in a cell: their mean by length, made one of variance 1 again.
+    /// Noise of the strands in a cell: their mean weighted by length, scaled to variance 1.
     pub fn noise(&self, index: usize) -> f32 {
         self.strands.get(index).map_or(0.0, |[sum, squares]| sum / squares.max(1e-30).sqrt())
     }
 
-    /// Walks all curves, for every cell.
+    /// Sums over all curves for every cell of the volume, in the order of dense storage.
+    ///
+    /// # Errors
+    /// Returns an error if `monitor` ends the work.
     pub fn new(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Flow> {
         let [nx, ny, nz] = spec.size.map(|n| n as usize);
         let layers_per_slab = nz.div_ceil(16);
         let slab = nx * ny * layers_per_slab;
         let lengths: Vec<usize> =
             (0..nz.div_ceil(layers_per_slab)).map(|i| slab.min(nx * ny * nz - i * slab)).collect();
-        let place = |cell: IVec3| {
+        let position = |cell: IVec3| {
             let z = cell.z as usize;
             let in_slab = ((z % layers_per_slab) * ny + cell.y as usize) * nx + cell.x as usize;
             (z / layers_per_slab, in_slab as u32)
         };
-        Flow::summed(spec, &lengths, place, [0, 1], monitor)
+        Flow::summed(spec, &lengths, position, [0, 1], monitor)
     }
 
-    /// Computes the sums of [`Flow::new`] for the cells that `bricks` will store, in storage order.
+    /// Sums over all curves for the cells that `bricks` will store, in their order. Each sum equals that of
+    /// [`Flow::new`].
+    ///
+    /// # Errors
+    /// Returns an error if `monitor` ends the work.
     pub fn packed(spec: &WaterSpec, bricks: &Bricks, monitor: &dyn Monitor) -> Result<Flow> {
         let layers = bricks.layers();
         let layers_per_slab = layers.len().div_ceil(16);
@@ -69,82 +77,101 @@ impl Flow {
             Some(*sum - length)
         });
         let firsts: Vec<usize> = sums.collect();
-        let place = |cell: IVec3| {
+        let position = |cell: IVec3| {
             let [x, y, z] = cell.to_array().map(|c| c as u32);
             let slab = (z / BRICK) as usize / layers_per_slab;
-            let place = bricks.place(x, y, z).expect("it was marked by the same walk");
-            (slab, (place - firsts[slab]) as u32)
+            let stored = bricks.stored_index(x, y, z).expect("the same walk marked the cell");
+            (slab, (stored - firsts[slab]) as u32)
         };
-        Flow::summed(spec, &lengths, place, [1, 2], monitor)
+        Flow::summed(spec, &lengths, position, [1, 2], monitor)
     }
 
-    /// Walks all curves. `place` says in which slab a cell is, of those with these `lengths`, and where in
-    /// it; this is round `round` of `rounds`.
+    /// Sums over all curves. `lengths` are the numbers of cells of the slabs, and `position` gives the slab
+    /// of a cell and its index there. The curves are walked `walks` times in all, `walks_before` times before
+    /// this one.
     ///
-    /// They are walked in parallel; their contributions are added slab by slab in z, within a slab in
-    /// the curves' order, so the sums depend neither on the number of threads nor on the slabs.
+    /// Curves are walked in parallel. Their contributions are added slab by slab in z, and inside a slab in
+    /// the order of the curves, so the sums depend neither on the number of threads nor on the slabs.
     fn summed(
         spec: &WaterSpec,
         lengths: &[usize],
-        place: impl Fn(IVec3) -> (usize, u32) + Sync,
-        [before, rounds]: [u64; 2],
+        position: impl Fn(IVec3) -> (usize, u32) + Sync,
+        [walks_before, walks]: [u64; 2],
         monitor: &dyn Monitor,
     ) -> Result<Flow> {
-        let coherent = spec.structure.coherence > 0.0;
         let cells = lengths.iter().sum();
-        let mut directions = vec![Vec3::ZERO; cells];
-        let mut strands = vec![[0.0; 2]; if coherent { cells } else { 0 }];
-        let slabs = lengths.len();
+        let strand_cells = if spec.structure.coherence > 0.0 { cells } else { 0 };
+        let mut flow = Flow { directions: vec![Vec3::ZERO; cells], strands: vec![[0.0; 2]; strand_cells] };
         let curves = spec.across as usize * spec.deep as usize;
         let starts: Vec<usize> = (0..curves).step_by(CURVES_PER_TASK).collect();
-        for (round, tasks) in starts.chunks(TASKS_PER_ROUND).enumerate() {
+        for (round, starts) in starts.chunks(TASKS_PER_ROUND).enumerate() {
             let done = (round * TASKS_PER_ROUND * CURVES_PER_TASK) as u64;
-            monitor.progress("curves", before * curves as u64 + done, rounds * curves as u64)?;
-            let tasks: Vec<Vec<Bucket>> = tasks
+            monitor.progress("curves", walks_before * curves as u64 + done, walks * curves as u64)?;
+            let tasks: Vec<Vec<Bucket>> = starts
                 .par_iter()
                 .map(|&first| {
-                    let mut buckets = vec![Bucket::default(); slabs];
-                    let (mut points, mut noise) = (Vec::new(), Vec::new());
-                    for curve in first..(first + CURVES_PER_TASK).min(curves) {
-                        curve_points(spec, curve, &mut points);
-                        if coherent {
-                            strand_noise(spec, curve, points.len() - 1, &mut noise);
-                        }
-                        walk_curve(spec, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
-                            let (slab, in_slab) = place(cell);
-                            let bucket = &mut buckets[slab];
-                            bucket.parts.push((in_slab, part));
-                            if coherent {
-                                bucket.noises.push(noise[segment]);
-                            }
-                        });
-                    }
-                    buckets
+                    let own = first..(first + CURVES_PER_TASK).min(curves);
+                    contributions(spec, own, lengths.len(), &position)
                 })
                 .collect();
-            parted(&mut directions, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
-                for &(index, v) in tasks.iter().flat_map(|buckets| &buckets[slab].parts) {
-                    cells[index as usize] += v;
-                }
-            });
-            if !coherent {
-                continue;
-            }
-            parted(&mut strands, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
-                for bucket in tasks.iter().map(|buckets| &buckets[slab]) {
-                    for (&(index, v), w) in bucket.parts.iter().zip(&bucket.noises) {
-                        let [sum, squares] = &mut cells[index as usize];
-                        *sum += v.length() * w;
-                        *squares += v.length_squared();
-                    }
-                }
-            });
+            flow.add(&tasks, lengths);
         }
-        Ok(Flow { directions, strands })
+        Ok(flow)
+    }
+
+    /// Adds the contributions of `tasks` to the cells of the slabs, in the order of the tasks.
+    fn add(&mut self, tasks: &[Vec<Bucket>], lengths: &[usize]) {
+        parted(&mut self.directions, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
+            for &(index, v) in tasks.iter().flat_map(|buckets| &buckets[slab].parts) {
+                cells[index as usize] += v;
+            }
+        });
+        if self.strands.is_empty() {
+            return;
+        }
+        parted(&mut self.strands, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
+            for bucket in tasks.iter().map(|buckets| &buckets[slab]) {
+                for (&(index, v), w) in bucket.parts.iter().zip(&bucket.noises) {
+                    let [sum, squares] = &mut cells[index as usize];
+                    *sum += v.length() * w;
+                    *squares += v.length_squared();
+                }
+            }
+        });
     }
 }
 
+/// Walks `curves` and sorts their contributions into one bucket for each slab.
+fn contributions(
+    spec: &WaterSpec,
+    curves: std::ops::Range<usize>,
+    slabs: usize,
+    position: &impl Fn(IVec3) -> (usize, u32),
+) -> Vec<Bucket> {
+    let coherent = spec.structure.coherence > 0.0;
+    let mut buckets = vec![Bucket::default(); slabs];
+    let (mut points, mut noise) = (Vec::new(), Vec::new());
+    for curve in curves {
+        curve_points(spec, curve, &mut points);
+        if coherent {
+            strand_noise(spec, curve, points.len() - 1, &mut noise);
+        }
+        walk_curve(spec, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
+            let (slab, in_slab) = position(cell);
+            let bucket = &mut buckets[slab];
+            bucket.parts.push((in_slab, part));
+            if coherent {
+                bucket.noises.push(noise[segment]);
+            }
+        });
+    }
+    buckets
+}
+
 /// Marks every cell that a curve passes.
+///
+/// # Errors
+/// Returns an error if `monitor` ends the work.
 pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
     let marks = Marks::new(spec.size);
     let curves = spec.across as usize * spec.deep as usize;
@@ -163,12 +190,12 @@ pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
     Ok(marks)
 }
 
-/// Estimates the number of cells that the curves pass, from a sample and as if all cells were hit
-/// independently.
+/// Estimates how many cells the curves pass: extrapolates from some of the curves, as if the cells of all
+/// were strewn independently.
 pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
     let curves = spec.across as usize * spec.deep as usize;
-    let looked: Vec<usize> = (0..curves).step_by(curves.div_ceil(SAMPLE_CURVES)).collect();
-    let passed: u64 = looked
+    let sample: Vec<usize> = (0..curves).step_by(curves.div_ceil(SAMPLE_CURVES)).collect();
+    let passed: u64 = sample
         .par_iter()
         .map(|&curve| {
             let (mut points, mut passed) = (Vec::new(), 0);
@@ -178,19 +205,20 @@ pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
         })
         .sum();
     let all = spec.size.iter().map(|&n| f64::from(n)).product::<f64>();
-    let passed = passed as f64 / looked.len() as f64 * curves as f64;
+    let passed = passed as f64 / sample.len() as f64 * curves as f64;
     (all * -(-passed / all).exp_m1()) as u64
 }
 
-/// The noise that a curve carries, at the start of each of its segments.
+/// Writes the noise that a curve carries at the start of each of its segments into `noise`.
 fn strand_noise(spec: &WaterSpec, curve: usize, segments: usize, noise: &mut Vec<f32>) {
     let mut rng = Family::new(spec.seed, Stream::Strand).member(curve as u64);
     noise.clear();
     Ripple::new(spec.structure.strand_length, &mut rng).sample(segments, noise);
 }
 
-/// Reports each cell the curve passes, its part there and the segment that came in; parts of
-/// neighbouring segments inside one cell come as one. x and y wrap; what leaves in z is dropped.
+/// Reports each cell that the curve passes, with length × direction of the curve there and the number of the
+/// segment that enters. Successive parts inside one cell are reported as one. x and y wrap around; cells
+/// outside the slab in z are dropped.
 fn walk_curve(spec: &WaterSpec, points: &[Vec3], report: &mut impl FnMut(IVec3, Vec3, usize)) {
     let size = IVec3::from_array(spec.size.map(|n| n as i32));
     let mut open: Option<(IVec3, Vec3, usize)> = None;
@@ -208,7 +236,7 @@ fn walk_curve(spec: &WaterSpec, points: &[Vec3], report: &mut impl FnMut(IVec3, 
         let d = ends[1] - ends[0];
         let cell = cell_of(ends[0]);
         if cell == cell_of(ends[1]) {
-            // Many segments lie in one cell: the walk would find just that.
+            // Many segments lie in one cell, and then the walk would find that cell alone.
             add(IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z), d, segment);
             continue;
         }
@@ -223,6 +251,7 @@ fn walk_curve(spec: &WaterSpec, points: &[Vec3], report: &mut impl FnMut(IVec3, 
     }
 }
 
+/// Cell that holds the point `p`, not wrapped around.
 #[inline]
 fn cell_of(p: Vec3) -> IVec3 {
     IVec3::new(floor_cell(p.x), floor_cell(p.y), floor_cell(p.z))

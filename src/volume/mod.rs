@@ -30,25 +30,25 @@ pub use water::{
     BUILDER_VERSION, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,
 };
 
-/// A volume texture: nx × ny × nz packed cells, x fastest, then y, then z.
+/// Volume texture of nx × ny × nz packed cells. x varies fastest, then y, then z.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VolumeTexture {
-    /// Cells along x (across the flow), y (along it) and z (into the surface).
+    /// Number of cells along x (across the flow), y (along the flow) and z (into the surface).
     pub size: [u32; 3],
-    /// Scale of ρ, 0 to 1: the cells hold ρ/α.
+    /// Scale α of the density, 0 to 1. The cells hold ρ/α.
     pub alpha: f32,
-    /// nx·ny·nz cells. They are shared, so a copy with another α costs nothing.
+    /// The nx·ny·nz cells. They are shared, so a copy with another α costs nothing.
     pub cells: Cells,
 }
 
 impl VolumeTexture {
-    /// Returns the linear index of a cell inside the tile.
+    /// Linear index of the cell at x, y, z of the tile.
     #[inline]
     pub fn index(&self, x: u32, y: u32, z: u32) -> usize {
         (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
     }
 
-    /// Returns the cell at x, y, z of the tile.
+    /// The cell at x, y, z of the tile.
     #[inline]
     pub fn cell(&self, x: u32, y: u32, z: u32) -> Cell {
         match &self.cells {
@@ -57,22 +57,22 @@ impl VolumeTexture {
         }
     }
 
-    /// Iterates over the cells with a direction, in storage order.
+    /// Iterates over the cells with a direction, in the order in which they are stored.
     pub fn flow_cells(&self) -> impl Iterator<Item = &Cell> {
         self.cells.stored().iter().filter(|cell| cell.has_direction())
     }
 
-    /// Returns whether the cells are stored in bricks.
+    /// Whether the cells are stored in bricks.
     pub fn is_sparse(&self) -> bool {
         self.cells.bricks().is_some()
     }
 
-    /// Returns the sum of the ρ codes of each layer z.
+    /// Sums the ρ codes of each layer of cells, from z = 0 on.
     pub fn layer_codes(&self) -> Vec<u64> {
         self.cells.layer_codes(self.size[0] as usize * self.size[1] as usize)
     }
 
-    /// Returns the CRC-32 of size, α and cells. Equal volumes have equal checksums, whether built or read.
+    /// CRC-32 of size, α and cells. Equal volumes have equal checksums, whether built or read.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(bytemuck::bytes_of(&self.size));
@@ -81,8 +81,7 @@ impl VolumeTexture {
         hasher.finalize()
     }
 
-    /// Returns the histogram of ρ over the flow cells, with `bins` equal steps between 0 and α (at least
-    /// one).
+    /// Counts the flow cells by ρ, with `bins` equal steps between 0 and α (at least one).
     pub fn rho_histogram(&self, bins: usize) -> RhoHistogram {
         let bins = bins.max(1);
         let mut h = RhoHistogram { at_zero: 0, between: vec![0; bins], at_alpha: 0 };
@@ -129,53 +128,52 @@ impl VolumeTexture {
     }
 }
 
-/// Histogram of ρ over the flow cells. A built volume clamps ρ, so many cells lie exactly at 0 or α; both
-/// ends are counted separately.
+/// Number of flow cells by ρ. A built volume clamps ρ, so many cells lie exactly at 0 and at α and are
+/// counted apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RhoHistogram {
-    /// Cells with ρ = 0.
+    /// Number of cells with ρ = 0.
     pub at_zero: u64,
-    /// Cells with 0 < ρ < α, in equal steps of ρ.
+    /// Number of cells with 0 < ρ < α, in equal steps of ρ.
     pub between: Vec<u64>,
-    /// Cells with ρ = α.
+    /// Number of cells with ρ = α.
     pub at_alpha: u64,
 }
 
 impl RhoHistogram {
-    /// Returns the number of flow cells.
+    /// Number of all flow cells.
     pub fn total(&self) -> u64 {
         self.at_zero + self.between.iter().sum::<u64>() + self.at_alpha
     }
 }
 
-/// Figures of a volume texture. Means and fractions are taken over the flow cells, the cells with a
-/// direction.
+/// Figures of a volume texture. Means and shares are over the flow cells, the cells with a direction.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Statistics {
     /// nx, ny, nz.
     pub size: [u32; 3],
-    /// Scale of ρ.
+    /// Scale α of the density.
     pub alpha: f32,
-    /// nx·ny·nz.
+    /// Number of cells, nx·ny·nz.
     pub cells: u64,
-    /// Cells with a direction.
+    /// Number of cells with a direction.
     pub flow_cells: u64,
-    /// Cells with ρ > 0.
+    /// Number of cells with ρ > 0.
     pub occupied_cells: u64,
-    /// Mean ρ; α/2 in theory.
+    /// Mean of ρ, α included; α/2 in theory.
     pub rho_mean: f64,
-    /// Fraction of flow cells with ρ = 0; 0.3085 in theory.
+    /// Share of cells with ρ = 0; 0.3085 in theory.
     pub rho_share_at_zero: f64,
-    /// Fraction of flow cells with ρ = α; 0.3085 in theory.
+    /// Share of cells with ρ = α; 0.3085 in theory.
     pub rho_share_at_alpha: f64,
-    /// Mean k_d.
+    /// Mean of k_d.
     pub k_d_mean: f64,
-    /// Mean k_s.
+    /// Mean of k_s.
     pub k_s_mean: f64,
-    /// Mean v (not a unit vector).
+    /// Mean of v, not a unit vector.
     pub v_mean: [f64; 3],
-    /// Number of stored cells; all cells in dense storage.
+    /// Number of cells that are stored: all of them, except in sparse storage.
     pub stored_cells: u64,
-    /// Size of the stored cells and of their index (masks and bases of bricks), bytes.
+    /// Size of the stored cells and, in sparse storage, of the bricks' masks and bases, bytes.
     pub bytes: u64,
 }

@@ -1,25 +1,26 @@
-//! The volume texture prefiltered: levels of half as many cells along each axis, for views that see many
-//! cells in one pixel.
+//! §4 Prefiltered levels of the volume texture, for views that see many cells in one pixel. Each level has
+//! half as many cells along each axis as the one before.
 //!
-//! A coarse cell stands for all cells in its part of the volume (where a number of cells is odd, for parts of
-//! them: the copies of the volume still join without a seam):
+//! A coarse cell stands for the finer cells in its part of the volume. If the number of finer cells along an
+//! axis is odd, it stands for parts of them, so that the copies of the volume still join without a seam.
 //!
-//! - **ρ covers as much.** Light goes straight through between strands, so that the mean density would hide
-//!   too much of what is behind. With T the mean transmittance of the finer cells' columns along z, the
-//!   coarse cell has the ρ that lets T pass: −log₂ T over the column's length in [`bits`].
-//! - **Directions stay a distribution.** The second moments Σ w·v·vᵀ/Σ w of the unit directions v, w = ρ, are
-//!   kept as in SGGX (Heitz, Dupuy, Crassin and Dachsbacher 2015), so that strands that cross do not become
-//!   one between them.
-//! - k_d and k_s are means weighted by ρ.
+//! - **ρ keeps the coverage.** Light goes straight through between strands, so the mean density would hide
+//!   too much of what is behind. Let T be the mean transmittance of the finer cells' columns along z. The
+//!   coarse cell has the ρ that lets T pass: −log₂ T divided by the optical depth of a column, in bits per
+//!   unit of ρ.
+//! - **Directions stay a distribution.** A level keeps the second moments Σ w·v·vᵀ/Σ w of the unit directions
+//!   v, w = ρ, as in SGGX (Heitz, Dupuy, Crassin and Dachsbacher 2015). So two strands that cross do not
+//!   become one strand between them.
+//! - **k_d and k_s** are means weighted by ρ.
 //!
 //! A level is a volume texture of fewer cells, whose second word holds moments in place of v:
 //!
-//! | bits | what |
+//! | bits | value |
 //! |---|---|
 //! | 0–6, 7–13 | √xx and √zz in 127ths; yy = 1 − xx − zz |
 //! | 14–19, 20–25, 26–31 | xy, xz and yz over the product of the two roots, in 31sts, signed |
 //!
-//! One direction has correlations of ±1, which have codes of their own: it stays one.
+//! A single direction has correlations of ±1, which these codes hold exactly, so it stays a single direction.
 
 use std::sync::Arc;
 
@@ -28,13 +29,13 @@ use rayon::prelude::*;
 
 use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
 
-/// Shared levels, as walks read them.
+/// Levels as walks read them. They are shared, as a volume's cells are.
 pub type Levels = Arc<Pyramid>;
 
 /// Levels of a volume, the volume itself first.
 pub struct Pyramid {
     levels: Vec<VolumeTexture>,
-    /// True if empty cells hold boxes of empty cells ([`with_boxes`]) in place of k and v.
+    /// Whether empty cells hold boxes to leap over ([`with_boxes`]) in place of k and v.
     pub leaps: bool,
 }
 
@@ -46,19 +47,19 @@ impl std::ops::Deref for Pyramid {
     }
 }
 
-/// Choice whether rays leap over empty cells. It changes neither pictures nor cell counts.
+/// Choice whether rays leap over empty cells. Pictures and numbers of cells do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Leaps {
-    /// Leap in volumes where it pays ([`worth_leaping`]).
+    /// Leaps if the volume is empty enough ([`worth_leaping`]).
     #[default]
     Auto,
-    /// Leap in any volume whose cells are all stored.
+    /// Leaps in every volume that is stored densely.
     Always,
-    /// Visit every cell.
+    /// Walks every cell.
     Never,
 }
 
-/// Second moments of directions: xx, yy, zz and xy, xz, yz. Their scale cancels in the fibre model.
+/// Second moments S of directions. Their scale cancels in the fibre model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
     /// xx, yy, zz.
@@ -68,12 +69,12 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// v·vᵀ.
+    /// Moments v·vᵀ of one direction.
     pub fn of(v: Vec3) -> Self {
         Moments { diagonal: v * v, mixed: Vec3::new(v.x * v.y, v.x * v.z, v.y * v.z) }
     }
 
-    /// S·v.
+    /// Product S·v.
     pub fn times(&self, v: Vec3) -> Vec3 {
         let (d, m) = (self.diagonal, self.mixed);
         Vec3::new(
@@ -83,7 +84,7 @@ impl Moments {
         )
     }
 
-    /// Packs moments whose trace is 1 into the word of a coarse cell.
+    /// Packs moments of trace 1 into the second word of a coarse cell.
     pub fn packed(&self) -> u32 {
         let root = self.diagonal.max(Vec3::ZERO).map(f32::sqrt);
         let over = |product: f32, a: f32, b: f32| (product / (a * b).max(1e-12)).clamp(-1.0, 1.0);
@@ -97,7 +98,7 @@ impl Moments {
         share(root.x) | share(root.z) << 7 | xy << 14 | xz << 20 | yz << 26
     }
 
-    /// Unpacks the word of a coarse cell.
+    /// Unpacks the second word of a coarse cell.
     #[inline]
     pub fn unpacked(word: u32) -> Self {
         let share = |shift: u32| (word >> shift & 127) as f32 * (1.0 / 127.0);
@@ -112,13 +113,13 @@ impl Moments {
     }
 }
 
-/// Returns the cells along each axis of level `level` of a volume of `size`.
+/// Size of level `level` of a volume of `size`, cells along each axis.
 pub fn level_size(size: [u32; 3], level: u32) -> [u32; 3] {
     size.map(|n| ((n - 1) >> level) + 1)
 }
 
-/// Returns the number of levels of a volume of `size` cells, including the volume itself. Levels go down to
-/// one cell across the face, as far as they fit side by side in [`LevelAtlas`].
+/// Number of levels of a volume of `size` cells, the volume itself included. The levels go down to one cell
+/// across the face, as far as they fit side by side into the [`LevelAtlas`].
 pub fn level_count(size: [u32; 3]) -> u32 {
     let coarse = size[0].max(size[1]).next_power_of_two().trailing_zeros();
     let mut height = 0;
@@ -129,32 +130,32 @@ pub fn level_count(size: [u32; 3]) -> u32 {
     1 + (1..=coarse).take_while(fits).count() as u32
 }
 
-/// Layout of the levels in one texture: the volume itself first, then, after it along z, the coarse levels
-/// side by side along y. Twin: `shaders/trace/levels.wgsl`.
+/// Layout of the levels in one texture. The volume itself comes first; behind it along z lie the coarse
+/// levels, one after the other along y. Twin: `shaders/trace/levels.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LevelAtlas {
-    /// Cells of the volume itself along each axis.
+    /// Size of the volume itself, cells along each axis.
     pub size: [u32; 3],
-    /// Number of levels; 1 is the volume alone.
+    /// Number of levels. With 1 there is the volume alone.
     pub count: u32,
 }
 
 impl LevelAtlas {
-    /// Returns the layout of `levels`.
+    /// Layout of `levels`, the volume itself first.
     pub fn new(levels: &[VolumeTexture]) -> Self {
         LevelAtlas { size: levels[0].size, count: levels.len() as u32 }
     }
 
-    /// Returns the first cell of a level.
+    /// First cell of a level in the texture.
     pub fn place(&self, level: u32) -> [u32; 3] {
         match level {
             0 => [0; 3],
-            // A multiple of 4, so that a light volume's word, four codes along z, belongs to one level.
+            // A word of a light volume holds four codes along z, and all four must belong to one level.
             _ => [0, (1..level).map(|l| level_size(self.size, l)[1]).sum(), self.size[2].next_multiple_of(4)],
         }
     }
 
-    /// Returns the size of the texture, cells.
+    /// Size of the texture, cells along each axis.
     pub fn extent(&self) -> [u32; 3] {
         let [nx, ny, nz] = self.size;
         if self.count == 1 {
@@ -165,30 +166,33 @@ impl LevelAtlas {
     }
 }
 
-/// Parameters of the levels of a volume.
+/// Trace settings that the levels of a volume depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PyramidSpec {
-    /// Bits of transmittance along the depth of one cell, per unit of its ρ code: coarse levels hide as much
-    /// of what is behind as their columns do with these. `None`: there are no coarse levels.
+    /// Optical depth of one cell along z, in bits (−log₂ of the transmittance) per unit of its ρ code. Coarse
+    /// levels hide as much of what is behind as columns of such cells do. `None` means that there are no
+    /// coarse levels.
     pub coverage_bits: Option<f32>,
-    /// True if walks interpolate between cells.
+    /// Whether rays interpolate between cells.
     pub interpolated: bool,
 }
 
-/// Builds the levels of a volume without boxes to leap over, for few rays.
+/// Computes the levels of a volume without boxes to leap over. For a few rays, boxes cost more time than they
+/// save.
 pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
-    LevelsCache { leaps: Leaps::Never, kept: None }.get(volume, spec)
+    LevelsCache { leaps: Leaps::Never, last: None }.get(volume, spec)
 }
 
 /// Cache of the levels from frame to frame.
 #[derive(Default)]
 pub struct LevelsCache {
-    /// Choice whether the levels hold boxes for leaps.
+    /// Choice whether rays leap.
     pub leaps: Leaps,
-    kept: Option<(Key, Levels)>,
+    /// The levels of the last call.
+    last: Option<(Key, Levels)>,
 }
 
-/// Inputs of the levels.
+/// Values that the levels depend on.
 struct Key {
     cells: Cells,
     size: [u32; 3],
@@ -204,16 +208,16 @@ impl PartialEq for Key {
 }
 
 impl LevelsCache {
-    /// Returns the levels of a volume; builds them unless the inputs equal those of the last call.
+    /// Returns the levels of a volume. Computes them unless they are those of the last call.
     pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
         let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };
-        if let Some((of, levels)) = &self.kept
-            && *of == key
+        if let Some((last, levels)) = &self.last
+            && *last == key
         {
             return levels.clone();
         }
-        // Old levels are freed first: both might not fit into memory.
-        self.kept = None;
+        // The old levels are freed first, because the memory might not hold both.
+        self.last = None;
         let mut levels = vec![volume.clone()];
         if let Some(bits) = spec.coverage_bits {
             levels.extend(coarse_levels(volume, bits));
@@ -229,12 +233,12 @@ impl LevelsCache {
             levels = levels.iter().map(|level| with_boxes(level, spec.interpolated)).collect();
         }
         let levels = Arc::new(Pyramid { levels, leaps });
-        self.kept = Some((key, levels.clone()));
+        self.last = Some((key, levels.clone()));
         levels
     }
 }
 
-/// Builds the levels from 1 on; `bits` is [`PyramidSpec::coverage_bits`].
+/// Computes the levels from 1 on. `bits` is [`PyramidSpec::coverage_bits`].
 pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
     let mut levels = Vec::new();
     let mut means: Vec<Mean> = Vec::new();
@@ -251,11 +255,12 @@ pub fn coarse_levels(volume: &VolumeTexture, bits: f32) -> Vec<VolumeTexture> {
     levels
 }
 
-/// A cell of any level, before it is packed.
+/// Cell of any level before it is packed.
 #[derive(Clone, Copy, Default)]
 struct Mean {
-    /// ρ in codes of the volume's cells.
+    /// ρ in codes of the volume's cells, 0 to 65535.
     rho: f64,
+    /// k_d and k_s in codes, 0 to 255.
     k: [f64; 2],
     diagonal: DVec3,
     mixed: DVec3,
@@ -286,8 +291,8 @@ impl Mean {
     }
 }
 
-/// Returns the fine cells that cell `i` of a coarse axis covers: the first one, and the covered fraction of
-/// it and of the next two.
+/// Finer cells along one axis that coarse cell `i` stands for: the first of them, and the lengths that it and
+/// the next two contribute, in finer cells. `fine` and `coarse` are the numbers of cells along the axis.
 fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
     let step = f64::from(fine) / f64::from(coarse);
     let (from, to) = (f64::from(i) * step, f64::from(i + 1) * step);
@@ -296,47 +301,58 @@ fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
     (first as u32, [share(0.0), share(1.0), share(2.0)])
 }
 
-/// Averages fine cells into coarse ones. `depth`: bits along a fine cell's depth per unit of ρ.
-fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, of: impl Fn(usize) -> Mean + Sync) -> Vec<Mean> {
+/// Computes a level of `coarse` cells from the level of `fine` cells before it. `depth` is the optical depth
+/// of a finer cell along z, in bits per unit of its ρ code, and `cell_at` gives a finer cell by its linear
+/// index.
+fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, cell_at: impl Fn(usize) -> Mean + Sync) -> Vec<Mean> {
     let [nx, ny, nz] = coarse.map(|n| n as usize);
     (0..nx * ny * nz)
         .into_par_iter()
         .map(|i| {
             let at = UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32).to_array();
-            let [(x0, xs), (y0, ys), (z0, zs)] =
-                [0, 1, 2].map(|axis| parts(fine[axis], coarse[axis], at[axis]));
-            let (mut sum, mut passed, mut area) = (Mean::default(), 0.0, 0.0);
-            for (y, wy) in (y0..).zip(ys).filter(|part| part.1 > 1e-9) {
-                for (x, wx) in (x0..).zip(xs).filter(|part| part.1 > 1e-9) {
-                    let mut column = 0.0;
-                    for (z, wz) in (z0..).zip(zs).filter(|part| part.1 > 1e-9) {
-                        let index =
-                            (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
-                        let cell = of(index);
-                        let weight = cell.rho * wx * wy * wz;
-                        column += cell.rho * wz;
-                        sum.rho += weight;
-                        sum.k = [0, 1].map(|c| sum.k[c] + weight * cell.k[c]);
-                        sum.diagonal += cell.diagonal * weight;
-                        sum.mixed += cell.mixed * weight;
-                    }
-                    passed += wx * wy * (-column * depth).exp2();
-                    area += wx * wy;
-                }
-            }
-            if sum.rho == 0.0 {
-                return Mean::default();
-            }
-            let length = zs.iter().sum::<f64>();
-            let mean = sum.rho / (area * length);
-            // Without extinction nothing is hidden, whatever the density.
-            let rho = if depth > 0.0 { -(passed / area).max(1e-300).log2() / (depth * length) } else { mean };
-            Mean {
-                rho: rho.min(mean),
-                k: sum.k.map(|k| k / sum.rho),
-                diagonal: sum.diagonal / sum.rho,
-                mixed: sum.mixed / sum.rho,
-            }
+            let along = [0, 1, 2].map(|axis| parts(fine[axis], coarse[axis], at[axis]));
+            mean_of_parts(fine, along, depth, &cell_at)
         })
         .collect()
+}
+
+/// Computes one coarse cell from the finer cells that it stands for, given along x, y and z as [`parts`]
+/// gives them.
+fn mean_of_parts(
+    fine: [u32; 3],
+    [(x0, xs), (y0, ys), (z0, zs)]: [(u32, [f64; 3]); 3],
+    depth: f64,
+    cell_at: &impl Fn(usize) -> Mean,
+) -> Mean {
+    let (mut sum, mut passed, mut area) = (Mean::default(), 0.0, 0.0);
+    for (y, wy) in (y0..).zip(ys).filter(|part| part.1 > 1e-9) {
+        for (x, wx) in (x0..).zip(xs).filter(|part| part.1 > 1e-9) {
+            let mut column = 0.0;
+            for (z, wz) in (z0..).zip(zs).filter(|part| part.1 > 1e-9) {
+                let index = (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
+                let cell = cell_at(index);
+                let weight = cell.rho * wx * wy * wz;
+                column += cell.rho * wz;
+                sum.rho += weight;
+                sum.k = [0, 1].map(|c| sum.k[c] + weight * cell.k[c]);
+                sum.diagonal += cell.diagonal * weight;
+                sum.mixed += cell.mixed * weight;
+            }
+            passed += wx * wy * (-column * depth).exp2();
+            area += wx * wy;
+        }
+    }
+    if sum.rho == 0.0 {
+        return Mean::default();
+    }
+    let length = zs.iter().sum::<f64>();
+    let mean = sum.rho / (area * length);
+    // Without extinction nothing is hidden, whatever the density.
+    let rho = if depth > 0.0 { -(passed / area).max(1e-300).log2() / (depth * length) } else { mean };
+    Mean {
+        rho: rho.min(mean),
+        k: sum.k.map(|k| k / sum.rho),
+        diagonal: sum.diagonal / sum.rho,
+        mixed: sum.mixed / sum.rho,
+    }
 }

@@ -3,16 +3,16 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Weights below this share of the first are left out: they change the variance by less than 1e-4.
-const SMALLEST: f64 = 1e-5;
-/// Most harmonics; with the shortest length the scene takes, 0.005, the weights end at 153.
-const MOST: usize = 256;
+/// Smallest weight that is kept, relative to the first. Smaller ones change the variance by less than 1e-4.
+const MIN_WEIGHT: f64 = 1e-5;
+/// Largest number of harmonics. With 0.005, the shortest length a scene accepts, the weights end at 153.
+const MAX_HARMONICS: usize = 256;
 
-/// A stationary normal process w(s) with period 1, mean 0 and variance 1, and with the covariance
-/// Σ_n e^(−(Δ + n)²/2ℓ²) up to a factor: a Gaussian of width ℓ, wrapped around the period.
+/// Stationary normal process w(s) with period 1, mean 0 and variance 1. Its covariance is Σ_n e^(−(Δ +
+/// n)²/2ℓ²) up to a factor: a Gaussian of width ℓ, wrapped around the period.
 ///
-/// It is its Fourier series, by Poisson's summation: a_m² ∝ e^(−(2πmℓ)²/2), twice that for m > 0, times
-/// normal coefficients.
+/// The process is computed as its Fourier series. By Poisson's summation the squared amplitudes are
+/// a_m² ∝ e^(−(2πmℓ)²/2), and twice that for m > 0; each is multiplied by a normal coefficient.
 #[derive(Clone, Debug)]
 pub struct Ripple {
     /// Coefficients of cos 2πms and sin 2πms, from m = 0.
@@ -20,12 +20,12 @@ pub struct Ripple {
 }
 
 impl Ripple {
-    /// Draws noise with correlation length `length`, a fraction of the period.
+    /// Draws a process with the correlation length `length`, a fraction of the period.
     pub fn new(length: f32, rng: &mut impl Rng) -> Self {
         let weight = |m: usize| (-0.5 * (std::f64::consts::TAU * m as f64 * f64::from(length)).powi(2)).exp();
-        let weights: Vec<f64> = (0..MOST)
+        let weights: Vec<f64> = (0..MAX_HARMONICS)
             .map(|m| weight(m) * if m == 0 { 1.0 } else { 2.0 })
-            .take_while(|&w| w > SMALLEST)
+            .take_while(|&w| w > MIN_WEIGHT)
             .collect();
         let sum: f64 = weights.iter().sum();
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
@@ -34,7 +34,7 @@ impl Ripple {
         Ripple { coefficients }
     }
 
-    /// Appends the `steps` values of w at 0, 1/steps, … to `values`.
+    /// Appends the `steps` values w(0), w(1/steps), w(2/steps), … to `values`.
     pub fn sample(&self, steps: usize, values: &mut Vec<f32>) {
         let step = std::f64::consts::TAU / steps as f64;
         let circle: Vec<[f32; 2]> = (0..steps)

@@ -1,48 +1,50 @@
-//! Choice between dense and sparse storage of a volume's cells, and the memory of each.
+//! Choice between dense and sparse storage, and the memory that each takes.
 
 use super::{Bricks, Cell, WaterSpec};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 
-/// Storage of a volume's cells.
+/// Form in which a volume's cells are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Storage {
     /// All cells are stored.
     #[default]
     Dense,
-    /// Non-empty cells are stored in bricks.
+    /// The non-empty cells are stored, in bricks.
     Sparse,
 }
 
 /// Storage that a scene asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StorageChoice {
-    /// Dense if that fits into memory.
+    /// Dense if that fits the memory, otherwise sparse.
     #[default]
     Auto,
-    /// All cells.
+    /// Always dense.
     Dense,
-    /// In bricks.
+    /// Always sparse.
     Sparse,
 }
 
 words! { StorageChoice { Auto => "auto", Dense => "dense", Sparse => "sparse" } }
 
-/// Bytes of a volume of `size` cells, all stored, in a picture: on the host, there again where its empty
-/// cells hold boxes to leap over, and on the device. Coarse levels (`pyramid`) take a seventh on the host,
-/// and up to three quarters on the device.
+/// Bytes that a dense volume of `size` cells takes while a picture is rendered. The host holds the cells and
+/// a copy whose empty cells hold boxes to leap over; the device holds one copy. Coarse levels (`pyramid`) add
+/// a seventh on the host and up to three quarters on the device.
 pub fn dense_bytes(size: [u32; 3], pyramid: bool) -> u128 {
     let per_cell = size_of::<Cell>() * if pyramid { 4 } else { 3 };
     cells(size) * per_cell as u128
 }
 
-/// Bytes of a volume of `size` cells of which `stored` are stored in bricks: the most of building it, which
-/// needs `extra` bytes for each of those, and of a picture, which needs it on host and device.
+/// Bytes that a sparse volume of `size` cells takes, of which `stored` are stored. This is the larger of two
+/// needs: building takes `extra` bytes for each stored cell beside the volume on the host, and a picture
+/// takes a copy on the device beside it.
 pub fn sparse_bytes(size: [u32; 3], stored: u64, extra: usize) -> u128 {
     let [host, device] = Bricks::bytes_of(size, stored);
     host + device.max(u128::from(stored) * extra as u128)
 }
 
+/// Number of cells of a volume of `size`.
 fn cells(size: [u32; 3]) -> u128 {
     size.iter().map(|&n| u128::from(n)).product()
 }
@@ -50,33 +52,40 @@ fn cells(size: [u32; 3]) -> u128 {
 /// Chooses the storage of a water volume within `memory` bytes. Allocates nothing of the volume's size.
 ///
 /// # Errors
-/// An error if it does not fit. The number of cells that the curves pass is not known yet;
+/// [`Error::Memory`] if the volume does not fit. The number of cells that curves pass is not known yet, so
 /// [`super::build_sparse_water`] checks again.
 pub fn storage_of(spec: &WaterSpec, asked: StorageChoice, memory: u64) -> Result<Storage> {
     let fits = check_budget(spec.size, spec.strand_bytes(), memory);
-    let is_drawn = dense_bytes(spec.size, false) <= u128::from(memory);
-    chosen(asked, fits, is_drawn, check_sparse(spec, 0, memory))
+    let is_drawable = dense_bytes(spec.size, false) <= u128::from(memory);
+    choose(asked, fits, is_drawable, check_sparse(spec, 0, memory))
 }
 
-/// Chooses the storage of a volume file of `size` cells.
+/// Chooses the storage of a volume file of `size` cells within `memory` bytes.
+///
+/// # Errors
+/// [`Error::Memory`] if the volume does not fit.
 pub(super) fn file_storage(size: [u32; 3], asked: StorageChoice, memory: u64) -> Result<Storage> {
-    chosen(asked, check_budget(size, 0, memory), true, check_stored(size, 0, 0, memory))
+    choose(asked, check_budget(size, 0, memory), true, check_stored(size, 0, 0, memory))
 }
 
-/// Resolves `Auto`: dense if that can be built and drawn, or if sparse storage does not help.
-fn chosen(asked: StorageChoice, dense: Result<()>, is_drawn: bool, sparse: Result<()>) -> Result<Storage> {
+/// Chooses between the two forms. `dense` and `sparse` say whether each can be built, `is_drawable` whether a
+/// dense volume can also be rendered. Auto is dense if both hold, or if sparse storage does not fit either.
+fn choose(asked: StorageChoice, dense: Result<()>, is_drawable: bool, sparse: Result<()>) -> Result<Storage> {
     match asked {
         StorageChoice::Dense => dense.map(|()| Storage::Dense),
         StorageChoice::Sparse => sparse.map(|()| Storage::Sparse),
-        StorageChoice::Auto if sparse.is_err() || (dense.is_ok() && is_drawn) => {
+        StorageChoice::Auto if sparse.is_err() || (dense.is_ok() && is_drawable) => {
             dense.map(|()| Storage::Dense)
         }
         StorageChoice::Auto => Ok(Storage::Sparse),
     }
 }
 
-/// Checks before any allocation that a volume of `size` cells fits into `budget` bytes.
-/// Building needs the packed cells and one vector per cell, and `extra` bytes more per cell.
+/// Checks, before anything is allocated, that a dense volume of `size` cells can be built within `budget`
+/// bytes. Building takes the packed cell, one vector and `extra` bytes for each cell.
+///
+/// # Errors
+/// [`Error::Memory`] if it does not fit.
 pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
     let per_cell = (size_of::<Cell>() + size_of::<glam::Vec3>() + extra) as u128;
     let need = cells(size) * per_cell;
@@ -86,19 +95,25 @@ pub fn check_budget(size: [u32; 3], extra: usize, budget: u64) -> Result<()> {
             format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)"),
             need,
             budget,
-            "lower volume.nx, volume.ny or volume.nz, or raise --memory; volume.storage=sparse \
-             (without trace.filter=pyramid) takes less where most cells are empty",
+            "lower volume.nx, volume.ny or volume.nz, or raise --memory; volume.storage=sparse (without \
+             trace.filter=pyramid) takes less where most cells are empty",
         ));
     }
     Ok(())
 }
 
-/// Refuses a water volume whose curves pass at least `stored` cells, if these do not fit into `memory` bytes.
+/// Checks that a sparse water volume fits into `memory` bytes if curves pass at least `stored` of its cells.
+///
+/// # Errors
+/// [`Error::Memory`] if it does not fit.
 pub(super) fn check_sparse(spec: &WaterSpec, stored: u64, memory: u64) -> Result<()> {
     check_stored(spec.size, stored, size_of::<glam::Vec3>() + spec.strand_bytes(), memory)
 }
 
-/// Refuses sparse storage that needs more than `memory` bytes; parameters as in [`sparse_bytes`].
+/// Checks that a sparse volume fits into `memory` bytes. The other parameters are those of [`sparse_bytes`].
+///
+/// # Errors
+/// [`Error::Memory`] if it does not fit, or if more than 2³² − 1 cells are stored.
 pub(super) fn check_stored(size: [u32; 3], stored: u64, extra: usize, memory: u64) -> Result<()> {
     let need = sparse_bytes(size, stored, extra);
     if need <= u128::from(memory) && stored <= u64::from(u32::MAX) {
@@ -109,7 +124,7 @@ pub(super) fn check_stored(size: [u32; 3], stored: u64, extra: usize, memory: u6
     let (what, fix) = match stored {
         0 => (what, "lower volume.nx, volume.ny or volume.nz, or raise --memory"),
         _ => (
-            format!("{what}, stored sparse with {stored} of them,"),
+            format!("{what}, {stored} of them stored sparsely,"),
             "lower curves.across, curves.deep, volume.nx, volume.ny or volume.nz, or raise --memory",
         ),
     };

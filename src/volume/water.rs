@@ -1,6 +1,6 @@
-//! §2.2 The builder for gushing water: spatial fractal curves from the face y = 0 to the same points of the
-//! face y = ny give every cell they pass its direction. ρ and k are random in each cell, or follow the
-//! strands.
+//! §2 Builder of volumes of gushing water (the paper's §2.2). Spatial fractal curves run from the face y = 0
+//! to their twins on y = ny and give every cell they pass its direction. ρ and k are random in every cell, or
+//! follow the strands.
 
 use std::sync::Arc;
 
@@ -18,36 +18,37 @@ use crate::util::random::{Family, Stream};
 use crate::volume::WaterSpec;
 
 impl WaterSpec {
-    /// Returns whether ρ and k depend on the packed cells alone. If so, [`set_density_and_reflection`]
-    /// applies a new base of k without walking the curves again.
+    /// Whether ρ and k can be computed from packed cells alone ([`set_density_and_reflection`]). If so, a
+    /// change of k_d, k_s or their noise only packs the cells again and walks no curve.
     pub fn density_is_of_cells(&self) -> bool {
         self.structure.coherence == 0.0 && self.structure.coverage == 0.0
     }
 
-    /// Returns the extra bytes per cell that building needs if ρ follows the strands, else 0.
+    /// Bytes that building takes for each cell beside its vector: more than 0 if ρ follows the strands.
     pub fn strand_bytes(&self) -> usize {
         if self.structure.coherence > 0.0 { size_of::<[f32; 2]>() } else { 0 }
     }
 }
 
-/// Builds the volume texture with dense storage.
+/// Builds the volume texture in dense storage.
 ///
 /// # Errors
-/// Any error with which `monitor` stops the work.
+/// Returns an error if `monitor` ends the work.
 pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let flow = Flow::new(spec, monitor)?;
     let cells: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
     let mut cells = cells.into();
-    let of_cells = spec.density_is_of_cells();
-    set(spec, &mut cells, (!of_cells).then_some(&flow));
+    let follows_strands = !spec.density_is_of_cells();
+    set(spec, &mut cells, follows_strands.then_some(&flow));
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
 }
 
-/// Builds the same cells as [`build_water`], stored in bricks. Memory grows with the number of cells that the
-/// curves pass. The curves are walked twice: first to mark those cells, then to sum their contributions.
+/// Builds the same volume in sparse storage. Memory grows with the number of cells that curves pass: the
+/// curves are walked once to mark those cells, and once more to add up their contributions.
 ///
 /// # Errors
-/// An error if the cells need more than `memory` bytes, or if `monitor` stops the work.
+/// Returns [`crate::Error::Memory`] if the cells that curves pass need more than `memory` bytes, and an error
+/// if `monitor` ends the work.
 pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     check_sparse(spec, 0, memory)?;
     let marks = flow::marked(spec, monitor)?;
@@ -56,54 +57,55 @@ pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) 
     let flow = Flow::packed(spec, &bricks, monitor)?;
     bricks.fill(flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect());
     let mut cells = bricks.into();
-    let of_cells = spec.density_is_of_cells();
-    set(spec, &mut cells, (!of_cells).then_some(&flow));
+    let follows_strands = !spec.density_is_of_cells();
+    set(spec, &mut cells, follows_strands.then_some(&flow));
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
 }
 
-/// Estimates the number of cells that a water volume stores in bricks.
+/// Estimates how many cells a water volume stores in sparse storage.
 pub fn expected_cells(spec: &WaterSpec) -> u64 {
     flow::expected_cells(spec)
 }
 
-/// Reads the volume of `spec` from `cache`, or builds it with [`build_water`].
+/// Returns the volume of [`build_water`], from `cache` if it is there.
 ///
 /// # Errors
-/// Any error with which `monitor` stops the work.
+/// Returns an error if `monitor` ends the work.
 pub fn kept_water(spec: &WaterSpec, cache: &Cache, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let count = spec.size.iter().map(|&n| n as usize).product();
-    // The cells do not contain α.
+    // The cells do not depend on α, so neither does the key.
     let key = key("volume", BUILDER_VERSION, &WaterSpec { alpha: 0.0, ..*spec });
     let build = || {
         let volume = build_water(spec, monitor)?;
-        Ok(Arc::unwrap_or_clone(volume.cells.dense().expect("all cells are stored").clone()))
+        Ok(Arc::unwrap_or_clone(volume.cells.dense().expect("the storage is dense").clone()))
     };
     let cells = cache.get("volumes", &key, count, build)?;
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells: cells.into() })
 }
 
-/// Version of the builder, part of the key of cached volumes. Raise it with every change of the cells that a
-/// spec gives; a test compares their checksums.
+/// Version of the builder, part of the key of volumes on disk. Raise it with every change of the cells that a
+/// specification builds; a test compares their checksums.
 pub const BUILDER_VERSION: u32 = 1;
 
-/// Elements 1 and 3: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and k = clamp(base + noise, 0, 1) in
-/// every cell with a direction. Correct only if [`WaterSpec::density_is_of_cells`]: it uses no curves.
+/// Sets elements 1 and 3 of every cell with a direction: ρ = clamp(N(0,1) + 0.5, 0, 1) (before α) and
+/// k = clamp(base + noise, 0, 1). Gives the builder's cells if [`WaterSpec::density_is_of_cells`] holds.
 pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut Cells) {
     set(spec, cells, None);
 }
 
-/// Sets ρ, k_d and k_s of every cell with a direction.
+/// Sets ρ, k_d and k_s of every cell with a direction; with `flow`, ρ follows the strands.
 ///
-/// With coherence c the normal variate of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²). Its variance is 1
-/// again, so the distribution of ρ stays. Coverage then multiplies ρ by 1 − coverage·e^(−l), where l is the
-/// length of the strands in the cell, so that strands end softly.
+/// With coherence c the normal number of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²). It has variance 1
+/// again, so ρ keeps its distribution. Coverage then multiplies ρ by 1 − coverage·e^(−length of the strands
+/// in the cell), so that strands end softly.
 fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
     let family = Family::new(spec.seed, Stream::Cell);
     let structure = &spec.structure;
     let (c, d) = (structure.coherence, 1.0 - structure.coherence);
     let root = (c * c + d * d).sqrt();
-    // `place` indexes the sums of `flow`. The random numbers depend on the linear index, not on the storage.
-    cells.change(|index, place, cell| {
+    // `stored` is the cell's index in the sums of `flow`. Random numbers follow from the linear index
+    // `index`, so they do not depend on the storage.
+    cells.change(|index, stored, cell| {
         if !cell.has_direction() {
             return cell;
         }
@@ -111,21 +113,21 @@ fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
         let mut normal = || normal_rand(&mut rng);
         let mut rho = normal();
         if let Some(flow) = flow {
-            rho = (c * flow.noise(place) + d * rho) / root;
+            rho = (c * flow.noise(stored) + d * rho) / root;
         }
         rho += 0.5;
         let crest = structure.crest * (rho.clamp(0.0, 1.0) - 0.5);
         let k_d = spec.k_d + normal() * spec.k_noise + crest;
         let k_s = spec.k_s + normal() * spec.k_noise;
         if let Some(flow) = flow {
-            let length = flow.directions[place].length();
+            let length = flow.directions[stored].length();
             rho = rho.clamp(0.0, 1.0) * (1.0 - structure.coverage * (-length).exp());
         }
         cell.with_density(rho, k_d, k_s)
     });
 }
 
-/// The paper's normal_rand(): mean 0, variance 1.
+/// Draws the paper's normal_rand(), a normal number of mean 0 and variance 1.
 fn normal_rand(rng: &mut Pcg64Mcg) -> f32 {
     StandardNormal.sample(rng)
 }
