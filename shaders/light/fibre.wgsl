@@ -1,9 +1,10 @@
-// §5 The light of one cell: decoding, and the fibre model of Kajiya and Kay 1989. Twins: src/volume/cell.rs
-// (v_code) and src/shading.rs.
+// §5 Decoding of a cell's direction, and the fibre model of Kajiya and Kay 1989. Twins: v_code in
+// src/volume/cell.rs, and src/light/fibre.rs.
 
 #import layout
 
-// The specular exponent where it is a whole number up to 255, else 0: `pow` costs three times as much.
+// Specular exponent if it is a whole number from 1 to 255, else 0. `pow` costs three times as much as the
+// squarings.
 override EXPONENT: u32 = 0u;
 
 fn v_code(word: u32) -> vec3<f32> {
@@ -36,7 +37,16 @@ fn specular_power(x: f32, p: f32) -> f32 {
 }
 
 // Ψ = k_d·sin(t,l) + k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p, with t = v/√q in the view's metric.
-fn psi(p: f32, k_d: f32, k_s: f32, v: vec3<f32>, l_v: vec3<f32>, t_dot_e: f32, sin2_e: f32, inverse_q: f32) -> f32 {
+fn psi(
+    p: f32,
+    k_d: f32,
+    k_s: f32,
+    v: vec3<f32>,
+    l_v: vec3<f32>,
+    t_dot_e: f32,
+    sin2_e: f32,
+    inverse_q: f32,
+) -> f32 {
     let t_dot_l = dot3(v, l_v);
     let sin2_l = max(1.0 - t_dot_l * t_dot_l * inverse_q, 0.0);
     let base = sqrt(sin2_l * sin2_e) - t_dot_l * t_dot_e * inverse_q;
