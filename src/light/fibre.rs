@@ -130,9 +130,9 @@ impl Spread {
     ///
     /// With x the cosine of an angle δ, x^p is about e^(−pδ²/2). Its convolution with a Gaussian of variance
     /// s² is the same function with the exponent p/(1 + p·s²), divided by √(1 + p·s²). δ is the sum of the
-    /// angles that light and eye make with the plane across the flow. A turn of the flow's direction changes δ
-    /// in proportion to the sum of the unit vectors of light and eye across the flow. That sum has the square
-    /// 2 + 2 cos φ.
+    /// angles that light and eye make with the plane across the flow. A turn of the flow's direction changes
+    /// δ in proportion to the sum of the unit vectors of light and eye across the flow. That sum has the
+    /// square 2 + 2 cos φ.
     pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
         let [cos2_l, product] = self.cosines(l_v);
         let sin2_l = (1.0 - cos2_l).max(0.0);

@@ -32,9 +32,9 @@ pub enum Light {
 
 /// The cone of a spot light.
 ///
-/// Inside the cone a point receives the share s²(3 − 2s) of a point light's intensity. Here
-/// s = (c − `cos_edge`)·`inverse_soft`, clamped to 0..1, and c is the cosine of the angle between the beam and
-/// the direction from the light to the point.
+/// Inside the cone a point receives the share s²(3 − 2s) of a point light's intensity. Here s = (c −
+/// `cos_edge`)·`inverse_soft`, clamped to 0..1, and c is the cosine of the angle between the beam and the
+/// direction from the light to the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Unit vector against the beam.
