@@ -1,26 +1,36 @@
-// §5 A reflection model made for flowing water: Ψ of strands from a table, and of air between them. Twin:
-// src/strand/table.rs, where the axes of the table are described; the model stands in src/strand/mod.rs.
+// §5 The reflection model for flowing water: Ψ of the strands from a table, and Ψ of the air between them.
+// Twin: src/light/strand/table.rs, which describes the table's axes; src/light/strand/mod.rs describes the
+// model.
 
-// Nodes of the table.
+// Number of nodes of the table along each axis.
 const STRAND_X: f32 = 40.0;
 const STRAND_Y: f32 = 48.0;
 const STRAND_Z: f32 = 128.0;
-// Of its z axis.
+// Weight w of the table's z axis.
 const SINE_SHARE: f32 = 0.75;
 
 struct Strand {
-    // Of the table: k of its x axis, v_R/2 of its texels.
+    // Constants of the table: k of its x axis, and v_R/2 of its texels.
     squeeze: f32,
     spread: f32,
     // Share of air in a cell with k_d = k_s.
     aeration: f32,
-    // Mean cosine of the scattering by air.
+    // Mean cosine of the scattering angle at air bubbles.
     g: f32,
 }
 
-// Ψ = π·Φ of a cell with coefficients k, in any unit, from the cosines between unit vectors: t along the flow, l to
-// the light, e to the eye.
-fn strand_psi(table: texture_3d<f32>, linear: sampler, strand: Strand, k_d: f32, k_s: f32, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> vec3<f32> {
+// Ψ = π·Φ of a cell with the coefficients k_d and k_s, in any common unit, from the cosines between unit
+// vectors: t along the flow, l to the light, e to the eye.
+fn strand_psi(
+    table: texture_3d<f32>,
+    linear: sampler,
+    strand: Strand,
+    k_d: f32,
+    k_s: f32,
+    t_dot_l: f32,
+    t_dot_e: f32,
+    l_dot_e: f32,
+) -> vec3<f32> {
     let sisi = t_dot_l * t_dot_e;
     let coco = sqrt(max(1.0 - t_dot_l * t_dot_l, 0.0) * max(1.0 - t_dot_e * t_dot_e, 0.0));
     let s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));
