@@ -41,12 +41,12 @@ fn strand_psi(
     let size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
     let node = vec3<f32>(x, cos_d, z) * (size - 1.0);
     let texel = textureSampleLevel(table, linear, (node + 0.5) / size, 0.0).rgb;
-    let of_strands = texel / sqrt(coco + strand.spread);
+    let strands = texel / sqrt(coco + strand.spread);
 
     let k = k_d + k_s;
     let a = select(strand.aeration, clamp(strand.aeration * (2.0 * k_d / k), 0.0, 1.0), k > 0.0);
     let g = strand.g;
     let turn = max(1.0 + g * g + 2.0 * g * l_dot_e, 1e-6);
-    let of_air = a * (0.25 * (1.0 - g * g)) / (turn * sqrt(turn));
-    return of_strands * (1.0 - a) + of_air;
+    let air = a * (0.25 * (1.0 - g * g)) / (turn * sqrt(turn));
+    return strands * (1.0 - a) + air;
 }

@@ -50,10 +50,10 @@ fn moments_of(word: u32, level: Level) -> Moments {
     let y = sqrt(yy);
     let bits = vec3<u32>(word << 12u, word << 6u, word);
     let r = vec3<f32>(bitcast<vec3<i32>>(bits) >> vec3<u32>(26u)) * (1.0 / 31.0);
-    let whole = level.number == 0u;
+    let is_whole = level.number == 0u;
     return Moments(
-        select(vec3<f32>(x * x, yy, z * z), one.diagonal, whole),
-        select(r * vec3<f32>(x * y, x * z, y * z), one.mixed, whole),
+        select(vec3<f32>(x * x, yy, z * z), one.diagonal, is_whole),
+        select(r * vec3<f32>(x * y, x * z, y * z), one.mixed, is_whole),
     );
 }
 

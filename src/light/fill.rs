@@ -66,7 +66,7 @@ impl<'a> Rows<'a> {
     /// Values of a light volume, level by level. Empty cells have 0, because no view ray reads them; only
     /// with [`Lookup::Trilinear`] are they computed.
     pub fn fill(&self, light_volume: &LightVolume, medium: Medium, form: Form) -> Vec<Numbers> {
-        let of_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
+        let fill_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
             let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };
             let taps = taps(level, light_volume.direction, medium);
             let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
@@ -78,7 +78,7 @@ impl<'a> Rows<'a> {
                 Form::Depths => Numbers::Depths(self.sums(level, rho, &taps, |depth| depth)),
             }
         };
-        self.levels.iter().map(of_level).collect()
+        self.levels.iter().map(fill_level).collect()
     }
 
     /// Values of a sparse level, walked from each cell separately.

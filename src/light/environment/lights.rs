@@ -76,7 +76,7 @@ impl Table {
         if w <= 0.0 { 0.0 } else { (w - (x * x + y * y + z * z) / w).max(0.0) }
     }
 
-    /// The cut through a region that removes the most variance.
+    /// Finds the cut through a region that removes the most variance.
     fn candidate(&self, region: Region) -> Candidate {
         let whole = self.variance(region);
         let mut best = Candidate { region, gain: 0.0, halves: [region; 2] };
@@ -104,7 +104,7 @@ impl LightSet {
         let least = table.sums.last().map_or(0.0, |all| all[0]) * LEAST_GAIN;
         let mut regions = vec![table.candidate(whole)];
         while regions.len() < count as usize {
-            // Of equal regions the first is cut, so that one map always gives one set.
+            // The first of equal regions is cut, so that one map always gives one set.
             let mut best = 0;
             for (i, region) in regions.iter().enumerate() {
                 if region.gain > regions[best].gain {
@@ -134,10 +134,10 @@ impl LightSet {
     /// over normals spread evenly over the sphere, relative to the map's mean irradiance. It is 0 for a black
     /// map.
     pub fn error(&self, cells: &Cells) -> f64 {
-        let of_lights = |n: DVec3| {
+        let irradiance = |n: DVec3| {
             self.lights.iter().map(|(to, power)| luminance(*power) * n.dot(*to).max(0.0)).sum::<f64>()
         };
-        error_of(cells, of_lights)
+        error_of(cells, irradiance)
     }
 }
 

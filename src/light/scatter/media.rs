@@ -47,15 +47,15 @@ impl Media {
 /// Distinct thicknesses of the quads in metres, and for every quad the index of its thickness.
 pub fn thicknesses(quads: &[Quad]) -> (Vec<f32>, Vec<u32>) {
     let (mut list, mut known) = (Vec::new(), HashMap::new());
-    let of_quad = quads.iter().map(|quad| {
+    let indices = quads.iter().map(|quad| {
         let thickness_m = quad.material.thickness_m;
         *known.entry(thickness_m.to_bits()).or_insert_with(|| {
             list.push(thickness_m);
             list.len() as u32 - 1
         })
     });
-    let of_quad = of_quad.collect();
-    (list, of_quad)
+    let indices = indices.collect();
+    (list, indices)
 }
 
 /// Number of values in one profile of `layers` layers.

@@ -120,11 +120,11 @@ impl Scattering {
 /// thickness of a layer in metres (H / nz); per-cell attenuation ignores it.
 pub fn layer_depths(volume: &VolumeTexture, attenuation: &Attenuation, depth_m: f32) -> Vec<f64> {
     let [nx, ny, _] = volume.size.map(|n| n as usize);
-    let whole = match *attenuation {
+    let full_depth = match *attenuation {
         Attenuation::PathLength { sigma } => sigma as f64 * depth_m as f64,
         Attenuation::PerCell { tau } => tau as f64,
     } * volume.alpha as f64;
-    let mean = |codes: u64| whole * codes as f64 / (65535.0 * (nx * ny) as f64);
+    let mean = |codes: u64| full_depth * codes as f64 / (65535.0 * (nx * ny) as f64);
     volume.layer_codes().into_iter().map(mean).collect()
 }
 
