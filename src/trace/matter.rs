@@ -89,7 +89,7 @@ impl SheetDensity {
     }
 }
 
-/// Share of the mean ρ that erosion by e leaves: E[max(ρ − e, 0)]/E[ρ].
+/// Share of the mean ρ that erosion by e leaves, `E[max(ρ − e, 0)]/E[ρ]`.
 ///
 /// The paper's ρ is clamp(N + ½, 0, 1) with N a standard normal variable.
 /// The exact value is 2∫_e^1 Φ(½ − x) dx. Φ is linear to within 0.002 from Φ(½) = 0.6915 to Φ(−½) = 0.3085,
