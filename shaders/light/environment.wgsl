@@ -1,6 +1,6 @@
-// The environment: radiance of an equirectangular map, and irradiance from its spherical harmonics. Twins:
-// src/light/environment/map.rs and irradiance.rs, the same operations in the same order; the convention
-// stands there.
+// §5 Environment light: radiance of an equirectangular map, and irradiance from its spherical harmonics.
+// Twins: src/light/environment/map.rs, which explains the map's orientation, and
+// src/light/environment/irradiance.rs; the operations are the same, in the same order.
 
 #import layout
 
@@ -12,12 +12,12 @@ struct Environment {
     // E(n)/π: coefficients of 1, x, y, z, xy, yz, 3y² − 1, xz, x² − z².
     irradiance: array<vec4<f32>, 9>,
     to_sun: vec3<f32>,
-    // Square of the distance on the unit sphere from the sun's middle to its rim; 0: no sun.
+    // Square of the chord on the unit sphere from the sun's centre to its rim; 0 without a sun.
     rim2: f32,
     sun_radiance: vec3<f32>,
-    // Factor on the map.
+    // Factor on the map's radiance.
     intensity: f32,
-    // About +y, once round is 1.
+    // Rotation about +y, in turns.
     turn: f32,
     pad_a: f32,
     pad_b: f32,

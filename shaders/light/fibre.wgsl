@@ -1,9 +1,10 @@
-// §5 The light of one cell: decoding, and the fibre model of Kajiya and Kay 1989. Twins: src/volume/cell.rs
-// (v_code) and src/light/fibre.rs.
+// §5 Decoding of a cell's direction, and the fibre model of Kajiya and Kay 1989. Twins: v_code in
+// src/volume/cell.rs, and src/light/fibre.rs.
 
 #import layout
 
-// The specular exponent where it is a whole number up to 255, else 0: `pow` costs three times as much.
+// Specular exponent if it is a whole number from 1 to 255, else 0. `pow` costs three times as much as the
+// squarings.
 override EXPONENT: u32 = 0u;
 
 fn v_code(word: u32) -> vec3<f32> {

@@ -1,8 +1,8 @@
-// Haze between the eye and what it sees. src/light/haze.rs, EyeHaze.
+// Haze between the eye and the scene. Twin: EyeHaze in src/light/haze.rs.
 
 #import layout
 
-// e^(−τ) over t metres along a unit direction that climbs by d_y a metre.
+// Transmittance e^(−τ) over t metres along a unit direction with the y component d_y.
 fn haze_transmittance(density: f32, falloff: f32, d_y: f32, t: f32) -> f32 {
     let x = max(d_y * t * falloff, -60.0);
     var mean = 1.0 - x * (0.5 - x * (1.0 / 6.0));
@@ -20,7 +20,8 @@ fn haze_over(frame: FrameUniforms, radiance: vec3<f32>, d_y: f32, t: f32) -> vec
     return radiance * transmittance + frame.haze_color * (1.0 - transmittance);
 }
 
-// EyeHaze::over_water: `seen` is the light of the water and of what is behind it, and what it lets through.
+// Twin: EyeHaze::over_water. `seen` holds the radiance of the water with its backdrop, and in w the share of
+// the backdrop that the water lets through.
 fn haze_over_water(frame: FrameUniforms, seen: vec4<f32>, behind: vec3<f32>, d_y: f32, t: f32) -> vec4<f32> {
     let transmittance = haze_transmittance(frame.haze_density, frame.haze_falloff, d_y, t);
     let passed = behind * seen.w;

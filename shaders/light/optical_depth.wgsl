@@ -1,24 +1,24 @@
-// §5 V_i(k): what lies between a cell and a light. Shared by the stages visibility and integrate. Twin:
-// src/light/optical_depth.rs.
+// §5 V_i(k): optical depth between a cell and a light. Shared by the stages visibility and integrate. Twins:
+// src/light/optical_depth.rs, and transmittance_code in src/light/visibility.rs.
 
 #import trace::levels
 #import trace::matter
 #import volume::cells
 #import walk
 
-// Whether cells count whole, not by the length of the way in them.
+// Whether a cell's ρ counts once, whatever the length of the ray inside the cell.
 override PER_CELL: bool = false;
 
-// From the middle of a cell to where the light ray leaves the slab.
+// State of the walk from the centre of a cell to the point where the light ray leaves the slab.
 struct LightWalk {
-    // Σ ρ code · length, or Σ ρ code.
+    // Σ ρ code × length, or Σ ρ code.
     depth: f32,
     t: f32,
     cells: u32,
     done: bool,
 }
 
-// In cells of a level, along a direction in those. Ends early where the depth is `enough`.
+// Walks from `cell` along `direction`, both in the level's cells. Ends early once the depth exceeds `enough`.
 fn optical_depth(
     level: Level,
     matter: SheetDensity,
@@ -54,7 +54,7 @@ fn pass_cell(
     let t_exit = walk_exit(*walk);
     let rho = matter_rho(f32(texel.x & 0xffffu), matter);
     if PER_CELL {
-        // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+        // A cell of the volume does not shadow itself. In a coarse cell, half of the other cells do.
         let own = 0.5 - 0.5 * level.scale.z;
         (*ray).depth += select(rho * select(1.0, own, (*ray).cells == 0u), 0.0, (*ray).done);
     } else {
@@ -70,18 +70,18 @@ fn pass_cell(
     (*ray).done |= (z < 0) | (z >= level.size.z) | ((*ray).cells >= max_cells) | ((*ray).depth > enough);
 }
 
-// Codes of transmittances that one word of a light volume holds, of cells that follow one another along z.
+// Transmittance codes in one word of a light volume; their cells follow one another along z.
 const CELLS_A_WORD: i32 = 4;
 
-// −log₂ of a T whose code is 0.
+// Depth in bits (−log₂ T) at which the code of T is 0.
 const DARK_BITS: f32 = 18.0;
 
-// √T in 255ths, from −log₂ T: steps are finest where it is dark.
+// Code of a transmittance, √T in 255ths, from its depth −log₂ T. The steps of T are finest in the dark.
 fn transmittance_code(depth_bits: f32) -> u32 {
     return u32(255.0 * exp2(-0.5 * depth_bits) + 0.5);
 }
 
-// The code of cell `z` of its column, as a number.
+// Code of the cell in layer `z` of its column, as a number.
 fn code_in_word(word: u32, z: i32) -> f32 {
     return f32((word >> u32(8 * (z & 3))) & 0xffu);
 }

@@ -1,9 +1,9 @@
-// §5 Light scattered more than once. Twin: src/light/scatter/mod.rs, where the formula and its reasons stand.
+// §5 Multiple scattering. Twin: src/light/scatter/mod.rs, which explains the formula.
 
 const COSINES: u32 = 12u;
 const LN_2: f32 = 0.693147180559945309;
 
-// Per colour: a = 1 − ωg, ω, b' = ω'/4 and b = ω(1 − g)/4.
+// Reduced medium, per colour: extinction a = 1 − ωg, albedo ω, reduced b' = ω'/4, isotropic b = ω(1 − g)/4.
 struct Similarity {
     extinction: vec3<f32>,
     g: f32,
@@ -15,24 +15,24 @@ struct Similarity {
     pad_2: f32,
 }
 
-// Where a light's values stand in a profile: between two rows of `layers` values.
+// Position of a light in a profile: two rows of `layers` values, and the share between them.
 struct Row {
     near: u32,
     far: u32,
     share: f32,
 }
 
-// h₂ … h₅, and h₆.
+// Forward peak: h₂ … h₅, and h₆.
 struct Peak {
     first: vec4<f32>,
     last: f32,
 }
 
 fn scatter_row(l_n: f32, layers: u32) -> Row {
-    let place = sqrt(min(abs(l_n), 1.0)) * f32(COSINES - 1u);
-    let below = min(u32(place), COSINES - 2u);
+    let position = sqrt(min(abs(l_n), 1.0)) * f32(COSINES - 1u);
+    let below = min(u32(position), COSINES - 2u);
     let near = (select(0u, COSINES, l_n < 0.0) + below) * layers;
-    return Row(near, near + layers, place - f32(below));
+    return Row(near, near + layers, position - f32(below));
 }
 
 // P, from the profile's values at row.near + z and row.far + z.

@@ -1,26 +1,26 @@
-// §5 A reflection model made for flowing water: Ψ of strands from a table, and of air between them. Twin:
-// src/light/strand/table.rs, where the axes of the table are described.
-// Model: src/light/strand/mod.rs.
+// §5 The reflection model for flowing water: Ψ of the strands from a table, and Ψ of the air between them.
+// Twin: src/light/strand/table.rs, which describes the table's axes; src/light/strand/mod.rs describes the
+// model.
 
-// Nodes of the table.
+// Number of nodes of the table along each axis.
 const STRAND_X: f32 = 40.0;
 const STRAND_Y: f32 = 48.0;
 const STRAND_Z: f32 = 128.0;
-// Of its z axis.
+// Weight w of the table's z axis.
 const SINE_SHARE: f32 = 0.75;
 
 struct Strand {
-    // Of the table: k of its x axis, v_R/2 of its texels.
+    // Constants of the table: k of its x axis, and v_R/2 of its texels.
     squeeze: f32,
     spread: f32,
     // Share of air in a cell with k_d = k_s.
     aeration: f32,
-    // Mean cosine of the scattering by air.
+    // Mean cosine of the scattering angle at air bubbles.
     g: f32,
 }
 
-// Ψ = π·Φ of a cell with coefficients k, in any unit, from the cosines between unit vectors: t along the
-// flow, l to the light, e to the eye.
+// Ψ = π·Φ of a cell with the coefficients k_d and k_s, in any common unit, from the cosines between unit
+// vectors: t along the flow, l to the light, e to the eye.
 fn strand_psi(
     table: texture_3d<f32>,
     linear: sampler,
@@ -41,12 +41,12 @@ fn strand_psi(
     let size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
     let node = vec3<f32>(x, cos_d, z) * (size - 1.0);
     let texel = textureSampleLevel(table, linear, (node + 0.5) / size, 0.0).rgb;
-    let of_strands = texel / sqrt(coco + strand.spread);
+    let strands = texel / sqrt(coco + strand.spread);
 
     let k = k_d + k_s;
     let a = select(strand.aeration, clamp(strand.aeration * (2.0 * k_d / k), 0.0, 1.0), k > 0.0);
     let g = strand.g;
     let turn = max(1.0 + g * g + 2.0 * g * l_dot_e, 1e-6);
-    let of_air = a * (0.25 * (1.0 - g * g)) / (turn * sqrt(turn));
-    return of_strands * (1.0 - a) + of_air;
+    let air = a * (0.25 * (1.0 - g * g)) / (turn * sqrt(turn));
+    return strands * (1.0 - a) + air;
 }

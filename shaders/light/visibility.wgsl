@@ -1,6 +1,7 @@
-// §5 V_i(k) kept: for every occupied cell, what lies between its centre and where a light's ray leaves the
-// slab. One invocation a column of cells along z. Twin: src/engine/cpu/visibility.rs. Reasons and form:
-// src/light/visibility.rs.
+// §5 V_i(k) in light volumes: for every occupied cell, the optical depth from its centre to the point where
+// the light ray leaves the slab. One invocation fills one word: up to four cells along z. Twin:
+// light_volume_value in src/light/optical_depth.rs; src/light/visibility.rs describes the forms of the
+// values.
 
 #import layout
 #import light::optical_depth
@@ -9,33 +10,33 @@
 #import volume::cells
 #import walk
 
-// Whether codes of transmittances are kept, or optical depths.
+// Whether light volumes store transmittance codes; otherwise they store optical depths.
 override CODES: bool = false;
-// Of empty cells too, for rays that look between cells.
+// Whether empty cells are computed too, for rays that interpolate between cells.
 override EVERYWHERE: bool = false;
 
 // One light volume, or a part of it.
 struct LightVolume {
     direction: vec3<f32>,
-    // The columns [first_column, first_column + column_count) of the list.
+    // Columns [first_column, first_column + column_count) of the list.
     first_column: u32,
-    // Where it is in the texture that holds them all.
+    // Position in the texture that holds all light volumes.
     offset: vec3<i32>,
     column_count: u32,
-    // Bits of transmittance in one unit of optical depth.
+    // Bits of transmittance (−log₂ T) per unit of depth.
     bits: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<uniform> light_volume: LightVolume;
 @group(0) @binding(2) var volume: texture_storage_3d<rg32uint, read>;
-// Linear indices of the columns in which any cell has density.
+// Linear indices of the columns (of four cells along z) that contain a cell with density.
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
-// Of sparse storage, shaders/volume/cells.wgsl.
+// Bricks of sparse storage, see shaders/volume/cells.wgsl.
 @group(0) @binding(5) var bricks: texture_storage_3d<rgba32uint, read>;
 
-// The level that has cells at (y, z) of the texture.
+// Level whose cells lie at (y, z) of the texture.
 fn level_with(size: vec3<i32>, y: i32, z: i32) -> Level {
     var level = level_new(size, 0u);
     if PYRAMID {
@@ -60,11 +61,11 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let max_cells = frame.max_cells;
     let index = columns[light_volume.first_column + id.x];
-    let of_slice = u32(extent.x * extent.y);
+    let slice_columns = u32(extent.x * extent.y);
     let x = i32(index % u32(extent.x));
-    let y = i32((index % of_slice) / u32(extent.x));
-    let column = i32(index / of_slice);
-    // Sheets of one volume share a light volume, whatever they make of it.
+    let y = i32((index % slice_columns) / u32(extent.x));
+    let column = i32(index / slice_columns);
+    // All sheets share a light volume, so erosion and mist are left out here.
     let whole = SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);
     let level = level_with(frame.cells, y, column * CELLS_A_WORD);
     let direction = light_volume.direction * level.scale;
@@ -72,16 +73,16 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     let enough = select(NEVER, DARK_BITS / max(bits, 1e-20), CODES);
     var word = 0u;
     for (var i = 0; i < CELLS_A_WORD; i++) {
-        let place = vec3<i32>(x, y, column * CELLS_A_WORD + i);
-        let cell = place - level.offset;
-        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(place).x & 0xffffu) == 0u) {
+        let texel = vec3<i32>(x, y, column * CELLS_A_WORD + i);
+        let cell = texel - level.offset;
+        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(texel).x & 0xffffu) == 0u) {
             continue;
         }
         let depth = optical_depth(level, whole, cell, direction, max_cells, enough).depth;
         if CODES {
             word |= transmittance_code(depth * bits) << u32(8 * i);
         } else {
-            textureStore(light_volumes, place + light_volume.offset, vec4<u32>(bitcast<u32>(depth)));
+            textureStore(light_volumes, texel + light_volume.offset, vec4<u32>(bitcast<u32>(depth)));
         }
     }
     if CODES {

@@ -1,10 +1,10 @@
-// The picture from the linear frame: mean of the samples, white balance, exposure, tone curve, encoding, 8
-// bits. CPU twin: src/picture/resolve.rs.
+// Development of the picture from the linear frame: mean of the samples, white balance, exposure, tone curve,
+// sRGB encoding and rounding to 8 bits. Twin: src/picture/resolve.rs; Develop is in src/picture/develop.rs.
 
 #import layout
 
 struct Develop {
-    // Rows of the white balance, where there is any.
+    // Rows of the white balance matrix, used if `balanced` is not 0.
     balance: array<vec4<f32>, 3>,
     exposure: f32,
     tone: u32,
@@ -17,22 +17,22 @@ const TONE_AGX: u32 = 2u;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> radiance: array<vec4<f32>>;
-// One pixel a word: red in the lowest byte, alpha 255 in the highest.
+// One pixel per word, with red in the lowest byte and alpha 255 in the highest.
 @group(0) @binding(2) var<storage, read_write> picture: array<u32>;
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var<uniform> develop: Develop;
 
-// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
+// Filmic tone curve (Narkowicz, "ACES Filmic Tone Mapping Curve", 2015).
 fn filmic(x: f32) -> f32 {
     return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-// IEC 61966-2-1.
+// sRGB encoding (IEC 61966-2-1).
 fn srgb(x: f32) -> f32 {
     return select(1.055 * pow(x, 1.0 / 2.4) - 0.055, 12.92 * x, x <= 0.0031308);
 }
 
-// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023.
+// AgX tone curve (Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023).
 fn agx(x: vec3<f32>) -> vec3<f32> {
     let least_ev = -12.47393;
     let most_ev = 4.026069;
@@ -77,7 +77,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
             dot3(develop.balance[2].xyz, linear),
         );
     }
-    // Past 10⁴ all curves are flat; the bound keeps their squares finite.
+    // All curves are flat above 10⁴. The bound keeps their squares finite.
     let x = clamp(linear * develop.exposure, vec3<f32>(0.0), vec3<f32>(1e4));
     var bytes = vec3<u32>(channel(x.r), channel(x.g), channel(x.b));
     if develop.tone == TONE_AGX {

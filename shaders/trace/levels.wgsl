@@ -1,18 +1,19 @@
-// Where the levels of the volume lie in its texture: the volume itself first, behind it along z the coarse
-// levels, one after the other along y. Shared by the stages visibility and integrate. Twin:
-// src/volume/pyramid.rs, LevelAtlas.
+// §4 Layout of the volume's levels in its texture: the volume itself comes first; the coarse levels lie
+// behind it along z, one after the other along y. Shared by the stages visibility and integrate. Twins:
+// LevelAtlas in src/volume/pyramid.rs, and Level in src/trace/lookup.rs.
 
-// Whether there are coarse levels.
+// Whether the texture holds coarse levels.
 override PYRAMID: bool = false;
 
 struct Level {
-    // 0: the volume itself.
+    // 0 is the volume itself.
     number: u32,
+    // Position of the level's first cell in the texture.
     offset: vec3<i32>,
     size: vec3<i32>,
-    // Its cells per cell of the volume.
+    // Cells of the level per cell of the volume.
     scale: vec3<f32>,
-    // Cells of the volume in the depth of one of its.
+    // Depth of one cell of the level, in cells of the volume.
     deep: f32,
 }
 
@@ -36,7 +37,7 @@ fn level_new(size: vec3<i32>, number: u32) -> Level {
     return level;
 }
 
-// Place in the texture of a cell of a level.
+// Texel that holds a cell of a level.
 fn in_level(cell: vec3<i32>, level: Level) -> vec3<i32> {
     if PYRAMID {
         return cell + level.offset;

@@ -1,5 +1,6 @@
-// What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; many directions and
-// the light they send on. Part of the stage integrate. Twins: src/trace/lookup.rs and src/light/fibre.rs, Spread.
+// §4 Values interpolated between eight cell centres, and §5 the light reflected by a distribution of
+// directions. Part of the stage integrate. Twins: src/trace/lookup.rs, Moments in src/volume/pyramid.rs, and
+// Spread in src/light/fibre.rs.
 
 #import layout
 #import light::fibre
@@ -7,9 +8,9 @@
 #import trace::matter
 #import volume::cells
 
-// Interpolates between cells.
+// Whether rays interpolate between cell centres.
 override TRILINEAR: bool = false;
-// Cells have more than one direction.
+// Whether a sample can have more than one direction.
 override MANY_DIRECTIONS: bool = PYRAMID || TRILINEAR;
 
 // Second moments of directions: xx, yy, zz and xy, xz, yz.
@@ -18,7 +19,7 @@ struct Moments {
     mixed: vec3<f32>,
 }
 
-// What a ray finds: in codes, ρ of what the sheet leaves.
+// Values that a ray reads in one cell: ρ on the sheet in codes (0 to 65535), k_d and k_s in codes (0 to 255).
 struct CellSample {
     rho: f32,
     k_d: f32,
@@ -49,15 +50,15 @@ fn moments_of(word: u32, level: Level) -> Moments {
     let y = sqrt(yy);
     let bits = vec3<u32>(word << 12u, word << 6u, word);
     let r = vec3<f32>(bitcast<vec3<i32>>(bits) >> vec3<u32>(26u)) * (1.0 / 31.0);
-    let whole = level.number == 0u;
+    let is_whole = level.number == 0u;
     return Moments(
-        select(vec3<f32>(x * x, yy, z * z), one.diagonal, whole),
-        select(r * vec3<f32>(x * y, x * z, y * z), one.mixed, whole),
+        select(vec3<f32>(x * x, yy, z * z), one.diagonal, is_whole),
+        select(r * vec3<f32>(x * y, x * z, y * z), one.mixed, is_whole),
     );
 }
 
-// Between the centres of the eight cells around the point `middle` of a ray's way through a cell, in the
-// level's cells.
+// Values interpolated between the eight cell centres around `middle`, the midpoint of the ray's segment in a
+// cell, in the level's cells. Twin: Level::between.
 fn between(
     level: Level,
     matter: SheetDensity,
@@ -73,15 +74,16 @@ fn between(
     for (var corner = 0; corner < 8; corner++) {
         let away = vec3<i32>(corner & 1, (corner >> 1u) & 1, corner >> 2u);
         let shares = select(far, 1.0 - far, away == vec3<i32>(0));
-        var at = cell + side * away;
-        at = select(at, level.size - 1, at < vec3<i32>(0));
-        at = select(at, vec3<i32>(0), at >= level.size);
-        at.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
-        let texel = cell_words(in_level(at, level));
+        var index = cell + side * away;
+        index = select(index, level.size - 1, index < vec3<i32>(0));
+        index = select(index, vec3<i32>(0), index >= level.size);
+        index.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
+        let texel = cell_words(in_level(index, level));
         let weight = shares.x * shares.y * shares.z * f32(texel.x & 0xffffu);
         rho += weight;
         k += vec2<f32>(f32((texel.x >> 16u) & 0xffu), f32(texel.x >> 24u)) * weight;
-        // The length of a direction's code is no weight of it.
+        // The direction's code is not of unit length; dividing by the trace keeps that from acting as a
+        // weight.
         let own = moments_of(texel.y, level);
         let share = weight / max(own.diagonal.x + own.diagonal.y + own.diagonal.z, 1e-20);
         moments.diagonal += own.diagonal * share;
@@ -94,14 +96,15 @@ fn between(
     return CellSample(matter_rho(rho, matter), k.x, k.y, moments);
 }
 
-// Moments as seen by a ray.
+// Terms of the fibre model that a ray and a distribution of directions share. `metric` and `e_v` as in View.
 struct Spread {
     moments: Moments,
     // S·e / tr(M·S).
     s_e: vec3<f32>,
     inverse_q: f32,
-    // Mean of (t·e)².
+    // Mean of (t·e)² over the distribution.
     cos2_e: f32,
+    // Variance of the directions in the world, radians²; see Spread::variance.
     variance: f32,
 }
 
@@ -122,20 +125,20 @@ fn spread_new(metric: vec4<f32>, moments: Moments, e_v: vec3<f32>) -> Spread {
     return Spread(moments, s_e, inverse_q, dot3(s_e, e_v), variance);
 }
 
-// Mean of (t·l)², and of (t·l)(t·e).
+// Means of (t·l)² and of (t·l)(t·e) over the distribution.
 fn spread_cosines(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
     let cos2_l = dot3(moments_times(spread.moments, l_v), l_v) * spread.inverse_q;
     return vec2<f32>(cos2_l, dot3(spread.s_e, l_v));
 }
 
-// t·l and t·e of the one direction that would have these means, but for the sign of both.
+// t·l and t·e of a single direction with these means. The sign common to both is arbitrary.
 fn spread_of_one(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
     let cosines = spread_cosines(spread, l_v);
     let e = sqrt(clamp(spread.cos2_e, 0.0, 1.0));
     return vec2<f32>(sqrt(clamp(cosines.x, 0.0, 1.0)), select(e, -e, cosines.y < 0.0));
 }
 
-// Ψ of many directions.
+// Ψ of a distribution of directions. Twin: Spread::psi, where the highlight's widening is derived.
 fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>, l_dot_e: f32) -> f32 {
     let cosines = spread_cosines(spread, l_v);
     let sin2_l = max(1.0 - cosines.x, 0.0);

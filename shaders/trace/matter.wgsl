@@ -1,28 +1,29 @@
-// What a sheet makes of the cells: eroded ρ, and mist. Shared by the stages visibility and integrate. Twin:
-// src/trace/matter.rs.
+// §4 Density of the cells as one sheet shows it: eroded, or replaced by mist. Shared by the stages visibility
+// and integrate. Twin: src/trace/matter.rs.
 
 #import layout
 
-// Sheets that are eroded, or of mist.
+// Whether any sheet is eroded or of mist.
 override ERODED: bool = false;
 
-// Share of mist's ρ that is the cells', and ρ of even mist in codes.
+// Share of mist's ρ that comes from the cells, and ρ of uniform mist in codes.
 const MIST_OF_CELLS: f32 = 0.3;
 const MIST_RHO: f32 = 32768.0;
 
-// Constant along a ray. ρ' = max(scale·ρ + shift, 0), in codes.
+// Map from a cell's ρ to the sheet's ρ' = max(scale·ρ + shift, 0), both in codes. Constant along a ray.
 struct SheetDensity {
     scale: f32,
     shift: f32,
-    // 255·Ψ of mist; 0 where there is none.
+    // 255·Ψ of mist; 0 on a sheet without mist.
     mist: f32,
-    // ρ of even mist.
+    // ρ of uniform mist, in codes.
     even: f32,
-    // Share of the mean ρ that is left.
+    // Share of the mean ρ that erosion leaves, 0 to 1.
     left: f32,
 }
 
-// Of cells that stand for many (`coarse`) e is taken in the mean.
+// Density map at texture coordinates of a quad. For cells of a coarse level (`coarse`), erosion scales ρ by
+// the mean loss instead of subtracting e.
 fn matter_at(quad: Quad, uv: vec2<f32>, coarse: bool) -> SheetDensity {
     if !ERODED {
         return SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);

@@ -1,10 +1,10 @@
-//! §5 Light volumes filled on the host, for both engines.
+//! §5 Filling of light volumes on the host, for both engines.
 //!
-//! Seen from the middle of a cell, the light's way leads through the same cells over the same lengths from
-//! all of them, to the bit: what is rounded along it are differences of boundaries and origin, which are
-//! exact. So the way is walked once, and the depths of a row of cells are summed side by side, cell of the
-//! way by cell of the way: the bits of [`optical_depth`](super::optical_depth::optical_depth) for a twentieth
-//! of the work.
+//! A light ray from the centre of any cell passes the same cells, relative to its start, over the same
+//! lengths, equal to the bit. The reason is that the walk computes every parameter from a difference between
+//! a boundary and the origin, and these differences are exact. The ray is therefore walked once, and the
+//! depths of a row of cells are summed side by side, one cell of the ray at a time. This gives the bits of
+//! [`optical_depth`](super::optical_depth::optical_depth) for a twentieth of the work.
 
 use std::sync::Arc;
 
@@ -18,16 +18,16 @@ use crate::trace::lookup::Level;
 use crate::volume::{Cell, Pyramid};
 use crate::walk::Walk;
 
-/// What one light volume holds of a level, in the order of its cells.
+/// Values that one light volume stores for a level, in the order of the level's cells.
 pub enum Numbers {
-    /// √T in 255ths.
+    /// Transmittance codes: √T in 255ths.
     Codes(Vec<u8>),
-    /// Optical depths.
+    /// Optical depths, in the unit of [`Form::Depths`].
     Depths(Vec<f32>),
 }
 
 impl Numbers {
-    /// Of the cell with this index, as a number.
+    /// Value of the cell with this index, as a number.
     pub fn at(&self, index: usize) -> f32 {
         match self {
             Numbers::Codes(codes) => codes[index].into(),
@@ -36,23 +36,23 @@ impl Numbers {
     }
 }
 
-/// The levels that light volumes are of, as rows of ρ codes.
+/// Levels of a volume as rows of ρ codes, from which light volumes are filled.
 pub struct Rows<'a> {
-    /// Rows of sparse volumes would not fit.
+    /// Each level with its ρ codes. A sparse level has none, because rows of all its cells would not fit.
     levels: Vec<(Level<'a>, Option<Vec<f32>>)>,
     lookup: Lookup,
 }
 
-/// A cell on the light's way.
+/// A cell on the light ray.
 struct Tap {
-    /// From the cell that asks.
+    /// Position relative to the cell where the ray starts.
     offset: IVec3,
-    /// What its ρ counts.
+    /// Factor on the cell's ρ: a length, or with per-cell attenuation a count.
     weight: f32,
 }
 
 impl<'a> Rows<'a> {
-    /// Of all levels.
+    /// Rows of all levels of a pyramid.
     pub fn new(levels: &'a Pyramid, lookup: Lookup) -> Self {
         let rows = |level: Level<'a>| {
             let codes =
@@ -63,10 +63,10 @@ impl<'a> Rows<'a> {
         Rows { levels, lookup }
     }
 
-    /// A light volume, level by level. Cells without density, which no view ray asks, have 0, but for rays
-    /// that look between cells.
+    /// Values of a light volume, level by level. Empty cells have 0, because no view ray reads them; only
+    /// with [`Lookup::Trilinear`] are they computed.
     pub fn fill(&self, light_volume: &LightVolume, medium: Medium, form: Form) -> Vec<Numbers> {
-        let of_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
+        let fill_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
             let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };
             let taps = taps(level, light_volume.direction, medium);
             let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
@@ -78,27 +78,28 @@ impl<'a> Rows<'a> {
                 Form::Depths => Numbers::Depths(self.sums(level, rho, &taps, |depth| depth)),
             }
         };
-        self.levels.iter().map(of_level).collect()
+        self.levels.iter().map(fill_level).collect()
     }
 
-    /// Walked from cell to cell.
+    /// Values of a sparse level, walked from each cell separately.
     fn walked(&self, level: &Level, light_volume: &LightVolume, medium: Medium, form: Form) -> Numbers {
-        let of = |cell: IVec3| {
-            let asked = self.lookup == Lookup::Trilinear || level.cell(cell).rho_code() > 0;
-            if asked { light_volume_value(level, cell, light_volume, medium, form) } else { 0.0 }
+        let value = |cell: IVec3| {
+            let is_read = self.lookup == Lookup::Trilinear || level.cell(cell).rho_code() > 0;
+            if is_read { light_volume_value(level, cell, light_volume, medium, form) } else { 0.0 }
         };
         match form {
-            Form::Codes => Numbers::Codes(in_order(level, |cell| of(cell) as u8)),
-            Form::Depths => Numbers::Depths(in_order(level, of)),
+            Form::Codes => Numbers::Codes(in_order(level, |cell| value(cell) as u8)),
+            Form::Depths => Numbers::Depths(in_order(level, value)),
         }
     }
 
+    /// Sums the depths of all cells of a level and converts each with `value_of`.
     fn sums<T: Copy + Default + Send>(
         &self,
         level: &Level,
         rho: &[f32],
         taps: &[Tap],
-        of: impl Fn(f32) -> T + Sync,
+        value_of: impl Fn(f32) -> T + Sync,
     ) -> Vec<T> {
         let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
         let mut numbers = vec![T::default(); rho.len()];
@@ -115,7 +116,7 @@ impl<'a> Rows<'a> {
                     }
                     let y = (y + i64::from(tap.offset.y)).rem_euclid(ny as i64);
                     let first = (z as usize * ny + y as usize) * nx;
-                    // The copies of the tile beside it.
+                    // The row wraps into the next copy of the volume.
                     let shift = i64::from(tap.offset.x).rem_euclid(nx as i64) as usize;
                     let (left, right) = rho[first..first + nx].split_at(shift);
                     let (near, far) = depths.split_at_mut(nx - shift);
@@ -125,7 +126,7 @@ impl<'a> Rows<'a> {
                 let own = &rho[row * nx..][..nx];
                 for ((number, &depth), &rho) in numbers.iter_mut().zip(&*depths).zip(own) {
                     if everywhere || rho > 0.0 {
-                        *number = of(depth);
+                        *number = value_of(depth);
                     }
                 }
             },
@@ -134,11 +135,11 @@ impl<'a> Rows<'a> {
     }
 }
 
-fn in_order<T: Send>(level: &Level, of: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
+fn in_order<T: Send>(level: &Level, value: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
     let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
-    let place =
+    let cell =
         |index: usize| IVec3::new((index % nx) as i32, (index / nx % ny) as i32, (index / nx / ny) as i32);
-    (0..nx * ny * nz).into_par_iter().map(|index| of(place(index))).collect()
+    (0..nx * ny * nz).into_par_iter().map(|index| value(cell(index))).collect()
 }
 
 /// Adds `rho` × `weight` to the depths.
@@ -149,21 +150,22 @@ fn add(depths: &mut [f32], rho: &[f32], weight: f32) {
     }
 }
 
-/// The way from the middle of any cell of a level to where it leaves the slab from the farthest of them.
+/// Cells on the light ray from the centre of any cell of a level, long enough for the cell farthest from the
+/// face where the light enters.
 fn taps(level: &Level, direction: Vec3, medium: Medium) -> Vec<Tap> {
-    // Larger than any way is long.
+    // Longer than any ray, so that a cell's offset is unique.
     const TILE: i32 = 1 << 22;
     let size = IVec3::new(TILE, TILE, level.size.z);
-    let apart = |c: i32| if c > TILE / 2 { c - TILE } else { c };
+    let signed = |c: i32| if c > TILE / 2 { c - TILE } else { c };
     let mut taps = Vec::new();
     for crossing in Walk::new(size, Vec3::splat(0.5), direction * level.scale, f32::INFINITY) {
-        let offset = IVec3::new(apart(crossing.cell.x), apart(crossing.cell.y), crossing.cell.z);
+        let offset = IVec3::new(signed(crossing.cell.x), signed(crossing.cell.y), crossing.cell.z);
         if taps.len() == medium.max_cells as usize || offset.z.abs() >= level.size.z {
             break;
         }
         let weight = match (medium.per_cell, taps.len()) {
             (false, _) => crossing.t_exit - crossing.t_enter,
-            // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+            // A cell of the volume does not shadow itself. In a coarse cell, half of the other cells do.
             (true, 0) => 0.5 - 0.5 * level.scale.z,
             (true, _) => 1.0,
         };

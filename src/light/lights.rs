@@ -1,4 +1,4 @@
-//! §5 Lights, and what is seen where nothing is.
+//! §5 Lights, and the background.
 
 use glam::Vec3;
 
@@ -7,27 +7,27 @@ use crate::util::words::words;
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// From infinitely far: unit vector towards it, radiance factor I.
+    /// A light infinitely far away; its intensity is I = irradiance / π.
     Directional {
         /// Unit vector towards the light.
         to_light: Vec3,
-        /// Colour × intensity.
+        /// I: colour × intensity, linear RGB.
         intensity: Vec3,
     },
-    /// From a point: I at 1 m, falling with the square of the distance.
+    /// A point light: I at a distance of 1 m, falling with the square of the distance.
     Point {
-        /// Metres.
+        /// Position in the world, metres.
         position: Vec3,
-        /// Colour × intensity, at 1 m.
+        /// I at 1 m: colour × intensity, linear RGB.
         intensity: Vec3,
     },
-    /// From a point into a cone: inside it as a point light.
+    /// A spot light: a point light restricted to a cone.
     Spot {
-        /// Metres.
+        /// Position in the world, metres.
         position: Vec3,
-        /// Colour × intensity, at 1 m.
+        /// I at 1 m: colour × intensity, linear RGB.
         intensity: Vec3,
-        /// Cone that the light fills.
+        /// Cone that the light shines into.
         cone: Cone,
     },
 }
@@ -56,41 +56,44 @@ impl Light {
     }
 }
 
-/// The cone of a spot light. With c the cosine of the angle between the beam and the way to a point, and
-/// s = (c − `cos_edge`)·`inverse_soft` clamped to 0..1, its light is s²(3 − 2s) of a point light's.
+/// The cone of a spot light.
+///
+/// Inside the cone a point receives the share s²(3 − 2s) of a point light's intensity. Here s = (c −
+/// `cos_edge`)·`inverse_soft`, clamped to 0..1, and c is the cosine of the angle between the beam and the
+/// direction from the light to the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    /// Unit, against the beam.
+    /// Unit vector against the beam.
     pub axis: Vec3,
-    /// Cosine of the half angle.
+    /// Cosine of the half angle, at which the light reaches zero.
     pub cos_edge: f32,
-    /// 1 / (cosine where the full light begins − `cos_edge`).
+    /// 1 / (cosine of the angle at which the full light begins − `cos_edge`).
     pub inverse_soft: f32,
 }
 
 impl Cone {
-    /// Around the unit vector `axis`, with a half angle in degrees of which the outer share `softness` (0 to
-    /// 1) is the way from full light to none.
+    /// Cone around the unit vector `axis` with the half angle `angle` in degrees. The light falls from full
+    /// to zero over the outer share `softness` (0 to 1) of the half angle.
     pub fn new(axis: Vec3, angle: f32, softness: f32) -> Self {
         let cosine = |degrees: f64| degrees.to_radians().cos();
         let (edge, full) = (cosine(angle as f64), cosine(angle as f64 * (1.0 - softness as f64)));
-        // A hard edge is a thousandth of a degree wide at most.
+        // The bound keeps the quotient finite. It makes a hard edge at most a thousandth of a degree wide.
         let inverse_soft = (1.0 / (full - edge).max(1e-7)) as f32;
         Cone { axis, cos_edge: edge as f32, inverse_soft }
     }
 }
 
-/// Radiance where nothing is seen: horizon + (zenith − horizon)·max(0, d·y).
+/// Background: radiance horizon + (zenith − horizon)·max(0, d·y) along the unit direction d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background {
-    /// Straight up.
+    /// Radiance straight up, linear RGB.
     pub zenith: Vec3,
-    /// At and below the horizon.
+    /// Radiance at and below the horizon, linear RGB.
     pub horizon: Vec3,
 }
 
 impl Background {
-    /// Radiance along a unit direction.
+    /// Radiance along the unit direction `d`.
     pub fn radiance(&self, d: Vec3) -> Vec3 {
         self.horizon + (self.zenith - self.horizon) * d.y.max(0.0)
     }

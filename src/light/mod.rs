@@ -1,4 +1,4 @@
-//! §5 Light: what lights send, what of it reaches a cell, and what the cell sends on to the eye.
+//! §5 Light: the lights, their visibility from a cell, and the light that the cell reflects to the eye.
 
 pub mod environment;
 pub mod fibre;

@@ -1,4 +1,4 @@
-//! §5 What lies between cells and lights. Twins: `shaders/light/optical_depth.wgsl` and
+//! §5 Optical depth between a cell and a light. Twins: `shaders/light/optical_depth.wgsl` and
 //! `shaders/light/visibility.wgsl`.
 
 use glam::{IVec3, Vec3};
@@ -9,7 +9,8 @@ use crate::trace::lookup::Level;
 use crate::volume::large_box;
 use crate::walk::{NEVER, Walk};
 
-/// What a light volume of a form holds for a cell.
+/// Value that a light volume of the given form stores for a cell: a code as a number (0 to 255), or an
+/// optical depth.
 pub fn light_volume_value(
     level: &Level,
     cell: IVec3,
@@ -28,9 +29,13 @@ pub fn light_volume_value(
     }
 }
 
-/// From the middle of the cell `start` of a level to where the light ray leaves the slab: Σ ρ code × length,
-/// in units of `direction`, or Σ ρ code over the cells but the first, of what a sheet makes of the cells.
-/// Ends early where the depth is `enough`. `walked` grows by the cells of the way.
+/// Optical depth from the centre of cell `start` of a level to the point where the light ray leaves the slab.
+///
+/// The depth is Σ ρ code × length, in units of `direction`. With per-cell attenuation it is Σ ρ code, and the
+/// first cell counts only by the half of its other cells, if it is coarse. ρ is the sheet's
+/// ([`SheetDensity::rho`]).
+///
+/// The walk ends early once the depth exceeds `enough`. `walked` grows by the number of cells visited.
 pub fn optical_depth(
     level: &Level,
     matter: &SheetDensity,
@@ -58,7 +63,7 @@ pub fn optical_depth(
         let Some(crossing) = walk.next() else { break };
         let rho = matter.rho(cell.rho_code() as f32);
         if medium.per_cell {
-            // The cell itself does not hide its own light; half the others that a coarse one stands for do.
+            // A cell of the volume does not shadow itself. In a coarse cell, half of the other cells do.
             let own = 0.5 - 0.5 * level.scale.z;
             depth += rho * if n == 0 { own } else { 1.0 };
         } else {

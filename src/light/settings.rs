@@ -1,38 +1,38 @@
-//! §5 How light is worked out.
+//! §5 Settings of the light: where angles are measured, visibility, reflection and scattering.
 
 use super::strand::StrandParams;
 use crate::util::words::words;
 
-/// Where the fibre model's angles are measured.
+/// Space in which the fibre model's angles are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleFrame {
-    /// t = normalize(J v) against world vectors.
+    /// World space: t = normalize(J v) against world vectors.
     World,
-    /// v against J⁻¹l and J⁻¹e, normalised: the paper's.
+    /// Texture space, as in the paper: v against J⁻¹l and J⁻¹e, normalised.
     Texture,
 }
 
 words! { AngleFrame { World => "world", Texture => "texture" } }
 
-/// V_i(k).
+/// Computation of V_i(k), the transmittance from cell k to light i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visibility {
-    /// 1.
+    /// V = 1: the volume casts no shadow on itself.
     None,
-    /// Exact walk from the cell's centre to the light.
+    /// Exact walk from the cell's centre towards the light, for every cell that a view ray meets.
     March,
-    /// The same, walked once for every cell of the volume and kept.
+    /// Exact walk from every cell of the volume, stored in light volumes ([`super::visibility`]).
     Cached,
 }
 
 words! { Visibility { March => "march", Cached => "cached", None => "none" } }
 
-/// How a cell reflects light.
+/// Reflection model of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
-    /// The paper's: fibres with the coefficients of the cell.
+    /// The paper's model: fibres with the cell's coefficients k_d and k_s ([`super::fibre`]).
     KajiyaKay,
-    /// Strands of water and air.
+    /// Strands of water with air between them ([`super::strand`]).
     Strand(StrandParams),
 }
 
@@ -57,12 +57,12 @@ impl Reflection {
     }
 }
 
-/// How often light may be scattered on its way through the volume.
+/// Number of times that light may scatter on its way through the volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scattering {
-    /// Once.
+    /// Once: at the cell that the view ray meets.
     Single,
-    /// As often as it is.
+    /// Any number of times ([`super::scatter`]).
     Multiple,
 }
 

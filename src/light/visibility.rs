@@ -1,16 +1,20 @@
-//! §5 V_i(k) kept: which light volumes a scene needs, and in which units their depths are.
+//! §5 V_i(k) in light volumes: which light volumes a scene needs, and in which form they store visibility.
 //!
-//! A light volume has a number for every cell of the volume texture: the optical depth from the cell's centre
-//! to where the light's ray leaves the slab, for one direction of light in cells. The slab's copies go on for
-//! ever, so for a directional light and a parallelogram one light volume says what an exact walk from every
-//! cell would. Where the direction in cells changes over a quad it is cut into patches: a little (the map is
-//! no parallelogram's), and each has a light volume; more (a point light), and they have one at each corner,
-//! between which is interpolated.
+//! A light volume stores one value for every cell of the volume texture. The value describes the optical
+//! depth from the cell's centre to the point where the light's ray leaves the slab, for one direction of
+//! light in cells. Copies of the slab continue without end, so one light volume equals exact walks from every
+//! cell for a directional light and a parallelogram.
 //!
-//! What is kept of a cell is a code of its transmittance T to the light, √T in 255ths: a byte, so that many
-//! patches fit into a processor's caches, with no exponential left to the view ray. Where light is scattered
-//! more than once optical depths are kept, for its formula asks for them. Passes:
-//! `src/engine/gpu/visibility.rs` with `shaders/light/visibility.wgsl`, and `src/engine/cpu/visibility.rs`.
+//! Where the direction in cells changes over a quad, the quad is cut into patches. If it changes little (the
+//! quad is not a parallelogram), each patch has one light volume. If it changes more (a point light), each
+//! patch has one at every corner, and rays interpolate between them.
+//!
+//! A value is normally a code of the transmittance T to the light, √T in 255ths. A code takes one byte, so
+//! many patches fit into a processor's caches, and the view ray computes no exponential. With multiple
+//! scattering the value is the optical depth, because the scattering formula needs it.
+//!
+//! Light volumes are filled on the GPU by `src/engine/gpu/visibility.rs` with
+//! `shaders/light/visibility.wgsl`, or on the host by `src/light/fill.rs`.
 
 use std::collections::HashMap;
 
@@ -21,104 +25,108 @@ use crate::mapping::{CellFrame, Quad};
 use crate::trace::{Attenuation, Trace, extinction, level_atlas};
 use crate::util::error::{Error, Result};
 
-/// Codes in one word of a light volume, of cells that follow one another along z.
+/// Transmittance codes in one word of a light volume; their cells follow one another along z.
 pub const CELLS_A_WORD: u32 = 4;
 
-/// Angles, in degrees, that the light's direction (in cells) may turn by over a patch with one light volume,
-/// and between the corners of a patch with four. With these, pictures of directional lights are within 2 % of
-/// exact walks on quads that fan out; twice as much makes it 3 %. A point light half a quad's width away
-/// gives 5 % RMSE, of the size of single cells.
+/// Maximum turn of the light's direction (in cells) over a patch with one light volume, and between the
+/// corners of a patch with four, in degrees.
+///
+/// With these values, pictures of directional lights on quads that fan out are within 2 % of exact walks;
+/// doubled values make it 3 %. A point light half a quad's width away gives 5 % RMSE, with errors the size of
+/// single cells.
 const PATCH_ANGLES: [f64; 2] = [1.0, 4.0];
 
-/// The same of lights that stand for a part of the environment, which comes from many directions: 14°.
-const ENVIRONMENT_SAME_DIRECTION: f32 = 1.0 / 4.0;
+/// Direction tolerance, as [`DIRECTION_TOLERANCE`], of lights that stand for a part of the environment: 14°.
+/// Their light comes from many directions anyway.
+const ENVIRONMENT_DIRECTION_TOLERANCE: f32 = 1.0 / 4.0;
 
-/// Most cells of a walk that is kept: one invocation makes four of them, four cells a turn, and software
-/// Vulkan grants all its loops 65535 turns.
-const MOST_CELLS: u32 = 65_000;
+/// Maximum number of cells in one walk that fills a light volume. One shader invocation makes four walks at
+/// four cells per loop turn, and software Vulkan allows an invocation 65535 loop turns in total.
+const MAX_WALK_CELLS: u32 = 65_000;
 
-/// Where the light volumes do not fit into the budget the angles are doubled so many times (once more where
-/// quads share light volumes, for else there would be no picture): at 8 and 32 degrees shadows in the middle
-/// of a patch are seen double.
-const DOUBLINGS: i32 = 3;
+/// Maximum number of times that the angles are doubled until the light volumes fit into the budget.
+///
+/// The limit is three because shadows in the middle of a patch appear double at 8 and 32 degrees. Where quads
+/// share light volumes one more doubling is allowed, because otherwise there would be no picture.
+const MAX_DOUBLINGS: i32 = 3;
 
-/// Most patches of a quad with one light volume each; where it would need more it has fewer and larger ones
-/// with four, for those may be larger.
-const MOST_PATCHES: u32 = 16;
+/// Maximum number of patches on a quad with one light volume each. A quad that needs more gets fewer, larger
+/// patches with four light volumes each.
+const MAX_PATCHES: u32 = 16;
 
-/// Most patches with four light volumes along one side of a quad.
-const MOST_CORNERED: u32 = 16;
+/// Maximum number of patches with four light volumes along one side of a quad.
+const MAX_CORNERED_SIDE: u32 = 16;
 
-/// Directions that differ by less, relative to their length, share a light volume: over a slab of 1000 cells
-/// they part by a thousandth of a cell.
-const SAME_DIRECTION: f32 = 1e-6;
+/// Relative difference of directions below which they share a light volume. At this value rays diverge by a
+/// thousandth of a cell over a slab of 1000 cells.
+const DIRECTION_TOLERANCE: f32 = 1e-6;
 
-/// The light volumes of a frame.
+/// Plan of a frame's light volumes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightVolumes {
-    /// Each of them once.
+    /// The distinct light volumes.
     pub volumes: Vec<LightVolume>,
-    /// Numbers of light volumes: of patches, or of their corners, row by row along u.
+    /// Indices into `volumes`, one for each patch or for each patch corner, row by row along u.
     pub numbers: Vec<u32>,
-    /// Of quad q and light i the entry q·lights + i.
+    /// Patches of each quad and light; quad q and light i have the entry q·lights + i.
     pub patches: Vec<Patches>,
     /// Number of lights.
     pub lights: usize,
-    /// What the light goes through.
+    /// Medium that the light passes through.
     pub medium: Medium,
-    /// What is kept.
+    /// Form of the stored values.
     pub form: Form,
 }
 
 /// One light volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightVolume {
-    /// Towards the light, in cells per cell depth: J⁻¹l·(H/nz).
+    /// Direction towards the light, in cells per cell depth: J⁻¹l·(H/nz).
     pub direction: Vec3,
-    /// Bits of transmittance in one unit of optical depth; of optical depths, 1.
+    /// Bits of transmittance (−log₂ T) per unit of depth, Σ ρ code × length; 1 for [`Form::Depths`].
     pub bits: f32,
 }
 
-/// What a light volume holds for a cell.
+/// Form of the value that a light volume stores for a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// √T in 255ths.
+    /// Transmittance code: √T in 255ths.
     Codes,
-    /// Optical depth: Σ ρ code × length, in depths of a cell; or Σ ρ code.
+    /// Optical depth: Σ ρ code × length, with lengths in cell depths, or Σ ρ code with per-cell attenuation.
     Depths,
 }
 
-/// −log₂ of a T whose code is 0: 255·2^(−9) is less than a half.
+/// Depth in bits (−log₂ T) at which the code of T is 0: 255·2^(−9) is less than a half.
 pub const DARK_BITS: f32 = 18.0;
 
-/// √T in 255ths, from −log₂ T: steps are finest where it is dark.
+/// Code of a transmittance, √T in 255ths, from its depth −log₂ T. The steps of T are finest in the dark.
 pub fn transmittance_code(depth_bits: f32) -> u8 {
     (255.0 * (-0.5 * depth_bits).exp2() + 0.5) as u8
 }
 
-/// How a quad is cut for one light.
+/// Patches into which a quad is cut for one light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patches {
-    /// Where its numbers begin.
+    /// Index of the first entry in [`LightVolumes::numbers`].
     pub first: u32,
-    /// Patches along u and along v.
+    /// Number of patches along u and along v.
     pub count: [u32; 2],
-    /// Whether there is a light volume for each corner, between which is interpolated, or one for each
-    /// patch.
+    /// Whether every patch corner has a light volume, between which rays interpolate; otherwise every patch
+    /// has one.
     pub cornered: bool,
 }
 
-/// What an optical depth depends on besides cells and direction.
+/// Properties, besides cells and direction, that an optical depth depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Medium {
-    /// Whether cells count whole, not by the length of the way in them.
+    /// Whether a cell's ρ counts once, whatever the length of the ray inside the cell.
     pub per_cell: bool,
-    /// Most cells of one walk.
+    /// Maximum number of cells in one walk.
     pub max_cells: u32,
 }
 
 impl Medium {
-    /// The medium that a trace goes through.
+    /// Medium of a trace.
     pub fn of(trace: &Trace) -> Self {
         Medium {
             per_cell: matches!(trace.attenuation, Attenuation::PerCell { .. }),
@@ -127,24 +135,24 @@ impl Medium {
     }
 }
 
-/// The quads of a frame and the lights that shine on them.
+/// Quads of a frame with the lights that shine on them.
 #[derive(Clone, Copy)]
 pub struct LitQuads<'a> {
-    /// The volume's quads.
+    /// Quads that the volume is mapped to.
     pub quads: &'a [Quad],
-    /// The lights that shine on the volume: the scene's own, then those that stand for its environment.
+    /// Lights that shine on the volume: first the scene's own, then those that stand for its environment.
     pub lights: &'a [Light],
     /// Number of the scene's own lights.
     pub own_lights: usize,
-    /// The eye, metres.
+    /// Position of the eye, metres.
     pub eye: Vec3,
-    /// How rays go through the volume.
+    /// Settings of the trace.
     pub trace: &'a Trace,
-    /// How often light is scattered.
+    /// Single or multiple scattering.
     pub scattering: Scattering,
-    /// Cells of the volume.
+    /// Number of cells of the volume along x, y and z.
     pub size: [u32; 3],
-    /// Scale of its density.
+    /// Scale α of the volume's density.
     pub alpha: f32,
 }
 
@@ -152,15 +160,15 @@ impl LightVolumes {
     /// Plans the light volumes of a frame.
     ///
     /// # Errors
-    /// [`Error::Memory`] where even the coarsest need more than `budget` bytes.
+    /// Returns [`Error::Memory`] if even the coarsest plan needs more than `budget` bytes.
     pub fn new(lit: &LitQuads, budget: u64) -> Result<Self> {
         let mut need = 0;
-        // Sheets of many small quads: only where each cannot have its own do they share light volumes.
+        // Quads share light volumes only if separate ones do not fit, as on sheets of many small quads.
         for shared in [false, true] {
-            for doubling in 0..=DOUBLINGS + i32::from(shared) {
+            for doubling in 0..=MAX_DOUBLINGS + i32::from(shared) {
                 let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
-                let same = if shared { angles[0] as f32 } else { SAME_DIRECTION };
-                let volumes = LightVolumes::at_angles(lit, angles, same);
+                let tolerance = if shared { angles[0] as f32 } else { DIRECTION_TOLERANCE };
+                let volumes = LightVolumes::at_angles(lit, angles, tolerance);
                 need = volumes.bytes(level_atlas(lit.trace, lit.size).extent());
                 if need <= u128::from(budget) {
                     return Ok(volumes);
@@ -175,13 +183,13 @@ impl LightVolumes {
         ))
     }
 
-    /// Bytes of all light volumes, of textures of `size` cells.
+    /// Memory of all light volumes in bytes, for textures of `size` cells.
     pub fn bytes(&self, size: [u32; 3]) -> u128 {
         let [nx, ny, nz] = self.words(size).map(u128::from);
         nx * ny * nz * 4 * self.volumes.len() as u128
     }
 
-    /// Words of four bytes in one of them, along x, y and z.
+    /// Number of four-byte words in one light volume along x, y and z, for a texture of that many cells.
     pub fn words(&self, [nx, ny, nz]: [u32; 3]) -> [u32; 3] {
         match self.form {
             Form::Codes => [nx, ny, nz.div_ceil(CELLS_A_WORD)],
@@ -189,25 +197,27 @@ impl LightVolumes {
         }
     }
 
-    /// Whether is interpolated anywhere.
+    /// Whether any patch interpolates between light volumes at its corners.
     pub fn cornered(&self) -> bool {
         self.patches.iter().any(|patches| patches.cornered)
     }
 
-    /// Directions that differ by less than `same` of their length share a light volume.
-    fn at_angles(lit: &LitQuads, angles: [f64; 2], same: f32) -> Self {
+    /// Plan for patches of the given maximum turns, in radians. Directions that differ by less than
+    /// `tolerance` times their length share a light volume.
+    fn at_angles(lit: &LitQuads, angles: [f64; 2], tolerance: f32) -> Self {
         let &LitQuads { quads, lights, own_lights, eye, trace, scattering, size, alpha } = lit;
         let mut medium = Medium::of(trace);
-        medium.max_cells = medium.max_cells.min(MOST_CELLS);
+        medium.max_cells = medium.max_cells.min(MAX_WALK_CELLS);
         let form = match scattering {
             Scattering::Single => Form::Codes,
             Scattering::Multiple => Form::Depths,
         };
         let mut volumes: Vec<LightVolume> = Vec::new();
         let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
-        let mut number = |direction: Vec3, bits: f32, same: f32| {
-            let step = same * direction.length().max(1e-30);
-            // The step is a power of two, so that equal directions fall into equal squares.
+        let mut number_of = |direction: Vec3, bits: f32, tolerance: f32| {
+            let step = tolerance * direction.length().max(1e-30);
+            // The step is rounded to a power of two. Directions that are nearly equal then round to the same
+            // grid.
             let step = step.log2().floor().exp2();
             let key = (direction.to_array().map(|x| (x / step).round() as i64), bits.to_bits());
             *known.entry(key).or_insert_with(|| {
@@ -224,9 +234,11 @@ impl LightVolumes {
             };
             let side_seen = if quad_seen_from_behind(quad, eye) { -1.0 } else { 1.0 };
             for (i, light) in lights.iter().enumerate() {
-                let same = if i < own_lights { same } else { same.max(ENVIRONMENT_SAME_DIRECTION) };
+                let tolerance =
+                    if i < own_lights { tolerance } else { tolerance.max(ENVIRONMENT_DIRECTION_TOLERANCE) };
                 if quad.mist > 0.0 {
-                    // Its light is not asked for.
+                    // Mist computes its light without light volumes; the entry only keeps the indices
+                    // regular.
                     patches.push(Patches { first: numbers.len() as u32, count: [1, 1], cornered: false });
                     numbers.push(0);
                     continue;
@@ -237,8 +249,9 @@ impl LightVolumes {
                 let [nu, nv] = count.map(|n| n + u32::from(cornered));
                 let offset = if cornered { 0.0 } else { 0.5 };
                 for (j, i) in (0..nv).flat_map(|j| (0..nu).map(move |i| (j, i))) {
-                    let place = |i: u32, n: u32| (i as f32 + offset) / n as f32;
-                    numbers.push(number(at(place(i, count[0]), place(j, count[1])), bits, same));
+                    let coordinate = |i: u32, n: u32| (i as f32 + offset) / n as f32;
+                    let direction = at(coordinate(i, count[0]), coordinate(j, count[1]));
+                    numbers.push(number_of(direction, bits, tolerance));
                 }
             }
         }
@@ -249,12 +262,13 @@ impl LightVolumes {
     }
 }
 
-/// Whether the eye is behind the plane of a quad; then all its rays are.
+/// Whether the eye is behind the plane of a quad. All its rays then meet the quad from behind.
 fn quad_seen_from_behind(quad: &Quad, eye: Vec3) -> bool {
     (eye.as_dvec3() - quad.map.a_world.as_dvec3()).dot(quad.map.n_world.as_dvec3()) < 0.0
 }
 
-/// Towards a light from a point of a quad, in cells per cell depth.
+/// Direction from a point of a quad towards a light, in cells per cell depth. `side` is −1 for a quad seen
+/// from behind, else 1.
 fn direction(quad: &Quad, light: &Light, side: f32, size: [u32; 3], uv: Vec2) -> Vec3 {
     let map = &quad.map;
     let frame = CellFrame::new(map, &quad.material, size, uv);
@@ -263,10 +277,10 @@ fn direction(quad: &Quad, light: &Light, side: f32, size: [u32; 3], uv: Vec2) ->
     frame.cell_from_plane(plane) * frame.depth
 }
 
-/// Patches along u and v over which the direction turns by no more than the first angle; or cornered ones and
-/// the second.
+/// Number of patches along u and v, and whether they are cornered. The direction turns by at most `whole`
+/// over a plain patch and by at most `cornered` over a cornered one, in radians.
 fn cut(at: &impl Fn(f32, f32) -> Vec3, [whole, cornered]: [f64; 2]) -> ([u32; 2], bool) {
-    // The way of the direction along the quad's sides and middles, in eight steps each.
+    // Total turn of the direction along the quad's sides and centre lines, in eight steps each.
     const STEPS: u32 = 8;
     let turn = |point: &dyn Fn(f32, f32) -> Vec3| {
         let along = |across: f32| -> f64 {
@@ -278,6 +292,6 @@ fn cut(at: &impl Fn(f32, f32) -> Vec3, [whole, cornered]: [f64; 2]) -> ([u32; 2]
     let turns = [turn(&|u, v| at(u, v)), turn(&|v, u| at(u, v))];
     let patches =
         |angle: f64, most: u32| turns.map(|turn| (turn / angle).ceil().clamp(1.0, most as f64) as u32);
-    let [nu, nv] = patches(whole, MOST_PATCHES + 1);
-    if nu * nv <= MOST_PATCHES { ([nu, nv], false) } else { (patches(cornered, MOST_CORNERED), true) }
+    let [nu, nv] = patches(whole, MAX_PATCHES + 1);
+    if nu * nv <= MAX_PATCHES { ([nu, nv], false) } else { (patches(cornered, MAX_CORNERED_SIDE), true) }
 }

@@ -1,24 +1,25 @@
-//! Bloom: the share of the light that lenses and eyes scatter around bright things.
+//! Bloom: the light that lenses and eyes scatter around bright things.
 //!
-//! Light is spread by a sum of near-Gaussians an octave apart, each with the same share: about a point it
-//! falls with the square of the distance, as the glare of the eye does (Stiles and Holladay 1926; Spencer et
-//! al., "Physically-Based Glare Effects for Digital Images", 1995). Nothing is added and nothing cut off:
-//! what a pixel gives others get.
+//! Light is spread by a sum of near-Gaussians an octave apart, each with the same share. Around a point the
+//! light falls with the square of the distance, like glare in the eye (Stiles and Holladay 1926; Spencer et
+//! al., "Physically-Based Glare Effects for Digital Images", 1995). There is no threshold, and energy is
+//! conserved: other pixels receive the light that a pixel loses.
 //!
-//! They come from a pyramid (Burt and Adelson 1983). A level is the one below it under the weights 1 3 3 1,
-//! at every second pixel; back up, each pixel mixes the nearest of it by 3 to 1. Both ways together widen a
-//! point by a variance of (4^k − 1)/2 pixels² for level k, wherever it is, so that two neighbouring levels
-//! make any variance between theirs. The picture is continued by its mirror image.
+//! The near-Gaussians come from a pyramid (Burt and Adelson 1983). A level is the one below it, convolved
+//! with the weights 1 3 3 1 and sampled at every second pixel. On the way back, each pixel blends its nearest
+//! pixels in the level above by 3 to 1. Both ways together spread a point by a variance of (4^k − 1)/2
+//! pixels² for level k, wherever the point lies. A blend of two neighbouring levels has any variance between
+//! theirs. Mirror images continue the picture beyond its edges.
 
 use rayon::prelude::*;
 
 use super::Look;
 
-/// Near-Gaussians of the spread: σ is the radius for the first, half of it for the next …
+/// Number of near-Gaussians. The first has σ = radius, and each next one half the σ.
 pub const OCTAVES: u32 = 6;
 
-/// Shares of the pyramid's levels, from the picture itself, for a first σ of `radius` pixels. They add up to
-/// 1.
+/// Shares of the pyramid's levels, starting with the picture itself, for a largest σ of `radius` pixels. They
+/// add up to 1.
 pub fn shares(radius: f64) -> Vec<f64> {
     let mut shares = vec![0.0; 1];
     for octave in 0..OCTAVES {
@@ -37,13 +38,13 @@ pub fn shares(radius: f64) -> Vec<f64> {
     shares.into_iter().map(|share| share / f64::from(OCTAVES)).collect()
 }
 
-/// A picture's radiance with its bloom, pixel by pixel.
+/// Radiance of a picture with bloom, evaluated pixel by pixel.
 pub struct Bloom<'a> {
     radiance: &'a [[f32; 4]],
     width: usize,
-    /// What stays of a pixel's own light.
-    kept: f32,
-    /// The spread light at half the size; none where nothing is spread over a pixel's width.
+    /// Share of its own light that a pixel keeps.
+    own_share: f32,
+    /// Spread light at half the picture's size; `None` if no light is spread beyond a pixel.
     glow: Option<Level>,
 }
 
@@ -54,9 +55,9 @@ struct Level {
 }
 
 impl Level {
-    /// The pixel (x, y) of the level below.
+    /// Value at pixel (x, y) of the level below, blended from four pixels of this level.
     fn up(&self, x: usize, y: usize) -> [f32; 3] {
-        // The mirror image of the first pixel and of the last is that pixel.
+        // The first and the last pixel are their own mirror images.
         let near = |i: usize, n: usize| {
             let other = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(n - 1) };
             (i / 2, other)
@@ -67,14 +68,14 @@ impl Level {
         [0, 1, 2].map(|i| 0.75 * (0.75 * a[i] + 0.25 * b[i]) + 0.25 * (0.75 * c[i] + 0.25 * d[i]))
     }
 
-    /// The next level, of `size`, from the one `below` it of `of` pixels.
-    fn down(size: [usize; 2], of: [usize; 2], below: impl Fn(usize) -> [f32; 3] + Sync) -> Level {
+    /// Level of `size` pixels from the level `below` it, of `below_size` pixels.
+    fn down(size: [usize; 2], below_size: [usize; 2], below: impl Fn(usize) -> [f32; 3] + Sync) -> Level {
         const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
-        let places = |i: usize, n: usize| [0, 1, 2, 3].map(|k| mirrored((2 * i + k) as isize - 1, n));
-        let columns: Vec<[usize; 4]> = (0..size[0]).map(|x| places(x, of[0])).collect();
+        let taps = |i: usize, n: usize| [0, 1, 2, 3].map(|k| mirrored((2 * i + k) as isize - 1, n));
+        let columns: Vec<[usize; 4]> = (0..size[0]).map(|x| taps(x, below_size[0])).collect();
         let mut pixels = vec![[0.0; 3]; size[0] * size[1]];
         pixels.par_chunks_mut(size[0]).enumerate().for_each(|(y, row)| {
-            let rows = places(y, of[1]).map(|y| y * of[0]);
+            let rows = taps(y, below_size[1]).map(|y| y * below_size[0]);
             for (out, columns) in row.iter_mut().zip(&columns) {
                 for (row, wy) in rows.into_iter().zip(WEIGHTS) {
                     let mut sum = [0.0; 3];
@@ -90,28 +91,28 @@ impl Level {
     }
 }
 
-/// Place of a pixel in a row of `n` that goes on as its mirror image.
+/// Index of pixel `i` in a row of `n` pixels that its mirror images continue on both sides.
 fn mirrored(i: isize, n: usize) -> usize {
-    let place = i.rem_euclid(2 * n as isize) as usize;
-    if place < n { place } else { 2 * n - 1 - place }
+    let index = i.rem_euclid(2 * n as isize) as usize;
+    if index < n { index } else { 2 * n - 1 - index }
 }
 
 impl<'a> Bloom<'a> {
-    /// Of a whole picture of `width`×`height` pixels.
+    /// Bloom of a whole picture of `width`×`height` pixels.
     pub fn new(radiance: &'a [[f32; 4]], width: usize, height: usize, look: &Look) -> Self {
         let shares = shares(f64::from(look.bloom_radius) * height as f64);
         let share = |level: usize| (shares[level] * f64::from(look.bloom)) as f32;
-        let kept = (1.0 - f64::from(look.bloom) * (1.0 - shares[0])) as f32;
+        let own_share = (1.0 - f64::from(look.bloom) * (1.0 - shares[0])) as f32;
         let levels = shares.len() - 1;
         if levels == 0 {
-            return Bloom { radiance, width, kept, glow: None };
+            return Bloom { radiance, width, own_share, glow: None };
         }
         let source = |i: usize| {
             let [r, g, b, _] = radiance[i];
-            // One pixel that is no number would blind the picture.
+            // A single NaN or infinite pixel would spread over the whole picture.
             [r, g, b].map(|x| if x.is_finite() { x } else { 0.0 })
         };
-        // Every level is half of a whole one.
+        // The size is rounded up so that it halves without a remainder at every level.
         let whole = [width, height].map(|n| n.next_multiple_of(1 << levels));
         let size = |level: usize| whole.map(|n| n >> level);
         let mut pyramid = vec![Level::down(size(1), [width, height], source)];
@@ -131,14 +132,15 @@ impl<'a> Bloom<'a> {
             });
             glow = Some(level);
         }
-        Bloom { radiance, width, kept, glow }
+        Bloom { radiance, width, own_share, glow }
     }
 
-    /// Radiance of pixel `i`, its alpha untouched.
+    /// Radiance of pixel `i` with bloom. The fourth component is unchanged.
     pub fn pixel(&self, i: usize) -> [f32; 4] {
         let [r, g, b, a] = self.radiance[i];
         let glow = self.glow.as_ref().map_or([0.0; 3], |glow| glow.up(i % self.width, i / self.width));
-        let [r, g, b] = [(r, glow[0]), (g, glow[1]), (b, glow[2])].map(|(own, glow)| self.kept * own + glow);
+        let [r, g, b] =
+            [(r, glow[0]), (g, glow[1]), (b, glow[2])].map(|(own, glow)| self.own_share * own + glow);
         [r, g, b, a]
     }
 }

@@ -1,4 +1,4 @@
-//! The pinhole camera: rays through pixels, and the matrix that puts geometry under them.
+//! The pinhole camera: rays through pixels, and the matrix that projects geometry onto the same pixels.
 
 use std::sync::LazyLock;
 
@@ -10,36 +10,38 @@ use crate::util::window::Window;
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Metres.
+    /// Position of the eye, metres.
     pub eye: Vec3,
-    /// Unit, to the right of the image.
+    /// Unit vector to the right of the image.
     pub right: Vec3,
-    /// Unit, up in the image.
+    /// Unit vector to the top of the image.
     pub up: Vec3,
-    /// Unit, into the image.
+    /// Unit vector into the image.
     pub forward: Vec3,
     /// Tangent of half the vertical field of view.
     pub tan_half_fov: f32,
-    /// Near plane, metres along `forward`.
+    /// Distance of the near plane along `forward`, metres.
     pub near: f32,
 }
 
 impl Camera {
-    /// Half the image plane at distance 1: (right, up), scaled by the field of view.
+    /// Vectors (right, up) from the centre of the image plane at distance 1 to its edges.
     pub fn image_plane(&self, width: u32, height: u32) -> (Vec3, Vec3) {
         let aspect = width as f32 / height as f32;
         (self.right * (self.tan_half_fov * aspect), self.up * self.tan_half_fov)
     }
 
-    /// Clip space with reversed infinite depth (z/w is 1 at the near plane, 0 at infinity): the sample
-    /// at `offset` inside each pixel comes to lie on the pixel's centre, where rasterisers look.
+    /// Matrix to clip space with reversed infinite depth: z/w is 1 at the near plane and 0 at infinity.
+    ///
+    /// The image is shifted so that the sample at `offset` inside each pixel lies on the pixel's centre,
+    /// where rasterisers sample.
     pub fn clip_from_world(&self, width: u32, height: u32, offset: [f32; 2]) -> Mat4 {
         let (right, up) = self.image_plane(width, height);
-        // Rows of view coordinates in units of the image plane; the eye goes in with float64.
+        // Rows give view coordinates in units of the image plane. The eye's part is computed in float64.
         let row = |axis: Vec3, scale: f32| {
             let axis64 = axis.as_dvec3() / scale as f64;
-            let moved = -axis64.dot(self.eye.as_dvec3());
-            axis64.as_vec3().extend(moved as f32)
+            let translation = -axis64.dot(self.eye.as_dvec3());
+            axis64.as_vec3().extend(translation as f32)
         };
         let w = row(self.forward, 1.0);
         let x = row(right, right.length_squared()) - w * ((2.0 * offset[0] - 1.0) / width as f32);
@@ -48,8 +50,8 @@ impl Camera {
         Mat4::from_cols(x, y, z, w).transpose()
     }
 
-    /// Unit direction through a pixel of the whole image, at `offset` from its top left corner.
-    /// Twin: `view_ray` in `shaders/layout.wgsl`.
+    /// Unit direction through a pixel of the whole image, at `offset` pixels from the pixel's top left
+    /// corner. Twin: `view_ray` in `shaders/layout.wgsl`.
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
         let (right, up) = self.image_plane(width, height);
         let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;
@@ -59,8 +61,8 @@ impl Camera {
     }
 }
 
-/// The clip space of a window from that of the whole image, in float64; the same bits where the window is
-/// the whole image.
+/// Converts the clip matrix of the whole image to that of a window, in float64. If the window is the whole
+/// image, the bits of the matrix do not change.
 pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: Window) -> Mat4 {
     let [w, h] = [width, height].map(f64::from);
     let [x, y, window_w, window_h] = [window.x, window.y, window.width, window.height].map(f64::from);
@@ -73,16 +75,17 @@ pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: 
     (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
 }
 
-/// Where sample `sample` of an image's lies from the top left corner of a pixel: in the centre for one
-/// sample, else by the R2 sequence (Roberts 2018), which fills a square evenly for any number and needs no
-/// random numbers. A filter other than the box bends the square, so that samples lie as densely as it weighs
-/// (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006): every pixel has its own samples, and
-/// their mean stays plain.
+/// Offset of sample `sample` from the top left corner of a pixel, in pixels.
+///
+/// A single sample lies in the centre. Several follow the R2 sequence (Roberts 2018), which fills a square
+/// evenly for any number of samples without random numbers. A filter other than the box warps the square, so
+/// that the density of samples is proportional to the filter (Ernst, Stamminger and Greiner, "Filter
+/// Importance Sampling", 2006). Every pixel has its own samples, and its value is their unweighted mean.
 pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
     if image.samples == 1 {
         return [0.5, 0.5];
     }
-    // Powers of the inverse of the plastic number.
+    // First and second power of the plastic number's reciprocal.
     const A: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let even = A.map(|a| (0.5 + a * sample as f64).fract());
     match image.filter {
@@ -92,17 +95,20 @@ pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
     }
 }
 
-/// Half the width of the filters but the box, pixels.
+/// Radius of the filters other than the box, pixels.
 pub const FILTER_RADIUS: f64 = 1.5;
-/// Steps of the table on either side: with them a sample lies within 10⁻⁵ pixels of its place.
+/// Number of steps of a quantile table on either side. With this number a sample's offset is accurate to 10⁻⁵
+/// pixels.
 const STEPS: usize = 1024;
 
+/// Gaussian with σ = ½ pixel, cut off at [`FILTER_RADIUS`].
 static GAUSSIAN: LazyLock<Quantiles> = LazyLock::new(|| {
     const SIGMA: f64 = 0.5;
     Quantiles::new(|x| (-x * x / (2.0 * SIGMA * SIGMA)).exp())
 });
 
-/// Harris, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform", 1978.
+/// Blackman–Harris window (Harris, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier
+/// Transform", 1978).
 static BLACKMAN_HARRIS: LazyLock<Quantiles> = LazyLock::new(|| {
     Quantiles::new(|x| {
         let a = std::f64::consts::PI * x / FILTER_RADIUS;
@@ -110,17 +116,17 @@ static BLACKMAN_HARRIS: LazyLock<Quantiles> = LazyLock::new(|| {
     })
 });
 
-/// The share of a symmetric filter between 0 and each step of its radius.
+/// Cumulative table of a symmetric filter: the share of its integral between 0 and each step of its radius.
 struct Quantiles(Vec<f64>);
 
 impl Quantiles {
-    /// Of a filter that is above 0 inside its radius.
+    /// Table of a filter that is positive inside its radius.
     fn new(weight: impl Fn(f64) -> f64) -> Self {
         let step = FILTER_RADIUS / STEPS as f64;
         let mut sum = 0.0;
         let mut shares = vec![0.0];
         for i in 0..STEPS {
-            // Simpson's rule.
+            // Integration by Simpson's rule.
             let [a, m, b] = [0.0, 0.5, 1.0].map(|part| weight((i as f64 + part) * step));
             sum += a + 4.0 * m + b;
             shares.push(sum);
@@ -128,17 +134,17 @@ impl Quantiles {
         Quantiles(shares.into_iter().map(|share| share / sum).collect())
     }
 
-    /// Pixels from the middle that the share `p` of the filter lies before.
+    /// Offset from the filter's centre, in pixels, below which the share `p` of the filter's integral lies.
     fn quantile(&self, p: f64) -> f64 {
         let wanted = (2.0 * p - 1.0).abs();
         let above = self.0.partition_point(|&share| share <= wanted).clamp(1, STEPS);
         let (a, b) = (self.0[above - 1], self.0[above]);
-        let place = (above - 1) as f64 + ((wanted - a) / (b - a)).min(1.0);
-        (place * FILTER_RADIUS / STEPS as f64).copysign(p - 0.5)
+        let steps = (above - 1) as f64 + ((wanted - a) / (b - a)).min(1.0);
+        (steps * FILTER_RADIUS / STEPS as f64).copysign(p - 0.5)
     }
 }
 
-/// Solid angle of the pixel in the middle of the image, over its number of samples.
+/// Solid angle of one sample, in sr: that of the pixel at the image centre, divided by the number of samples.
 pub fn footprint(camera: &Camera, image: &Image) -> f32 {
     let (right, up) = camera.image_plane(image.width, image.height);
     let pixels = image.width as f32 * image.height as f32;

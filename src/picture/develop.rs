@@ -1,28 +1,32 @@
-//! How the resolve pass makes the picture, as the shader reads it. Twin: `shaders/picture/resolve.wgsl`.
+//! Parameters of the resolve pass in the shader's layout. Twin: `shaders/picture/resolve.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::{Look, Tone, white_balance};
 
-/// `tone` of [`Develop`]: Narkowicz's curve.
+/// Value of [`Develop::tone`] for Narkowicz's curve.
 pub const TONE_FILMIC: u32 = 1;
-/// `tone` of [`Develop`]: AgX.
+/// Value of [`Develop::tone`] for AgX.
 pub const TONE_AGX: u32 = 2;
 
-/// How the resolve pass makes the picture; `shaders/picture/resolve.wgsl`.
+/// Parameters of the resolve pass; `Develop` in `shaders/picture/resolve.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[allow(missing_docs)]
 pub struct Develop {
+    /// Rows of the white balance matrix; the fourth component is padding.
     pub balance: [[f32; 4]; 3],
+    /// Factor on the radiance.
     pub exposure: f32,
+    /// Tone curve: 0 for none, [`TONE_FILMIC`] or [`TONE_AGX`].
     pub tone: u32,
+    /// 1 if the white balance changes anything, else 0.
     pub balanced: u32,
+    /// Padding.
     pub pad_a: u32,
 }
 
 impl Develop {
-    /// Of pictures that look so.
+    /// Parameters for this look.
     pub fn new(look: &Look) -> Self {
         let balanced = (look.temperature, look.tint) != (white_balance::NEUTRAL_K, 0.0);
         let rows = white_balance::matrix(look.temperature, look.tint).transpose().to_cols_array_2d();

@@ -1,27 +1,27 @@
-//! The linear frame with its layers.
+//! The linear frame, the raster pass's layers and the layers of an EXR file.
 
 use glam::Vec3;
 
 use crate::mapping::Quad;
 
-/// Seconds per stage. On the GPU engine gbuffer, integrate and resolve are the device's own time.
+/// Seconds per stage. On the GPU engine gbuffer, integrate and resolve are device time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Seconds {
     /// Building or reading the volume texture (host).
     pub volume: f64,
-    /// Opening the device and compiling the passes all scenes share (host).
+    /// Opening the device and compiling the passes that all scenes share (host).
     pub device: f64,
-    /// Compiling the pass specialised to the scene (host).
+    /// Compiling the pass that is specialised to the scene (host).
     pub pipelines: f64,
     /// Upload of volume, quads and mesh (host).
     pub upload: f64,
-    /// Light volumes, where they are not kept from the frame before.
+    /// Filling the light volumes, unless those of the previous frame still serve.
     pub visibility: f64,
     /// Raster pass.
     pub gbuffer: f64,
-    /// Walk and light.
+    /// Walk through the volume, and light.
     pub integrate: f64,
-    /// Tone and 8 bits.
+    /// Development of the picture: white balance, exposure, tone curve and 8 bits.
     pub resolve: f64,
     /// Read-back (host).
     pub readback: f64,
@@ -44,40 +44,40 @@ impl std::ops::AddAssign for Seconds {
     }
 }
 
-/// What the raster pass saw at the first sample of each pixel.
+/// Layers of the raster pass, at the first sample of each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// Metres from the eye to the water's face or the opaque scene; 0 where nothing is.
+    /// Distance from the eye to the nearest water or opaque surface, metres; 0 in the background.
     pub depth: Vec<f32>,
-    /// Texture coordinates on the quad.
+    /// Texture coordinates (u, v) on the quad, 0 to 1.
     pub uv: Vec<[f32; 2]>,
-    /// Number of the quad plus 1; 0 where there is none.
+    /// Number of the nearest quad plus 1; 0 without a quad.
     pub quad: Vec<u32>,
-    /// Unit normal on the seen side; 0 where nothing is.
+    /// Unit normal on the seen side; 0 in the background.
     pub normal: Vec<[f32; 3]>,
 }
 
-/// A finished frame: row by row from the top left.
+/// Finished frame. Every layer runs row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// Linear radiance and the volume's transmittance, means over the samples.
+    /// Linear radiance R, G, B and the volume's transmittance, averaged over the samples.
     pub radiance: Vec<[f32; 4]>,
-    /// Cells walked by view rays and by light rays, sums over the samples.
+    /// Cells walked by view rays and by light rays, summed over the samples.
     pub counts: Vec<[u32; 2]>,
-    /// The picture: sRGB bytes R, G, B, A.
+    /// Developed picture: sRGB bytes R, G, B, A.
     pub picture: Vec<[u8; 4]>,
-    /// The raster pass's layers, if asked for.
+    /// Layers of the raster pass, if requested.
     pub surface: Option<Surface>,
     /// Seconds per stage.
     pub seconds: Seconds,
 }
 
 impl Surface {
-    /// Empty layers.
+    /// Empty layers for that many pixels.
     pub fn new(pixels: usize) -> Self {
         Surface {
             depth: vec![0.0; pixels],
@@ -87,8 +87,11 @@ impl Surface {
         }
     }
 
-    /// Stores pixel `i`: the number plus 1 of the nearest of `quads` with its (u, v, metres), or 0; and the
-    /// depth and normal of what is behind, in metres.
+    /// Stores pixel `i`.
+    ///
+    /// `quad` is the number plus 1 of the nearest of `quads`, or 0. `hit` is (u, v, metres from the eye) on
+    /// that quad. `behind` is the depth in metres and the normal of the opaque surface, which are stored if
+    /// `quad` is 0.
     pub fn set(
         &mut self,
         i: usize,
@@ -113,7 +116,7 @@ impl Surface {
 }
 
 impl Frame {
-    /// An empty frame.
+    /// Empty frame, with the raster pass's layers if `surface` is set.
     pub fn new(width: u32, height: u32, surface: bool) -> Self {
         let pixels = width as usize * height as usize;
         Frame {
@@ -127,52 +130,52 @@ impl Frame {
         }
     }
 
-    /// Cells walked by view rays and by light rays.
+    /// Total number of cells walked by view rays and by light rays.
     pub fn cells_walked(&self) -> [u64; 2] {
         self.counts.iter().fold([0, 0], |[a, b], c| [a + c[0] as u64, b + c[1] as u64])
     }
 
-    /// Pixels with a volume quad in any sample.
+    /// Number of pixels in which any sample walks the volume.
     pub fn covered_pixels(&self) -> u64 {
         self.counts.iter().filter(|c| c[0] > 0).count() as u64
     }
 
-    /// Pixels whose radiance or transmittance is infinite or not a number. Always 0 in a sound frame.
+    /// Number of pixels whose radiance or transmittance is infinite or NaN. It is 0 in a correct frame.
     pub fn non_finite_pixels(&self) -> u64 {
         self.radiance.iter().filter(|r| !r.iter().all(|x| x.is_finite())).count() as u64
     }
 }
 
-/// A layer of the EXR file.
+/// Layer of an EXR file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Linear radiance: channels R, G, B.
     Rgb,
-    /// Metres to the first surface; 0: none.
+    /// Distance to the first surface in metres; 0 in the background.
     Depth,
-    /// Texture coordinates on the quad.
+    /// Texture coordinates on the nearest quad.
     Uv,
-    /// Quad number plus 1; 0: none.
+    /// Number of the nearest quad plus 1; 0 without a quad.
     Quad,
-    /// Transmittance of the volume.
+    /// Transmittance of the volume, 0 to 1.
     Transmittance,
-    /// Cells walked by the view rays.
+    /// Number of cells walked by view rays.
     Cells,
-    /// Normal on the seen side.
+    /// Unit normal on the seen side; 0 in the background.
     Normal,
 }
 
 impl Layer {
-    /// All layers, as written by default.
+    /// All layers; the default for an EXR file.
     pub const ALL: [Layer; 7] =
         [Layer::Rgb, Layer::Depth, Layer::Uv, Layer::Quad, Layer::Transmittance, Layer::Cells, Layer::Normal];
 
-    /// Whether it comes from the raster pass.
+    /// Whether the layer comes from the raster pass.
     pub fn of_surface(self) -> bool {
         matches!(self, Layer::Depth | Layer::Uv | Layer::Quad | Layer::Normal)
     }
 
-    /// Its name on the command line.
+    /// Name of the layer on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Layer::Rgb => "rgb",
@@ -185,7 +188,7 @@ impl Layer {
         }
     }
 
-    /// Its channels in the file.
+    /// Channels of the layer in the file.
     pub fn channels(self) -> &'static [&'static str] {
         match self {
             Layer::Rgb => &["R", "G", "B"],
@@ -198,7 +201,7 @@ impl Layer {
         }
     }
 
-    /// Value of its channel `channel` at pixel `i`.
+    /// Value of channel number `channel` of the layer at pixel `i`.
     pub fn value(self, frame: &Frame, channel: usize, i: usize) -> f32 {
         let surface = |get: fn(&Surface, usize, usize) -> f32| {
             frame.surface.as_ref().map_or(0.0, |s| get(s, channel, i))

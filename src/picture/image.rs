@@ -1,77 +1,77 @@
-//! The picture that is asked for: size, samples and look.
+//! Settings of the picture: size, samples and look.
 
 use crate::util::words::words;
 
-/// The picture.
+/// Settings of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Image {
-    /// Pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// Samples a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
-    /// Where they lie about the pixel.
+    /// Filter by which samples are distributed around a pixel.
     pub filter: Filter,
-    /// How far rock may be off for the sake of fewer triangles, in distances between samples.
+    /// Maximum error of simplified rock, in distances between samples. A larger error takes fewer triangles.
     pub rock_error: f32,
-    /// How the PNG is made from the radiance.
+    /// Development of the picture from the radiance.
     pub look: Look,
 }
 
-/// How the samples of a pixel are weighed, by where they are taken.
+/// Filter of a pixel's samples. The samples are distributed by it, so that they all have the same weight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// Evenly over the pixel.
+    /// Uniform over the pixel.
     Box,
-    /// σ of half a pixel, cut at 1½.
+    /// Gaussian with σ = ½ pixel, cut off at a radius of 1½ pixels.
     Gaussian,
-    /// The window of Blackman and Harris (1978), three pixels wide.
+    /// Blackman–Harris window (Harris 1978), three pixels wide.
     BlackmanHarris,
 }
 
 words! { Filter { Box => "box", Gaussian => "gaussian", BlackmanHarris => "blackman-harris" } }
 
-/// How a picture is made from linear radiance.
+/// Development of a picture from linear radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Stops.
+    /// Exposure, stops.
     pub exposure: f32,
-    /// How more of them are chosen, [`crate::engine::exposure`].
+    /// Method that chooses additional stops; see [`crate::engine::exposure`].
     pub auto_exposure: AutoExposure,
-    /// Share of the light that is spread around bright things.
+    /// Share of the light that bloom spreads around bright things, 0 to 1.
     pub bloom: f32,
-    /// σ of the widest spread, in heights of the image.
+    /// σ of the widest bloom, as a share of the image's height.
     pub bloom_radius: f32,
-    /// Colour temperature that is adapted to 6500 K, kelvin.
+    /// Colour temperature of the light that is adapted to 6500 K, kelvin.
     pub temperature: f32,
-    /// Its distance from the black body's curve, thousandths of Duv.
+    /// Distance of that light from the black body curve, thousandths of Duv; above 0 it is greener.
     pub tint: f32,
     /// Tone curve.
     pub tone: Tone,
 }
 
-/// How an exposure is chosen.
+/// Method that chooses an exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AutoExposure {
-    /// By hand.
+    /// None: the exposure is set by hand.
     None,
-    /// The logarithmic mean of the luminance becomes middle grey.
+    /// Makes the logarithmic mean of the luminance middle grey.
     Average,
-    /// The brightest hundredth begins at 1.
+    /// Puts the threshold of the brightest hundredth of the pixels at 1.
     Highlights,
 }
 
 words! { AutoExposure { None => "none", Average => "average", Highlights => "highlights" } }
 
-/// Tone curve of the PNG.
+/// Tone curve of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Clamp only.
+    /// Clamps to 0..1.
     None,
-    /// Narkowicz 2015.
+    /// Filmic curve of Narkowicz 2015.
     Filmic,
-    /// Sobotka 2022.
+    /// AgX of Sobotka 2022.
     Agx,
 }
 

@@ -1,4 +1,4 @@
-//! The picture: camera, the linear frame, and how it becomes an image.
+//! The picture: the camera, the linear frame, and the development of the frame into an image.
 
 pub mod bloom;
 mod budget;

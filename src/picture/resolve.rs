@@ -1,23 +1,24 @@
-//! The picture from linear radiance, on the CPU. Twin: `shaders/picture/resolve.wgsl`.
+//! Development of the picture from linear radiance, on the CPU. Twin: `shaders/picture/resolve.wgsl`.
 
 use rayon::prelude::*;
 
 use super::bloom::Bloom;
 use super::{Develop, Frame, Look, TONE_AGX, TONE_FILMIC};
 
-/// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015.
+/// Filmic tone curve (Narkowicz, "ACES Filmic Tone Mapping Curve", 2015).
 fn filmic(x: f32) -> f32 {
     (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
 }
 
-/// IEC 61966-2-1.
+/// Encodes a linear value from 0 to 1 as sRGB (IEC 61966-2-1).
 fn srgb(x: f32) -> f32 {
     if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023: primaries drawn in
-/// towards white, the curve over 16.5 stops about 0.18, and primaries drawn out again. What comes out is
-/// encoded for a display.
+/// AgX tone curve (Sobotka, "AgX", 2022, in the form of Wrensch, "Minimal AgX Implementation", 2023).
+///
+/// The primaries are drawn in towards white, the curve covers 16.5 stops about 0.18, and the primaries are
+/// drawn out again. The result is already encoded for a display.
 fn agx(x: [f32; 3]) -> [f32; 3] {
     const LEAST_EV: f32 = -12.47393;
     const MOST_EV: f32 = 4.026069;
@@ -37,33 +38,35 @@ fn agx(x: [f32; 3]) -> [f32; 3] {
     ]
 }
 
-/// Wrensch's fit of AgX's curve.
+/// Wrensch's polynomial fit of the AgX curve.
 fn agx_curve(x: f32) -> f32 {
     (((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x - 0.00232
 }
 
+/// Rounds an encoded value to 8 bits.
 fn byte(encoded: f32) -> u8 {
     (encoded.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
-/// Makes a picture's pixels.
+/// Develops the pixels of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolver(Develop);
 
 impl Resolver {
-    /// For pictures that look so.
+    /// Resolver for this look.
     pub fn new(look: &Look) -> Self {
         Resolver(Develop::new(look))
     }
 
-    /// White balance, exposure, tone curve, encoding and 8 bits of one pixel; alpha is 255.
+    /// Develops one pixel: white balance, exposure, tone curve, sRGB encoding and rounding to 8 bits. Alpha
+    /// is 255.
     pub fn pixel(&self, linear: [f32; 4]) -> [u8; 4] {
         let develop = &self.0;
         let mut rgb = [linear[0], linear[1], linear[2]];
         if develop.balanced != 0 {
             rgb = develop.balance.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]);
         }
-        // Past 10⁴ all curves are flat; the bound keeps their squares finite.
+        // All curves are flat above 10⁴. The bound keeps their squares finite.
         let x = rgb.map(|x| (x * develop.exposure).clamp(0.0, 1e4));
         let [r, g, b] = match develop.tone {
             TONE_AGX => agx(x).map(byte),
@@ -74,7 +77,8 @@ impl Resolver {
     }
 }
 
-/// Makes the picture of a frame from its radiance. Bloom is that of a whole image: a part of one gets none.
+/// Develops the picture of a frame from its radiance. Only a `whole` image gets bloom, because bloom needs
+/// all pixels.
 pub fn develop(frame: &mut Frame, look: &Look, whole: bool) {
     let resolver = Resolver::new(look);
     let picture = frame.picture.par_iter_mut().enumerate();

@@ -1,10 +1,10 @@
-//! §4 Which levels of the volume the rays of a scene look into.
+//! §4 The volume's levels that a scene needs, and how they share one texture.
 
 use super::{Attenuation, Lookup, Prefilter, Trace, extinction};
 use crate::mapping::Quad;
 use crate::volume::{LevelAtlas, PyramidSpec, VolumeTexture, level_count};
 
-/// What the levels of a volume are made for, where `quads` are traced through it.
+/// Specification of the levels from which rays through `quads` are traced.
 pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> PyramidSpec {
     let filtered = trace.filter == Prefilter::Pyramid;
     PyramidSpec {
@@ -13,7 +13,7 @@ pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> Py
     }
 }
 
-/// Where those levels lie in one texture, for a volume of `size` cells.
+/// Layout of those levels in one texture, for a volume of `size` cells.
 pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> LevelAtlas {
     let count = match trace.filter {
         Prefilter::None => 1,
@@ -22,8 +22,9 @@ pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> LevelAtlas {
     LevelAtlas { size, count }
 }
 
-/// Bits of transmittance along the depth of one cell, per unit of its ρ code: what coverage is reckoned with.
-/// Of several materials of strands the mean thickness counts, quad by quad.
+/// Optical depth across the depth of one cell, in bits (−log₂ T) per unit of its ρ code. The pyramid computes
+/// the coverage of its cells with it. Path-length attenuation takes the mean thickness over all quads that
+/// are not mist.
 fn coverage_bits(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> f32 {
     let extinction = extinction(&trace.attenuation, volume.alpha);
     if matches!(trace.attenuation, Attenuation::PerCell { .. }) {

@@ -1,5 +1,6 @@
-//! What a ray finds in a cell: the cell's own, or what lies between eight cells' centres; and which level of
-//! the volume it looks into. Twins: `shaders/trace/levels.wgsl` and `shaders/trace/lookup.wgsl`.
+//! §4 Values that a ray reads in a cell (its own, or interpolated between eight cell centres), and the level
+//! of the volume it reads them from. Twins: `shaders/trace/levels.wgsl`, `shaders/trace/lookup.wgsl` and
+//! `level_at` in `shaders/engine/integrate.wgsl`.
 
 use glam::{IVec3, UVec3, Vec3};
 
@@ -8,25 +9,25 @@ use crate::mapping::CellFrame;
 use crate::volume::{Cell, Moments, Pyramid, VolumeTexture};
 use crate::walk::Crossing;
 
-/// One level as walks see it.
+/// One level of the volume, with what a walk needs to know about it.
 #[derive(Clone, Copy)]
 pub struct Level<'a> {
-    /// Its cells.
+    /// Cells of the level.
     pub volume: &'a VolumeTexture,
-    /// 0 is the volume itself.
+    /// Number of the level; 0 is the volume itself.
     pub number: u32,
-    /// Whether it is that.
+    /// Whether the level is the volume itself.
     pub is_whole: bool,
-    /// Its cells per cell of the volume, along x, y and z.
+    /// Cells of the level per cell of the volume, along x, y and z; at most 1.
     pub scale: Vec3,
-    /// Its number of cells.
+    /// Number of cells along x, y and z.
     pub size: IVec3,
-    /// Whether its empty cells hold boxes to leap over.
+    /// Whether empty cells hold boxes of empty cells that a walk can leap over.
     pub leaps: bool,
 }
 
 impl<'a> Level<'a> {
-    /// Level `number` of `levels`.
+    /// Level `number` of `levels`, without leaps.
     pub fn new(levels: &'a [VolumeTexture], number: u32) -> Self {
         let volume = &levels[number as usize];
         let [whole, size] = [levels[0].size, volume.size].map(UVec3::from);
@@ -40,23 +41,23 @@ impl<'a> Level<'a> {
         }
     }
 
-    /// Level `number` of levels that are made for walks.
+    /// Level `number` of a pyramid, with leaps where the pyramid has them.
     pub fn of(levels: &'a Pyramid, number: u32) -> Self {
         Level { leaps: levels.leaps, ..Level::new(levels, number) }
     }
 
-    /// Cells of the volume in the depth of one of its.
+    /// Depth of one cell of the level, in cells of the volume.
     pub fn deep(&self) -> f32 {
         1.0 / self.scale.z
     }
 
-    /// The cell of the level.
+    /// The cell at `c`, which must lie inside the level.
     #[inline]
     pub fn cell(&self, c: IVec3) -> Cell {
         self.volume.cell(c.x as u32, c.y as u32, c.z as u32)
     }
 
-    /// Of a cell's directions.
+    /// Second moments of a cell's directions.
     pub fn moments(&self, cell: Cell) -> Moments {
         match self.is_whole {
             true => Moments::of(cell.v_code()),
@@ -64,14 +65,16 @@ impl<'a> Level<'a> {
         }
     }
 
-    /// The cell's own.
+    /// Values of the cell itself; `moments` is `None`.
     pub fn found(&self, cell: Cell, matter: &SheetDensity) -> CellSample {
         let (k_d, k_s) = cell.k_codes();
         CellSample { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
     }
 
-    /// Between the centres of the eight cells around the point in the middle of a ray's way through a cell;
-    /// the ray starts at `origin` and goes along `direction`, in the level's cells.
+    /// Values interpolated between the eight cell centres around the midpoint of the ray's segment in a cell.
+    /// The ray starts at `origin` and runs along `direction`, both in the level's cells.
+    ///
+    /// x and y wrap; z is clamped to the slab. k and the moments are means weighted by ρ.
     pub fn between(
         &self,
         crossing: &Crossing,
@@ -91,22 +94,23 @@ impl<'a> Level<'a> {
             let away = IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);
             let shares = Vec3::select(away.cmpeq(IVec3::ZERO), 1.0 - far, far);
             let c = crossing.cell + side * away;
-            let at = IVec3::new(
+            let index = IVec3::new(
                 c.x.rem_euclid(self.size.x),
                 c.y.rem_euclid(self.size.y),
                 c.z.clamp(0, self.size.z - 1),
             );
-            let cell = self.cell(at);
+            let cell = self.cell(index);
             let weight = shares.x * shares.y * shares.z * cell.rho_code() as f32;
             let (k_d, k_s) = cell.k_codes();
             rho += weight;
             k[0] += weight * k_d as f32;
             k[1] += weight * k_s as f32;
-            // The length of a direction's code is no weight of it.
-            let of = self.moments(cell);
-            let share = weight / of.diagonal.element_sum().max(1e-20);
-            moments.diagonal += of.diagonal * share;
-            moments.mixed += of.mixed * share;
+            // The direction's code is not of unit length; dividing by the trace keeps that from acting as a
+            // weight.
+            let own = self.moments(cell);
+            let share = weight / own.diagonal.element_sum().max(1e-20);
+            moments.diagonal += own.diagonal * share;
+            moments.mixed += own.mixed * share;
         }
         let inverse = 1.0 / rho.max(1e-20);
         CellSample {
@@ -117,19 +121,22 @@ impl<'a> Level<'a> {
     }
 }
 
-/// What a ray finds.
+/// Values that a ray reads in one cell.
 pub struct CellSample {
-    /// In codes, of what the sheet leaves.
+    /// ρ on the sheet ([`SheetDensity::rho`]), in codes, 0 to 65535.
     pub rho: f32,
-    /// k_d and k_s, in codes.
+    /// k_d and k_s, in codes, 0 to 255.
     pub k: [f32; 2],
-    /// Of the directions, in any unit, where they are of several cells. Those of one are worked out where
-    /// they are asked for: it would be a third of the walk.
+    /// Second moments of the directions of several cells, in any unit. `None` for a single cell: the caller
+    /// computes its moments when it needs them, because computing them always would cost a third of the walk.
     pub moments: Option<Moments>,
 }
 
-/// Which level's cells are as large as a sample's footprint, and the share of the next: 4^level cells lie
-/// across the ray in it. The ray goes along the unit vector `d_world` for `t` metres.
+/// Level whose cells are as large as a sample's footprint: the footprint covers 4^level cells across the ray.
+/// The fraction is the share of the next coarser level; the result is not clamped to the levels there are.
+///
+/// `footprint` is the solid angle of one sample at the image centre, in sr; `forward` and `d_world` are unit
+/// vectors; `t` is the distance along the ray in metres; `d_cell` is the ray's direction in cells per metre.
 pub fn level_at(
     footprint: f32,
     forward: Vec3,

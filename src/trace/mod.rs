@@ -1,4 +1,4 @@
-//! §4 The trace: what view rays find on their way through the volume.
+//! §4 The trace: how view rays sample the volume, cell by cell.
 
 mod levels;
 pub mod lookup;

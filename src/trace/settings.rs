@@ -1,55 +1,55 @@
-//! §4 How view rays go through the volume.
+//! §4 Settings of the trace: attenuation, limits, prefilter and lookup.
 
 use crate::util::words::words;
 
-/// How view rays go through the volume.
+/// Settings of the walk that view rays take through the volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trace {
-    /// τ_k of a cell.
+    /// Optical depth τ_k of a cell.
     pub attenuation: Attenuation,
-    /// Most cells of one ray.
+    /// Maximum number of cells that one ray visits.
     pub max_cells: u32,
-    /// A ray ends where T falls below this; 0: never.
+    /// Transmittance below which a ray ends, 0 to 1; at 0 no ray ends early.
     pub early_end: f32,
-    /// Most sheets one ray goes through.
+    /// Maximum number of sheets that one ray passes through.
     pub layers: u32,
-    /// Whether far away coarser levels of the volume are walked.
+    /// Filter for distant water: whether rays walk coarser levels of the volume.
     pub filter: Prefilter,
-    /// What a ray finds in a cell.
+    /// Reconstruction of a cell's values.
     pub lookup: Lookup,
 }
 
-/// How views that see many cells in one pixel are kept from aliasing.
+/// Filter against aliasing where one pixel covers many cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prefilter {
-    /// They are not.
+    /// No filter: every ray walks the volume's own cells.
     None,
-    /// By levels of fewer cells, the two that suit the pixel's footprint.
+    /// Coarser levels of the volume; a ray blends the two nearest to the pixel's footprint.
     Pyramid,
 }
 
 words! { Prefilter { None => "none", Pyramid => "pyramid" } }
 
-/// What a ray finds in a cell.
+/// Reconstruction of the values that a ray reads in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lookup {
-    /// The cell's own.
+    /// The cell's own values.
     Nearest,
-    /// At the middle of its way through the cell, what lies between the centres of eight cells.
+    /// Trilinear interpolation between eight cell centres, at the midpoint of the ray's segment in the cell.
     Trilinear,
 }
 
 words! { Lookup { Nearest => "nearest", Trilinear => "trilinear" } }
 
-/// τ_k of a cell with density ρ.
+/// Optical depth τ_k of a cell with density ρ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Attenuation {
-    /// σ·ρ·Δs, σ in 1/m.
+    /// τ_k = σ·ρ·Δs, with Δs the metres of the ray inside the cell.
     PathLength {
         /// Extinction at ρ = 1, 1/m.
         sigma: f32,
     },
-    /// τ·ρ.
+    /// τ_k = τ·ρ, whatever the length of the ray inside the cell.
     PerCell {
         /// Optical depth at ρ = 1.
         tau: f32,
@@ -77,8 +77,8 @@ impl Attenuation {
     }
 }
 
-/// Optical depth in bits (log₂ of the transmittance) per unit of a cell's ρ code, and per metre with
-/// path-length attenuation: the walk then needs one product and `exp2`.
+/// Optical depth in bits (−log₂ T) per unit of a cell's ρ code, and per metre with path-length attenuation.
+/// In this unit the walk needs one product and one `exp2` per cell.
 pub fn extinction(attenuation: &Attenuation, alpha: f32) -> f32 {
     let per_rho = match *attenuation {
         Attenuation::PathLength { sigma } => sigma,
@@ -87,8 +87,10 @@ pub fn extinction(attenuation: &Attenuation, alpha: f32) -> f32 {
     (per_rho as f64 * alpha as f64 / 65535.0 * std::f64::consts::LOG2_E) as f32
 }
 
-/// How far `flow` lengths of the volume move its `ny` cells, without the whole lengths: they change
-/// nothing, for copies of the volume join along y. In float64, so that whole numbers give exactly 0.
+/// Shift along y, in cells, of a volume of `ny` cells that has flowed by `flow` times its length.
+///
+/// Whole lengths are dropped because copies of the volume join along y. The arithmetic is float64, so a whole
+/// number of lengths gives exactly 0.
 pub fn flow_cells(flow: f32, ny: u32) -> f32 {
     ((flow as f64).rem_euclid(1.0) * ny as f64) as f32
 }

@@ -1,10 +1,12 @@
-//! Environment maps from files: Radiance `.hdr` (RGBE) and OpenEXR `.exr` (R, G, B of the first part that has
-//! them; half, float or integer, lines or tiles, any compression but DWA, the finest level).
+//! Environment maps in files: Radiance `.hdr` (RGBE) and OpenEXR `.exr`.
 //!
-//! Values are linear radiance with the primaries of Rec. 709. Those of an `.hdr` are divided by its EXPOSURE
-//! and COLORCORR. An alpha channel is not looked at: colours of an EXR are multiplied by it already. Values
-//! below zero, which resampling leaves beside bright texels, count as 0 and are counted; a value that is no
-//! number, infinite or larger than [`MAX_RADIANCE`] refuses the file.
+//! An `.exr` file may store half, float or integer values in lines or tiles, with any compression but DWA.
+//! The reader takes R, G and B at the finest level of the first part that has them.
+//!
+//! Values are linear radiance with the primaries of Rec. 709. Values of an `.hdr` file are divided by its
+//! EXPOSURE and COLORCORR. An alpha channel is ignored, because the colours of an EXR are multiplied by it
+//! already. Values below zero, which resampling leaves beside bright texels, are replaced by 0 and counted. A
+//! file with a value that is not a number, infinite or larger than [`MAX_RADIANCE`] is refused.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -18,30 +20,32 @@ use image::codecs::hdr::HdrDecoder;
 use super::map::Map;
 use crate::util::error::{Error, Result};
 
-/// Largest radiance of a texel: that of the sun's disc is 2e5.
+/// Maximum radiance of a texel. The sun's disc has 2e5.
 pub const MAX_RADIANCE: f32 = 1e9;
-/// Most bytes before the pixels.
+/// Maximum size of a file's header, bytes.
 const HEADER_BYTES: u64 = 1 << 20;
-/// Most columns or rows: what a texture coordinate in float32 still tells apart.
+/// Maximum number of columns or rows. A texture coordinate in float32 cannot distinguish more.
 const MAX_SIDE: u64 = 1 << 17;
-/// Bytes of a texel on the host and on the device, and of the decoder's own copy.
+/// Memory per texel, bytes: on the host, on the device, and in the decoder's own copy.
 const TEXEL_BYTES: u128 = 16 + 16 + 16;
 
-/// A map as a file holds it.
+/// Map read from a file.
 #[derive(Debug)]
 pub struct FileMap {
     /// The map.
     pub map: Map,
-    /// Values below zero that were taken as 0.
+    /// Number of values below zero that were replaced by 0.
     pub negative: u64,
 }
 
-/// Reads a map. Nothing of the size that the file claims is allocated before that was compared with `budget`
-/// bytes.
+/// Reads a map. The size that the file states is compared with `budget`, in bytes, before memory is allocated
+/// for it.
 ///
 /// # Errors
-/// [`Error::Input`] naming the file where it is none of these, broken, or holds a value that is no radiance;
-/// [`Error::Memory`] where it is too large; [`Error::Io`] where it cannot be read.
+/// - [`Error::Input`], which names the file, if the file is missing, of another format or broken, or if it
+///   holds a value that is not a radiance.
+/// - [`Error::Memory`] if the map is too large.
+/// - [`Error::Io`] if the file cannot be read.
 pub fn read(path: &Path, budget: u64) -> Result<FileMap> {
     let meta = std::fs::metadata(path).map_err(|e| match e.kind() {
         ErrorKind::NotFound => bad(path, e),
@@ -60,7 +64,7 @@ pub fn read(path: &Path, budget: u64) -> Result<FileMap> {
 }
 
 fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
-    // Words of libraries may have lines.
+    // Messages of libraries may span several lines.
     let why = why.to_string().replace(['\n', '\r'], " ");
     Error::input(
         format!("environment map {}: {why}", path.display()),
@@ -68,8 +72,8 @@ fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     )
 }
 
-/// A file that ends too early, or leads to places that no file has, is broken; others that cannot be read are
-/// a fault of the disk.
+/// Turns an error of reading into one of the program. A file that ends too early or contains impossible
+/// offsets is broken; any other failure is an I/O error.
 fn unreadable(path: &Path, e: std::io::Error) -> Error {
     match e.kind() {
         ErrorKind::UnexpectedEof | ErrorKind::InvalidInput | ErrorKind::InvalidData => bad(path, e),
@@ -101,9 +105,9 @@ fn read_hdr(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
     let mut start = Vec::new();
     (&mut file).take(HEADER_BYTES).read_to_end(&mut start).map_err(io)?;
     if !start.starts_with(b"#?RADIANCE") && !start.starts_with(b"#?RGBE") {
-        return Err(bad(path, "it does not begin as a Radiance picture"));
+        return Err(bad(path, "it does not start with #?RADIANCE or #?RGBE"));
     }
-    // The decoder takes lines of any length.
+    // The decoder does not limit the length of a header line, so the end of the header is checked here.
     if !start.windows(2).any(|pair| pair == b"\n\n") {
         return Err(bad(path, "its header has no end"));
     }
@@ -122,7 +126,7 @@ fn read_hdr(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
     let (r, g, b) = meta.color_correction.unwrap_or((1.0, 1.0, 1.0));
     let divisors = [r * exposure, g * exposure, b * exposure];
     if !divisors.iter().all(|d| d.is_normal() && *d > 0.0) {
-        return Err(bad(path, format!("its EXPOSURE and COLORCORR make factors of {divisors:?}")));
+        return Err(bad(path, format!("its EXPOSURE and COLORCORR give the divisors {divisors:?}")));
     }
     let mut values = vec![0.0f32; width as usize * height as usize * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut values)).map_err(fault)?;
@@ -147,7 +151,7 @@ fn read_exr(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
         return Err(bad(path, "no part of it has channels R, G and B"));
     };
     let size = header.layer_size;
-    // A block may hold the whole, packed and unpacked.
+    // One block may hold the whole image, compressed and uncompressed.
     let bytes: u128 = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample() as u128).sum();
     let bytes = bytes * size.0 as u128 * size.1 as u128 * 2;
     check_size(path, size.0 as u64, size.1 as u64, bytes, budget)?;
@@ -157,8 +161,8 @@ fn read_exr(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
         .largest_resolution_level()
         .rgb_channels(
             |size: Vec2<usize>, _| (size.0, vec![[0.0f32; 4]; size.0 * size.1]),
-            |(width, texels): &mut (usize, Vec<[f32; 4]>), at, (r, g, b): (f32, f32, f32)| {
-                texels[at.1 * *width + at.0] = [r, g, b, 0.0];
+            |(width, texels): &mut (usize, Vec<[f32; 4]>), position, (r, g, b): (f32, f32, f32)| {
+                texels[position.1 * *width + position.0] = [r, g, b, 0.0];
             },
         )
         .first_valid_layer()
@@ -170,7 +174,7 @@ fn read_exr(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
     checked(path, Map { width: size.0 as u32, height: size.1 as u32, texels })
 }
 
-/// Applies the rule for values that are no radiance.
+/// Replaces negative and subnormal values by 0, and refuses a map with a value that is not a radiance.
 fn checked(path: &Path, mut map: Map) -> Result<FileMap> {
     let mut negative = 0;
     for (i, texel) in map.texels.iter_mut().enumerate() {

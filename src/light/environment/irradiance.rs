@@ -1,6 +1,6 @@
-//! Irradiance on a surface of any direction from nine numbers a colour: the spherical harmonics of a map up
-//! to the second order, times those of the clamped cosine (Ramamoorthi and Hanrahan 2001, "An Efficient
-//! Representation for Irradiance Environment Maps", eqs. 5 to 10).
+//! Irradiance of a map on a surface of any direction, from nine coefficients per colour: the spherical
+//! harmonics of the map up to the second order, multiplied by those of the clamped cosine (Ramamoorthi and
+//! Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps", eqs. 5 to 10).
 
 use std::f64::consts::PI;
 
@@ -8,12 +8,13 @@ use glam::{DVec3, Vec3};
 
 use super::moments::TERMS;
 
-/// E(n)/π: what a white diffuse surface with normal n sends back, in the radiance's unit. The coefficients of
-/// 1, x, y, z, xy, yz, 3y² − 1, xz and x² − z².
+/// E(n)/π, the radiance of a white diffuse surface with normal n, in the unit of the map. The nine
+/// coefficients belong to 1, x, y, z, xy, yz, 3y² − 1, xz and x² − z².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Irradiance(pub [Vec3; TERMS]);
 
-/// A_l·N² of each term, where Y = N·term is the real harmonic and A_l = π, 2π/3, π/4 the clamped cosine's.
+/// A_l·N² of each term, with Y = N·term the real harmonic and A_l = π, 2π/3, π/4 the clamped cosine's
+/// coefficients.
 const COSINE: [f64; TERMS] = [
     1.0 / 4.0,
     1.0 / 2.0,
@@ -27,13 +28,14 @@ const COSINE: [f64; TERMS] = [
 ];
 
 impl Irradiance {
-    /// From a map's moments, for an environment that is `factor` as bright and turned by `turn` (1: once
-    /// round) about +y, from +z towards +x.
+    /// Irradiance from a map's moments ([`moments_of_map`](super::moments_of_map)), scaled by `factor` and
+    /// rotated by `turn` turns about +y, from +z towards +x.
     pub fn new(moments: &[DVec3; TERMS], turn: f64, factor: f64) -> Irradiance {
         let [one, x, y, z, xy, yz, yy, xz, xx_zz] = *moments;
         let (sin, cos) = (turn * 2.0 * PI).sin_cos();
         let (sin2, cos2) = (turn * 4.0 * PI).sin_cos();
-        // z and x, yz and xy turn once with the map; x² − z² and 2xz twice.
+        // The pairs z, x and yz, xy rotate by the angle of the map, the pair x² − z², 2xz by twice that
+        // angle.
         let turned = [
             one,
             x * cos + z * sin,
@@ -52,7 +54,7 @@ impl Irradiance {
         Irradiance(terms)
     }
 
-    /// E(n)/π at a unit normal, never negative. Twin: `environment_irradiance` in
+    /// E(n)/π for the unit normal `n`, never negative. Twin: `environment_irradiance` in
     /// `shaders/light/environment.wgsl`.
     pub fn at(&self, n: Vec3) -> Vec3 {
         let c = &self.0;

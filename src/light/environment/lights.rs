@@ -1,46 +1,49 @@
-//! Directional lights that stand for a map where every light is walked to: the volume.
+//! Directional lights that approximate a map in the volume, where visibility is walked for each light.
 //!
-//! The map is cut into rectangles, each time where the cut takes most of the variance of direction in them,
-//! weighted by power (Viriyothai and Debevec 2009, "Variance Minimization Light Probe Sampling"; the median
-//! cut of Debevec 2005 cuts into equal powers instead). A rectangle becomes one light with all its power from
-//! its power's centroid.
+//! The map is cut into rectangles. Each cut is the one that most reduces the variance of direction, weighted
+//! by power (Viriyothai and Debevec 2009, "Variance Minimization Light Probe Sampling"; the median cut of
+//! Debevec 2005 cuts into equal powers instead). A rectangle becomes one light with all its power, in the
+//! direction of the power's centroid.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::moments::{Beam, Cells, luminance};
 
-/// Variance that is not worth a cut, of the map's power: a tenth of a texel of the finest map, squared.
+/// Minimum variance that a cut must remove, as a share of the map's power: the square of a tenth of a texel
+/// of the finest map.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Normals that the error is measured on.
+/// Number of normals at which the error is measured.
 const NORMALS: usize = 128;
-/// Cells that it is measured with, columns and rows: those that a horizon cuts change it by 2e-4 of the mean.
+/// Number of columns and rows of cells with which the error is measured. Cells that a normal's horizon cuts
+/// change the error by 2e-4 of the mean.
 const COARSE: [usize; 2] = [128, 64];
 
-/// The lights of an unturned map.
+/// Lights that approximate a map without rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightSet {
-    /// Unit direction towards each light, and its irradiance ∫ L dω on a surface that faces it.
+    /// Unit direction towards each light, and the light's irradiance ∫ L dω (linear RGB) on a surface that
+    /// faces it.
     pub lights: Vec<(DVec3, DVec3)>,
 }
 
-/// A rectangle of cells: columns and rows, half open.
+/// Rectangle of cells, as a half-open range of columns and rows.
 #[derive(Clone, Copy, Debug)]
 struct Region {
     from: [usize; 2],
     to: [usize; 2],
 }
 
-/// A region with the best cut through it.
+/// Region with the best cut through it.
 struct Candidate {
     region: Region,
-    /// Variance that the cut takes away.
+    /// Variance that the cut removes.
     gain: f64,
     halves: [Region; 2],
 }
 
-/// Sums over all cells above and to the left: luminous power, and its first moments.
+/// Summed-area table of luminous power and its first moments: sums over all cells above and to the left.
 struct Table {
     stride: usize,
     sums: Vec<[f64; 4]>,
@@ -65,7 +68,7 @@ impl Table {
         Table { stride, sums }
     }
 
-    /// Σ w·|d − mean|² = w − |Σ w·d|²/w, for |d| = 1.
+    /// Variance Σ w·|d − mean|² = w − |Σ w·d|²/w of unit directions d in a region.
     fn variance(&self, Region { from, to }: Region) -> f64 {
         let at = |x: usize, y: usize| &self.sums[y * self.stride + x];
         let [a, b, c, d] = [at(to[0], to[1]), at(from[0], to[1]), at(to[0], from[1]), at(from[0], from[1])];
@@ -73,6 +76,7 @@ impl Table {
         if w <= 0.0 { 0.0 } else { (w - (x * x + y * y + z * z) / w).max(0.0) }
     }
 
+    /// Finds the cut through a region that removes the most variance.
     fn candidate(&self, region: Region) -> Candidate {
         let whole = self.variance(region);
         let mut best = Candidate { region, gain: 0.0, halves: [region; 2] };
@@ -92,15 +96,15 @@ impl Table {
 }
 
 impl LightSet {
-    /// At most `count` lights for a map; fewer where more would gain nothing, none where no light comes from.
-    /// Their irradiances sum up to the map's ∫ L dω.
+    /// At most `count` lights for a map; fewer if further cuts gain nothing, and none in black regions. Their
+    /// irradiances add up to the map's ∫ L dω.
     pub fn new(cells: &Cells, count: u32) -> LightSet {
         let table = Table::new(cells);
         let whole = Region { from: [0, 0], to: cells.size };
         let least = table.sums.last().map_or(0.0, |all| all[0]) * LEAST_GAIN;
         let mut regions = vec![table.candidate(whole)];
         while regions.len() < count as usize {
-            // The first of equals: one map, one set.
+            // The first of equal regions is cut, so that one map always gives one set.
             let mut best = 0;
             for (i, region) in regions.iter().enumerate() {
                 if region.gain > regions[best].gain {
@@ -114,10 +118,11 @@ impl LightSet {
             regions[best] = table.candidate(first);
             regions.push(table.candidate(second));
         }
-        // Of the cells again: differences of the table's sums would lose the digits of faint regions.
+        // The beams are summed from the cells, because differences of the table's sums would lose the digits
+        // of faint regions.
         let lights = regions.iter().map(|r| beam(cells, r.region)).filter(|b| luminance(b.power) > 0.0);
         let lights = lights.map(|b| {
-            // Light from everywhere alike has no direction but that of its rounding: it comes from above.
+            // Uniform light has only a direction of rounding errors, so it is taken to come from above.
             let directed = b.first.length() > 1e-9 * luminance(b.power);
             (if directed { b.first.normalize() } else { DVec3::Y }, b.power)
         });
@@ -125,17 +130,19 @@ impl LightSet {
         LightSet { lights }
     }
 
-    /// How far the irradiance of the lights is from that of the map: the root of the mean square over normals
-    /// spread evenly over the sphere, in luminance, relative to the map's mean irradiance. 0 for a black map.
+    /// Error of the lights' irradiance: the root mean square of its difference to the map's, in luminance,
+    /// over normals spread evenly over the sphere, relative to the map's mean irradiance. It is 0 for a black
+    /// map.
     pub fn error(&self, cells: &Cells) -> f64 {
-        let of_lights = |n: DVec3| {
+        let irradiance = |n: DVec3| {
             self.lights.iter().map(|(to, power)| luminance(*power) * n.dot(*to).max(0.0)).sum::<f64>()
         };
-        error_of(cells, of_lights)
+        error_of(cells, irradiance)
     }
 }
 
-/// As [`LightSet::error`], for any other stand-in: E(n) in luminance.
+/// Error, as in [`LightSet::error`], of any function that approximates the map's irradiance E(n) in
+/// luminance.
 pub fn error_of(cells: &Cells, irradiance: impl Fn(DVec3) -> f64 + Sync) -> f64 {
     let [columns, rows] = cells.size;
     let step = [columns.div_ceil(COARSE[0]), rows.div_ceil(COARSE[1])];
@@ -148,7 +155,7 @@ pub fn error_of(cells: &Cells, irradiance: impl Fn(DVec3) -> f64 + Sync) -> f64 
         .into_par_iter()
         .map(|i| {
             let n = normal(i);
-            // Exact but for cells that the horizon of n cuts.
+            // The map's irradiance is exact except for cells that the horizon of n cuts.
             [firsts.iter().map(|first| first.dot(n).max(0.0)).sum(), irradiance(n)]
         })
         .collect();
@@ -157,7 +164,7 @@ pub fn error_of(cells: &Cells, irradiance: impl Fn(DVec3) -> f64 + Sync) -> f64 
     if mean > 0.0 { square.sqrt() / mean } else { 0.0 }
 }
 
-/// Point i of a spiral with equal areas and the golden angle.
+/// Unit vector i of a golden-angle spiral that covers the sphere with equal areas.
 fn normal(i: usize) -> DVec3 {
     let y = 1.0 - (2 * i + 1) as f64 / NORMALS as f64;
     let (sin, cos) = (i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
@@ -165,6 +172,7 @@ fn normal(i: usize) -> DVec3 {
     DVec3::new(r * sin, y, r * cos)
 }
 
+/// Sum of the beams in a region.
 fn beam(cells: &Cells, Region { from, to }: Region) -> Beam {
     let mut sum = Beam::default();
     for y in from[1]..to[1] {
@@ -173,7 +181,7 @@ fn beam(cells: &Cells, Region { from, to }: Region) -> Beam {
     sum
 }
 
-/// A direction turned by `turn` (1: once round) about +y, from +z towards +x.
+/// Rotates a direction by `turn` turns about +y, from +z towards +x.
 pub fn turned(d: DVec3, turn: f64) -> Vec3 {
     let (sin, cos) = (turn * std::f64::consts::TAU).sin_cos();
     DVec3::new(d.x * cos + d.z * sin, d.y, d.z * cos - d.x * sin).as_vec3()

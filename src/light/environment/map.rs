@@ -1,7 +1,7 @@
-//! The equirectangular map: where a direction lies in it, and the radiance it has there.
+//! Equirectangular map: the texture coordinates of a direction, and the radiance there.
 //!
-//! u runs from left to right, v from top (straight up, +y) to bottom. The middle column is seen looking along
-//! −z, as a camera stands by default, with +x to its right; the left and the right edge meet at +z:
+//! u runs from left to right, v from the top (straight up, +y) to the bottom. The middle column lies at −z,
+//! where a camera looks by default, with +x to its right. The left and right edges meet at +z:
 //!
 //! ```text
 //! u = ½ + atan2(x, −z)/2π        x =  cos φ · sin 2π(u − ½)
@@ -12,14 +12,14 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::{DVec3, Vec3};
 
-/// Linear RGB radiance from every direction.
+/// Radiance from every direction, linear RGB.
 #[derive(PartialEq)]
 pub struct Map {
-    /// Columns, at least 1.
+    /// Number of columns, at least 1.
     pub width: u32,
-    /// Rows, at least 1.
+    /// Number of rows, at least 1.
     pub height: u32,
-    /// Radiance as r, g, b, and nothing: as the device wants it. Row by row from the top.
+    /// Radiance as r, g, b and padding, the device's format. Row by row from the top.
     pub texels: Vec<[f32; 4]>,
 }
 
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Map {
 }
 
 /// Coefficients of arctan x ≈ x·Σ a_k·x^(2k) on 0 ≤ x ≤ 1, good to 2e-8 (Abramowitz and Stegun 1964, 4.4.49).
-/// Devices have an arctangent of their own; here the map is to be seen at the same place by both engines.
+/// Devices have an arctangent of their own; with this one both engines see the map in the same position.
 pub const ARCTAN: [f32; 9] = [
     1.0,
     -0.333_331_47,
@@ -43,8 +43,8 @@ pub const ARCTAN: [f32; 9] = [
     0.002_866_225_7,
 ];
 
-/// Angle of (x, y) from the x axis, −π to π; 0 at the origin.
-/// Twin: `angle_of` in `shaders/light/environment.wgsl`.
+/// Angle of (x, y) from the x axis, −π to π radians; 0 at the origin. Twin: `angle_of` in
+/// `shaders/light/environment.wgsl`.
 pub fn angle_of(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let r = ax.min(ay) / ax.max(ay).max(1e-30);
@@ -63,15 +63,15 @@ pub fn angle_of(y: f32, x: f32) -> f32 {
     if y < 0.0 { -angle } else { angle }
 }
 
-/// Where a unit direction lies in a map that was turned by `turn` (1: once round) about +y, from +z towards
-/// +x: u from 0 to 1, v from 0 to 1.
+/// Texture coordinates (u, v), each from 0 to 1, of a unit direction in a map rotated by `turn` turns about
+/// +y, from +z towards +x.
 pub fn uv_of(d: Vec3, turn: f32) -> [f32; 2] {
     let u = 0.5 + angle_of(d.x, -d.z) * (0.5 * FRAC_1_PI) + turn;
     let v = 0.5 - angle_of(d.y, (d.x * d.x + d.z * d.z).sqrt()) * FRAC_1_PI;
     [u - u.floor(), v]
 }
 
-/// The unit direction at a place of an unturned map.
+/// Unit direction at the texture coordinates (u, v) of a map without rotation.
 pub fn direction_at(u: f64, v: f64) -> DVec3 {
     let (sin_phi, cos_phi) = ((0.5 - v) * std::f64::consts::PI).sin_cos();
     let (sin, cos) = ((u - 0.5) * std::f64::consts::TAU).sin_cos();
@@ -79,8 +79,9 @@ pub fn direction_at(u: f64, v: f64) -> DVec3 {
 }
 
 impl Map {
-    /// The radiance between the four texels around a place: linear, across the left and right edge too; above
-    /// the middles of the first row, and below those of the last, theirs. Twin: `environment_radiance`.
+    /// Radiance at texture coordinates, interpolated linearly between four texels. The interpolation wraps
+    /// across the left and right edges and is clamped to the centres of the first and last row. Twin:
+    /// `environment_radiance` in `shaders/light/environment.wgsl`.
     pub fn radiance(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (columns, rows) = (self.width as f32, self.height as f32);
         let s = u * columns - 0.5;
@@ -102,24 +103,24 @@ impl Map {
         Vec3::new(r, g, b)
     }
 
-    /// The same map with at least so many columns and rows; none if it has them.
+    /// Map resampled to at least `columns` × `rows` texels, or `None` if it has them already.
     pub fn enlarged(&self, columns: u32, rows: u32) -> Option<Map> {
         if self.width >= columns && self.height >= rows {
             return None;
         }
         let (width, height) = (self.width.max(columns), self.height.max(rows));
-        let place = |i: u32, n: u32| (i as f32 + 0.5) / n as f32;
-        let texel = |x, y| self.radiance([place(x, width), place(y, height)]).extend(0.0).to_array();
+        let centre = |i: u32, n: u32| (i as f32 + 0.5) / n as f32;
+        let texel = |x, y| self.radiance([centre(x, width), centre(y, height)]).extend(0.0).to_array();
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(x, y))).collect();
         Some(Map { width, height, texels })
     }
 
-    /// Bytes of its texels.
+    /// Memory of the texels, bytes.
     pub fn bytes(&self) -> u64 {
         self.texels.len() as u64 * 16
     }
 
-    /// CRC-32 of size and texels.
+    /// CRC-32 of the size and the texels.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(bytemuck::bytes_of(&[self.width, self.height]));

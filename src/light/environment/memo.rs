@@ -1,4 +1,4 @@
-//! Environments that were made, so that the next scene, frame or stroke of a slider finds them again.
+//! Cache of baked environments, so that the next scene, frame or slider movement finds them again.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -13,45 +13,45 @@ use super::sky::Sky;
 use super::{Source, file};
 use crate::util::error::Result;
 
-/// Environments that are kept: what a slider or a sweep goes to and fro between.
-const KEPT: usize = 2;
+/// Number of cached environments: a slider or a sweep alternates between two.
+const CACHED_ENVIRONMENTS: usize = 2;
 
-/// A map with all that follows from it alone.
+/// Map with everything that is computed from it alone.
 #[derive(Debug)]
 pub struct Baked {
-    /// Radiance.
+    /// Radiance map.
     pub map: Arc<Map>,
-    /// ∫ L·b dω of the terms of [`Irradiance`](super::Irradiance).
+    /// Integrals ∫ L·b dω for the terms b of [`Irradiance`](super::Irradiance).
     pub moments: [DVec3; TERMS],
-    /// The map in few cells.
+    /// The map at the coarse resolution from which lights are chosen.
     pub cells: Cells,
-    /// Irradiance of the sun on a surface that faces it; zero without one.
+    /// Irradiance of the sun on a surface that faces it; zero without a sun.
     pub sun: DVec3,
-    /// The largest component of a texel.
+    /// Largest component of any texel.
     pub brightest: f32,
-    /// Values of the file that were below zero.
+    /// Number of values in the file that were below zero.
     pub negative: u64,
     lights: Mutex<Option<Lights>>,
 }
 
-/// Lights of a map.
+/// Lights of a map, with their error once it has been measured.
 #[derive(Debug)]
 struct Lights {
-    /// At most so many.
+    /// Requested maximum number of lights.
     count: u32,
     set: Arc<LightSet>,
     error: Option<f64>,
 }
 
-/// Fewest columns and rows that are summed over: smaller maps are enlarged for it.
-const FINE: [u32; 2] = [128, 64];
+/// Minimum number of columns and rows of a map whose texels are summed. Smaller maps are enlarged first,
+/// because sums over large texels are inaccurate.
+const MIN_SUMMED: [u32; 2] = [128, 64];
 
 impl Baked {
-    /// What follows from a map.
+    /// Computes everything that depends on the map alone.
     pub fn new(map: Map, sun: DVec3, negative: u64) -> Baked {
-        // Sums over texels are good where these are small.
-        let fine = map.enlarged(FINE[0], FINE[1]);
-        let summed = fine.as_ref().unwrap_or(&map);
+        let enlarged = map.enlarged(MIN_SUMMED[0], MIN_SUMMED[1]);
+        let summed = enlarged.as_ref().unwrap_or(&map);
         Baked {
             moments: of_map(summed),
             cells: Cells::new(summed),
@@ -63,12 +63,12 @@ impl Baked {
         }
     }
 
-    /// At most `count` lights; the last ones that were asked for are kept.
+    /// At most `count` lights that approximate the map. The last set is cached.
     pub fn lights(&self, count: u32) -> Arc<LightSet> {
         self.with_lights(count, |lights| lights.set.clone())
     }
 
-    /// How far they are off: see [`LightSet::error`].
+    /// Relative error of those lights; see [`LightSet::error`].
     pub fn error(&self, count: u32) -> f64 {
         self.with_lights(count, |Lights { set, error, .. }| {
             *error.get_or_insert_with(|| set.error(&self.cells))
@@ -76,32 +76,36 @@ impl Baked {
     }
 
     fn with_lights<T>(&self, count: u32, get: impl FnOnce(&mut Lights) -> T) -> T {
-        let mut kept = lock(&self.lights);
-        if kept.as_ref().is_none_or(|lights| lights.count != count) {
-            *kept = None;
+        let mut cached = lock(&self.lights);
+        if cached.as_ref().is_none_or(|lights| lights.count != count) {
+            *cached = None;
         }
         let new = || Lights { count, set: Arc::new(LightSet::new(&self.cells, count)), error: None };
-        get(kept.get_or_insert_with(new))
+        get(cached.get_or_insert_with(new))
     }
 }
 
-/// What tells one environment from the next.
+/// Key of an environment in the cache.
 #[derive(Clone, Debug, PartialEq)]
 enum Key {
     Sky(Sky),
-    /// Path, and what tells one version of the file from the next.
+    /// Path of a file with its modification time and its size in bytes, which tell versions of it apart.
     File(PathBuf, Option<SystemTime>, u64),
 }
 
-/// Shared by all copies: the scenes of one run.
+/// Cache of environments. All clones share it, and with them the scenes of one run.
 #[derive(Clone, Debug, Default)]
-pub struct EnvironmentStock(Arc<Mutex<Kept>>);
+pub struct EnvironmentStock(Arc<Mutex<EnvironmentCache>>);
 
-/// The latest first.
-type Kept = Vec<(Key, Arc<Baked>)>;
+/// Cached environments, the most recently used first.
+type EnvironmentCache = Vec<(Key, Arc<Baked>)>;
 
 impl EnvironmentStock {
-    /// The source's map, from the stock if it is there. A file of at most `memory` bytes.
+    /// Returns the source's baked map, from the cache if it is there. Reading a file may take at most
+    /// `memory` bytes.
+    ///
+    /// # Errors
+    /// Returns the errors of [`read_map`](super::read_map) if the source is a file.
     pub fn baked(&self, source: &Source, memory: u64) -> Result<Arc<Baked>> {
         let key = match source {
             Source::Sky(sky) => Key::Sky(*sky),
@@ -111,15 +115,16 @@ impl EnvironmentStock {
                 Key::File(path.clone(), changed, meta.map_or(0, |m| m.len()))
             }
         };
-        // Held while it is made: whoever wants the same waits for it instead of making it again.
-        let mut kept = lock(&self.0);
-        if let Some(i) = kept.iter().position(|(of, _)| *of == key) {
-            let found = kept.remove(i);
-            kept.insert(0, found);
-            return Ok(kept[0].1.clone());
+        // The lock is held while an environment is baked, so that other threads wait for it instead of baking
+        // it again.
+        let mut cache = lock(&self.0);
+        if let Some(i) = cache.iter().position(|(cached, _)| *cached == key) {
+            let hit = cache.remove(i);
+            cache.insert(0, hit);
+            return Ok(cache[0].1.clone());
         }
-        // Old ones go first: two large ones might not fit.
-        kept.truncate(KEPT - 1);
+        // Old entries are dropped first, because two large ones beside a new one might not fit.
+        cache.truncate(CACHED_ENVIRONMENTS - 1);
         let baked = Arc::new(match source {
             Source::Sky(sky) => {
                 let baked = sky.bake();
@@ -130,7 +135,7 @@ impl EnvironmentStock {
                 Baked::new(read.map, DVec3::ZERO, read.negative)
             }
         });
-        kept.insert(0, (key, baked.clone()));
+        cache.insert(0, (key, baked.clone()));
         Ok(baked)
     }
 }

@@ -1,10 +1,9 @@
-//! The light of the surroundings: a sky or a picture of somewhere, seen where nothing is, lighting rock and
-//! water.
+//! §5 Environment light: a sky or a photographed map that forms the background and lights rock and water.
 //!
-//! One [`Map`] of radiance serves three ways. The background is the map itself. Rock takes its irradiance
-//! from nine [spherical harmonics](Irradiance). Water is walked through towards lights, so there a
-//! [`LightSet`] stands for the map, and how far it is off is [measured](Environment::error). The sun of a sky
-//! is none of this but a light of its own.
+//! One [`Map`] of radiance has three uses. It is the background. Nine [spherical harmonics](Irradiance) of it
+//! light the rock. In the water, where visibility needs separate lights, a [`LightSet`] approximates it, and
+//! [`Environment::error`] measures the approximation. The sun of a sky is not part of the map but a light of
+//! its own.
 
 mod file;
 mod irradiance;
@@ -33,42 +32,43 @@ pub use sun::{ANGULAR_RADIUS, air_mass, irradiance as sun_irradiance};
 use super::Light;
 use crate::util::error::{Error, Result};
 
-/// What an environment is made from.
+/// Source of an environment.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// The clear sky.
+    /// Model of the clear sky.
     Sky(Sky),
-    /// An equirectangular map, resolved and inside the allowed folders.
+    /// Equirectangular map in a file. The path is resolved and lies inside the allowed folders.
     File(PathBuf),
 }
 
-/// How it is used.
+/// Settings of an environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Factor on everything, the sun included.
+    /// Factor on all radiance, the sun's included.
     pub intensity: f32,
-    /// Degrees about +y, from +z towards +x.
+    /// Rotation about +y, from +z towards +x, degrees.
     pub turn: f32,
-    /// The sun's direction in the same sense, degrees from +z; of a sky only.
+    /// Azimuth of the sun, from +z towards +x, degrees. Only a sky uses it.
     pub azimuth: f32,
-    /// Most lights that stand for the map in the volume.
+    /// Maximum number of lights that approximate the map in the volume.
     pub lights: u32,
 }
 
-/// The light of the surroundings.
+/// Environment light, ready to render.
 #[derive(Clone, Debug)]
 pub struct Environment {
-    /// What it was made from.
+    /// Source of the map.
     pub source: Source,
-    /// Radiance, shared: who keeps it on a device knows it again by its memory.
+    /// Radiance map without rotation and factor. Shared, so that a copy on a device is recognised by its
+    /// address.
     pub map: Arc<Map>,
     /// Factor on the map's radiance.
     pub intensity: f32,
-    /// How far the map is turned about +y, from +z towards +x; once round is 1. 0 to 1.
+    /// Rotation of the map about +y, from +z towards +x, in turns, 0 to 1.
     pub turn: f32,
-    /// E(n)/π of the map, turned and with the factor.
+    /// E(n)/π of the map, with rotation and factor, without the sun.
     pub irradiance: Irradiance,
-    /// The sun, where there is one.
+    /// The sun of a sky; `None` for a file or a sky without sun.
     pub sun: Option<Sun>,
     lights: u32,
     baked: Arc<Baked>,
@@ -77,21 +77,21 @@ pub struct Environment {
 /// The sun of a sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Unit.
+    /// Unit vector towards the sun.
     pub to_sun: Vec3,
-    /// Irradiance on a surface that faces it, divided by π: the I of a directional light.
+    /// Intensity I of a directional light: irradiance on a surface that faces the sun, divided by π.
     pub intensity: Vec3,
-    /// Radiance of its disc.
+    /// Radiance of the disc.
     pub radiance: Vec3,
-    /// Square of the distance on the unit sphere from its middle to its rim.
+    /// Square of the chord on the unit sphere from the disc's centre to its rim.
     pub rim2: f32,
 }
 
 impl Environment {
-    /// Takes it from the stock, or makes it; a file of at most `memory` bytes.
+    /// Takes an environment from the stock or bakes it. Reading a file may take at most `memory` bytes.
     ///
     /// # Errors
-    /// Those of [`read_map`], and [`Error::Input`] where it would be infinitely bright.
+    /// Returns the errors of [`read_map`], and [`Error::Input`] if the radiance exceeds the range of float32.
     pub fn new(
         source: Source,
         settings: Settings,
@@ -101,7 +101,7 @@ impl Environment {
         let baked = stock.baked(&source, memory)?;
         let mut degrees = f64::from(settings.turn);
         if let Source::Sky(_) = source {
-            // Its map has the sun at −z.
+            // The map of a sky has its sun at −z.
             degrees += f64::from(settings.azimuth) + 180.0;
         }
         let turn = (degrees / 360.0).rem_euclid(1.0);
@@ -123,7 +123,7 @@ impl Environment {
         let environment = Environment {
             map: baked.map.clone(),
             intensity: settings.intensity,
-            // 1 − 1e-9 is 1 in float32, which is 0.
+            // A turn just below 1 rounds to 1 in float32; `fract` maps it to 0.
             turn: (turn as f32).fract(),
             irradiance: Irradiance::new(&baked.moments, turn, factor),
             sun,
@@ -131,7 +131,7 @@ impl Environment {
             baked,
             source,
         };
-        // What adds up all of it is 4π brighter than the brightest texel at most.
+        // A sum over the whole sphere is at most 4π times the brightest texel.
         let finite = (brightest * 16.0).is_finite() && sun.is_none_or(|s| s.radiance.is_finite());
         if !finite {
             return Err(Error::input(
@@ -142,11 +142,11 @@ impl Environment {
         Ok(environment)
     }
 
-    /// Radiance along a unit direction, the sun's disc included.
+    /// Radiance along the unit direction `d`, the sun's disc included.
     pub fn radiance(&self, d: Vec3) -> Vec3 {
         let radiance = self.map.radiance(uv_of(d, self.turn)) * self.intensity;
         match &self.sun {
-            // The ground hides what of the disc is below the horizon.
+            // The ground hides the part of the disc below the horizon.
             Some(sun) if d.y > 0.0 && (d - sun.to_sun).dot(d - sun.to_sun) < sun.rim2 => {
                 radiance + sun.radiance
             }
@@ -154,12 +154,13 @@ impl Environment {
         }
     }
 
-    /// The sun as a light.
+    /// The sun as a directional light.
     pub fn sunlight(&self) -> Option<Light> {
         self.sun.map(|sun| Light::Directional { to_light: sun.to_sun, intensity: sun.intensity })
     }
 
-    /// The lights that stand for the map in the volume, without the sun: I is irradiance/π.
+    /// Lights that approximate the map in the volume, without the sun. Their I is irradiance/π; black ones
+    /// are left out.
     pub fn volume_lights(&self) -> Vec<Light> {
         let factor = f64::from(self.intensity) / std::f64::consts::PI;
         let lights = self.baked.lights(self.lights);
@@ -172,18 +173,18 @@ impl Environment {
         lights.filter(lit).collect()
     }
 
-    /// How far the irradiance of [`Environment::volume_lights`] is from the map's: see [`LightSet::error`].
+    /// Relative error of the irradiance from [`Environment::volume_lights`]; see [`LightSet::error`].
     pub fn error(&self) -> f64 {
         self.baked.error(self.lights)
     }
 
-    /// The same of [`Environment::irradiance`], which lights the rock.
+    /// Relative error of [`Environment::irradiance`], which lights the rock; see [`LightSet::error`].
     pub fn irradiance_error(&self) -> f64 {
         let unturned = Irradiance::new(&self.baked.moments, 0.0, 1.0);
         error_of(&self.baked.cells, |n| luminance(unturned.at(n.as_vec3()).as_dvec3()) * std::f64::consts::PI)
     }
 
-    /// One line about it.
+    /// Description of the environment in one line.
     pub fn words(&self) -> String {
         let what = match &self.source {
             Source::Sky(_) => "sky",
@@ -193,25 +194,25 @@ impl Environment {
         let count = self.baked.lights(self.lights).lights.len();
         format!(
             "environment {what} of {width}×{height}: {count} lights in the water, \
-             {:.1} % off its irradiance (RMS)",
+             irradiance error {:.1} % (RMS)",
             100.0 * self.error()
         )
     }
 
-    /// What is odd about its file.
+    /// Warnings about the map's file, one line each; empty for a sky.
     pub fn warnings(&self) -> Vec<String> {
         let Source::File(path) = &self.source else { return Vec::new() };
         let path = path.display();
         let mut warnings = Vec::new();
         if self.baked.negative > 0 {
             let n = self.baked.negative;
-            warnings.push(format!("environment map {path}: {n} values below zero were taken as 0"));
+            warnings.push(format!("environment map {path}: {n} values below zero were replaced by 0"));
         }
         let Map { width, height, .. } = *self.map;
         if width != 2 * height {
             warnings.push(format!(
                 "environment map {path} has {width}×{height} texels: \
-                 an equirectangular one is twice as wide as high"
+                 an equirectangular map is twice as wide as it is high"
             ));
         }
         warnings

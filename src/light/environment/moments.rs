@@ -1,6 +1,7 @@
-//! Integrals of a map's radiance over the sphere, exact for a map whose texels are even: the solid angle and
-//! every product of the direction's components are integrated over each texel in closed form, row by row and
-//! column by column (φ and θ separate), never sampled at its middle.
+//! Integrals of a map's radiance over the sphere, exact for a map with constant texels.
+//!
+//! The solid angle and every product of the direction's components are integrated over each texel in closed
+//! form, row by row and column by column (φ and θ separate). Nothing is sampled at a texel's centre.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -9,16 +10,18 @@ use rayon::prelude::*;
 
 use super::map::Map;
 
-/// Polynomials of the direction that irradiance needs up to the second order, in the order of
-/// [`Irradiance`](super::Irradiance): 1, x, y, z, xy, yz, 3y² − 1, xz, x² − z².
+/// Number of polynomials of the direction that irradiance needs up to the second order. Their order is that
+/// of [`Irradiance`](super::Irradiance): 1, x, y, z, xy, yz, 3y² − 1, xz, x² − z².
 pub const TERMS: usize = 9;
 
-/// Cells that lights are chosen from: at most so many columns and rows. A cell of 0.7° keeps its power and
-/// its centroid exactly; finer ones would move no boundary between 1024 lights by more than a twentieth of
-/// its size.
+/// Maximum number of columns and rows of cells that lights are chosen from.
+///
+/// A cell of 0.7° preserves its power and its centroid exactly. With finer cells no boundary between 1024
+/// lights would move by more than a twentieth of a light's size.
 const CELLS: [usize; 2] = [512, 256];
 
-/// ∫ over the latitudes of one row: cos φ dφ times 1, y, r, y², r², y·r, where y = sin φ and r = cos φ.
+/// Integrals over the latitudes of one row: cos φ dφ times 1, y, r, y², r² and y·r, with y = sin φ and r =
+/// cos φ.
 struct Row {
     one: f64,
     y: f64,
@@ -28,14 +31,15 @@ struct Row {
     yr: f64,
 }
 
-/// ∫ over the longitudes of one column: 1, sin θ, cos θ, sin 2θ, cos 2θ, where x = r sin θ and z = −r cos θ.
+/// Integrals over the longitudes of one column: 1, sin θ, cos θ, sin 2θ and cos 2θ, with x = r sin θ and
+/// z = −r cos θ.
 type Column = [f64; 5];
 
 fn row(j: usize, rows: usize) -> Row {
     let at = |k: usize| {
         let phi = FRAC_PI_2 - PI * k as f64 / rows as f64;
         let (s, c) = phi.sin_cos();
-        // Antiderivatives at the row's edge.
+        // Antiderivatives of the six integrands at the row's edge.
         [s, s * s / 2.0, (phi + s * c) / 2.0, s * s * s / 3.0, s - s * s * s / 3.0, -c * c * c / 3.0]
     };
     let (top, bottom) = (at(j), at(j + 1));
@@ -60,7 +64,7 @@ fn rgb(texel: &[f32; 4]) -> DVec3 {
     DVec3::new(texel[0] as f64, texel[1] as f64, texel[2] as f64)
 }
 
-/// ∫ L·b dω for each of the [`TERMS`].
+/// Integral ∫ L·b dω for each of the [`TERMS`] polynomials b, linear RGB.
 pub fn of_map(map: &Map) -> [DVec3; TERMS] {
     let columns = columns(map.width as usize);
     let rows: Vec<[DVec3; TERMS]> = map
@@ -90,19 +94,19 @@ pub fn of_map(map: &Map) -> [DVec3; TERMS] {
             ]
         })
         .collect();
-    // In the rows' order: the same sum on any number of threads.
+    // Summed in the order of the rows, so that the result does not depend on the number of threads.
     rows.into_iter().fold([DVec3::ZERO; TERMS], |mut sum, row| {
         sum.iter_mut().zip(row).for_each(|(s, r)| *s += r);
         sum
     })
 }
 
-/// Power that comes through a piece of the sphere, and where from.
+/// Light from a region of the sphere: its power and its mean direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Beam {
-    /// ∫ L dω, linear RGB.
+    /// Power ∫ L dω, linear RGB.
     pub power: DVec3,
-    /// ∫ Y·d dω, with Y the luminance of L and d the direction.
+    /// First moment ∫ Y·d dω, with Y the luminance of L and d the direction.
     pub first: DVec3,
 }
 
@@ -118,26 +122,26 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// A map in few cells, row by row.
+/// Map at a coarse resolution.
 #[derive(Debug)]
 pub struct Cells {
-    /// Columns and rows.
+    /// Number of columns and rows of cells.
     pub size: [usize; 2],
-    /// Columns and rows of the map.
+    /// Number of columns and rows of the map.
     pub texels: [usize; 2],
-    /// Columns × rows.
+    /// Light of each cell, row by row from the top.
     pub beams: Vec<Beam>,
 }
 
 impl Cells {
-    /// Joins the texels of a map; each belongs to one cell.
+    /// Sums the texels of a map into cells. Each texel belongs to one cell.
     pub fn new(map: &Map) -> Cells {
         let (width, height) = (map.width as usize, map.height as usize);
         let size = [CELLS[0].min(width), CELLS[1].min(height)];
         let columns = columns(width);
         let mut beams = vec![Beam::default(); size[0] * size[1]];
         beams.par_chunks_exact_mut(size[0]).enumerate().for_each(|(y, cells)| {
-            // The texels j with j·cells/texels in this cell.
+            // Rows j of texels with ⌊j·cells/texels⌋ = y.
             for j in (y * height).div_ceil(size[1])..((y + 1) * height).div_ceil(size[1]) {
                 let row = row(j, height);
                 for (i, texel) in map.texels[j * width..][..width].iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A small picture of the surroundings.
+//! Thumbnail of the environment.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::Range;
@@ -9,11 +9,11 @@ use super::{Environment, luminance, uv_of};
 use crate::light::Light;
 
 impl Environment {
-    /// Mean radiance in the texels of a map of `columns` × `rows`, turned, with the factor, without the sun's
-    /// disc; row by row. It is taken from the cells that the lights are chosen from: the same few
-    /// milliseconds for any map.
+    /// Mean radiance of the map at a resolution of `columns` × `rows`, row by row, with rotation and factor,
+    /// without the sun's disc.
     ///
-    /// Where it has more texels than there are cells, it is no finer than those.
+    /// The result is computed from the cells that lights are chosen from, so it takes the same few
+    /// milliseconds for any map. A resolution above that of the cells adds no detail.
     pub fn overview(&self, columns: usize, rows: usize) -> Vec<Vec3> {
         let cells = &self.baked.cells;
         let [across, down] = cells.size;
@@ -37,33 +37,33 @@ impl Environment {
         (0..columns * rows).map(texel).collect()
     }
 
-    /// Where its strongest light is in [`Environment::overview`]: u and v from 0 to 1. The sun, or the
-    /// strongest of those that stand for the map.
+    /// Position (u, v), each from 0 to 1, of the strongest light in [`Environment::overview`]: the sun, or
+    /// else the strongest light that approximates the map.
     pub fn strongest(&self) -> Option<[f32; 2]> {
         let directional = |light: Light| match light {
             Light::Directional { to_light, intensity } => Some((luminance(intensity.as_dvec3()), to_light)),
             _ => None,
         };
         let sun = self.sunlight().and_then(directional);
-        let of_map = || self.volume_lights().into_iter().filter_map(directional);
-        let strongest = sun.or_else(|| of_map().max_by(|a, b| a.0.total_cmp(&b.0)));
+        let map_lights = || self.volume_lights().into_iter().filter_map(directional);
+        let strongest = sun.or_else(|| map_lights().max_by(|a, b| a.0.total_cmp(&b.0)));
         strongest.map(|(_, to_light)| uv_of(to_light, 0.0))
     }
 }
 
-/// The texels that were joined in one of `cells`.
+/// Range of texels that cell `cell` of `cells` combines, along one axis.
 fn texels(texels: usize, cells: usize, cell: usize) -> Range<usize> {
     (cell * texels).div_ceil(cells)..((cell + 1) * texels).div_ceil(cells)
 }
 
-/// ∫ cos φ dφ over the rows of a cell.
+/// Integral ∫ cos φ dφ over the rows of a cell.
 fn height(map_rows: usize, cells: usize, cell: usize) -> f64 {
     let rows = texels(map_rows, cells, cell);
     let sine = |row: usize| (FRAC_PI_2 - PI * row as f64 / map_rows as f64).sin();
     sine(rows.start) - sine(rows.end)
 }
 
-/// The cells that one of `texels` shows: at least one.
+/// Range of cells that texel `texel` of `texels` shows, along one axis; at least one cell.
 fn cells_of(cells: usize, texels: usize, texel: usize) -> Range<usize> {
     let start = texel * cells / texels;
     start..((texel + 1) * cells / texels).max(start + 1)

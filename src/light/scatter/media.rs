@@ -1,4 +1,4 @@
-//! The diffuse light of a scene's materials: what is to be known of the scene before its rays are walked.
+//! Multiple scattering of a whole scene: the data that is computed before rays are walked.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,22 +10,23 @@ use crate::mapping::Quad;
 use crate::trace::Attenuation;
 use crate::volume::VolumeTexture;
 
-/// Largest albedo that Kajiya and Kay's fibres are given: what gains light at every scattering has no end.
+/// Maximum albedo of Kajiya and Kay's fibres. A medium that gains light at every scattering has no finite
+/// solution.
 const MOST_ALBEDO: f32 = 0.99;
 
-/// Profiles kept: a slider that goes back and forth finds them again.
-const KEPT: usize = 16;
+/// Number of cached profiles. A slider that moves back and forth finds them again.
+const CACHED_PROFILES: usize = 16;
 
-/// Multiple scattering in a scene.
+/// Multiple scattering of a scene.
 pub struct Media {
-    /// Constants of the matter.
+    /// Constants of the reduced medium.
     pub similarity: Similarity,
-    /// One for every thickness, in the order the quads have them first.
+    /// One profile for each thickness, in the order in which the quads first have them.
     pub profiles: Vec<Arc<Profile>>,
 }
 
 impl Media {
-    /// The diffuse light of quads' materials in a volume. `p` is the exponent of the specular term.
+    /// Multiple scattering in the materials of `quads`. `p` is the exponent of the specular term.
     pub fn new(
         quads: &[Quad],
         attenuation: &Attenuation,
@@ -43,21 +44,21 @@ impl Media {
     }
 }
 
-/// The thicknesses of quads, metres, each once; and for every quad which of them it has.
+/// Distinct thicknesses of the quads in metres, and for every quad the index of its thickness.
 pub fn thicknesses(quads: &[Quad]) -> (Vec<f32>, Vec<u32>) {
     let (mut list, mut known) = (Vec::new(), HashMap::new());
-    let of_quad = quads.iter().map(|quad| {
+    let indices = quads.iter().map(|quad| {
         let thickness_m = quad.material.thickness_m;
         *known.entry(thickness_m.to_bits()).or_insert_with(|| {
             list.push(thickness_m);
             list.len() as u32 - 1
         })
     });
-    let of_quad = of_quad.collect();
-    (list, of_quad)
+    let indices = indices.collect();
+    (list, indices)
 }
 
-/// Values of one profile for `layers` layers.
+/// Number of values in one profile of `layers` layers.
 pub fn profile_length(layers: u32) -> u32 {
     2 * COSINES * layers
 }
@@ -77,18 +78,18 @@ fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scatte
 }
 
 fn profile(depths: Vec<f64>, scattering: Scattering) -> Arc<Profile> {
-    type Kept = (Vec<f64>, Scattering, Arc<Profile>);
-    static CACHE: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+    type CachedProfile = (Vec<f64>, Scattering, Arc<Profile>);
+    static CACHE: Mutex<Vec<CachedProfile>> = Mutex::new(Vec::new());
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
-    let kept = match cache.iter().position(|kept| kept.0 == depths && kept.1 == scattering) {
+    let cached = match cache.iter().position(|cached| cached.0 == depths && cached.1 == scattering) {
         Some(i) => cache.remove(i),
         None => {
             let profile = Arc::new(Profile::new(&depths, &scattering));
             (depths, scattering, profile)
         }
     };
-    let profile = kept.2.clone();
-    cache.insert(0, kept);
-    cache.truncate(KEPT);
+    let profile = cached.2.clone();
+    cache.insert(0, cached);
+    cache.truncate(CACHED_PROFILES);
     profile
 }

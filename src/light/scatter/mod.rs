@@ -1,38 +1,40 @@
-//! §5 beyond the paper: light that is scattered more than once in the volume.
+//! §5, beyond the paper: multiple scattering of light in the volume.
 //!
-//! Radiance of a cell towards the eye, for one light of intensity I (irradiance/π), per colour:
+//! Radiance that a cell sends to the eye for one light of intensity I (irradiance/π), per colour:
 //!
 //! ```text
 //! I·[ w·V·Ψ  +  w'·(P(z) + b'·V')  −  w·b·V  +  w·V·ω Σ_{n=2}^{6} h_n (ω τ_l)^(n−1)/(n−1)! ]
 //! ```
 //!
-//! w = T(1 − e^(−τ)) is the cell's weight in the view ray, V = e^(−τ_l) what is left of the light there, Ψ =
-//! ωπΦ the single scattering that is there without this module. The rest is light scattered twice and more:
+//! w = T(1 − e^(−τ)) is the cell's weight in the view ray. V = e^(−τ_l) is the light's transmittance to the
+//! cell. Ψ = ωπΦ is single scattering, which the program computes without this module too. The other terms
+//! add light that scatters twice or more:
 //!
-//! - **Similarity.** A phase function of mean cosine g passes the share g straight on, the rest in all
-//!   directions alike (van de Hulst, "Multiple Light Scattering", 1980, chapter 14; Joseph, Wiscombe and
-//!   Weinman 1976, with a delta peak of weight g). So the medium is replaced by one with isotropic
-//!   scattering, extinction a = 1 − ωg times the true one and albedo ω' = ω(1 − g)/a. w' and V' are w and V
-//!   at that extinction.
-//! - **Slab.** Copies of the volume lie side by side, so on the large scale it is a slab. ω'/4 of its mean
-//!   diffuse intensity is P, from the equation of Schwarzschild and Milne for the layers' mean optical depths
-//!   ([`slab`]). It depends on the layer, the face that is lit and the light's cosine μ₀ alone: a small table
-//!   ([`Profile`]).
-//! - **Once is once.** b' = ω'/4 is the reduced medium's single scattering; b = ω(1 − g)/4, the isotropic
-//!   part of the true one, is taken off again, for Ψ holds it (as in Nakajima and Tanaka 1988, TMS). With g =
-//!   0 the two cancel.
-//! - **Forward peak.** n scatterings by small angles make a phase function of mean cosine gⁿ (Goudsmit and
-//!   Saunderson 1940; exact for Henyey and Greenstein's). What it has above its own isotropic part is
-//!   h_n = max(0, π·Φ_HG(gⁿ, cosθ) − (1 − gⁿ)/4), summed up to six scatterings along the light's way.
+//! - **Similarity.** A phase function of mean cosine g passes the share g straight on and scatters the rest
+//!   isotropically (van de Hulst, "Multiple Light Scattering", 1980, chapter 14; Joseph, Wiscombe and Weinman
+//!   1976, with a delta peak of weight g). The medium is therefore replaced by a reduced one with isotropic
+//!   scattering, a = 1 − ωg times the extinction, and albedo ω' = ω(1 − g)/a. w' and V' are w and V in the
+//!   reduced medium.
+//! - **Slab.** Copies of the volume lie side by side, so on a large scale the volume is a slab. P is ω'/4 of
+//!   the slab's mean diffuse intensity, from the equation of Schwarzschild and Milne for the layers' mean
+//!   optical depths ([`slab`]). P depends only on the layer, the lit face and the light's cosine μ₀, so a
+//!   small table holds it ([`Profile`]).
+//! - **Single scattering counts once.** b' = ω'/4 is the reduced medium's single scattering. b = ω(1 − g)/4
+//!   is the isotropic part of the true single scattering; it is subtracted because Ψ contains it (as in
+//!   Nakajima and Tanaka 1988, TMS). With g = 0 the two cancel.
+//! - **Forward peak.** n scatterings by small angles have a phase function of mean cosine gⁿ (Goudsmit and
+//!   Saunderson 1940; exact for Henyey and Greenstein's function). Its excess over its own isotropic part is
+//!   h_n = max(0, π·Φ_HG(gⁿ, cosθ) − (1 − gⁿ)/4), summed up to six scatterings along the light's path.
 //!
-//! Why the *layers'* mean depths and not the depths along the cell's own line: scattered light comes from a
-//! neighbourhood as wide as its free path, which is wider than the strands. Against a path tracer
-//! (`tests/suite/scatter`) the local depths had 1.7 times the error. Attenuation series (Wrenninge, Kulla and
-//! Lundqvist, "Oz: The Great and Volumetric", SIGGRAPH 2013) were wrong by a third of the light at best;
-//! Zinke's dual scattering (2008) is made for fibres that scatter forward only, and knows nothing of a slab's
-//! faces.
+//! P uses the mean depths of the layers, not the depths along the cell's own line, because scattered light
+//! comes from a neighbourhood as wide as its free path, which is wider than the strands. Against a path
+//! tracer (`tests/suite/light/scatter`) the local depths had 1.7 times the error. Attenuation series
+//! (Wrenninge, Kulla and Lundqvist, "Oz: The Great and Volumetric", SIGGRAPH 2013) were wrong by at least a
+//! third of the light. Zinke's dual scattering (2008) is made for fibres that scatter forward only, and
+//! ignores the faces of a slab.
 //!
-//! `shaders/light/scatter.wgsl` is the twin of what works along a ray.
+//! `shaders/light/scatter.wgsl` is the twin of [`Row::new`], [`Profile::at`], [`forward_peak`] and
+//! [`multiple`].
 
 pub mod media;
 pub mod slab;
@@ -44,23 +46,24 @@ use crate::trace::Attenuation;
 use crate::volume::VolumeTexture;
 use slab::Slab;
 
-/// Rows of a [`Profile`] for one face: μ₀ = (i / (COSINES − 1))². The diffuse light bends like μ₀ ln μ₀ at
-/// grazing incidence, so the rows are closer there.
+/// Number of rows of a [`Profile`] for one face; row i has μ₀ = (i / (COSINES − 1))². The diffuse light
+/// behaves like μ₀ ln μ₀ at grazing incidence, so the rows are denser there.
 pub const COSINES: u32 = 12;
 
-/// Scatterings by small angles that are summed. The sixth still matters at g = 0.85, more change nothing.
+/// Maximum number of small-angle scatterings in the forward peak. The sixth still matters at g = 0.85; a
+/// seventh changes nothing.
 pub const ORDERS: usize = 6;
 
-/// How the matter scatters.
+/// Scattering properties of the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scattering {
-    /// ω per colour, 0 to 1: the share of the light that is scattered and not absorbed.
+    /// Albedo ω per colour, 0 to 1: the share of the light that is scattered, not absorbed.
     pub albedo: Vec3,
-    /// Mean cosine of the scattering angle, −1 < g < 1. Backward scattering (g < 0) is taken as isotropic.
+    /// Mean cosine of the scattering angle, −1 < g < 1. Backward scattering (g < 0) is treated as isotropic.
     pub g: f32,
 }
 
-/// The constants of the formula above that a scene has, per colour.
+/// Constants of the reduced medium, per colour; the module's formula defines the symbols.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Similarity {
     /// a = 1 − ωg.
@@ -71,12 +74,12 @@ pub struct Similarity {
     pub reduced: Vec3,
     /// b = ω(1 − g)/4.
     pub isotropic: Vec3,
-    /// g, not less than 0.
+    /// Mean cosine g of the scattering angle, at least 0.
     pub g: f32,
 }
 
 impl Scattering {
-    /// Its reduced medium.
+    /// Reduced medium of this scattering.
     pub fn similarity(&self) -> Similarity {
         let g = self.g.max(0.0);
         let extinction = Vec3::ONE - self.albedo * g;
@@ -84,20 +87,23 @@ impl Scattering {
         Similarity { extinction, albedo: self.albedo, reduced: isotropic / extinction, isotropic, g }
     }
 
-    /// That of Kajiya and Kay's fibres whose directions are spread evenly. Their model reflects more than it
-    /// receives once π·k_d + … passes 1 (at the default k_d = ½ it is 1.6), and what gains light at every
-    /// scattering has no end: the albedo is clamped to `most` < 1.
+    /// Scattering by Kajiya and Kay's fibres with uniformly distributed directions.
     ///
-    /// Averages of Ψ/π over all fibres and all eyes; g from the specular cone, which sends light on
-    /// by its angle with the fibre. Quadrature by midpoints, good to 1e-3.
-    pub fn kajiya_kay(k_d: f32, k_s: f32, p: f32, most: f32) -> Scattering {
+    /// The albedo is the mean of Ψ/π over all fibres and all eyes. g comes from the specular cone, which
+    /// keeps the light's angle with the fibre. Both are integrated by the midpoint rule, with an error of
+    /// 1e-3.
+    ///
+    /// The model reflects more light than it receives once π·k_d + … exceeds 1; at the default k_d = ½ it is
+    /// 1.6. A medium that gains light at every scattering has no finite solution, so the albedo is clamped to
+    /// `max_albedo` < 1.
+    pub fn kajiya_kay(k_d: f32, k_s: f32, p: f32, max_albedo: f32) -> Scattering {
         const N: usize = 256;
         let angles = || (0..N).map(|i| (i as f64 + 0.5) * std::f64::consts::PI / N as f64);
         let step = std::f64::consts::PI / N as f64;
         let (mut sum, mut forward) = (0.0, 0.0);
         for l in angles() {
             for e in angles() {
-                // −(t·l)(t·e) is what is left of −l·e after a turn around the fibre.
+                // The mean of −l·e over a turn around the fibre is −(t·l)(t·e).
                 let cone = (l.sin() * e.sin() - l.cos() * e.cos()).max(0.0).powf(p as f64);
                 let psi = k_d as f64 * l.sin() + k_s as f64 * cone;
                 let weight = psi * l.sin() * e.sin() * step * step;
@@ -106,36 +112,36 @@ impl Scattering {
             }
         }
         let g = if sum > 0.0 { forward / sum } else { 0.0 };
-        Scattering { albedo: Vec3::splat((sum as f32).min(most)), g: g as f32 }
+        Scattering { albedo: Vec3::splat((sum as f32).min(max_albedo)), g: g as f32 }
     }
 }
 
-/// Mean optical depth of each layer of a volume across the slab, seen side first. `depth_m` is the
-/// thickness of a layer in metres (H / nz); with per-cell attenuation it is not asked for.
+/// Mean optical depth of each layer of a volume across the slab, starting at the seen side. `depth_m` is the
+/// thickness of a layer in metres (H / nz); per-cell attenuation ignores it.
 pub fn layer_depths(volume: &VolumeTexture, attenuation: &Attenuation, depth_m: f32) -> Vec<f64> {
     let [nx, ny, _] = volume.size.map(|n| n as usize);
-    let whole = match *attenuation {
+    let full_depth = match *attenuation {
         Attenuation::PathLength { sigma } => sigma as f64 * depth_m as f64,
         Attenuation::PerCell { tau } => tau as f64,
     } * volume.alpha as f64;
-    let mean = |codes: u64| whole * codes as f64 / (65535.0 * (nx * ny) as f64);
+    let mean = |codes: u64| full_depth * codes as f64 / (65535.0 * (nx * ny) as f64);
     volume.layer_codes().into_iter().map(mean).collect()
 }
 
-/// P: what the diffuse light of a slab gives to each layer, by the lit face, the light's cosine and the
-/// layer.
+/// Table of P, the diffuse light of a slab, by lit face, cosine of the light and layer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// Layers nz.
+    /// Number of layers nz.
     pub layers: u32,
-    /// (ω'/4)·4π·J_diffuse/E per colour (the fourth is 0), in units of the light's intensity I:
-    /// layer fastest, then cosine, then face (0: lit from the seen side, 1: from behind). 2·[`COSINES`]·nz
-    /// of them: 15 KiB for 40 layers.
+    /// (ω'/4)·4π·J_diffuse/E per colour, in units of the light's intensity I; the fourth component is 0.
+    ///
+    /// The layer varies fastest, then the cosine, then the face (0: lit from the seen side, 1: from behind).
+    /// There are 2·[`COSINES`]·nz entries, 15 KiB for 40 layers.
     pub values: Vec<[f32; 4]>,
 }
 
 impl Profile {
-    /// For layers of the optical depths `depths` (each ≥ 0), seen side first.
+    /// Profile of a slab whose layers have the optical depths `depths` (each ≥ 0), starting at the seen side.
     pub fn new(depths: &[f64], scattering: &Scattering) -> Profile {
         let layers = depths.len();
         let similarity = scattering.similarity();
@@ -147,7 +153,7 @@ impl Profile {
             .map(|c| {
                 let a = similarity.extinction[c] as f64;
                 let omega = 4.0 * similarity.reduced[c] as f64;
-                // Equal colours are solved once.
+                // Equal colours share one solution.
                 let twin = (0..c).any(|d| similarity.albedo[d] == similarity.albedo[c]);
                 let total: f64 = depths.iter().sum::<f64>() * a;
                 if twin || omega <= 0.0 || total <= 1e-9 {
@@ -180,7 +186,7 @@ impl Profile {
         Profile { layers: layers as u32, values }
     }
 
-    /// P of layer `z` for a light's row.
+    /// P of layer `z`, interpolated between a light's two rows.
     #[inline]
     pub fn at(&self, row: &Row, z: u32) -> Vec3 {
         let value = |first: u32| {
@@ -192,31 +198,33 @@ impl Profile {
     }
 }
 
-/// Where a light's values stand in a [`Profile`]: between two rows.
+/// Position of a light in a [`Profile`]: two rows and the share between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Index of the first layer's value at the row below μ₀.
+    /// Index of the first layer's value in the row below μ₀.
     pub near: u32,
-    /// At the row above.
+    /// Index of the first layer's value in the row above μ₀.
     pub far: u32,
-    /// From the one to the other, 0 to 1.
+    /// Share of the row above, 0 to 1.
     pub share: f32,
 }
 
 impl Row {
-    /// For a light whose direction has the cosine `l_n` with the seen face's normal; less than 0: it comes
-    /// from behind. With per-cell attenuation a slanted line meets more cells instead of more metres:
-    /// −z/(|x| + |y| + |z|) of the direction in cells takes the cosine's place.
+    /// Position of a light whose direction has the cosine `l_n` with the seen face's normal. The light comes
+    /// from behind if `l_n` is negative.
+    ///
+    /// With per-cell attenuation a slanted line meets more cells instead of more metres, so the caller passes
+    /// −z/(|x| + |y| + |z|) of the direction in cells in place of the cosine.
     pub fn new(l_n: f32, layers: u32) -> Row {
-        let place = l_n.abs().min(1.0).sqrt() * (COSINES - 1) as f32;
-        let below = (place as u32).min(COSINES - 2);
+        let position = l_n.abs().min(1.0).sqrt() * (COSINES - 1) as f32;
+        let below = (position as u32).min(COSINES - 2);
         let face = if l_n < 0.0 { COSINES } else { 0 };
         let near = (face + below) * layers;
-        Row { near, far: near + layers, share: place - below as f32 }
+        Row { near, far: near + layers, share: position - below as f32 }
     }
 }
 
-/// h₂ … h₆ for one ray and light; `cos` is that of the scattering angle, −e·l.
+/// Forward peak h₂ … h₆ for one ray and light. `cos` is the cosine −e·l of the scattering angle.
 pub fn forward_peak(g: f32, cos: f32) -> [f32; ORDERS - 1] {
     let mut power = g;
     std::array::from_fn(|_| {
@@ -228,10 +236,11 @@ pub fn forward_peak(g: f32, cos: f32) -> [f32; ORDERS - 1] {
     })
 }
 
-/// What one cell sends to the eye of one light of I = 1, besides w·V·Ψ.
+/// Radiance that a cell sends to the eye for a light of I = 1, without the single scattering w·V·Ψ.
 ///
-/// Depths are in powers of two (optical depth · log₂e, as the walk has them): `view` from the face to where
-/// the ray enters the cell, `cell` inside it, `light` from its middle to the light. `diffuse` is P.
+/// Depths are in bits (optical depth · log₂e), as the walk computes them: `view` from the face to the point
+/// where the ray enters the cell, `cell` inside the cell, `light` from the cell's centre to the light.
+/// `diffuse` is P.
 #[inline]
 pub fn multiple(
     similarity: &Similarity,

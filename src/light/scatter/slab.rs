@@ -1,34 +1,39 @@
-//! Multiple scattering in a homogeneous plane-parallel slab with isotropic phase function, float64.
+//! Multiple scattering in a homogeneous plane-parallel slab with an isotropic phase function, in float64.
 //!
-//! The mean intensity J of a slab of optical depth X, lit by a beam from the direction whose cosine with
-//! the normal is μ₀, obeys the integral equation of Schwarzschild and Milne (Chandrasekhar, "Radiative
-//! Transfer", 1950, chapter I):
+//! A beam whose direction has the cosine μ₀ with the normal lights a slab of optical depth X. The slab's mean
+//! intensity J obeys the integral equation of Schwarzschild and Milne (Chandrasekhar, "Radiative Transfer",
+//! 1950, chapter I):
 //!
 //! ```text
 //! J(τ) = J_beam(τ) + (ω/2) ∫₀^X E₁(|τ − t|) J(t) dt,   J_beam(τ) = (E/4π) e^(−τ/μ₀)
 //! ```
 //!
-//! with E the beam's irradiance on a plane across it and ω the albedo. Here everything is in units of E/4π.
-//! The equation is solved by Galerkin's method with functions constant in each of many layers: the
-//! double integrals of E₁ over two layers are differences of E₃, so the matrix is exact and symmetric and
-//! energy is kept to rounding.
+//! E is the beam's irradiance on a plane perpendicular to it and ω the albedo. All intensities here are in
+//! units of E/4π.
+//!
+//! Galerkin's method solves the equation with functions that are constant in each of many layers. The double
+//! integrals of E₁ over two layers are differences of E₃, so the matrix is exact and symmetric, and energy is
+//! conserved up to rounding.
 
-/// Largest thickness of a layer. Constant pieces of thickness h let h²/4 too much light through the depth of
-/// a thick slab (∫ s² E₁ ds = 2/3 becomes 2/3 + h²/6): 1.6 % here.
+/// Maximum optical depth of a layer. Constant functions on layers of depth h let too much light through a
+/// thick slab, by the relative error h²/4 (∫ s² E₁ ds = 2/3 becomes 2/3 + h²/6): 1.6 % here.
 const THICKEST: f64 = 0.25;
 
-/// Most layers between the two faces' thin ones. Slabs deeper than 60 get thicker ones: what comes through
-/// them, 2 % and less, is then overestimated.
+/// Maximum number of layers between the thin ones at the faces. Slabs deeper than 60 get thicker layers,
+/// which overestimate the light that comes through; it is at most 2 % of the beam.
 const MOST: f64 = 240.0;
 
-/// Thickness of a layer at a face, where J bends, and by how much each next one is thicker.
+/// Optical depth of the layer at a face. It is thin because J changes fastest there.
 const THINNEST: f64 = 0.02;
+/// Ratio of the depths of successive layers, from a face inwards.
 const GROWTH: f64 = 1.2;
 
-/// The exponential integrals E₁, E₂ and E₃ at x > 0; E₁(0) is given as 0, for it is only used times 0.
+/// Exponential integrals E₁, E₂ and E₃ at x ≥ 0. E₁(0) is returned as 0 because it is only ever multiplied by
+/// 0.
 ///
-/// Series below 1, Lentz's continued fraction above (Abramowitz and Stegun 1964, 5.1.11 and 5.1.22), then
-/// the recurrence 5.1.14; relative error about 1e-14 of E₁, absolute 1e-15 of the others.
+/// E₁ comes from its series below 1 and from Lentz's continued fraction above (Abramowitz and Stegun 1964,
+/// 5.1.11 and 5.1.22), E₂ and E₃ from the recurrence 5.1.14. E₁ has a relative error of about 1e-14, the
+/// others an absolute error of 1e-15.
 pub fn exponential_integrals(x: f64) -> [f64; 3] {
     if x <= 0.0 {
         return [0.0, 1.0, 0.5];
@@ -64,16 +69,16 @@ pub fn exponential_integrals(x: f64) -> [f64; 3] {
     [e1, e2, 0.5 * (decay - x * e2)]
 }
 
-/// A slab ready to be solved for any albedo and light.
+/// Slab that can be solved for any albedo and light.
 pub struct Slab {
-    /// Optical depths of the layers' boundaries, 0 to X.
+    /// Optical depths of the layer boundaries, from 0 to X.
     pub boundaries: Vec<f64>,
-    /// ∫∫ E₁(|τ − t|) dτ dt over pairs of layers.
+    /// Integrals ∫∫ E₁(|τ − t|) dτ dt over pairs of layers, row by row.
     pairs: Vec<f64>,
 }
 
 impl Slab {
-    /// A slab of optical depth `x` > 0.
+    /// Cuts a slab of optical depth `x` > 0 into layers and integrates over their pairs.
     pub fn new(x: f64) -> Self {
         let mut side = vec![0.0];
         let mut thickness = THINNEST.min(x / 24.0);
@@ -104,8 +109,8 @@ impl Slab {
         Slab { boundaries, pairs }
     }
 
-    /// Means over the layers of J (the beam's part included) for each cosine of `mu_0` (all > 0), in units
-    /// of E/4π; 0 ≤ `omega` ≤ 1.
+    /// Mean of J over each layer, the beam's own part included, for each cosine in `mu_0` (all > 0). The unit
+    /// is E/4π; 0 ≤ `omega` ≤ 1.
     pub fn mean_intensity(&self, omega: f64, mu_0: &[f64]) -> Vec<Vec<f64>> {
         let n = self.boundaries.len() - 1;
         let width = |i: usize| self.boundaries[i + 1] - self.boundaries[i];
@@ -120,7 +125,8 @@ impl Slab {
         for i in 0..n {
             a[i * n + i] += width(i);
         }
-        // Cholesky: symmetric, and positive definite because some light leaves every slab.
+        // Cholesky decomposition. The matrix is symmetric, and positive definite because some light leaves
+        // every slab.
         for j in 0..n {
             for i in j..n {
                 let dot: f64 = (0..j).map(|k| a[i * n + k] * a[j * n + k]).sum();
@@ -141,7 +147,7 @@ impl Slab {
         rows
     }
 
-    /// (½) ∫ E₁(|τ − t|) over each layer, t in the layer: what the layers' J give to J(τ) before ω.
+    /// Weights ½ ∫ E₁(|τ − t|) dt over each layer: the share of the layer's J in J(τ), before the factor ω.
     pub fn weights(&self, tau: f64) -> Vec<f64> {
         let toward = |t: f64| {
             let e2 = exponential_integrals((t - tau).abs())[1];

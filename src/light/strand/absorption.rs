@@ -1,10 +1,10 @@
-//! What pure water absorbs, as linear sRGB.
+//! Absorption of pure water in linear sRGB.
 
 use glam::DVec3;
 
-/// Wavelength of the first row, nm.
+/// Wavelength of the first value in the table, nm.
 const FIRST_NM: f64 = 380.0;
-/// Between rows, nm.
+/// Difference of wavelength between successive values, nm.
 const STEP_NM: f64 = 10.0;
 
 /// Absorption of pure water at 22 °C, 1/m, 380 to 700 nm: every fourth row of table 3 of Pope and Fry,
@@ -16,9 +16,11 @@ const POPE_FRY: [f64; 33] = [
     0.2916, 0.3108, 0.340, 0.410, 0.439, 0.465, 0.516, 0.624,
 ];
 
-/// σ_a of pure water, 1/m: for each primary of sRGB the mean of the spectrum, weighted with the positive part
-/// of the primary's colour matching function. With the negative part, which makes an exact colour of a thin
-/// layer of water, blue would have a negative coefficient: no exponential could go on from there.
+/// Absorption coefficient σ_a of pure water, 1/m, linear sRGB.
+///
+/// Each primary takes the mean of the spectrum, weighted by the positive part of its colour matching
+/// function. The negative part would make the colour of a thin layer exact. It would also give blue a
+/// negative coefficient, and a deep layer would then amplify light.
 pub fn pure_water() -> DVec3 {
     let (mut sum, mut weights) = (DVec3::ZERO, DVec3::ZERO);
     for (i, a) in POPE_FRY.iter().enumerate() {
@@ -29,9 +31,9 @@ pub fn pure_water() -> DVec3 {
     sum / weights
 }
 
-/// Linear sRGB (IEC 61966-2-1) of the CIE 1931 observer's colour matching functions, in the fit by Wyman,
-/// Sloan and Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions", JCGT 2
-/// (2013).
+/// Colour matching functions of linear sRGB (IEC 61966-2-1), from those of the CIE 1931 observer in the fit
+/// by Wyman, Sloan and Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions",
+/// JCGT 2 (2013).
 fn srgb_matching(nm: f64) -> DVec3 {
     let lobe = |height: f64, middle: f64, left: f64, right: f64| {
         let t = (nm - middle) * if nm < middle { left } else { right };

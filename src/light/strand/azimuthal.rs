@@ -1,4 +1,4 @@
-//! N_p: how the lobes spread around the strand, the mean over all offsets of what leaves there.
+//! Azimuthal lobes N_p: the distribution of light around the strand, averaged over all offsets of a ray.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -11,7 +11,7 @@ pub fn logistic_scale(roughness: f64) -> f64 {
     (PI / 8.0).sqrt() * (0.265 * roughness + 1.194 * roughness.powi(2) + 5.372 * roughness.powi(22))
 }
 
-/// D: the logistic distribution of scale s, trimmed to −π..π.
+/// Logistic distribution D of scale s, trimmed to −π..π.
 #[derive(Clone, Copy, Debug)]
 pub struct Logistic {
     s: f64,
@@ -19,13 +19,13 @@ pub struct Logistic {
 }
 
 impl Logistic {
-    /// Of scale `s`.
+    /// Distribution of scale `s`, in radians.
     pub fn new(s: f64) -> Self {
-        // CDF(π) − CDF(−π).
+        // The norm divides by CDF(π) − CDF(−π).
         Logistic { s, norm: 1.0 / (s * (PI / (2.0 * s)).tanh()) }
     }
 
-    /// D of an angle, wrapped into −π..π first; its integral over a turn is 1.
+    /// Density at an angle in radians, which is wrapped into −π..π. The integral over a turn is 1.
     pub fn at(&self, angle: f64) -> f64 {
         let wrapped = (angle - TAU * (angle / TAU).round()).abs();
         let e = (-wrapped / self.s).exp();
@@ -33,24 +33,25 @@ impl Logistic {
     }
 }
 
-/// The rays of one inclination, at many offsets h of 0..1; those of −h are their mirror images.
+/// Rays of one inclination at many offsets h in 0..1. The rays at −h are their mirror images.
 pub struct Azimuth {
     d: Logistic,
-    /// Share of the rays, and what becomes of them.
+    /// Share of the rays with their passage through the cylinder.
     passages: Vec<(f64, Passage)>,
 }
 
 impl Azimuth {
-    /// For a scale `s` of the logistic, index `eta`, inclination θ_d and optical depth of a diameter.
+    /// Traces rays for the logistic scale `s`, the index of refraction `eta`, the cosine of the inclination
+    /// θ_d and the optical depth of a diameter.
     pub fn new(s: f64, eta: f64, cos_d: f64, depth: DVec3) -> Self {
-        // Equal steps of γ, for Φ_p turns by at most 2 radians per radian of γ. The logistic's poles lie at
-        // ±iπs, so with steps of 1.6·s in Φ_p the sum is within e^(−2π²/1.6) of its integral.
+        // Equal steps of γ suit Φ_p, which turns by at most 2 radians per radian of γ. The logistic's poles
+        // lie at ±iπs, so with steps of 1.6·s in Φ_p the sum is within e^(−2π²/1.6) of its integral.
         let count = (2.0 / s).ceil().clamp(64.0, 4096.0) as usize;
         let step = FRAC_PI_2 / count as f64;
         let passages = (0..count)
             .map(|i| {
                 let gamma = (i as f64 + 0.5) * step;
-                // The exact share of the offsets: the shares add up to 1.
+                // The shares of the offsets are exact, so they add up to 1.
                 let share = (gamma + 0.5 * step).sin() - (gamma - 0.5 * step).sin();
                 (share, Passage::new(eta, cos_d, gamma.sin(), depth))
             })
@@ -58,7 +59,7 @@ impl Azimuth {
         Azimuth { d: Logistic::new(s), passages }
     }
 
-    /// ⟨A_p⟩, the mean over the offsets; the integral of N_p over a turn.
+    /// Mean ⟨A_p⟩ over the offsets, which is the integral of N_p over a turn.
     pub fn attenuation(&self) -> [DVec3; LOBES] {
         let mut sum = [DVec3::ZERO; LOBES];
         for (share, passage) in &self.passages {
@@ -69,8 +70,9 @@ impl Azimuth {
         sum
     }
 
-    /// N_p(φ) = ½ ∫ A_p(h)·D(φ − Φ_p(h)) dh, h from −1 to 1, per radian. What has been inside for longer than
-    /// TRT has forgotten where it came from: 1/2π.
+    /// Azimuthal lobes N_p(φ) = ½ ∫ A_p(h)·D(φ − Φ_p(h)) dh with h from −1 to 1, per radian. The residual
+    /// lobe is uniform, 1/2π, because light that stays inside for longer than TRT leaves in every direction
+    /// alike.
     pub fn at(&self, phi: f64) -> [DVec3; LOBES] {
         let mut sum = [DVec3::ZERO; LOBES];
         for (share, passage) in &self.passages {

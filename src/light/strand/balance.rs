@@ -1,8 +1,8 @@
-//! The factor that makes the lobes' sum keep the energy at every inclination.
+//! Factor that makes the sum of the lobes conserve energy at every inclination.
 //!
-//! M_p is normalised and Σ A_p = 1, but A_p is taken at θ_d, which is not the same for all θ_o of a wide
-//! lobe, so the integral of their product strays from 1. A factor b(θ_i)·b(θ_o) that is the same for both
-//! directions repairs it and keeps Φ reciprocal (Sinkhorn 1964, for a symmetric matrix).
+//! M_p is normalised and Σ A_p = 1. A_p is evaluated at θ_d, though, which varies with θ_o over a wide lobe,
+//! so the integral of their product differs from 1. The symmetric factor b(θ_i)·b(θ_o) corrects the integral
+//! and keeps Φ reciprocal (Sinkhorn 1964, for a symmetric matrix).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -13,27 +13,29 @@ use super::azimuthal::Azimuth;
 use super::cylinder::{ETA, LOBES};
 use super::longitudinal::longitudinal;
 
-/// Inclinations from −90° to 90°. Their step, 0.7°, is a third of the narrowest lobe's standard deviation.
+/// Number of inclinations from −90° to 90°. Their step, 0.7°, is a third of the narrowest lobe's standard
+/// deviation.
 const NODES: usize = 256;
-/// Each halves the error or better; it starts below a third.
+/// Number of iterations. Each at least halves the error, which starts below a third.
 const ROUNDS: usize = 24;
 
-/// b of the inclination.
+/// Factor b as a function of the inclination.
 #[derive(Clone, Debug)]
 pub struct Balance {
-    /// At the middles of equal steps of |θ| from 0 to 90°.
+    /// Values of b at the midpoints of equal steps of |θ| from 0 to 90°.
     b: Vec<f64>,
 }
 
 impl Balance {
-    /// For the variances of the lobes, without absorption: what is absorbed must stay lost.
+    /// Balance of lobes with the variances `v`. It is computed without absorption, so that absorbed light
+    /// stays lost.
     pub fn new(v: &[f64; LOBES]) -> Self {
         let step = PI / NODES as f64;
         let theta = |i: usize| (i as f64 + 0.5) * step - FRAC_PI_2;
-        // d sin θ.
+        // Weight of an inclination: d sin θ.
         let weight: Vec<f64> =
             (0..NODES).map(|i| (theta(i) + 0.5 * step).sin() - (theta(i) - 0.5 * step).sin()).collect();
-        // By the difference of two inclinations, 2θ_d.
+        // ⟨A_p⟩ by the difference of two inclinations, 2θ_d.
         let attenuation: Vec<[f64; LOBES]> = (0..NODES)
             .into_par_iter()
             .map(|i| {
@@ -45,14 +47,14 @@ impl Balance {
             .into_par_iter()
             .map(|i| {
                 let (sin_i, cos_i) = theta(i).sin_cos();
-                let of = |o: usize| {
+                let energy = |o: usize| {
                     let (sin_o, cos_o) = theta(o).sin_cos();
                     let a = &attenuation[i.abs_diff(o)];
                     let m = |p: usize| longitudinal(v[p], cos_i * cos_o, sin_i * sin_o);
                     (0..LOBES).map(|p| m(p) * a[p]).sum::<f64>() * weight[o]
                 };
                 // b is even in θ, so the rows and columns of −θ fold onto those of θ.
-                (0..NODES / 2).map(|o| of(o) + of(NODES - 1 - o)).collect()
+                (0..NODES / 2).map(|o| energy(o) + energy(NODES - 1 - o)).collect()
             })
             .collect();
         let mut b = vec![1.0; NODES / 2];
@@ -67,7 +69,7 @@ impl Balance {
         Balance { b }
     }
 
-    /// b(θ), θ in radians; beyond 90° that of 90°.
+    /// Returns b(θ), θ in radians. Angles beyond 90° take the value at 90°.
     pub fn at(&self, theta: f64) -> f64 {
         let last = self.b.len() - 1;
         let x = (theta.abs() / FRAC_PI_2 * self.b.len() as f64 - 0.5).clamp(0.0, last as f64);

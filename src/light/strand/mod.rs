@@ -1,22 +1,23 @@
-//! A reflection model made for flowing water: every cell of the volume holds strands of water along the flow,
-//! and air between them.
+//! §5, beyond the paper: a reflection model for flowing water. Every cell of the volume holds strands of
+//! water along the flow, with air between them.
 //!
 //! A strand is a dielectric cylinder along the cell's direction t. Light that meets it leaves by reflection
-//! (R), through it (TT), after one reflection inside (TRT, which makes the bow) or later; the sum is a phase
-//! function
+//! (R), by transmission (TT), after one internal reflection (TRT, which makes the rainbow) or after several.
+//! The sum is a phase function
 //!
 //! Φ(l→e) = b(θ_i)·b(θ_o)·Σ_p M_p(θ_i, θ_o)·N_p(θ_d, φ),   θ_d = (θ_o − θ_i)/2
 //!
-//! in 1/sr, whose integral over all directions is the albedo, 1 where nothing is absorbed. Light and eye both
-//! point outward; sin θ_i = t·l, sin θ_o = t·e, φ is the angle between both around t. Exchanging l and e,
-//! turning t round, and φ → −φ change nothing.
+//! in 1/sr. Its integral over all directions is the albedo, which is 1 without absorption. The vectors l and
+//! e point outward; sin θ_i = t·l, sin θ_o = t·e, and φ is the angle between l and e around t. Φ does not
+//! change when l and e are exchanged, when t is reversed, or for φ → −φ.
 //!
-//! The frame of lobes is Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light Scattering from Human Hair
-//! Fibers", SIGGRAPH 2003; [`longitudinal`] is from d'Eon et al. 2011, [`azimuthal`] from Chiang et al. 2016,
-//! [`cylinder`] and [`absorption`] are water's, [`balance`] keeps the energy. The air is a Henyey–Greenstein
-//! phase function (1941), mixed in by the cell's own coefficients. [`table`] holds it all for the renderers.
+//! The sum over lobes follows Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light Scattering from Human
+//! Hair Fibers", SIGGRAPH 2003. [`longitudinal`] follows d'Eon et al. 2011 and [`azimuthal`] Chiang et al.
+//! 2016. [`cylinder`] and [`absorption`] describe water, and [`balance`] conserves energy. The air has a
+//! Henyey–Greenstein phase function (1941), mixed in by the cell's own coefficients. [`table`] tabulates the
+//! model for the renderers.
 //!
-//! taki's intensities are irradiance over π, so Ψ = π·Φ stands where the fibre model's Ψ stands.
+//! Intensities are irradiance over π, so Ψ = π·Φ takes the place of the fibre model's Ψ.
 
 pub mod absorption;
 pub mod azimuthal;
@@ -33,7 +34,7 @@ use azimuthal::{Azimuth, logistic_scale};
 use balance::Balance;
 use cylinder::{ETA, LOBES};
 
-/// What a strand of water is like.
+/// Properties of a strand of water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrandParams {
     /// Radius of the cylinder, metres.
@@ -42,11 +43,11 @@ pub struct StrandParams {
     pub roughness_m: f32,
     /// Roughness around the strand, β_n, 0.1 to 1.
     pub roughness_n: f32,
-    /// Absorption in units of pure water's.
+    /// Absorption as a multiple of pure water's.
     pub absorption: f32,
-    /// Share of the light that meets air bubbles instead of strands, 0 to 1.
+    /// Share of the light that meets air bubbles instead of strands in a cell with k_d = k_s, 0 to 1.
     pub aeration: f32,
-    /// Mean cosine of the scattering by bubbles, −0.99 to 0.99.
+    /// Mean cosine of the scattering angle at air bubbles, −0.99 to 0.99.
     pub g: f32,
 }
 
@@ -64,38 +65,38 @@ impl Default for StrandParams {
 }
 
 impl StrandParams {
-    /// σ_a · 2r, the optical depth of a diameter, linear RGB.
+    /// Optical depth σ_a · 2r of a diameter, linear RGB.
     pub fn depth(&self) -> DVec3 {
         absorption::pure_water() * (2.0 * self.radius_m as f64 * self.absorption as f64)
     }
 }
 
-/// Smallest roughness: what is smoother has lobes too narrow for the table.
+/// Minimum roughness. Smoother strands have lobes too narrow for the table.
 pub const ROUGHNESS_MIN: f64 = 0.1;
 
-/// The lobes at one pair of directions, 1/sr, linear RGB.
+/// Values of the lobes for one pair of directions, 1/sr, linear RGB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lobes {
-    /// Reflected from the outside.
+    /// R: light reflected from the outside.
     pub r: DVec3,
-    /// Through the strand.
+    /// TT: light transmitted through the strand.
     pub tt: DVec3,
-    /// Reflected once inside.
+    /// TRT: light reflected once inside.
     pub trt: DVec3,
-    /// Reflected inside twice or more often.
+    /// Residual: light reflected inside twice or more.
     pub residual: DVec3,
-    /// By bubbles of air.
+    /// Light scattered by air bubbles.
     pub aerated: DVec3,
 }
 
 impl Lobes {
-    /// Φ.
+    /// Phase function Φ, the sum of all lobes.
     pub fn total(&self) -> DVec3 {
         self.r + self.tt + self.trt + self.residual + self.aerated
     }
 }
 
-/// The model evaluated directly, in float64: what the table is made from and measured against.
+/// Direct evaluation of the model in float64. The table is built from it and measured against it.
 pub struct Strand {
     params: StrandParams,
     depth: DVec3,
@@ -105,7 +106,7 @@ pub struct Strand {
 }
 
 impl Strand {
-    /// For a strand like this.
+    /// Model of a strand with these properties.
     pub fn new(params: &StrandParams) -> Self {
         let v = longitudinal::variances(params.roughness_m as f64);
         Strand {
@@ -117,8 +118,8 @@ impl Strand {
         }
     }
 
-    /// Φ by lobes for inclinations of light and eye (−π/2 to π/2) and the angle between them around the
-    /// strand. The shares of strand and air are those of a cell with k_d = k_s.
+    /// Lobes of Φ for the inclinations of light and eye (−π/2 to π/2) and the angle `phi` between them around
+    /// the strand, in radians. The shares of strand and air are those of a cell with k_d = k_s.
     pub fn lobes(&self, theta_i: f64, theta_o: f64, phi: f64) -> Lobes {
         let ((sin_i, cos_i), (sin_o, cos_o)) = (theta_i.sin_cos(), theta_o.sin_cos());
         let a = self.params.aeration as f64;
@@ -130,29 +131,29 @@ impl Strand {
         Lobes { r, tt, trt, residual, aerated }
     }
 
-    /// b(θ_i)·b(θ_o)·M_p.
+    /// Balanced longitudinal lobes b(θ_i)·b(θ_o)·M_p.
     fn along(&self, theta_i: f64, theta_o: f64, coco: f64, sisi: f64) -> [f64; LOBES] {
         let balance = self.balance.at(theta_i) * self.balance.at(theta_o);
         self.v.map(|v| balance * longitudinal::longitudinal(v, coco, sisi))
     }
 
-    /// N_p of one inclination.
+    /// Azimuthal lobes N_p at inclination θ_d.
     fn around(&self, cos_d: f64) -> Azimuth {
         Azimuth::new(self.s, ETA, cos_d, self.depth)
     }
 }
 
-/// Henyey and Greenstein's phase function, 1/sr; `cos` of the angle by which light is turned.
+/// Henyey and Greenstein's phase function, 1/sr. `cos` is the cosine of the scattering angle.
 pub fn henyey_greenstein(g: f64, cos: f64) -> f64 {
     0.25 * FRAC_1_PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos).powf(1.5)
 }
 
-/// Share of air in a cell: `aeration` where k_d = k_s, more where diffuse reflection is stronger, so that the
-/// noise of k is noise of the air.
+/// Share of air in a cell: `aeration` where k_d = k_s, and more where k_d is larger than k_s. The noise of k
+/// thus becomes noise of the air.
 pub fn cell_aeration(aeration: f32, k_d: f32, k_s: f32) -> f32 {
     let sum = k_d + k_s;
     if sum > 0.0 { (aeration * (2.0 * k_d / sum)).clamp(0.0, 1.0) } else { aeration }
 }
 
-/// Ψ per Φ: intensities are irradiance over π.
+/// Ratio Ψ/Φ. It is π because intensities are irradiance over π.
 pub const PSI_PER_PHI: f64 = PI;

@@ -1,20 +1,22 @@
-//! Ψ of a strand as a table over three angles, for the renderers. `shaders/light/strand.wgsl` is the twin of the
-//! lookup: the same operations in the same order.
+//! Table of Ψ of a strand over three angles, for the renderers. `shaders/light/strand.wgsl` is the twin of
+//! the lookup: the same operations in the same order.
 //!
-//! | axis | runs over | nodes |
+//! | axis | coordinate | nodes |
 //! |---|---|---|
-//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: from the mirror cone on, in steps as fine as it is narrow | 40 |
+//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: starts at the mirror cone, with steps as fine as the cone is narrow | 40 |
 //! | y | cos θ_d | 48 |
-//! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the light's side, where the bow is, to the far one | 128 |
+//! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the side of the light, where the rainbow is, to the far side | 128 |
 //!
-//! All come from the cosines between the directions by square roots alone. A texel holds
-//! Ψ·√(cos θ_i·cos θ_o + v_R/2): near the mirror cone M is inversely proportional to that root, within a factor
-//! of 1.8 over all inclinations. Without it the steps of y would be too coarse where the strand is seen end on.
-//! It is linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half the time of float16.
+//! All three coordinates follow from the cosines between the directions by square roots alone.
+//!
+//! A texel holds Ψ·√(cos θ_i·cos θ_o + v_R/2). Near the mirror cone M is inversely proportional to that root,
+//! within a factor of 1.8 over all inclinations. Without the factor the steps of y would be too coarse where
+//! a strand is seen end on. Texels are linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half
+//! the time of float16.
 //!
 //! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
 //! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones
-//! (tests/suite/strand.rs).
+//! (`tests/suite/light/strand.rs`).
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -23,21 +25,22 @@ use rayon::prelude::*;
 
 use super::{PSI_PER_PHI, Strand, StrandParams, cell_aeration};
 
-/// Nodes along x, y and z.
+/// Number of nodes along x, y and z.
 pub const SIZE: [usize; 3] = [40, 48, 128];
-/// w of the z axis: with 1 the steps of φ grow without bound at the far side, with 0 at the light's.
+/// Weight w of the z axis. With w = 1 the steps of φ would grow without bound at the far side, with w = 0 at
+/// the side of the light.
 pub const SINE_SHARE: f32 = 0.75;
-/// Tables kept: those of a slider that goes back and forth, and of the scenes of a gallery.
-const CACHED: usize = 4;
+/// Number of cached tables, for a slider that moves back and forth or the scenes of a gallery.
+const CACHED_TABLES: usize = 4;
 
-/// Ψ of the strands alone, tabulated.
+/// Tabulated Ψ of the strands alone, without air.
 pub struct StrandTable {
     key: [u32; 4],
-    /// k of the x axis.
+    /// Constant k of the x axis.
     pub squeeze: f32,
-    /// v_R/2.
+    /// v_R/2, with v_R the longitudinal variance of lobe R.
     pub spread: f32,
-    /// As `rgb9e5ufloat` holds them; x runs fastest, then y.
+    /// Texels rounded to `rgb9e5ufloat`; x runs fastest, then y.
     texels: Vec<Vec3>,
     moments: OnceLock<Moments>,
 }
@@ -45,14 +48,14 @@ pub struct StrandTable {
 /// Means over all directions of light and eye, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {
-    /// Share of the light that is scattered.
+    /// Albedo: share of the light that is scattered, 0 to 1.
     pub albedo: DVec3,
-    /// Mean cosine of the angle by which it is turned.
+    /// Mean cosine of the scattering angle.
     pub mean_cosine: DVec3,
 }
 
 impl StrandTable {
-    /// The table of a strand, from the cache or built.
+    /// Table of a strand, taken from the cache or built.
     pub fn of(params: &StrandParams) -> Arc<StrandTable> {
         static CACHE: Mutex<Vec<Arc<StrandTable>>> = Mutex::new(Vec::new());
         let key = key(params);
@@ -62,11 +65,11 @@ impl StrandTable {
             None => Arc::new(StrandTable::build(params)),
         };
         cache.insert(0, table.clone());
-        cache.truncate(CACHED);
+        cache.truncate(CACHED_TABLES);
         table
     }
 
-    /// Builds the table; aeration does not enter.
+    /// Builds the table of a strand, which does not depend on aeration.
     pub fn build(params: &StrandParams) -> StrandTable {
         let strand = Strand::new(params);
         let [nx, ny, nz] = SIZE;
@@ -84,7 +87,7 @@ impl StrandTable {
                     .map(|ix| {
                         let x = node(ix, nx);
                         let s = x * k / (1.0 + k - x);
-                        // Outside the triangle of real directions, S > cos θ_d, its edge goes on.
+                        // Nodes with S > cos θ_d belong to no pair of directions and repeat the edge.
                         let coco = (cos_d * cos_d - s * s).max(0.0);
                         let sisi = coco - 1.0 + 2.0 * s * s;
                         let (half_sum, theta_d) = (s.asin(), cos_d.acos());
@@ -110,12 +113,12 @@ impl StrandTable {
         StrandTable { key: key(params), squeeze, spread, texels, moments: OnceLock::new() }
     }
 
-    /// The texels as `rgb9e5ufloat`, x fastest, then y, then z.
+    /// Returns the texels as `rgb9e5ufloat`; x runs fastest, then y, then z.
     pub fn texels(&self) -> Vec<u32> {
         self.texels.iter().map(|t| pack_rgb9e5(*t)).collect()
     }
 
-    /// Ψ of the strands alone, from t·l, t·e and l·e of unit vectors.
+    /// Reflection Ψ of the strands alone, from the cosines t·l, t·e and l·e between unit vectors.
     pub fn psi(&self, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> Vec3 {
         let sisi = t_dot_l * t_dot_e;
         let coco = ((1.0 - t_dot_l * t_dot_l).max(0.0) * (1.0 - t_dot_e * t_dot_e).max(0.0)).sqrt();
@@ -127,24 +130,24 @@ impl StrandTable {
         self.sample(Vec3::new(x, cos_d, z)) / (coco + self.spread).sqrt()
     }
 
-    /// Trilinear, as a sampler does it.
-    fn sample(&self, at: Vec3) -> Vec3 {
+    /// Trilinear interpolation at coordinates from 0 to 1, as a texture sampler does it.
+    fn sample(&self, position: Vec3) -> Vec3 {
         let [nx, ny, nz] = SIZE;
         let split = |x: f32, n: usize| {
             let x = x * (n - 1) as f32;
             let i = (x as usize).min(n - 2);
             (i, x - i as f32)
         };
-        let (ix, fx) = split(at.x, nx);
-        let (iy, fy) = split(at.y, ny);
-        let (iz, fz) = split(at.z, nz);
+        let (ix, fx) = split(position.x, nx);
+        let (iy, fy) = split(position.y, ny);
+        let (iz, fz) = split(position.z, nz);
         let along_x = |i: usize| self.texels[i].lerp(self.texels[i + 1], fx);
         let along_y = |i: usize| along_x(i).lerp(along_x(i + nx), fy);
         let i = (iz * ny + iy) * nx + ix;
         along_y(i).lerp(along_y(i + nx * ny), fz)
     }
 
-    /// Albedo and mean cosine of the strands alone, by quadrature of the table.
+    /// Albedo and mean cosine of the strands alone, integrated over the table.
     pub fn moments(&self) -> Moments {
         *self.moments.get_or_init(|| self.quadrature())
     }
@@ -157,7 +160,7 @@ impl StrandTable {
         let theta = |i: usize| (i as f64 + 0.5) * step - FRAC_PI_2;
         let weight = |i: usize| (theta(i) + 0.5 * step).sin() - (theta(i) - 0.5 * step).sin();
         let cos_phi: Vec<f64> = (0..PHI).map(|i| ((i as f64 + 0.5) * PI / PHI as f64).cos()).collect();
-        // Turning the flow round changes nothing: light from one side is enough.
+        // Reversing the flow changes nothing, so light from one side is enough.
         let (albedo, cosine) = (THETA / 2..THETA)
             .into_par_iter()
             .map(|i| {
@@ -178,19 +181,19 @@ impl StrandTable {
             .into_iter()
             .fold((DVec3::ZERO, DVec3::ZERO), |a, b| (a.0 + b.0, a.1 + b.1));
         let per_direction = 2.0 / PHI as f64;
-        // What the table's error adds must not be taken for light.
+        // The bound keeps the table's error from adding energy.
         Moments { albedo: (albedo * per_direction).min(DVec3::ONE), mean_cosine: cosine / albedo }
     }
 }
 
-/// φ of a place on the z axis.
+/// Angle φ, in radians, at the coordinate z from 0 to 1 of the z axis.
 fn azimuth_of(z: f64) -> f64 {
     let (w, rest) = (SINE_SHARE as f64, 1.0 - SINE_SHARE as f64);
     2.0 * (rest.atan2(w) + ((z - rest) / w.hypot(rest)).clamp(-1.0, 1.0).asin())
 }
 
-/// Three numbers of 9 bits with one exponent of 5 (the OpenGL extension EXT_texture_shared_exponent); of 0 to
-/// 65408, good to 0.2 % of the largest.
+/// Packs three numbers from 0 to 65408 into 9 bits each with a shared exponent of 5 bits (the OpenGL
+/// extension EXT_texture_shared_exponent). The error is at most 0.2 % of the largest number.
 fn pack_rgb9e5(rgb: Vec3) -> u32 {
     let rgb = rgb.clamp(Vec3::ZERO, Vec3::splat(65408.0));
     let largest = rgb.max_element();
@@ -207,7 +210,7 @@ fn unpack_rgb9e5(word: u32) -> Vec3 {
     Vec3::new(bits(0), bits(9), bits(18)) / unit(-((word >> 27) as i32))
 }
 
-/// 2^(24 + e), exact: what makes a number of 9 bits of one with the exponent −e.
+/// Factor 2^(24 + e), exact, that scales a number with the shared exponent −e to a 9-bit integer.
 fn unit(e: i32) -> f32 {
     ((24 + e) as f32).exp2()
 }
@@ -216,33 +219,34 @@ fn key(params: &StrandParams) -> [u32; 4] {
     [params.radius_m, params.absorption, params.roughness_m, params.roughness_n].map(f32::to_bits)
 }
 
-/// The whole model as the renderers evaluate it: strands from the table, and air.
+/// Complete model as the renderers evaluate it: strands from the table, and air.
 pub struct StrandShading {
-    /// The strands.
+    /// Table of the strands.
     pub table: Arc<StrandTable>,
     /// Share of air in a cell with k_d = k_s.
     pub aeration: f32,
-    /// Mean cosine of the scattering by air.
+    /// Mean cosine of the scattering angle at air bubbles.
     pub g: f32,
 }
 
 impl StrandShading {
-    /// For a strand like this.
+    /// Model of a strand with these properties.
     pub fn new(params: &StrandParams) -> Self {
         StrandShading { table: StrandTable::of(params), aeration: params.aeration, g: params.g }
     }
 
-    /// Ψ = π·Φ of a cell with coefficients k, in any unit.
+    /// Reflection Ψ = π·Φ of a cell with the coefficients k_d and k_s, in any common unit, from the cosines
+    /// between unit vectors.
     pub fn psi(&self, k_d: f32, k_s: f32, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> Vec3 {
         let a = cell_aeration(self.aeration, k_d, k_s);
         let g = self.g;
-        // The angle light is turned by has the cosine −l·e.
+        // The scattering angle has the cosine −l·e.
         let x = (1.0 + g * g + 2.0 * g * l_dot_e).max(1e-6);
         let air = a * (0.25 * (1.0 - g * g)) / (x * x.sqrt());
         self.table.psi(t_dot_l, t_dot_e, l_dot_e) * (1.0 - a) + Vec3::splat(air)
     }
 
-    /// Albedo and mean cosine of the mixture in a cell with k_d = k_s.
+    /// Albedo and mean cosine of strands and air together, in a cell with k_d = k_s.
     pub fn moments(&self) -> Moments {
         let strand = self.table.moments();
         let (a, g) = (self.aeration as f64, self.g as f64);

@@ -271,7 +271,7 @@ fn only_regular_files_with_the_two_names_are_read() {
     }
     refused("exr", read_bytes(&folder, "a.exr", &hdr_bytes(&small())), "a.exr");
     let exr = exr_bytes(&small(), Compression::ZIP16, Blocks::ScanLines);
-    refused("hdr", read_bytes(&folder, "a.hdr", &exr), "does not begin as a Radiance picture");
+    refused("hdr", read_bytes(&folder, "a.hdr", &exr), "does not start with #?RADIANCE");
     let endless = [b"#?RADIANCE\n".as_slice(), &vec![b'a'; 4 << 20]].concat();
     refused("hdr", read_bytes(&folder, "endless.hdr", &endless), "its header has no end");
 }

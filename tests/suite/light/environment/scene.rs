@@ -300,7 +300,7 @@ fn a_render_says_in_one_line_how_far_its_lights_are_off() {
     let run = run(command.arg(&out));
     run.done();
     let lines = run.lines("taki: environment sky of 1024×512: 24 lights");
-    assert!(lines.len() == 1 && lines[0].contains("% off its irradiance"), "{}", run.stderr());
+    assert!(lines.len() == 1 && lines[0].contains("irradiance error"), "{}", run.stderr());
 }
 
 #[test]
