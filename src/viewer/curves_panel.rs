@@ -1,5 +1,5 @@
-//! The curves inspector: draws the spatial fractal curves (§1) as lines in the volume's box, to show the effect of
-//! h, amplitude and levels.
+//! The curves inspector: draws the spatial fractal curves (§1) as lines in the volume's box, to show the
+//! effect of h, amplitude and levels.
 
 mod view;
 
@@ -255,7 +255,8 @@ fn draw_curves(
     }
 }
 
-/// The segments from point `start` drawn as one polyline: at most [`RUN`], all inside the volume or all outside.
+/// The segments from point `start` drawn as one polyline: at most [`RUN`], all inside the volume or all
+/// outside.
 fn run_from(curve: &[Vec3], start: usize, outside: impl Fn(Vec3) -> bool) -> Range<usize> {
     let last = (start + RUN).min(curve.len() - 1);
     let is_outside = outside(curve[start]);
@@ -280,7 +281,8 @@ fn draw_levels(
             let age = (level - n) as f32;
             let colour = ink.level(n, points.levels).gamma_multiply(0.75f32.powf(age).max(0.25));
             let width = if n == level { 2.2 } else { 1.3 };
-            // More dots would merge into the line. From level 1 on, every second point is a displaced midpoint.
+            // More dots would merge into the line. From level 1 on, every second point is a displaced
+            // midpoint.
             if n == level && line.len() <= 65 {
                 let first = if n == 0 { 0 } else { 1 };
                 for at in line.iter().skip(first).step_by(1 + first) {
@@ -292,7 +294,8 @@ fn draw_levels(
     }
 }
 
-/// Draws the axes from the corner where x, y and z are 0, each with its number of cells, and the flow direction.
+/// Draws the axes from the corner where x, y and z are 0, each with its number of cells, and the flow
+/// direction.
 fn draw_axes(painter: &egui::Painter, projection: &Projection, spec: &WaterSpec, ink: &Ink) {
     let size = Vec3::from_array(spec.size.map(|n| n as f32));
     let font = egui::FontId::proportional(13.0);

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::scene::{
-    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve,
-    set_by_hand,
+    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve, set_by_hand,
 };
 use crate::util::error::{Error, Result};
 
@@ -20,8 +19,8 @@ pub struct Document {
     pub name: String,
     /// The file it was read from or last saved to. `None` for a preset.
     pub path: Option<PathBuf>,
-    /// The folder that references are relative to and must lie in. `None` once the user has named a file by hand:
-    /// references are then trusted.
+    /// The folder that references are relative to and must lie in. `None` once the user has named a file by
+    /// hand: references are then trusted.
     folder: Option<PathBuf>,
     limits: Limits,
     values: Values,
@@ -98,8 +97,8 @@ impl Document {
         self.saved.get(key)
     }
 
-    /// Whether the value of `key` differs from when the scene was opened or saved. Always false for a key of a
-    /// light that was added since.
+    /// Whether the value of `key` differs from when the scene was opened or saved. Always false for a key of
+    /// a light that was added since.
     pub fn differs(&self, key: &str) -> bool {
         owner_exists(&self.saved, key) && self.values.get(key) != self.saved.get(key)
     }
@@ -209,7 +208,8 @@ impl Document {
         let mut values = self.values.clone();
         values.clear_under(key);
         if !owner_exists(&values, key) {
-            // A light exists only while it has a key, so its last key is set to the default instead of removed.
+            // A light exists only while it has a key, so its last key is set to the default instead of
+            // removed.
             let default = values.get(key);
             values.0.insert(Key::new(key), default);
         }
@@ -347,8 +347,8 @@ impl Document {
     }
 }
 
-/// Whether the light that `key` belongs to exists; true for a key outside `lights`. A light whose values are all
-/// defaults still differs from no light.
+/// Whether the light that `key` belongs to exists; true for a key outside `lights`. A light whose values are
+/// all defaults still differs from no light.
 fn owner_exists(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {

@@ -1,5 +1,5 @@
-//! The viewer's `--measure`: changes parameters at the pace of a user, then draws without pause while a picture
-//! is refined.
+//! The viewer's `--measure`: changes parameters at the pace of a user, then draws without pause while a
+//! picture is refined.
 
 use std::time::{Duration, Instant};
 

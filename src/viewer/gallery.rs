@@ -99,9 +99,9 @@ impl Gallery {
     }
 }
 
-/// Renders a preset at the gallery's size and aspect, on the CPU: the picture is small, and the GPU stays free for the
-/// renderer. Light volumes are replaced by light rays: for so few pixels, filling them would take longer than
-/// the rays that they save.
+/// Renders a preset at the gallery's size and aspect, on the CPU: the picture is small, and the GPU stays
+/// free for the renderer. Light volumes are replaced by light rays: for so few pixels, filling them would
+/// take longer than the rays that they save.
 fn thumbnail(preset: &str) -> Option<egui::ColorImage> {
     let mut sets =
         vec![format!("image.width={WIDTH}"), format!("image.height={HEIGHT}"), "image.samples=3".into()];

@@ -50,8 +50,8 @@ pub enum Legend {
 
 /// Draws `layer` of `frame`, which has `samples` samples per pixel.
 ///
-/// Values that are not finite are magenta, also in the `rgb` layer. Pixels without a value (no quad, no surface,
-/// no cell) show a dark checkerboard, whose colours no map contains.
+/// Values that are not finite are magenta, also in the `rgb` layer. Pixels without a value (no quad, no
+/// surface, no cell) show a dark checkerboard, whose colours no map contains.
 pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     let samples = samples.max(1) as f32;
     let radiance = |i: usize| frame.radiance.get(i).copied().unwrap_or([0.0; 4]);
@@ -157,8 +157,8 @@ fn scale_image(
     LayerImage { pixels, legend }
 }
 
-/// The range of the finite values, cut off at outliers. It extends at most half the distance between the 2nd and
-/// the 98th percentile beyond these. Without values low > high.
+/// The range of the finite values, cut off at outliers. It extends at most half the distance between the 2nd
+/// and the 98th percentile beyond these. Without values low > high.
 fn robust_range(frame: &Frame, value: impl Fn(usize) -> Option<f32> + Sync) -> (f32, f32) {
     let finite = |i: usize| value(i).filter(|v| v.is_finite());
     let pixels = frame.picture.len();
@@ -215,8 +215,8 @@ pub(super) fn direction_colour(n: [f32; 3]) -> [u8; 3] {
     n.map(|x| byte(0.5 * x + 0.5))
 }
 
-/// Colour of quad number `quad`, counted from 0. The hue turns by the golden angle and the lightness repeats every
-/// three quads, so that neither the next quad nor the one in the next row looks similar.
+/// Colour of quad number `quad`, counted from 0. The hue turns by the golden angle and the lightness repeats
+/// every three quads, so that neither the next quad nor the one in the next row looks similar.
 pub fn quad_colour(quad: u32) -> [u8; 3] {
     let hue = (quad as f32 * 0.618_034 + 0.58).fract();
     let (saturation, value) = [(0.62, 0.95), (0.80, 0.62), (0.38, 0.85)][quad as usize % 3];
@@ -259,7 +259,8 @@ pub fn show_legend(ui: &mut egui::Ui, layer: Layer, legend: &Legend) {
                 Legend::Scale { low, high, unit, map } => {
                     let decimals = decimals(low, high, unit);
                     ui.label(RichText::new(format!("{low:.decimals$}")).color(INK));
-                    colour_bar(ui, BAR, map).on_hover_text("values beyond the ends have the colours of the ends");
+                    colour_bar(ui, BAR, map)
+                        .on_hover_text("values beyond the ends have the colours of the ends");
                     let gap = if unit.is_empty() { "" } else { " " };
                     ui.label(RichText::new(format!("{high:.decimals$}{gap}{unit}")).color(INK));
                 }

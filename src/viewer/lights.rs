@@ -1,5 +1,5 @@
-//! The lights of the scene being edited: which one is selected, and the commands that add, copy, rename, switch and
-//! remove them.
+//! The lights of the scene being edited: which one is selected, and the commands that add, copy, rename,
+//! switch and remove them.
 //!
 //! Each change is one step of undo.
 
@@ -67,8 +67,8 @@ impl Lights {
         self.selected = name.map(str::to_owned);
     }
 
-    /// Adapts to changes of the lights by an undo, a slider or another scene: forgets lights that are gone, and
-    /// records intensities.
+    /// Adapts to changes of the lights by an undo, a slider or another scene: forgets lights that are gone,
+    /// and records intensities.
     pub fn follow(&mut self, values: &Values) {
         let gone = |name: &str| !values.has_under(&format!("lights.{name}"));
         if self.selected.as_deref().is_some_and(gone) {

@@ -1,5 +1,5 @@
-//! Scattering lobes: the distribution of the water's reflection over directions, for one light. These are the numbers
-//! behind the plot in the parameter panel.
+//! Scattering lobes: the distribution of the water's reflection over directions, for one light. These are the
+//! numbers behind the plot in the parameter panel.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -23,13 +23,15 @@ pub enum Plane {
     /// The mirror cone θ_o = −θ_i around the strand. α is the azimuth φ, which is 0 at the light.
     #[default]
     Around,
-    /// The plane of strand and light. cos α is the direction's component across the strand towards the light, sin α
-    /// its component along the strand. θ_o = α and φ = 0 on the light's side, θ_o = ±π − α and φ = π on the other.
+    /// The plane of strand and light. cos α is the direction's component across the strand towards the light,
+    /// sin α its component along the strand. θ_o = α and φ = 0 on the light's side, θ_o = ±π − α and φ = π on
+    /// the other.
     Along,
 }
 
 impl Plane {
-    /// Returns θ_o and φ at `alpha` (−π to π), for a light of inclination `theta_i`. All angles are in radians.
+    /// Returns θ_o and φ at `alpha` (−π to π), for a light of inclination `theta_i`. All angles are in
+    /// radians.
     pub fn direction(self, theta_i: f64, alpha: f64) -> (f64, f64) {
         match self {
             Plane::Around => (-theta_i, alpha),
@@ -173,12 +175,14 @@ impl Scale {
 pub struct Incidence {
     /// Name of the light.
     pub light: String,
-    /// Inclination θ_i of the light to the plane across the flow, radians. Positive if the flow goes towards the light.
+    /// Inclination θ_i of the light to the plane across the flow, radians. Positive if the flow goes towards
+    /// the light.
     pub theta_i: f64,
 }
 
-/// Incidence of the selected light. Without a selection it is that of the first light that shines, else of the sky's
-/// sun, else of the first light. Returns `None` without lights, or if the light is exactly at the middle of the quad.
+/// Incidence of the selected light. Without a selection it is that of the first light that shines, else of
+/// the sky's sun, else of the first light. Returns `None` without lights, or if the light is exactly at the
+/// middle of the quad.
 pub fn incidence(scene: &Scene, values: &Values, selected: Option<&str>) -> Option<Incidence> {
     let names = values.names("lights");
     let preferred = selected.or_else(|| names.iter().find(|name| shines(values, name)).map(String::as_str));

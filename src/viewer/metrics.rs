@@ -76,8 +76,8 @@ impl Shared {
         self.0.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Records the beginning of a frame. `own` is the work of the last frame, seconds. `interval` is the time since
-    /// that frame began, seconds, if the renderer was at work and the window drew without pause.
+    /// Records the beginning of a frame. `own` is the work of the last frame, seconds. `interval` is the time
+    /// since that frame began, seconds, if the renderer was at work and the window drew without pause.
     pub fn frame(&self, own: Option<f32>, interval: Option<f64>) {
         let mut s = self.lock();
         s.start.get_or_insert_with(Instant::now);
@@ -95,8 +95,8 @@ impl Shared {
         }
     }
 
-    /// Records that this frame draws a new picture, which counts as shown when the next frame begins. `asked` is the
-    /// time of its request, if it is the request's first picture.
+    /// Records that this frame draws a new picture, which counts as shown when the next frame begins. `asked`
+    /// is the time of its request, if it is the request's first picture.
     pub fn picture(&self, asked: Option<Instant>, cost: Cost) {
         let mut s = self.lock();
         s.pictures += 1;

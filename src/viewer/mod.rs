@@ -67,8 +67,8 @@ pub struct Options {
     pub lose_window_after: Option<Duration>,
 }
 
-/// Most windows opened in one run, so that repeated losses of the window's GPU device end. Each loss takes two
-/// attempts: the first window after it closes at once.
+/// Most windows opened in one run, so that repeated losses of the window's GPU device end. Each loss takes
+/// two attempts: the first window after it closes at once.
 const MAX_WINDOWS: usize = 8;
 
 /// What draws the window.

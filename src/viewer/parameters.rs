@@ -31,7 +31,11 @@ struct Group {
 const GROUPS: [Group; 9] = [
     group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
     group("Volume", "The volume texture: cells, density, reflection", &["volume"]),
-    group("Mapping", "How the volume is mapped onto the quads", &["materials", "sheets", "splashes", "quads"]),
+    group(
+        "Mapping",
+        "How the volume is mapped onto the quads",
+        &["materials", "sheets", "splashes", "quads"],
+    ),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
     group("Lights", "", LIGHTS),
     group(
@@ -61,7 +65,8 @@ const MARKS_WIDTH: f32 = 60.0;
 /// State of the panel.
 #[derive(Default)]
 pub struct ParameterPanel {
-    /// Search text. The panel shows only parameters that have all its words in their key, symbol, descriptions or cost.
+    /// Search text. The panel shows only parameters that have all its words in their key, symbol,
+    /// descriptions or cost.
     pub search: String,
     /// Why the last edit was refused.
     fault: Option<String>,
@@ -161,7 +166,8 @@ impl ParameterPanel {
         }
     }
 
-    /// The rows of a group, with a heading for each light, quad or rock, and the pictures that belong to a row.
+    /// The rows of a group, with a heading for each light, quad or rock, and the pictures that belong to a
+    /// row.
     fn group_body(&mut self, ui: &mut Ui, context: &mut Context, keys: &[&String]) {
         let mut heading = String::new();
         for key in keys {
@@ -281,8 +287,8 @@ fn parent(key: &str) -> &str {
     key.rsplit_once('.').map_or("", |(parent, _)| parent)
 }
 
-/// Sorts the keys of each light, quad or rock together, in the order in which these first appear. The parameter
-/// table lists them parameter by parameter instead.
+/// Sorts the keys of each light, quad or rock together, in the order in which these first appear. The
+/// parameter table lists them parameter by parameter instead.
 fn sort_by_parent(keys: &mut [&String]) {
     let mut first = HashMap::new();
     for (i, key) in keys.iter().enumerate() {
@@ -346,10 +352,9 @@ fn cost_text(cost: Cost, costs: Costs) -> String {
     match cost {
         Cost::Uniform => "A change uploads a few bytes and renders the picture again.".into(),
         Cost::Upload => "A change packs existing data again and uploads it to the GPU.".into(),
-        Cost::Volume if costs.volume_seconds > 0.0 => format!(
-            "A change rebuilds the volume. The last build took {:.0} ms.",
-            costs.volume_seconds * 1e3
-        ),
+        Cost::Volume if costs.volume_seconds > 0.0 => {
+            format!("A change rebuilds the volume. The last build took {:.0} ms.", costs.volume_seconds * 1e3)
+        }
         Cost::Volume => "A change rebuilds the volume.".into(),
     }
 }

@@ -1,5 +1,5 @@
-//! Traces the ray through a clicked pixel on a thread of its own, because finely subdivided rock takes a tenth of a
-//! second.
+//! Traces the ray through a clicked pixel on a thread of its own, because finely subdivided rock takes a
+//! tenth of a second.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};

@@ -69,7 +69,8 @@ impl Settings {
         dirs::config_dir().map(|folder| folder.join("taki").join("viewer.json"))
     }
 
-    /// Reads the settings. A missing file gives the defaults. A damaged one gives the defaults and a note for the user.
+    /// Reads the settings. A missing file gives the defaults. A damaged one gives the defaults and a note for
+    /// the user.
     pub fn load(path: Option<&Path>) -> (Settings, Option<String>) {
         let Some(path) = path else { return (Settings::default(), None) };
         let text = match std::fs::read_to_string(path) {

@@ -16,8 +16,8 @@ pub enum Purpose {
     Save,
 }
 
-/// A dialog that asks for a path, which the user types or picks in the system's file dialog. Typing also works where
-/// the system has no file dialog.
+/// A dialog that asks for a path, which the user types or picks in the system's file dialog. Typing also
+/// works where the system has no file dialog.
 #[derive(Default)]
 pub struct PathDialog {
     /// Purpose of the open dialog. `None` while it is closed.
@@ -52,8 +52,8 @@ impl PathDialog {
         self.open.is_some()
     }
 
-    /// Shows the dialog. Returns the path that the user gave. `also` adds contents, such as recent files, and returns
-    /// the path chosen there.
+    /// Shows the dialog. Returns the path that the user gave. `also` adds contents, such as recent files, and
+    /// returns the path chosen there.
     pub fn show(
         &mut self,
         ctx: &egui::Context,

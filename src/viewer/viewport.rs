@@ -25,7 +25,12 @@ pub enum Tool {
 impl Tool {
     /// All tools in the order of the toolbar, each with name, key and tooltip.
     pub const ALL: [(Tool, &'static str, egui::Key, &'static str); 4] = [
-        (Tool::Orbit, "Orbit", egui::Key::O, "Drag to turn the camera around its target; drag with Shift or the right button to pan"),
+        (
+            Tool::Orbit,
+            "Orbit",
+            egui::Key::O,
+            "Drag to turn the camera around its target; drag with Shift or the right button to pan",
+        ),
         (Tool::Pan, "Pan", egui::Key::P, "Drag to move the camera parallel to the image"),
         (
             Tool::Light,

@@ -180,8 +180,8 @@ impl Viewer {
         let now = Instant::now();
         let seconds = self.last_flow.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
         let flow = f64::from(self.document.values().float("volume.flow"));
-        // A shift by a whole length gives the same picture, so the loop has no seam. The step is limited so that
-        // the water does not jump after the window has been idle.
+        // A shift by a whole length gives the same picture, so the loop has no seam. The step is limited so
+        // that the water does not jump after the window has been idle.
         let next = (flow + seconds.min(0.5) * self.settings.flow_speed).rem_euclid(1.0);
         let set = self.document.set_quietly("volume.flow", &Raw::Float(f64::from(next as f32)));
         self.report(set);

@@ -54,8 +54,8 @@ impl Viewer {
         }
     }
 
-    /// Requests the window's picture, and writes it once it has arrived. Returns whether it is written, or none
-    /// is wanted.
+    /// Requests the window's picture, and writes it once it has arrived. Returns whether it is written, or
+    /// none is wanted.
     pub(super) fn take_screenshot(&mut self, ctx: &egui::Context) -> bool {
         let Some(path) = &self.options.screenshot else { return true };
         let id = egui::Id::unique("screenshot");

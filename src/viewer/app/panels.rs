@@ -114,8 +114,7 @@ impl Viewer {
             self.move_camera(self.first_pose, None);
         }
         ui.separator();
-        for (theme, text) in
-            [(Theme::System, "System theme"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
+        for (theme, text) in [(Theme::System, "System theme"), (Theme::Light, "Light"), (Theme::Dark, "Dark")]
         {
             if ui.radio(self.settings.theme == theme, text).clicked() {
                 let ctx = ui.ctx().clone();
@@ -164,8 +163,8 @@ impl Viewer {
                 }
             }
             ui.separator();
-            // The room is the same while the renderer works and at rest. Otherwise the picture below would change
-            // its size each time, and be rendered again without end.
+            // The room is the same while the renderer works and at rest. Otherwise the picture below would
+            // change its size each time, and be rendered again without end.
             let room = egui::vec2(PROGRESS_WIDTH, ui.spacing().interact_size.y);
             let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
             let layout = egui::Layout::left_to_right(egui::Align::Center);
@@ -175,7 +174,8 @@ impl Viewer {
 
     /// The button that plays the water, and its speed.
     fn flow_controls(&mut self, ui: &mut Ui) {
-        let (text, action) = if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
+        let (text, action) =
+            if self.playing { ("⏸", "Pause the water") } else { ("▶", "Play the water") };
         let play = ui.button(text).on_hover_text(format!("{action} (Space)"));
         name(&play, action);
         if play.clicked() {

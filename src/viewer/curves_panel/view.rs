@@ -3,17 +3,17 @@
 use eframe::egui::{self, Pos2, Rect};
 use glam::Vec3;
 
-/// Distance of the eye from the middle of the box, in radii of the sphere around the box. It is close enough for
-/// perspective to be seen.
+/// Distance of the eye from the middle of the box, in radii of the sphere around the box. It is close enough
+/// for perspective to be seen.
 const DISTANCE: f32 = 4.0;
-/// Diameter of that sphere's outline as a share of the canvas without its labels. It is more than 1 because two
-/// opposite corners seldom lie on the outline.
+/// Diameter of that sphere's outline as a share of the canvas without its labels. It is more than 1 because
+/// two opposite corners seldom lie on the outline.
 const FILL: f32 = 1.05;
 /// Room for the labels of both sides together, points.
 const LABELS: egui::Vec2 = egui::vec2(64.0, 40.0);
 
-/// Direction and distance from which the box is seen. At yaw and pitch 0, x points right, y (the flow) down and z
-/// away.
+/// Direction and distance from which the box is seen. At yaw and pitch 0, x points right, y (the flow) down
+/// and z away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
     /// Rotation about the vertical, radians.

@@ -24,8 +24,8 @@ pub fn takes(kind: &str, what: &str) -> bool {
     }
 }
 
-/// Returns a name that no light has: `wanted`, or the first free one of wanted-2, wanted-3, …. A number at the end of
-/// `wanted` is replaced, so that `sun-2` gives `sun-3`, not `sun-2-2`.
+/// Returns a name that no light has: `wanted`, or the first free one of wanted-2, wanted-3, …. A number at
+/// the end of `wanted` is replaced, so that `sun-2` gives `sun-3`, not `sun-2-2`.
 pub fn free_name(values: &Values, wanted: &str) -> String {
     if !is_taken(values, wanted) {
         return wanted.into();
@@ -43,8 +43,9 @@ fn is_taken(values: &Values, name: &str) -> bool {
     values.has_under(&format!("lights.{name}"))
 }
 
-/// Adds a light at a position where the camera sees its effect: in front of the target, above it and to the left.
-/// It is as bright at the target as a directional light of intensity 1. Returns the new values and the light's name.
+/// Adds a light at a position where the camera sees its effect: in front of the target, above it and to the
+/// left. It is as bright at the target as a directional light of intensity 1. Returns the new values and the
+/// light's name.
 ///
 /// # Errors
 /// If the parameter table has no such kind, or the position is out of range.

@@ -59,8 +59,8 @@ struct Canvas<'a> {
     done: Drawn,
 }
 
-/// Shows the handles of the selected light. With `tool`, the Light tool, shows those of all lights. With `turning`,
-/// a light being turned by a drag, shows that light's dial.
+/// Shows the handles of the selected light. With `tool`, the Light tool, shows those of all lights. With
+/// `turning`, a light being turned by a drag, shows that light's dial.
 pub fn show(
     ui: &Ui,
     image: Rect,
@@ -153,8 +153,8 @@ impl Canvas<'_> {
         }
     }
 
-    /// Draws a spot light's cone at a distance from the light: the circle where its light ends, the circle within
-    /// which it is full, and four lines to the light.
+    /// Draws a spot light's cone at a distance from the light: the circle where its light ends, the circle
+    /// within which it is full, and four lines to the light.
     fn cone(&self, position: DVec3, to_light: DVec3, distance: f64, light: &str, color: Color32) {
         let number = |what: &str| f64::from(self.values.float(&format!("lights.{light}.{what}")));
         let (u, v) = to_light.any_orthonormal_pair();
@@ -240,8 +240,8 @@ impl Canvas<'_> {
         painter.text(below, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
     }
 
-    /// Whether a point of the world is visible in the picture, and the position of its handle. The handle of a point
-    /// outside the picture is at the border.
+    /// Whether a point of the world is visible in the picture, and the position of its handle. The handle of
+    /// a point outside the picture is at the border.
     fn handle_position(&self, point: DVec3) -> (bool, Pos2) {
         let projected = self.view.project(point).0;
         let at = projected.unwrap_or_else(|| self.view.border_towards(point));
@@ -274,8 +274,8 @@ impl Canvas<'_> {
         if response.drag_started() {
             let (projected, depth) = self.view.project(now);
             let pressed = self.ui.input(|i| i.pointer.press_origin()).map_or(pointer, point);
-            // The handle of a point outside the picture jumps to the pointer. A point behind the eye gets the depth
-            // of the camera's target.
+            // The handle of a point outside the picture jumps to the pointer. A point behind the eye gets the
+            // depth of the camera's target.
             let visible = projected.filter(|at| self.view.contains(*at));
             let offset = visible.map_or(DVec2::ZERO, |at| at - pressed);
             let depth = if depth > 0.0 { depth } else { self.view.project(self.pose.target).1 };

@@ -24,8 +24,8 @@ impl View {
         View { eye: pose.eye, axes: pose.axes(), tan_half_fov: pose.tan_half_fov, corner, size }
     }
 
-    /// Projects a point of the world to the window, in points. Also returns the point's depth along the view axis,
-    /// metres. A point behind the eye has a depth of at most 0 and no projection.
+    /// Projects a point of the world to the window, in points. Also returns the point's depth along the view
+    /// axis, metres. A point behind the eye has a depth of at most 0 and no projection.
     pub fn project(&self, point: DVec3) -> (Option<DVec2>, f64) {
         let [right, up, forward] = self.axes;
         let d = point - self.eye;
@@ -71,11 +71,12 @@ impl View {
         across.normalize_or(DVec2::Y) * (angle / std::f64::consts::PI)
     }
 
-    /// The unit direction towards the light at a position on the dial. Outside the dial it is that of the rim.
+    /// The unit direction towards the light at a position on the dial. Outside the dial it is that of the
+    /// rim.
     ///
-    /// The dial shows all directions at once, with up as in the image. The distance from its middle is proportional to
-    /// the angle from the direction towards the eye (azimuthal equidistant projection). The middle lights the scene
-    /// from the eye, radius ½ from the side, the rim (radius 1) from behind.
+    /// The dial shows all directions at once, with up as in the image. The distance from its middle is
+    /// proportional to the angle from the direction towards the eye (azimuthal equidistant projection). The
+    /// middle lights the scene from the eye, radius ½ from the side, the rim (radius 1) from behind.
     pub fn dial_direction(&self, position: DVec2) -> DVec3 {
         let [right, up, forward] = self.axes;
         let (sin, cos) = (position.length().min(1.0) * std::f64::consts::PI).sin_cos();

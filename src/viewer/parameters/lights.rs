@@ -10,8 +10,8 @@ use crate::scene::{PARAMS, Raw};
 use crate::viewer::document::Document;
 use crate::viewer::lights::{Lights, Renaming, edit};
 
-/// In a longer list, folded entries that are scrolled out of sight are skipped. Otherwise each frame would lay out
-/// thousands of buttons.
+/// In a longer list, folded entries that are scrolled out of sight are skipped. Otherwise each frame would
+/// lay out thousands of buttons.
 const MAX_LAID_OUT: usize = 200;
 
 /// What the user asks for in the entry of one light.
@@ -27,8 +27,8 @@ enum Command {
 }
 
 impl ParameterPanel {
-    /// Shows the group of the lights. Returns the number of their parameters that are shown, but at least 1 without a
-    /// search.
+    /// Shows the group of the lights. Returns the number of their parameters that are shown, but at least 1
+    /// without a search.
     pub(super) fn lights(&mut self, ui: &mut Ui, context: &mut Context) -> usize {
         let names = context.document.values().names("lights");
         let entries: Vec<(String, Vec<String>)> = names
@@ -96,8 +96,7 @@ impl ParameterPanel {
             state.set_open(true);
         }
         let mut command = None;
-        let header =
-            state.show_header(ui, |ui| command = entry(ui, context.document, context.lights, light));
+        let header = state.show_header(ui, |ui| command = entry(ui, context.document, context.lights, light));
         let (_, header, _) = header.body(|ui| {
             for key in keys {
                 self.row(ui, context, key);
@@ -218,7 +217,8 @@ fn name_button(ui: &mut Ui, selected: bool, light: &str) -> Option<Command> {
         button.clicked().then_some(Command::Select)
     };
     name(&button, &format!("Light {light}"));
-    button.on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
+    button
+        .on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
     command
 }
 
@@ -242,7 +242,8 @@ fn name_field(ui: &mut Ui, renaming: &mut Renaming) -> Option<Command> {
         return None;
     }
     let pressed = |key| ui.input(|i| i.key_pressed(key));
-    // After Enter, a refused name stays in the field, which gets the focus again. After a click elsewhere it does not.
+    // After Enter, a refused name stays in the field, which gets the focus again. After a click elsewhere it
+    // does not.
     renaming.focused = !pressed(egui::Key::Enter);
     let new = renaming.text.trim().to_owned();
     Some(if pressed(egui::Key::Escape) { Command::KeepName } else { Command::Rename(new) })

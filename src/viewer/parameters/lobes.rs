@@ -16,7 +16,8 @@ use crate::viewer::lobes::{Curve, Plane, STEPS, Scale, Setting, alpha, curves, i
 const MAX_WIDTH: f32 = 380.0;
 /// Half the side of the plot in radii of its rim. It leaves room for the light's arrow and the angles.
 const EXTENT: f64 = 1.24;
-/// Angle on both sides of the light that is kept free of labels, radians: the light's arrow and name are there.
+/// Angle on both sides of the light that is kept free of labels, radians: the light's arrow and name are
+/// there.
 const ARROW_ROOM: f64 = 0.35;
 
 /// The plot, its curves, and the setting that they were computed for.
@@ -129,7 +130,8 @@ impl LobesPlot {
             let _ = send.send(curves(&setting));
             ctx.request_repaint();
         };
-        // On a thread of its own: the strand's energy balance waits for the thread pool, which may be busy rendering.
+        // On a thread of its own: the strand's energy balance waits for the thread pool, which may be busy
+        // rendering.
         let _ = std::thread::Builder::new().name("lobes".into()).spawn(compute);
         self.computing = Some((setting, answer));
     }

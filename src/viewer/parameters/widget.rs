@@ -27,7 +27,8 @@ pub(super) fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bo
     changed
 }
 
-/// Shows the azimuth and elevation of a direction as sliders. Returns the direction that they were changed to.
+/// Shows the azimuth and elevation of a direction as sliders. Returns the direction that they were changed
+/// to.
 pub(super) fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let mut angles = navigate::angles(t.into());
     let mut changed = false;
@@ -192,7 +193,8 @@ fn is_logarithmic(low: f64, high: f64, default: f64) -> bool {
     low >= 0.0 && (wide || small)
 }
 
-/// Shows a linear colour as a button and, for a component above 1, a factor. Returns the colour that it was changed to.
+/// Shows a linear colour as a button and, for a component above 1, a factor. Returns the colour that it was
+/// changed to.
 fn color(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Raw> {
     let picked = color_button(ui, key, t);
     let factor = brightness(t);
