@@ -96,7 +96,7 @@ pub struct Busy {
 pub struct Message {
     /// Severity.
     pub kind: MessageKind,
-    /// What happened and what to do.
+    /// Text that says what happened and what to do.
     pub text: String,
 }
 

@@ -89,8 +89,8 @@ impl LobesPlot {
             Reflection::Strand(_) => "Strand of water with air bubbles, Φ",
         };
         ui.label(format!("θ_i = {theta_i} of {}", incidence.light)).on_hover_text(
-            "Inclination of the light to the plane across the flow. The flow is v at the middle of the first quad. \
-             Select a light to see its lobes.",
+            "Inclination of the light to the plane across the flow. The flow is v at the middle of the first \
+             quad. Select a light to see its lobes.",
         );
         legend(ui, curves);
         let scale = Scale::new(curves);
@@ -100,8 +100,8 @@ impl LobesPlot {
             Plane::Along => "over θ_o, with φ = 0 on the left, φ = π on the right, and the flow down".into(),
         };
         let caption = format!(
-            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. The radius is the luminance in 1/sr on a \
-             logarithmic scale, from {} or less in the middle to the largest value at the rim.",
+            "{model}, {angle}, of a cell with k_d = {} and k_s = {}. The radius is the luminance in 1/sr on \
+             a logarithmic scale, from {} or less in the middle to the largest value at the rim.",
             setting.k_d,
             setting.k_s,
             power_of_ten(scale.middle)

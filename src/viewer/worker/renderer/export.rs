@@ -13,8 +13,8 @@ use crate::util::window::Window;
 use crate::viewer::worker::{Export, MessageKind, Request};
 
 impl Renderer {
-    /// Exports a picture and reports the result. Only a lost device is returned as an error, so that the
-    /// export is tried again.
+    /// Exports a picture and reports the result. Returns an error only for a device that was lost or hangs,
+    /// so that the export is tried again.
     pub(super) fn export(&mut self, export: &Export) -> Result<()> {
         let clock = Instant::now();
         let result = self.export_files(export);
