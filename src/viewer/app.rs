@@ -243,7 +243,7 @@ impl Viewer {
     pub fn shows_latest(&self) -> bool {
         self.picture
             .as_ref()
-            .is_some_and(|p| p.serial == self.serial && Arc::ptr_eq(&p.of, self.document.scene()))
+            .is_some_and(|p| p.serial == self.serial && Arc::ptr_eq(&p.requested, self.document.scene()))
     }
 
     /// The inspected ray.

@@ -12,7 +12,7 @@ use crate::util::error::{Error, Result};
 /// Most steps that can be undone.
 const MAX_UNDO: usize = 500;
 
-/// A scene under edit.
+/// A scene being edited, with its history.
 #[derive(Clone)]
 pub struct Document {
     /// Name of the preset, or stem of the file name.

@@ -46,7 +46,7 @@ pub struct Options {
     pub sets: Vec<String>,
     /// Memory budget and allowed folders.
     pub limits: Limits,
-    /// What draws the window.
+    /// Graphics API that draws the window.
     pub window: WindowChoice,
     /// The engine that renders.
     pub engine: EngineChoice,
@@ -71,10 +71,10 @@ pub struct Options {
 /// two attempts: the first window after it closes at once.
 const MAX_WINDOWS: usize = 8;
 
-/// What draws the window.
+/// Graphics API that draws the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WindowChoice {
-    /// Vulkan, Metal or Direct3D on a GPU; OpenGL where they would be software.
+    /// Vulkan, Metal or Direct3D on a GPU; OpenGL if these run only in software.
     #[default]
     Auto,
     /// Vulkan, Metal or Direct3D.
@@ -271,7 +271,8 @@ impl Loss {
         result
     }
 
-    /// Polls the device, so that a lost one calls its callback. It refuses work before it reports the loss.
+    /// Polls the device, so that a lost one calls its callback. A lost device refuses work before it reports
+    /// its loss.
     fn poll_device(&self) {
         if let Some(device) = &*self.device.lock().unwrap_or_else(|e| e.into_inner()) {
             // The callback reports a loss, so the result is not needed.

@@ -1,11 +1,11 @@
-//! The inspector of one pixel: what its ray meets behind the face, as curves over the depth and as a
-//! table of cells.
+//! The pixel inspector: shows the cells that a pixel's ray walks behind the face, as curves over the depth
+//! and as a table.
 
 use eframe::egui::{
     Align, Color32, Grid, Label, Layout, Rangef, RichText, ScrollArea, TextStyle, TextWrapMode, Ui, Vec2b,
     vec2,
 };
-use egui_extras::{Column, TableBuilder};
+use egui_extras::{Column, TableBuilder, TableRow};
 use egui_plot::{AxisHints, HoverPosition, Line, Plot, PlotPoints, Span, VLine};
 use glam::Vec3;
 
@@ -13,40 +13,43 @@ use crate::engine::cpu::ray::{RayReport, RayStep};
 
 /// Rec. 709 weights of linear RGB.
 const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-/// Height of a plot without its axis, points: three of them and some rows fit a laptop's screen.
+/// Height of a plot without its axis, points. Three plots and some rows of the table fit on a laptop's
+/// screen.
 const PLOT_HEIGHT: f32 = 76.0;
-/// Room for the depth axis: its figures and its label.
+/// Height of the depth axis with its figures and label, points.
 const AXIS_HEIGHT: f32 = 34.0;
-/// Room for a plot's own figures: the same for all, so that their depths lie under one another.
+/// Width of the figures beside a plot, points. It is the same for all plots, so that their depths line up.
 const FIGURES_WIDTH: f32 = 48.0;
-/// Size of the table's figures and of the plots' titles, points: a row of the table is wide.
+/// Text size of the table's figures and the plots' titles, points. A larger one would make the table too
+/// wide.
 const SMALL: f32 = 11.0;
-/// The column of what a ray through one sheet does not have.
+/// Name of the column that is shown only if the ray meets several faces.
 const FACE: &str = "face";
-/// Heads, widths in points and meanings of the table's columns.
+/// Columns of the table: head, width in points, and tooltip.
 const COLUMNS: [(&str, f32, &str); 11] = [
-    ("#", 22.0, "Place of the cell on the ray, from 0"),
-    (FACE, 30.0, "The sheet the cell belongs to, by its place above, from 0"),
-    ("x  y  z", 58.0, "The cell in the volume"),
-    ("from – to m", 96.0, "Where the ray enters and leaves the cell, metres behind its face"),
+    ("#", 22.0, "Number of the cell along the ray, from 0"),
+    (FACE, 30.0, "Number of the face in front of the cell, from 0, in the order above"),
+    ("x  y  z", 58.0, "Indices of the cell in the volume"),
+    ("from – to m", 96.0, "Distances at which the ray enters and leaves the cell, metres behind its face"),
     ("ρ", 36.0, "Density, α·ρ"),
     ("T", 36.0, "Transmittance before the cell"),
-    ("radiance", 134.0, "Linear RGB the cell adds towards the eye, ambient light included"),
-    ("V", 36.0, "Attenuation towards each light"),
+    ("radiance", 134.0, "Linear RGB that the cell adds towards the eye, including ambient light"),
+    ("V", 36.0, "Visibility of each light: the share of its light that reaches the cell"),
     ("v", 112.0, "Direction of the flow in the volume"),
     ("k_d", 30.0, "Diffuse reflection coefficient"),
     ("k_s", 30.0, "Specular reflection coefficient"),
 ];
 
-/// Shows a pixel's report in the space there is.
+/// Shows a pixel's report in the available space.
 pub fn show(ui: &mut Ui, report: &RayReport) {
     headline(ui, report);
     if report.steps.is_empty() {
         ui.add_space(8.0);
-        ui.label("No water covers this pixel: its ray goes straight to the rock or the background.");
+        ui.label("No water covers this pixel. Its ray goes straight to the rock or the background.");
         return;
     }
-    // What the pointer is on: a row marks its cell in the plots, a depth in a plot its row.
+    // The row under the pointer marks its cell in the plots. The depth under the pointer in a plot selects
+    // its row.
     let pointed_row = ui.scope_id().with("pointed row");
     let row: Option<usize> = ui.data(|data| data.get_temp(pointed_row)).flatten();
     let marked = row.and_then(|row| report.steps.get(row));
@@ -66,7 +69,8 @@ pub fn show(ui: &mut Ui, report: &RayReport) {
     }
 }
 
-/// The cells that the table lists: those with water, or all if a box above it says so.
+/// Shows a checkbox for empty cells. Returns the cells that the table lists: those with water, or all of
+/// them.
 fn rows(ui: &mut Ui, report: &RayReport) -> Vec<usize> {
     let key = ui.scope_id().with("empty too");
     let mut all: bool = ui.data(|data| data.get_temp(key)).unwrap_or(false);
@@ -82,7 +86,7 @@ fn rows(ui: &mut Ui, report: &RayReport) -> Vec<usize> {
     if all { (0..report.steps.len()).collect() } else { wet }
 }
 
-/// The pixel in a few figures.
+/// Shows the pixel in a few figures.
 fn headline(ui: &mut Ui, report: &RayReport) {
     let [x, y] = report.pixel;
     ui.heading(format!("Pixel {x}, {y}"));
@@ -110,75 +114,77 @@ fn headline(ui: &mut Ui, report: &RayReport) {
         }
     });
     if report.filtered {
-        ui.label(RichText::new("of the volume's own cells: without trace.filter and trace.lookup").weak());
+        ui.label(
+            RichText::new("Computed from the volume's own cells, without trace.filter and trace.lookup")
+                .weak(),
+        );
     }
 }
 
-/// Density, transmittance and radiance over the depth; the depth under the pointer.
-fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f64> {
-    let dark = ui.visuals().dark_mode;
+/// A curve over the depth.
+struct Curve {
+    name: &'static str,
+    points: Vec<[f64; 2]>,
+    color: Color32,
+    /// A value that the axis includes besides 0.
+    includes: Option<f64>,
+}
+
+/// The curves of a report: density, transmittance and radiance over the depth.
+fn curves(report: &RayReport, dark: bool) -> [Curve; 3] {
     let color = |on_dark: [u8; 3], on_light: [u8; 3]| {
         let [r, g, b] = if dark { on_dark } else { on_light };
         Color32::from_rgb(r, g, b)
     };
-    let density = steps(report, |s| s.rho);
-    let radiance = steps(report, |s| s.radiance.dot(LUMINANCE));
     let mut transmittance: Vec<[f64; 2]> =
         report.steps.iter().map(|s| [report.behind_nearest_m(s)[0] as f64, s.transmittance as f64]).collect();
     if let Some(last) = report.steps.last() {
         transmittance.push([report.behind_nearest_m(last)[1] as f64, report.transmittance as f64]);
     }
+    [
+        Curve {
+            name: "density α·ρ",
+            points: step_curve(report, |s| s.rho),
+            color: color([110, 180, 255], [20, 100, 190]),
+            includes: None,
+        },
+        Curve {
+            name: "transmittance T",
+            points: transmittance,
+            color: color([255, 170, 90], [190, 90, 0]),
+            includes: Some(1.0),
+        },
+        Curve {
+            name: "radiance added (luminance)",
+            points: step_curve(report, |s| s.radiance.dot(LUMINANCE)),
+            color: color([150, 220, 130], [40, 130, 30]),
+            includes: None,
+        },
+    ]
+}
+
+/// Plots the curves below one another, with the cell `marked`. Returns the depth under the pointer, metres.
+fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f64> {
     let axis =
         if report.faces.len() > 1 { "metres behind the nearest face" } else { "metres behind the face" };
-    let group = ui.scope_id().with("depth");
-    let plots = [
-        ("density α·ρ", density, color([110, 180, 255], [20, 100, 190]), None),
-        ("transmittance T", transmittance, color([255, 170, 90], [190, 90, 0]), Some(1.0)),
-        ("radiance added (luminance)", radiance, color([150, 220, 130], [40, 130, 30]), None),
-    ];
+    let mark = marked.map(|step| report.behind_nearest_m(step).map(f64::from));
+    let weak = ui.visuals().weak_text_color();
+    let curves = curves(report, ui.visuals().dark_mode);
     let mut depth = None;
-    let last = plots.len() - 1;
-    for (i, (name, points, color, top)) in plots.into_iter().enumerate() {
+    let last = curves.len() - 1;
+    for (i, curve) in curves.into_iter().enumerate() {
         ui.add_space(4.0);
-        let peak = points.iter().map(|p| p[1] as f32).fold(0.0, f32::max);
-        ui.label(RichText::new(format!("{name}, up to {}", figure(peak))).size(SMALL).color(color));
-        let plot = Plot::new(name)
-            .height(if i == last { PLOT_HEIGHT + AXIS_HEIGHT } else { PLOT_HEIGHT })
-            // The last figure of the axis stands half beyond it.
-            .width(ui.available_width() - 10.0)
-            .link_axis(group, Vec2b::new(true, false))
-            .link_cursor(group, Vec2b::new(true, false))
-            .show_axes(Vec2b::new(i == last, true))
-            .custom_x_axes(vec![AxisHints::new_x().label(axis).label_spacing(Rangef::new(24.0, 32.0))])
-            .custom_y_axes(vec![
-                AxisHints::new_y().min_thickness(FIGURES_WIDTH).label_spacing(Rangef::new(12.0, 18.0)),
-            ])
-            // The wheel is the panel's.
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false)
-            .allow_drag(Vec2b::new(true, false))
-            .allow_zoom(Vec2b::new(true, false))
-            .set_margin_fraction(vec2(0.0, 0.08))
-            .include_y(0.0)
-            .label_formatter(move |at| {
-                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) =
-                    at;
-                Some(format!("{:.4} m\n{}", position.x, figure(position.y as f32)))
-            });
-        let plot = match top {
-            Some(top) => plot.include_y(top),
-            None => plot,
-        };
-        let mark = marked.map(|step| report.behind_nearest_m(step).map(f64::from));
-        let weak = ui.visuals().weak_text_color();
+        let peak = curve.points.iter().map(|p| p[1] as f32).fold(0.0, f32::max);
+        let title = format!("{}, up to {}", curve.name, figure(peak));
+        ui.label(RichText::new(title).size(SMALL).color(curve.color));
+        let plot = depth_plot(ui, &curve, (i == last).then_some(axis));
         let shown = plot.show(ui, |plot| {
             if let Some([enter, exit]) = mark {
                 plot.span(Span::new("", enter..=exit).fill(weak.gamma_multiply(0.25)).border_width(0.0));
                 plot.vline(VLine::new("", enter).color(weak).allow_hover(false));
             }
-            let line = Line::new(name, PlotPoints::new(points)).color(color);
-            // A band would round the steps off.
+            let line = Line::new(curve.name, PlotPoints::new(curve.points)).color(curve.color);
+            // A hover band would round off the steps.
             plot.line(line.allow_band(false).fill(0.0).fill_alpha(0.15));
             plot.pointer_coordinate().filter(|_| plot.response().hovered())
         });
@@ -187,8 +193,45 @@ fn plots(ui: &mut Ui, report: &RayReport, marked: Option<&RayStep>) -> Option<f6
     depth
 }
 
-/// A value of each cell from where the ray enters it to where it leaves it; nothing between the sheets.
-fn steps(report: &RayReport, value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
+/// The plot of one curve. All plots share their depth axis and cursor. Only the last one shows the axis, with
+/// this label.
+fn depth_plot(ui: &Ui, curve: &Curve, depth_axis: Option<&'static str>) -> Plot<'static> {
+    let group = ui.scope_id().with("depth");
+    let axis_height = if depth_axis.is_some() { AXIS_HEIGHT } else { 0.0 };
+    let plot = Plot::new(curve.name)
+        .height(PLOT_HEIGHT + axis_height)
+        // Half of the axis's last figure extends beyond the plot.
+        .width(ui.available_width() - 10.0)
+        .link_axis(group, Vec2b::new(true, false))
+        .link_cursor(group, Vec2b::new(true, false))
+        .show_axes(Vec2b::new(depth_axis.is_some(), true))
+        .custom_x_axes(vec![
+            AxisHints::new_x().label(depth_axis.unwrap_or("")).label_spacing(Rangef::new(24.0, 32.0)),
+        ])
+        .custom_y_axes(vec![
+            AxisHints::new_y().min_thickness(FIGURES_WIDTH).label_spacing(Rangef::new(12.0, 18.0)),
+        ])
+        // The wheel scrolls the panel.
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .allow_drag(Vec2b::new(true, false))
+        .allow_zoom(Vec2b::new(true, false))
+        .set_margin_fraction(vec2(0.0, 0.08))
+        .include_y(0.0)
+        .label_formatter(move |at| {
+            let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = at;
+            Some(format!("{:.4} m\n{}", position.x, figure(position.y as f32)))
+        });
+    match curve.includes {
+        Some(value) => plot.include_y(value),
+        None => plot,
+    }
+}
+
+/// A step curve with each cell's value from where the ray enters the cell to where it leaves it. The value is
+/// 0 between sheets.
+fn step_curve(report: &RayReport, value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     let mut face = 0;
     for step in &report.steps {
@@ -204,14 +247,16 @@ fn steps(report: &RayReport, value: impl Fn(&RayStep) -> f32) -> Vec<[f64; 2]> {
 }
 
 /// Whether a column is shown.
-fn shown(report: &RayReport, name: &str) -> bool {
+fn is_shown(report: &RayReport, name: &str) -> bool {
     name != FACE || report.faces.len() > 1
 }
 
-/// The cells `rows`, of which `selected` is shown as such; the one under the pointer.
+/// Shows the table of the cells `rows`, with the cell `selected` highlighted. Returns the cell under the
+/// pointer.
 fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize>) -> Option<usize> {
     let mut hovered = None;
     let row_height = ui.text_style_height(&TextStyle::Monospace) + 2.0;
+    let columns = || COLUMNS.into_iter().filter(|(name, ..)| is_shown(report, name));
     ScrollArea::horizontal().id_salt("cells").show(ui, |ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         let height = ui.available_height();
@@ -223,66 +268,66 @@ fn table(ui: &mut Ui, report: &RayReport, rows: &[usize], selected: Option<usize
             .min_scrolled_height(3.0 * row_height)
             .max_scroll_height(height)
             .cell_layout(Layout::right_to_left(Align::Center));
-        for (_, width, _) in COLUMNS.into_iter().filter(|(name, ..)| shown(report, name)) {
+        for (_, width, _) in columns() {
             table = table.column(Column::initial(width).at_least(width.min(36.0)).clip(true));
         }
         if let Some(row) = selected.and_then(|number| rows.iter().position(|&row| row == number)) {
             table = table.scroll_to_row(row, None);
         }
-        table
-            .header(row_height + 2.0, |mut header| {
-                for (name, _, tip) in COLUMNS.into_iter().filter(|(name, ..)| shown(report, name)) {
-                    header.col(|ui| {
-                        ui.add(
-                            Label::new(RichText::new(name).size(SMALL + 1.0).strong())
-                                .wrap_mode(TextWrapMode::Extend),
-                        )
-                        .on_hover_text(tip);
-                    });
-                }
-            })
-            .body(|body| {
-                body.rows(row_height, rows.len(), |mut row| {
-                    let number = rows[row.index()];
-                    let step = &report.steps[number];
-                    row.set_selected(selected == Some(number));
-                    for ((name, ..), text) in COLUMNS.into_iter().zip(cells(number, step)) {
-                        if !shown(report, name) {
-                            continue;
-                        }
-                        row.col(|ui| {
-                            // What is empty steps back.
-                            let text = RichText::new(text).monospace().size(SMALL);
-                            let text = if step.rho > 0.0 { text } else { text.weak() };
-                            ui.add(Label::new(text).wrap_mode(TextWrapMode::Extend).selectable(false));
-                        });
-                    }
-                    if row.response().hovered() {
-                        hovered = Some(number);
-                    }
+        let table = table.header(row_height + 2.0, |mut header| {
+            for (name, _, tip) in columns() {
+                header.col(|ui| {
+                    let name = RichText::new(name).size(SMALL + 1.0).strong();
+                    ui.add(Label::new(name).wrap_mode(TextWrapMode::Extend)).on_hover_text(tip);
                 });
+            }
+        });
+        table.body(|body| {
+            body.rows(row_height, rows.len(), |mut row| {
+                let number = rows[row.index()];
+                row.set_selected(selected == Some(number));
+                fill_row(&mut row, report, number);
+                if row.response().hovered() {
+                    hovered = Some(number);
+                }
             });
+        });
     });
     hovered
 }
 
-/// A row of the table, in the order of [`COLUMNS`].
+fn fill_row(row: &mut TableRow, report: &RayReport, number: usize) {
+    let step = &report.steps[number];
+    for ((name, ..), text) in COLUMNS.into_iter().zip(cells(number, step)) {
+        if !is_shown(report, name) {
+            continue;
+        }
+        row.col(|ui| {
+            // Empty cells are less prominent.
+            let text = RichText::new(text).monospace().size(SMALL);
+            let text = if step.rho > 0.0 { text } else { text.weak() };
+            ui.add(Label::new(text).wrap_mode(TextWrapMode::Extend).selectable(false));
+        });
+    }
+}
+
+/// Texts of one row of the table, in the order of [`COLUMNS`].
 fn cells(number: usize, step: &RayStep) -> [String; 11] {
     let [x, y, z] = step.cell;
     let occupied = step.rho > 0.0;
-    let only = |text: String| if occupied { text } else { String::new() };
+    let if_occupied = |text: String| if occupied { text } else { String::new() };
     [
         number.to_string(),
         step.face.to_string(),
         format!("{x:>2} {y:>2} {z:>2}"),
         format!("{:.4}–{:.4}", step.enter_m, step.exit_m),
-        only(format!("{:.3}", step.rho)),
+        if_occupied(format!("{:.3}", step.rho)),
         format!("{:.3}", step.transmittance),
-        only(triple(step.radiance)),
+        if_occupied(triple(step.radiance)),
         step.visibility.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(" "),
-        only(format!("{:>5.2} {:>5.2} {:>5.2}", step.v.x, step.v.y, step.v.z)),
-        only(format!("{:.2}", step.k_d)),
-        only(format!("{:.2}", step.k_s)),
+        if_occupied(format!("{:>5.2} {:>5.2} {:>5.2}", step.v.x, step.v.y, step.v.z)),
+        if_occupied(format!("{:.2}", step.k_d)),
+        if_occupied(format!("{:.2}", step.k_s)),
     ]
 }
 
@@ -290,7 +335,7 @@ fn triple(x: Vec3) -> String {
     format!("{} {} {}", figure(x.x), figure(x.y), figure(x.z))
 }
 
-/// Three or four digits of a number of any size.
+/// A number of any size with two to five significant digits.
 fn figure(x: f32) -> String {
     match x.abs() {
         0.0 => "0".into(),

@@ -292,7 +292,7 @@ pub fn ask_unsaved(ctx: &egui::Context, scene: &str) -> Option<UnsavedAnswer> {
     if shown.should_close() { Some(UnsavedAnswer::Stay) } else { answer }
 }
 
-/// What to do with unsaved changes.
+/// The user's answer to the dialog about unsaved changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnsavedAnswer {
     /// Saves the scene, then continues.

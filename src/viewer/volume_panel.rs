@@ -1,4 +1,5 @@
-//! The volume inspector: three slices through the cells, how ρ is spread, and figures beside theory's.
+//! The volume inspector: three slices through the cells, the histogram of ρ, and statistics compared to
+//! theory.
 
 mod figures;
 mod histogram;
@@ -11,28 +12,28 @@ use eframe::egui::{self, Color32, RichText};
 use crate::volume::{RhoHistogram, Statistics, VolumeTexture};
 use slice::Slice;
 
-/// Steps between 0 and α in the histogram: few enough that a step stands clear of the axis beside the
-/// clamped ends, which hold eight times as many cells.
+/// Steps between 0 and α in the histogram. With few steps, each bar is tall enough to see beside the bars of
+/// the clamped ends, which hold eight times as many cells.
 const BINS: usize = 10;
-/// Cells that are counted at once, a few milliseconds; a larger volume (than 64³) is counted beside the
-/// frames.
+/// Most cells that are counted within a frame, which takes a few milliseconds. A larger volume than 64³ is
+/// counted on another thread.
 const COUNT_AT_ONCE: usize = 1 << 18;
-/// Narrowest panel with the three slices in one row, points.
+/// Smallest width of a panel with the three slices in one row, points.
 const ROW_WIDTH: f32 = 620.0;
-/// Narrowest panel with a title and its key in one line, points.
+/// Smallest width of a panel with a title and its key on one line, points.
 const ONE_LINE_WIDTH: f32 = 350.0;
-/// Narrowest slice with its directions named, points.
+/// Smallest width of a slice whose caption names its directions, points.
 const FULL_CAPTION_WIDTH: f32 = 115.0;
-/// Least width and height of the scrubbers beside slices, points.
-const SCRUBBERS_BESIDE: f32 = 150.0;
+/// Smallest width and height of the sliders beside slices, points.
+const SLIDERS_BESIDE: f32 = 150.0;
 /// Largest height of all slices together, points.
 const MAX_HEIGHT: f32 = 430.0;
-/// Between slices, points.
+/// Gap between slices, points.
 const GAP: f32 = 8.0;
 
-/// What the slices show.
+/// The quantity that the slices show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Shown {
+enum Quantity {
     #[default]
     Rho,
     V,
@@ -40,33 +41,34 @@ enum Shown {
     KS,
 }
 
-impl Shown {
-    const ALL: [(Shown, &str); 4] =
-        [(Shown::Rho, "ρ"), (Shown::V, "v"), (Shown::KD, "k_d"), (Shown::KS, "k_s")];
+impl Quantity {
+    const ALL: [(Quantity, &str); 4] =
+        [(Quantity::Rho, "ρ"), (Quantity::V, "v"), (Quantity::KD, "k_d"), (Quantity::KS, "k_s")];
 }
 
-/// The volume inspector. It keeps the cell its three planes meet in, their pictures and the counts.
+/// The volume inspector. It keeps the cell in which its three planes meet, their pictures, and the
+/// statistics.
 #[derive(Default)]
 pub struct VolumePanel {
     volume: Option<Arc<VolumeTexture>>,
-    /// x, y, z of the cell the three planes meet in.
+    /// x, y and z of the cell in which the three planes meet.
     cell: [u32; 3],
-    shown: Shown,
+    quantity: Quantity,
     slices: [Slice; 3],
     counts: Arc<OnceLock<Counts>>,
 }
 
-/// What is counted over all cells.
+/// Statistics over all cells.
 struct Counts {
     statistics: Statistics,
     rho: RhoHistogram,
 }
 
 impl VolumePanel {
-    /// Shows `volume`. Another one (by pointer) is counted anew, and keeps the planes where they are
-    /// if it is of the same size.
+    /// Shows `volume`. A new volume (by pointer) is counted again. The planes stay where they are if its size
+    /// is the same.
     pub fn show(&mut self, ui: &mut egui::Ui, volume: &Arc<VolumeTexture>) {
-        self.take(ui.ctx(), volume);
+        self.set_volume(ui.ctx(), volume);
         self.selector(ui, volume);
         ui.add_space(2.0);
         let size = volume.size.map(|n| n as f32);
@@ -86,27 +88,28 @@ impl VolumePanel {
             None => {
                 ui.horizontal(|ui| {
                     ui.spinner();
-                    ui.label("Counting cells");
+                    ui.label("Counting cells …");
                 });
             }
         }
     }
 
-    /// The cell the three planes meet in: x, y, z.
+    /// x, y and z of the cell in which the three planes meet.
     pub fn cell(&self) -> [u32; 3] {
         self.cell
     }
 
-    fn take(&mut self, ctx: &egui::Context, volume: &Arc<VolumeTexture>) {
-        if self.volume.as_ref().is_some_and(|known| Arc::ptr_eq(known, volume)) {
+    fn set_volume(&mut self, ctx: &egui::Context, volume: &Arc<VolumeTexture>) {
+        if self.volume.as_ref().is_some_and(|last| Arc::ptr_eq(last, volume)) {
             return;
         }
-        if self.volume.as_ref().is_none_or(|known| known.size != volume.size) {
+        if self.volume.as_ref().is_none_or(|last| last.size != volume.size) {
             self.cell = volume.size.map(|n| n / 2);
         }
         self.volume = Some(volume.clone());
         self.slices = Default::default();
-        // Counts of the volume before, if they still come, go to the cell nobody looks at any more.
+        // Counts of the last volume that are still being made go to the old `OnceLock`, which is dropped
+        // here.
         self.counts = Arc::default();
         let (counts, volume, cells) = (self.counts.clone(), volume.clone(), volume.cells.len());
         let count = move || {
@@ -122,16 +125,16 @@ impl VolumePanel {
             count();
             ctx.request_repaint();
         };
-        // A thread of its own: the pool's may be rendering for long. Where none is to be had the
-        // figures are missing, the slices are not.
+        // On a thread of its own, because the thread pool may be busy rendering. If the thread cannot start,
+        // only the statistics are missing.
         let _ = std::thread::Builder::new().name("count cells".into()).spawn(counting);
     }
 
     fn selector(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         let one_line = ui.available_width() >= ONE_LINE_WIDTH;
         ui.horizontal(|ui| {
-            for (shown, name) in Shown::ALL {
-                ui.selectable_value(&mut self.shown, shown, name);
+            for (quantity, name) in Quantity::ALL {
+                ui.selectable_value(&mut self.quantity, quantity, name);
             }
             if one_line {
                 ui.add_space(6.0);
@@ -143,11 +146,11 @@ impl VolumePanel {
         }
     }
 
-    /// What the slices' colours mean.
+    /// Shows the meaning of the slices' colours.
     fn key(&self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         ui.spacing_mut().item_spacing.x = 6.0;
-        match self.shown {
-            Shown::V => {
+        match self.quantity {
+            Quantity::V => {
                 for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
                     let mut n = [0.0; 3];
                     n[axis] = 1.0;
@@ -155,19 +158,19 @@ impl VolumePanel {
                     ui.label(format!("+{name}"));
                 }
             }
-            Shown::Rho | Shown::KD | Shown::KS => {
+            Quantity::Rho | Quantity::KD | Quantity::KS => {
                 ui.label("0");
                 let bar = egui::vec2(60.0, 11.0);
                 super::layer_image::colour_bar(ui, bar, super::layer_image::sequential);
-                let high = if self.shown == Shown::Rho { volume.alpha } else { 1.0 };
+                let high = if self.quantity == Quantity::Rho { volume.alpha } else { 1.0 };
                 ui.label(short(high as f64));
             }
         }
         swatch(ui, slice::empty_colour(ui.visuals().dark_mode));
-        ui.label("no flow").on_hover_text("Cells no curve passes: ρ, v and k are 0");
+        ui.label("no flow").on_hover_text("Cells that no curve passes through: ρ, v and k are 0");
     }
 
-    /// Side by side, each with its scrubber below.
+    /// The slices side by side, with the sliders below.
     fn row(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture, [nx, ny, nz]: [f32; 3], width: f32) {
         let scale = ((width - 2.0 * GAP) / (nz + nx + nx)).min(MAX_HEIGHT / ny.max(nz));
         let columns = width.min((nz + nx + nx) * scale + 2.0 * GAP);
@@ -178,25 +181,25 @@ impl VolumePanel {
                 self.slice(ui, volume, axis, scale);
             }
         });
-        self.scrubbers(ui, volume);
+        self.sliders(ui, volume);
     }
 
-    /// As in a technical drawing: the front (across z) with the side (across x) to its right, on the
-    /// same y, and the top (across y) below, on the same x.
+    /// The slices as in a technical drawing: the front view (across z), the side view (across x) to its right
+    /// with the same y, and the top view (across y) below with the same x.
     fn three_views(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture, [nx, ny, nz]: [f32; 3], width: f32) {
         let scale = ((width - GAP) / (nx + nz)).min((MAX_HEIGHT - GAP) / (ny + nz));
         ui.spacing_mut().item_spacing = egui::Vec2::splat(GAP);
-        // The scrubbers go where there is room: beside a long volume, under the side view of a square
-        // one, below all in a narrow panel.
+        // The sliders go where there is room: to the right of a long volume, under the side view of a square
+        // one, below everything in a narrow panel.
         let right_of_all = width - (nx + nz) * scale - 2.0 * GAP;
-        let under_side = if nz * scale >= SCRUBBERS_BESIDE { width - nx * scale - GAP } else { 0.0 };
+        let under_side = if nz * scale >= SLIDERS_BESIDE { width - nx * scale - GAP } else { 0.0 };
         let beside = |panel: &mut Self, ui: &mut egui::Ui, room: f32| {
-            if room >= SCRUBBERS_BESIDE {
+            if room >= SLIDERS_BESIDE {
                 ui.vertical(|ui| {
                     ui.set_max_width(room);
                     ui.spacing_mut().item_spacing.y = 4.0;
-                    panel.scrubbers(ui, volume);
-                    ui.label(slice::in_words(volume, panel.cell));
+                    panel.sliders(ui, volume);
+                    ui.label(slice::cell_text(volume, panel.cell));
                 });
             }
         };
@@ -207,12 +210,12 @@ impl VolumePanel {
         });
         ui.horizontal_top(|ui| {
             self.slice(ui, volume, 1, scale);
-            if right_of_all < SCRUBBERS_BESIDE {
+            if right_of_all < SLIDERS_BESIDE {
                 beside(self, ui, under_side);
             }
         });
-        if right_of_all.max(under_side) < SCRUBBERS_BESIDE {
-            self.scrubbers(ui, volume);
+        if right_of_all.max(under_side) < SLIDERS_BESIDE {
+            self.sliders(ui, volume);
         }
     }
 
@@ -221,16 +224,16 @@ impl VolumePanel {
         ui.vertical(|ui| {
             ui.set_max_width(right);
             ui.spacing_mut().item_spacing.y = 2.0;
-            let words =
+            let captions =
                 ["across x: z right, y down", "across y: x right, z down", "across z: x right, y down"];
-            let words =
-                if right >= FULL_CAPTION_WIDTH { words[axis] } else { &words[axis][.."across x".len()] };
-            ui.add(egui::Label::new(RichText::new(words).small()).truncate());
-            self.slices[axis].show(ui, volume, axis, self.shown, &mut self.cell, scale);
+            let caption = captions[axis];
+            let caption = if right >= FULL_CAPTION_WIDTH { caption } else { &caption[.."across x".len()] };
+            ui.add(egui::Label::new(RichText::new(caption).small()).truncate());
+            self.slices[axis].show(ui, volume, axis, self.quantity, &mut self.cell, scale);
         });
     }
 
-    fn scrubbers(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
+    fn sliders(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         ui.spacing_mut().item_spacing.y = 4.0;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             ui.scope(|ui| {
@@ -243,7 +246,7 @@ impl VolumePanel {
     }
 }
 
-/// The colour of an axis and of the plane across it: x red, y green, z blue.
+/// Colour of an axis and of the plane across it: x red, y green, z blue.
 pub(super) fn axis_colour(axis: usize, dark_mode: bool) -> Color32 {
     let colours = if dark_mode {
         [(255, 110, 100), (120, 215, 110), (110, 170, 255)]
@@ -261,7 +264,7 @@ fn swatch(ui: &mut egui::Ui, [r, g, b]: [u8; 3]) {
     ui.painter().rect_stroke(rect, 2.0, stroke, egui::StrokeKind::Inside);
 }
 
-/// At most four digits, without zeros at the end.
+/// A number with at most four decimals, without trailing zeros.
 fn short(x: f64) -> String {
     let text = format!("{x:.4}");
     text.trim_end_matches('0').trim_end_matches('.').into()

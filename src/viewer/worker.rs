@@ -1,8 +1,8 @@
-//! The render thread: takes the latest request, shows a coarse preview at once, then refines.
+//! The render thread: takes the latest request, shows a coarse preview at once, then refines it.
 //!
-//! The window's thread only leaves requests and picks up pictures; it waits for nothing. The renderer has
-//! a device of its own, beside the one that draws the window: a long tile does not hold up the window's
-//! own drawing, and a device lost under the renderer takes nothing else with it.
+//! The window's thread only leaves requests and picks up pictures. It never waits. The renderer has a device
+//! of its own, separate from the one that draws the window. A long tile does not delay the window's drawing,
+//! and the loss of the renderer's device affects nothing else.
 
 mod renderer;
 
@@ -25,138 +25,143 @@ use crate::util::cache::Cache;
 use crate::volume::VolumeTexture;
 use renderer::Renderer;
 
-/// What the window wants to see.
+/// A picture that the window requests.
 #[derive(Clone)]
 pub struct Request {
-    /// Counts the requests.
+    /// Number of the request, counted from 1.
     pub serial: u64,
-    /// When it was asked for.
+    /// Time of the request.
     pub asked: Instant,
-    /// The scene.
+    /// Scene to render.
     pub scene: Arc<Scene>,
-    /// Pixels at full resolution; the scene's own size does not count.
+    /// Width and height at full resolution, pixels. They replace the scene's own.
     pub size: [u32; 2],
-    /// Samples a pixel to refine to.
+    /// Samples per pixel to refine to.
     pub samples: u32,
-    /// The layer that is shown.
+    /// The layer to show.
     pub layer: Layer,
 }
 
-/// A picture to be written to files.
+/// A picture to render and write to files.
 pub struct Export {
     /// The scene, with the picture's size and samples.
     pub scene: Scene,
-    /// Files, .png or .exr.
+    /// Files to write, `.png` or `.exr`.
     pub paths: Vec<PathBuf>,
 }
 
 /// A picture for the window.
 pub struct Picture {
-    /// Of which request.
+    /// Number of its request.
     pub serial: u64,
-    /// When that was asked for.
+    /// Time of its request.
     pub asked: Instant,
-    /// The scene that was asked for.
-    pub of: Arc<Scene>,
-    /// The same with the picture's size.
+    /// The requested scene.
+    pub requested: Arc<Scene>,
+    /// The scene with the picture's size and exposure.
     pub scene: Arc<Scene>,
-    /// Its volume.
+    /// The scene's volume.
     pub volume: Arc<VolumeTexture>,
-    /// Its opaque mesh.
+    /// The scene's opaque mesh.
     pub mesh: Mesh,
-    /// The frame.
+    /// The rendered frame.
     pub frame: Arc<Frame>,
-    /// The layer that was asked for, as it is shown.
+    /// The requested layer as it is shown.
     pub image: Arc<egui::ColorImage>,
-    /// That layer.
+    /// The requested layer.
     pub layer: Layer,
-    /// What its colours mean.
+    /// Meaning of the image's colours.
     pub legend: Legend,
-    /// Pixels of the viewport per pixel, along a side.
+    /// Pixels of the viewport per pixel of the picture, along one side.
     pub scale: u32,
-    /// Samples in it.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Whether this request's first.
+    /// Whether this is the request's first picture.
     pub first: bool,
-    /// What had to be done for it.
+    /// Most expensive work that was needed before rendering.
     pub cost: Cost,
 }
 
-/// What the renderer is at.
+/// Work in progress on the render thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Busy {
-    /// In a word: `curves`, `preview`, `refining`, `export`.
+    /// Kind of work: `curves`, `exposure`, `preview`, `refining` or `export`.
     pub what: &'static str,
-    /// 0 to 1.
+    /// Finished share, 0 to 1.
     pub share: f32,
 }
 
-/// Something the user should read.
+/// A message for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Message {
-    /// How bad it is.
+    /// Severity.
     pub kind: MessageKind,
-    /// What happened and what to do.
+    /// Text that says what happened and what to do.
     pub text: String,
 }
 
-/// How bad a message is.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageKind {
-    /// Good news.
+    /// Work was done.
     Note,
-    /// The work goes on.
+    /// Something went wrong, and the work continues.
     Warning,
-    /// It does not.
+    /// Something failed.
     Error,
 }
 
-/// What the renderer shows of itself.
+/// State of the render thread, as the window reads it.
 #[derive(Default)]
 pub struct State {
-    /// The engine in one line; empty until it is open.
+    /// Description of the engine in one line. Empty until the engine is open.
     pub engine: String,
     /// The newest picture.
     pub picture: Option<Arc<Picture>>,
-    /// What it is at; none when there is nothing to do.
+    /// Work in progress. `None` while there is nothing to do.
     pub busy: Option<Busy>,
     /// New messages, oldest first.
     pub messages: Vec<Message>,
-    /// The last request that was finished, given up or failed.
+    /// Number of the last request that was finished, abandoned or failed.
     pub settled: u64,
     /// Why the last request could not be rendered.
     pub fault: Option<String>,
-    /// Seconds of the last volume that was built or read.
+    /// Time that the last volume took to build or read, seconds.
     pub volume_seconds: f64,
-    /// Devices that were lost.
+    /// Number of devices lost.
     pub devices_lost: usize,
-    /// Exports that ended, well or not.
+    /// Number of exports that ended, successfully or not.
     pub exports_done: usize,
 }
 
+/// Work that waits for the render thread.
 #[derive(Default)]
 struct Queue {
+    /// The latest request of the window.
     view: Option<Request>,
     exports: VecDeque<Export>,
     lose_device: bool,
     quit: bool,
 }
 
+/// State shared between the window's thread and the render thread.
 struct Shared {
     queue: Mutex<Queue>,
-    news: Condvar,
-    /// Serial of the newest request.
+    /// Signalled when the queue changes.
+    queue_changed: Condvar,
+    /// Number of the newest request.
     newest: AtomicU64,
-    /// Requests up to this one are not to be refined further.
+    /// Requests up to this number are not refined further.
     stopped: AtomicU64,
     cancel_export: AtomicBool,
     quit: AtomicBool,
     state: Mutex<State>,
+    /// Called when there is something new to show.
     wake: Box<dyn Fn() + Send + Sync>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panic elsewhere leaves plain data behind, never a half-made picture.
+    // The data stays valid when a thread panics: a picture is stored only when it is complete.
     mutex.lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -167,8 +172,8 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; it opens the engine, and takes the first scene from `cache`. `wake` is called when
-    /// there is something new to show.
+    /// Starts the render thread, which opens the engine. The first scene's volume and mesh may come from
+    /// `cache`. `memory` is the budget in bytes. `wake` is called when there is something new to show.
     pub fn new(
         choice: EngineChoice,
         device: DeviceOptions,
@@ -178,7 +183,7 @@ impl Worker {
     ) -> Worker {
         let shared = Arc::new(Shared {
             queue: Mutex::default(),
-            news: Condvar::new(),
+            queue_changed: Condvar::new(),
             newest: AtomicU64::new(0),
             stopped: AtomicU64::new(0),
             cancel_export: AtomicBool::new(false),
@@ -189,46 +194,46 @@ impl Worker {
         let renderer = Renderer::new(shared.clone(), choice, device, memory, cache);
         let thread = std::thread::Builder::new().name("render".into()).spawn(move || renderer.run());
         if let Err(e) = &thread {
-            lock(&shared.state).fault = Some(format!("the render thread did not start: {e}"));
+            lock(&shared.state).fault = Some(format!("the render thread could not be started: {e}"));
         }
         Worker { shared, thread: thread.ok() }
     }
 
-    /// Asks for a picture; an older wish is forgotten.
+    /// Requests a picture. It replaces an older request that is still waiting.
     pub fn request(&self, request: Request) {
         self.shared.newest.store(request.serial, Ordering::Relaxed);
         lock(&self.shared.queue).view = Some(request);
-        self.shared.news.notify_one();
+        self.shared.queue_changed.notify_one();
     }
 
-    /// Asks for a picture in files.
+    /// Requests an export.
     pub fn export(&self, export: Export) {
         self.shared.cancel_export.store(false, Ordering::Relaxed);
         lock(&self.shared.queue).exports.push_back(export);
-        self.shared.news.notify_one();
+        self.shared.queue_changed.notify_one();
     }
 
-    /// Stops the work in hand; what is shown stays.
+    /// Stops refining. The picture in the window stays.
     pub fn stop(&self) {
         self.shared.stopped.store(self.shared.newest.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 
-    /// Stops the export in hand and those that wait.
+    /// Cancels the running export and the waiting ones.
     pub fn cancel_exports(&self) {
         lock(&self.shared.queue).exports.clear();
         self.shared.cancel_export.store(true, Ordering::Relaxed);
     }
 
-    /// What the renderer shows of itself.
+    /// State of the render thread.
     pub fn state(&self) -> MutexGuard<'_, State> {
         lock(&self.shared.state)
     }
 
-    /// Takes the device away as a driver's reset does. For tests.
+    /// Destroys the renderer's device, as a driver reset would. For tests.
     #[doc(hidden)]
     pub fn lose_device(&self) {
         lock(&self.shared.queue).lose_device = true;
-        self.shared.news.notify_one();
+        self.shared.queue_changed.notify_one();
     }
 }
 
@@ -236,9 +241,9 @@ impl Drop for Worker {
     fn drop(&mut self) {
         self.shared.quit.store(true, Ordering::Relaxed);
         lock(&self.shared.queue).quit = true;
-        self.shared.news.notify_one();
+        self.shared.queue_changed.notify_one();
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread was reported when it happened.
+            // A panic of the thread was already reported when it happened.
             let _ = thread.join();
         }
     }

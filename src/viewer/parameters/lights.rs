@@ -14,7 +14,7 @@ use crate::viewer::lights::{Lights, Renaming, edit};
 /// lay out thousands of buttons.
 const MAX_LAID_OUT: usize = 200;
 
-/// What the user asks for in the entry of one light.
+/// The user's command in the entry of one light.
 enum Command {
     Select,
     Switch,

@@ -1,4 +1,4 @@
-//! The thread itself: what it does with a request.
+//! The loop of the render thread, and its work on a request.
 
 mod export;
 mod faults;
@@ -27,30 +27,31 @@ use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
 
-/// A preview aims at this: with the window's own frame and the volume's upload it stays under 150 ms.
+/// Target time of a preview. With the window's own frame and the volume's upload, a preview stays under 150
+/// ms.
 const PREVIEW_SECONDS: f64 = 0.06;
-/// Pixels of the first preview of all, when nothing is known about the scene's cost.
+/// Pixels of the very first preview, when the scene's cost is not yet known.
 const FIRST_PREVIEW_PIXELS: f64 = 15_000.0;
-/// A full picture that takes longer than this is reached over pictures of half the size.
+/// If a full picture takes longer than this, smaller pictures of growing size come first.
 const STEP_SECONDS: f64 = 0.4;
-/// After a preview the renderer waits this long for the next change before it starts to refine.
+/// Time that the renderer waits for the next change after a preview, before it starts to refine.
 const SETTLE: Duration = Duration::from_millis(60);
-/// A preview is finished even if something newer waits, so that a moving slider shows pictures at all;
-/// one that takes longer than this is given up.
+/// A preview is finished even if a newer request waits, because otherwise a moving slider would show no
+/// pictures. A preview that takes longer than this is abandoned for the newer request.
 const PATIENCE: Duration = Duration::from_millis(250);
-/// So is the building of a volume, but it is worth a longer wait.
+/// The same limit for building a volume, which is worth a longer wait.
 const BUILD_PATIENCE: Duration = Duration::from_secs(2);
-/// Bytes for results of the raster pass: while the water plays or one slider of the walk moves, previews are
-/// spared it. Those of several previews, or of one picture of 1.2 times 720p.
-const KEPT_RASTERS: u64 = 48 << 20;
-/// From this scale on the rocks are drawn coarsely,
+/// Size of the cache of raster passes, bytes. With it, previews skip the raster pass while the water plays or
+/// a slider of the walk moves. It holds the results of several previews, or of one picture of 1.2 times 720p.
+const RASTER_CACHE_BYTES: u64 = 48 << 20;
+/// Scale from which on rocks are drawn coarsely.
 const COARSE_SCALE: u32 = 3;
-/// and may be off by so many of a preview's pixels, [`Image::rock_error`](crate::picture::Image).
+/// Error of coarsely drawn rocks, pixels of the preview. See [`Image::rock_error`](crate::picture::Image).
 const COARSE_ROCK: f32 = 6.0;
-/// Preview pixels per side of a full pixel that are tried.
+/// Scales of previews to choose from: pixels of the viewport per pixel of the preview, along one side.
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
-/// The picture that refinement goes on from.
+/// The full-size picture that refinement continues from.
 struct Rendered {
     scene: Arc<Scene>,
     look: Look,
@@ -60,16 +61,16 @@ struct Rendered {
     volume: Arc<VolumeTexture>,
 }
 
-/// What the last pictures took, seconds a sample.
+/// Times of the last pictures, seconds per sample.
 #[derive(Default)]
 struct Speed {
-    /// Of walk, tone and read-back.
+    /// Time of walk, tone and read-back, per pixel.
     per_pixel: Option<f64>,
-    /// Of the rest, mostly the raster pass: with fine rocks, and with coarse ones.
-    once: [f64; 2],
+    /// Time of the rest per picture, mostly the raster pass: with fine rocks, then with coarse ones.
+    per_picture: [f64; 2],
 }
 
-/// What the thread holds.
+/// State of the render thread.
 pub struct Renderer {
     shared: Arc<Shared>,
     choice: EngineChoice,
@@ -77,14 +78,14 @@ pub struct Renderer {
     memory: u64,
     engine: Option<Engine>,
     volume: VolumeStock,
-    /// Of the first scene.
+    /// Disk cache for the mesh of the first scene. `None` once that is made.
     cache: Option<Cache>,
     mesh: Option<(Ground, Mesh)>,
     rendered: Option<Rendered>,
-    /// The values that the last automatic exposure was measured for, and its stops.
+    /// The values that the last automatic exposure was measured for, and the exposure in stops.
     exposed: Option<(Values, f32)>,
     speed: Speed,
-    /// When devices were lost.
+    /// Times at which devices were lost in the last minute.
     losses: VecDeque<Instant>,
 }
 
@@ -96,7 +97,7 @@ enum Task {
 }
 
 impl Renderer {
-    /// Opens nothing yet.
+    /// Creates the renderer. It opens the engine in [`Renderer::run`].
     pub fn new(
         shared: Arc<Shared>,
         choice: EngineChoice,
@@ -133,11 +134,11 @@ impl Renderer {
                 }
                 Task::View(request) => {
                     let serial = request.serial;
-                    let again = (*request).clone();
+                    let retry = (*request).clone();
                     if self.attempt(|renderer| renderer.view(*request)) {
-                        // On the new device, or on the CPU, which is tried once only.
+                        // Retries on the new device or on the CPU, unless a newer request waits.
                         let mut queue = lock(&self.shared.queue);
-                        queue.view.get_or_insert(again);
+                        queue.view.get_or_insert(retry);
                         continue;
                     }
                     let mut state = lock(&self.shared.state);
@@ -158,6 +159,7 @@ impl Renderer {
         }
     }
 
+    /// Waits for the next task. Exports come before requests of the window.
     fn next(&self) -> Task {
         let mut queue = lock(&self.shared.queue);
         loop {
@@ -173,11 +175,11 @@ impl Renderer {
             if let Some(request) = queue.view.take() {
                 return Task::View(Box::new(request));
             }
-            queue = self.shared.news.wait(queue).unwrap_or_else(|e| e.into_inner());
+            queue = self.shared.queue_changed.wait(queue).unwrap_or_else(|e| e.into_inner());
         }
     }
 
-    /// Whether there is something newer to do than `serial`; waits for it up to `time`.
+    /// Waits up to `time` for a task newer than request `serial`. Returns whether there is one.
     fn superseded(&self, serial: u64, time: Duration) -> bool {
         let until = Instant::now() + time;
         let mut queue = lock(&self.shared.queue);
@@ -186,67 +188,74 @@ impl Renderer {
             if newer || queue.quit || queue.lose_device || !queue.exports.is_empty() {
                 return true;
             }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
+            let remaining = until.saturating_duration_since(Instant::now());
+            if remaining.is_zero() {
                 return false;
             }
-            queue =
-                self.shared.news.wait_timeout(queue, left).map_or_else(|e| e.into_inner().0, |woken| woken.0);
+            let woken = self.shared.queue_changed.wait_timeout(queue, remaining);
+            queue = woken.map_or_else(|e| e.into_inner().0, |woken| woken.0);
         }
     }
 
+    /// Renders a request of the window: a preview, the full size, then sample after sample.
     fn view(&mut self, request: Request) -> Result<()> {
-        let (volume, made) = self.volume(&request)?;
-        let (mesh, mesh_made) = self.mesh(&request.scene);
-        let cost = match made {
+        let (volume, volume_cost) = self.volume(&request)?;
+        let (mesh, new_mesh) = self.mesh(&request.scene);
+        let cost = match volume_cost {
             Some(cost) => cost,
-            None if mesh_made => Cost::Upload,
+            None if new_mesh => Cost::Upload,
             None => Cost::Uniform,
         };
         let look = self.exposed(&request.scene, &volume, &mesh, request.serial)?.image.look;
         let job = Job { request: &request, volume, mesh, cost, look };
-        let mut first = true;
-        if let Some(rendered) = self.goes_on(&job) {
-            let samples = rendered.samples;
-            self.keep(&job, rendered, first);
-            if samples >= request.samples {
-                return Ok(());
-            }
-            first = false;
+        if let Some(rendered) = self.continued(&job) {
+            self.keep(&job, rendered, true);
         } else {
             self.rendered = None;
-            let mut scale = self.preview_scale(request.size);
-            self.picture(&job, scale, first)?;
-            first = false;
+            let scale = self.preview_scale(request.size);
+            self.picture(&job, scale, true)?;
             if self.superseded(request.serial, SETTLE) {
                 return Ok(());
             }
-            while scale > 1 {
-                scale = match self.seconds_for(request.size, 1) {
-                    // Half a picture's time is well spent on showing what the next one will be.
-                    full if full > STEP_SECONDS && scale > 2 => scale.div_ceil(2).max(2),
-                    _ => 1,
-                };
-                self.picture(&job, scale, first)?;
-            }
+            self.enlarge(&job, scale)?;
         }
-        // As many samples again as there are: half the time goes into the last step.
+        self.refine(&job)
+    }
+
+    /// Renders pictures of growing size, from a preview's `scale` to full size.
+    fn enlarge(&mut self, job: &Job, mut scale: u32) -> Result<()> {
+        while scale > 1 {
+            scale = match self.seconds_for(job.request.size, 1) {
+                // On the way to a slow picture, each picture has twice the resolution of the one before it.
+                full if full > STEP_SECONDS && scale > 2 => scale.div_ceil(2).max(2),
+                _ => 1,
+            };
+            self.picture(job, scale, false)?;
+        }
+        Ok(())
+    }
+
+    /// Adds samples to the full-size picture, until it has as many as requested.
+    fn refine(&mut self, job: &Job) -> Result<()> {
+        let request = job.request;
+        // Each step doubles the number of samples, so that the last one takes half of the time.
         while let Some(samples) = self.rendered.as_ref().map(|r| r.samples)
             && samples < request.samples
         {
             let more = samples.min(request.samples - samples);
-            let part = self.render(&job, 1, samples..samples + more, "refining")?;
+            let part = self.render(job, 1, samples..samples + more, "refining")?;
             if let Some(rendered) = self.rendered.take() {
                 let mut frame = rendered.frame;
                 add(Arc::make_mut(&mut frame), samples, &part, more, &job.look);
-                self.keep(&job, Rendered { frame, samples: samples + more, ..rendered }, first);
+                self.keep(job, Rendered { frame, samples: samples + more, ..rendered }, false);
             }
         }
         Ok(())
     }
 
-    /// The finished part of the same picture, if that is what is asked for again.
-    fn goes_on(&mut self, job: &Job) -> Option<Rendered> {
+    /// Takes the last full-size picture if the request only continues it: with more samples, another layer,
+    /// or other `image.` values such as the tone.
+    fn continued(&mut self, job: &Job) -> Option<Rendered> {
         let Job { request, volume, look, .. } = job;
         let old = self.rendered.take()?;
         let same = old.size == request.size
@@ -269,7 +278,7 @@ impl Renderer {
         Some(Rendered { scene: request.scene.clone(), look: *look, frame, ..old })
     }
 
-    /// Renders and shows sample 0 at 1/scale of the size.
+    /// Renders and shows sample 0 at 1/`scale` of the size.
     fn picture(&mut self, job: &Job, scale: u32, first: bool) -> Result<()> {
         let frame = self.render(job, scale, 0..1, if first { "preview" } else { "refining" })?;
         let frame = Arc::new(frame);
@@ -289,11 +298,13 @@ impl Renderer {
         Ok(())
     }
 
+    /// Shows a full-size picture and keeps it for refinement.
     fn keep(&mut self, job: &Job, rendered: Rendered, first: bool) {
         self.show(job, rendered.frame.clone(), 1, rendered.samples, first);
         self.rendered = Some(rendered);
     }
 
+    /// Hands a frame to the window.
     fn show(&self, job: &Job, frame: Arc<Frame>, scale: u32, samples: u32, first: bool) {
         let mut scene = (*job.request.scene).clone();
         let shown = &mut scene.edit().image;
@@ -305,7 +316,7 @@ impl Renderer {
         let picture = Picture {
             serial: job.request.serial,
             asked: job.request.asked,
-            of: job.request.scene.clone(),
+            requested: job.request.scene.clone(),
             scene: Arc::new(scene),
             volume: job.volume.clone(),
             mesh: job.mesh.clone(),
@@ -322,6 +333,8 @@ impl Renderer {
         (self.shared.wake)();
     }
 
+    /// Renders `samples` at 1/`scale` of the size, and measures the time. `what` names the work for the
+    /// progress bar.
     fn render(
         &mut self,
         job: &Job,
@@ -344,26 +357,26 @@ impl Renderer {
         let options = RenderOptions {
             surface: job.request.layer.of_surface() && samples.start == 0,
             samples: Some(samples.clone()),
-            keep_rasters: KEPT_RASTERS,
+            keep_rasters: RASTER_CACHE_BYTES,
             ..Default::default()
         };
         let clock = Instant::now();
         let mut frame = self.run_engine(&scene, &job.volume, &job.mesh, &options, &watch)?;
         let s = &mut frame.seconds;
-        let of_pixels = s.integrate + s.resolve + s.readback;
-        let once = clock.elapsed().as_secs_f64() - of_pixels - s.pipelines - s.upload;
+        let pixel_seconds = s.integrate + s.resolve + s.readback;
+        let other_seconds = clock.elapsed().as_secs_f64() - pixel_seconds - s.pipelines - s.upload;
         let samples = samples.len() as f64;
-        self.speed.per_pixel = Some(of_pixels / samples / (width as f64 * height as f64));
-        // Where results of the raster pass were kept it says nothing of the next picture, which may need it.
+        self.speed.per_pixel = Some(pixel_seconds / samples / (width as f64 * height as f64));
+        // A picture whose raster pass came from the cache does not tell how long the next one takes.
         if s.gbuffer > 0.0 {
-            self.speed.once[usize::from(coarse)] = once.max(0.0) / samples;
+            self.speed.per_picture[usize::from(coarse)] = other_seconds.max(0.0) / samples;
         }
-        // People compare passes, not parts of a refinement.
+        // The status bar shows times per sample, which are comparable between refinement steps.
         (s.gbuffer, s.integrate) = (s.gbuffer / samples, s.integrate / samples);
         Ok(frame)
     }
 
-    /// Renders without [`Engine::render`]'s own second try: lost devices are counted here.
+    /// Renders without the retry of [`Engine::render`], because the render thread counts lost devices itself.
     fn run_engine(
         &mut self,
         scene: &Scene,
@@ -378,19 +391,20 @@ impl Renderer {
         }
     }
 
-    /// Expected seconds of one sample at 1/scale of the size.
+    /// Expected time of one sample at 1/`scale` of the size, seconds.
     fn seconds_for(&self, size: [u32; 2], scale: u32) -> f64 {
         let pixels = size.map(|n| n.div_ceil(scale) as f64).iter().product::<f64>();
         let per_pixel = self.speed.per_pixel.unwrap_or(PREVIEW_SECONDS / FIRST_PREVIEW_PIXELS);
-        pixels * per_pixel + self.speed.once[usize::from(scale >= COARSE_SCALE)]
+        pixels * per_pixel + self.speed.per_picture[usize::from(scale >= COARSE_SCALE)]
     }
 
+    /// The finest scale whose preview is expected to meet its target time, or the coarsest.
     fn preview_scale(&self, size: [u32; 2]) -> u32 {
         let fits = |scale: &u32| self.seconds_for(size, *scale) <= PREVIEW_SECONDS;
         SCALES.into_iter().find(fits).unwrap_or(SCALES[SCALES.len() - 1])
     }
 
-    /// The request's volume, and what making it cost.
+    /// Returns the request's volume, and its cost if it was not the last one.
     fn volume(&mut self, request: &Request) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
         let scene = &request.scene;
         let clock = Instant::now();
@@ -404,7 +418,7 @@ impl Renderer {
         Ok((volume, cost))
     }
 
-    /// The request's geometry, and whether it was made anew.
+    /// Returns the scene's opaque mesh, and whether it is new.
     fn mesh(&mut self, scene: &Scene) -> (Mesh, bool) {
         let ground = scene.ground();
         if let Some((known, mesh)) = &self.mesh
@@ -417,20 +431,22 @@ impl Renderer {
         (mesh, true)
     }
 
-    /// The scene with its automatic exposure, if it has one: measured anew where something has changed that
-    /// it depends on. The flow is not among it, so that nothing flickers while the water plays.
+    /// Returns the scene with its automatic exposure, if it has one. The exposure is measured again when
+    /// something that it depends on has changed. The flow does not count, so that the picture does not
+    /// flicker while the water plays.
     fn exposed(&mut self, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, serial: u64) -> Result<Scene> {
         if scene.image.look.auto_exposure == AutoExposure::None {
             return Ok(scene.clone());
         }
-        const OF_SIZE_AND_WAY: [&str; 3] = ["image.width", "image.height", "image.auto_exposure"];
-        let same = |key: &String| {
-            let of_image = key.starts_with("image.") && !OF_SIZE_AND_WAY.contains(&key.as_str());
+        const AFFECTS_EXPOSURE: [&str; 3] = ["image.width", "image.height", "image.auto_exposure"];
+        let is_irrelevant = |key: &String| {
+            let of_image = key.starts_with("image.") && !AFFECTS_EXPOSURE.contains(&key.as_str());
             of_image || key.starts_with("animate.") || key == "volume.flow"
         };
-        let known =
-            self.exposed.as_ref().filter(|(of, _)| changed_keys(of, scene.written()).iter().all(same));
-        let stops = match known {
+        let is_current = |(measured, _): &&(Values, f32)| {
+            changed_keys(measured, scene.written()).iter().all(is_irrelevant)
+        };
+        let stops = match self.exposed.as_ref().filter(is_current) {
             Some((_, stops)) => *stops,
             None => exposure::measure(scene, volume, mesh, &self.watch("exposure", serial, PATIENCE))?,
         };
@@ -439,17 +455,17 @@ impl Renderer {
     }
 }
 
-/// What all pictures of a request share.
+/// Data shared by all pictures of a request.
 struct Job<'a> {
     request: &'a Request,
     volume: Arc<VolumeTexture>,
     mesh: Mesh,
     cost: Cost,
-    /// With the automatic exposure, if there is one.
+    /// The scene's look, including the automatic exposure.
     look: Look,
 }
 
-/// Adds the mean of `more` samples to the mean of `samples`.
+/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`.
 fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
     let share = more as f32 / (samples + more) as f32;
     sum.radiance

@@ -122,7 +122,7 @@ fn a_lost_device_is_replaced_and_after_four_in_a_minute_the_cpu_takes_over() {
         assert!(*window.viewer().document().values() == want, "the document is not touched");
         let engine = window.viewer().worker().state().engine.clone();
         assert_eq!(engine.contains("cpu"), loss == 4, "loss {loss}: {engine}");
-        assert!(window.reads(if loss == 4 { "CPU engine goes on" } else { "device was lost" }));
+        assert!(window.reads(if loss == 4 { "CPU engine takes over" } else { "device was lost" }));
     }
     window.viewer().worker().lose_device();
     window.set("trace.sigma", Raw::Float(1.0));

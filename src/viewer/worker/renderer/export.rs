@@ -1,4 +1,4 @@
-//! Export of stills, at any size.
+//! Export of a still picture at any size.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,6 +13,8 @@ use crate::util::window::Window;
 use crate::viewer::worker::{Export, MessageKind, Request};
 
 impl Renderer {
+    /// Exports a picture and reports the result. Returns an error only for a device that was lost or hangs,
+    /// so that the export is tried again.
     pub(super) fn export(&mut self, export: &Export) -> Result<()> {
         let clock = Instant::now();
         let result = self.export_files(export);
@@ -24,7 +26,7 @@ impl Renderer {
                 self.say(MessageKind::Note, format!("wrote {names} in {seconds:.1} s"));
             }
             Err(Error::Interrupted { .. }) => {
-                self.say(MessageKind::Note, format!("export cancelled; {names} was not written"));
+                self.say(MessageKind::Note, format!("export cancelled; {names} not written"));
             }
             Err(Error::DeviceLost(_) | Error::Watchdog { .. }) => return result,
             Err(e) => self.say(MessageKind::Error, format!("export failed: {e}")),
@@ -35,7 +37,7 @@ impl Renderer {
     fn export_files(&mut self, export: &Export) -> Result<()> {
         let still = Still::create(&export.paths)?;
         let request = Request {
-            // No view request is ever older: a volume that is being built for the export is not given up.
+            // No request is newer, so the volume of the export is never abandoned.
             serial: u64::MAX,
             asked: Instant::now(),
             scene: Arc::new(export.scene.clone()),

@@ -1,4 +1,4 @@
-//! What work of the thread reports, and what ends it.
+//! Progress reports and cancellation of the render thread's work.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -10,6 +10,7 @@ use crate::util::monitor::Monitor;
 use crate::viewer::worker::{Busy, Message, MessageKind, Shared, lock};
 
 impl Renderer {
+    /// Creates the monitor of one piece of work for request `serial`. See [`Watch`].
     pub(super) fn watch(&self, what: &'static str, serial: u64, patience: Duration) -> Watch {
         Watch {
             shared: self.shared.clone(),
@@ -17,21 +18,24 @@ impl Renderer {
             serial,
             patience,
             start: Instant::now(),
-            shown: Mutex::new(None),
+            last_report: Mutex::new(None),
         }
     }
 }
 
-/// Watches one piece of work for the render thread: ends it when something newer is wanted.
+/// Monitor of one piece of work: reports its progress, and ends it when it is stopped or a newer request
+/// waits.
 pub(super) struct Watch {
     shared: Arc<Shared>,
+    /// Kind of work, see [`Busy`].
     what: &'static str,
+    /// Number of the request, `u64::MAX` for an export.
     serial: u64,
-    /// How long the work goes on though something newer is wanted.
+    /// Time for which the work continues although a newer request waits.
     patience: Duration,
     start: Instant,
-    /// When the window was last told.
-    shown: Mutex<Option<Instant>>,
+    /// When progress was last reported to the window.
+    last_report: Mutex<Option<Instant>>,
 }
 
 impl Monitor for Watch {
@@ -44,9 +48,9 @@ impl Monitor for Watch {
         if quit || stopped || cancelled || (newer && self.start.elapsed() >= self.patience) {
             return Err(Error::Interrupted { code: 130 });
         }
-        let mut shown = lock(&self.shown);
-        if shown.is_none_or(|at| at.elapsed() > Duration::from_millis(100)) {
-            *shown = Some(Instant::now());
+        let mut last_report = lock(&self.last_report);
+        if last_report.is_none_or(|at| at.elapsed() > Duration::from_millis(100)) {
+            *last_report = Some(Instant::now());
             let share = done as f32 / total.max(1) as f32;
             lock(&self.shared.state).busy = Some(Busy { what: self.what, share });
             (self.shared.wake)();
