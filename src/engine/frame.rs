@@ -22,7 +22,7 @@ impl Engine {
     /// For many frames of one volume, build both once and call [`Engine::render_volume`].
     ///
     /// # Errors
-    /// Those of [`Scene::volume`] with the memory of [`Limits::default`], and of [`Engine::render_volume`].
+    /// Errors of [`Scene::volume`] with the memory of [`Limits::default`], and of [`Engine::render_volume`].
     pub fn render(&mut self, scene: &Scene, options: &RenderOptions) -> Result<Frame> {
         let volume = scene.volume(Limits::default().memory, &Unwatched)?;
         self.render_volume(scene, &volume, &scene.mesh(), options, &Unwatched)

@@ -77,7 +77,7 @@ impl Still {
         let about = About {
             whole: [scene.image.width, scene.image.height],
             window,
-            // What describes no scene would only mislead: an edited one has no values.
+            // An edited scene has no values, so the picture tells no scene.
             scene: scene.values().is_some().then(|| metadata(scene, volume)),
             channels: channel_names(layers),
         };
