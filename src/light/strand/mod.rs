@@ -71,9 +71,6 @@ impl StrandParams {
     }
 }
 
-/// Minimum roughness. Smoother strands have lobes too narrow for the table.
-pub const ROUGHNESS_MIN: f64 = 0.1;
-
 /// Values of the lobes for one pair of directions, 1/sr, linear RGB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lobes {
