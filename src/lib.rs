@@ -17,7 +17,7 @@
 //!
 //! # The frame, stage by stage
 //!
-//! The modules stand in the order in which the data meets them, and a module imports only those before it.
+//! The modules stand from the ground up: a module imports only those before it.
 //!
 //! 1. [`curve`] makes spatial fractal curves (§1 of the [method](guide::method)), and [`walk`] finds the
 //!    cells that a segment passes.

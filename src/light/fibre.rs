@@ -2,7 +2,8 @@
 //! SIGGRAPH 1989.
 //!
 //! All vectors point outward from the cell. Twins: `shaders/light/fibre.wgsl`, and for [`Spread`]
-//! `shaders/trace/lookup.wgsl`.
+//! `shaders/trace/lookup.wgsl`. The CPU engine takes the terms of [`psi`] apart, so that what is constant
+//! along a ray is computed once: `src/engine/cpu/integrate/walk.rs`.
 
 use glam::Vec3;
 

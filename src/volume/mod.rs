@@ -1,4 +1,6 @@
 //! §2 The volume texture: density ρ, flow direction v and reflection coefficients k in every cell.
+//!
+//! `water.rs` sets ρ and k, `flow.rs` sets v, `cell.rs` packs them.
 
 mod bricks;
 mod bundle;
