@@ -50,8 +50,9 @@ impl VolumeTexture {
         (z as usize * self.size[1] as usize + y as usize) * self.size[0] as usize + x as usize
     }
 
-    /// The cell at x, y, z of the tile.
-    #[inline]
+    /// The cell at x, y, z of the tile. Every step of every walk calls it, so the choice is not left to the
+    /// compiler.
+    #[inline(always)]
     pub fn cell(&self, x: u32, y: u32, z: u32) -> Cell {
         match &self.cells {
             Cells::Dense(cells) => cells[self.index(x, y, z)],

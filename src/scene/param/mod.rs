@@ -12,6 +12,9 @@ mod splash;
 mod trace;
 mod volume;
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use Cost::*;
 use Kind::*;
 
@@ -170,6 +173,11 @@ fn matches(pattern: &str, key: &str) -> bool {
         && parts.next().is_none()
 }
 
+/// The part of a key after its last dot. In no pattern it is `*`.
+fn last_part(key: &str) -> &str {
+    key.rsplit('.').next().unwrap_or(key)
+}
+
 /// Returns the known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
 pub fn nearest(key: &str) -> Option<String> {
     let parts: Vec<&str> = key.split('.').collect();
@@ -186,7 +194,7 @@ pub fn nearest(key: &str) -> Option<String> {
         })
         .map(|candidate| {
             // The commonest slip is a bare last part, such as `sigma` for `trace.sigma`.
-            let last = candidate.rsplit('.').next().unwrap_or("").to_owned();
+            let last = last_part(&candidate).to_owned();
             let score = strsim::jaro_winkler(key, &candidate).max(strsim::jaro_winkler(key, &last));
             (score, candidate)
         })
@@ -215,7 +223,15 @@ impl Param {
 
     /// Returns the parameter of a concrete key such as `lights.sun.color`.
     pub fn find(key: &str) -> Option<&'static Param> {
-        PARAMS.iter().find(|param| matches(param.key, key))
+        // Every row of the viewer asks in every frame, and the last part alone leaves few to compare.
+        static BY_LAST_PART: LazyLock<HashMap<&str, Vec<&Param>>> = LazyLock::new(|| {
+            let mut params: HashMap<&str, Vec<&Param>> = HashMap::new();
+            for param in PARAMS {
+                params.entry(last_part(param.key)).or_default().push(param);
+            }
+            params
+        });
+        BY_LAST_PART.get(last_part(key))?.iter().find(|param| matches(param.key, key)).copied()
     }
 
     /// Formats the range for messages and tables.

@@ -50,6 +50,7 @@ pub fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3);
 
 /// Projects a part of [`clip_near`] to an image of `width` × `height` pixels. Its corners snap to 1/256
 /// pixel, as on a GPU, and are ordered so that its area is positive.
+#[inline]
 pub fn to_screen(
     part: [(Vec4, Vec3); 3],
     [width, height]: [usize; 2],
