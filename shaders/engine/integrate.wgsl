@@ -315,7 +315,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
         texel = cell_words(in_level((*walk).cell, view.level));
     }
     if TRILINEAR {
-        rho = sample_between(*walk, *ray, view).rho;
+        rho = sample_on_ray(*walk, *ray, view).rho;
     } else {
         rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
     }
@@ -371,9 +371,9 @@ fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
 }
 
 // Sample between cells, half way along the ray through the current cell.
-fn sample_between(walk: Walk, ray: Ray, view: View) -> CellSample {
+fn sample_on_ray(walk: Walk, ray: Ray, view: View) -> CellSample {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
-    return between(view.level, view.matter, walk.cell, middle);
+    return sample_trilinear(view.level, view.matter, walk.cell, middle);
 }
 
 // Adds the light of one cell and steps to the next. After the end of the walk, nothing changes.
@@ -386,7 +386,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     let t_exit = walk_exit(*walk);
     var sample: CellSample;
     if TRILINEAR {
-        sample = sample_between(*walk, *ray, view);
+        sample = sample_on_ray(*walk, *ray, view);
     } else {
         sample.rho = matter_rho(f32(texel.x & 0xffffu), view.matter);
         sample.k_d = f32((texel.x >> 16u) & 0xffu);

@@ -214,7 +214,7 @@ fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
             depth = value * view.depth_bits;
         }
         if CODES {
-            let transmittance = code * code * (1.0 / 65025.0);
+            let transmittance = code * code * TRANSMITTANCE_OF_CODE;
             if ERODED {
                 let thinner = exp2(view.matter.left * log2(max(transmittance, 1e-9)));
                 return vec2<f32>(select(transmittance, thinner, view.matter.left < 1.0), 0.0);

@@ -75,6 +75,8 @@ const CELLS_A_WORD: i32 = 4;
 
 // Depth in bits (−log₂ T) at which the code of T is 0.
 const DARK_BITS: f32 = 18.0;
+// Transmittance of a code, over the code's square.
+const TRANSMITTANCE_OF_CODE: f32 = 1.0 / 65025.0;
 
 // Code of a transmittance, √T in 255ths, from its depth −log₂ T. The steps of T are finest in the dark.
 fn transmittance_code(depth_bits: f32) -> u32 {

@@ -58,8 +58,8 @@ fn moments_of(word: u32, level: Level) -> Moments {
 }
 
 // Values interpolated between the eight cell centres around `middle`, the midpoint of the ray's segment in a
-// cell, in the level's cells. Twin: Level::between.
-fn between(
+// cell, in the level's cells. Twin: Level::sample_trilinear.
+fn sample_trilinear(
     level: Level,
     matter: SheetDensity,
     cell: vec3<i32>,

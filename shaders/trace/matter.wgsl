@@ -9,6 +9,8 @@ override ERODED: bool = false;
 // Share of mist's ρ that comes from the cells, and ρ of uniform mist in codes.
 const MIST_OF_CELLS: f32 = 0.3;
 const MIST_RHO: f32 = 32768.0;
+// How much faster than linearly erosion takes the mean ρ.
+const MEAN_EROSION: f32 = 0.383;
 
 // Map from a cell's ρ to the sheet's ρ' = max(scale·ρ + shift, 0), both in codes. Constant along a ray.
 struct SheetDensity {
@@ -36,7 +38,7 @@ fn matter_at(quad: Quad, uv: vec2<f32>, coarse: bool) -> SheetDensity {
         let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;
         return SheetDensity(MIST_OF_CELLS * left, shift, quad.mist * 255.0, MIST_RHO * left, left);
     }
-    let left = (1.0 - e) * (1.0 - 0.383 * e);
+    let left = (1.0 - e) * (1.0 - MEAN_EROSION * e);
     if coarse {
         return SheetDensity(left, 0.0, 0.0, 0.0, left);
     }

@@ -13,12 +13,11 @@ use serde::Serialize;
 use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
 use crate::engine::gpu::GpuBench;
-use crate::engine::{Engine, EngineChoice, cpu};
+use crate::engine::{Engine, EngineChoice, RenderOptions, cpu};
 use crate::picture::resolve::develop;
 use crate::scene::{Limits, Scene};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::{Monitor, Unwatched};
-use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
 #[derive(Args, Clone)]
@@ -253,17 +252,8 @@ fn passes(
             _ => scenes.len(),
         };
         for (pass, scene) in scenes.iter().take(on_cpu) {
-            let (whole, samples) = (Window::whole([scene.image.width, scene.image.height]), 0..1);
-            let frame = cpu::render_samples(
-                scene,
-                volume,
-                &mesh,
-                whole,
-                samples,
-                false,
-                &mut light_volumes,
-                &Unwatched,
-            )?;
+            let options = RenderOptions { samples: Some(0..1), ..Default::default() };
+            let frame = cpu::render_with(scene, volume, &mesh, &options, &mut light_volumes, &Unwatched)?;
             if counted {
                 add("cpu", *pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
                 if *pass == scenes[0].0 {

@@ -81,9 +81,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let (made, (opened, device_seconds)) = std::thread::scope(|scope| {
         let made = scope.spawn(|| {
             let clock = Instant::now();
-            let volume = scene.kept_volume(cache, limits.memory, terminal)?;
+            let volume = scene.cached_volume(cache, limits.memory, terminal)?;
             let seconds = clock.elapsed().as_secs_f64();
-            Ok((volume, seconds, scene.kept_mesh(cache)))
+            Ok((volume, seconds, scene.cached_mesh(cache)))
         });
         let clock = Instant::now();
         let mut opened = Engine::open(args.engine.engine, &args.engine.device());

@@ -4,13 +4,12 @@
 //! and strip, for every picture size and on both engines, and nothing flickers. The chosen exposure is
 //! written into the scene as an ordinary `image.exposure`.
 
-use super::cpu::{self, LightVolumeCache};
+use super::cpu;
 use crate::picture::AutoExposure;
 use crate::place::Mesh;
 use crate::scene::{Animation, Scene};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
 /// Longest side of the measured picture, pixels: enough pixels to count one in a hundred.
@@ -30,7 +29,7 @@ const STEPS: f64 = 64.0;
 /// asks for no automatic exposure or if every pixel is black.
 ///
 /// # Errors
-/// Errors of [`cpu::render_samples`], including those of `monitor`.
+/// Errors of [`cpu::render`], including those of `monitor`.
 pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn Monitor) -> Result<f32> {
     let method = scene.image.look.auto_exposure;
     if method == AutoExposure::None {
@@ -41,10 +40,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     let longest = image.width.max(image.height).max(SIDE);
     let side = |n: u32| ((u64::from(n) * u64::from(SIDE)).div_ceil(u64::from(longest)) as u32).max(1);
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
-    let window = Window::whole([image.width, image.height]);
-    let watch = Quiet(monitor);
-    let light_volumes = &mut LightVolumeCache::default();
-    let frame = cpu::render_samples(&small, volume, mesh, window, 0..1, false, light_volumes, &watch)?;
+    let frame = cpu::render(&small, volume, mesh, false, &Quiet(monitor))?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }
 
@@ -61,8 +57,8 @@ pub fn exposed(animation: Animation, monitor: &dyn Monitor) -> Result<(Animation
     }
     let limits = animation.limits();
     let cache = limits.cache.as_ref();
-    let volume = scene.kept_volume(cache, limits.memory, monitor)?;
-    let stops = measure(&scene, &volume, &scene.kept_mesh(cache), monitor)?;
+    let volume = scene.cached_volume(cache, limits.memory, monitor)?;
+    let stops = measure(&scene, &volume, &scene.cached_mesh(cache), monitor)?;
     Ok((animation.exposed(stops), Some(stops)))
 }
 

@@ -15,7 +15,6 @@ use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
-use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 use gpu::{DeviceOptions, Gpu, GpuRenderer};
 
@@ -117,7 +116,7 @@ impl Engine {
     /// with smaller tiles.
     ///
     /// # Errors
-    /// Errors of [`cpu::render_samples`] or [`GpuRenderer::render`], and those of `monitor`.
+    /// Errors of [`cpu::render_with`] or [`GpuRenderer::render`], and those of `monitor`.
     pub fn render_volume(
         &mut self,
         scene: &Scene,
@@ -128,10 +127,7 @@ impl Engine {
     ) -> Result<Frame> {
         match self {
             Engine::Cpu(light_volumes) => {
-                let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
-                let window = options.window.unwrap_or(Window::whole([scene.image.width, scene.image.height]));
-                let surface = options.surface;
-                cpu::render_samples(scene, volume, mesh, window, samples, surface, light_volumes, monitor)
+                cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
             }
             Engine::Gpu(renderer, device) => {
                 let result = renderer.render(scene, volume, mesh, options, monitor);

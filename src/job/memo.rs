@@ -14,7 +14,7 @@ use crate::volume::{
 
 /// Keeps the volume texture of the last scene.
 #[derive(Default)]
-pub struct VolumeStock {
+pub struct VolumeMemo {
     last: Option<(Source, Arc<VolumeTexture>)>,
     cache: Option<Cache>,
 }
@@ -27,10 +27,10 @@ enum Source {
     File(PathBuf, StorageChoice, Option<SystemTime>, u64),
 }
 
-impl VolumeStock {
-    /// A stock that looks volumes up in `cache` and adds new ones to it.
-    pub fn with(cache: Option<Cache>) -> VolumeStock {
-        VolumeStock { last: None, cache }
+impl VolumeMemo {
+    /// A memo that looks volumes up in `cache` and adds new ones to it.
+    pub fn with(cache: Option<Cache>) -> VolumeMemo {
+        VolumeMemo { last: None, cache }
     }
 
     /// Stops using the cache. Values that a user tries out by hand would only fill it.
@@ -38,11 +38,11 @@ impl VolumeStock {
         self.cache = None;
     }
 
-    /// Returns the scene's volume and how much work it took: `None` if the volume in stock fits unchanged.
+    /// Returns the scene's volume and how much work it took: `None` if the remembered volume fits unchanged.
     /// `memory` is the budget for building it, bytes.
     ///
     /// # Errors
-    /// Any error of building or reading the volume, or of the monitor. The volume in stock stays.
+    /// Any error of building or reading the volume, or of the monitor. The remembered volume stays.
     pub fn volume(
         &mut self,
         scene: &Scene,
@@ -75,7 +75,7 @@ impl VolumeStock {
             }
             (old, _) => {
                 self.last = old;
-                (scene.kept_volume(self.cache.as_ref(), memory, monitor)?, Cost::Volume)
+                (scene.cached_volume(self.cache.as_ref(), memory, monitor)?, Cost::Volume)
             }
         };
         let volume = Arc::new(volume);

@@ -8,7 +8,7 @@ mod stitch;
 mod strips;
 
 pub use claim::{Asked, Claim, Claims};
-pub use memo::VolumeStock;
+pub use memo::VolumeMemo;
 pub(crate) use still::{About, Sink};
 pub use still::{Still, StillWriter};
 pub use stitch::stitch;

@@ -59,7 +59,7 @@ impl<'a> Rows<'a> {
                 |cells: &Arc<Vec<Cell>>| cells.par_iter().map(|cell| cell.rho_code() as f32).collect();
             (level, level.volume.cells.dense().map(codes))
         };
-        let levels = (0..levels.len() as u32).map(|number| rows(Level::of(levels, number))).collect();
+        let levels = (0..levels.len() as u32).map(|number| rows(Level::in_pyramid(levels, number))).collect();
         Rows { levels, lookup }
     }
 
@@ -69,7 +69,8 @@ impl<'a> Rows<'a> {
         let fill_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
             let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };
             let taps = taps(level, light_volume.direction, medium);
-            let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
+            let bits =
+                if medium.per_cell { light_volume.bits * level.depth_in_cells() } else { light_volume.bits };
             match form {
                 Form::Codes => {
                     let code = |depth: f32| transmittance_code(depth * bits);

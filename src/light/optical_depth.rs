@@ -22,7 +22,7 @@ pub fn light_volume_value(
         let direction = light_volume.direction * level.scale;
         optical_depth(level, &SheetDensity::WHOLE, cell, direction, medium, enough, &mut 0)
     };
-    let bits = if medium.per_cell { light_volume.bits * level.deep() } else { light_volume.bits };
+    let bits = if medium.per_cell { light_volume.bits * level.depth_in_cells() } else { light_volume.bits };
     match form {
         Form::Codes => transmittance_code(depth(DARK_BITS / bits.max(1e-20)) * bits).into(),
         Form::Depths => depth(NEVER),

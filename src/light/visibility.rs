@@ -99,6 +99,9 @@ pub enum Form {
 /// Depth in bits (−log₂ T) at which the code of T is 0: 255·2^(−9) is less than a half.
 pub const DARK_BITS: f32 = 18.0;
 
+/// Transmittance of a code, over the code's square: 1/255².
+pub const TRANSMITTANCE_OF_CODE: f32 = 1.0 / 65025.0;
+
 /// Code of a transmittance, √T in 255ths, from its depth −log₂ T. The steps of T are finest in the dark.
 pub fn transmittance_code(depth_bits: f32) -> u8 {
     (255.0 * (-0.5 * depth_bits).exp2() + 0.5) as u8

@@ -35,7 +35,7 @@ impl Mesh {
         for (i, tile) in self.tiles.iter().enumerate() {
             let corners = tiles::triangles(tile.side, steps[i], tiles::coarser(&self.tiles, steps, i));
             let (triangles, _) = corners.as_chunks::<3>();
-            out.extend(triangles.iter().map(|t| t.map(|corner| tile.vertex(tiles::place(corner)))));
+            out.extend(triangles.iter().map(|t| t.map(|corner| tile.vertex(tiles::grid_point(corner)))));
         }
         out
     }
@@ -65,7 +65,7 @@ impl Ground {
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
-    pub fn kept_mesh(&self, cache: &Cache) -> Mesh {
+    pub fn cached_mesh(&self, cache: &Cache) -> Mesh {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
         let make = || Ok::<_, Infallible>(self.vertices());
         let Ok(vertices) = cache.get("meshes", &key("mesh", BUILDER_VERSION, self), count, make);

@@ -114,7 +114,7 @@ pub fn coarser(tiles: &[Tile], steps: &[u32], tile: usize) -> [bool; 4] {
     tiles[tile].neighbours.map(|other| other.is_some_and(|other| steps[other as usize] > steps[tile]))
 }
 
-/// Returns a tile's triangles as numbers of corners; [`place`] gives their positions. At an edge with a
+/// Returns a tile's triangles as numbers of corners; [`grid_point`] gives their positions. At an edge with a
 /// coarser tile, every other vertex moves to the one before it, so that both tiles have the same edges there.
 pub fn triangles(side: u32, step: u32, coarser: [bool; 4]) -> &'static [u16] {
     list(list_number(side, step, coarser))
@@ -142,14 +142,14 @@ pub fn list(number: usize) -> &'static [u16] {
 }
 
 /// Returns the column and row of a corner in its tile.
-pub fn place(corner: u16) -> [u32; 2] {
+pub fn grid_point(corner: u16) -> [u32; 2] {
     let corner = u32::from(corner);
     [corner % (SIDE + 1), corner / (SIDE + 1)]
 }
 
-/// Returns [`place`] as a position in squares.
+/// Returns [`grid_point`] as a position in squares.
 pub fn at(corner: u16) -> Vec2 {
-    Vec2::from(place(corner).map(|i| i as f32))
+    Vec2::from(grid_point(corner).map(|i| i as f32))
 }
 
 fn make_list(side: u32, step: u32, coarser: [bool; 4]) -> Vec<u16> {

@@ -24,7 +24,7 @@ pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
 pub use value::{Key, Place, Raw, Value, Values};
 
-use crate::light::environment::{self, Environment, EnvironmentStock};
+use crate::light::environment::{self, Environment, EnvironmentMemo};
 use crate::light::haze::Haze;
 use crate::light::scatter::media::Media;
 use crate::light::visibility::{LightVolumes, LitQuads};
@@ -125,7 +125,7 @@ pub struct Limits {
     /// Memory that the work may use, bytes.
     pub memory: u64,
     /// Environments that the scenes share.
-    pub environments: EnvironmentStock,
+    pub environments: EnvironmentMemo,
     /// Disk cache of volumes and meshes, shared with later processes.
     pub cache: Option<Cache>,
 }
@@ -135,7 +135,7 @@ impl Default for Limits {
         Limits {
             allow_paths: Vec::new(),
             memory: 4 << 30,
-            environments: EnvironmentStock::default(),
+            environments: EnvironmentMemo::default(),
             cache: None,
         }
     }
@@ -272,7 +272,7 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::volume`].
-    pub fn kept_volume(
+    pub fn cached_volume(
         &self,
         cache: Option<&Cache>,
         memory: u64,
@@ -288,8 +288,8 @@ impl Scene {
     }
 
     /// Returns [`Scene::mesh`], from the cache where it is stored there.
-    pub fn kept_mesh(&self, cache: Option<&Cache>) -> Mesh {
-        cache.map_or_else(|| self.mesh(), |cache| self.ground().kept_mesh(cache))
+    pub fn cached_mesh(&self, cache: Option<&Cache>) -> Mesh {
+        cache.map_or_else(|| self.mesh(), |cache| self.ground().cached_mesh(cache))
     }
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.

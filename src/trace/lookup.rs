@@ -42,12 +42,12 @@ impl<'a> Level<'a> {
     }
 
     /// Level `number` of a pyramid, with leaps where the pyramid has them.
-    pub fn of(levels: &'a Pyramid, number: u32) -> Self {
+    pub fn in_pyramid(levels: &'a Pyramid, number: u32) -> Self {
         Level { leaps: levels.leaps, ..Level::new(levels, number) }
     }
 
     /// Depth of one cell of the level, in cells of the volume.
-    pub fn deep(&self) -> f32 {
+    pub fn depth_in_cells(&self) -> f32 {
         1.0 / self.scale.z
     }
 
@@ -66,7 +66,7 @@ impl<'a> Level<'a> {
     }
 
     /// Values of the cell itself; `moments` is `None`.
-    pub fn found(&self, cell: Cell, matter: &SheetDensity) -> CellSample {
+    pub fn sample_cell(&self, cell: Cell, matter: &SheetDensity) -> CellSample {
         let (k_d, k_s) = cell.k_codes();
         CellSample { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }
     }
@@ -75,7 +75,7 @@ impl<'a> Level<'a> {
     /// The ray starts at `origin` and runs along `direction`, both in the level's cells.
     ///
     /// x and y wrap; z is clamped to the slab. k and the moments are means weighted by ρ.
-    pub fn between(
+    pub fn sample_trilinear(
         &self,
         crossing: &Crossing,
         origin: Vec3,

@@ -9,6 +9,8 @@ use crate::mapping::Quad;
 pub const MIST_OF_CELLS: f32 = 0.3;
 /// ρ of uniform mist, in codes (0 to 65535): the mean of the paper's flow cells.
 pub const MIST_RHO: f32 = 32768.0;
+/// How much faster than linearly erosion takes the mean ρ: Φ(½) − Φ(−½), as in [`SheetDensity::left`].
+pub const MEAN_EROSION: f32 = 0.383;
 
 /// Map from a cell's ρ to the ρ that a sheet shows, constant along one ray. ρ is in codes, 0 to 65535.
 ///
@@ -93,7 +95,7 @@ impl SheetDensity {
 ///
 /// The paper's ρ is clamp(N + ½, 0, 1) with N a standard normal variable.
 /// The exact value is 2∫_e^1 Φ(½ − x) dx. Φ is linear to within 0.002 from Φ(½) = 0.6915 to Φ(−½) = 0.3085,
-/// and the linear Φ gives (1 − e)(1 − 0.383 e).
+/// and the linear Φ gives (1 − e)(1 − [`MEAN_EROSION`] e).
 fn mean_left(e: f32) -> f32 {
-    (1.0 - e) * (1.0 - 0.383 * e)
+    (1.0 - e) * (1.0 - MEAN_EROSION * e)
 }

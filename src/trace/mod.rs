@@ -6,5 +6,5 @@ mod matter;
 mod settings;
 
 pub use levels::{level_atlas, pyramid_spec};
-pub use matter::{MIST_OF_CELLS, MIST_RHO, SheetDensity};
+pub use matter::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, SheetDensity};
 pub use settings::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace, extinction, flow_cells};

@@ -147,7 +147,7 @@ impl LevelAtlas {
     }
 
     /// First cell of a level in the texture.
-    pub fn place(&self, level: u32) -> [u32; 3] {
+    pub fn origin(&self, level: u32) -> [u32; 3] {
         match level {
             0 => [0; 3],
             // A word of a light volume holds four codes along z, and all four must belong to one level.

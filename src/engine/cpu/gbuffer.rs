@@ -168,8 +168,9 @@ impl<'a> WindowFrame<'a> {
             .enumerate()
             .flat_map_iter(|(i, tile)| {
                 let mut out = Vec::new();
-                let point =
-                    |corner| Vec3::from(mesh.vertices[tile.vertex(tiles::place(corner)) as usize].position);
+                let point = |corner| {
+                    Vec3::from(mesh.vertices[tile.vertex(tiles::grid_point(corner)) as usize].position)
+                };
                 let drawn = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
                 for &corners in drawn.as_chunks::<3>().0 {
                     project(corners.map(point), i as u32, corners, &mut out);

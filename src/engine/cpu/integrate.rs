@@ -238,9 +238,9 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ray = self.sheet_hit(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
-        let mut result = self.walk(&ray, &Level::of(&self.levels, level), before, observer);
+        let mut result = self.walk(&ray, &Level::in_pyramid(&self.levels, level), before, observer);
         if share > 0.0 {
-            let next = self.walk(&ray, &Level::of(&self.levels, level + 1), before, observer);
+            let next = self.walk(&ray, &Level::in_pyramid(&self.levels, level + 1), before, observer);
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lights, cells } = result;
@@ -261,7 +261,7 @@ impl<'a> Integrator<'a> {
 
     /// Extinction in the cells of a level.
     fn extinction_in(&self, level: &Level) -> f32 {
-        if self.per_cell { self.extinction * level.deep() } else { self.extinction }
+        if self.per_cell { self.extinction * level.depth_in_cells() } else { self.extinction }
     }
 
     /// Maps a ray to the cells of quad number `number`, which it meets at `hit` = (u, v, metres from the

@@ -8,7 +8,6 @@ pub mod pool;
 pub mod ray;
 pub mod visibility;
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -16,6 +15,7 @@ use rayon::prelude::*;
 
 pub use visibility::LightVolumeCache;
 
+use crate::engine::options::RenderOptions;
 use crate::picture::resolve::develop;
 use crate::picture::{Frame, Seconds};
 use crate::place::Mesh;
@@ -28,7 +28,7 @@ use crate::volume::VolumeTexture;
 /// Renders a scene. With `surface` the frame also holds depth, texture coordinates, quads and normals.
 ///
 /// # Errors
-/// Errors of [`render_samples`].
+/// Errors of [`render_with`].
 pub fn render(
     scene: &Scene,
     volume: &VolumeTexture,
@@ -36,36 +36,34 @@ pub fn render(
     surface: bool,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
-    let window = Window::whole([scene.image.width, scene.image.height]);
-    let light_volumes = &mut LightVolumeCache::default();
-    render_samples(scene, volume, mesh, window, 0..scene.image.samples, surface, light_volumes, monitor)
+    let options = RenderOptions { surface, ..Default::default() };
+    render_with(scene, volume, mesh, &options, &mut LightVolumeCache::default(), monitor)
 }
 
 /// Pixels rendered at once. Each takes 28 bytes, and 16 for every layer of quads, besides the frame.
 const BAND_PIXELS: u64 = 1 << 21;
 
-/// Renders a part of the image with some of the scene's samples; the radiance is their mean. A pixel has the
-/// same bits in every window. Light volumes stay in `light_volumes` for later frames.
+/// Renders the options' part of the image and of the samples. A pixel has the same bits in every window.
+/// Light volumes stay in `light_volumes` for later frames.
 ///
 /// # Errors
 /// Errors of `monitor`, which may stop the work. With cached visibility, [`Error::Memory`] if the light
 /// volumes do not fit into the scene's budget for them.
 ///
 /// [`Error::Memory`]: crate::util::error::Error::Memory
-#[expect(clippy::too_many_arguments, reason = "the inputs, the part, the cache and the monitor")]
-pub fn render_samples(
+pub fn render_with(
     scene: &Scene,
     volume: &VolumeTexture,
     mesh: &Mesh,
-    window: Window,
-    samples: Range<u32>,
-    surface: bool,
+    options: &RenderOptions,
     light_volumes: &mut LightVolumeCache,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let image = &scene.image;
+    let window = options.window.unwrap_or(Window::whole([image.width, image.height]));
+    let samples = options.samples.clone().unwrap_or(0..image.samples);
     let width = window.width as usize;
-    let mut frame = Frame::new(window.width, window.height, surface);
+    let mut frame = Frame::new(window.width, window.height, options.surface);
     let mut seconds = Seconds::default();
     let clock = Instant::now();
     let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;

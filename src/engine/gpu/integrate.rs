@@ -1,6 +1,7 @@
 //! §4 and §5: the compute pass that walks the volume under each pixel. Shader:
 //! `shaders/engine/integrate.wgsl`; twin: `src/engine/cpu/integrate.rs`.
 
+use super::binding::{bind, bind_buffer, bind_texture, integrate as at};
 use super::device::Gpu;
 use super::layout::{Groups, WORKGROUP};
 use super::shader::resolve;
@@ -225,24 +226,24 @@ impl Integrate {
         let (surface, opaque) = (view(&targets.surface), view(&targets.opaque));
         let quad_id = targets.ids(0..frame.layers);
         let entries = [
-            entry(0, uniform.as_entire_binding()),
-            entry(1, up.lights.as_entire_binding()),
-            entry(2, up.quads.as_entire_binding()),
-            entry(3, part.as_entire_binding()),
-            entry(4, wgpu::BindingResource::TextureView(&up.volume)),
-            entry(5, wgpu::BindingResource::TextureView(&surface)),
-            entry(6, wgpu::BindingResource::TextureView(&quad_id)),
-            entry(7, wgpu::BindingResource::TextureView(&opaque)),
-            entry(8, sums.radiance.as_entire_binding()),
-            entry(9, sums.counts.as_entire_binding()),
-            entry(10, wgpu::BindingResource::TextureView(&filled.texture)),
-            entry(11, filled.places.as_entire_binding()),
-            entry(12, reflection.uniform.as_entire_binding()),
-            entry(13, wgpu::BindingResource::TextureView(&reflection.table)),
-            entry(14, wgpu::BindingResource::Sampler(&reflection.sampler)),
-            entry(15, reflection.profiles.as_entire_binding()),
-            entry(16, groups.buffer.as_entire_binding()),
-            entry(17, wgpu::BindingResource::TextureView(&up.bricks)),
+            bind_buffer(at::FRAME, &uniform),
+            bind_buffer(at::LIGHTS, &up.lights),
+            bind_buffer(at::QUADS, &up.quads),
+            bind_buffer(at::GROUPS, &part),
+            bind_texture(at::VOLUME, &up.volume),
+            bind_texture(at::SURFACE, &surface),
+            bind_texture(at::QUAD_ID, &quad_id),
+            bind_texture(at::OPAQUE_RADIANCE, &opaque),
+            bind_buffer(at::RADIANCE, &sums.radiance),
+            bind_buffer(at::COUNTS, &sums.counts),
+            bind_texture(at::LIGHT_VOLUMES, &filled.texture),
+            bind_buffer(at::LIGHT_PLACES, &filled.places),
+            bind_buffer(at::REFLECTION, &reflection.uniform),
+            bind_texture(at::STRAND_TABLE, &reflection.table),
+            bind(at::LINEAR, wgpu::BindingResource::Sampler(&reflection.sampler)),
+            bind_buffer(at::PROFILES, &reflection.profiles),
+            bind_buffer(at::GROUP_LIST, &groups.buffer),
+            bind_texture(at::BRICKS, &up.bricks),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -286,7 +287,7 @@ impl Integrate {
     }
 }
 
-/// The bindings of `shaders/engine/integrate.wgsl`, in order.
+/// The layout of the bindings.
 fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
@@ -306,28 +307,31 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
         format,
         view_dimension: TextureViewDimension::D3,
     };
-    let (volume, depths) = (cells(TextureFormat::Rg32Uint), cells(TextureFormat::R32Uint));
-    let bricks = cells(TextureFormat::Rgba32Uint);
     let list = buffer(BufferBindingType::Storage { read_only: true });
-    let ids = texture(TextureSampleType::Uint, TextureViewDimension::D2Array);
-    let table = texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3);
-    let linear = BindingType::Sampler(SamplerBindingType::Filtering);
     let types = [
-        uniform, list, list, uniform, volume, floats, ids, floats, sums, sums, depths, list, uniform, table,
-        linear, list, list, bricks,
+        (at::FRAME, uniform),
+        (at::LIGHTS, list),
+        (at::QUADS, list),
+        (at::GROUPS, uniform),
+        (at::VOLUME, cells(TextureFormat::Rg32Uint)),
+        (at::SURFACE, floats),
+        (at::QUAD_ID, texture(TextureSampleType::Uint, TextureViewDimension::D2Array)),
+        (at::OPAQUE_RADIANCE, floats),
+        (at::RADIANCE, sums),
+        (at::COUNTS, sums),
+        (at::LIGHT_VOLUMES, cells(TextureFormat::R32Uint)),
+        (at::LIGHT_PLACES, list),
+        (at::REFLECTION, uniform),
+        (at::STRAND_TABLE, texture(TextureSampleType::Float { filterable: true }, TextureViewDimension::D3)),
+        (at::LINEAR, BindingType::Sampler(SamplerBindingType::Filtering)),
+        (at::PROFILES, list),
+        (at::GROUP_LIST, list),
+        (at::BRICKS, cells(TextureFormat::Rgba32Uint)),
     ];
-    let mut binding = 0;
-    types.map(|ty| {
-        binding += 1;
-        wgpu::BindGroupLayoutEntry {
-            binding: binding - 1,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty,
-            count: None,
-        }
+    types.map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty,
+        count: None,
     })
-}
-
-fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {
-    wgpu::BindGroupEntry { binding, resource }
 }

@@ -1,6 +1,7 @@
 //! The GPU engine. A frame goes through five steps: upload, gbuffer, integrate, resolve, read back.
 
 mod bench;
+pub mod binding;
 mod bricks;
 mod canvas;
 mod device;

@@ -1,5 +1,6 @@
 //! The resolve pass: develops the picture from the linear sums.
 
+use super::binding::{bind_buffer, resolve as at};
 use super::device::Gpu;
 use super::integrate::Sums;
 use super::layout::{FrameUniforms, Tile, WORKGROUP};
@@ -50,11 +51,11 @@ impl Resolve {
             label: Some("resolve"),
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: sums.radiance.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 2, resource: picture.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 3, resource: tile.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 4, resource: develop.as_entire_binding() },
+                bind_buffer(at::FRAME, &uniform),
+                bind_buffer(at::RADIANCE, &sums.radiance),
+                bind_buffer(at::PICTURE, picture),
+                bind_buffer(at::TILE, &tile),
+                bind_buffer(at::DEVELOP, &develop),
             ],
         });
         timer.run(gpu, "resolve", |encoder, span| {

@@ -240,7 +240,7 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
     }
     let texture = bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
     for (number, level) in levels.iter().enumerate() {
-        upload_level(gpu, &texture, atlas.place(number as u32), level)?;
+        upload_level(gpu, &texture, atlas.origin(number as u32), level)?;
     }
     Ok(texture.create_view(&Default::default()))
 }

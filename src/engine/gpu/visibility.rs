@@ -6,6 +6,7 @@ mod host;
 
 use std::sync::Arc;
 
+use super::binding::{bind_buffer, bind_texture, visibility as at};
 use super::compute_pipeline;
 use super::device::Gpu;
 use super::layout::{FrameUniforms, LightVolume};
@@ -207,17 +208,16 @@ impl VisibilityPass {
             size_of::<LightVolume>() as u64,
             wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         );
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let mut entries = vec![
-            entry(0, frame.as_entire_binding()),
-            entry(1, part.as_entire_binding()),
-            entry(2, wgpu::BindingResource::TextureView(&up.volume)),
-            entry(3, occupied.as_entire_binding()),
-            entry(4, wgpu::BindingResource::TextureView(&filled.texture)),
+            bind_buffer(at::FRAME, &frame),
+            bind_buffer(at::LIGHT_VOLUME, &part),
+            bind_texture(at::VOLUME, &up.volume),
+            bind_buffer(at::COLUMNS, &occupied),
+            bind_texture(at::LIGHT_VOLUMES, &filled.texture),
         ];
         // The pipeline's layout holds only the bindings that its specialised shader uses.
         if up.levels[0].is_sparse() {
-            entries.push(entry(5, wgpu::BindingResource::TextureView(&up.bricks)));
+            entries.push(bind_texture(at::BRICKS, &up.bricks));
         }
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("visibility"),
@@ -273,7 +273,7 @@ impl VisibilityPass {
         let mut indices: Vec<u32> = Vec::new();
         for (level, number) in levels.iter().zip(0..) {
             let [nx, ny, nz] = level.size;
-            let [_, y0, z0] = atlas.place(number);
+            let [_, y0, z0] = atlas.origin(number);
             let occupied = |x: u32, y: u32, z: u32| {
                 everywhere || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cell(x, y, z).rho_code() > 0)
             };

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{Batch, stamp};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
-use crate::job::{Claims, VolumeStock};
+use crate::job::{Claims, VolumeMemo};
 use crate::output::frame::{Kind, Verified, verify};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
@@ -182,7 +182,7 @@ impl Batch {
             // A built volume follows from its parameters, but a volume file may have changed.
             let memory = self.base.limits().memory;
             let (volume, _) =
-                VolumeStock::default().volume(scene, memory, &crate::util::monitor::Unwatched)?;
+                VolumeMemo::default().volume(scene, memory, &crate::util::monitor::Unwatched)?;
             if line != volume_line(&volume) {
                 return Ok(Some("it was made with other contents of volume.file".into()));
             }

@@ -6,7 +6,7 @@ use super::Batch;
 use super::report::{Event, Name, Summary, Watcher};
 use super::writer::{Outcomes, Start, Writer};
 use crate::engine::{Engine, RenderOptions};
-use crate::job::{Asked, Claim, Claims, Still, VolumeStock, memory_of, spare_for_rasters};
+use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, memory_of, spare_for_rasters};
 use crate::output::frame::remove_left_by;
 use crate::place::{Ground, Mesh};
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ struct Work<'a> {
     batch: &'a Batch,
     engine: &'a mut Engine,
     claims: Claims,
-    volumes: VolumeStock,
+    volumes: VolumeMemo,
     mesh: Option<(Ground, Mesh)>,
     watcher: &'a dyn Watcher,
     /// Whether the scene's warnings have been shown.
@@ -59,7 +59,7 @@ impl Batch {
             batch: self,
             engine,
             claims: Claims::new(self.request.stale),
-            volumes: VolumeStock::with(self.base.limits().cache.clone()),
+            volumes: VolumeMemo::with(self.base.limits().cache.clone()),
             mesh: None,
             watcher,
             warned: false,
@@ -241,7 +241,7 @@ impl Work<'_> {
             Some((known, mesh)) if *known == ground => mesh.clone(),
             _ => {
                 let cache = self.batch.base.limits().cache.as_ref();
-                let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(cache));
+                let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.cached_mesh(cache));
                 self.mesh = Some((ground, mesh.clone()));
                 mesh
             }

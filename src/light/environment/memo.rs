@@ -95,12 +95,12 @@ enum Key {
 
 /// Cache of environments. All clones share it, and with them the scenes of one run.
 #[derive(Clone, Debug, Default)]
-pub struct EnvironmentStock(Arc<Mutex<EnvironmentCache>>);
+pub struct EnvironmentMemo(Arc<Mutex<EnvironmentCache>>);
 
 /// Cached environments, the most recently used first.
 type EnvironmentCache = Vec<(Key, Arc<Baked>)>;
 
-impl EnvironmentStock {
+impl EnvironmentMemo {
     /// Returns the source's baked map, from the cache if it is there. Reading a file may take at most
     /// `memory` bytes.
     ///

@@ -24,7 +24,7 @@ pub use file::{FileMap, MAX_RADIANCE, read as read_map};
 pub use irradiance::Irradiance;
 pub use lights::{LightSet, error_of};
 pub use map::{ARCTAN, Map, angle_of, direction_at, uv_of};
-pub use memo::{Baked, EnvironmentStock};
+pub use memo::{Baked, EnvironmentMemo};
 pub use moments::{Beam, Cells, TERMS, luminance, of_map as moments_of_map};
 pub use sky::{BakedSky, Sky, UNIT_CD_M2, luminance_cd_m2};
 pub use sun::{ANGULAR_RADIUS, air_mass, irradiance as sun_irradiance};
@@ -88,17 +88,17 @@ pub struct Sun {
 }
 
 impl Environment {
-    /// Takes an environment from the stock or bakes it. Reading a file may take at most `memory` bytes.
+    /// Takes an environment from the memo or bakes it. Reading a file may take at most `memory` bytes.
     ///
     /// # Errors
     /// Returns the errors of [`read_map`], and [`Error::Input`] if the radiance exceeds the range of float32.
     pub fn new(
         source: Source,
         settings: Settings,
-        stock: &EnvironmentStock,
+        memo: &EnvironmentMemo,
         memory: u64,
     ) -> Result<Environment> {
-        let baked = stock.baked(&source, memory)?;
+        let baked = memo.baked(&source, memory)?;
         let mut degrees = f64::from(settings.turn);
         if let Source::Sky(_) = source {
             // The map of a sky has its sun at −z.

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::engine::gpu::DeviceOptions;
 use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
-use crate::job::VolumeStock;
+use crate::job::VolumeMemo;
 use crate::picture::resolve::develop;
 use crate::picture::{AutoExposure, Frame, Look};
 use crate::place::{Ground, Mesh};
@@ -77,7 +77,7 @@ pub struct Renderer {
     device: DeviceOptions,
     memory: u64,
     engine: Option<Engine>,
-    volume: VolumeStock,
+    volume: VolumeMemo,
     /// Disk cache for the mesh of the first scene. `None` once that is made.
     cache: Option<Cache>,
     mesh: Option<(Ground, Mesh)>,
@@ -111,7 +111,7 @@ impl Renderer {
             device,
             memory,
             engine: None,
-            volume: VolumeStock::with(cache.clone()),
+            volume: VolumeMemo::with(cache.clone()),
             cache,
             mesh: None,
             rendered: None,
@@ -426,7 +426,7 @@ impl Renderer {
         {
             return (mesh.clone(), false);
         }
-        let mesh = self.cache.take().map_or_else(|| ground.mesh(), |cache| ground.kept_mesh(&cache));
+        let mesh = self.cache.take().map_or_else(|| ground.mesh(), |cache| ground.cached_mesh(&cache));
         self.mesh = Some((ground, mesh.clone()));
         (mesh, true)
     }

@@ -1,9 +1,11 @@
 //! Shaders against the host: every file is valid and imports what it uses, and every struct, constant and
 //! binding that both sides share is equal on both.
 
+use std::collections::BTreeSet;
 use std::mem::offset_of;
 use std::path::Path;
 
+use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
     Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Reflection, Similarity, Strand,
     Tile, VertexMaterial, WORKGROUP,
@@ -210,6 +212,8 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("CELLS_A_WORD"), taki::light::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::light::scatter::COSINES as f64);
     assert_eq!(constant("DARK_BITS"), f64::from(taki::light::visibility::DARK_BITS));
+    assert_eq!(constant("TRANSMITTANCE_OF_CODE"), f64::from(taki::light::visibility::TRANSMITTANCE_OF_CODE));
+    assert_eq!(constant("MEAN_EROSION"), f64::from(taki::trace::MEAN_EROSION));
     assert_eq!(constant("NEVER"), taki::walk::NEVER as f64);
     assert_eq!(constant("PARALLEL"), taki::walk::PARALLEL as f64);
     assert_eq!(constant("LEAP_MARGIN"), taki::walk::LEAP_MARGIN as f64);
@@ -223,6 +227,34 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::light::strand::table::SIZE);
+}
+
+/// Names and numbers of the bindings of a stage's shader.
+fn bound(stage_name: &str) -> BTreeSet<(String, u32)> {
+    let module = validate(&stage(stage_name)).expect("valid");
+    let bindings = module.global_variables.iter().filter_map(|(_, variable)| {
+        let at = variable.binding?;
+        assert_eq!(at.group, 0, "{stage_name}");
+        Some((variable.name.clone().expect("a name").to_uppercase(), at.binding))
+    });
+    bindings.collect()
+}
+
+#[test]
+fn binding_numbers_are_the_same_on_both_sides() {
+    for (name, ours) in [
+        ("gbuffer", binding::gbuffer::ALL),
+        ("integrate", binding::integrate::ALL),
+        ("resolve", binding::resolve::ALL),
+        ("visibility", binding::visibility::ALL),
+    ] {
+        let ours: BTreeSet<(String, u32)> = ours.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect();
+        assert_eq!(bound(name), ours, "{name}");
+    }
+    let whole = bound("integrate");
+    assert_eq!(bound("integrate, one sheet"), whole);
+    let bare = bound("bare");
+    assert!(!bare.is_empty() && bare.is_subset(&whole), "{bare:?}");
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
@@ -246,7 +278,7 @@ const COMPARED: [&str; 15] = [
 
 #[test]
 fn every_struct_of_a_buffer_is_compared() {
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     for (stage, text) in stages() {
         let module = validate(&text).expect("valid");
         for (_, variable) in module.global_variables.iter() {

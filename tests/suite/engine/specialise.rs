@@ -116,7 +116,9 @@ fn the_walk_without_light_has_no_model_of_light() {
     let source = Source::read("integrate", &integrate_source(true));
     let plain = source.compute("integrate", &[("LIGHTS", 0.0)]);
     assert_valid(&plain);
-    for gone in ["strand_psi", "scatter_multiple", "optical_depth", "between", "spread_psi", "walk_leap"] {
+    for gone in
+        ["strand_psi", "scatter_multiple", "optical_depth", "sample_trilinear", "spread_psi", "walk_leap"]
+    {
         assert!(!functions(&plain).contains(&gone), "{gone} is still there");
     }
     let whole = source.compute(
@@ -132,7 +134,7 @@ fn the_walk_without_light_has_no_model_of_light() {
         ],
     );
     assert_valid(&whole);
-    for needed in ["strand_psi", "scatter_multiple", "optical_depth", "between", "walk_leap"] {
+    for needed in ["strand_psi", "scatter_multiple", "optical_depth", "sample_trilinear", "walk_leap"] {
         assert!(functions(&whole).contains(&needed), "{needed} is missing");
     }
 }

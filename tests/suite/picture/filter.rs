@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};
-use taki::engine::cpu::{LightVolumeCache, render_samples};
+use taki::engine::RenderOptions;
+use taki::engine::cpu::{LightVolumeCache, render_with};
 use taki::picture::camera::{FILTER_RADIUS, sample_offset};
 use taki::picture::{Filter, Image};
 use taki::util::monitor::Unwatched;
@@ -73,7 +74,8 @@ fn a_part_of_a_filtered_picture_has_the_bits_of_the_whole_and_the_engines_agree(
         let mesh = scene.mesh();
         let render = |window| {
             let kept = &mut LightVolumeCache::default();
-            render_samples(&scene, &volume, &mesh, window, 0..5, false, kept, &Unwatched).expect("a frame")
+            let options = RenderOptions { window: Some(window), ..Default::default() };
+            render_with(&scene, &volume, &mesh, &options, kept, &Unwatched).expect("a frame")
         };
         let whole = render(Window::whole([60, 50]));
         let part = Window { x: 11, y: 7, width: 20, height: 9 };

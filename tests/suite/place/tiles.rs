@@ -190,7 +190,7 @@ fn a_place_has_the_values_of_the_vertices_around_it() {
         for corner in tiles::triangles(tile.side, 4, [false; 4]) {
             let (numbers, weights) = tile.around(tiles::at(*corner));
             let whole = (0..3).find(|&i| weights[i] == 1.0).expect("one vertex alone");
-            assert_eq!(numbers[whole], tile.vertex(tiles::place(*corner)));
+            assert_eq!(numbers[whole], tile.vertex(tiles::grid_point(*corner)));
         }
         let (numbers, weights) = tile.around(Vec2::new(3.75, 5.25));
         assert_eq!(numbers, [[3, 5], [4, 5], [4, 6]].map(|place| tile.vertex(place)));

@@ -169,7 +169,7 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
         let scene = Scene::load(Path::new("waterfall"), &sets, &Limits::default()).expect("valid");
         let made = build_water(&scene.water, &Unwatched).expect("built");
         assert!(kept_water(&scene.water, &cache, &Unwatched).expect("found") == made, "{sets:?}");
-        assert!(scene.kept_mesh(Some(&cache)) == scene.mesh(), "{sets:?}");
+        assert!(scene.cached_mesh(Some(&cache)) == scene.mesh(), "{sets:?}");
     }
     let files = |kind| fs::read_dir(dir.path().join(kind)).unwrap().count();
     // α is not in the cells; the last six change no volume, the first nine no mesh.

@@ -9,7 +9,7 @@ use proptest::test_runner::RngSeed;
 use taki::curve::{CurveShape, levels_for};
 use taki::engine::gpu::{Filling, GpuRenderer};
 use taki::engine::{RenderOptions, cpu};
-use taki::job::VolumeStock;
+use taki::job::VolumeMemo;
 use taki::picture::Frame;
 use taki::scene::{Limits, Scene, presets};
 use taki::util::monitor::Unwatched;
@@ -320,10 +320,10 @@ fn a_sparse_volume_that_does_not_fit_is_refused_before_its_cells_are_made() {
 
 #[test]
 fn a_change_of_reflection_repacks_a_sparse_volume_and_one_of_storage_makes_it_anew() {
-    let mut stock = VolumeStock::default();
+    let mut memo = VolumeMemo::default();
     let mut volume = |sets: &[&str]| {
         let scene = scene("front", sets);
-        let (volume, cost) = stock.volume(&scene, MEMORY, &Unwatched).expect("a volume");
+        let (volume, cost) = memo.volume(&scene, MEMORY, &Unwatched).expect("a volume");
         (volume, cost, dense(&scene.water))
     };
     let (first, cost, whole) = volume(&["volume.storage=sparse"]);

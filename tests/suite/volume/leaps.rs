@@ -11,7 +11,6 @@ use taki::engine::gpu::GpuRenderer;
 use taki::picture::Frame;
 use taki::scene::{Scene, presets};
 use taki::util::monitor::Unwatched;
-use taki::util::window::Window;
 use taki::volume::{Cell, Leaps, VolumeTexture, box_exponents, empty_share, with_boxes, worth_leaping};
 use taki::walk::{Crossing, Walk};
 
@@ -184,10 +183,8 @@ fn rays_through_an_empty_volume_take_a_fifth_of_the_turns() {
 fn on_cpu(scene: &Scene, volume: &VolumeTexture, leaps: Leaps) -> Frame {
     let mut kept = LightVolumeCache::default();
     kept.levels.leaps = leaps;
-    let window = Window::whole([scene.image.width, scene.image.height]);
-    let samples = 0..scene.image.samples;
-    cpu::render_samples(scene, volume, &scene.mesh(), window, samples, false, &mut kept, &Unwatched)
-        .expect("a frame")
+    let options = RenderOptions::default();
+    cpu::render_with(scene, volume, &scene.mesh(), &options, &mut kept, &Unwatched).expect("a frame")
 }
 
 fn on_gpu(renderer: &mut GpuRenderer, scene: &Scene, volume: &VolumeTexture, leaps: Leaps) -> Frame {

@@ -5,6 +5,7 @@ use crate::engine::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use crate::tolerance::close;
 use glam::{IVec3, Vec3};
 use rand::{RngExt, SeedableRng};
+use taki::engine::RenderOptions;
 use taki::engine::cpu;
 use taki::engine::cpu::integrate::Integrator;
 use taki::light::fibre::{Metric, Spread, psi};
@@ -14,7 +15,6 @@ use taki::scene::Scene;
 use taki::trace::lookup::Level;
 use taki::trace::{Lookup, Prefilter, SheetDensity};
 use taki::util::monitor::Unwatched;
-use taki::util::window::Window;
 use taki::volume::{Cell, LevelAtlas, Moments, VolumeTexture, coarse_levels, level_count, level_size};
 use taki::walk::Walk;
 
@@ -168,7 +168,7 @@ fn levels_lie_beside_one_another_in_their_texture() {
         let extent = stack.extent();
         let boxes: Vec<[[u32; 3]; 2]> = (0..stack.count)
             .map(|level| {
-                let place = stack.place(level);
+                let place = stack.origin(level);
                 [place, [0, 1, 2].map(|axis| place[axis] + level_size(size, level)[axis])]
             })
             .collect();
@@ -277,7 +277,7 @@ fn between_cells_lies_what_their_centres_say() {
                 rho += weight;
                 k_d += weight * f64::from(at(low.as_ivec3() + away)[1]);
             }
-            let found = level.between(&crossing, origin, direction, &SheetDensity::WHOLE);
+            let found = level.sample_trilinear(&crossing, origin, direction, &SheetDensity::WHOLE);
             // Codes of ρ are good to 2^(−17), of k to 2^(−9).
             assert!(close((found.rho / 65535.0).into(), rho, 1e-3, 1e-3), "{} {rho}", found.rho / 65535.0);
             assert!(close((found.k[0] / 255.0).into(), k_d / rho, 0.0, 4e-3));
@@ -404,10 +404,9 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
         let mut fresh = crate::engine::gpu::renderer("levels anew").expect("as before");
         let fresh = fresh.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
         assert!(used.radiance == fresh.radiance, "{step:?}");
-        let window = Window::whole([scene.image.width, scene.image.height]);
+        let one = RenderOptions { samples: Some(0..1), ..Default::default() };
         let on_cpu = |kept: &mut cpu::LightVolumeCache| {
-            cpu::render_samples(&scene, &volume, &mesh, window, 0..1, false, kept, &Unwatched)
-                .expect("a frame")
+            cpu::render_with(&scene, &volume, &mesh, &one, kept, &Unwatched).expect("a frame")
         };
         let used = on_cpu(&mut kept);
         assert!(used.radiance == on_cpu(&mut Default::default()).radiance, "{step:?}, CPU");

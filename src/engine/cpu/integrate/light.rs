@@ -6,7 +6,7 @@ use glam::{IVec3, UVec2, Vec2, Vec3};
 use super::{Integrator, SheetHit};
 use crate::light::optical_depth::{light_volume_value, optical_depth};
 use crate::light::scatter::{ORDERS, Row, forward_peak};
-use crate::light::visibility::{Form, LightVolumes};
+use crate::light::visibility::{Form, LightVolumes, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Visibility};
 use crate::trace::lookup::Level;
 use crate::walk::NEVER;
@@ -95,7 +95,7 @@ impl Integrator<'_> {
             Visibility::Cached => {
                 let value = self.patch_value(level, cell, &light.corners);
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
-                    let transmittance = value * value * (1.0 / 65025.0);
+                    let transmittance = value * value * TRANSMITTANCE_OF_CODE;
                     if matter.left < 1.0 {
                         return ((matter.left * transmittance.max(1e-9).log2()).exp2(), 0.0);
                     }

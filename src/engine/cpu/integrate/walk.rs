@@ -71,8 +71,8 @@ impl Integrator<'_> {
             let Some(crossing) = walk.next() else { break };
             walked[0] += 1;
             let CellSample { rho, k: [k_d, k_s], moments } = match scene.trace.lookup {
-                Lookup::Trilinear => level.between(&crossing, origin, d_cell, matter),
-                Lookup::Nearest => level.found(cell, matter),
+                Lookup::Trilinear => level.sample_trilinear(&crossing, origin, d_cell, matter),
+                Lookup::Nearest => level.sample_cell(cell, matter),
             };
             observer.enter(&crossing, cell, rho / 65535.0, transmittance);
             if rho <= 0.0 {
@@ -142,6 +142,6 @@ impl Integrator<'_> {
         if level.is_whole {
             return z as u32;
         }
-        (((z as f32 + 0.5) * level.deep()) as u32).min(self.levels[0].size[2] - 1)
+        (((z as f32 + 0.5) * level.depth_in_cells()) as u32).min(self.levels[0].size[2] - 1)
     }
 }

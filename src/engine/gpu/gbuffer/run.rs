@@ -6,6 +6,7 @@ use glam::{Mat4, Vec3};
 
 use super::Gbuffer;
 use super::pipeline::OpaqueVariant;
+use crate::engine::gpu::binding::{bind_buffer, bind_texture, gbuffer as at};
 use crate::engine::gpu::device::Gpu;
 use crate::engine::gpu::tiles::{Part, in_view};
 use crate::engine::gpu::timing::Span;
@@ -86,8 +87,9 @@ impl Run<'_> {
         if !parts.is_empty() {
             let pipeline = self.pass.rock_surface_pipeline(gpu);
             pass.set_pipeline(pipeline);
-            let buffers = [(0, &self.uniform), (8, &up.positions), (9, &up.tiles)];
-            let entries = buffers.map(|(binding, buffer)| entry(binding, buffer.as_entire_binding()));
+            let buffers =
+                [(at::FRAME, &self.uniform), (at::POSITIONS, &up.positions), (at::TILES, &up.tiles)];
+            let entries = buffers.map(|(binding, buffer)| bind_buffer(binding, buffer));
             pass.set_bind_group(0, &group(gpu, pipeline, &entries), &[]);
             draw(&mut pass, up, parts.iter().copied());
         }
@@ -101,12 +103,17 @@ impl Run<'_> {
             let variant = self.variant();
             let pipeline = self.pass.background(gpu, variant);
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &self.bind(pipeline, &[(0, &self.uniform)], true, None), &[]);
+            pass.set_bind_group(0, &self.bind(pipeline, &[(at::FRAME, &self.uniform)], true, None), &[]);
             pass.draw(0..3, 0..1);
             if rock {
                 let pipeline = self.pass.rock(gpu, variant);
                 pass.set_pipeline(pipeline);
-                let buffers = [(0, &self.uniform), (1, &up.lights), (9, &up.tiles), (11, &up.coats)];
+                let buffers = [
+                    (at::FRAME, &self.uniform),
+                    (at::LIGHTS, &up.lights),
+                    (at::TILES, &up.tiles),
+                    (at::COATS, &up.coats),
+                ];
                 pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, Some(&surface)), &[]);
                 pass.draw(0..3, 0..1);
             }
@@ -126,8 +133,8 @@ impl Run<'_> {
             let pipeline = self.pass.pool(gpu, self.variant());
             pass.set_pipeline(pipeline);
             for (surface, parts) in &up.pools {
-                let lit = [(0, &self.uniform), (1, &up.lights), (7, surface)];
-                let mesh = [(8, &up.positions), (9, &up.tiles), (11, &up.coats)];
+                let lit = [(at::FRAME, &self.uniform), (at::LIGHTS, &up.lights), (at::POOL, surface)];
+                let mesh = [(at::POSITIONS, &up.positions), (at::TILES, &up.tiles), (at::COATS, &up.coats)];
                 let buffers = [lit, mesh].concat();
                 pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, None), &[]);
                 draw(pass, up, parts.iter());
@@ -179,7 +186,8 @@ impl Run<'_> {
         self.set_viewport(&mut pass);
         if up.quad_count > 0 {
             let pipeline = self.pass.volume(gpu);
-            let group = self.bind(pipeline, &[(0, &self.uniform), (2, &up.quads)], false, None);
+            let group =
+                self.bind(pipeline, &[(at::FRAME, &self.uniform), (at::QUADS, &up.quads)], false, None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..6, 0..up.quad_count);
@@ -194,10 +202,10 @@ impl Run<'_> {
         let known_ids = targets.ids(0..layer);
         let pipeline = self.pass.peel(gpu);
         let entries = [
-            entry(0, self.uniform.as_entire_binding()),
-            entry(2, up.quads.as_entire_binding()),
-            entry(3, wgpu::BindingResource::TextureView(&self.depths[known])),
-            entry(4, wgpu::BindingResource::TextureView(&known_ids)),
+            bind_buffer(at::FRAME, &self.uniform),
+            bind_buffer(at::QUADS, &up.quads),
+            bind_texture(at::KNOWN_DEPTH, &self.depths[known]),
+            bind_texture(at::KNOWN_IDS, &known_ids),
         ];
         let group = group(gpu, pipeline, &entries);
         copy(encoder, &targets.depth[2], &targets.depth[own]);
@@ -226,16 +234,16 @@ impl Run<'_> {
     ) -> wgpu::BindGroup {
         let Inputs { gpu, up, .. } = *self.inputs;
         let mut entries: Vec<_> =
-            buffers.iter().map(|(binding, buffer)| entry(*binding, buffer.as_entire_binding())).collect();
-        // Only the shaders of volume quads bind the quads, at 2, and they read no environment.
-        let is_opaque = buffers.iter().all(|(binding, _)| *binding != 2);
+            buffers.iter().map(|(binding, buffer)| bind_buffer(*binding, buffer)).collect();
+        // Only the shaders of volume quads bind the quads, and they read no environment.
+        let is_opaque = buffers.iter().all(|(binding, _)| *binding != at::QUADS);
         if let (true, Some(environment)) = (is_opaque, &up.environment) {
-            entries.push(entry(5, environment.uniform.as_entire_binding()));
+            entries.push(bind_buffer(at::ENVIRONMENT, &environment.uniform));
             if with_map {
-                entries.push(entry(6, wgpu::BindingResource::TextureView(&environment.map)));
+                entries.push(bind_texture(at::ENVIRONMENT_MAP, &environment.map));
             }
         }
-        entries.extend(rock_surface.map(|view| entry(10, wgpu::BindingResource::TextureView(view))));
+        entries.extend(rock_surface.map(|view| bind_texture(at::ROCK_SURFACE, view)));
         group(gpu, pipeline, &entries)
     }
 
@@ -281,10 +289,6 @@ fn group(gpu: &Gpu, pipeline: &wgpu::RenderPipeline, entries: &[wgpu::BindGroupE
 
 pub fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&Default::default())
-}
-
-fn entry(binding: u32, resource: wgpu::BindingResource) -> wgpu::BindGroupEntry {
-    wgpu::BindGroupEntry { binding, resource }
 }
 
 fn colour(

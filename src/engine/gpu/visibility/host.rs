@@ -30,7 +30,7 @@ pub fn fill_on_host(
         let [x, y, z] = atlas.origin(number as u32).map(|c| c as u32);
         let filled_levels = rows.fill(light_volume, plan.medium, plan.form);
         for ((level, numbers), level_number) in levels.iter().zip(filled_levels).zip(0..) {
-            let [_, y_level, z_level] = level_atlas.place(level_number);
+            let [_, y_level, z_level] = level_atlas.origin(level_number);
             let z_level = match plan.form {
                 Form::Codes => z_level / CELLS_A_WORD,
                 Form::Depths => z_level,

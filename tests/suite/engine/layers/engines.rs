@@ -108,9 +108,10 @@ fn parts_tiles_and_kept_rasters_of_several_sheets_change_no_bit() {
         let rows = window.y as usize..window.bottom() as usize;
         rows.flat_map(|y| frame.radiance[y * 64..][13..50].to_vec()).collect()
     };
-    let some =
-        cpu::render_samples(&scene, &volume, &mesh, window, 0..1, true, &mut Default::default(), &Unwatched)
-            .expect("a frame");
+    let options =
+        RenderOptions { window: Some(window), samples: Some(0..1), surface: true, ..Default::default() };
+    let some = cpu::render_with(&scene, &volume, &mesh, &options, &mut Default::default(), &Unwatched)
+        .expect("a frame");
     assert_eq!(part(&whole), some.radiance);
     let Some(mut renderer) = renderer("parts of sheets") else { return };
     for grid in [Grid::default(), Grid { side: 32, pixels: 32 * 20 }] {

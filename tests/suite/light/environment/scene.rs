@@ -8,7 +8,7 @@ use crate::cli::faults::{run, taki};
 use crate::engine::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use glam::{DVec3, Vec3};
 use taki::engine::{RenderOptions, cpu};
-use taki::job::VolumeStock;
+use taki::job::VolumeMemo;
 use taki::light::Light;
 use taki::light::environment::{Environment, Source, luminance};
 use taki::scene::{Animation, Limits, Scene};
@@ -258,7 +258,7 @@ fn kept_results_of_the_raster_pass_know_the_environment() {
     ];
     let options = RenderOptions { keep_rasters: 64 << 20, ..Default::default() };
     let mut fresh = renderer("rasters").expect("an adapter");
-    let mut volumes = VolumeStock::default();
+    let mut volumes = VolumeMemo::default();
     let mesh = lit(&[]).mesh();
     let (mut spared, limits) = (0, Limits::default());
     for change in changes.iter().flat_map(|c| [c, c, c]) {
