@@ -1,5 +1,6 @@
 // §5 Per-ray terms of the lights, and the light that a cell sends to the eye. shaders/engine/integrate.wgsl
-// holds the bindings. Twin: src/engine/cpu/integrate/light.rs.
+// holds the bindings. Twins: src/engine/cpu/integrate/light.rs, and for `lit` and `lit_in_colour` the loop
+// over lights in src/engine/cpu/integrate/walk.rs.
 
 #import engine::integrate
 #import layout

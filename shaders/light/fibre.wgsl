@@ -1,5 +1,5 @@
 // §5 Decoding of a cell's direction, and the fibre model of Kajiya and Kay 1989. Twins: v_code in
-// src/volume/cell.rs, and src/light/fibre.rs.
+// src/volume/cell.rs, and src/light/fibre.rs. shaders/engine/integrate_light.wgsl calls psi for each cell.
 
 #import layout
 

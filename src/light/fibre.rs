@@ -2,8 +2,10 @@
 //! SIGGRAPH 1989.
 //!
 //! All vectors point outward from the cell. Twins: `shaders/light/fibre.wgsl`, and for [`Spread`]
-//! `shaders/trace/lookup.wgsl`. The CPU engine takes the terms of [`psi`] apart, so that what is constant
-//! along a ray is computed once: `src/engine/cpu/integrate/walk.rs`.
+//! `shaders/trace/lookup.wgsl`.
+//!
+//! The CPU engine does not call [`psi`]. It calls [`fibre_angles`] and [`specular_power`] for each cell in
+//! `src/engine/cpu/integrate/walk.rs`.
 
 use glam::Vec3;
 

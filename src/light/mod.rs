@@ -1,4 +1,7 @@
 //! §5 Light: the lights, their visibility from a cell, and the light that the cell reflects to the eye.
+//!
+//! This module has the models. The integrate pass applies them to each cell of a ray:
+//! `src/engine/cpu/integrate/walk.rs` on the CPU, `lit` in `shaders/engine/integrate_light.wgsl` on the GPU.
 
 pub mod environment;
 pub mod fibre;

@@ -3,8 +3,11 @@
 //! A quad A(0,0) B(1,0) C(1,1) D(0,1) is handled in its own plane, with the axes e1 (along AB), e2 (such that
 //! A, B, C, D run counter-clockwise) and n = e1 × e2. Lengths are metres.
 //!
-//! Twins: `quad_hit` and `CellFrame` in `shaders/mapping.wgsl` are those of [`QuadMap::uv`] and
-//! [`CellFrame`].
+//! [`QuadMap::uv`] inverts the map: from a point of the plane to (u, v). `quad.rs` adds a material to a quad;
+//! `sheet.rs` and `splash.rs` cut falling water into quads.
+//!
+//! Twins in `shaders/mapping.wgsl`: `CellFrame`, and `quad_hit`, which finds the point of the plane that a
+//! pixel's ray meets and inverts the map there. On the CPU `map_quad` in `src/engine/cpu/gbuffer.rs` does so.
 
 mod quad;
 mod sheet;

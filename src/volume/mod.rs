@@ -1,6 +1,7 @@
 //! §2 The volume texture: density ρ, flow direction v and reflection coefficients k in every cell.
 //!
-//! `water.rs` sets ρ and k, `flow.rs` sets v, `cell.rs` packs them.
+//! `set` in `water.rs` gives every cell its ρ and k, `flow.rs` gives it v, and `cell.rs` packs them. What a
+//! sheet makes of ρ later, by erosion or mist, is in `src/trace/matter.rs`.
 
 mod bricks;
 mod bundle;

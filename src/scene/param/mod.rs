@@ -1,8 +1,10 @@
 //! The parameter table: every number, choice, colour and file that a scene can set.
 //!
 //! The reader of scene files, `--set`, the printed scene, docs/parameters.md and the viewer's sliders all use
-//! it. A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The
-//! words of a choice stand at its enum (see `src/util/words.rs`).
+//! it. `src/scene/build.rs` puts the values into the types that need them.
+//!
+//! A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The words of
+//! a choice stand at its enum (see `src/util/words.rs`).
 
 mod light;
 mod picture;

@@ -1,5 +1,6 @@
-//! §4 and §5: the walk of a ray through the cells of one level. Twin: `walk_level` and `visit` of
-//! `shaders/engine/integrate.wgsl`.
+//! §4 and §5: the walk of a ray through the cells of one level, and the light of each cell. Twins:
+//! `walk_level` and `visit` of `shaders/engine/integrate.wgsl`, and `lit` and `lit_in_colour` of
+//! `shaders/engine/integrate_light.wgsl`.
 
 use glam::Vec3;
 
