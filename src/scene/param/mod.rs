@@ -3,8 +3,8 @@
 //! The reader of scene files, `--set`, the printed scene, docs/parameters.md and the viewer's sliders all use
 //! it. `src/scene/build.rs` puts the values into the types that need them.
 //!
-//! A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The words of
-//! a choice stand at its enum (see `src/util/words.rs`).
+//! A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The words
+//! of a choice stand at its enum (see `src/util/words.rs`).
 
 mod light;
 mod picture;
