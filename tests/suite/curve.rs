@@ -1,4 +1,4 @@
-//! §1 Spatial fractal curves against the statements of the paper's §2.1. Reference truth.
+//! §1 Spatial fractal curves, tested against the statements of the paper's §2.1. Reference truth.
 
 use glam::Vec3;
 use proptest::prelude::*;
@@ -26,7 +26,7 @@ fn the_scale_is_two_to_the_minus_n_h() {
         let shape = CurveShape { h, sigma_g_cells: 1.0, levels: 1 };
         assert_eq!(shape.scale(0), 1.0);
         for n in 1..=16 {
-            // The recurrence of eq. (1), S(n) = S(n−1)·0.5^h.
+            // Recurrence of eq. (1): S(n) = S(n−1)·0.5^h.
             let step = shape.scale(n) as f64 / shape.scale(n - 1) as f64;
             assert!((step - 0.5f64.powf(h as f64)).abs() < 1e-6, "h {h}, n {n}: {step}");
             assert!((shape.scale(n) as f64 - 2f64.powf(-(n as f64) * h as f64)).abs() < 1e-6);
@@ -83,7 +83,7 @@ proptest! {
                 let (p, q) = (points[start].as_dvec3(), points[start + stride].as_dvec3());
                 let r = points[start + stride / 2].as_dvec3() - (p + q) * 0.5;
                 let along = (q - p).normalize_or_zero();
-                // Rounding of coordinates up to some hundred cells.
+                // Rounding error of coordinates of up to a few hundred cells.
                 prop_assert!(r.dot(along).abs() < 1e-4, "{r} along {along} at level {level}");
                 displaced += usize::from(r.length() > 1e-3);
             }
@@ -109,14 +109,15 @@ fn the_first_displacement_is_normal_with_sigma_s_1_along_a_uniform_axis() {
         x2 += r.x * r.x;
         xz += r.x * r.z;
     }
-    // Five standard errors; for a normal g E g² = 1 (variance 2), E g⁴ = 3 (variance 96). The fourth
-    // moment tells a normal g on a random axis from a displacement that is normal in both axes (2).
+    // Five standard errors. For a normal g, E g² = 1 (variance 2) and E g⁴ = 3 (variance 96). The fourth
+    // moment distinguishes a normal g on a random axis from a displacement that is normal along both axes
+    // (2).
     let five = |variance: f64| 5.0 * (variance / n as f64).sqrt();
     let mean = |sum: f64| sum / n as f64;
     assert!((mean(r2) - 1.0).abs() < five(2.0), "variance {}", mean(r2));
     assert!((mean(r4) - 3.0).abs() < five(96.0), "fourth moment {}", mean(r4));
     assert!(mean(x).abs() < five(0.5) && mean(z).abs() < five(0.5), "mean {} {}", mean(x), mean(z));
-    // A uniform axis: E (g cos)² = 1/2, E g² cos·sin = 0.
+    // For a uniform axis, E (g cos)² = 1/2 and E g² cos·sin = 0.
     assert!((mean(x2) - 0.5).abs() < five(3.0 * 0.375 - 0.25), "along x {}", mean(x2));
     assert!(mean(xz).abs() < five(3.0 * 0.125), "correlation {}", mean(xz));
 }
@@ -153,7 +154,7 @@ fn the_default_depth_is_the_least_that_spans_half_a_cell() {
 #[test]
 fn at_the_default_depth_segments_stay_shorter_than_a_cell() {
     for ny in [16u32, 40, 100, 400] {
-        // The default look: h 0.9, amplitude 0.05 flow lengths.
+        // The default look: h = 0.9, amplitude 0.05 flow lengths.
         let levels = levels_for(ny);
         let shape = CurveShape { h: 0.9, sigma_g_cells: 0.05 * ny as f32, levels };
         let (p1, p2) = (Vec3::ZERO, Vec3::new(0.0, ny as f32, 0.0));

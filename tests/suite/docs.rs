@@ -1,7 +1,7 @@
-//! README.md and the pages under docs/ are true: generated tables match the code, and files, links, commands
-//! and options exist.
+//! Checks that README.md and the pages under docs/ are true: the generated tables match the code, and the
+//! files, links, commands and options that they name exist.
 //!
-//! `TAKI_BLESS=1 tests/run docs` writes the generated tables anew.
+//! `TAKI_BLESS=1 tests/run docs` rewrites the generated tables.
 
 use taki::scene::{GROUPS, Kind, PARAMS, Param, parameters_markdown, presets};
 
@@ -28,7 +28,7 @@ fn the_parameter_table_is_the_codes_own() {
     }
 }
 
-/// The README, what stands beside it, and the pages of `docs/`: path from the root, and text.
+/// Path from the root and text of the README, the pages beside it, and the pages of `docs/`.
 fn pages() -> Vec<(String, String)> {
     let mut names =
         ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md"].map(String::from).to_vec();
@@ -41,13 +41,13 @@ fn pages() -> Vec<(String, String)> {
     names.iter().map(|name| (name.clone(), read(name))).collect()
 }
 
-/// What a user is told: the README and `docs/`, in one text.
+/// Text of the user documentation: the README and the pages of `docs/`.
 fn documentation() -> String {
     let told = |name: &str| name == "README.md" || name.starts_with("docs/");
     pages().into_iter().filter(|(name, _)| told(name)).map(|(_, text)| text + "\n").collect()
 }
 
-/// The lines of a page that are not code, and those that begin or end a block of code.
+/// Splits a page into the lines outside blocks of code and the lines that begin or end such a block.
 fn prose_and_fences(text: &str) -> (Vec<&str>, Vec<&str>) {
     let (mut prose, mut fences, mut code) = (Vec::new(), Vec::new(), false);
     for line in text.lines() {
@@ -62,20 +62,20 @@ fn prose_and_fences(text: &str) -> (Vec<&str>, Vec<&str>) {
     (prose, fences)
 }
 
-/// What stands between `start` and `end`, every time.
+/// Every text between `start` and `end`.
 fn between<'a>(text: &'a str, start: &'a str, end: char) -> impl Iterator<Item = &'a str> {
     text.split(start).skip(1).map(move |rest| rest.split(end).next().unwrap_or(""))
 }
 
-/// Where a page's links and pictures lead.
+/// Targets of a page's links and pictures.
 fn targets(text: &str) -> Vec<String> {
     let prose = prose_and_fences(text).0.join("\n");
-    // What is between backticks is no link.
+    // Text between backticks is not a link.
     let prose: String = prose.split('`').step_by(2).collect();
     between(&prose, "](", ')').chain(between(&prose, "src=\"", '"')).map(String::from).collect()
 }
 
-/// The anchors of a page's headings, as GitHub and rustdoc make them.
+/// Anchors of a page's headings, as GitHub and rustdoc make them.
 fn anchors(text: &str) -> Vec<String> {
     let mut anchors: Vec<String> = Vec::new();
     for line in prose_and_fences(text).0 {
@@ -104,7 +104,7 @@ fn parameters_are_told_in_whole_sentences_that_fit_a_table() {
     }
 }
 
-/// What stands between backticks, of every parameter and group.
+/// Every text between backticks in the descriptions of parameters and groups.
 fn quoted() -> Vec<&'static str> {
     let words = PARAMS.iter().flat_map(|p| [p.doc, p.when]).chain(GROUPS.iter().map(|g| g.about));
     words.flat_map(|words| words.split('`').skip(1).step_by(2)).collect()
@@ -159,7 +159,7 @@ fn every_link_leads_to_a_file_and_every_anchor_to_a_heading() {
     assert!(links > 40, "{links} links");
 }
 
-/// The paths between backticks. Commands and patterns are not among them: they have other characters too.
+/// Paths between backticks. Commands and patterns are left out, because they contain other characters too.
 fn named_paths(text: &str) -> Vec<&str> {
     let roots = ["src/", "shaders/", "tests/", "assets/", "docs/", "examples/", "findings/"];
     let is_path = |quoted: &&str| {
@@ -209,7 +209,8 @@ fn every_page_of_the_docs_is_linked_from_the_readme_and_begins_with_its_purpose(
     }
 }
 
-/// rustdoc shows the pages too, and takes a block of code without a language, or an indented one, for Rust.
+/// rustdoc also shows the pages. It takes a block of code as Rust if the block is indented or names no
+/// language.
 #[test]
 fn every_block_of_code_names_its_language() {
     for (name, text) in pages() {
@@ -240,7 +241,7 @@ fn commands(under: &[String]) -> Vec<Vec<String>> {
     let text = help(under);
     let list =
         text.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    // The description goes on in lines that are indented further.
+    // Lines that are indented further continue the description.
     let names = list.filter_map(|line| line.strip_prefix("  ").filter(|rest| !rest.starts_with(' ')));
     let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
     names
@@ -252,7 +253,7 @@ fn commands(under: &[String]) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Whether an option is named, not only as the beginning of a longer one.
+/// Whether the text names an option itself, not just a longer option that begins with it.
 fn names_option(text: &str, option: &str) -> bool {
     text.split(option).skip(1).any(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '-'))
 }
@@ -284,7 +285,7 @@ fn the_map_of_the_readme_is_that_of_the_crates_front_page() {
     }
 }
 
-/// Files of sources, shaders and docs, with their text.
+/// Paths and texts of the source, shader and documentation files.
 fn lines_of_the_house() -> Vec<(String, String)> {
     let mut folders: Vec<_> = ["src", "shaders", "docs"].map(|name| path(name).into()).to_vec();
     let mut found = Vec::new();

@@ -14,13 +14,14 @@ use std::time::{Duration, Instant};
 
 use tempfile::{TempDir, tempdir};
 
-/// No command of these tests works longer than a few seconds; one that hangs must not hang the suite.
+/// Longest time that a run may take. Every command of these tests ends within seconds; one that hangs must
+/// not hang the suite.
 const LONGEST: Duration = Duration::from_secs(120);
 const TINY: [&str; 6] = ["--engine", "cpu", "--size", "16x16", "--samples", "1"];
-/// Hours of work, for tests that stop it.
+/// A render that takes hours, for tests that stop it.
 const ENDLESS: [&str; 7] = ["render", "fig5", "--engine", "cpu", "--samples", "4096", "-o"];
 
-/// What a run of the program left.
+/// Result of one run of the program.
 #[derive(Debug)]
 pub struct Run {
     code: Option<i32>,
@@ -29,7 +30,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// The run ended with `code`, and one error line that has all of `words`.
+    /// Asserts that the run ended with `code` and one error line that contains all of `words`.
     pub fn refused(&self, code: i32, words: &[&str]) {
         let lines = self.lines("taki: error:");
         assert_eq!((self.code, lines.len()), (Some(code), 1), "{}", self.err);
@@ -38,34 +39,34 @@ impl Run {
         }
     }
 
-    /// The run ended well; its stdout.
+    /// Asserts that the run succeeded, and returns its stdout.
     pub fn done(&self) -> &str {
         assert_eq!((self.code, self.lines("taki: error:").len()), (Some(0), 0), "{}", self.err);
         &self.out
     }
 
-    /// How it ended; none after a signal.
+    /// Exit code; `None` after a signal.
     pub fn exit_code(&self) -> Option<i32> {
         self.code
     }
 
-    /// What it printed.
+    /// Text on stdout.
     pub fn stdout(&self) -> &str {
         &self.out
     }
 
-    /// What it said.
+    /// Text on stderr.
     pub fn stderr(&self) -> &str {
         &self.err
     }
 
-    /// The lines it said that start so.
+    /// Lines of stderr that begin with `start`.
     pub fn lines(&self, start: &str) -> Vec<&str> {
         self.err.lines().filter(|line| line.starts_with(start)).collect()
     }
 }
 
-/// Runs to the end, at most `LONGEST`; a panic's words are never right.
+/// Runs the command to its end, for at most `LONGEST`. Fails if the program panics.
 pub fn run(command: &mut Command) -> Run {
     let (mut out, mut err) = (tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap());
     command.stdin(Stdio::null()).stdout(out.try_clone().unwrap()).stderr(err.try_clone().unwrap());
@@ -82,7 +83,7 @@ pub fn run(command: &mut Command) -> Run {
     run
 }
 
-/// Waits for the end; how it ended.
+/// Waits for the end of the process and returns its exit code.
 pub fn wait(child: &mut Child) -> Option<i32> {
     let start = Instant::now();
     loop {
@@ -97,7 +98,7 @@ pub fn wait(child: &mut Child) -> Option<i32> {
     }
 }
 
-/// The program with arguments.
+/// Command that runs `taki` with `arguments`.
 pub fn taki<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_taki"));
     command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
@@ -105,14 +106,14 @@ pub fn taki<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command 
     command
 }
 
-/// A tiny render on the CPU.
+/// Command for a tiny render on the CPU.
 fn render(scene: impl AsRef<OsStr>, output: impl AsRef<OsStr>) -> Command {
     let mut command = taki(["render"]);
     command.arg(scene).args(TINY).arg("-o").arg(output);
     command
 }
 
-/// The program in a shell that prepares its surroundings.
+/// Command that runs `before` in a shell and then the program.
 fn in_shell(before: &str, redirect: &str, command: &Command) -> Command {
     let mut shell = Command::new("bash");
     shell.args(["-c", &format!("{before} exec \"$@\" {redirect}"), "bash"]);
@@ -120,7 +121,7 @@ fn in_shell(before: &str, redirect: &str, command: &Command) -> Command {
     shell
 }
 
-/// The names of the files in a folder.
+/// Names of the files in a folder.
 fn names(folder: &Path) -> BTreeSet<String> {
     let entries = fs::read_dir(folder).unwrap();
     entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
@@ -136,7 +137,7 @@ fn is_picture(path: &Path) {
     assert_eq!((picture.width(), picture.height()), (16, 16));
 }
 
-/// A folder with a scene file that takes its volume from `volume`.
+/// Makes a folder with a scene file that takes its volume from `volume`.
 fn scene_with_volume(volume: &str) -> (TempDir, PathBuf) {
     let dir = tempdir().unwrap();
     let folder = dir.path().join("scene");
@@ -167,7 +168,7 @@ fn outputs_that_cannot_be_made_are_known_before_work() {
         ("..".into(), 2, ".."),
     ];
     for (path, code, words) in cases {
-        // So much work that it cannot be done first.
+        // The work takes hours, so the fault must be reported before the work begins.
         let start = Instant::now();
         run(taki(ENDLESS).arg(&path)).refused(code, &[words, &path.display().to_string()]);
         assert!(start.elapsed() < Duration::from_secs(30), "{} was known late", path.display());
@@ -178,7 +179,7 @@ fn outputs_that_cannot_be_made_are_known_before_work() {
 
 #[test]
 fn a_full_disk_leaves_the_old_file_and_no_other() {
-    // A limit on the size of files fails as a full disk does: in the middle of a write.
+    // A limit on the size of files acts as a full disk does: it fails in the middle of a write.
     for (name, start) in [("x.png", "render"), ("x.exr", "render"), ("x.npz", "volume")] {
         let dir = tempdir().unwrap();
         let path = dir.path().join(name);
@@ -192,7 +193,7 @@ fn a_full_disk_leaves_the_old_file_and_no_other() {
             }
         };
         let full = run(&mut in_shell("trap '' XFSZ; ulimit -f 1;", "", &command));
-        // The limit holds for the run's own stderr too; its lines are far shorter.
+        // The limit also applies to the run's own stderr, but its lines are far shorter than the limit.
         full.refused(74, &["cannot write", name, "free some space"]);
         assert_eq!(full.err.matches("drop failed").count(), 0, "{}", full.err);
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
@@ -230,7 +231,8 @@ fn temporary_files_of_the_dead_are_removed_and_those_of_the_living_kept() {
     let name = |target: &str, pid: u32| format!(".{target}.taki-abc.{machine}-{pid}.tmp");
     let (stale, living) = (name("x.png", dead.id()), name("x.png", std::process::id()));
     let (other, foreign) = (name("y.png", dead.id()), ".x.png.taki-notes".to_owned());
-    // Another machine's processes cannot be asked: its files are stale after a day without a write.
+    // The processes of another machine cannot be checked, so its files count as stale after a day without a
+    // write.
     let elsewhere = |n: &str| format!(".x.png.taki-{n}.00000000-{}.tmp", dead.id());
     let (recent, ancient) = (elsewhere("a"), elsewhere("b"));
     for file in [&stale, &living, &other, &foreign, &recent, &ancient] {
@@ -309,7 +311,7 @@ fn paths_of_every_kind_work() {
         run(taki(["render", "front", argument]).args(TINY).current_dir(&dir)).done();
         is_picture(&dir.path().join(name));
     }
-    // A scene's own path too, seen in the name of the picture it makes by default.
+    // The scene's own path may also be odd: its name is in the name of the default picture.
     let scene = dir.path().join(OsStr::from_bytes(b"\xff s.v2.toml"));
     fs::write(&scene, "version = 1\nbase = \"front\"\n").unwrap();
     run(taki(["render"]).arg(&scene).args(TINY).current_dir(&dir)).done();
@@ -443,7 +445,7 @@ fn the_same_input_gives_the_same_bytes_on_any_number_of_threads() {
 
 #[test]
 fn cameras_in_odd_places_see_finite_pictures() {
-    // The quad of `front` lies at z = 0.5, the volume reaches 1 m below it.
+    // The quad of `front` lies at z = 0.5. The volume reaches 1 m below it.
     let places = [
         ("on the surface", "[0.0, 0.0, 0.5]", "[0.0, 0.0, 0.0]"),
         ("on the surface, along it", "[0.0, 0.0, 0.5]", "[1.0, 0.0, 0.5]"),
@@ -460,7 +462,7 @@ fn cameras_in_odd_places_see_finite_pictures() {
         for fov in ["0.01", "170"] {
             let sets =
                 [format!("camera.eye={eye}"), format!("camera.target={target}"), format!("camera.fov={fov}")];
-            // An odd size has a ray through the very middle.
+            // With an odd size, one ray passes through the exact middle.
             let mut command = taki(["render", "front", "--engine=cpu", "--size=17x17", "--json", "-o"]);
             command.arg(dir.path().join("x.png")).args(sets.map(|s| format!("--set={s}")));
             let json: serde_json::Value = serde_json::from_str(run(&mut command).done()).unwrap();

@@ -1,3 +1,3 @@
-//! What the command line prints and does when something fails.
+//! Output of the command line, and what happens when something fails.
 
 pub mod faults;

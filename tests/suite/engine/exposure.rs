@@ -1,4 +1,4 @@
-//! Automatic exposure: closed forms of its measurement, and one exposure for all frames and parts.
+//! Automatic exposure: its measurement against closed forms, and one exposure for all frames and parts.
 
 use std::path::Path;
 use std::process::Command;
@@ -33,8 +33,9 @@ fn twice_the_light_is_one_stop_less() {
 
 #[test]
 fn the_average_is_that_of_the_logarithm_of_luminance() {
-    // Half of the pixels at 2^-1, half at 2^-5: the mean is 2^-3, where their arithmetic mean is above 2^-2. In
-    // 64ths of a stop; darkness adds 1e-3 of the mean, 0.012 stops to the dark half.
+    // Half of the pixels are at 2^-1 and half at 2^-5, so the logarithmic mean is 2^-3; the arithmetic mean
+    // would be above 2^-2. The measurement works in 64ths of a stop. The dark floor adds 1e-3 of the mean,
+    // which is 0.012 stops for the dark half.
     let pixels = (0..100).map(|i| [if i % 2 == 0 { 0.5 } else { 0.03125 }; 3]);
     let got = stops(Average, pixels);
     let want = 0.18f32.log2() + 3.0;
@@ -92,7 +93,7 @@ fn every_frame_has_the_exposure_of_the_first_and_its_scene_alone_gives_the_same_
         assert_eq!((look.exposure, look.auto_exposure), (0.5 + chosen, AutoExposure::None));
         assert!(
             scene.to_toml().contains("auto_exposure = \"none\""),
-            "the scene in a picture is measured no more"
+            "the scene that a picture contains is not measured again"
         );
     }
     let changed = animation.with(&[]).expect("the same");

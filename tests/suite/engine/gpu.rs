@@ -12,8 +12,8 @@ use taki::util::error::Error;
 use taki::util::monitor::Unwatched;
 use taki::volume::Leaps;
 
-/// A renderer, or none on a machine without an adapter: then a GPU test says so and ends. In
-/// continuous integration (CI=true) that is a failure.
+/// Returns a renderer. On a machine without an adapter it prints that and returns `None`, and the test ends;
+/// in continuous integration (CI set) that is a failure.
 pub fn renderer(test: &str) -> Option<GpuRenderer> {
     match Gpu::open(&DeviceOptions::default()) {
         Ok(gpu) => Some(GpuRenderer::new(gpu)),
@@ -30,8 +30,8 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
     Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a valid scene")
 }
 
-/// The default scene's place made coarse: the normals of a fine mesh turn so much inside a pixel, and the foam changes
-/// so much, that the two engines' interpolations differ by more than their shading may.
+/// A coarse version of the default scene's place. On a fine mesh, the normals and the foam change so much
+/// inside one pixel that the two engines' interpolations differ by more than their shading may.
 pub const COARSE_PLACE: [&str; 10] = [
     "rocks.wall.levels=1",
     "rocks.left.levels=1",
@@ -68,7 +68,7 @@ fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
     frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect()
 }
 
-/// Parity of final radiance and transmittance, and of the raster pass's layers.
+/// Asserts parity of the final radiance and transmittance, and of the raster pass's layers.
 pub fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
     let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
     let least = |what: &str, a: &[[f32; 3]], b: &[[f32; 3]]| {
@@ -100,7 +100,7 @@ fn continuous_integration_runs_on_software_vulkan() {
         let names: Vec<String> = adapters().iter().map(|a| a.get_info().name).collect();
         assert!(names.iter().any(|n| n.contains("llvmpipe")), "adapters: {names:?}");
         let renderer = renderer("software Vulkan").expect("an adapter");
-        assert!(!renderer.gpu.timestamps, "its time stamps are not to be trusted");
+        assert!(!renderer.gpu.timestamps, "its time stamps must not be trusted");
     }
 }
 
@@ -157,7 +157,7 @@ fn the_engines_agree_with_many_lights_and_a_volume_of_unequal_sides() {
     let Some(mut renderer) = renderer("lights") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lights.toml");
-    // One walk of a ray takes 16 lights.
+    // One walk of a ray handles at most 16 lights.
     for count in [16, 17, 40] {
         let lights: String = (1..count)
             .map(|i| {
@@ -192,7 +192,8 @@ fn the_engines_agree_at_odd_sizes_and_with_several_samples() {
             (gpu.radiance.len(), cpu.radiance.len()),
             ((width * height) as usize, (width * height) as usize)
         );
-        // Of so few pixels one on an edge would break the share: the mean tells a shifted row.
+        // With so few pixels, a single one on an edge would exceed the allowed share. The mean detects a
+        // shifted row.
         let mean =
             |f: &Frame| rgb(f).iter().flatten().map(|&x| x as f64).sum::<f64>() / (width * height) as f64;
         assert!((mean(gpu) - mean(cpu)).abs() <= 0.02 * mean(cpu).abs() + 1e-4, "{width}×{height}");
@@ -242,7 +243,7 @@ fn tiles_do_not_change_a_single_bit_and_the_grid_no_more_than_rounding() {
     }
     for grid in [Grid { side: 4096, pixels: 101 * 7 }, Grid { side: 40, pixels: 40 * 32 }] {
         let other = render(None, Some(grid));
-        // A corner of a rock may be snapped to the next 256th of a pixel: few pixels on edges change.
+        // A corner of a rock may snap to the next 256th of a pixel, which changes a few pixels on edges.
         let tolerance = Tolerance { relative: 1e-4, absolute: 1e-5 };
         let d = Difference::new(101, &rgb(&whole), &rgb(&other), tolerance);
         eprintln!("{grid:?}: {d:?}, counts equal: {}", whole.counts == other.counts);
@@ -265,7 +266,8 @@ fn scenes_without_quads_are_drawn_by_both_engines() {
 #[test]
 fn walks_that_the_device_ends_early_are_refused_and_not_shown() {
     let Some(mut renderer) = renderer("long walks") else { return };
-    // Light along the face from every cell of a ray: over 262,000 cells a pixel, four a turn.
+    // The light runs along the face from every cell of a ray: more than 262,000 cells per pixel, four per
+    // loop turn.
     let long = ["lights.key.direction=[1,0,0]", "trace.max_cells=65536", "image.width=9", "image.height=9"];
     let render = |renderer: &mut GpuRenderer, more: &[&str]| {
         let scene = scene("front", &[&long[..], more].concat());
@@ -352,7 +354,8 @@ fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
 fn what_stays_on_the_device_is_never_stale() {
     let Some(mut kept) = renderer("resident") else { return };
     let size = ["image.width=64", "image.height=48"];
-    // Each differs from the one before in what a renderer keeps: cells, α, mesh, size, lights, exponent.
+    // Each change differs from the one before in something that a renderer keeps: cells, α, mesh, size,
+    // lights, exponent.
     let changes: [&[&str]; 8] = [
         &[],
         &["volume.seed=9"],
@@ -371,7 +374,7 @@ fn what_stays_on_the_device_is_never_stale() {
         let frame = |renderer: &mut GpuRenderer| {
             renderer.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame")
         };
-        // Twice: the second finds everything on the device.
+        // Rendered twice: the second frame finds everything on the device.
         let [first, again] = [frame(&mut kept), frame(&mut kept)];
         let fresh = frame(&mut renderer("resident").expect("an adapter"));
         for (name, other) in [("first", &first), ("again", &again)] {
@@ -413,7 +416,8 @@ fn kept_results_of_the_raster_pass_change_no_bit_and_are_never_stale() {
     let mut spared = 0;
     let mut meshes: Vec<(taki::place::Ground, taki::place::Mesh)> = Vec::new();
     let volume = scene("fig5", &base).volume(1 << 30, &Unwatched).expect("a volume");
-    // Each three times over: drawn, kept, and used again; and back to what was first.
+    // Each change is rendered three times: drawn, kept, and used again. Then the first scene is rendered
+    // again.
     for change in changes.iter().flat_map(|c| [Some(c), Some(c), Some(c), None, None]) {
         let sets: Vec<&str> = base.iter().chain(change).copied().collect();
         let scene = scene("fig5", &sets);

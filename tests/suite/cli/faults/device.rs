@@ -11,7 +11,7 @@ use taki::scene::{Limits, Scene};
 use taki::util::monitor::{Monitor, Unwatched};
 use tempfile::tempdir;
 
-/// Whether a GPU is there. Where the project is checked as a whole, its absence is a fault.
+/// Whether a GPU is present. In continuous integration (CI set) its absence fails the test.
 fn has_gpu() -> bool {
     let found = !adapters().is_empty();
     assert!(found || std::env::var_os("CI").is_none(), "CI needs an adapter (mesa-vulkan-drivers)");
@@ -35,7 +35,7 @@ fn without_an_adapter_gpu_is_refused_and_auto_takes_the_cpu_with_advice() {
     let blind = |arguments: &[&str]| {
         let mut command = taki(["render", "front", "--size=16x16", "-o"]);
         command.arg(&out).args(arguments);
-        // The loader's new and old way to name its drivers.
+        // The loader has a new and an old variable that name its drivers.
         run(command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent"))
     };
     blind(&["--engine=gpu"]).refused(69, &["no GPU adapter", "mesa-vulkan-drivers", "--engine cpu"]);
@@ -80,7 +80,7 @@ fn a_device_that_hangs_is_not_waited_for() {
     if !has_gpu() {
         return;
     }
-    // Seconds of work in one submission, given a third of a second.
+    // One submission takes seconds; the watchdog allows it a third of a second.
     let mut sets = vec!["image.width=1024", "image.height=1024", "light.visibility=march"];
     sets.extend(["volume.nx=200", "volume.ny=200", "volume.nz=200", "trace.sigma=0.1", "volume.alpha=0.05"]);
     let scene = front(&sets);
@@ -108,7 +108,7 @@ fn a_lost_device_is_an_error_and_no_panic() {
     let scene = front(&TINY);
     let volume = scene.volume(1 << 30, &Unwatched).unwrap();
     let mut renderer = GpuRenderer::new(Gpu::open(&DeviceOptions::default()).unwrap());
-    // Once as new, once with everything compiled.
+    // First with a new renderer, then with one whose shaders are compiled.
     for warm in [false, true] {
         if warm {
             renderer = GpuRenderer::new(Gpu::open(&DeviceOptions::default()).unwrap());
@@ -149,7 +149,7 @@ fn a_lost_device_is_replaced_once_with_a_warning() {
         renderer.gpu.device.destroy();
     }
     let after = engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
-    // Smaller tiles give the same pixels.
+    // Smaller tiles must give the same pixels.
     assert!(before == after);
     let warnings = warnings.0.into_inner().unwrap();
     assert_eq!(warnings.len(), 1, "{warnings:?}");
@@ -179,16 +179,17 @@ fn a_watchdog_that_ends_work_in_flight_ends_the_process_with_its_own_code() {
         return;
     }
     let dir = tempdir().unwrap();
-    // Deep and marched: a first tile takes software Vulkan far longer than the watchdog's time, and its
-    // threads are still at work when the process ends.
+    // The volume is deep and light is marched. On software Vulkan the first tile takes far longer than the
+    // watchdog allows, and its threads are still at work when the process ends.
     let sets = ["volume.nz=200", "volume.nx=100", "volume.ny=100", "trace.max_cells=5000"];
-    // Whether they are caught at work is chance: several tries.
+    // Chance decides whether the end of the process catches the threads at work, so the test runs several
+    // times.
     for _ in 0..12 {
         let mut command =
             taki(["render", "front", "--engine=gpu", "--watchdog=0.01", "--size=1500x1500", "-o"]);
         command.arg(dir.path().join("x.png")).arg("--set=light.visibility=march");
         let run = run(command.args(sets.map(|s| format!("--set={s}"))));
-        // A fast GPU may be done in time; a signal is never right.
+        // A fast GPU may finish in time. The process must never end by a signal.
         assert!(matches!(run.code, Some(0 | 124)), "{:?}: {}", run.code, run.err);
         if run.code == Some(124) {
             has_only(dir.path(), &[]);
