@@ -34,7 +34,7 @@ fn cluster() -> kubernetes::Options {
     kubernetes::Options { image: "taki".into(), claim: "scenes".into(), mount: "/work".into() }
 }
 
-/// The words that bash makes of the end of `command`.
+/// Words that bash reads from the end of `command`.
 fn read_by_bash(command: &str) -> Vec<OsString> {
     let script = format!("printf '%s\\0' {command}");
     let out = Command::new("bash").args(["--norc", "-c", &script]).output().expect("bash");
@@ -45,14 +45,14 @@ fn read_by_bash(command: &str) -> Vec<OsString> {
     words
 }
 
-/// Bytes that are hard on a shell and on YAML, often beside any others.
+/// Bytes that are difficult for a shell and for YAML, often beside arbitrary others.
 fn word() -> impl Strategy<Value = OsString> {
     let hard = prop::sample::select(b" '\"\\$`!{}\n\r\t#&*-:~[]()<>|;%=\x1b\x7f\xff\xc2\x85".to_vec());
     let byte = prop_oneof![3 => hard, 1 => 1..=255u8];
     prop::collection::vec(byte, 0..12).prop_map(OsString::from_vec)
 }
 
-/// Text that is hard on YAML.
+/// Text that is difficult for YAML.
 fn text() -> impl Strategy<Value = String> {
     let hard = prop::sample::select(
         " '\"\\$(){}\n\r\t#&*-:~[]|>,?!%@`=0x1enoyf.滝\u{85}\u{2028}\u{feff}\u{ffff}\u{1b}"
@@ -199,16 +199,16 @@ fn arguments_that_batch_would_not_take_are_refused_before_the_nodes_do() {
     slurm(&["front", "--sweep", "h=1,2", "-o", "{h}.png"]).done();
 }
 
-/// Whether the tools that a test needs are there. In continuous integration (CI=true) they must be.
+/// Reports that the tools of a test are missing. In continuous integration (CI set) that fails the test.
 fn absent(test: &str, why: &str) {
     assert!(std::env::var("CI").is_err(), "continuous integration needs the tools of {test}: {why}");
     eprintln!("{test}: not run: {why}");
 }
 
-/// Runs a test of `tests/farm` with the program; 77 says that its tools are missing.
+/// Runs a test of `tests/farm` with the program. Exit code 77 means that its tools are missing.
 fn on_the_engine(test: &str, interpreter: &Path) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/farm").join(test);
-    // It waits with bounds of its own; this is for what it did not think of.
+    // The script has time limits of its own; this one covers what they miss.
     let mut command = Command::new("timeout");
     command.args(["--kill-after=20", "400"]).arg(interpreter).arg(script).arg(env!("CARGO_BIN_EXE_taki"));
     command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
@@ -221,7 +221,7 @@ fn on_the_engine(test: &str, interpreter: &Path) {
     }
 }
 
-/// A Python with the packages of `tests/farm/requirements.txt`, made once for each list of them.
+/// A Python with the packages of `tests/farm/requirements.txt`, installed once for each version of that list.
 fn python(test: &str) -> Option<PathBuf> {
     static MAKING: std::sync::Mutex<()> = std::sync::Mutex::new(());
     let _one = MAKING.lock().unwrap_or_else(|e| e.into_inner());

@@ -1,5 +1,6 @@
-//! Several sheets under one pixel, against closed forms and a float64 reference that intersects every quad
-//! with the ray, sorts the hits and composites them. `engines` holds what both engines must do alike.
+//! Several sheets under one pixel, against closed forms and a float64 reference. The reference intersects
+//! every quad with the ray, sorts the hits and composites them. `engines` tests what both engines must do
+//! alike.
 
 mod engines;
 
@@ -22,12 +23,12 @@ use taki::trace::Attenuation;
 use taki::util::monitor::Unwatched;
 use taki::volume::{Cell, VolumeTexture};
 
-/// A weight T − T′ is rounded to 2^-24: relative to 1 for a sheet alone, as the reference has it, relative to
-/// what comes through for one behind others. Some 200 cells of Ψ·I ≤ 1 make 200 · 6e-8 = 1.2e-5 if all
-/// rounded the same way.
+/// Absolute tolerance of a composited pixel. A weight T − T′ is rounded to 2^-24. The reference traces each
+/// sheet alone, so its rounding is relative to 1; behind other sheets the rounding is relative to the light
+/// that they let through. Some 200 cells of Ψ·I ≤ 1 give 200 · 6e-8 = 1.2e-5 if all round the same way.
 const COMPOSITE_ABSOLUTE: f64 = 1.2e-5;
-/// Metres from an edge, or between two faces, where float32 and the raster's grid of 1/256 pixel may decide
-/// otherwise: a pixel of these scenes is some 0.03 m.
+/// Distance in metres from an edge, or between two faces, within which float32 and the raster's grid of 1/256
+/// pixel may give another result. A pixel of these scenes is about 0.03 m wide.
 const DOUBT_M: f64 = 1e-3;
 
 fn quad(corners: [Vec3; 4], thickness_m: f32) -> Quad {
@@ -35,14 +36,15 @@ fn quad(corners: [Vec3; 4], thickness_m: f32) -> Quad {
     Quad::new(corners, material).expect("a quad")
 }
 
-/// An upright rectangle from x, y to x, y at z.
+/// An upright rectangle at `z`, from the corner `low` to the corner `high`.
 fn upright(low: [f32; 2], high: [f32; 2], z: f32) -> Quad {
     let corner = |x, y| Vec3::new(x, y, z);
     let ([x0, y0], [x1, y1]) = (low, high);
     quad([corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)], 0.2)
 }
 
-/// Quads before the camera at z = 3.5, with a sun, a lamp and ambient light; rays do not end early.
+/// A scene of quads in front of the camera at z = 3.5, with a sun, a lamp and ambient light. Rays do not end
+/// early.
 fn sheets(quads: Vec<Quad>) -> Scene {
     let sets = ["image.width=64", "image.height=48", "volume.nx=12", "volume.ny=10", "volume.nz=8"];
     let mut scene = preset("front", &sets);
@@ -56,7 +58,7 @@ fn sheets(quads: Vec<Quad>) -> Scene {
     scene
 }
 
-/// Sheets that lie and turn at random over one another.
+/// Sheets with random positions and orientations, one over another.
 fn heap(count: usize, seed: u64) -> Scene {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
     let quads = (0..count).map(|i| {
@@ -76,7 +78,7 @@ fn heap(count: usize, seed: u64) -> Scene {
     sheets(quads.collect())
 }
 
-/// Two sheets that cross in the line x = 0, z = 0; the first is nearer on the right.
+/// Two sheets that cross in the line x = 0, z = 0. The first is nearer on the right.
 pub fn crossing() -> Scene {
     let plane = |slope: f32| {
         let corner = |x: f32, y: f32| Vec3::new(x, y, slope * x);
@@ -85,14 +87,14 @@ pub fn crossing() -> Scene {
     sheets(vec![plane(0.5), plane(-0.5)])
 }
 
-/// A strip with the sides of a Z, folded over itself twice.
+/// A strip with the profile of a Z: folded over itself twice.
 fn folded() -> Scene {
     let at = |x: f32, z: f32| [Vec3::new(x, -0.5, z), Vec3::new(x, 0.5, z)];
     let fold = [at(-0.6, 0.0), at(0.6, 0.3), at(-0.6, 0.6), at(0.5, 0.9)];
     sheets(fold.windows(2).map(|s| quad([s[0][0], s[1][0], s[1][1], s[0][1]], 0.15)).collect())
 }
 
-/// Rock: a rectangle at z.
+/// A rock: one rectangle at `z`.
 fn rock([x0, y0]: [f32; 2], [x1, y1]: [f32; 2], z: f32) -> Mesh {
     let corner = |x, y| Vertex {
         position: [x, y, z],
@@ -111,7 +113,7 @@ fn curves(scene: &Scene) -> VolumeTexture {
     scene.volume(1 << 30, &Unwatched).expect("a volume")
 }
 
-/// The same cell everywhere.
+/// A volume with the same cell everywhere.
 fn uniform() -> VolumeTexture {
     let cell = Cell::from_direction(Vec3::Y).with_density(0.6, 0.5, 0.5);
     VolumeTexture { size: [3, 4, 5], alpha: 1.0, cells: vec![cell; 60].into() }
@@ -127,8 +129,8 @@ fn view_ray(scene: &Scene, i: usize) -> Vec3 {
     scene.camera.view_ray(image.width, image.height, pixel, sample_offset(image, 0))
 }
 
-/// Metres along the ray and numbers of the quads that pixel i's ray meets, sorted; none where an edge, or
-/// another face, is too close to tell.
+/// Distances in metres and numbers of the quads that the ray of pixel i meets, sorted by distance. Returns
+/// `None` if an edge or another face is too close to decide.
 fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
     let (eye, d) = (scene.camera.eye.as_dvec3(), view_ray(scene, i).as_dvec3());
     let mut all = Vec::new();
@@ -141,7 +143,7 @@ fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
             n.cross(b - a).normalize().dot(eye + d * t - a)
         };
         let least = (0..4).map(inside).fold(f64::INFINITY, f64::min);
-        // A face seen from its edge runs past several pixels' rays at once.
+        // A face seen at a grazing angle spans the rays of several pixels.
         let doubt = DOUBT_M / d.dot(n).abs();
         if least.abs() < doubt || (t - f64::from(opaque_m)).abs() < doubt {
             return None;
@@ -154,14 +156,15 @@ fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
     all.windows(2).all(|pair| pair[1].0 - pair[0].0 > DOUBT_M).then_some(all)
 }
 
-/// One sheet alone, before nothing.
+/// Traces one sheet alone, with nothing in front of it.
 fn alone(scene: &Scene, volume: &VolumeTexture, quad: usize, d: Vec3) -> RayResult {
     let own = &scene.quads[quad];
     let hit = map_quad(own, eye_in_plane(own, scene.camera.eye), d);
     Integrator::new(scene, volume).trace(quad, d, hit, Vec3::ZERO, &mut ())
 }
 
-/// Compares every pixel that can be told with the reference; how many were, by number of sheets.
+/// Compares every pixel that can be decided with the reference. Returns the number of such pixels by their
+/// number of sheets.
 fn assert_composited(
     what: &str,
     scene: &Scene,
@@ -235,14 +238,14 @@ fn rock_between_two_sheets_cuts_the_second() {
     let frame = on_cpu(&scene, &volume, &mesh);
     let told = assert_composited("rock", &scene, &volume, &mesh, &frame);
     assert!(told[1] > 800 && told[2] > 500, "{told:?}");
-    // Left of the middle the rock is behind the nearer sheet, right of it the farther sheet is.
+    // Left of the middle the rock lies behind the nearer sheet; right of it, the farther sheet does.
     let at = |x: usize| frame.radiance[24 * 64 + x][3];
     assert!(close((at(20) * at(20)).into(), at(43).into(), 0.01, 0.0), "{} {}", at(20), at(43));
 }
 
 #[test]
 fn uniform_sheets_transmit_the_product_of_what_each_does_and_a_shared_edge_counts_once() {
-    // At z = 2.5 the camera is 1 m away: edges of four quads meet in the centres of pixels.
+    // At z = 2.5 the camera is 1 m away, so the edges of four quads meet at pixel centres.
     let mut scene = sheets(Vec::new());
     let pixel = 2.0 * (scene.camera.tan_half_fov / 48.0);
     let at = |x: f32, y: f32| [(x - 31.5) * pixel, (y - 23.5) * pixel];
@@ -333,7 +336,7 @@ fn an_early_end_ends_all_sheets_and_max_cells_counts_for_each() {
     scene.edit().trace.max_cells = 2;
     assert_eq!(cells(&scene), 6);
     scene.edit().trace.max_cells = 512;
-    // Each sheet lets e^(−0.48) = 0.62 through: 0.5 is passed in the second cell of the second.
+    // Each sheet lets e^(−0.48) = 0.62 through, so 0.5 is passed in the second cell of the second sheet.
     scene.edit().trace.early_end = 0.5;
     let ended = on_cpu(&scene, &volume, &no_rock());
     assert_eq!(ended.counts[middle][0], 7 + 1);
@@ -341,7 +344,7 @@ fn an_early_end_ends_all_sheets_and_max_cells_counts_for_each() {
     assert!(transmittance < 0.5);
     scene.edit().background.horizon += 1.0;
     let brighter = on_cpu(&scene, &volume, &no_rock()).radiance[middle];
-    // What is left still shows what is behind.
+    // The remaining transmittance still shows the background.
     assert!(close((brighter[0] - radiance[0]).into(), transmittance.into(), 1e-5, 0.0));
 }
 
@@ -359,10 +362,10 @@ fn layers_are_as_many_as_quads_overlap_and_never_fewer() {
         scene.edit().trace.layers = 2;
         assert_eq!(overlap::sheets(&scene), got.min(2));
     }
-    // Many more than can be looked at one by one: the most is taken.
+    // These are too many to compare one by one, so the largest number is taken.
     let full = (0..3000).map(|i| upright([-0.5, -0.5], [0.5, 0.5], i as f32 * -0.01));
     assert_eq!(overlap::sheets(&sheets(full.collect())), 16);
-    // One before the eye and behind it.
+    // One sheet reaches from before the eye to behind it.
     let corner = |x, z| Vec3::new(x, -0.2, z);
     let floor = quad([corner(-1.0, 9.0), corner(1.0, 9.0), corner(1.0, -9.0), corner(-1.0, -9.0)], 0.1);
     assert_eq!(overlap::sheets(&sheets(vec![floor, upright([-0.5, -0.5], [0.5, 0.5], 0.0)])), 2);

@@ -1,4 +1,4 @@
-//! The engines: parity between them, and the parts that they share.
+//! The engines: parity between them, and the code that they share.
 
 pub mod exposure;
 pub mod gpu;

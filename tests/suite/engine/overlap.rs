@@ -1,4 +1,4 @@
-//! Squares of the image that water may cover: none that it covers is left out, and few others are included.
+//! Squares of the image that water may cover: no covered square is left out, and few others are included.
 
 use super::gpu::{COARSE_PLACE, scene};
 use glam::Vec3;
@@ -22,7 +22,7 @@ fn no_square_under_water_is_left_out_wherever_the_eye_is() {
                 Vec3::from_array([(); 3].map(|()| rng.random_range(-3.0..3.0)))
             };
             let (eye, forward) = (place(&mut rng), place(&mut rng).normalize());
-            // Also eyes among the quads, so that some are cut by the near plane.
+            // Some eyes lie among the quads, so that the near plane cuts some quads.
             scene.edit().camera.eye = base.camera.eye.lerp(eye, rng.random_range(0.0..1.0));
             scene.edit().camera.forward =
                 base.camera.forward.lerp(forward, rng.random_range(0.0..1.0)).normalize();
@@ -51,11 +51,12 @@ fn no_square_under_water_is_left_out_wherever_the_eye_is() {
 
 #[test]
 fn a_small_quad_covers_its_own_squares_and_a_margin() {
-    // A quad of 1 m seen from 3 m: a tenth of the image's height, in its middle.
+    // A quad of 1 m seen from 3 m covers a tenth of the image's height, in its middle.
     let sets = ["image.width=640", "image.height=640", "camera.fov=118"];
     let scene = scene("front", &sets);
     let squares = covered(&scene, [0, 0], [80, 80], 8);
-    // 2·3·tan 59° = 9.98 m are 640 pixels, so 64 pixels or 8 squares a side; with 3 pixels more on each, at most 10.
+    // 640 pixels show 2·3·tan 59° = 9.98 m, so the quad has 64 pixels or 8 squares a side. With 3 more pixels
+    // on each side it has at most 10 squares.
     let count = squares.iter().filter(|&&under| under).count();
     assert!((64..=100).contains(&count), "{count}");
     assert!(squares[40 * 80 + 40] && !squares[0]);

@@ -12,7 +12,7 @@ use taki::trace::Prefilter;
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
 
-/// Rough rocks: each report projects them anew.
+/// Coarse rocks, because each report projects them again.
 const FIG5_ROCKS: [&str; 4] =
     ["rocks.wall.levels=4", "rocks.left.levels=4", "rocks.right.levels=4", "rocks.foot.levels=4"];
 const WATERFALL_ROCKS: [&str; 12] = [
@@ -30,7 +30,7 @@ const WATERFALL_ROCKS: [&str; 12] = [
     "volume.flow=0.4",
 ];
 
-/// Scenes with rock and water, small.
+/// Small scenes with rock and water.
 fn scenes() -> [(&'static str, Scene); 3] {
     let small = |preset, width: u32, height: u32, more: &[&str]| {
         let size = [format!("image.width={width}"), format!("image.height={height}")];
@@ -44,7 +44,7 @@ fn scenes() -> [(&'static str, Scene); 3] {
     [small("fig5", 67, 107, &FIG5_ROCKS), small("waterfall", 96, 54, &WATERFALL_ROCKS), lit]
 }
 
-/// The report says where its radiance comes from, without a gap.
+/// Asserts that the report accounts for all of its radiance.
 pub fn assert_whole(what: &str, report: &RayReport) {
     let sum: Vec3 = report.steps.iter().map(|s| s.radiance).sum();
     let all = sum + report.behind * report.transmittance;
@@ -84,7 +84,7 @@ fn a_rays_report_is_the_pixel_of_the_frame_on_every_pixel() {
         let frame = taki::engine::cpu::render(&scene, &volume, &mesh, true, &Unwatched).expect("a frame");
         let surface = frame.surface.as_ref().expect("asked for");
         let (mut wet, mut dry) = (0, 0);
-        // Prime to the width: every column and row has its turn.
+        // The step is prime to the width, so every column and row is tested.
         for i in (0..frame.radiance.len()).step_by(13) {
             let pixel = [i as u32 % frame.width, i as u32 / frame.width];
             let what = format!("{name} at {pixel:?}");
@@ -113,7 +113,8 @@ fn a_rays_report_is_the_pixel_of_the_frame_on_every_pixel() {
                     true => (0.3 * cell.rho() + 0.7 * 32768.0 / 65535.0) * (1.0 - e),
                     false => (cell.rho() - e).max(0.0),
                 };
-                // Exact where nothing is eroded; else some roundings of numbers up to 1.
+                // The result is exact where nothing is eroded. Otherwise numbers of up to 1 are rounded a few
+                // times.
                 let allowed = if quad.mist > 0.0 || e > 0.0 { 1e-6 } else { 0.0 };
                 assert!((step.rho - rho * volume.alpha).abs() <= allowed, "{what}: {} {rho}", step.rho);
                 assert_eq!(step.v, cell.v(), "{what}");
@@ -174,7 +175,7 @@ mod panel {
 
     use crate::engine::gpu::scene;
 
-    /// A pixel of water, and one without.
+    /// Reports of a pixel with water and of one without.
     fn reports() -> [RayReport; 2] {
         let scene = scene("front", &["light.visibility=march"]);
         let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
@@ -250,7 +251,7 @@ mod panel {
         panel.run();
     }
 
-    /// `TAKI_LOOK=folder` keeps the pictures, to be looked at.
+    /// `TAKI_LOOK=folder` keeps the pictures, to look at.
     #[test]
     fn the_inspector_is_drawn_in_both_themes() {
         if crate::engine::gpu::renderer("inspector").is_none() {

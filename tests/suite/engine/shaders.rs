@@ -1,4 +1,4 @@
-//! Shaders against the host: every file is valid and imports what it uses, and every struct, constant and
+//! Shaders against the host code. Every file is valid and imports what it uses. Every struct, constant and
 //! binding that both sides share is equal on both.
 
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use taki::engine::pool_surface::{AROUND, Surface, WAVES, Wave};
 use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
 use wgpu::naga;
 
-/// The stages: name, and text with all that it imports.
+/// Name of each stage, and its text with all imports.
 fn stages() -> [(&'static str, String); 6] {
     [
         ("bare", resolve("#import engine::bare")),
@@ -41,7 +41,7 @@ fn validate(source: &str) -> Result<naga::Module, String> {
     Ok(module)
 }
 
-/// Names of the files in a folder of shaders, without their ending, as imports write them.
+/// Names of the files in a folder of shaders, without extension, as imports write them.
 fn files_in(folder: &Path, prefix: &str) -> Vec<String> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
@@ -71,7 +71,7 @@ fn every_file_in_shaders_is_in_the_program_and_some_stage_imports_it() {
     }
 }
 
-/// The names that a shader declares for others: functions and types, constants and overrides.
+/// Names that a shader declares for others: functions, types, constants and overrides.
 fn declared(text: &str) -> Vec<&str> {
     let mut names = Vec::new();
     for line in text.lines() {
@@ -83,7 +83,7 @@ fn declared(text: &str) -> Vec<&str> {
     names
 }
 
-/// Whether a shader uses a name that is declared elsewhere, outside comments.
+/// Whether a shader uses a name outside its comments.
 fn uses(text: &str, name: &str) -> bool {
     let called = name.starts_with(|c: char| c.is_lowercase());
     let part = |c: char| c.is_alphanumeric() || c == '_';
@@ -101,7 +101,7 @@ fn every_shader_imports_the_files_whose_names_it_uses() {
     for (file, text) in FILES {
         let imported: Vec<String> = imports(text).collect();
         for (other, declares) in FILES.iter().filter(|(other, _)| other != file) {
-            // What two files declare, as both kinds of sheets do, tells nothing.
+            // A name that two files declare (as both kinds of sheets do) does not tell which file is meant.
             let only_there =
                 |name: &&str| FILES.iter().filter(|(_, text)| declared(text).contains(name)).count() == 1;
             for name in declared(declares).into_iter().filter(only_there).filter(|name| uses(text, name)) {
@@ -136,7 +136,7 @@ fn an_import_of_nothing_is_an_error_of_the_program() {
     resolve("#import light::nothing");
 }
 
-/// (name, offset) of each member, and the size, of a struct of a module.
+/// Name and offset of each member of a module's struct, and the struct's size.
 fn members(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
     let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
@@ -175,7 +175,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("resolve")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
     let module = validate(&stage("visibility")).expect("valid");
-    // Padded on the host to what a uniform takes.
+    // The host pads this struct to the size that a uniform needs.
     let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
     light_volume.pop();
     assert_eq!(members(&module, "LightVolume"), (light_volume, size));
@@ -229,7 +229,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(size, taki::light::strand::table::SIZE);
 }
 
-/// Names and numbers of the bindings of a stage's shader.
+/// Names and numbers of the bindings that a stage's shader uses.
 fn bound(stage_name: &str) -> BTreeSet<(String, u32)> {
     let module = validate(&stage(stage_name)).expect("valid");
     let bindings = module.global_variables.iter().filter_map(|(_, variable)| {

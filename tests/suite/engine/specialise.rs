@@ -59,7 +59,7 @@ fn functions(module: &Module) -> Vec<&str> {
     names
 }
 
-/// `if`s in a block and those inside it.
+/// Number of `if`s in a block, nested ones included.
 fn conditions(block: &Block) -> usize {
     block
         .iter()
@@ -89,7 +89,7 @@ fn what_constants_rule_out_is_left_out() {
         let all: usize = module.functions.iter().map(|(_, f)| conditions(&f.body)).sum();
         (functions(&module).join(" "), conditions(own) + all)
     };
-    // The condition on id.x always stays, and from `many` on the one that ends its loop.
+    // The condition on id.x always stays. With `many`, the condition that ends its loop stays too.
     assert_eq!(left(&[]), (String::new(), 1));
     assert_eq!(left(&[("DEEP", 1.0)]), ("deep".into(), 1));
     assert_eq!(left(&[("DEEP", 1.0), ("MANY", 2.0)]), ("both deep many".into(), 2));

@@ -14,17 +14,17 @@ use tempfile::{TempDir, tempdir};
 
 use crate::cli::faults::{Run, run, taki};
 
-/// Pictures small enough to make hundreds of.
+/// Pictures so small that a test can make hundreds of them.
 const TINY: [&str; 6] = ["front", "--engine", "cpu", "--size", "16x12", "--samples=1"];
 
-/// `taki batch` of tiny pictures into `folder`.
+/// Command `taki batch` that renders tiny pictures into `folder`.
 fn batch<A: AsRef<OsStr>>(folder: &Path, arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = taki(["batch"]);
     command.args(TINY).current_dir(folder).args(arguments);
     command
 }
 
-/// The final files of a folder, by name; it must hold nothing else but what `also` names.
+/// Files of a folder, by name.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
     entries
@@ -32,7 +32,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// The last event of a run with `--events json`.
+/// Last event of a run with `--events json`.
 fn done(run: &Run) -> serde_json::Value {
     let last = run.stdout().lines().last().expect("events");
     let event: serde_json::Value = serde_json::from_str(last).expect("JSON");
@@ -69,7 +69,7 @@ fn a_frame_is_what_render_makes_of_it_to_the_byte() {
             assert!(made[&format!("f.{frame:04}.{kind}")] == alone, "frame {frame}.{kind}");
         }
     }
-    // And they differ: the water moves.
+    // The pictures differ, because the water moves.
     assert!(made["f.0000.png"] != made["f.0001.png"]);
 }
 
@@ -116,7 +116,7 @@ fn a_second_run_keeps_what_is_whole_and_makes_what_is_not() {
     let again = run(&mut batch(dir.path(), arguments));
     assert_eq!(counts(&again), [5, 5, 0, 0, 0]);
 
-    // One is missing, one is cut short, one is empty: names alone say nothing.
+    // One picture is missing, one is cut short and one is empty, so the names alone do not tell.
     fs::remove_file(dir.path().join("f.0001.png")).unwrap();
     let cut = &expected["f.0002.png"][..expected["f.0002.png"].len() - 20];
     fs::write(dir.path().join("f.0002.png"), cut).unwrap();
@@ -138,7 +138,7 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
     run(batch(dir.path(), other).arg("--overwrite")).done();
     let after = files(dir.path());
     assert!(after.len() == 3 && after.iter().all(|(name, bytes)| before[name] != *bytes));
-    // What is no picture of this program is not replaced either.
+    // A file that is not a picture of this program is not replaced either.
     for foreign in [&b"not a picture"[..], b"", b"\x89PNG\r\n\x1a\n and more"] {
         let place = folder();
         fs::write(place.path().join("f.0001.png"), foreign).unwrap();
@@ -152,7 +152,7 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
     fs::write(sheets.path().join("front.manifest.csv"), "mine").unwrap();
     run(&mut batch(sheets.path(), ["--sweep", "h=1,2", "-o", "{h}.png"]))
         .refused(73, &["front.manifest.csv"]);
-    // Any foreign picture, and another part of the same one.
+    // Neither is a picture of another part of the same scene.
     run(&mut batch(
         dir.path(),
         ["--frames", "0-2", "-o", "f.####.png", "--set", "trace.sigma=3", "--crop", "0,0,4,4"],
@@ -219,7 +219,7 @@ fn a_dry_run_tells_what_would_be_made_and_makes_nothing() {
     let json: serde_json::Value =
         serde_json::from_str(run(batch(dir.path(), arguments).arg("--json")).done()).unwrap();
     assert_eq!((json["pictures"].as_u64(), json["to_render"].as_u64()), (Some(10), Some(10)));
-    // Twelve channels and a PNG of 16×12 pixels.
+    // A picture has twelve channels and a PNG of 16×12 pixels.
     assert_eq!(json["disk_bytes"].as_u64(), Some(10 * 16 * 12 * (12 * 4 + 3)));
 }
 
@@ -251,7 +251,7 @@ fn one_failure_ends_the_run_or_with_keep_going_does_not() {
     let arguments = ["--sweep", "volume.file=a.npz,b.npz,c.npz", "-o", "f-{file}.png", "--events", "json"];
     let stopped = run(&mut batch(dir.path(), arguments));
     stopped.refused(65, &["b.npz"]);
-    // The picture after it may have been in work, but not both.
+    // The next picture may have been in progress, but not both.
     let [_, _, rendered, failed, left] = counts(&stopped);
     assert_eq!((rendered, failed, left), (1, 1, 1));
     let on = run(batch(dir.path(), arguments).arg("--keep-going"));

@@ -1,5 +1,5 @@
-//! Large pictures: a part of an image equals that part of the whole bit for bit, files do not depend on how
-//! their rows arrived, crops stitch to the file of the whole, and damaged files are noticed.
+//! Large pictures. A part of an image equals that part of the whole bit for bit. Files do not depend on how
+//! their rows arrived, crops stitch to the file of the whole, and damaged files are detected.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ use taki::util::window::Window;
 use taki::volume::VolumeTexture;
 use tempfile::{TempDir, tempdir};
 
-/// A scene with what its engines need.
+/// A scene with the volume and mesh that the engines need.
 struct Subject {
     scene: Scene,
     volume: VolumeTexture,
@@ -34,7 +34,7 @@ impl Subject {
         Subject { mesh: scene.mesh(), volume, scene }
     }
 
-    /// Small, with water, rock and background.
+    /// A small scene with water, rock and background.
     fn small() -> Subject {
         let sets = ["image.width=97", "image.height=61", "image.samples=2", "rocks.foot.levels=5"];
         Subject::new("fig5", &sets)
@@ -49,7 +49,7 @@ impl Subject {
         engine.render_volume(&self.scene, &self.volume, &self.mesh, &options, &Unwatched).expect("a frame")
     }
 
-    /// Writes `window` to `path` in strips of the given rows, the last again and again.
+    /// Writes `window` to `path` in strips of the given heights. The last height repeats.
     fn write(&self, path: &Path, window: Window, rows: &[u32]) -> Figures {
         let still = Still::create(&[path.to_owned()]).expect("an output");
         let mut writer = still.begin(&self.scene, &self.volume, window, &Layer::ALL).expect("begun");
@@ -99,7 +99,7 @@ fn assert_same(what: &str, a: &Frame, b: &Frame) {
     assert!(a.surface == b.surface, "{what}: surface");
 }
 
-/// Windows of every kind, always with the same numbers.
+/// Windows of every kind, with the same numbers in every run.
 fn crops(size: [u32; 2], count: usize) -> Vec<Window> {
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
     let mut some = |n: u32| {
@@ -123,7 +123,7 @@ fn a_part_of_an_image_is_that_part_of_the_whole_bit_for_bit_on_both_engines() {
     let subject = Subject::small();
     let mut engines = vec![Engine::cpu()];
     engines.extend(renderer("crops").map(|r| Engine::Gpu(Box::new(r), DeviceOptions::default())));
-    // As many windows of the device as a picture of gigapixels has.
+    // The small grid gives as many device windows as a picture of gigapixels has.
     for grid in [Grid { side: 32, pixels: 32 * 16 }, Grid { side: 64, pixels: 64 * 64 }, Grid::default()] {
         for engine in &mut engines {
             let whole = subject.render(engine, None, grid);
@@ -142,7 +142,7 @@ fn a_window_that_is_the_whole_image_has_the_matrix_of_the_image() {
     let clip = scene.camera.clip_from_world(1280, 720, [0.25, 0.75]);
     let bits = |m: glam::Mat4| m.to_cols_array().map(|x| (x + 0.0).to_bits());
     assert_eq!(bits(clip_to_window(clip, [1280, 720], Window::whole([1280, 720]))), bits(clip));
-    // And the corner of any other is the corner of its clip space.
+    // The corner of any other window is the corner of its clip space.
     let window = Window { x: 320, y: 90, width: 64, height: 40 };
     let moved = clip_to_window(glam::Mat4::IDENTITY, [1280, 720], window);
     let corner = moved * glam::Vec4::new(320.0 / 640.0 - 1.0, 1.0 - 90.0 / 360.0, 0.5, 1.0);
@@ -225,7 +225,7 @@ fn a_file_does_not_depend_on_how_its_rows_came() {
     }
 }
 
-/// Other programs read what was rendered.
+/// Checks that other programs can read what was rendered.
 fn check_contents(path: &Path, frame: &Frame, window: Window) {
     if path.extension().is_some_and(|e| e == "png") {
         let image = image::open(path).expect("a PNG").into_rgb8();
@@ -272,7 +272,7 @@ fn figures_of_parts_add_up_to_those_of_the_whole() {
     assert_eq!(Figures::of(&odd).non_finite_pixels, 1);
 }
 
-/// Crops of the small subject in a folder, and the file of the whole.
+/// Crops of the small subject in a folder, and the file of the whole picture.
 fn pieces(extension: &str, windows: &[(u32, u32, u32, u32)]) -> (TempDir, Vec<PathBuf>, PathBuf) {
     let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));
     let file = |name: String| dir.path().join(format!("{name}.{extension}"));
@@ -299,7 +299,7 @@ fn crops_stitch_to_the_file_of_the_whole() {
             let joined = dir.path().join(format!("joined.{extension}"));
             let known = stitch(&parts, &joined, &Unwatched).expect("stitched");
             let same = std::fs::read(&joined).expect("joined") == std::fs::read(&whole).expect("whole");
-            // Where crops overlap, the sums of a PNG cannot be known from its parts.
+            // Where crops overlap, the sums of a PNG cannot be derived from its parts.
             assert_eq!(same, figures || extension == "exr", "{extension} {windows:?}");
             assert_eq!(known.is_some(), figures && extension == "png");
             let (a, b) = (verify(&joined).expect("whole"), verify(&whole).expect("whole"));
@@ -339,7 +339,7 @@ fn parts_that_make_no_whole_are_refused() {
             &["60×61"],
         );
 
-        // The same scene by its text, but another picture: one that was tampered with.
+        // This crop has the same scene text but another picture: it was tampered with.
         let mut wrong = Subject::small();
         wrong.mesh = Default::default();
         let window = Window { x: 30, y: 10, width: 50, height: 40 };
@@ -384,7 +384,8 @@ fn a_changed_byte_of_a_png_is_seen_and_one_of_an_exr_does_no_harm() {
         for round in 0..bytes.len() {
             let mut wrong = bytes.clone();
             wrong[round] ^= 1 << random.random_range(0..8);
-            // Several at once, too: one alone rarely makes a header that is read further.
+            // Several bytes change at once too, because one change alone rarely gives a header that is read
+            // further.
             for _ in 0..round % 4 * usize::from(extension == "exr") {
                 let at = random.random_range(0..bytes.len());
                 wrong[at] = random.random();
@@ -405,7 +406,7 @@ fn a_changed_byte_of_a_png_is_seen_and_one_of_an_exr_does_no_harm() {
 fn hostile_headers_are_refused_without_much_memory() {
     let dir = tempdir().expect("a folder");
     let path = dir.path().join("x");
-    // A PNG of a million pixels a side with no data, and with its checksum right.
+    // A PNG of a million pixels a side without data, but with a correct checksum.
     let mut ihdr = b"IHDR".to_vec();
     ihdr.extend(1_000_000u32.to_be_bytes());
     ihdr.extend(1_000_000u32.to_be_bytes());
@@ -452,7 +453,7 @@ fn a_disk_that_fills_up_in_the_middle_of_a_picture_leaves_no_file() {
     let dir = tempdir().expect("a folder");
     for name in ["x.png", "x.exr"] {
         let render = taki(["render", "fig5", "--engine=cpu", "--size=300x300", "--samples=1", "-o"]);
-        // 64 KiB fit, and then no more.
+        // The limit lets 64 KiB through and no more.
         let mut shell = std::process::Command::new("bash");
         shell.args(["-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash"]).arg(render.get_program());
         shell.args(render.get_args()).arg(dir.path().join(name));

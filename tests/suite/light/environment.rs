@@ -1,4 +1,4 @@
-//! Environments against closed forms in float64. `file` tests map files and their faults, `sky` the sky,
+//! Environments against closed forms in float64. `file` tests map files and their faults, `sky` the sky, and
 //! `scene` both engines.
 
 mod file;
@@ -12,10 +12,10 @@ use taki::light::environment::{
     Cells, Irradiance, LightSet, Map, angle_of, direction_at, error_of, luminance, moments_of_map, uv_of,
 };
 
-/// Float32 values of a few operations, each good to 6e-8.
+/// Rounding error of float32 values after a few operations, each good to 6e-8.
 const ROUNDING: f64 = 1e-6;
 
-/// A map whose radiance at a texel's middle is `radiance` of its direction.
+/// A map whose texels hold `radiance` of the direction through their middle.
 pub fn map(width: u32, height: u32, radiance: impl Fn(DVec3) -> DVec3) -> Map {
     let texel = |i: u32| {
         let (x, y) = (i % width, i / width);
@@ -25,13 +25,13 @@ pub fn map(width: u32, height: u32, radiance: impl Fn(DVec3) -> DVec3) -> Map {
     Map { width, height, texels: (0..width * height).map(texel).collect() }
 }
 
-/// Something with a bright spot, colours and no symmetry.
+/// Radiance with a bright spot, colours and no symmetry.
 pub fn uneven(d: DVec3) -> DVec3 {
     let spot = (40.0 * (d.dot(DVec3::new(0.6, 0.64, -0.48)) - 1.0)).exp();
     DVec3::new(0.4 + 0.3 * d.x + 9.0 * spot, 0.5 + 0.2 * d.y * d.z + 7.0 * spot, 0.6 + 0.3 * d.y + 5.0 * spot)
 }
 
-/// Directions all over the sphere.
+/// Directions spread over the whole sphere.
 pub fn directions(count: usize) -> impl Iterator<Item = DVec3> {
     (0..count).map(move |i| {
         let y = 1.0 - (2 * i + 1) as f64 / count as f64;
@@ -60,14 +60,14 @@ fn the_six_axes_lie_where_the_convention_says() {
     ];
     for (d, u, v) in places {
         let [got_u, got_v] = uv_of(d, 0.0);
-        // At a pole every u is right.
+        // At a pole every u is correct.
         let u_is = d.y != 0.0 || (f64::from(got_u) - u).abs() < ROUNDING;
         assert!(u_is && (f64::from(got_v) - v).abs() < ROUNDING, "{d}: {got_u} {got_v}");
         assert!((direction_at(u, v).as_vec3() - d).length() < 1e-6, "{d}");
     }
     let [u, v] = uv_of(Vec3::Z, 0.0);
     assert!(u.min(1.0 - u) < 1e-6 && (v - 0.5).abs() < 1e-6, "+z is at the edge: {u} {v}");
-    // Turned from +z towards +x, what was at +z is seen at +x.
+    // After a turn from +z towards +x, the light from +z is seen at +x.
     let [u, _] = uv_of(Vec3::X, 0.25);
     assert!(u.min(1.0 - u) < 1e-6, "{u}");
 }
@@ -79,7 +79,7 @@ fn directions_and_places_in_the_map_are_inverse_to_each_other() {
             let [u, v] = uv_of(d.as_vec3(), turn as f32);
             assert!((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v));
             let back = about(direction_at(u.into(), v.into()), turn);
-            // u and v are float32: 2π of its last digit.
+            // u and v are float32, so the angle is off by 2π times their last digit.
             assert!((back - d).length() < 1.5e-6, "{d} {back}");
         }
     }
@@ -91,7 +91,7 @@ fn the_arctangent_is_good_to_the_last_digits_all_round() {
         let angle = (i as f64 / 20_000.0 - 0.5) * TAU * 0.99999;
         let (y, x) = ((3.0 * angle.sin()) as f32, (3.0 * angle.cos()) as f32);
         let right = f64::from(y).atan2(f64::from(x));
-        // 2e-8 of the polynomial, and some roundings of up to π.
+        // The polynomial is off by 2e-8. Values of up to π are rounded a few times.
         assert!((f64::from(angle_of(y, x)) - right).abs() < 6e-7, "{angle}");
     }
     assert_eq!(angle_of(0.0, 0.0), 0.0);
@@ -113,7 +113,7 @@ fn radiance_is_the_texels_own_in_its_middle_and_linear_between_and_wraps_round()
             assert!((between - (at(x, y) + below) * 0.5).length() < 1e-5, "{x} {y}");
         }
     }
-    // Across the edge, from either side; and nothing beyond the poles.
+    // Both sides of the map's edge agree. The poles return the texels of the outermost rows.
     assert!((map.radiance([0.0, 0.5]) - map.radiance([1.0, 0.5])).length() < 1e-5);
     assert_eq!(map.radiance([0.5 / 8.0, 0.0]), at(0, 0));
     assert_eq!(map.radiance([0.5 / 8.0, 1.0]), at(0, 3));
@@ -124,7 +124,7 @@ fn even_light_gives_pi_times_its_radiance_on_every_normal_exactly() {
     for (width, height) in [(1, 1), (2, 1), (7, 3), (64, 32)] {
         let moments = moments_of_map(&map(width, height, |_| DVec3::new(1.0, 2.0, 0.5)));
         assert!((moments[0] - DVec3::new(1.0, 2.0, 0.5) * 4.0 * PI).length() < 1e-9);
-        // Every other term integrates to nothing over the sphere, however coarse the map is.
+        // Every other moment integrates to zero over the sphere, however coarse the map is.
         assert!(moments[1..].iter().all(|m| m.length() < 1e-12), "{moments:?}");
         let irradiance = Irradiance::new(&moments, 0.0, 1.0);
         for n in directions(50) {
@@ -136,7 +136,7 @@ fn even_light_gives_pi_times_its_radiance_on_every_normal_exactly() {
 
 #[test]
 fn moments_are_the_integrals_of_the_directions_products() {
-    // A fine map of a polynomial, whose products have integrals in closed form: ∫x²=4π/3, ∫x⁴=4π/5,
+    // A fine map of a polynomial whose products have integrals in closed form: ∫x²=4π/3, ∫x⁴=4π/5,
     // ∫x²y²=4π/15.
     let (a, b) = (0.7, 0.4);
     let fine = map(512, 256, |d| DVec3::new(1.0 + a * d.x, 1.0 + b * d.y * d.z, 1.0 + d.x * d.x - d.z * d.z));
@@ -153,14 +153,16 @@ fn moments_are_the_integrals_of_the_directions_products() {
         (8, DVec3::new(0.0, 0.0, 2.0 * (4.0 * PI / 5.0 - 4.0 * PI / 15.0))),
     ];
     for (i, right) in expected {
-        // Texels are even, the polynomial is not: the square of half a texel.
+        // A texel has one value but the polynomial varies inside it, so the error is of the order of half a
+        // texel squared.
         assert!((m[i] - right).length() < 1e-3, "{i}: {} {right}", m[i]);
     }
 }
 
 #[test]
 fn light_of_the_first_two_orders_gives_its_exact_irradiance() {
-    // E/π of L = 1 is 1, of x, y and z two thirds of them, of products of the second order a quarter.
+    // E/π of L = 1 is 1. For L = x, y or z it is two thirds of L; for products of the second order, a
+    // quarter.
     type Order = fn(DVec3) -> f64;
     let orders: [(f64, Order); 8] = [
         (2.0 / 3.0, |d| d.x),
@@ -184,7 +186,7 @@ fn light_of_the_first_two_orders_gives_its_exact_irradiance() {
 
 #[test]
 fn light_from_one_half_is_exact_and_light_from_one_spot_is_never_negative() {
-    // All light from the upper half: E(n) = π(1 + n·y)/2, of the zeroth and first order alone.
+    // Light from the whole upper half gives E(n) = π(1 + n·y)/2, which has only the zeroth and first orders.
     let half = map(256, 128, |d| DVec3::splat(if d.y > 0.0 { 1.0 } else { 0.0 }));
     let irradiance = Irradiance::new(&moments_of_map(&half), 0.0, 1.0);
     for n in directions(500) {
@@ -192,7 +194,7 @@ fn light_from_one_half_is_exact_and_light_from_one_spot_is_never_negative() {
         let got = f64::from(irradiance.at(n.as_vec3()).y);
         assert!((got - right).abs() < 1e-5, "{n} {got}");
     }
-    // Of a spot straight up, ¼ + c/2 + 5/32·(3c² − 1) with c = n·y: below zero around c = −8/15.
+    // A spot straight up gives ¼ + c/2 + 5/32·(3c² − 1) with c = n·y, which is below zero around c = −8/15.
     let spot = map(64, 32, |d| DVec3::splat(if d.y > 0.995 { 100.0 } else { 0.0 }));
     let irradiance = Irradiance::new(&moments_of_map(&spot), 0.0, 1.0);
     let c = -8.0f32 / 15.0;
@@ -238,9 +240,9 @@ fn one_bright_texel_becomes_one_light_of_its_direction_and_power() {
         let lights = LightSet::new(&Cells::new(&map), 24).lights;
         assert_eq!(lights.len(), 1);
         let (to, power) = lights[0];
-        // The centroid of a texel's light is not quite in its middle: nearer to the equator.
+        // The centroid of a texel's light lies slightly off its middle, towards the equator.
         assert!(to.angle_between(d) < 0.03 && (to.y.abs() < d.y.abs() + 1e-9), "{to} {d}");
-        assert!((to.x * d.z - to.z * d.x).abs() < 1e-12, "but at the same longitude");
+        assert!((to.x * d.z - to.z * d.x).abs() < 1e-12, "the longitude is the same");
         let right = DVec3::new(3.0, 2.0, 1.0) * solid_angle(&map, y as u32);
         assert!((power / right - DVec3::ONE).length() < 1e-12);
     }
@@ -256,12 +258,13 @@ fn a_black_map_has_no_lights_and_no_error() {
 
 #[test]
 fn a_turned_map_turns_irradiance_and_lights_with_it() {
-    // A quarter of the columns: the same texels at other places, so everything else must be the same.
+    // The turn is a quarter of the columns: the same texels lie at other places, so everything else must be
+    // the same.
     let (width, turn) = (64, 0.25);
     let still = map(width, 32, uneven);
     let mut turned = map(width, 32, uneven);
     for row in turned.texels.chunks_exact_mut(width as usize) {
-        // u falls where the azimuth grows.
+        // u falls as the azimuth grows.
         row.rotate_left(width as usize / 4);
     }
     let of = |map: &Map, turn| Irradiance::new(&moments_of_map(map), turn, 1.0);
@@ -276,7 +279,7 @@ fn a_turned_map_turns_irradiance_and_lights_with_it() {
         let seen = still.radiance(uv_of(n.as_vec3(), turn as f32));
         assert!((seen - turned.radiance(uv_of(n.as_vec3(), 0.0))).length() < 1e-3, "{n}");
     }
-    // As many lights as the edge, which is elsewhere now, does not matter for.
+    // So many lights that the position of the map's edge, which has moved, does not matter.
     let first = |map: &Map| -> DVec3 {
         LightSet::new(&Cells::new(map), 1024).lights.iter().map(|(to, p)| *to * luminance(*p)).sum()
     };
@@ -290,13 +293,13 @@ fn more_lights_are_nearer_to_the_map_and_the_error_is_what_it_says() {
         [1, 4, 24, 128, 1024].iter().map(|&n| LightSet::new(&cells, n).error(&cells)).collect();
     assert!(errors.windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{errors:?}");
     assert!(errors[2] < 0.05 && errors[4] < 0.002, "{errors:?}");
-    // One light from above for even light: E = 4π·max(0, y) instead of π. Mean square of 4max(0,y) − 1: 16/6
-    // − 2 + 1.
+    // One light from above replaces even light: E = 4π·max(0, y) instead of π. The mean square of 4max(0,y) −
+    // 1 is 16/6 − 2 + 1.
     let even = Cells::new(&map(64, 32, |_| DVec3::ONE));
     let one = LightSet::new(&even, 1).error(&even);
     assert!((one - (16.0 / 6.0 - 1.0f64).sqrt()).abs() < 1e-3, "{one}");
-    // The map's own irradiance is no error, and twice it is one of 1, but for the cells that horizons cut: of
-    // a band of half their height h on both sides, 2h² of the mean at most.
+    // The map's own irradiance has no error, and twice that irradiance has an error of 1. Only the cells that
+    // horizons cut deviate: in a band of half their height h on both sides, by at most 2h² of the mean.
     let even = Cells::new(&map(512, 256, |_| DVec3::ONE));
     let cut = 2.0 * (PI / 64.0 / 2.0f64).powi(2);
     assert!(error_of(&even, |_| PI) < cut);

@@ -1,4 +1,4 @@
-//! §5 The fibre model against a computation with angles in float64. Reference truth.
+//! §5 The fibre model against float64 with the angles themselves. Reference truth.
 
 use glam::{DMat3, DVec3, Mat3, Vec2, Vec3};
 use proptest::prelude::*;
@@ -6,7 +6,7 @@ use proptest::test_runner::RngSeed;
 use taki::light::fibre::{Metric, fibre_angles, psi, specular_power, whole_exponent};
 use taki::mapping::{CellFrame, cross};
 
-/// Ψ in float64, through the angles themselves: sin·sin − cos·cos is −cos of the sum of both.
+/// Ψ in float64 from the angles themselves: sin·sin − cos·cos is −cos of the sum of both angles.
 fn true_psi(k_d: f64, k_s: f64, p: f64, t: DVec3, l: DVec3, e: DVec3) -> f64 {
     let (angle_l, angle_e) = (t.angle_between(l), t.angle_between(e));
     k_d * angle_l.sin() + k_s * (-(angle_l + angle_e).cos()).max(0.0).powf(p)
@@ -43,9 +43,10 @@ proptest! {
         k_d in 0.0f32..1.0, k_s in 0.0f32..1.0, p in 1.0f32..60.0,
     ) {
         let want = true_psi(k_d as f64, k_s as f64, p as f64, t.as_dvec3(), l.as_dvec3(), e.as_dvec3());
-        // The direction's length must cancel.
+        // The length of the direction must cancel.
         let got = own_psi(k_d, k_s, p, t * length, l, e) as f64;
-        // 1 − cos² loses digits as the sine falls: its error is 1e-7 / sine. The power multiplies it by p.
+        // 1 − cos² loses digits as the sine falls: its error is 1e-7 / sine. The power multiplies that error
+        // by p.
         let sine = |w: Vec3| t.as_dvec3().cross(w.as_dvec3()).length().max(3e-4);
         let error = 4e-7 / sine(l) + 4e-7 / sine(e);
         let allowed = error * (k_d + k_s * p) as f64 + 1e-6;
@@ -61,7 +62,7 @@ proptest! {
     fn diffuse_light_vanishes_along_the_fibre_and_is_k_d_across_it(t in unit(), w in unit(), e in unit()) {
         let across = t.as_dvec3().cross(w.as_dvec3()).normalize_or(t.any_orthonormal_vector().as_dvec3());
         prop_assert!((own_psi(0.7, 0.0, 1.0, t, across.as_vec3(), e) - 0.7).abs() < 1e-6);
-        // cos² is 1 but for rounding: the sine is at most the root of that.
+        // cos² is 1 except for rounding, and the sine is at most the square root of that rounding.
         for l in [t, -t] {
             prop_assert!(own_psi(0.7, 0.0, 1.0, t, l, e) < 0.7 * 1e-3);
         }
@@ -79,12 +80,12 @@ proptest! {
         let around = |theta: f64, turn: f64| {
             (t64 * theta.cos() + (x * turn.cos() + y * turn.sin()) * theta.sin()).as_vec3()
         };
-        // t·l = −t·e, anywhere around the fibre: a cone, not one direction.
+        // t·l = −t·e holds anywhere around the fibre: on a cone, not in one direction.
         let l = around(theta, turns[0]);
         let e = around(std::f64::consts::PI - theta, turns[1]);
         let p = 20.0;
         prop_assert!((own_psi(0.0, 0.4, p, t, l, e) - 0.4).abs() < 2e-4);
-        // Off the cone by some angle the base is its cosine.
+        // At some angle off the cone, the base is the cosine of that angle.
         for off in [off, -off] {
             let theta_e = std::f64::consts::PI - theta + off;
             if (0.02..3.12).contains(&theta_e) {
@@ -104,7 +105,7 @@ proptest! {
         let j = matrix(&frame);
         let v = Vec3::from_array(v);
         let world = (j * v.as_dvec3()).length_squared();
-        // Terms of both signs may cancel: the bound is on the terms.
+        // Terms of both signs may cancel, so the bound uses the sizes of the terms.
         let terms = (j.abs() * v.abs().as_dvec3()).length_squared();
         prop_assert!((metric.squared(v) as f64 - world).abs() <= 1e-6 * terms, "{world}");
     }
@@ -138,7 +139,7 @@ proptest! {
     fn squaring_is_the_power(x in 0.0f32..=1.0, p in 1u32..=255) {
         let want = (x as f64).powi(p as i32);
         let got = specular_power(x, p as f32) as f64;
-        // One rounding for each factor; below the smallest normal number digits go.
+        // Each factor adds one rounding. Below the smallest normal number, digits are lost.
         prop_assert!((got - want).abs() <= want * p as f64 * 6e-8 + 1e-37, "{x}^{p} = {got}, not {want}");
         prop_assert_eq!(whole_exponent(p as f32), Some(p));
     }
@@ -156,7 +157,7 @@ fn matrix(frame: &CellFrame) -> DMat3 {
 
 #[test]
 fn frames_differ_where_the_map_is_no_similarity() {
-    // Stretched threefold along the flow: else the choice of frame would be no choice.
+    // The map stretches threefold along the flow. Without a stretch both frames would give the same result.
     let (frame, world) = frame_and_metric(Vec2::X, Vec2::Y * 3.0, 1.0);
     let (v, l) = (Vec3::new(1.0, 1.0, 0.0), Vec3::X);
     let (in_world, _) = fibre_angles(v.dot(frame.transposed(l)), 0.0, 1.0 / world.squared(v));
@@ -181,7 +182,7 @@ fn a_power_with_a_fraction_or_beyond_255_is_powf() {
 
 #[test]
 fn specular_light_behind_the_cone_is_dark_not_negative() {
-    // Light and eye both along the fibre: the base is −1.
+    // Light and eye both point along the fibre, so the base is −1.
     assert_eq!(own_psi(0.0, 1.0, 3.0, Vec3::Y, Vec3::Y, Vec3::Y), 0.0);
     assert_eq!(own_psi(0.0, 1.0, 1.0, Vec3::Y, Vec3::Y, Vec3::Y), 0.0);
 }

@@ -37,8 +37,8 @@ fn the_order_of_the_quads_in_the_scene_does_not_matter() {
 
 #[test]
 fn a_quad_that_snapping_folds_over_itself_comes_once() {
-    // Corners may leave their plane by 1e-4: through a lens this long that is several pixels, and seen from
-    // the edge the quad's two triangles lie over one another.
+    // Corners may leave their plane by 1e-4. Through a lens this long that is several pixels, and edge-on the
+    // quad's two triangles lie over one another.
     let corner = |x: f32, y, z| Vec3::new(x, y, z);
     let (low, high) = (0.0, 1.9e-4);
     let saddle =
@@ -52,7 +52,7 @@ fn a_quad_that_snapping_folds_over_itself_comes_once() {
         renderer.render(&scene, &volume, &no_rock(), &SURFACE, &Unwatched).expect("a frame")
     }));
     for frame in frames {
-        // A ray along the first sheet meets as many cells as it may, and the second has five.
+        // A ray along the first sheet meets as many cells as it may. The second sheet has five.
         let both = frame.counts.iter().filter(|count| count[0] == 512 + 5).count();
         assert!(both > 64 && frame.counts.iter().all(|count| [5, 512 + 5].contains(&count[0])), "{both}");
     }
@@ -91,7 +91,7 @@ fn the_engines_agree_on_scenes_of_several_sheets() {
             }
         }
     }
-    // Without its rock, whose shading is not what is compared here.
+    // The rock is left out, because its shading is not compared here.
     let scene = preset("waterfall", &["image.width=320", "image.height=180", "image.samples=1"]);
     let volume = curves(&scene);
     let on_gpu = renderer.render(&scene, &volume, &no_rock(), &SURFACE, &Unwatched).expect("a frame");
@@ -123,7 +123,7 @@ fn parts_tiles_and_kept_rasters_of_several_sheets_change_no_bit() {
         let some =
             frame(&scene, &RenderOptions { window: Some(window), tile_pixels: Some(50), ..options.clone() });
         assert_eq!(part(&whole), some.radiance);
-        // Drawn, kept, used again; and other layers in between.
+        // Each is drawn, kept and used again, with other numbers of layers in between.
         for layers in [2, 16, 16, 2, 3, 16] {
             scene.edit().trace.layers = layers;
             let [first, again] =

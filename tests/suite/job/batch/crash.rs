@@ -1,6 +1,6 @@
 //! Runs that are killed, stopped or out of disk space: no file is torn, no finished picture is lost, and the
-//! next run renders the rest to the same bytes. `TAKI_LONG` in the environment (`tests/run --long`) repeats
-//! each more often.
+//! next run renders the rest to the same bytes. With `TAKI_LONG` in the environment (`tests/run --long`) each
+//! test repeats more often.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -20,7 +20,7 @@ fn long() -> bool {
     std::env::var_os("TAKI_LONG").is_some()
 }
 
-/// What a whole run makes.
+/// Files that an uninterrupted run makes.
 fn expected() -> BTreeMap<String, Vec<u8>> {
     let dir = folder();
     run(&mut batch(dir.path(), FRAMES)).done();
@@ -29,7 +29,7 @@ fn expected() -> BTreeMap<String, Vec<u8>> {
     made
 }
 
-/// Every file with a final name is whole.
+/// Asserts that every file with a final name is complete.
 fn none_is_torn(folder: &Path, expected: &BTreeMap<String, Vec<u8>>) {
     for (name, bytes) in files(folder) {
         if !name.starts_with('.') {
@@ -75,7 +75,7 @@ fn killed_at_any_moment_nothing_is_torn_or_lost_and_the_next_run_completes() {
 fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
     for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
         let dir = folder();
-        // Enough samples that the signal comes into the work.
+        // Enough samples that the signal arrives during the work.
         let slow = || {
             let mut command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=512"]);
             command.args(["--frames", "0-7", "-o", "f.####.png", "--events=json"]).current_dir(dir.path());
@@ -126,7 +126,7 @@ fn workers_that_share_a_folder_make_every_picture_once_even_if_some_are_killed()
             let code = wait(&mut worker);
             assert!(code == Some(0) || (i == 1 || i == 2), "worker {i}: {code:?}");
             for line in out.lines() {
-                // A killed worker's last line may be cut.
+                // The last line of a killed worker may be cut off.
                 let Ok(event) = serde_json::from_str::<serde_json::Value>(line) else { continue };
                 if event["event"] == "saved" {
                     saved.push(event["frame"].as_u64().unwrap());
@@ -157,7 +157,7 @@ fn a_claim_of_another_machine_is_taken_over_when_it_is_not_touched() {
     assert!(ended.stdout().contains("process 7 on far"), "{}", ended.stdout());
     assert_eq!(files(dir.path()).len(), 3, "{:?}", files(dir.path()).keys());
 
-    // One that is touched is not: the work is waited for.
+    // A claim that is touched is not taken over: the run waits for its work.
     fs::remove_file(dir.path().join("f.0001.png")).unwrap();
     fs::write(claim(1), elsewhere).unwrap();
     let mut child = batch(dir.path(), arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
@@ -181,13 +181,13 @@ fn what_is_no_claim_in_a_claims_place_does_not_stop_the_work_for_long() {
     let ended =
         run(&mut batch(dir.path(), ["--frames", "0-2", "-o", "f.####.png", "--stale=1", "--events=json"]));
     assert_eq!(counts(&ended), [3, 0, 3, 0, 0]);
-    // A shard without pictures of its own has nothing to do, and nothing to say against it.
+    // A shard without pictures of its own has nothing to do, and that is no error.
     let none = ["--frames", "0-2", "-o", "g.####.exr", "--shard", "5/8", "--layers", "rgb", "--events=json"];
     assert_eq!(counts(&run(&mut batch(dir.path(), none))), [0; 5]);
 }
 
-/// Runs a command under strace, which makes every thread's `when`-th call of `call` fail for want of room;
-/// whether any call did. None where strace may not trace.
+/// Runs a command under strace, which makes the `when`-th call of `call` in every thread fail with "no space
+/// left". Returns the exit code, and whether any call failed. Returns `None` where strace cannot trace.
 fn without_room(command: &Command, call: &str, when: usize) -> Option<(Option<i32>, bool)> {
     let log = tempfile::NamedTempFile::new().unwrap();
     let mut strace = Command::new("strace");
@@ -224,7 +224,7 @@ fn no_room_at_any_write_tears_nothing_and_the_next_run_completes() {
                 break;
             }
             places += 1;
-            // Where what could not be written was a line on stderr or a claim's contents, the work goes on.
+            // The work goes on if the failed write was a line on stderr or the contents of a claim.
             assert!(matches!(code, Some(0 | 74)), "{call} {when}: {code:?}");
             failed += usize::from(code == Some(74));
             run(&mut batch(dir.path(), arguments)).done();
@@ -234,7 +234,7 @@ fn no_room_at_any_write_tears_nothing_and_the_next_run_completes() {
     assert!(failed >= 4 && places >= 7, "{failed} of {places} writes ended the run");
 }
 
-/// Memory in KiB, threads and open files of a process; none once it has ended.
+/// Memory in KiB, number of threads and number of open files of a process; `None` once it has ended.
 fn footprint(pid: u32) -> Option<[u64; 3]> {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let field = |name: &str| {
@@ -244,7 +244,8 @@ fn footprint(pid: u32) -> Option<[u64; 3]> {
     Some([field("VmRSS:")?, field("Threads:")?, open])
 }
 
-/// The largest footprints while the pictures `from` to `to` were made.
+/// Asserts that memory, threads and open files do not grow between the second and the last quarter of a
+/// batch.
 fn grows_not(engine: &str, frames: usize) {
     let dir = folder();
     let last = format!("0-{}", frames - 1);
@@ -266,7 +267,8 @@ fn grows_not(engine: &str, frames: usize) {
     eprintln!("{engine}, {frames} frames: second quarter {early:?}, last {late:?} (KiB, threads, files)");
     assert!(early[0] > 0 && late[0] > 0, "no footprint seen");
     assert!(late[0] <= early[0] + early[0] / 50 + 1024, "memory grew: {early:?} {late:?}");
-    // Which files are open just then is chance; what is never closed would be hundreds by now.
+    // Chance decides which files are open at that moment. Files that are never closed would number hundreds
+    // by now.
     assert!(late[1] <= early[1] && late[2] <= early[2] + 8, "threads or files grew: {early:?} {late:?}");
 }
 

@@ -51,7 +51,7 @@ fn a_movie_that_is_there_is_kept_if_it_shows_these_frames_and_never_replaced_una
     let made = fs::metadata(dir.path().join("f.gif")).unwrap().modified().unwrap();
     run(&mut batch(dir.path(), arguments)).done();
     assert_eq!(fs::metadata(dir.path().join("f.gif")).unwrap().modified().unwrap(), made, "made again");
-    // A picture that is missing is made again; the movie of it still is right.
+    // A missing picture is rendered again. The movie is still right, so it is kept.
     fs::remove_file(dir.path().join("f.1.png")).unwrap();
     run(&mut batch(dir.path(), arguments)).done();
     run(&mut batch(dir.path(), ["--loop", "3", "-o", "f.gif"])).done();

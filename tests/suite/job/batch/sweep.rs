@@ -93,7 +93,7 @@ fn a_sweep_leaves_a_sheet_and_manifests_that_agree_with_its_pictures() {
         assert_eq!([line[column("volume.alpha")], line[column("curves.h")]], [alpha.as_str(), h.as_str()]);
         let exr = line[column("exr")];
         assert_eq!(row["files"][1], exr);
-        // The figures are those of the picture's own linear values.
+        // The numbers are those of the picture's own linear values.
         let (_, _, channels) = taki::output::frame::read_exr(&dir.path().join(exr)).unwrap();
         let mean = |name: &str| {
             let (_, values) = channels.iter().find(|(n, _)| n == name).unwrap();
@@ -106,11 +106,11 @@ fn a_sweep_leaves_a_sheet_and_manifests_that_agree_with_its_pictures() {
         assert_eq!(row["cells_walked"].as_f64().unwrap(), mean("cells.N") * 16.0 * 12.0);
         assert!((row["mean_transmittance"].as_f64().unwrap() - mean("transmittance.T")).abs() < 1e-4);
     }
-    // Denser is less transparent, as the manifest tells.
+    // The denser volume is less transparent, and the manifest says so.
     let transmittance = |n: usize| rows[n]["mean_transmittance"].as_f64().unwrap();
     assert!(transmittance(0) > transmittance(3));
 
-    // The sheet shows the pictures themselves, each once.
+    // The sheet shows each picture itself, once.
     let sheet = image::load_from_memory(&made["front.sheet.png"]).unwrap().to_rgb8();
     let mut places = Vec::new();
     for alpha in ["0.5", "1"] {
@@ -120,7 +120,7 @@ fn a_sweep_leaves_a_sheet_and_manifests_that_agree_with_its_pictures() {
             places.push(at);
         }
     }
-    // The first sweep goes across, the second down.
+    // The first sweep runs across the sheet, the second down.
     assert!(places[0].1 == places[3].1 && places[0].0 < places[3].0, "{places:?}");
     assert!(
         places[0].0 == places[1].0 && places[0].1 < places[1].1 && places[1].1 < places[2].1,
@@ -132,7 +132,7 @@ fn a_sweep_leaves_a_sheet_and_manifests_that_agree_with_its_pictures() {
     assert!(files(dir.path()) == made);
 }
 
-/// Where `part` is found in `whole`, pixel for pixel.
+/// Position at which `part` lies in `whole`, pixel for pixel.
 fn find(whole: &image::RgbImage, part: &image::RgbImage) -> Option<(u32, u32)> {
     let (w, h) = part.dimensions();
     let is_at = |x: u32, y: u32| {

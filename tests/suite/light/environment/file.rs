@@ -1,4 +1,4 @@
-//! Environment maps in files: what is written can be read back, and malformed files are refused.
+//! Environment maps in files: maps that are written can be read back, and malformed files are refused.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use tempfile::{TempDir, tempdir};
 
 const BUDGET: u64 = 64 << 20;
 
-/// Its pixels are runs and lines of no run: both kinds of the format's encoding.
+/// A small map with runs of equal pixels and rows without runs, so that both of the format's encodings occur.
 fn small() -> Map {
     map(24, 12, |d| if d.y > 0.4 { DVec3::splat(0.5) } else { uneven(d) })
 }
@@ -67,10 +67,10 @@ fn refused(what: &str, result: taki::Result<FileMap>, name: &str) {
 fn a_radiance_picture_is_read_to_the_digits_it_has() {
     let folder = tempdir().unwrap();
     let read = read_bytes(&folder, "small.hdr", &hdr_bytes(&small())).unwrap();
-    // Eight bits beside the largest component's exponent.
+    // The format keeps eight bits of each component, at the largest component's exponent.
     assert_close(&read.map, &small(), 1.0 / 128.0);
     assert_eq!(read.negative, 0);
-    // Its exposure has been multiplied into it: the radiance is what was there before.
+    // The stored pixels are already multiplied by the file's exposure. The radiance is the value before that.
     let text = "#?RGBE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nEXPOSURE=4\n\n-Y 1 +X 2\n";
     let bytes = [text.as_bytes(), &[128, 64, 0, 129, 255, 255, 255, 136]].concat();
     let read = read_bytes(&folder, "b.HDR", &bytes).unwrap().map;
@@ -120,7 +120,7 @@ fn other_parts_and_channels_of_an_exr_do_not_matter() {
     image.write().to_file(&path).unwrap();
     let read = read_map(&path, BUDGET).unwrap().map;
     assert_eq!((read.width, read.height, read.texels[0]), (6, 3, [1.0, 2.0, 3.0, 0.0]));
-    // And one without colours is none.
+    // A file without colours is not a map.
     let part = part("depth", vec![channel("Z", 7.0)]);
     Image::from_layer(part).write().to_file(&path).unwrap();
     refused("no colours", read_map(&path, BUDGET), "layers.exr");
@@ -189,7 +189,7 @@ fn flipped_bytes_give_another_map_or_a_refusal_and_never_more() {
         for _ in 0..1500 {
             let mut bytes = bytes.clone();
             for _ in 0..rng.random_range(1..4) {
-                // Half of them where sizes and counts stand.
+                // Half of the changes fall where sizes and counts are stored.
                 let end = if rng.random() { bytes.len() } else { bytes.len().min(400) };
                 let at = rng.random_range(0..end);
                 bytes[at] =
@@ -214,7 +214,7 @@ fn hdr_of_size(width: u64, height: u64) -> Vec<u8> {
     format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes()
 }
 
-/// The bytes of an EXR whose windows claim another size.
+/// Bytes of an EXR file whose windows claim another size.
 fn exr_of_size(width: i32, height: i32) -> Vec<u8> {
     let mut bytes = exr_bytes(&small(), Compression::ZIP16, Blocks::ScanLines);
     for name in [b"dataWindow\0box2i\0", b"displayWindow\0box2i\0".as_slice()] {
@@ -245,10 +245,10 @@ fn sizes_are_compared_with_the_budget_before_anything_is_allocated() {
             other => panic!("{name}: {other:?}"),
         }
     }
-    // Beyond what the decoder can count.
+    // This size exceeds what the decoder can count.
     let endless = read_bytes(&folder, "endless.hdr", &hdr_of_size(4_000_000_000, 4_000_000_000));
     refused("endless", endless, "endless.hdr");
-    // Enough memory for a file that is not there: it ends too early.
+    // The memory suffices for this size, but the file ends too early.
     let path = folder.path().join("big.hdr");
     std::fs::write(&path, hdr_of_size(4096, 2048)).unwrap();
     refused("short", read_map(&path, 1 << 30), "big.hdr");

@@ -15,7 +15,7 @@ use taki::scene::{Animation, Limits, Scene};
 use taki::util::monitor::Unwatched;
 use tempfile::{TempDir, tempdir};
 
-/// A scene of rock, water and open background, small.
+/// Settings of a small picture of rock, water and open background.
 const SMALL: [&str; 4] = ["image.width=80", "image.height=60", "image.samples=2", "environment.lights=5"];
 
 fn hdr(folder: &Path, width: u32, height: u32, radiance: impl Fn(DVec3) -> DVec3) -> String {
@@ -53,10 +53,10 @@ fn the_engines_agree_on_background_rock_and_water_under_an_environment() {
     let variants: [&[&str]; 9] = [
         &[sky],
         &[sky, "sky.elevation=2", "sky.azimuth=170", "camera.fov=100"],
-        // The sun in the picture, and the pole.
+        // The sun and the pole are in the picture.
         &[sky, "sky.elevation=80", "camera.target=[0,60,-10]", "camera.fov=60"],
         &[map, &file, "camera.fov=140"],
-        // The map's edge in the middle of the picture.
+        // The map's edge is in the middle of the picture.
         &[map, &file, "camera.fov=140", "environment.turn=180"],
         &[map, &file, "environment.turn=77", "environment.intensity=3", "light.visibility=none"],
         &[map, &file, "environment.turn=-200", "camera.target=[0,1,60]", "environment.lights=37"],
@@ -125,11 +125,11 @@ fn the_volumes_lights_are_the_scenes_own_the_sun_and_those_of_the_map() {
     let own = lit(&[]).lights.len();
     assert_eq!((sky.lights.len(), sky.environment_lights.len()), (own + 1, 24));
     assert_eq!(sky.volume_lights().len(), own + 25);
-    // No sun in the map's lights: without it the sky's are the same.
+    // The map's lights do not contain the sun: they are the same in a sky without it.
     let shade = of(&["sky.sun=0", "sky.ground=[0,0,0]"]);
     assert_eq!(shade.lights.len(), own);
     assert_eq!(shade.environment_lights, of(&["sky.ground=[0,0,0]"]).environment_lights);
-    // The sun stands where its angles say, turned with the environment, and is as wide as it is.
+    // The sun stands where its angles place it, turns with the environment, and has its own angular size.
     let low = of(&["sky.elevation=30", "sky.azimuth=50", "environment.turn=40", "environment.intensity=0.5"]);
     let sun = environment(&low).sun.expect("a sun");
     assert!((sun.to_sun - Vec3::new(0.75f32.sqrt(), 0.5, 0.0)).length() < 1e-6, "{}", sun.to_sun);
@@ -137,11 +137,11 @@ fn the_volumes_lights_are_the_scenes_own_the_sun_and_those_of_the_map() {
     let up = sun.to_sun.cross(Vec3::Z).normalize();
     let off = |degrees: f32| (sun.to_sun + up * degrees.to_radians().tan()).normalize();
     assert!(brightest(&low, off(0.26)) > 1e3 && brightest(&low, off(0.275)) < 10.0);
-    // Of a sun on the horizon the lower half is not seen.
+    // The lower half of a sun on the horizon is not seen.
     let setting = of(&["sky.elevation=0", "sky.azimuth=0", "sky.turbidity=1"]);
     let at = |degrees: f32| Vec3::new(0.0, degrees.to_radians().sin(), degrees.to_radians().cos());
     assert!(brightest(&setting, at(0.1)) > 1e2 && brightest(&setting, at(-0.1)) < 10.0);
-    // Its radiance times its solid angle is its irradiance.
+    // The sun's radiance times its solid angle is its irradiance.
     let omega = 2.0 * std::f64::consts::PI * (1.0 - taki::light::environment::ANGULAR_RADIUS.cos());
     let ratio = f64::from(sun.radiance.x) * omega / (f64::from(sun.intensity.x) * std::f64::consts::PI);
     assert!((ratio - 1.0).abs() < 1e-5, "{ratio}");
@@ -152,7 +152,7 @@ fn the_volumes_lights_are_the_scenes_own_the_sun_and_those_of_the_map() {
 #[test]
 fn the_lights_come_from_where_the_background_is_bright_and_the_rock_is_lit_from_there() {
     let folder = tempdir().expect("a folder");
-    // One texel, at u = 0.7, v = 0.3.
+    // One bright spot, at u = 0.7, v = 0.3.
     let spot = taki::light::environment::direction_at(0.7, 0.3);
     let near = |d: DVec3| if d.dot(spot) > 0.999 { DVec3::splat(200.0) } else { DVec3::ZERO };
     let file = format!("environment.file={}", hdr(folder.path(), 200, 100, near));
@@ -162,12 +162,13 @@ fn the_lights_come_from_where_the_background_is_bright_and_the_rock_is_lit_from_
         let [light] = scene.environment_lights[..] else { panic!("one light") };
         let (to_light, intensity) = light.at(Vec3::ZERO);
         let environment = environment(&scene);
-        // The spot is 2.6° wide in radius.
+        // The radius of the spot is 2.6°.
         assert_eq!(environment.radiance(to_light), Vec3::splat(200.0), "{turn}");
         for d in super::directions(300).map(|d| d.as_vec3()).filter(|d| d.dot(to_light) < 0.99) {
             assert_eq!(environment.radiance(d), Vec3::ZERO, "{turn} {d}");
         }
-        // Of a spot the three orders have ¼ + ½ + 5/16 of E/π where the rock faces it; those left out have −1/16.
+        // Where the rock faces a spot, the three orders sum to ¼ + ½ + 5/16 of E/π. The orders that are left
+        // out sum to −1/16.
         let facing = environment.irradiance.at(to_light);
         assert!((facing / intensity - Vec3::splat(1.0625)).abs().max_element() < 0.01, "{turn} {facing}");
     }
@@ -201,7 +202,7 @@ fn intensity_is_a_factor_on_everything() {
         scene.environment_lights.iter().map(power).sum()
     };
     assert!((sum(&three) / sum(&one) / 3.0 - DVec3::ONE).length() < 1e-6);
-    // ∫ L dω of the map: as much as its irradiance has in the zeroth order.
+    // ∫ L dω of the map, which the zeroth order of its irradiance also gives.
     let mean = environment(&one).irradiance.0[0].as_dvec3() * 4.0;
     assert!((sum(&one) / mean - DVec3::ONE).length() < 1e-6);
     for d in super::directions(40) {
@@ -223,7 +224,7 @@ fn the_map_is_made_once_for_all_scenes_and_frames_of_a_run() {
     let animation = Animation::load(Path::new("waterfall"), &sets, &Limits::default()).expect("an animation");
     let maps: Vec<_> = (0..3).map(|f| environment(&animation.at(f).expect("a frame")).map.clone()).collect();
     assert!(Arc::ptr_eq(&maps[0], &maps[1]) && Arc::ptr_eq(&maps[1], &maps[2]));
-    // Another file of this name is another map.
+    // Another file of the same name is another map.
     hdr(folder.path(), 16, 8, uneven);
     let anew = animation.at(3).expect("a frame");
     assert_eq!((environment(&anew).map.width, environment(&anew).map.height), (16, 8));
@@ -359,7 +360,7 @@ fn bad_environments_are_refused_by_their_key_and_file() {
     run(command.arg(&out).args(all.iter().map(|s| format!("--set={s}")))).done();
 }
 
-/// A scene file in a folder, beside a map and a volume.
+/// Makes a folder with a scene file, beside a map and a volume.
 fn scene_folder(map: &str) -> (TempDir, std::path::PathBuf) {
     let dir = tempdir().expect("a folder");
     let folder = dir.path().join("scene");
@@ -384,13 +385,13 @@ fn maps_stay_in_the_scenes_folder_unless_allowed() {
     assert!(error.contains("environment.file") && error.contains("--allow-path"), "{error}");
     let allowed = Limits { allow_paths: vec![dir.path().to_owned()], ..Limits::default() };
     assert!(load(&folder, &[], &allowed).is_ok());
-    // Given by hand it may lie anywhere; what the scene itself names is still confined.
+    // A map given on the command line may lie anywhere. Files that the scene itself names are still confined.
     let by_hand = |path: &Path| vec![format!("environment.file={}", path.display())];
     assert!(load(&folder, &by_hand(&dir.path().join("map.hdr")), &Limits::default()).is_ok());
     let volume = ["volume.file=nowhere.npz".to_owned()];
     let error = load(&folder, &volume, &Limits::default()).expect_err("outside").to_string();
     assert!(error.contains("environment.file"), "{error}");
-    // And is found from any folder, though another file is given by hand.
+    // The scene's map is found from any folder, even if another file is given on the command line.
     let (_dir, folder) = scene_folder("map.hdr");
     assert!(load(&folder, &volume, &Limits::default()).is_ok());
 }
@@ -409,7 +410,7 @@ fn a_picture_tells_its_map_by_its_contents_and_not_by_its_path() {
     let text = std::fs::read(out("a").join("f.00.png")).expect("a picture");
     let text = String::from_utf8_lossy(&text);
     assert!(text.contains("# environment map: crc32") && !text.contains("map.hdr"), "{text}");
-    // Whole pictures are kept; with another map of the same name they are others.
+    // Complete pictures are kept. With another map of the same name they belong to another scene.
     assert!(batch("a").done().is_empty());
     hdr(&folder, 8, 4, |_| DVec3::ONE);
     batch("a").refused(73, &["environment map"]);
@@ -424,7 +425,7 @@ fn what_is_odd_about_a_map_is_told() {
     let warnings = scene.warnings(&volume);
     assert!(warnings.iter().any(|w| w.contains("9×9") && w.contains("twice as wide")), "{warnings:?}");
     assert!(matches!(environment(&scene).source, Source::File(_)));
-    // A scene that only its environment lights is not without light.
+    // A scene that only its environment lights does not count as unlit.
     let sets = ["environment.kind=sky", "light.ambient=[0,0,0]", "lights.sun.intensity=0", "sky.sun=0"];
     assert!(lit(&sets).warnings(&volume).is_empty());
     let e = environment(&lit(&sets)).irradiance.at(Vec3::Y);

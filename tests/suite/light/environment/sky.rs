@@ -1,4 +1,4 @@
-//! The sky model against the published coefficients, its symmetries, and known properties of daylight.
+//! The sky model against the published coefficients, its symmetries and known properties of daylight.
 
 use std::f64::consts::PI;
 
@@ -16,8 +16,8 @@ fn at(sky: &BakedSky, x: u32, y: u32) -> Vec3 {
 
 #[test]
 fn a_pure_sky_under_a_sun_at_the_zenith_has_the_published_radiance() {
-    // Hosek and Wilkie's RGB data at turbidity 1, albedo 0 and the last of the elevation's control points:
-    // nine coefficients and the mean radiance of red and blue, and eq. 8 of the paper.
+    // Hosek and Wilkie's RGB data at turbidity 1, albedo 0 and the elevation's last control point: nine
+    // coefficients and the mean radiance, for red and for blue. Eq. 8 of the paper combines them.
     type Published = (usize, [f64; 9], f64);
     let published: [Published; 2] = [
         (
@@ -39,7 +39,7 @@ fn a_pure_sky_under_a_sun_at_the_zenith_has_the_published_radiance() {
     for (channel, [a, b, c, d, e, f, g, i, h], mean) in published {
         for row in [0, 40, 100, 200] {
             let theta = (row as f64 + 0.5) / baked.map.height as f64 * PI;
-            // The sun is straight up: γ is θ.
+            // The sun is straight up, so γ = θ.
             let (cos, gamma) = (theta.cos(), theta);
             let mie = (1.0 + cos * cos) / (1.0 + h * h - 2.0 * h * cos).powf(1.5);
             let shape = (1.0 + a * (b / (cos + 0.01)).exp())
@@ -72,11 +72,12 @@ fn the_sky_is_brightest_towards_the_sun_which_stands_where_its_angles_say() {
     let [u, v] = uv_of(sky.to_sun().as_vec3(), 0.0);
     let (x, y) = ((u * baked.map.width as f32) as u32, (v * baked.map.height as f32) as u32);
     assert_eq!((x, y), (512, 170));
-    // Round the sky at the sun's height it falls away from the sun, to the blue a right angle and more away.
+    // At the sun's height, the sky darkens with the azimuth from the sun, down to the blue at a right angle
+    // and beyond.
     let green = |x: u32| at(&baked, x, y).y;
     assert!((512..768).all(|x| green(x) >= green(x + 1)));
     assert!(green(512) > 2.0 * green(900));
-    // And above it, up to the zenith; below it the horizon's haze is bright too.
+    // Above the sun it darkens up to the zenith. Below the sun, the haze at the horizon is bright too.
     let above = |y: u32| at(&baked, 512, y).y;
     assert!((0..y).all(|y| above(y) <= above(y + 1)));
 }
@@ -84,7 +85,8 @@ fn the_sky_is_brightest_towards_the_sun_which_stands_where_its_angles_say() {
 #[test]
 fn daylight_has_the_luminance_that_is_measured() {
     let baked = NOON.bake();
-    // Direct sun of a clear day at 60°: 80 to 105 klx; sky alone 8 to 25 klx (CIE 108, Littlefair 1985).
+    // On a clear day the direct sun at 60° gives 80 to 105 klx and the sky alone 8 to 25 klx (CIE 108,
+    // Littlefair 1985).
     let direct = luminance(baked.sun) * UNIT_CD_M2;
     assert!((8e4..1.05e5).contains(&direct), "{direct}");
     let up = Irradiance::new(&moments_of_map(&baked.map), 0.0, 1.0).at(Vec3::Y);
@@ -92,7 +94,7 @@ fn daylight_has_the_luminance_that_is_measured() {
     assert!((8e3..2.5e4).contains(&diffuse), "{diffuse}");
     let zenith = luminance_cd_m2(at(&baked, 0, 0));
     assert!((1500.0..9000.0).contains(&zenith), "{zenith}");
-    // Away from the sun it is blue.
+    // Away from the sun the sky is blue.
     let away = at(&baked, 0, 100);
     assert!(away.z > 1.5 * away.x, "{away}");
 }
@@ -100,7 +102,7 @@ fn daylight_has_the_luminance_that_is_measured() {
 #[test]
 fn the_sun_fades_and_reddens_with_the_air_it_shines_through() {
     assert!((air_mass(PI / 2.0) - 1.0).abs() < 1e-3);
-    // Kasten and Young's own values at 30°, 10° and 0°.
+    // Values of Kasten and Young at 30°, 10° and 0°.
     for (degrees, mass) in [(30.0, 1.9943), (10.0, 5.5841), (0.0, 37.9196)] {
         assert!((air_mass(f64::to_radians(degrees)) / mass - 1.0).abs() < 2e-3, "{degrees}");
     }
@@ -111,7 +113,8 @@ fn the_sun_fades_and_reddens_with_the_air_it_shines_through() {
         before = now;
     }
     assert!(luminance(sun_irradiance(0.5, 6.0)) < luminance(sun_irradiance(0.5, 2.0)));
-    // Above the air it is 128 to 135 klx: with no haze and straight up nine tenths of it at least come down.
+    // Above the air, sunlight is 128 to 135 klx. From straight above and without haze, at least nine tenths
+    // of it reach the ground.
     let clearest = luminance(sun_irradiance(PI / 2.0, 1.0)) * 683.0;
     assert!((1.1e5..1.28e5).contains(&clearest), "{clearest}");
 }
@@ -122,7 +125,7 @@ fn the_ground_sends_back_its_share_of_what_sky_and_sun_send_down() {
     for (elevation, sun) in [(60.0, 1.0), (20.0, 0.0), (5.0, 3.0)] {
         let sky = Sky { elevation, ground, sun, ..NOON };
         let baked = sky.bake();
-        // The upper half alone: E on a level surface by sums over the texels' own solid angles.
+        // The upper half alone: E on a level surface, summed with the texels' own solid angles.
         let (width, height) = (baked.map.width, baked.map.height);
         let mut down = baked.sun * sky.to_sun().y;
         for y in 0..height / 2 {
