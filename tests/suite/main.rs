@@ -1,4 +1,4 @@
-//! All tests of the project in one binary, because linking one is quicker than linking twelve.
+//! All tests of the project in one binary, because one binary links faster than twelve.
 //!
 //! There are two kinds of tests: reference truth (float64, closed forms) and parity of the engines (float32,
 //! same order of operations). Each module says which kind it holds. `tolerance` defines the tolerances.

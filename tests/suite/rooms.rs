@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// The rooms, from the ground up. Rooms of one line do not know one another.
+/// The rooms, from the ground up. Rooms on one line must not import each other.
 const FLOORS: &[&[&str]] = &[
     &["util"],
     &["curve", "walk"],
@@ -24,7 +24,8 @@ const FLOORS: &[&[&str]] = &[
     &["guide", "lib", "main"],
 ];
 
-/// Floor and name of the room of a file or module, given as a path below `src/`: the longest that holds it.
+/// Floor and name of the room of a file or module, given as a path below `src/`. The longest room name that
+/// matches counts.
 fn room(path: &str) -> Option<(usize, &'static str)> {
     let holds =
         |room: &str| path.strip_prefix(room).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
@@ -33,7 +34,8 @@ fn room(path: &str) -> Option<(usize, &'static str)> {
     rooms.filter(|(_, room)| holds(room)).max_by_key(|(_, room)| room.len())
 }
 
-/// The paths below `src/` that a file's text names: what stands behind `crate::`, and each name of a group by itself.
+/// Paths below `src/` that a file's text names: each path after `crate::`, and each name of a group
+/// separately.
 fn named(text: &str) -> Vec<String> {
     let code: String =
         text.lines().filter(|l| !l.trim_start().starts_with("//")).flat_map(|l| [l, "\n"]).collect();
@@ -53,12 +55,12 @@ fn named(text: &str) -> Vec<String> {
     paths
 }
 
-/// Imports of a file that lead up, or across a floor.
+/// Imports of a file that lead up, or to another room on the same floor.
 fn upward(file: &str, text: &str) -> Vec<String> {
     let Some((floor, own)) = room(file) else { panic!("src/{file}.rs is in no room: add it to FLOORS") };
     let mut faults = Vec::new();
     for path in named(text) {
-        // What is defined at the crate's root is there for everyone.
+        // Every room may use items of the crate's root.
         let Some((other, name)) = room(&path) else { continue };
         if name != own && other >= floor {
             faults.push(format!(

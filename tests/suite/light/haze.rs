@@ -42,7 +42,7 @@ fn haze_that_thins_upwards_dims_by_the_integral_along_the_ray() {
             for t in [0.01f32, 1.0, 4.0] {
                 let tau = depth(&haze, eye.y.into(), d_y.into(), t.into());
                 let got = f64::from(haze.seen_from(eye).transmittance(d_y, t));
-                // The quotient loses up to 6e-8/1e-2 of τ beside its series.
+                // Next to the range of its series, the quotient loses up to 6e-8/1e-2 of τ.
                 let tolerance = CLOSED_FORM_RELATIVE * (1.0 + tau);
                 assert!(close(got, (-tau).exp(), tolerance, 1e-30), "H {height}, d_y {d_y}, {t} m: {got}");
             }
@@ -113,10 +113,10 @@ fn haze_of_the_colour_of_all_it_hides_is_not_seen() {
     ];
     let frame = frame("front", &furnace);
     let through = frame.radiance.iter().filter(|r| r[3] > 0.05 && r[3] < 0.95).count();
-    assert!(through > 100, "water that is seen through: {through} pixels");
+    assert!(through > 100, "see-through water: {through} pixels");
     for radiance in &frame.radiance {
         for (c, want) in [0.3, 0.5, 0.7].into_iter().enumerate() {
-            // Rounding of a walk, and once more of what haze takes off and adds.
+            // The walk rounds, and the haze rounds again what it removes and adds.
             assert!(close(radiance[c].into(), want, 2.0 * CLOSED_FORM_RELATIVE, 0.0), "{radiance:?}");
         }
     }

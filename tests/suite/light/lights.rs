@@ -9,7 +9,7 @@ fn spot(angle: f32, softness: f32) -> Light {
     Light::Spot { position: Vec3::ZERO, intensity: Vec3::ONE, cone: Cone::new(Vec3::Z, angle, softness) }
 }
 
-/// A point `metres` away, `degrees` off the axis −z.
+/// The point `metres` away from the origin, `degrees` off the axis −z.
 fn off_axis(degrees: f32, metres: f32) -> Vec3 {
     let angle = degrees.to_radians();
     Vec3::new(angle.sin(), 0.0, -angle.cos()) * metres
@@ -57,7 +57,7 @@ fn a_spot_light_shines_where_it_is_aimed() {
     ];
     let scene = Scene::load("front".as_ref(), &sets.map(String::from), &Limits::default()).expect("valid");
     let light = scene.lights.first().expect("the lamp");
-    // The direction is against the beam: below it is lit, above it is not.
+    // The direction points against the beam: a point below the lamp is lit, a point above it is not.
     assert!((light.at(Vec3::new(1.0, 0.0, 3.0)).1 - 0.25).abs().max_element() < 1e-6);
     assert_eq!(light.at(Vec3::new(1.0, 4.0, 3.0)).1, Vec3::ZERO);
 }

@@ -12,7 +12,7 @@ use tracer::Phase;
 
 const ISOTROPIC: Phase = Phase::HenyeyGreenstein(0.0);
 
-/// The unit vector at `degrees` from the normal, `side` −1 on the seen side and 1 behind.
+/// Unit vector at `degrees` from the normal. `side` is −1 on the seen side and 1 behind.
 fn toward(degrees: f64, turn: f64, side: f64) -> DVec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     DVec3::new(sin * turn.cos(), sin * turn.sin(), side * cos)

@@ -1,5 +1,5 @@
-//! The reflection model for flowing water. Reference truth: closed forms of optics, and the direct model in
-//! float64 for the table. The shader against the CPU is parity.
+//! The reflection model of flowing water. Reference truth: closed forms of optics, and for the table the
+//! direct model in float64. The shader is tested for parity with the CPU.
 
 mod lookup;
 mod optics;
@@ -11,22 +11,22 @@ use rand_pcg::Pcg64Mcg;
 use taki::light::strand::table::{StrandShading, StrandTable};
 use taki::light::strand::{Strand, StrandParams, cell_aeration, henyey_greenstein};
 
-/// Roughnesses along and around: both ends of the range, the default, and mixtures.
+/// Roughnesses along and around the strand: both ends of the range, the default, and mixtures.
 const ROUGHNESSES: [[f32; 2]; 7] =
     [[0.1, 0.1], [0.1, 1.0], [0.3, 0.2], [0.3, 0.1], [0.6, 0.6], [1.0, 0.1], [1.0, 1.0]];
 
-/// Strands without air.
+/// Parameters of strands without air.
 fn strands([roughness_m, roughness_n]: [f32; 2], absorption: f32) -> StrandParams {
     StrandParams { roughness_m, roughness_n, absorption, aeration: 0.0, ..StrandParams::default() }
 }
 
-/// The cosines t·l, t·e and l·e of directions given by inclinations and the azimuth between them.
+/// Cosines t·l, t·e and l·e of two directions, given by their inclinations and the azimuth between them.
 fn cosines(theta_i: f64, theta_o: f64, phi: f64) -> [f32; 3] {
     let l_dot_e = theta_i.sin() * theta_o.sin() + theta_i.cos() * theta_o.cos() * phi.cos();
     [theta_i.sin(), theta_o.sin(), l_dot_e].map(|x| x as f32)
 }
 
-/// ∫ f(θ, φ) dω over the sphere: cells of equal angles, each with its exact solid angle.
+/// ∫ f(θ, φ) dω over the sphere, in cells of equal angles, each with its exact solid angle.
 fn over_sphere(thetas: usize, phis: usize, f: impl Fn(f64, f64) -> f64) -> f64 {
     let step = PI / thetas as f64;
     let mut sum = 0.0;
@@ -38,7 +38,7 @@ fn over_sphere(thetas: usize, phis: usize, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum * TAU / phis as f64
 }
 
-/// Directions of light and eye: one half anywhere, the other about the mirror cone, where Φ is large.
+/// Directions of light and eye. Half of them lie anywhere, the others near the mirror cone, where Φ is large.
 fn directions(count: usize, sigma: f64) -> Vec<[f64; 3]> {
     let mut rng = Pcg64Mcg::seed_from_u64(1986);
     let mut unit = || rng.random_range(-1.0..1.0f64);
@@ -75,7 +75,7 @@ fn the_model_itself_gives_back_all_light() {
             let phi_and_theta =
                 |theta_o: f64, phi: f64| strand.lobes(degrees.to_radians(), theta_o, phi).total().x;
             let sum = over_sphere(720, 16, phi_and_theta);
-            // The balance's own inclinations are 0.7° apart, its iteration is done.
+            // The balance uses inclinations 0.7° apart, and its iteration has ended.
             assert!((sum - 1.0).abs() < 2e-3, "{sum} at {degrees}°, roughness {roughness_m}");
         }
     }
@@ -116,7 +116,8 @@ fn light_goes_to_the_mirror_cone_and_on_through_the_strand() {
         let mirror = strand.lobes(theta, -theta, PI);
         let beside = strand.lobes(theta, theta, PI);
         assert!(mirror.total().x > 1e3 * beside.total().x, "{mirror:?}, {beside:?}");
-        // Straight on is what went through; back to the light's side only what was reflected.
+        // Light that passed through the strand leaves straight on. Only reflected light returns to the
+        // light's side.
         let back = strand.lobes(theta, -theta, 0.0);
         assert!(mirror.tt.x > 10.0 * mirror.r.x && back.tt.x < 1e-3 * back.r.x, "{mirror:?}, {back:?}");
     }
@@ -124,7 +125,7 @@ fn light_goes_to_the_mirror_cone_and_on_through_the_strand() {
 
 #[test]
 fn water_takes_most_of_red_and_least_of_blue() {
-    // A strand of a metre: thin ones absorb next to nothing.
+    // The strand is a metre thick, because thin ones absorb almost nothing.
     let thick = StrandParams { radius_m: 0.5, ..strands([0.3, 0.2], 1.0) };
     let albedo = StrandTable::of(&thick).moments().albedo;
     assert!(albedo.x < albedo.y && albedo.y < albedo.z && albedo.z < 1.0, "{albedo}");
@@ -145,7 +146,7 @@ fn air_scatters_all_light_by_its_mean_cosine() {
             sum += phi;
             cosine += phi * mu;
         }
-        // The midpoint rule's h²/24·f′ at g = 0.9, where f′ is 6e3.
+        // The bound is the midpoint rule's h²/24·f′ at g = 0.9, where f′ is 6e3.
         assert!((sum - 1.0).abs() < 1e-6 && (cosine - g).abs() < 1e-6, "{g}: {sum}, {cosine}");
     }
 }
@@ -156,7 +157,7 @@ fn isotropic_air_alone_is_a_quarter_everywhere_and_g_is_its_own_mean_cosine() {
     for [theta_i, theta_o, phi] in directions(100, 0.3) {
         let [l, e, le] = cosines(theta_i, theta_o, phi);
         assert_eq!(air(0.0).psi(0.5, 0.5, l, e, le).to_array(), [0.25; 3]);
-        // Forward is where the eye is opposite to the light.
+        // Light goes forward if the eye is opposite the light.
         let want = PI * henyey_greenstein(0.6, -le as f64);
         assert!((air(0.6).psi(0.5, 0.5, l, e, le).x as f64 - want).abs() < 1e-5 * want);
     }
@@ -172,7 +173,7 @@ fn means_over_all_directions_are_those_of_the_model() {
     let mut cosine = 0.0;
     let light = 24;
     for i in 0..light {
-        // Equal shares of the sphere, of one half of it.
+        // The inclinations have equal shares of one half of the sphere.
         let theta_i = ((i as f64 + 0.5) / light as f64).asin();
         albedo += over_sphere(120, 24, |theta_o, phi| strand.lobes(theta_i, theta_o, phi).total().x);
         cosine += over_sphere(120, 24, |theta_o, phi| {
@@ -193,6 +194,6 @@ fn the_noise_of_k_is_noise_of_the_air() {
     assert_eq!(cell_aeration(0.3, 0.0, 0.5), 0.0);
     assert_eq!(cell_aeration(0.3, 0.5, 0.0), 0.6);
     assert_eq!(cell_aeration(0.8, 0.5, 0.0), 1.0);
-    // Any unit: the shader has k in 1/255.
+    // The unit of k does not matter: the shader has k in 1/255.
     assert_eq!(cell_aeration(0.3, 0.25, 0.75), cell_aeration(0.3, 1.0, 3.0));
 }

@@ -27,7 +27,7 @@ fn volume(scene: &Scene) -> VolumeTexture {
     scene.volume(1 << 30, &Unwatched).expect("a volume")
 }
 
-/// Root of the mean squared difference of the radiances, relative to the mean radiance of the second.
+/// Root mean square difference of the radiances, relative to the mean radiance of the second frame.
 fn rmse([a, b]: [&Frame; 2]) -> f64 {
     let (mut squares, mut sum, mut n) = (0.0, 0.0, 0.0);
     for (a, b) in a.radiance.iter().zip(&b.radiance) {
@@ -50,7 +50,8 @@ fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     let of = |sets: &[&str]| scene("front", sets).light_volumes(size, 1.0, u64::MAX).expect("they fit");
     let one = of(&[]);
     assert_eq!((one.volumes.len(), one.cornered(), one.patches.len()), (1, false, 1));
-    // The same parallelogram twice, elsewhere; another thickness; another place of the eye on the same side.
+    // The same parallelogram again at another place; then with another thickness; then another eye on the
+    // same side.
     let mut two = scene("front", &[]);
     let mut moved = two.quads[0];
     moved.corners = moved.corners.map(|c| c + Vec3::new(3.0, 1.0, -2.0));
@@ -62,10 +63,10 @@ fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     assert_eq!(two.light_volumes(size, 1.0, u64::MAX).expect("they fit").volumes.len(), 2);
     let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4"]);
     assert_eq!(elsewhere, one, "camera, exposure and flow leave light volumes as they are");
-    // Of optical depths σ does.
+    // σ leaves light volumes of optical depths as they are, too.
     let many = of(&["light.visibility=cached", "light.scattering=multiple"]);
     assert_eq!(of(&["light.visibility=cached", "light.scattering=multiple", "trace.sigma=3"]), many);
-    // From behind, the face is the other one.
+    // From behind, the eye sees the other face.
     let behind = of(&["camera.eye=[0,0,-3.5]"]);
     assert!(
         (behind.volumes[0].direction * Vec3::new(1.0, 1.0, -1.0) - one.volumes[0].direction).length() < 1e-5
@@ -142,7 +143,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
             assert!((depth * cosine / above - 1.0).abs() < 1e-5, "{towards} {z}: {depth}");
         }
     }
-    // Per cell the cell itself does not hide its own light.
+    // With attenuation per cell, a cell does not hide its own light.
     let medium = Medium { per_cell: true, max_cells: 512 };
     let mut walked = 0;
     let depth = optical_depth(
@@ -167,18 +168,20 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let whole: Vec<String> = keys.iter().chain(&more).map(|key| format!("sheets.{key}=0")).collect();
     let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
     let few = [&whole[..], &["light.cache=160"]].concat();
-    // A directional light on a parallelogram is exact but for the codes: √T in 255ths is T to 0.0039·√T at most and
-    // 0.0023·√T in the mean, relative to T more where it is dark, less in the mean of a ray's cells. Under a point light half the quad's width
-    // away directions turn by 80° over it: what is interpolated between corners 5° apart is what is not promised.
+    // A directional light on a parallelogram is exact except for the codes. √T in 255ths gives T to 0.0039·√T
+    // at most and to 0.0023·√T in the mean. Relative to T that is more where it is dark, and less in the mean
+    // of a ray's cells. Under a point light half the quad's width away, directions turn by 80° over the quad.
+    // The promise does not cover this interpolation between corners 5° apart.
     for (preset, more, allowed) in [
         ("front", &[][..], 2.5e-3),
         ("front", &cell[..], 2.5e-3),
         ("front", &near[..], 0.06),
         ("fig5", &[][..], 0.02),
         ("waterfall", &whole[..], 0.02),
-        // Quads share light volumes whose directions are up to 8° apart, so that all fit into 160 MiB.
+        // Quads share light volumes whose directions are up to 8° apart, so that all of them fit into 160
+        // MiB.
         ("waterfall", &few[..], 0.035),
-        // Of eroded water depths are lessened in the mean over cells, not cell by cell.
+        // In eroded water the depths are reduced by the mean loss over cells, not cell by cell.
         ("waterfall", &[][..], 0.05),
     ] {
         let sets: Vec<&str> = size.iter().chain(more).copied().collect();
@@ -189,7 +192,7 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
         let error = rmse([&cached, &march]);
         println!("{preset} {more:?}: cached {error:.5}, none {:.3}", rmse([&none, &march]));
         assert!(error <= allowed, "{preset} {more:?}: {error}");
-        // The comparison can fail: without attenuation it does.
+        // The comparison can fail: it does without attenuation.
         assert!(rmse([&none, &march]) > 0.02, "{preset} {more:?}");
     }
 }
@@ -237,7 +240,7 @@ fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
         let levels = [&plain, &pyramid][round % 2];
         let mut direction = Vec3::from_array([0; 3].map(|_| rng.random_range(-4.0..4.0)));
         match round % 5 {
-            // Along the slab, which it never leaves; along axes; through corners.
+            // Directions along the slab, which the walk then never leaves; along axes; and through corners.
             0 => direction.z = 0.0,
             1 => direction = Vec3::new(0.0, -0.0, -1.0),
             2 => direction = Vec3::new(-1.0, 1.0, 1.0),
@@ -326,7 +329,7 @@ fn bad_values_of_light_in_the_volume_have_their_line() {
 fn a_kept_walk_that_ends_in_the_dark_has_the_code_of_the_whole_one() {
     use taki::light::visibility::{DARK_BITS, transmittance_code};
     assert_eq!([DARK_BITS, DARK_BITS - 0.01].map(transmittance_code), [0, 0]);
-    assert!(transmittance_code(DARK_BITS - 0.1) > 0, "no later than need be");
+    assert!(transmittance_code(DARK_BITS - 0.1) > 0, "the walk ends no later than necessary");
     let volume = volume(&scene("front", &[]));
     let medium = Medium { per_cell: false, max_cells: 512 };
     let direction = Vec3::new(3.0, 0.7, -0.1);

@@ -8,11 +8,11 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taki::mapping::{CellFrame, Material, QuadFault, QuadMap};
 
-/// Convex quads in the plane by a margin: the smallest sine-like corner measure they may have. Towards 0
-/// the inverse map becomes singular and float32 loses digits as 1/margin.
+/// Margin by which the random quads are convex: the smallest sine-like corner measure that they may have.
+/// Towards 0 the inverse map becomes singular, and float32 loses digits as 1/margin.
 const MARGIN: f64 = 0.1;
 
-/// A random convex planar quad with sides of 0.1 to 20 m, turned and moved anywhere near.
+/// A random convex planar quad with sides of 0.1 to 20 m, rotated and moved at random.
 pub fn quad() -> impl Strategy<Value = [Vec3; 4]> {
     let corner = || [-0.45f64..0.45, -0.45f64..0.45].prop_map(DVec2::from_array);
     let shape = [corner(), corner(), corner(), corner()]
@@ -42,13 +42,13 @@ fn material() -> impl Strategy<Value = Material> {
     })
 }
 
-/// X(u,v) of the method, from the corners.
+/// X(u,v) of the method, computed from the corners.
 fn point(corners: [Vec3; 4], u: f64, v: f64) -> DVec3 {
     let [a, b, c, d] = corners.map(Vec3::as_dvec3);
     a * ((1.0 - u) * (1.0 - v)) + b * (u * (1.0 - v)) + c * (u * v) + d * ((1.0 - u) * v)
 }
 
-/// ∂X/∂u and ∂X/∂v, from the corners.
+/// ∂X/∂u and ∂X/∂v, computed from the corners.
 fn jacobian(corners: [Vec3; 4], u: f64, v: f64) -> (DVec3, DVec3) {
     let [a, b, c, d] = corners.map(Vec3::as_dvec3);
     let g = a - b + c - d;
@@ -90,7 +90,7 @@ proptest! {
     fn the_inverse_map_undoes_the_map(corners in quad(), u in 0.0f32..=1.0, v in 0.0f32..=1.0) {
         let map = QuadMap::new(corners).unwrap();
         let uv = Vec2::new(u, v);
-        // Against the corners in float64, and against the map's own forward direction.
+        // The inverse is compared with the corners in float64 and with the map's own forward direction.
         let truth = map.uv_and_det(in_plane(&map, point(corners, u as f64, v as f64))).0;
         prop_assert!(truth.distance(uv) < 1e-4, "{truth}, not {uv}");
         let own = map.uv_and_det(map.point(u, v)).0;
@@ -122,7 +122,7 @@ proptest! {
     ) {
         let map = QuadMap::new(corners).unwrap();
         let frame = CellFrame::new(&map, &material, size, Vec2::new(u, v));
-        // The columns in the world, from the corners.
+        // Columns of the Jacobian in the world, computed from the corners.
         let (du, dv) = jacobian(corners, u as f64, v as f64);
         let columns = [
             du / (material.repeat_u as f64 * size[0] as f64),
@@ -141,7 +141,7 @@ proptest! {
             let (a, b) = (own.col(axis), in_plane.col(axis));
             prop_assert!(a.distance(b) < 1e-5 * b.length().max(1e-3), "column {axis}: {a}, not {b}");
         }
-        // d_cell = J⁻¹ d and Jᵀ d, in float64 from the frame's own columns.
+        // d_cell = J⁻¹ d and Jᵀ d are compared in float64 with the frame's own columns.
         let d = Vec3::from_array(d);
         let back = own * frame.cell_from_plane(d).as_dvec3();
         let condition = (frame.cx.length() * frame.cy.length() / frame.det) as f64;
@@ -191,12 +191,12 @@ fn a_quad_without_area_or_with_a_repeated_corner_is_degenerate() {
 #[test]
 fn a_concave_or_self_crossing_quad_is_not_convex() {
     let not_convex = [
-        // Concave at each corner in turn.
+        // Each of these is concave at another corner.
         [[0.9, 0.9], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
         [[0.0, 0.0], [0.2, 0.7], [1.0, 1.0], [0.0, 1.0]],
         [[0.0, 0.0], [1.0, 0.0], [0.3, 0.3], [0.0, 1.0]],
         [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.7, 0.2]],
-        // Bow-ties of unequal halves.
+        // Bow-ties with unequal halves.
         [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [2.0, 1.0]],
         [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [0.0, 1.5]],
         // A corner of 180°.
@@ -213,7 +213,7 @@ fn a_quad_that_leaves_its_plane_is_not_planar() {
     for z in [1.0, -0.3, 1e-2, 1e-3] {
         assert_eq!(bent(z), Err(QuadFault::NotPlanar), "{z}");
     }
-    // Rounding of corners far from the origin is no fault.
+    // The rounding of corners far from the origin is accepted.
     assert!(bent(1e-5).is_ok());
 }
 

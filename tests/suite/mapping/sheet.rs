@@ -1,4 +1,4 @@
-//! Sheets of falling water: position of their quads, layout of the texture on them, and erosion.
+//! Sheets of falling water: positions of their quads, layout of the texture on them, and erosion.
 
 mod engines;
 
@@ -29,12 +29,12 @@ fn scene(text: &str) -> Scene {
     read(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A plumb sheet from y = 3 to y = −2, 2 m wide.
+/// A vertical sheet from y = 3 to y = −2, 2 m wide.
 fn plumb(more: &str) -> Scene {
     scene(&format!("[sheets.a]\npoints = [[0, 3, 0], [0, 1, 0], [0, -2, 0]]\nwidths = [2.0]\n{more}\n"))
 }
 
-/// Bent over a lip and across, wider at its foot, ragged.
+/// A ragged sheet that bends over a lip and sideways, and that is wider at its foot.
 const CURVED: &str = "[materials.water]\nrepeat_u = 1.5\nrepeat_v = 2.5
 [sheets.a]\npoints = [[0, 1.2, -1.4], [0.1, 1.2, -0.6], [0.2, 0.4, 0.3], [0.1, -1.2, 0.8]]
 widths = [0.8, 0.8, 1.1, 1.7]\nsegments = 13\ncolumns = 4\nround = 0.3\noffset_u = 0.3\noffset_v = 0.7\nv0 = 0.7
@@ -56,7 +56,7 @@ fn the_texture_of_a_free_fall_lies_by_the_time_of_the_fall() {
         for quad in &scene.quads {
             for (corner, place, _) in corners(quad) {
                 let want = copies * time(3.0 - f64::from(corner.y)) / time(5.0);
-                // Places and corners are float32.
+                // Texture coordinates and corners are float32.
                 assert!(
                     (f64::from(place.y) - want).abs() < 2e-6 * copies.max(1.0),
                     "{corner}: {place}, {want}"
@@ -68,7 +68,8 @@ fn the_texture_of_a_free_fall_lies_by_the_time_of_the_fall() {
 
 #[test]
 fn water_runs_at_the_speed_of_its_fall() {
-    // The texture runs past at a constant rate: metres of a quad by its share of the texture are its mean speed.
+    // The texture passes at a constant rate, so a quad's length divided by its share of the texture is its
+    // mean speed.
     let scene = plumb("segments = 20\nv0 = 1.5");
     let speed = |y: f32| (1.5f64 * 1.5 + 2.0 * GRAVITY * (3.0 - f64::from(y))).sqrt();
     let whole = (speed(-2.0) - 1.5) / GRAVITY;
@@ -83,7 +84,8 @@ fn water_runs_at_the_speed_of_its_fall() {
 
 #[test]
 fn water_that_rises_slows_down_by_gravity() {
-    // Thrown up at 8 m/s to 2 m: t = (v0 − √(v0² − 2 g h))/g. Higher than v0²/2g = 3.26 m it keeps a twentieth of v0.
+    // The water is thrown up at 8 m/s to 2 m: t = (v0 − √(v0² − 2 g h))/g. Above v0²/2g = 3.26 m it keeps a
+    // twentieth of v0.
     let up = |height: f64| {
         let text = format!(
             "[sheets.a]\npoints = [[0, 0, 0], [0, {}, 0], [0, {height}, 0]]\nsegments = 12\nv0 = 8.0",
@@ -94,12 +96,14 @@ fn water_that_rises_slows_down_by_gravity() {
     let time = |h: f64| (8.0 - (64.0 - 2.0 * GRAVITY * h).sqrt()) / GRAVITY;
     for quad in &up(2.0).quads {
         for (corner, place, _) in corners(quad) {
-            // The root of the speed is taken at float32 corners: 1e-7 of 2 m over the least speed, 5 m/s.
+            // The speed's square root is taken at float32 corners. The error is 1e-7 of 2 m over the least
+            // speed, 5 m/s.
             let want = time(f64::from(corner.y)) / time(2.0);
             assert!((f64::from(place.y) - want).abs() < 2e-6, "{corner}: {place}, {want}");
         }
     }
-    // 5 m above where it would stop, at 0.4 m/s all along: as much texture as way.
+    // 5 m above the height at which it would stop, the water moves at 0.4 m/s throughout. Texture and
+    // distance are then proportional.
     let high = up(9.0);
     let last: Vec<f32> = high
         .quads
@@ -134,9 +138,10 @@ fn a_profile_along_a_circle_is_as_long_as_the_arc() {
     let length: f64 =
         scene(&text).quads.iter().map(|q| q.corners[0].as_dvec3().distance(q.corners[3].as_dvec3())).sum();
     let arc = std::f64::consts::PI;
-    // Spans of 11.25°: a chord would be short of its arc by 1.6e-3, a spline that turns evenly by a tenth of that.
+    // The spans are 11.25°. A chord would be shorter than its arc by 1.6e-3, and a spline that turns evenly
+    // by a tenth of that.
     assert!((length / arc - 1.0).abs() < 4e-4, "{length} {arc}");
-    // Nowhere is it further from the circle than the chords between its points are: 2 m · (1 − cos 5.6°).
+    // It is nowhere further from the circle than the chords between its points are: 2 m · (1 − cos 5.6°).
     for quad in &scene(&text).quads {
         let r = quad.corners[0].as_dvec3().distance(DVec3::new(f64::from(quad.corners[0].x), 0.0, 0.0));
         assert!((r - 2.0).abs() < 9.6e-3, "{r}");
@@ -146,7 +151,7 @@ fn a_profile_along_a_circle_is_as_long_as_the_arc() {
 #[test]
 fn neighbours_share_corners_texture_coordinates_and_erosion() {
     let scene = scene(CURVED);
-    // Four columns, and the borders of the eroded sides at 0.3 and 0.7.
+    // There are four columns, and the eroded sides have borders at 0.3 and 0.7.
     let (columns, rows) = (6, 13);
     assert_eq!(scene.quads.len(), columns * rows);
     let mut shared = 0;
@@ -155,7 +160,7 @@ fn neighbours_share_corners_texture_coordinates_and_erosion() {
             let at = |row: usize, column: usize| corners(&scene.quads[row * columns + column]);
             let same = |a: (Vec3, Vec2, f32), b: (Vec3, Vec2, f32)| {
                 assert_eq!((a.0, a.2), (b.0, b.2));
-                // Offset and extent are rounded once each.
+                // Offset and extent are each rounded once.
                 assert!((a.1 - b.1).abs().max_element() < 5e-7, "{} {}", a.1, b.1);
             };
             let own = at(row, column);
@@ -193,12 +198,12 @@ fn streaks_go_on_across_the_borders_of_quads() {
         for column in 0..columns {
             let at = |row: usize| &scene.quads[row * columns + column];
             let (upper, lower) = (at(row), at(row + 1));
-            // Along the flow they turn as the profile does, and the profile is as sheer as the corners are.
+            // Along the flow, the cells turn by the same angle as the sides of the quads.
             let along = |q: &Quad| q.corners[3] - q.corners[0];
             let turn = along(upper).angle_between(along(lower));
             let [a, b] = [world(upper, Vec2::new(0.5, 1.0), 0.0), world(lower, Vec2::new(0.5, 0.0), 0.0)];
             assert!((a.angle_between(b) - turn).abs() < 1e-3, "{row}: {a} {b} {turn}");
-            // A cell's length is the sheet's by its share of the texture.
+            // The length of a cell is the quad's length divided by the number of its cells.
             let metres = along(upper).length() / (upper.material.repeat_v * 40.0);
             assert!((a.length() / metres - 1.0).abs() < 1e-4);
         }
@@ -219,7 +224,7 @@ fn a_tube_is_round_and_closed() {
     for row in scene.quads.chunks(12) {
         assert!(row[0].corners[0].distance(row[11].corners[1]) < 1e-6);
         assert!(row[0].corners[3].distance(row[11].corners[2]) < 1e-6);
-        // Its opposite corners are a width apart.
+        // Opposite corners are one width apart.
         let width = 0.4 + 0.4 * f64::from(2.0 - row[0].corners[0].y) / 2.0;
         let apart = f64::from(row[0].corners[0].distance(row[6].corners[0]));
         assert!((apart - width).abs() < 1e-5, "{apart} {width}");
@@ -232,7 +237,8 @@ fn a_tube_is_round_and_closed() {
         all.iter().copied().fold(f32::MIN, f32::max) - all.iter().copied().fold(f32::MAX, f32::min)
     };
     assert!((wide(&flat) - 2.0).abs() < 1e-6 && (wide(&half) - 2.0).abs() < 1e-6);
-    // It bulges towards the outside of the fall: +z, where water falls down −y across +x.
+    // The sheet bulges towards the outside of the fall. That is +z where water falls down −y and `across` is
+    // +x.
     let front = half.quads.iter().flat_map(|q| q.corners.map(|c| c.z)).fold(f32::MIN, f32::max);
     let back = half.quads.iter().flat_map(|q| q.corners.map(|c| c.z)).fold(f32::MAX, f32::min);
     assert!(front.abs() < 1e-6 && (back + 1.0).abs() < 1e-6, "{front} {back}");
@@ -259,7 +265,7 @@ fn uniform(rho: f32) -> VolumeTexture {
     VolumeTexture { size: [8, 9, 10], alpha: 1.0, cells: vec![cell; 8 * 9 * 10].into() }
 }
 
-/// One rectangle of 2 m × 3 m, 0.4 m thick, seen along −z at `uv`, by its transmittance and radiance.
+/// Transmittance and radiance of one rectangle of 2 m × 3 m, 0.4 m thick, seen along −z at `uv`.
 fn through(
     quad: impl Fn(Quad) -> Quad,
     visibility: Visibility,
@@ -293,7 +299,7 @@ fn eroded_water_transmits_by_what_is_left_of_its_density() {
             for visibility in [Visibility::None, Visibility::March] {
                 let traced = through(|q| Quad { erosion, ..q }, visibility, &volume, uv);
                 let got = f64::from(traced.transmittance);
-                // e is taken from ρ in float32, to 2^-24 of 1.
+                // e is subtracted from ρ in float32, to 2^-24 of 1.
                 assert!(close(got, want, CLOSED_FORM_RELATIVE, 1e-6), "ρ {rho} at {uv:?}: {got} {want}");
             }
         }
@@ -302,12 +308,12 @@ fn eroded_water_transmits_by_what_is_left_of_its_density() {
 
 #[test]
 fn light_is_dimmed_by_what_is_left_of_the_density_too() {
-    // Even water with the light behind the eye: L = Ψ·Σ w·e^(−τ to the light). Eroded by e it is the same as water
-    // of density ρ − e, but for rounding.
+    // Even water with the light behind the eye has L = Ψ·Σ w·e^(−τ to the light). Water eroded by e equals
+    // water of density ρ − e, except for rounding.
     for visibility in [Visibility::March, Visibility::None] {
         let eroded = through(|q| Quad { erosion: [0.25; 4], ..q }, visibility, &uniform(0.75), [0.5, 0.5]);
         let thin = through(|q| q, visibility, &uniform(0.5), [0.5, 0.5]);
-        // ρ's codes are 2^-16.
+        // The codes of ρ have steps of 2^-16.
         assert!((eroded.radiance - thin.radiance).abs().max_element() < 2e-5);
         assert!(thin.radiance.x > 0.1);
     }
@@ -325,10 +331,10 @@ fn mist_is_even_and_sends_light_everywhere_alike() {
         let traced = through(quad, Visibility::None, &volume, [0.4, 0.4]);
         let want = (-5.0 * 0.4 * density).exp();
         assert!(close(f64::from(traced.transmittance), want, CLOSED_FORM_RELATIVE, 1e-6));
-        // Σ w = 1 − T, and Ψ is the mist's whatever the cells'.
+        // Σ w = 1 − T. Ψ is that of the mist, whatever the cells hold.
         assert!(close(f64::from(traced.radiance.x), 0.8 * (1.0 - want), 2e-5, 0.0), "{}", traced.radiance);
 
-        // With light walks V is that of even mist, from the middle of each cell.
+        // With light walks, V is that of even mist from the middle of each cell.
         let lit = through(quad, Visibility::March, &volume, [0.4, 0.4]);
         let (mut t, mut sum) = (1.0f64, 0.0);
         for z in 0..10 {

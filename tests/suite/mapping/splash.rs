@@ -23,7 +23,7 @@ fn splash() -> Splash {
     }
 }
 
-/// Speed of launch of an arc, from where it is at every time.
+/// Launch velocity of an arc, from its positions over time.
 fn launch(stations: &[Station]) -> DVec3 {
     let (first, last) = (stations[0], stations[stations.len() - 1]);
     (last.point - first.point) / last.time + DVec3::Y * (0.5 * GRAVITY * last.time)
@@ -49,8 +49,8 @@ proptest! {
         for arc in splash.arcs() {
             let stations = arc.stations();
             let v = launch(&stations);
-            // Time is summed over straight pieces of a spline: the steepest is off by 2.5e-3, and the launch as told from
-            // its ends as much again.
+            // Time is summed over straight pieces of a spline. In the steepest arc it is off by 2.5e-3, and
+            // the launch derived from the arc's ends by as much again.
             for at in &stations {
                 let want = stations[0].point + v * at.time - DVec3::Y * (0.5 * GRAVITY * at.time * at.time);
                 let end = stations[stations.len() - 1];
@@ -67,7 +67,8 @@ proptest! {
 
 #[test]
 fn the_highest_drop_rises_to_the_square_of_the_restitution_times_the_fall() {
-    // Plumb, as nearly as an arc may be: sin² 87° = 0.997. The fastest of so many has nearly all of the speed.
+    // The arcs are as close to vertical as they may be: sin² 87° = 0.997. The fastest of so many has nearly
+    // the full speed.
     let splash = Splash { count: 3000, elevation: 90.0, spread: 0.0, ..splash() };
     let rise =
         |arc: &taki::mapping::Sheet| arc.points.iter().map(|p| p.y - arc.points[0].y).fold(0.0, f32::max);
@@ -94,7 +95,7 @@ fn a_crown_goes_all_around() {
         let v = launch(&arc.stations());
         sectors[((v.x.atan2(v.z) / std::f64::consts::TAU + 0.5) * 8.0) as usize % 8] += 1;
     }
-    // Six in each, by golden steps: they are within two of that for any number.
+    // The even share is six. Golden steps stay within two of it for any number of arcs.
     assert!(sectors.iter().all(|n| (4..=8).contains(n)), "{sectors:?}");
 }
 
@@ -120,7 +121,7 @@ fn one_seed_is_one_splash() {
 #[test]
 fn a_scene_has_the_arcs_of_its_splashes() {
     let scene = read("[splashes.a]\nfrom = [0, 1, 0]\ncount = 5\nsegments = 3\n").expect("valid");
-    // Eroded sides meet in the middle: two columns.
+    // The eroded sides meet in the middle, so there are two columns.
     assert_eq!(scene.quads.len(), 5 * 3 * 2);
     let starts = scene.quads.iter().step_by(6).map(|q| (q.corners[1] - Vec3::Y).length());
     assert!(starts.into_iter().all(|away| away < 1e-5), "without `to` all start at `from`");

@@ -1,4 +1,4 @@
-//! Contact sheets: no label overlaps another, and every picture stands where its values belong.
+//! Contact sheets: no label overlaps another, and every picture is in the place of its values.
 
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ fn axis(name: &str, values: impl IntoIterator<Item = impl ToString>) -> Axis {
     Axis { name: name.into(), values: values.into_iter().map(|v| v.to_string()).collect() }
 }
 
-/// Everything lies on the sheet and apart from everything else.
+/// Asserts that everything lies on the sheet and that nothing overlaps.
 fn sound(sheet: &Sheet, layout: &Layout) {
     let [width, height] = layout.size;
     assert!(width <= LONGEST_SIDE && height <= LONGEST_SIDE, "{:?}", layout.size);
@@ -35,7 +35,7 @@ fn sound(sheet: &Sheet, layout: &Layout) {
     assert_eq!(indices, expected);
 }
 
-/// A flat colour of its own for each place.
+/// A flat colour that tells the place.
 fn shade(row: usize, column: usize) -> Rgb<u8> {
     Rgb([60 + (row * 7 % 190) as u8, 60 + (column * 5 % 190) as u8, 200])
 }
@@ -54,7 +54,7 @@ fn drawn(sheet: &Sheet) -> (Layout, RgbImage) {
     (layout, image)
 }
 
-/// Pixels of a box that are not the paper.
+/// Number of pixels of a box that are not paper.
 fn ink(image: &RgbImage, r: Rect) -> usize {
     let paper = *image.get_pixel(0, 0);
     let all = (r.y..r.y + r.h).flat_map(|y| (r.x..r.x + r.w).map(move |x| (x, y)));
@@ -82,7 +82,7 @@ fn sweeps_of_every_shape_are_laid_out_soundly_and_every_label_is_drawn() {
         for cell in [[133, 213], [64, 36], [36, 36], [8, 8]] {
             let sheet = Sheet::of("fig5", "seed 1 · 133×213", &axes, cell);
             let (layout, image) = drawn(&sheet);
-            assert!(layout.places.iter().all(|p| [p.rect.w, p.rect.h] == cell), "nothing had to shrink");
+            assert!(layout.places.iter().all(|p| [p.rect.w, p.rect.h] == cell), "no picture had to shrink");
             for label in &layout.labels {
                 assert!(ink(&image, label.rect) > label.text.chars().count(), "{label:?}");
             }
@@ -114,7 +114,7 @@ fn labels_stand_with_their_pictures() {
         assert!((column.x + column.w / 2).abs_diff(r.x + r.w / 2) <= 1 && column.y + column.h <= r.y);
         assert!((row.y + row.h / 2).abs_diff(r.y + r.h / 2) <= 1 && row.x + row.w <= r.x);
     }
-    // One parameter wraps, each picture with its value below it.
+    // A single parameter wraps, with its value below each picture.
     let sheet = Sheet::of("", "", &[axis("h", (0..37).map(|i| format!("v{i}")))], [50, 40]);
     let layout = sheet.layout().unwrap();
     let label = |text: &str| layout.labels.iter().find(|l| l.text == text).unwrap().rect;
@@ -184,7 +184,7 @@ fn large_sweeps_shrink_and_larger_ones_are_refused() {
         assert!(e.to_string().contains("sweep fewer values"), "{e}");
     }
     assert!(Sheet::of("", "", &[], [0, 5]).layout().is_err());
-    // A panorama and a single large picture.
+    // Panoramas, and a single large picture.
     for cell in [[20_000, 10], [10, 20_000], [16_384, 16_384]] {
         let sheet = Sheet::of("t", "s", &[axis("h", 0..2)], cell);
         sound(&sheet, &sheet.layout().unwrap());

@@ -1,4 +1,4 @@
-//! The comparison harness can fail: a comparison that always passes proves nothing.
+//! The comparison code must be able to fail: a comparison that always passes proves nothing.
 
 use taki::output::frame::{Difference, Tolerance};
 

@@ -1,4 +1,4 @@
-//! Movies decode to the frames that they were made from. A movie that is interrupted leaves no file.
+//! Movies decode to the frames that they were made from. An interrupted movie leaves no file.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -18,18 +18,19 @@ const KINDS: [(MovieKind, &str); 4] = [
     (MovieKind::Webm, "m.webm"),
 ];
 
-/// Mean absolute error of a channel, of 255, that a video may have: 4:2:0 and the encoder's quantiser. A
-/// conversion with BT.601's matrix, or full range taken for limited, is off by 5 to 15 in these frames.
+/// Largest mean absolute error of a channel of a video, in 255ths, from 4:2:0 and the encoder's quantiser.
+/// With the matrix of BT.601, or with full range taken for limited range, these frames would be off by 5 to
+/// 15.
 const VIDEO_ERROR: f64 = 2.5;
 
-/// Mean absolute error of a GIF: a smooth picture in 255 colours, with the dither's grain.
+/// Largest mean absolute error of a GIF: a smooth picture in 255 colours, with the grain of the dither.
 const GIF_ERROR: f64 = 4.0;
 
 fn options(size: [u32; 2], fps: f64, frames: u64) -> MovieOptions {
     MovieOptions { size, fps, frames, repeat: true, mark: 7 }
 }
 
-/// Frame `i`: smooth and coloured, with a bright bar that wanders down and a part that never changes.
+/// Frame `i`: smooth and coloured, with a bright bar that moves down and a part that never changes.
 fn frame([width, height]: [u32; 2], i: u64) -> Vec<u8> {
     let pixel = |x: u32, y: u32| {
         let (u, v) = (x as f64 / width as f64, y as f64 / height as f64);
@@ -59,7 +60,7 @@ fn mean_error(a: &[u8], b: &[u8]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.abs_diff(*b) as f64).sum::<f64>() / a.len() as f64
 }
 
-/// A GIF played: canvases (R, G, B), delays in hundredths of a second, repetition.
+/// Plays a GIF. Returns its canvases (R, G, B), delays in hundredths of a second, and repetition.
 fn play_gif(path: &Path) -> (Vec<Vec<u8>>, Vec<u16>, gif::Repeat) {
     let mut decoder = gif::Decoder::new(BufReader::new(File::open(path).unwrap())).unwrap();
     let width = decoder.width() as usize;
@@ -80,10 +81,10 @@ fn play_gif(path: &Path) -> (Vec<Vec<u8>>, Vec<u16>, gif::Repeat) {
     (canvases, delays, decoder.repeat())
 }
 
-/// A video decoded by ffmpeg to R, G, B.
+/// Decodes a video to R, G, B with ffmpeg.
 fn play_video(path: &Path) -> Vec<u8> {
     let mut ffmpeg = Command::new("ffmpeg");
-    // The matrix is taken from the file's own tags: a wrong one shows.
+    // ffmpeg takes the matrix from the file's own tags, so a wrong tag shows.
     ffmpeg.args(["-loglevel", "error", "-nostdin", "-i"]).arg(path);
     let convert = "scale=flags=bicubic+accurate_rnd+full_chroma_int";
     ffmpeg.args(["-vf", convert, "-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"]);
@@ -92,7 +93,7 @@ fn play_video(path: &Path) -> Vec<u8> {
     out.stdout
 }
 
-/// What ffprobe says of the stream's fields.
+/// Output of ffprobe for fields of the stream.
 fn probe(path: &Path, fields: &str) -> String {
     let mut ffprobe = Command::new("ffprobe");
     ffprobe.args(["-v", "error", "-count_frames", "-of", "default=nw=1", "-show_entries"]);
@@ -127,8 +128,8 @@ fn a_gif_shows_its_frames_for_the_right_time() {
         let true_frame = frame(options.size, i as u64);
         let error = mean_error(canvas, &true_frame);
         assert!(error < GIF_ERROR, "frame {i}: {error}");
-        assert!(mean_error(canvas, &frame(options.size, i as u64 + 1)) > error + 1.0, "it is this frame");
-        // The left half never changes: no pixel of it may flicker.
+        assert!(mean_error(canvas, &frame(options.size, i as u64 + 1)) > error + 1.0, "the canvas shows this frame");
+        // The left half never changes, so none of its pixels may flicker.
         grain.push(canvas.chunks(67 * 3).flat_map(|row| row[..33 * 3].to_vec()).collect::<Vec<u8>>());
     }
     assert!(grain.iter().all(|g| *g == grain[0]));
@@ -198,13 +199,14 @@ fn videos_decode_to_their_frames_by_their_own_tags() {
             let bytes = (width * height * 3) as usize;
             assert_eq!(played.len(), 9 * bytes);
             for (i, picture) in played.chunks(bytes).enumerate() {
-                // The column and row added to odd sides are the last ones again; what was given is compared.
+                // The column and row that are added to odd sides repeat the last ones. Only the given part is
+                // compared.
                 let rows = picture.chunks(width as usize * 3).take(size[1] as usize);
                 let given: Vec<u8> = rows.flat_map(|row| row[..size[0] as usize * 3].to_vec()).collect();
                 let true_frame = frame(size, i as u64);
                 let error = mean_error(&given, &true_frame);
                 assert!(error < VIDEO_ERROR, "{name} {size:?} frame {i}: {error}");
-                assert!(mean_error(&given, &frame(size, i as u64 + 1)) > error + 1.0, "it is this frame");
+                assert!(mean_error(&given, &frame(size, i as u64 + 1)) > error + 1.0, "the picture shows this frame");
                 let [mut sum, mut edge] = [[0i64; 3]; 2];
                 for (a, b) in given.as_chunks::<3>().0.iter().zip(true_frame.as_chunks::<3>().0) {
                     (0..3).for_each(|c| sum[c] += a[c] as i64 - b[c] as i64);
@@ -277,7 +279,7 @@ fn frames_that_are_not_as_announced_are_refused() {
     }
 }
 
-/// Runs of this process's that are called `ffmpeg…` below `dir`.
+/// Number of running processes with a path below `dir` on their command line.
 fn running(dir: &Path) -> usize {
     let lines =
         fs::read_dir("/proc").unwrap().flatten().filter_map(|e| fs::read(e.path().join("cmdline")).ok());
@@ -296,7 +298,7 @@ fn a_movie_given_up_leaves_nothing() {
         for i in 0..30 {
             movie.push(&frame(options.size, i)).unwrap();
         }
-        assert_eq!(names(dir.path()).len(), 2, "the old one and the one being made");
+        assert_eq!(names(dir.path()).len(), 2, "the old movie and the one being made");
         drop(movie);
         assert_eq!(names(dir.path()), [name]);
         assert_eq!(fs::read(&path).unwrap(), b"an older movie");
@@ -304,7 +306,7 @@ fn a_movie_given_up_leaves_nothing() {
     }
 }
 
-/// A program that says it can encode and then does `what`.
+/// A program that claims that it can encode, and then does `what`.
 fn fake(dir: &TempDir, what: &str) -> PathBuf {
     let path = dir.path().join("ffmpeg-fake");
     let script = format!(
@@ -345,7 +347,7 @@ fn an_ffmpeg_that_fails_tells_why_and_leaves_nothing() {
         assert!(e.to_string().contains(words) && !e.to_string().contains('\n'), "{what}: {e}");
         assert!(names(dir.path()).is_empty());
     }
-    // A hung one is ended with the movie, and does not hold up the drop.
+    // An encoder that hangs is ended with its movie and does not delay the drop.
     let program = fake(&tools, "exec tail -f /dev/null \"$0\"");
     let movie = Movie::create_with(&path, MovieKind::Mp4, &options, &program).unwrap();
     while running(tools.path()) == 0 {}
@@ -354,7 +356,7 @@ fn an_ffmpeg_that_fails_tells_why_and_leaves_nothing() {
     assert!(names(dir.path()).is_empty());
 }
 
-/// Stops whatever asks it.
+/// A monitor that stops the work at its first report.
 struct Stop;
 
 impl Monitor for Stop {
@@ -402,7 +404,7 @@ fn a_missing_ffmpeg_is_known_before_work() {
     }
 }
 
-/// Runs with a file system of `size` bytes mounted, where the rights to make one are there.
+/// Runs `test` on a mounted file system of `size` bytes, or skips it without the right to mount one.
 fn on_a_small_disk(size: u64, test: impl FnOnce(&Path)) {
     let dir = tempdir().unwrap();
     let mount = |args: &[&str]| Command::new(args[0]).args(&args[1..]).arg(dir.path()).status();
@@ -422,7 +424,7 @@ fn on_a_small_disk(size: u64, test: impl FnOnce(&Path)) {
 fn a_full_disk_is_an_error_and_leaves_nothing() {
     on_a_small_disk(64 << 10, |folder| {
         let size = [160, 120];
-        // Noise, which nothing compresses.
+        // Noise cannot be compressed.
         let mut state = 1u32;
         let mut noise = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -447,7 +449,7 @@ fn a_full_disk_is_an_error_and_leaves_nothing() {
 fn handles_and_threads_stay_flat_over_movies_and_frames() {
     let dir = tempdir().unwrap();
     let own = |movie: &Movie| {
-        // Other tests open files at the same time: only those of this folder are counted.
+        // Other tests open files at the same time, so only files of this folder are counted.
         let _ = movie;
         let links =
             fs::read_dir("/proc/self/fd").unwrap().flatten().filter_map(|e| fs::read_link(e.path()).ok());

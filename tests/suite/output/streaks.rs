@@ -1,4 +1,4 @@
-//! Streaks and flicker against gratings with known gradients.
+//! Streaks and flicker, tested on gratings with known gradients.
 
 use std::f64::consts::PI;
 use std::process::Command;
@@ -26,7 +26,8 @@ fn near(got: f64, want: f64, relative: f64) {
 #[test]
 fn a_slope_has_its_gradients() {
     let s = of(|x, y| 0.25 + 0.003 * x - 0.0005 * y, Window::whole(SIZE));
-    // Float32 of values up to 2.4 has steps of 2.4e-7, the sums of which end at both ends: 1e-3 of the smaller.
+    // Float32 values of up to 2.4 have steps of 2.4e-7. In the sums only the errors of both ends remain: 1e-3
+    // of the smaller gradient.
     near(s.across, 0.003, 1e-3);
     near(s.along, 0.0005, 1e-3);
     near(s.ratio.expect("it changes along the flow"), 6.0, 1e-3);
@@ -34,8 +35,9 @@ fn a_slope_has_its_gradients() {
 
 #[test]
 fn a_grating_has_the_gradients_of_its_waves() {
-    // The difference of neighbours of sin ωx is 2·sin(ω/2)·cos(ω(x+½)), its mean size 2/π of that; the other wave
-    // counts by the mean of its own size, 2/π, in both directions. Over n waves the means are good to 1/n.
+    // Neighbours of sin ωx differ by 2·sin(ω/2)·cos(ω(x+½)), whose mean size is 2/π of its amplitude. The
+    // other wave contributes its own mean size, 2/π, in both directions. Over n waves the means are good to
+    // 1/n.
     let (omega, upsilon) = (0.9, 0.13);
     let s = of(|x, y| (omega * x).sin() * (upsilon * y).sin(), Window::whole(SIZE));
     let two = (2.0 / PI).powi(2);
@@ -65,12 +67,13 @@ fn bands_are_the_region_and_each_has_its_own_streaks() {
     assert!(
         cut.windows(2).all(|w| w[0].bottom() == w[1].y) && cut.iter().all(|b| b.height.abs_diff(100) <= 1)
     );
-    // Threads that break up on the way down: every band's wave along the flow is twice as quick.
+    // Threads that break up on the way down: from band to band, the wave along the flow becomes twice as
+    // fast.
     let upsilon = |y: f64| 0.05 * f64::from(1 << cut.iter().filter(|b| f64::from(b.bottom()) <= y).count());
     for (k, band) in cut.iter().enumerate() {
         let s = of(|x, y| (0.9 * x).sin() * (upsilon(y) * y).sin(), *band);
         let want = (0.45f64).sin() / (0.025 * f64::from(1 << k)).sin();
-        // One to six waves in a band: its ends are up to a fifth of the sum.
+        // A band has one to six waves, so its ends are up to a fifth of the sum.
         near(s.ratio.expect("a number"), want, 0.2);
     }
 }
@@ -101,19 +104,20 @@ fn flicker_is_what_alternates_and_not_what_moves_steadily() {
         1e-6,
     );
     assert!(flicker(20, |t, i| 1.0 + 0.01 * t + i).expect("told") < 1e-6, "a drift");
-    // a·sin ωt through (−¼, ½, −¼) is sin²(ω/2) of it, its root mean square a/√2; over 2000 frames to 1e-3.
+    // The filter (−¼, ½, −¼) leaves sin²(ω/2) of a·sin ωt. Its root mean square is a/√2, over 2000 frames to
+    // 1e-3.
     for omega in [0.1f64, 1.0, 2.5] {
         let got = flicker(2000, |t, i| 3.0 + 0.3 * (omega * t + i).sin()).expect("told");
         near(got, 0.1 / 2f64.sqrt() * (omega / 2.0).sin().powi(2), 5e-3);
     }
     assert_eq!(flicker(2, |t, _| t), None, "two frames tell nothing");
-    assert_eq!(flicker(5, |_, _| 0.0), None, "nor does darkness");
+    assert_eq!(flicker(5, |_, _| 0.0), None, "darkness tells nothing");
 }
 
 #[test]
 fn luminance_is_of_linear_light() {
     assert!((luminance([1.0, 1.0, 1.0]) - 1.0).abs() < 1e-6);
-    // Half of the encoded range is 21.4 % of the light, IEC 61966-2-1.
+    // Half of the encoded range is 21.4 % of the light (IEC 61966-2-1).
     assert!((decoded(0.5) - 0.21404).abs() < 1e-5 && decoded(1.0) == 1.0 && decoded(0.0) == 0.0);
 }
 
@@ -123,7 +127,7 @@ fn the_command_line_tells_them_of_the_region_and_refuses_what_has_none() {
     let mut frame = Frame::new(64, 48, false);
     for t in 0..3u8 {
         for (i, pixel) in frame.picture.iter_mut().enumerate() {
-            // Threads on the left, cross-bars on the right; every frame a little brighter or darker.
+            // Threads on the left, cross-bars on the right. Every frame is a little brighter or darker.
             let (x, y) = (i % 64, i / 64);
             let on = if x < 32 { x % 2 == 0 } else { y % 2 == 0 };
             *pixel = [if on { 200 } else { 100 } + 20 * (t % 2) + (y / 8) as u8; 4];

@@ -1,4 +1,4 @@
-//! Bloom: its spread against closed forms, conservation of light, parity of the engines, and refusal for
+//! Bloom: its spread against closed forms, conservation of light, parity of the engines, and refusal of
 //! crops.
 
 use std::path::Path;
@@ -20,7 +20,7 @@ fn spread(radiance: &[[f32; 4]], width: usize, look: &Look) -> Vec<[f32; 4]> {
     (0..radiance.len()).map(|i| bloom.pixel(i)).collect()
 }
 
-/// Some bright and dark pixels, alike every time.
+/// Bright and dark pixels, the same in every run.
 fn noise(pixels: usize) -> Vec<[f32; 4]> {
     let value = |i: usize| ((i * 7919 + 13) % 101) as f32 / 101.0;
     (0..pixels).map(|i| [value(i), 3.0 * value(i + 1), if i % 37 == 0 { 50.0 } else { 0.0 }, 0.5]).collect()
@@ -40,11 +40,11 @@ fn a_points_light_is_spread_about_it_by_the_mean_of_the_octaves_variances_and_no
                 let of = [1.0, dx, dy, dx * dx, dy * dy];
                 (0..5).for_each(|k| moments[k] += f64::from(pixel[0]) * of[k]);
                 assert_eq!(pixel[1], 2.0 * pixel[0], "channels are alike");
-                assert_eq!((pixel[2], pixel[3]), (0.0, 1.0), "what is dark gets none of another colour");
+                assert_eq!((pixel[2], pixel[3]), (0.0, 1.0), "a dark channel gets no light from another");
             }
             let want: f64 =
                 (0..OCTAVES).map(|j| (radius / f64::from(1 << j)).powi(2)).sum::<f64>() / f64::from(OCTAVES);
-            // Float32 sums of some 10⁴ values; far ones count by the square of some 50 pixels.
+            // These are float32 sums of some 10⁴ values. Far values count with the square of some 50 pixels.
             assert!((moments[0] - 1.0).abs() < 1e-5, "light: {}", moments[0]);
             assert!(moments[1].abs() < 1e-3 && moments[2].abs() < 1e-3, "place: {moments:?}");
             for variance in [moments[3], moments[4]] {

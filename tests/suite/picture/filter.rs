@@ -50,7 +50,8 @@ fn samples_lie_as_densely_as_their_filter_weighs() {
             for (k, value) in values.into_iter().enumerate() {
                 let got = (0..N).map(|s| value(away(s))).sum::<f64>() / f64::from(N);
                 let want = mean(filter, value);
-                // An even sequence of N points: the discrepancy is some log N / N of the values' variation.
+                // For an even sequence of N points, the discrepancy is some log N / N of the values'
+                // variation.
                 assert!((got - want).abs() < 5e-3, "{filter:?}, axis {axis}, moment {k}: {got} for {want}");
             }
             assert!((0..N).all(|s| away(s).abs() <= FILTER_RADIUS), "{filter:?} ends");

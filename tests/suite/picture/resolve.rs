@@ -20,7 +20,7 @@ fn grey_stays_grey_and_more_light_is_never_darker_in_every_tone_curve() {
         for step in -1600..=1600 {
             let x = (step as f32 / 100.0).exp2();
             let [r, g, b] = of(tone, [x; 3]);
-            // The rows of AgX's published matrices sum to 1.0001: half a step of 255 may round either way.
+            // The rows of AgX's published matrices sum to 1.0001, so half a step of 255 may round either way.
             assert!(r.abs_diff(g) <= 1 && g.abs_diff(b) <= 1, "{tone:?} {x}: {r} {g} {b}");
             assert!(g >= last, "{tone:?}: {x} gives {g} after {last}");
             last = g;
@@ -32,10 +32,10 @@ fn grey_stays_grey_and_more_light_is_never_darker_in_every_tone_curve() {
 
 #[test]
 fn agx_shows_middle_grey_in_the_middle_and_is_white_four_stops_and_the_rest_above_it() {
-    // The curve's pivot: 0.18 is encoded as one half; the fit is good to some thousandths.
+    // At the curve's pivot, 0.18 is encoded as one half. The fit is good to some thousandths.
     let [_, grey, _] = of(Tone::Agx, [0.18; 3]);
     assert!(grey.abs_diff(128) <= 3, "{grey}");
-    // 4.026 stops above 1 the curve ends.
+    // The curve ends 4.026 stops above 1.
     let [_, bright, _] = of(Tone::Agx, [16.3; 3]);
     let [_, less, _] = of(Tone::Agx, [8.0; 3]);
     assert!(bright >= 254 && less < bright, "{less} {bright}");
@@ -52,12 +52,12 @@ fn agx_leads_a_saturated_light_to_white_where_filmic_keeps_it_saturated() {
 
 #[test]
 fn what_is_drawn_in_is_drawn_out_again() {
-    // One matrix undoes the other where the curve between them is straight: a nearly grey light keeps its tint. With one
-    // of them missing red and green are a fifth nearer to one another.
+    // Where the curve between the two matrices is straight, one undoes the other and a nearly grey light
+    // keeps its tint. Without one of them, red and green would be a fifth closer to each other.
     let [r, g, b] = of(Tone::Agx, [0.22, 0.18, 0.18]);
     // The curve's slope at middle grey is 2.06, over 16.5 stops.
     let want = (0.22f32 / 0.18).log2() * 2.06 / 16.5 * 255.0;
     let got = f32::from(r) - f32::from(g);
-    // Half a step of rounding each.
+    // Each of the two is rounded by up to half a step.
     assert!((got - want).abs() <= 1.0 && g.abs_diff(b) <= 1, "{r} {g} {b}: {got} for {want}");
 }

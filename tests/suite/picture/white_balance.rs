@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use taki::picture::white_balance::{matrix, white};
 
-/// Rec. 709 RGB from XYZ to four digits, IEC 61966-2-1.
+/// Rec. 709 RGB from XYZ, to four digits (IEC 61966-2-1).
 fn rgb_from_xyz(xyz: DVec3) -> DVec3 {
     DVec3::new(
         xyz.dot(DVec3::new(3.2406, -1.5372, -0.4986)),
@@ -25,8 +25,8 @@ fn at_6500_kelvin_without_tint_nothing_changes() {
 
 #[test]
 fn the_black_bodys_curve_goes_through_the_standard_illuminant_a() {
-    // CIE standard illuminant A is a black body of 2856 K: x 0.44757, y 0.40745. Krystek's fit is good to 9e-5 in
-    // u and v; the five digits are good to 1e-5 more.
+    // CIE standard illuminant A is a black body of 2856 K at x 0.44757, y 0.40745. Krystek's fit is good to
+    // 9e-5 in u and v. The five digits add an error of 1e-5.
     let uv = |xyz: DVec3| DVec2::new(4.0 * xyz.x, 6.0 * xyz.y) / xyz.dot(DVec3::new(1.0, 15.0, 3.0));
     let a = DVec3::new(0.44757, 0.40745, 1.0 - 0.44757 - 0.40745);
     let away = (uv(white(2856.0, 0.0)) - uv(a)).abs();
@@ -41,7 +41,7 @@ fn light_of_the_chosen_temperature_and_tint_becomes_that_of_6500_kelvin_at_the_s
     {
         let light = rgb_from_xyz(white(temperature.into(), f64::from(tint) * 1e-3));
         let seen = matrix(temperature, tint) * light;
-        // The matrix above has four digits; of a light with hardly any blue 1e-4 of it become 1e-3.
+        // The matrix above has four digits. For a light with hardly any blue, its 1e-4 become 1e-3.
         assert!((seen - neutral).abs().max_element() < 3e-3, "{temperature} K, {tint}: {seen} for {neutral}");
         assert!((luminance(seen) - luminance(neutral)).abs() < 1e-3);
     }

@@ -1,4 +1,5 @@
-//! Rock and pools: closed forms of how they shade, get wet and mirror (float64), and parity of the engines.
+//! Rock and pools: closed forms (float64) of their shading, wetness and reflection, and parity of the
+//! engines.
 
 pub mod tiles;
 
@@ -27,7 +28,8 @@ fn of(text: &str) -> Scene {
     read(text).expect("a valid scene")
 }
 
-/// A smooth floor of 20 m × 20 m around the origin, and a wall of height 4 m on its line x = 0 that faces +x.
+/// A smooth floor of 20 m × 20 m around the origin, with a wall of height 4 m on its line x = 0 that faces
+/// +x.
 fn floor_and_wall(more: &str) -> Scene {
     let rock = "amplitude = 0.0\nlevels = 7\ncavity = 0.0\ncolor_noise = 0.0\n";
     of(&format!(
@@ -56,9 +58,10 @@ fn a_wall_hides_of_the_sky_what_its_form_factor_says() {
     for vertex in floor {
         let [x, _, z] = vertex.position;
         if (0.8..6.0).contains(&x) && z.abs() < 3.0 {
-            // Of an endless wall (Howell, Mengüç, Daun and Siegel 2020, A-1): ½(1 − x/√(x² + h²)).
+            // Share of an endless wall (Howell, Mengüç, Daun and Siegel 2020, A-1): ½(1 − x/√(x² + h²)).
             let truth = 0.5 * (1.0 - x / (x * x + 16.0).sqrt());
-            // 48 directions: those that meet the wall's edge weigh up to 1/24 each, some two or three at once.
+            // Each of the 48 directions that meets the wall's edge weighs up to 1/24, and two or three may do
+            // so at once.
             assert!((vertex.occlusion - truth).abs() < 0.06, "{x} {z}: {} {truth}", vertex.occlusion);
             seen += 1;
         }
@@ -72,7 +75,7 @@ fn a_wall_throws_a_shadow_as_long_as_it_is_high_when_the_sun_stands_at_45_degree
     let (mut dark, mut light) = (0, 0);
     for vertex in floor {
         let [x, _, z] = vertex.position;
-        // A cell of the map is 8 cm here, and the point looked up lies off the floor by 1½ cells.
+        // A cell of the map is 8 cm here, and the point that is looked up lies 1½ cells off the floor.
         if z.abs() < 9.0 && (0.5..3.6).contains(&x) {
             assert!((vertex.shadow - 0.7).abs() < 1e-6, "{x} {z}: {}", vertex.shadow);
             dark += 1;
@@ -102,7 +105,7 @@ fn a_film_sends_back_what_gets_out_after_all_its_inner_reflections() {
             on_rock *= dry * inside;
         }
         let wet = f64::from(wet_albedo(Vec3::splat(dry as f32)).x);
-        // The film's constants have three digits.
+        // The constants of the film have three digits.
         assert!(close(wet, sum, 5e-3, 1e-9), "{dry}: {wet} {sum}");
         assert!(wet < dry || dry == 0.0);
     }
@@ -145,7 +148,7 @@ fn ridges_never_stand_higher_than_where_their_field_is_zero() {
 #[test]
 fn beds_lie_level_or_as_they_are_tilted() {
     let side = 129;
-    // Variance of the means along rows (level lines), and along columns.
+    // Variance of the means along rows (level lines) and along columns.
     let variances = |tilt: f32| {
         let rock = wall(&format!("amplitude = 0.0\nstrata = 1.0\nstrata_height = 1.0\nstrata_tilt = {tilt}"));
         let mean = |of: &dyn Fn(usize, usize) -> usize| -> f32 {
@@ -175,7 +178,7 @@ const POOL: &str = "[pools.p]\ncorners = [[-9,0,9],[9,0,9],[9,0,-9],[-9,0,-9]]\n
 const VIEW: &str = "[camera]\neye = [0.5, 3, 12]\ntarget = [0, 0, 0]\n[image]\nwidth = 64\nheight = 48\nsamples = 1\n\
      [background]\nzenith = [0.1, 0.4, 1.0]\nhorizon = [0.9, 0.7, 0.5]\n";
 
-/// Radiance and the depth of every pixel that shows the pool.
+/// Radiance and depth, and coordinates, of every pixel that shows the pool.
 fn pixels(scene: &Scene) -> Vec<([f32; 4], [u32; 2])> {
     let targets = gbuffer::run(scene, &scene.mesh(), 0);
     let place = |i: usize| [i as u32 % 64, i as u32 / 64];
@@ -247,13 +250,13 @@ fn waves_have_the_variance_that_is_asked_for_and_close_with_the_flow() {
         .map(|w| (f64::from(w.slope / w.k) / std::f64::consts::TAU).powi(2) / 2.0)
         .sum();
     assert!(close(variance.sqrt(), 0.05, 1e-5, 0.0), "{variance}");
-    assert!(still == at(1.0) && still == at(7.0), "whole flows are the same");
+    assert!(still == at(1.0) && still == at(7.0), "whole lengths of flow change nothing");
     assert!(still != at(0.5));
     for (a, b) in still.waves.iter().zip(at(0.125).waves).filter(|(a, _)| a.k > 0.0) {
         let moved = (a.phase - b.phase - 0.125 * turns(1.0 / a.k, 3.0)).rem_euclid(1.0);
         assert!(moved.min(1.0 - moved) < 1e-4, "{a:?}");
     }
-    // 1 m: √(9.81·2π)/2π = 1.249 turns a second.
+    // A wave of 1 m makes √(9.81·2π)/2π = 1.249 turns a second.
     assert_eq!((turns(1.0, 10.0), turns(1.0, 0.01)), (12.0, 1.0));
 }
 
@@ -271,7 +274,7 @@ fn foam_is_where_water_falls_in_and_rings_run_from_there() {
     let rings: Vec<_> = surface(&scene).waves.into_iter().filter(|w| w.ring == 1.0).collect();
     assert!(rings.len() == 2 && rings.iter().all(|w| w.toward == [0.0, -2.0]), "{rings:?}");
     let dry = of(&format!("{POOL}{}", fall.replace("-1,-2", "1,-2")));
-    assert!(surface(&dry).waves.iter().all(|w| w.ring == 0.0), "this one ends above the pool");
+    assert!(surface(&dry).waves.iter().all(|w| w.ring == 0.0), "this quad ends above the pool");
     assert_eq!(surface(&dry).waves.len(), WAVES);
 }
 
@@ -294,7 +297,7 @@ fn the_lobe_of_a_film_sends_back_no_more_than_fresnel_allows() {
     for degrees in [0.0f32, 30.0, 60.0] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let l = Vec3::new(sin, cos, 0.0);
-        // The mean of the lobe over all views; its light is π of the irradiance.
+        // The mean of the lobe over all views. Its light is π times the irradiance.
         let (mut sum, count) = (0.0f64, 400);
         for i in 0..count {
             for j in 0..count {
@@ -304,7 +307,7 @@ fn the_lobe_of_a_film_sends_back_no_more_than_fresnel_allows() {
             }
         }
         let share = 2.0 * sum / f64::from(count * count);
-        // (s + 8)/8π for the exact (s + 2)(s + 4)/8π(s + 2^(−s/2)).
+        // The lobe uses (s + 8)/8π instead of the exact (s + 2)(s + 4)/8π(s + 2^(−s/2)).
         let normalised = 40.0 / 38.25;
         assert!(share < 1.001 * normalised * f64::from(opaque::fresnel(cos)), "{degrees}: {share}");
         if degrees == 0.0 {
@@ -337,8 +340,9 @@ fn small_seen_from(eye: &str, target: &str, more: &str) -> Scene {
 fn the_engines_agree_on_pools_and_on_wet_and_shaded_rock() {
     let Some(mut renderer) = renderer("place") else { return };
     for more in ["", "[environment]\nkind = \"sky\"\nlights = 3\n"] {
-        // Near the water, and far off without foam: there a pixel holds several of the triangles it is mixed over,
-        // and the engines' interpolations differ by more than their shading may.
+        // The first view is far off and without foam, because there a pixel holds several of the triangles
+        // that it interpolates, and the engines' interpolations differ by more than their shading may. The
+        // second view is near the water.
         let mut scene = small(more);
         scene.edit().pools[0].foam = 0.0;
         assert_parity(more, &both(&mut renderer, &scene));
@@ -353,7 +357,7 @@ fn where_only_waves_move_the_kept_place_has_the_bits_of_one_drawn_anew() {
     let Some(mut keeping) = renderer("waves") else { return };
     let Some(mut fresh) = renderer("waves") else { return };
     let options = RenderOptions { keep_rasters: 64 << 20, ..SURFACE };
-    // One sheet, and two behind one another; without and with an environment.
+    // One sheet, two sheets behind one another, and an environment.
     let behind = "[[quads]]\ncorners = [[-1,4,-2.4],[1,4,-2.4],[1,-0.5,-1.9],[-1,-0.5,-1.9]]\n";
     for (more, layers) in [("", 1), (behind, 2), ("[environment]\nkind = \"sky\"\nlights = 3\n", 1)] {
         let scene = small(more);
@@ -391,7 +395,7 @@ fn no_rock_in_view_is_left_out_wherever_the_eye_is() {
     ];
     for (eye, target, fov) in views {
         let mut scene = small_seen_from(eye, target, "");
-        // 32,768 triangles, 97 parts, in the larger of the two.
+        // The larger of the two rocks has 32,768 triangles in 97 parts.
         scene.edit().rocks.iter_mut().for_each(|rock| rock.levels = 7);
         scene.edit().camera.tan_half_fov = (0.5 * f32::to_radians(fov)).tan();
         scene.edit().image.samples = 1;
@@ -401,7 +405,7 @@ fn no_rock_in_view_is_left_out_wherever_the_eye_is() {
         let on_cpu = cpu::render(&scene, &volume, &mesh, true, &Unwatched).expect("a frame");
         let far = |frame: &Frame| frame.surface.as_ref().expect("asked for").depth.clone();
         let (a, b) = (far(&on_gpu), far(&on_cpu));
-        // The engines' rounding may give a pixel on a silhouette to what is behind it; a part covers hundreds.
+        // Rounding may give a pixel on a silhouette to what lies behind it. A part covers hundreds of pixels.
         let differ = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * b.abs().max(0.1)).count();
         assert!(differ * 200 <= a.len(), "{eye} to {target}: {differ} of {} pixels", a.len());
         assert!(b.iter().filter(|d| **d > 0.0).count() * 10 > b.len(), "{eye}: rock is seen");

@@ -29,7 +29,7 @@ fn grid(squares: u32, size: f32, height: impl Fn(u32, u32) -> f32) -> Mesh {
     Mesh::new(rows.map(|(x, y)| vertex(x, y)).collect(), [squares])
 }
 
-/// A cliff whose parts are near and far, smooth and rough.
+/// A cliff with near and far, smooth and rough parts.
 fn cliff(more: &[&str]) -> Scene {
     let mut sets: Vec<&str> = vec![
         "rocks.wall.levels=6",
@@ -53,7 +53,7 @@ fn chosen(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
     steps(&mesh.tiles, &scene.camera, &scene.image)
 }
 
-/// Random steps, those of neighbours one apart at most.
+/// Random steps; those of neighbours differ by one level at most.
 fn random_steps(mesh: &Mesh, random: &mut Pcg64Mcg) -> Vec<u32> {
     let mut steps: Vec<u32> = mesh.tiles.iter().map(|t| t.side.min(1 << random.random_range(0..5))).collect();
     for _ in 0..5 {
@@ -87,7 +87,7 @@ fn tiles_of_any_steps_cover_their_grid_once_and_leave_no_cracks() {
                 }
             }
             assert_eq!(doubled, 2.0 * (squares * squares) as f32);
-            // Every edge is met once in each direction, but for those around the grid.
+            // Every edge occurs once in each direction, except the edges around the grid.
             for (&(from, to), &count) in &edges {
                 let side = squares as f32;
                 let [a, b] = [from, to].map(|i| Vec2::from_slice(&mesh.vertices[i as usize].position));
@@ -103,19 +103,19 @@ fn tiles_of_any_steps_cover_their_grid_once_and_leave_no_cracks() {
 
 #[test]
 fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
-    // Every other column is h metres out. With step s, of s + 1 columns s/2 are missed by h: the root of the mean square
-    // is h·√(s/(2(s + 1))), above h/3, the third of the most.
+    // Every other column stands out by h metres. With step s, s/2 of s + 1 columns are missed by h. The root
+    // mean square is h·√(s/(2(s + 1))), which is above h/3, a third of the largest loss.
     let h = 0.01;
     let loss = |s: f64| h * (s / (2.0 * (s + 1.0))).sqrt();
     let mesh = grid(16, 1.0, |x, _| if x % 2 == 1 { h as f32 } else { 0.0 });
     let mut scene = cliff(&[]);
     (scene.edit().image.height, scene.edit().image.samples, scene.edit().image.rock_error) = (1000, 1, 1.0);
-    // Far off and along the grid: f·loss/distance pixels.
+    // From far off and along the grid, the loss is f·loss/distance pixels.
     let distance = 1e4;
     scene.edit().camera.eye = glam::Vec3::new(0.5 - distance as f32, 0.5, 0.0);
     scene.edit().camera.forward = glam::Vec3::X;
     let mut step = |lost_pixels: f64, samples: u32, error: f32| {
-        // A step of 2 moves points by so many pixels.
+        // With this focal length, a step of 2 moves points by `lost_pixels`.
         let focal = lost_pixels * distance / loss(2.0);
         scene.edit().camera.tan_half_fov = (500.0 / focal) as f32;
         (scene.edit().image.samples, scene.edit().image.rock_error) = (samples, error);
@@ -128,23 +128,24 @@ fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
     assert_eq!(step(0.99 * of(4.0), 1, 1.0), 4);
     assert_eq!(step(0.99 * of(8.0), 1, 1.0), 8);
     assert_eq!(step(0.99 * of(16.0), 1, 1.0), 16);
-    // Four samples are half as far from one another.
+    // With four samples, a sample is half as far from the next.
     assert_eq!((step(0.99, 4, 1.0), step(0.505, 4, 1.0), step(0.495, 4, 1.0)), (1, 1, 2));
     assert_eq!((step(1.98, 1, 2.0), step(2.02, 1, 2.0), step(0.99, 1, 0.0)), (2, 1, 1));
-    // Seen from straight above nothing of it moves.
+    // Seen from straight above, no point moves.
     (scene.edit().image.samples, scene.edit().image.rock_error) = (1, 1.0);
     scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, distance as f32);
     scene.edit().camera.forward = glam::Vec3::NEG_Z;
     scene.edit().camera.tan_half_fov = (500.0 * loss(2.0) / (4.0 * distance)) as f32;
     assert_eq!(chosen(&scene, &mesh), [16]);
-    // What the eye is in, or beside, is whole.
+    // A tile that the eye is in or beside is drawn whole.
     scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, 0.005);
     assert_eq!(chosen(&scene, &mesh), [1]);
 }
 
 #[test]
 fn one_stone_that_stands_out_alone_is_kept() {
-    // Of 289 vertices one is 0.3 m out: the mean square is small, a third of the most is not.
+    // One of 289 vertices stands out by 0.3 m. The mean square is small, but a third of the largest loss is
+    // not.
     let mesh = grid(16, 1.0, |x, y| if (x, y) == (7, 7) { 0.3 } else { 0.0 });
     let mut scene = cliff(&[]);
     scene.edit().camera.eye = glam::Vec3::new(-1e4, 0.5, 0.0);
@@ -172,7 +173,7 @@ fn triangles_grow_with_distance_and_all_are_drawn_for_many_samples() {
     many.edit().image.samples = 4096;
     assert_eq!(count(&many), all);
     assert_eq!(count(&cliff(&["image.rock_error=0"])), all);
-    // Neighbours are one step apart at most, and pools are whole.
+    // Neighbours differ by one level at most, and pools are drawn whole.
     for scene in [&near, &far, &small] {
         let steps = chosen(scene, &mesh);
         for (i, tile) in mesh.tiles.iter().enumerate() {
@@ -204,7 +205,7 @@ fn a_place_has_the_values_of_the_vertices_around_it() {
 #[test]
 fn the_engines_agree_on_rock_of_mixed_steps() {
     let Some(mut renderer) = renderer("tiles") else { return };
-    // Without foam, which changes more within a pixel than engines interpolate alike.
+    // Foam is left out, because it varies more inside a pixel than the engines interpolate alike.
     let scene = cliff(&["image.rock_error=2", "pools.plunge.foam=0"]);
     let steps = chosen(&scene, &scene.mesh());
     assert!([1, 2, 4].iter().all(|step| steps.contains(step)), "{steps:?}");
@@ -252,7 +253,7 @@ fn fewer_triangles_change_the_picture_of_rock_by_less_than_an_eye_finds() {
         frame.iter().map(|p| f64::from(p[0] + p[1] + p[2])).sum::<f64>() / frame.len() as f64
     };
     assert_ne!(all, few);
-    // Neither darker nor brighter, by a step of eight bits: the shares of light come from all vertices.
+    // The mean changes by less than a step of eight bits, because the shares of light come from all vertices.
     let (a, b) = (mean(&all), mean(&few));
     assert!((a - b).abs() < a / 256.0, "{a} {b}");
 }

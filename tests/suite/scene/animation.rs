@@ -42,7 +42,7 @@ fn keyframes_are_met_and_between_them_lies_what_was_asked_for() {
     assert_eq!(float(&track("linear", ""), 25, "trace.tau"), 2.75);
     assert_eq!(float(&track("hold", ""), 19, "trace.tau"), 1.0);
     assert_eq!(float(&track("hold", ""), 39, "trace.tau"), 3.0);
-    // With slopes of nothing at both ends the cubic is 3s² − 2s³.
+    // With slopes of zero at both ends, the cubic is 3s² − 2s³.
     assert_eq!(float(&track("smooth", ""), 15, "trace.tau"), 2.0);
     let quarter = 1.0 + 2.0 * (3.0 * 0.04 - 2.0 * 0.008);
     assert!((float(&track("smooth", ""), 12, "trace.tau") - quarter).abs() < 1e-6);
@@ -57,7 +57,7 @@ fn a_smooth_track_never_overshoots_and_has_no_corner() {
     .unwrap();
     let values: Vec<f32> = (0..=160).map(|f| float(&a, f, "trace.tau")).collect();
     assert!(values[..=120].is_sorted() && values[120..].is_sorted_by(|a, b| a >= b), "{values:?}");
-    // A corner of a straight-line track would turn the slope by 0.09 at once, at frame 80.
+    // At frame 80, a corner of a straight-line track would change the slope by 0.09 at once.
     for w in values.windows(3) {
         assert!((w[2] - 2.0 * w[1] + w[0]).abs() < 0.02, "{w:?}");
     }
@@ -83,7 +83,7 @@ fn the_water_flows_by_itself_and_a_loop_of_it_closes_exactly() {
     let a = animation("[animate]\nfps = 10.0\nspeed = 0.5\n[volume]\nflow = 0.25\n").unwrap();
     assert_eq!(float(&a, 0, "volume.flow"), 0.25);
     assert_eq!(float(&a, 10, "volume.flow"), 0.75);
-    // 2.4 s of half a length make 1.2 lengths: in a loop one.
+    // 2.4 s at half a length a second make 1.2 lengths. A loop rounds that to one.
     let a = animation("[animate]\nfps = 10.0\nspeed = 0.5\nloop = 24\n").unwrap();
     assert_eq!(a.frames, 24);
     assert_eq!(float(&a, 12, "volume.flow"), 0.5);
@@ -92,7 +92,7 @@ fn the_water_flows_by_itself_and_a_loop_of_it_closes_exactly() {
         assert_eq!(a.at(frame).unwrap().to_toml(), a.at(frame + 24).unwrap().to_toml());
         assert_eq!(a.at(frame).unwrap().to_toml(), a.at(frame + 24_000_000).unwrap().to_toml());
     }
-    // Slow water still moves, and upwards too.
+    // Slow water still moves, also upwards.
     let flow = |speed: &str| {
         let a = animation(&format!("[animate]\nspeed = {speed}\nloop = 24\n")).unwrap();
         float(&a, 12, "volume.flow")
@@ -105,7 +105,7 @@ fn the_water_flows_by_itself_and_a_loop_of_it_closes_exactly() {
 #[test]
 fn a_track_of_a_loop_comes_round() {
     let a = track("linear", "loop = 60");
-    // From 2 at 40 back to 1 at 60 + 10.
+    // The track runs from 2 at frame 40 back to 1 at frame 60 + 10.
     for (frame, value) in [(40, 2.0), (55, 1.5), (60, 1.0 + 10.0 / 30.0), (0, 1.0 + 10.0 / 30.0), (70, 1.0)] {
         assert!((float(&a, frame, "trace.tau") - value).abs() < 1e-6, "{frame}");
     }
@@ -152,7 +152,7 @@ fn a_path_goes_through_its_points_smoothly() {
     }
     let steps: Vec<Vec3> = (0..90).map(|f| eye(f + 1) - eye(f)).collect();
     for (f, w) in steps.windows(2).enumerate() {
-        // At rest at both ends; elsewhere neither speed nor direction jump.
+        // The camera rests at both ends. Elsewhere neither its speed nor its direction jumps.
         assert!((w[1] - w[0]).length() < 0.12, "{f}: {w:?}");
     }
     assert!(steps[0].length() < 0.2 && steps[45].length() > 0.4);
@@ -166,7 +166,8 @@ fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
     let steps: Vec<Vec3> = (0..80).map(|f| eye(f + 1) - eye(f)).collect();
     let turn = |a: Vec3, b: Vec3| a.angle_between(b).to_degrees();
     for f in 0..80 {
-        // Four points of a circle: a step turns by 4.5° on average, at the points by more; straight lines would turn by 90°.
+        // The path has four points of a circle. A step turns by 4.5° on average, and by more at the points.
+        // With straight lines it would turn by 90°.
         let angle = turn(steps[f], steps[(f + 1) % 80]);
         assert!(angle < 15.0, "{f}: {angle}");
         assert!((8.5..10.1).contains(&eye(f as u32).length()), "{f}: {}", eye(f as u32));
@@ -185,7 +186,7 @@ fn a_frame_is_a_scene_of_its_own() {
     let again =
         Animation::new("s", source(&scene.to_toml()).values().unwrap(), None, &Limits::default()).unwrap();
     assert_eq!(again.at(0).unwrap().to_toml(), scene.to_toml());
-    // And so is the animation.
+    // The animation as a whole can be written and read back, too.
     let whole =
         animation("[[animate.tracks]]\nkey = \"curves.h\"\nframes = [0, 12]\nvalues = [0.5, 1.5]\n").unwrap();
     let printed =
@@ -230,7 +231,7 @@ fn what_cannot_move_is_refused_with_the_reason() {
         let error = result.expect_err(words);
         assert!(error.contains(words), "no {words:?} in: {error}");
     }
-    // A frame that cannot be seen tells its number.
+    // The error of a frame that cannot be rendered names the frame.
     let a = animation(
         "[[animate.tracks]]\nkey = \"camera.eye\"\nframes = [0, 10]\nvalues = [[0, 0, 5], [0, -1.5, -5]]\n",
     )

@@ -9,8 +9,8 @@ use rand::{RngExt, SeedableRng};
 use taki::light::scatter::slab::{Slab, exponential_integrals};
 use taki::light::scatter::{Profile, Row, Scattering};
 
-/// H of Chandrasekhar's for isotropic scattering, by iterating
-/// 1/H(μ) = √(1−ω) + (ω/2) ∫ μ' H(μ') / (μ + μ') dμ' ("Radiative Transfer", 1950, V §38), 1000 midpoints.
+/// Chandrasekhar's H for isotropic scattering, by iteration of 1/H(μ) = √(1−ω) + (ω/2) ∫ μ' H(μ') / (μ + μ')
+/// dμ' ("Radiative Transfer", 1950, V §38) with 1000 midpoints.
 pub fn h_function(omega: f64, mu: f64) -> f64 {
     let n = 1000;
     let node = |i: usize| (i as f64 + 0.5) / n as f64;
@@ -25,13 +25,14 @@ pub fn h_function(omega: f64, mu: f64) -> f64 {
     next(&h, mu)
 }
 
-/// Fluxes of J (units of E/4π) out of both faces over the beam's π·E·μ₀/π, and what the beam itself carries through.
+/// Fluxes of J (in units of E/4π) out of both faces, relative to the beam's flux π·E·μ₀/π. The second
+/// includes the light that the beam itself carries through.
 fn reflected_and_transmitted(slab: &Slab, omega: f64, j: &[f64], mu_0: f64) -> [f64; 2] {
     let x = slab.boundaries[j.len()];
     let e3 = |t: f64| exponential_integrals(t)[2];
     let mut out = [0.0, (-x / mu_0).exp()];
     for (layer, j) in slab.boundaries.windows(2).zip(j) {
-        // Flux = 2π ω ∫ J E₂, J = j·E/4π.
+        // Flux = 2π ω ∫ J E₂, with J = j·E/4π.
         out[0] += 0.5 * omega * j * (e3(layer[0]) - e3(layer[1])) / mu_0;
         out[1] += 0.5 * omega * j * (e3(x - layer[1]) - e3(x - layer[0])) / mu_0;
     }
@@ -56,7 +57,7 @@ fn exponential_integrals_are_those_of_abramowitz_and_stegun() {
         assert!((got - want).abs() < 1e-7f64.min(1e-6 * want.max(0.06)), "E{n}({x}) = {got}");
     }
     assert_eq!(exponential_integrals(0.0)[1..], [1.0, 0.5]);
-    // Both forms meet at 1.
+    // Both forms agree at 1.
     let [below, above] = [1.0 - 1e-12, 1.0 + 1e-12].map(exponential_integrals);
     assert!(below.iter().zip(above).all(|(a, b)| (a - b).abs() < 1e-11));
 }
@@ -70,7 +71,7 @@ fn a_slab_that_absorbs_nothing_sends_all_light_back() {
             let sum: f64 = reflected_and_transmitted(&slab, 1.0, j, mu_0).iter().sum();
             assert!((sum - 1.0).abs() < 1e-8, "X = {x}, μ₀ = {mu_0}: {sum}");
         }
-        // With an albedo below 1 some is lost.
+        // With an albedo below 1, some light is lost.
         let j = slab.mean_intensity(0.9, &mu_0);
         let sum: f64 = reflected_and_transmitted(&slab, 0.9, &j[2], 1.0).iter().sum();
         assert!(sum < 1.0 - 0.05 * x.min(1.0), "{sum}");
@@ -79,8 +80,8 @@ fn a_slab_that_absorbs_nothing_sends_all_light_back() {
 
 #[test]
 fn diffuse_light_passes_a_slab_as_heaslet_and_warming_found() {
-    // Int. J. Heat Mass Transfer 8, 979 (1965): flux between two walls through a grey medium in equilibrium, which
-    // is a slab of albedo 1 under diffuse light.
+    // Int. J. Heat Mass Transfer 8, 979 (1965): flux between two walls through a grey medium in equilibrium,
+    // which equals a slab of albedo 1 under diffuse light.
     let table = [
         (0.1, 0.9157),
         (0.2, 0.8491),
@@ -98,20 +99,20 @@ fn diffuse_light_passes_a_slab_as_heaslet_and_warming_found() {
         let through =
             |(j, mu): (&Vec<f64>, &f64)| 2.0 * mu * reflected_and_transmitted(&slab, 1.0, j, *mu)[1];
         let got = solved.iter().zip(&mu_0).map(through).sum::<f64>() / n as f64;
-        // Constant layers of ¼ let h²/4 = 1.6 % too much of a flux through; the table has four digits.
+        // Constant layers of ¼ let h²/4 = 1.6 % too much flux through. The table has four digits.
         assert!(got - want < 0.016 * want && got - want > -1e-4, "X = {x}: {got}, not {want}");
     }
 }
 
 #[test]
 fn the_lit_face_of_a_deep_slab_is_chandrasekhars_h() {
-    // Table XI: H(1) = 2.9078 at albedo 1; there light comes back from any depth, and the slab's 64 are not without end.
+    // Table XI: H(1) = 2.9078 at albedo 1. There light returns from any depth, but the slab is only 64 deep.
     assert!((h_function(1.0, 1.0) - 2.9078).abs() < 0.005);
     for (omega, allowed) in [(0.3, 0.003), (0.9, 0.003), (1.0, 0.03)] {
         let slab = Slab::new(64.0);
         for mu_0 in [0.1, 0.5, 1.0] {
             let j = &slab.mean_intensity(omega, &[mu_0])[0];
-            // J(0) = E/4π · H(μ₀), and the beam's own part of it is 1.
+            // J(0) = E/4π · H(μ₀), of which the beam's own part is 1.
             let diffuse: f64 = slab.weights(0.0).iter().zip(j).map(|(w, j)| omega * w * j).sum();
             let want = h_function(omega, mu_0) - 1.0;
             assert!(
@@ -132,24 +133,25 @@ fn a_profile_knows_the_lit_face_the_cosine_and_the_albedo() {
     let [front, back] = [1.0, -1.0].map(|l_n| [0, 4].map(|z| of(Vec3::ONE, 0.0, l_n, z).x));
     assert!(
         front[0] > 1.5 * front[1] && back[1] > 1.5 * back[0],
-        "the lit side is the brighter: {front:?} {back:?}"
+        "the lit side is brighter: {front:?} {back:?}"
     );
-    // Turning the slab over is lighting it from behind.
+    // Turning the slab over equals lighting it from behind.
     let turned: Vec<f64> = depths.iter().rev().copied().collect();
     let over = Profile::new(&turned, &Scattering { albedo: Vec3::ONE, g: 0.0 });
     for z in 0..5 {
         let mirrored = over.at(&Row::new(-0.4, 5), 4 - z);
         assert!((mirrored - of(Vec3::ONE, 0.0, 0.4, z)).abs().max_element() < 1e-6);
     }
-    // Grazing light enters little; at the rows nothing is interpolated, between them they join.
+    // Grazing light hardly enters. At the rows nothing is interpolated; between them the values join.
     assert_eq!(of(Vec3::ONE, 0.0, 0.0, 0), Vec3::ZERO);
     assert!(of(Vec3::ONE, 0.0, 0.05, 2).x < 0.2 * of(Vec3::ONE, 0.0, 0.8, 2).x);
-    // Two scatterings at least: it falls faster than the albedo. Colours are their own.
+    // The light was scattered at least twice, so it falls faster than the albedo. Colours do not mix.
     let coloured = of(Vec3::new(1.0, 0.5, 0.0), 0.0, 1.0, 2);
     assert_eq!(coloured.x, of(Vec3::ONE, 0.0, 1.0, 2).x);
     assert_eq!(coloured.y, of(Vec3::splat(0.5), 0.0, 1.0, 2).x);
     assert!(coloured.y < 0.25 * coloured.x && coloured.z == 0.0);
-    // Similarity: without absorption a slab of mean cosine g is one of 1 − g times the depth.
+    // Similarity: without absorption, a slab of mean cosine g equals an isotropic slab of 1 − g times its
+    // depth.
     let thin: Vec<f64> = depths.iter().map(|depth| 0.25 * depth).collect();
     let thin = Profile::new(&thin, &Scattering { albedo: Vec3::ONE, g: 0.0 });
     let mut differs = false;
@@ -165,13 +167,13 @@ fn a_profile_knows_the_lit_face_the_cosine_and_the_albedo() {
 
 #[test]
 fn kajiya_and_kays_albedo_is_pi_k_d_and_below_one() {
-    // ⟨sin⟩ over the sphere is π/4, and Ψ/π over all eyes is 4 of it.
+    // ⟨sin⟩ over the sphere is π/4. Ψ/π over all eyes is 4 times that.
     let diffuse = Scattering::kajiya_kay(0.25, 0.0, 12.0, 0.99);
     assert!((diffuse.albedo.x as f64 - 0.25 * PI).abs() < 1e-3 && diffuse.g.abs() < 1e-3);
     let both = Scattering::kajiya_kay(0.1, 0.2, 12.0, 0.99);
     let plain = Scattering::kajiya_kay(0.1, 0.0, 12.0, 0.99);
     assert!(both.albedo.x > plain.albedo.x && both.albedo.x < 1.0);
-    // (t·l)² of the light goes on along the cone: a third of the specular part, on the mean.
+    // A part (t·l)² of the light continues along the cone: on average a third of the specular part.
     assert!(both.g > 0.05 && both.g < 0.34, "{}", both.g);
     assert_eq!(Scattering::kajiya_kay(0.5, 0.5, 12.0, 0.99).albedo, Vec3::splat(0.99));
 }
@@ -192,7 +194,7 @@ fn the_path_tracers_single_scattering_is_the_closed_form() {
             let phi = super::tracer::henyey_greenstein(g, -l.dot(e));
             let pixels = medium.render([e, l], 0.9, Phase::HenyeyGreenstein(g), 4, 20_000);
             let got = pixels.iter().map(|p| p.single).sum::<f64>() / 16.0;
-            // 320,000 paths whose spread is no more than their mean: 0.18 % at one sigma.
+            // With 320,000 paths whose spread is at most their mean, one sigma is 0.18 %.
             let want = 0.9 * PI * phi * share;
             assert!((got / want - 1.0).abs() < 0.007, "g {g}: {got}, not {want}");
         }
@@ -216,9 +218,10 @@ fn the_path_tracer_sees_h_times_h_over_a_deep_slab() {
 
 #[test]
 fn the_path_tracer_loses_no_light() {
-    // R + T + beam = 1: radiance over both hemispheres, directions by their cosine, light at 50°.
+    // R + T + beam = 1. The radiance covers both hemispheres, directions are weighted by their cosine, and
+    // the light stands at 50°.
     let mut medium = Medium::uniform(6, 0.5, 1.0);
-    // Clumps must not matter, nor what function scatters.
+    // Neither clumps nor the phase function may matter.
     for (i, sigma) in medium.sigma.iter_mut().enumerate() {
         *sigma *= [0.2, 3.0, 0.0, 0.8][(i * 7 / 3) % 4];
     }
@@ -236,7 +239,7 @@ fn the_path_tracer_loses_no_light() {
         let directions = 600;
         let mut sum = 0.0;
         for i in 0..directions {
-            // cos² is spread evenly.
+            // Even steps of cos² weight the directions by their cosine.
             let cos = ((i as f64 + 0.5) / directions as f64).sqrt();
             let turn = i as f64 * 2.399_963;
             let sin = (1.0 - cos * cos).sqrt();
@@ -246,9 +249,9 @@ fn the_path_tracer_loses_no_light() {
                 sum += pixels.iter().map(|p| p.single + p.multiple).sum::<f64>() / 4.0;
             }
         }
-        // ∫ L cosθ dω = π·mean(L); the light brings E·μ₀ = π·I·μ₀.
+        // ∫ L cosθ dω = π·mean(L). The light brings E·μ₀ = π·I·μ₀.
         let whole = sum / directions as f64 / l.z.abs() + beam;
-        // 192,000 paths of a spread of about 2 (their values reach some I): 0.5 % at one sigma.
+        // With 192,000 paths and a spread of about 2 (their values reach a few I), one sigma is 0.5 %.
         assert!((whole - 1.0).abs() < 0.02, "{whole}");
     }
 }

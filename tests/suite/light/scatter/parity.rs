@@ -44,7 +44,7 @@ fn the_shaders_multiple_scattering_is_the_hosts() {
     };
     let (mut input, mut want): (Vec<f32>, Vec<[f32; 4]>) = (Vec::new(), Vec::new());
     for n in 0..500 {
-        // Numbers between 0 and 1 that have nothing to do with one another.
+        // Unrelated numbers between 0 and 1.
         let x = |k: u32| (0.5 + n as f32 * (k as f32 * 2.0 + 3.0).sqrt()).fract();
         let scattering = Scattering { albedo: Vec3::new(1.0, x(0), x(1)), g: 1.1 * x(2) - 0.2 };
         let (near, far) = (Vec3::new(x(3), x(4), x(5)), Vec3::new(x(6), x(7), x(8)));
@@ -99,7 +99,8 @@ fn the_shaders_multiple_scattering_is_the_hosts() {
     let got: &[[f32; 4]] = bytemuck::cast_slice(&view);
     for (i, (got, want)) in got.iter().zip(&want).enumerate() {
         for c in 0..4 {
-            // Differences of exponentials near 1: each may be a few ulp off, and terms of both signs up to 5 cancel.
+            // The results are differences of exponentials near 1. Each exponential may be a few ulp off, and
+            // terms of both signs of up to 5 cancel.
             let allowed = 3e-6 * want[c].abs().max(5.0);
             assert!((got[c] - want[c]).abs() <= allowed, "case {i}, {c}: {got:?}, not {want:?}");
         }

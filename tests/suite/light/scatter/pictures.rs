@@ -1,5 +1,5 @@
-//! Pictures of the model against those of the path tracer: light scattered twice or more, as a share of all
-//! light.
+//! Pictures of the model against those of the path tracer. Only light scattered twice or more is compared, as
+//! a share of all light.
 
 use std::f64::consts::{LOG2_E, PI};
 use std::path::Path;
@@ -12,12 +12,12 @@ use taki::light::scatter::{Profile, Row, Scattering, forward_peak, multiple};
 use taki::scene::{Limits, Scene};
 use taki::volume::VolumeTexture;
 
-/// Pixels of a tile's picture along each edge, paths of one and rays of the model's.
+/// Pixels along each edge of a tile's picture, the tracer's paths per pixel, and the model's rays per pixel.
 const PIXELS: usize = 12;
 const PATHS: u32 = 60;
 const RAYS: usize = 24;
 
-/// Picture of the model's light scattered twice and more.
+/// Picture of the light that the model scatters twice or more.
 fn model(medium: &Medium, [e, l]: [DVec3; 2], albedo: f64, g: f64) -> Vec<f64> {
     let scattering = Scattering { albedo: Vec3::splat(albedo as f32), g: g as f32 };
     let similarity = scattering.similarity();
@@ -35,7 +35,7 @@ fn model(medium: &Medium, [e, l]: [DVec3; 2], albedo: f64, g: f64) -> Vec<f64> {
     })
 }
 
-/// Octaves of Wrenninge, Kulla and Lundqvist 2013 with the a, b, c that did best.
+/// Octaves of Wrenninge, Kulla and Lundqvist 2013, with the values of a, b and c that did best.
 fn octaves(medium: &Medium, [e, l]: [DVec3; 2], albedo: f64, g: f64) -> Vec<f64> {
     let cos = -e.dot(l);
     walk_all(medium, e, l, |_, view, cell, light| {
@@ -48,7 +48,7 @@ fn octaves(medium: &Medium, [e, l]: [DVec3; 2], albedo: f64, g: f64) -> Vec<f64>
     })
 }
 
-/// Sums `cell(z, view, cell, light)` over the cells of each pixel's rays; depths in powers of two.
+/// Sums `cell(z, view, cell, light)` over the cells of each pixel's rays. Depths are in powers of two.
 fn walk_all(
     medium: &Medium,
     e: DVec3,
@@ -90,7 +90,7 @@ fn walk_all(
         .collect()
 }
 
-/// Bias and root mean square of what is wrong, the tracer's noise taken off, as shares of the mean radiance.
+/// Bias and root mean square of the error as shares of the mean radiance. The tracer's noise is subtracted.
 fn error(picture: &[f64], truth: &[Pixel]) -> [f64; 2] {
     let n = truth.len() as f64;
     let whole = truth.iter().map(|p| p.single + p.multiple).sum::<f64>() / n;
@@ -108,7 +108,7 @@ fn volume(sets: &[&str]) -> VolumeTexture {
     scene.volume(1 << 30, &taki::util::monitor::Unwatched).unwrap()
 }
 
-/// A uniform slab, one that is filled to 42 %, and figure 5's and the default scene's strands, 6 %.
+/// A uniform slab, a slab that is filled to 42 %, and the strands of figure 5 and of the default scene (6 %).
 fn media() -> Vec<(&'static str, Vec<Medium>)> {
     let dense = [
         "curves.across=20",
@@ -133,7 +133,7 @@ fn media() -> Vec<(&'static str, Vec<Medium>)> {
 const LIGHTS: [(&str, f64, f64, f64); 3] =
     [("front", 20.0, 0.3, -1.0), ("oblique", 65.0, 1.2, -1.0), ("back", 30.0, 0.5, 1.0)];
 
-/// Mean |bias| and mean root mean square over lights and depths, of nothing, octaves and the model.
+/// Mean |bias| and mean root mean square over lights and depths, for no light, the octaves and the model.
 fn table(albedo: f64, g: f64) -> [[f64; 2]; 3] {
     let (mut sums, mut count) = ([[0.0; 2]; 3], 0.0);
     println!("albedo {albedo}, g {g}: bias and RMS error in % of nothing, octaves, the model");
@@ -144,7 +144,7 @@ fn table(albedo: f64, g: f64) -> [[f64; 2]; 3] {
             for (light, degrees, turn, side) in LIGHTS {
                 for e in [toward(0.0, 0.0, -1.0), toward(50.0, 2.0, -1.0)] {
                     let l = toward(degrees, turn, side);
-                    // Through 10 and more comes so little that paths cannot count it.
+                    // So little light passes a depth of 10 or more that paths cannot measure it.
                     if side > 0.0 && x > 5.0 {
                         continue;
                     }
@@ -175,8 +175,9 @@ fn table(albedo: f64, g: f64) -> [[f64; 2]; 3] {
 fn multiply_scattered_light_is_the_path_tracers() {
     for albedo in [1.0, 0.9] {
         let [nothing, octaves, model] = table(albedo, 0.0);
-        assert!(nothing[1] > 0.5, "there is something to get wrong: {nothing:?}");
-        // Measured: 0.029 and 0.049 at albedo 1, 0.026 and 0.045 at 0.9; a fifth is left for the paths' noise.
+        assert!(nothing[1] > 0.5, "without multiple scattering the error is large: {nothing:?}");
+        // Measured: 0.029 and 0.049 at albedo 1, 0.026 and 0.045 at 0.9. A fifth more is allowed for the
+        // paths' noise.
         assert!(model[0] < 0.035 && model[1] < 0.06 && 5.0 * model[1] < octaves[1], "{model:?} {octaves:?}");
     }
 }
@@ -184,7 +185,7 @@ fn multiply_scattered_light_is_the_path_tracers() {
 #[test]
 fn light_that_is_scattered_forward_is_the_path_tracers() {
     let [nothing, octaves, model] = table(1.0, 0.7);
-    assert!(nothing[1] > 0.5, "there is something to get wrong: {nothing:?}");
-    // Measured: 0.082 and 0.102; the paths of so narrow a peak are noisier.
+    assert!(nothing[1] > 0.5, "without multiple scattering the error is large: {nothing:?}");
+    // Measured: 0.082 and 0.102. The paths of such a narrow peak are noisier.
     assert!(model[0] < 0.1 && model[1] < 0.13 && 4.0 * model[1] < octaves[1], "{model:?} {octaves:?}");
 }

@@ -23,8 +23,8 @@ fn scene(sets: &[&str]) -> Scene {
     Scene::load(Path::new("front"), &sets, &Limits::default()).expect("valid")
 }
 
-/// Mean radiance of the pixels of the tile, seen along −e. The unit cube of `front` lies as the tracer's slab does, but
-/// z goes into the surface there.
+/// Mean radiance of the tile's pixels, seen along −e. The unit cube of `front` lies like the tracer's slab,
+/// except that the tracer's z points into the surface.
 fn picture(scene: &Scene, volume: &VolumeTexture, e: DVec3) -> Vec<f64> {
     let d = -(e * DVec3::new(1.0, 1.0, -1.0)).as_vec3();
     let integrator = Integrator::new(scene, volume);
@@ -44,7 +44,7 @@ fn picture(scene: &Scene, volume: &VolumeTexture, e: DVec3) -> Vec<f64> {
 
 #[test]
 fn the_renderers_radiance_is_the_path_tracers() {
-    // All air: Henyey and Greenstein's phase function, which the tracer has too.
+    // Air only: it has the phase function of Henyey and Greenstein, which the tracer has too.
     let air = ["light.reflection=strand", "strand.aeration=1"];
     for (g, light, degrees, side, depth) in [
         (0.0, "front", 20.0, -1.0, 3.0),
@@ -57,7 +57,7 @@ fn the_renderers_radiance_is_the_path_tracers() {
         let volume = multiple.volume(1 << 30, &taki::util::monitor::Unwatched).expect("a volume");
         let medium = Medium::of_volume(&volume, depth);
         let mean = medium.sigma.iter().sum::<f64>() / medium.sigma.len() as f64;
-        // The cube is 1 m deep, the tracer's 24 m.
+        // The cube is 1 m deep, the tracer's slab 24 m.
         let rho = volume.cells.iter().map(|c| c.rho() as f64).sum::<f64>() / volume.cells.len() as f64;
         multiple.edit().trace.attenuation = Attenuation::PathLength { sigma: (24.0 * mean / rho) as f32 };
         let (l, e) = (toward(degrees, 0.3, side), toward(35.0, 2.0, -1.0));
@@ -74,23 +74,24 @@ fn the_renderers_radiance_is_the_path_tracers() {
         let [multiple, single, cached] = [&multiple, &single, &cached].map(|s| picture(s, &volume, e));
         let once: f64 = truth.iter().map(|p| p.single).sum();
         println!("g {g} {light} {depth}: {:+.3} single {:+.3}", share(&multiple), share(&single));
-        // Single scattering's light is that at the cells' centres. At a mean depth of 10 a full cell
-        // of these volumes is 2 deep, and some per cent of the whole are wrong.
+        // Single scattering uses the light at the cells' centres. At a mean depth of 10, a full cell of these
+        // volumes is 2 deep, which changes the whole by a few per cent.
         let off = (single.iter().sum::<f64>() - once) / whole;
         let allowed = if depth > 5.0 { 0.03 } else { 0.01 };
         assert!(off.abs() < allowed, "single scattering, g {g} {light} {depth}: {off}");
-        // The model's own mean error (docs/method.md) and that.
+        // The allowance is the model's own mean error (docs/method.md) plus that of single scattering.
         let allowed = if g > 0.0 { 0.13 } else { 0.06 };
         assert!(share(&multiple).abs() < allowed, "g {g} {light} {depth}: {}", share(&multiple));
-        assert!(share(&single) < -0.25, "there is something to get wrong: {}", share(&single));
+        assert!(share(&single) < -0.25, "without multiple scattering the error is large: {}", share(&single));
         let differ = multiple.iter().zip(&cached).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-        assert!(differ < 1e-3, "cached depths are the walked ones: {differ}");
+        assert!(differ < 1e-3, "cached depths equal the walked ones: {differ}");
     }
 }
 
 #[test]
 fn a_deep_slab_that_absorbs_nothing_sends_back_nearly_all_light() {
-    // Irradiance in is π·μ₀, out is ∫ L μ dω: over a few eyes L of a Lambertian white is μ₀.
+    // The irradiance that enters is π·μ₀, and ∫ L μ dω leaves. A white Lambertian surface would show L = μ₀
+    // to every eye.
     let air = ["light.reflection=strand", "strand.aeration=1", "strand.g=0", "light.scattering=multiple"];
     let mut deep = scene(&air);
     let volume = deep.volume(1 << 30, &taki::util::monitor::Unwatched).expect("a volume");
@@ -98,7 +99,7 @@ fn a_deep_slab_that_absorbs_nothing_sends_back_nearly_all_light() {
     let l = toward(30.0, 0.3, -1.0);
     let to_light = (l * DVec3::new(1.0, 1.0, -1.0)).as_vec3();
     deep.edit().lights = vec![Light::Directional { to_light, intensity: Vec3::ONE }];
-    // Midpoints in μ² weigh eyes as a white wall does.
+    // Midpoints in μ² weight the eyes as a white wall does.
     let mut out = 0.0;
     for i in 0..6 {
         let degrees = ((i as f64 + 0.5) / 6.0).sqrt().acos().to_degrees();

@@ -1,6 +1,6 @@
-//! A brute-force path tracer of the tiled volume, for tests. It samples free flights with the exact walk,
-//! and looks at the light from every collision. It computes in float64, except for the walk's parameters,
-//! and uses nothing of `taki::light::scatter`.
+//! A brute-force path tracer of the tiled volume, for tests. It samples free flights with the exact walk, and
+//! adds the light that reaches every collision. It computes in float64, except for the walk's parameters, and
+//! uses nothing of `taki::light::scatter`.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,23 +11,24 @@ use rayon::prelude::*;
 use taki::volume::VolumeTexture;
 use taki::walk::Walk;
 
-/// A tile of cells with an extinction each, side by side in x and y without end, 0 ≤ z ≤ nz.
+/// A tile of cells, each with an extinction. It repeats endlessly in x and y, and ends at z = 0 and z = nz.
 pub struct Medium {
     pub size: IVec3,
-    /// A cell's edges, metres.
+    /// Edges of a cell in metres.
     pub edges: DVec3,
-    /// 1/m per cell, x fastest.
+    /// Extinction of each cell in 1/m, x fastest.
     pub sigma: Vec<f64>,
     /// Unit direction of each cell's fibres.
     pub t: Vec<Vec3>,
 }
 
-/// Φ in 1/sr.
+/// Phase function Φ in 1/sr.
 #[derive(Clone, Copy)]
 pub enum Phase {
-    /// Henyey and Greenstein's of mean cosine g; 0 is isotropic.
+    /// Function of Henyey and Greenstein with mean cosine g; 0 is isotropic.
     HenyeyGreenstein(f64),
-    /// Of the fibre, the direction to the light and that to the eye. Directions are drawn evenly.
+    /// Function of the fibre and of the directions to the light and to the eye. Directions are sampled
+    /// uniformly.
     Given(fn(Vec3, DVec3, DVec3) -> f64),
 }
 
@@ -36,14 +37,14 @@ pub enum Phase {
 pub struct Pixel {
     /// Radiance of light scattered once.
     pub single: f64,
-    /// Scattered twice and more.
+    /// Radiance of light scattered twice or more.
     pub multiple: f64,
     /// Variance of the mean of `multiple`.
     pub variance: f64,
 }
 
 impl Medium {
-    /// One extinction everywhere, cells of 1 m × 1 m × `height`.
+    /// Medium with one extinction everywhere, in cells of 1 m × 1 m × `height`.
     pub fn uniform(layers: i32, height: f64, sigma: f64) -> Medium {
         let cells = 16 * layers as usize;
         Medium {
@@ -54,7 +55,7 @@ impl Medium {
         }
     }
 
-    /// A volume texture in cells of 1 m, with the mean optical depth `depth` across the slab.
+    /// Medium of a volume texture in cells of 1 m, with the mean optical depth `depth` across the slab.
     pub fn of_volume(volume: &VolumeTexture, depth: f64) -> Medium {
         let rho = |c: &taki::volume::Cell| c.rho() as f64;
         let mean = volume.cells.iter().map(rho).sum::<f64>() / volume.cells.len() as f64;
@@ -71,7 +72,7 @@ impl Medium {
         ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize
     }
 
-    /// The cells of a ray inside the slab: index, metres.
+    /// Cells of a ray inside the slab: index and length in metres.
     pub fn cells(&self, p: DVec3, d: DVec3) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (nz, d) = (self.size.z, (d / self.edges).as_vec3());
         Walk::new(self.size, p.as_vec3(), d, f32::INFINITY)
@@ -79,7 +80,8 @@ impl Medium {
             .map(|c| (self.index(c.cell), (c.t_exit - c.t_enter) as f64))
     }
 
-    /// Optical depth to where a ray leaves; beyond 60 nothing counts.
+    /// Optical depth up to the point where the ray leaves the slab. The sum stops at 60, because nothing
+    /// counts beyond.
     pub fn depth(&self, p: DVec3, d: DVec3) -> f64 {
         let mut sum = 0.0;
         for (i, length) in self.cells(p, d) {
@@ -91,7 +93,7 @@ impl Medium {
         sum
     }
 
-    /// The cell and the point where a ray has passed the optical depth `tau`; none if it leaves before.
+    /// Cell and point at which a ray has passed the optical depth `tau`; `None` if it leaves the slab before.
     pub fn flight(&self, p: DVec3, d: DVec3, tau: f64) -> Option<(usize, DVec3)> {
         let (mut left, mut t) = (tau, 0.0);
         for (i, length) in self.cells(p, d) {
@@ -117,8 +119,8 @@ impl Medium {
         }
     }
 
-    /// Radiances towards `e` of the pixels of one tile, `paths` each. `l` and `e` are unit and point outward; −z is
-    /// the seen side.
+    /// Radiances towards `e` of the pixels of one tile, with `paths` paths each. `l` and `e` are unit vectors
+    /// that point outward. −z is the seen side.
     pub fn render(
         &self,
         [e, l]: [DVec3; 2],
@@ -152,7 +154,8 @@ impl Medium {
             .collect()
     }
 
-    /// One path from the eye: radiance scattered once, and more often. The first flight always collides.
+    /// Radiances of one path from the eye: of light scattered once, and of light scattered more often. The
+    /// first flight always collides.
     fn path(
         &self,
         face: DVec3,
@@ -171,7 +174,7 @@ impl Medium {
             let seen = (-self.depth(p, l)).exp();
             result[order] += weight * PI * self.phi(phase, cell, l, e) * seen;
             order = 1;
-            // Russian roulette: what is left of absorbed light ends somewhere.
+            // Russian roulette ends paths whose light is nearly absorbed.
             if weight < 0.05 {
                 if rng.random::<bool>() {
                     break;
@@ -186,7 +189,7 @@ impl Medium {
                     d
                 }
             };
-            // `from` points to where the light comes from: it goes on along it, away from the eye.
+            // `from` points to where the light comes from. The path continues along it, away from the eye.
             e = -from;
             at = self.flight(p, from, -(1.0 - rng.random::<f64>()).ln());
         }
@@ -194,12 +197,12 @@ impl Medium {
     }
 }
 
-/// Φ of Henyey and Greenstein 1941, 1/sr.
+/// Φ of Henyey and Greenstein 1941 in 1/sr.
 pub fn henyey_greenstein(g: f64, cos: f64) -> f64 {
     (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5))
 }
 
-/// A direction at a Henyey-Greenstein angle to d.
+/// Samples a direction at a Henyey-Greenstein angle to `d`.
 fn sample(g: f64, d: DVec3, rng: &mut impl Rng) -> DVec3 {
     let u: f64 = rng.random();
     let cos = if g == 0.0 {

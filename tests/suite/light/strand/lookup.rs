@@ -12,7 +12,7 @@ use taki::engine::gpu::{Gpu, StrandTexture};
 use taki::light::strand::table::{StrandShading, StrandTable};
 use taki::light::strand::{Strand, StrandParams};
 
-/// Sorted errors of Φ from the table in units of Φ + 1/4π, and the mean error per mean Φ.
+/// Sorted errors of Φ from the table in units of Φ + 1/4π, and the mean error divided by the mean Φ.
 fn errors(params: &StrandParams) -> (Vec<f64>, f64) {
     let (strand, table) = (Strand::new(params), StrandTable::of(params));
     let (mut error, mut all) = (0.0, 0.0);
@@ -33,8 +33,8 @@ fn errors(params: &StrandParams) -> (Vec<f64>, f64) {
 
 #[test]
 fn the_table_is_the_model_within_its_stated_error() {
-    // Roughnesses, largest error, that of 99 of 100 directions, and that of the mean. What is left is the
-    // bow, which moves with θ_d, between two nodes of y.
+    // Roughnesses, largest error, error of 99 of 100 directions, and error of the mean. The remaining error
+    // is that of the bow, which moves with θ_d between two nodes of y.
     for (roughness, largest, usual, mean) in [
         ([0.3, 0.2], 0.02, 0.012, 0.004),
         ([0.1, 0.1], 0.07, 0.035, 0.006),
@@ -75,7 +75,7 @@ fn one_strand_has_one_table_whatever_the_air() {
     assert!(!Arc::ptr_eq(&table, &StrandTable::of(&StrandParams { radius_m: 0.124, ..params })));
 }
 
-/// Ψ of the shader for (t·l, t·e, l·e, k_d), k_s = 1 − k_d.
+/// Ψ of the shader for (t·l, t·e, l·e, k_d), with k_s = 1 − k_d.
 fn on_gpu(gpu: &Gpu, shading: &StrandShading, inputs: &[[f32; 4]]) -> Vec<Vec3> {
     let stage = "#import light::strand
         @group(0) @binding(0) var<uniform> strand: Strand;
@@ -155,9 +155,9 @@ fn the_shader_looks_up_what_the_cpu_does() {
             let want = shading.psi(k_d, 1.0 - k_d, l, e, le);
             worst = worst.max(((got - want).abs() / (want + 0.25)).max_element());
         }
-        // The coordinates differ by fused products, 1e-6 on software Vulkan. Most of the bound is for devices
-        // whose filters place a sample on one of 256 steps between two texels: half a step of a difference of
-        // a texel's own size.
+        // The coordinates differ through fused products, by 1e-6 on software Vulkan. Most of the bound is for
+        // devices whose filters place a sample on one of 256 steps between two texels. Their error is half a
+        // step of a difference as large as a texel itself.
         assert!(worst < 2e-3, "{worst}");
     }
 }

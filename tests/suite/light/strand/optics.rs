@@ -32,7 +32,7 @@ fn fresnel_is_his_sines_and_tangents_and_p_vanishes_at_brewsters_angle() {
     assert!(p < 1e-28 && (s - ((ETA * ETA - 1.0) / (ETA * ETA + 1.0)).powi(2)).abs() < 1e-12);
 }
 
-/// Largest Φ_2 beyond the light's own direction, and where: by h in steps of 1e-5.
+/// Largest Φ_2 beyond the light's own direction, and its h, searched in steps of 1e-5.
 fn bow(eta_prime: f64) -> (f64, f64) {
     let turn = |h: f64| exit_azimuth(2, h, h / eta_prime) - TAU;
     (0..=100_000)
@@ -58,11 +58,11 @@ fn a_smooth_strand_is_brightest_in_the_bow() {
         let trt = |tenth: i32| around.at((tenth as f64 * 0.1).to_radians())[2].x;
         let brightest = (0..1800).max_by(|a, b| trt(*a).total_cmp(&trt(*b))).expect("some") as f64 * 0.1;
         let want = bow(modified_index(ETA, cos_d)).0.to_degrees();
-        // The lobe's width is 0.8°, and the bow is lit on one side only.
+        // The lobe is 0.8° wide, and the bow is lit on one side only.
         assert!((brightest - want).abs() < 0.8, "{brightest}°, not {want}° at {degrees}°");
         assert!(
             trt((want * 10.0) as i32 + 40) < 0.05 * trt((brightest * 10.0) as i32),
-            "dark outside the bow"
+            "it is dark outside the bow"
         );
     }
 }
@@ -100,7 +100,7 @@ fn a_ray_through_the_axis_is_attenuated_along_its_slanted_diameter() {
         assert!((got[1] - t * mean(|f| (1.0 - f).powi(2))).abs().max_element() < 1e-12);
         assert!((got[2] - t * t * mean(|f| (1.0 - f).powi(2) * f)).abs().max_element() < 1e-12);
     }
-    // Off the axis the chord is shorter: cos γ_t of the diameter.
+    // Off the axis the chord is shorter: cos γ_t times the diameter.
     let h = 0.8;
     let chord = (1.0f64 - (h / ETA).powi(2)).sqrt();
     let (with, without) = (Passage::new(ETA, 1.0, h, depth), Passage::new(ETA, 1.0, h, DVec3::ZERO));
@@ -110,14 +110,14 @@ fn a_ray_through_the_axis_is_attenuated_along_its_slanted_diameter() {
 
 #[test]
 fn reflection_from_a_smooth_strand_is_the_mirror_cylinders() {
-    // N_R = cos(φ/2)/4 · F, for h = sin(φ/2).
+    // N_R = cos(φ/2)/4 · F, with h = sin(φ/2).
     let around = Azimuth::new(0.002, ETA, 1.0, DVec3::ZERO);
     for degrees in [5.0f64, 60.0, 120.0] {
         let phi = degrees.to_radians();
         let [s, p] = reflectance((phi / 2.0).cos());
         let want = 0.25 * (phi / 2.0).cos() * 0.5 * (s + p);
         let got = around.at(phi)[0].x;
-        // The logistic's variance π²s²/3 times half the second derivative, far below this.
+        // The error is the logistic's variance π²s²/3 times half the second derivative, far below this bound.
         assert!((got - want).abs() < 1e-3 * want, "{got}, not {want} at {degrees}°");
     }
 }
@@ -141,7 +141,8 @@ fn around_the_strand_nothing_is_lost() {
 #[test]
 fn roughness_spreads_the_lobes_as_chiang_and_others_say() {
     let [r, tt, trt, residual] = variances(0.3);
-    // (0.726·0.3 + 0.812·0.3²)² radians², half as wide through the strand, twice as wide after a reflection.
+    // The variance is (0.726·0.3 + 0.812·0.3²)² radians². A lobe is half as wide through the strand, and
+    // twice as wide after a reflection.
     assert!((r.sqrt() - 0.29088).abs() < 1e-6, "{r}");
     assert_eq!([tt, trt, residual], [r / 4.0, 4.0 * r, 4.0 * r]);
     // √(π/8)·(0.265·0.2 + 1.194·0.2²).
@@ -164,7 +165,7 @@ fn along_the_strand_nothing_is_lost_for_any_variance() {
     let roughest = variances(1.0)[2];
     for v in [1e-6, 1e-4, 0.01, 0.3, 3.0, roughest] {
         for theta_i in [0.0f64, 0.7, -1.4, FRAC_PI_2] {
-            // About the peak at −θ_i, in steps of a fortieth of its width.
+            // The range around the peak at −θ_i is 40 standard deviations wide.
             let width = (40.0 * f64::sqrt(v)).min(TAU);
             let steps = 4000;
             let mut sum = 0.0;
@@ -176,7 +177,7 @@ fn along_the_strand_nothing_is_lost_for_any_variance() {
                     sum += m * theta.cos() * width / steps as f64;
                 }
             }
-            // The ends of the range may cut a step; the Bessel function is good to 2e-7.
+            // The ends of the range may cut a step. The Bessel function is good to 2e-7.
             assert!((sum - 1.0).abs() < 2e-4, "{sum} for v = {v} at {theta_i}");
         }
     }
@@ -197,7 +198,7 @@ fn the_bessel_function_is_its_integral() {
 fn absorption_is_pope_and_frys_seen_by_the_cie_observer() {
     let got = pure_water();
     assert!(got.x > got.y && got.y > got.z && got.z > 0.0, "{got}");
-    // The observer's table (CIE 1931, 2°), and the spectrum, every 20 nm.
+    // The observer's table (CIE 1931, 2°) and the spectrum, every 20 nm.
     const ROWS: [([f64; 3], f64); 17] = [
         ([0.0014, 0.0000, 0.0065], 0.01137),
         ([0.0143, 0.0004, 0.0679], 0.00663),
@@ -227,6 +228,6 @@ fn absorption_is_pope_and_frys_seen_by_the_cie_observer() {
         sum += srgb.max(DVec3::ZERO) * a;
         weights += srgb.max(DVec3::ZERO);
     }
-    // Half the rows and a fit for the table: some per cent where the spectrum is steep.
+    // Half of the rows and a fit replace the table, which is some per cent off where the spectrum is steep.
     assert!((got / (sum / weights) - 1.0).abs().max_element() < 0.03, "{got}, not {}", sum / weights);
 }

@@ -78,9 +78,9 @@ fn a_flat_even_sheet_is_one_quad() {
         let rgb = |frame: &Frame| frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect::<Vec<_>>();
         let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
         let outside = Difference::new(120, &rgb(&one), &rgb(&many), tolerance).share_outside();
-        // Where a ray grazes a corner of a cell, one ulp of its place chooses another.
+        // Where a ray grazes a corner of a cell, one ulp of its position selects another cell.
         assert!(outside < 0.01, "{outside}");
-        // A quad that lies elsewhere in the texture is seen as such.
+        // A quad with another place in the texture must look different.
         cut.edit().quads[10].offset.y += 0.5;
         let moved = frame(engine, &cut, &volume);
         assert!(Difference::new(120, &rgb(&one), &rgb(&moved), tolerance).share_outside() > outside + 0.005);
@@ -103,7 +103,8 @@ fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
                 frame(engine, &scene, &volume)
             });
             let [a, b] = &mut frames;
-            // Another shader is compiled, which may order products otherwise: two units in the last place.
+            // The second scene compiles another shader, which may order products differently: two units in
+            // the last place.
             let near = |a: f32, b: f32| (a - b).abs() <= 2.4e-7 * a.abs();
             let same = |i: usize| (0..4).all(|c| near(a.radiance[i][c], b.radiance[i][c]));
             let others: Vec<usize> = (0..a.counts.len()).filter(|&i| !same(i)).collect();
@@ -114,7 +115,7 @@ fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
 
 #[test]
 fn the_flow_falls_with_gravity_and_loops() {
-    // One layer of the volume, 1 of 64, is dense: a bar across the sheet.
+    // One of the volume's 64 layers is dense and makes a bar across the sheet.
     let mut scene = plumb("segments = 40\nv0 = 1.0");
     let image = &mut scene.edit().image;
     (image.width, image.height, image.samples) = (16, 400, 1);
@@ -142,12 +143,13 @@ fn the_flow_falls_with_gravity_and_loops() {
                 weight += hidden;
             }
             assert!(weight > 1.0);
-            // Metres a row at the sheet, and the middle row at y = 0.5.
+            // Metres per row at the sheet. The middle row is at y = 0.5.
             let metres = 2.0 * 10.0 * 20f64.to_radians().tan() / 400.0;
             let got = 0.5 + (200.0 - sum / weight) * metres;
             let time = |y: f64| (y / 64.0 + f64::from(flow)) * whole;
             let want = 3.0 - 0.5 * (fallen(time(8.0)) + fallen(time(9.0)));
-            // A pixel's rounding at either end of the bar, and rows of the sheet that are straight in time.
+            // The tolerance covers a pixel's rounding at either end of the bar, and the sheet's rows, in
+            // which time is linear.
             assert!((got - want).abs() < metres + 0.01, "flow {flow}: {got} {want}");
             last = got.min(last);
         }
