@@ -128,7 +128,7 @@ fn a_gif_shows_its_frames_for_the_right_time() {
         let true_frame = frame(options.size, i as u64);
         let error = mean_error(canvas, &true_frame);
         assert!(error < GIF_ERROR, "frame {i}: {error}");
-        assert!(mean_error(canvas, &frame(options.size, i as u64 + 1)) > error + 1.0, "the canvas shows this frame");
+        assert!(mean_error(canvas, &frame(options.size, i as u64 + 1)) > error + 1.0, "it is this frame");
         // The left half never changes, so none of its pixels may flicker.
         grain.push(canvas.chunks(67 * 3).flat_map(|row| row[..33 * 3].to_vec()).collect::<Vec<u8>>());
     }
