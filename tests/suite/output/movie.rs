@@ -206,7 +206,7 @@ fn videos_decode_to_their_frames_by_their_own_tags() {
                 let true_frame = frame(size, i as u64);
                 let error = mean_error(&given, &true_frame);
                 assert!(error < VIDEO_ERROR, "{name} {size:?} frame {i}: {error}");
-                assert!(mean_error(&given, &frame(size, i as u64 + 1)) > error + 1.0, "the picture shows this frame");
+                assert!(mean_error(&given, &frame(size, i as u64 + 1)) > error + 1.0, "it is this frame");
                 let [mut sum, mut edge] = [[0i64; 3]; 2];
                 for (a, b) in given.as_chunks::<3>().0.iter().zip(true_frame.as_chunks::<3>().0) {
                     (0..3).for_each(|c| sum[c] += a[c] as i64 - b[c] as i64);
