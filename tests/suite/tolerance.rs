@@ -1,25 +1,25 @@
 //! The only tolerances of the project. Other comparisons are exact, or have a bound that their test derives
 //! from float32 rounding or from the size of its sample.
 
-/// GPU against CPU, linear radiance: relative difference of a pixel that counts as the same. The two run
-/// the same float32 operations in the same order; what is left is `exp2`, `sqrt`, division and fused
-/// products, some ulp each, over a few hundred cells.
+/// GPU against CPU: largest relative difference of a pixel's linear radiance that counts as equal. Both run
+/// the same float32 operations in the same order. `exp2`, `sqrt`, division and fused products differ by some
+/// ulp each, over a few hundred cells.
 pub const PARITY_RELATIVE: f32 = 1e-3;
 
-/// GPU against CPU: absolute difference that counts as the same in dark pixels.
+/// GPU against CPU: largest absolute difference that counts as equal in dark pixels.
 pub const PARITY_ABSOLUTE: f32 = 1e-4;
 
-/// GPU against CPU: share of pixels that must be the same. The rest may lie on an edge between two quads
-/// or on a ray through a cell's corner, where one ulp chooses another cell.
+/// GPU against CPU: share of pixels that must be equal. The others may lie on an edge between two quads or on
+/// a ray through a cell's corner, where one ulp selects another cell.
 pub const PARITY_SHARE: f64 = 0.999;
 
-/// One ray in float32 against a closed form in float64. The transmittance is a product over up to some
-/// 500 cells, each factor good to about 2^-24 of itself and of its exponent: 500 · 6e-8 = 3e-5 if all
-/// rounded the same way, a tenth of it as they do. Doubling it would hide a lost cell of 1e-5.
+/// One ray in float32 against a closed form in float64. The transmittance is a product over up to about 500
+/// cells. Each factor is good to about 2^-24 of itself and of its exponent: 500 · 6e-8 = 3e-5 if all round
+/// the same way, and a tenth of that in practice. Twice this tolerance would hide a lost cell of 1e-5.
 pub const CLOSED_FORM_RELATIVE: f64 = 1e-5;
 
-/// Whether `a` is `b` but for a share `relative` of the larger one or a difference `absolute`. Never
-/// true of NaN.
+/// Whether `a` and `b` differ by at most a share `relative` of the larger one or by at most `absolute`. Never
+/// true for NaN.
 pub fn close(a: f64, b: f64, relative: f64, absolute: f64) -> bool {
     a == b || (a - b).abs() <= absolute.max(relative * a.abs().max(b.abs()))
 }

@@ -1,4 +1,4 @@
-//! The tutorial keeps its promise: whoever follows docs/tutorial.md has the scenes and pictures it shows.
+//! The tutorial keeps its promise: following docs/tutorial.md gives the scenes and pictures that it shows.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use taki::engine::cpu;
 use taki::scene::{Limits, Scene};
 use toml::{Table, Value};
 
-/// Bytes of a step's picture at most.
+/// Largest size of a step's picture in bytes.
 const MAX_PICTURE_BYTES: u64 = 80 << 10;
 
 fn path(name: &str) -> PathBuf {
@@ -18,14 +18,14 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// The text of steps 1 to 8; the last ends before the next heading.
+/// Texts of steps 1 to 8. The last ends before the next heading.
 fn steps() -> Vec<String> {
     let page = read("docs/tutorial.md");
     let numbered = |part: &&str| part.starts_with(|c: char| c.is_ascii_digit());
     page.split("\n## ").filter(numbered).map(String::from).collect()
 }
 
-/// The TOML blocks of a step.
+/// TOML blocks of a step.
 fn blocks(step: &str) -> impl Iterator<Item = &str> {
     step.split("```toml\n").skip(1).map(|rest| rest.split("```").next().expect("a block that ends"))
 }
@@ -40,10 +40,10 @@ fn merge(old: &mut Table, new: Table) {
     }
 }
 
-/// Removes a table named as `a.b`, and `a` with it where nothing else is left in that.
+/// Removes a table named `a.b`, and also `a` if that is then empty.
 fn remove(scene: &mut Table, name: &str) {
     match name.split_once('.') {
-        None => assert!(scene.remove(name).is_some(), "[{name}] is not there to be deleted"),
+        None => assert!(scene.remove(name).is_some(), "[{name}] cannot be deleted: it does not exist"),
         Some((outer, inner)) => {
             let table = scene[outer].as_table_mut().expect("a table");
             remove(table, inner);
@@ -54,7 +54,7 @@ fn remove(scene: &mut Table, name: &str) {
     }
 }
 
-/// Does what a step says: deletes the tables named in its sentence "Delete …", then adds its blocks.
+/// Does what a step says: deletes the tables that its sentence "Delete …" names, then adds its blocks.
 fn follow(scene: &mut Table, step: &str) {
     if let Some(rest) = step.split("Delete the tables ").nth(1) {
         let sentence = rest.split(':').next().expect("a sentence");
@@ -95,14 +95,14 @@ fn every_step_renders_water_in_light() {
         };
         let rocks = load(&[]).values().expect("as written").names("rocks").into_iter();
         let mut sets: Vec<String> = rocks.map(|rock| format!("rocks.{rock}.levels=4")).collect();
-        // For a few pixels it is quicker to walk to the lights from each than to fill light volumes.
+        // For so few pixels, walking to the lights from each is quicker than filling light volumes.
         let small = ["image.width=64", "image.height=36", "image.samples=1", "light.visibility=march"];
         sets.extend(small.map(String::from));
         let scene = load(&sets);
         let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
         let frame = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame");
         assert_eq!(frame.non_finite_pixels(), 0, "step {i}");
-        assert!(frame.covered_pixels() > 64 * 36 / 25, "step {i}: the water covers hardly anything");
+        assert!(frame.covered_pixels() > 64 * 36 / 25, "step {i}: the water covers almost nothing");
         assert!(frame.picture.iter().any(|p| p[..3].iter().all(|&x| x > 150)), "step {i} is dark");
     }
 }

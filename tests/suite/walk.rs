@@ -5,14 +5,14 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taki::walk::{Crossing, PARALLEL, Walk};
 
-/// Largest relative error of a boundary parameter: a difference, a reciprocal and a product, each
-/// rounded to 2^-24, and one to spare for their products.
+/// Largest relative error of a boundary parameter. It has a difference, a reciprocal and a product, each
+/// rounded to 2^-24, and one more for their products.
 const ROUNDING: f64 = 4.0 / (1u64 << 24) as f64;
 
 /// A crossing of a cell boundary: its parameter and axis.
 pub type Event = (f64, usize);
 
-/// The cell a ray starts in, not wrapped: on a face it is the one the ray goes into.
+/// Cell in which a ray starts, not wrapped. On a face it is the cell that the ray enters.
 pub fn true_start(origin: DVec3, direction: DVec3) -> IVec3 {
     IVec3::from_array([0, 1, 2].map(|axis| {
         let x = origin[axis];
@@ -20,8 +20,8 @@ pub fn true_start(origin: DVec3, direction: DVec3) -> IVec3 {
     }))
 }
 
-/// Every crossing of a cell boundary with parameter below `t_end`, in order; of equals x before y
-/// before z. Each axis is enumerated on its own, nothing is stepped.
+/// Every crossing of a cell boundary with a parameter below `t_end`, in order; equal parameters are ordered
+/// x, y, z. Each axis is enumerated on its own, without steps.
 pub fn true_events(origin: DVec3, direction: DVec3, t_end: f64) -> Vec<Event> {
     let start = true_start(origin, direction);
     let mut events = Vec::new();
@@ -42,8 +42,8 @@ fn wrapped(cell: IVec3, size: IVec3) -> IVec3 {
     IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z)
 }
 
-/// The axis and sign of the step from `a` to `b`, all axes wrapping as the walk does; `step` tells the
-/// way each axis goes.
+/// Axis of the step from `a` to `b`, with axes that wrap as in the walk. `step` gives the direction of each
+/// axis.
 fn stepped_axis(a: IVec3, b: IVec3, step: IVec3, size: IVec3) -> Result<usize, TestCaseError> {
     let fits = |axis: usize| {
         let mut next = a;
@@ -55,7 +55,7 @@ fn stepped_axis(a: IVec3, b: IVec3, step: IVec3, size: IVec3) -> Result<usize, T
         .ok_or_else(|| TestCaseError::fail(format!("{a} to {b} is no single step")))
 }
 
-/// Compares a walk with the truth: the cells may differ only where crossings coincide within rounding.
+/// Compares a walk with the truth. Cells may differ only where crossings coincide within rounding.
 fn agrees_with_truth(size: IVec3, origin: Vec3, direction: Vec3, t_end: f32) -> Result<(), TestCaseError> {
     let walk: Vec<Crossing> = Walk::new(size, origin, direction, t_end).collect();
     let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
@@ -68,7 +68,7 @@ fn agrees_with_truth(size: IVec3, origin: Vec3, direction: Vec3, t_end: f32) -> 
     prop_assert_eq!(walk[0].cell, wrapped(cell, size));
     let mut per_axis = [0, 1, 2].map(|axis| truth.iter().filter(move |e| e.1 == axis));
     for (i, pair) in walk.windows(2).enumerate() {
-        // With a tile of one or two cells a step's axis does not show in the wrapped cell: the truth's
+        // In a tile of one or two cells, the wrapped cell does not show the axis of a step, so the truth's
         // axis is tried first.
         let t = pair[1].t_enter as f64;
         let (t_true, axis_true) = truth[i];
@@ -88,14 +88,15 @@ fn agrees_with_truth(size: IVec3, origin: Vec3, direction: Vec3, t_end: f32) -> 
         prop_assert_eq!(pair[1].cell, wrapped(cell, size));
         let of_axis = per_axis[axis].next();
         prop_assert!(of_axis.is_some(), "one crossing of axis {axis} too many");
-        // In another order than the truth's only what coincides may come.
+        // The order may differ from the truth's only where crossings coincide.
         let own = of_axis.unwrap().0;
         prop_assert!((t - own).abs() <= 2.0 * slack(own), "axis {axis} is crossed at {t}, in truth at {own}");
     }
     Ok(())
 }
 
-/// The lengths add up, parameters never decrease, each cell begins where the last one ended.
+/// Checks that the lengths add up, that parameters never decrease, and that each cell begins where the last
+/// one ended.
 fn is_gapless(walk: &[Crossing], t_end: f32) -> Result<(), TestCaseError> {
     prop_assert_eq!(walk[0].t_enter, 0.0);
     prop_assert_eq!(walk.last().unwrap().t_exit, t_end);
@@ -110,7 +111,7 @@ fn is_gapless(walk: &[Crossing], t_end: f32) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// A component of a start: anywhere, or on a face, or on a coarse grid where crossings coincide.
+/// A component of a start: anywhere, on a face, or on a coarse grid where crossings coincide.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => -20.0f32..20.0,
@@ -169,7 +170,7 @@ proptest! {
         origin in vector(coordinate().boxed()),
         direction in vector(component().boxed()),
     ) {
-        // A tile as large as the ray's reach: a wrapped step cannot be mistaken for another.
+        // The tile is as large as the ray's reach, so a wrapped step cannot be mistaken for another.
         let size = IVec3::splat(97);
         let walk: Vec<Crossing> = Walk::new(size, origin, direction, 30.0).collect();
         for pair in walk.windows(2) {
@@ -187,7 +188,7 @@ proptest! {
         tiles in [-50i32..50, -50i32..50],
         direction in vector(component().boxed()),
     ) {
-        // Whole 1/512ths, so that the shifted start is exact.
+        // Coordinates are multiples of 1/512, so that the shifted start is exact.
         let origin = Vec3::from_array(start.map(|x| x as f32 / 512.0));
         let shift = Vec3::new((tiles[0] * size.x) as f32, (tiles[1] * size.y) as f32, 0.0);
         let here: Vec<Crossing> = Walk::new(size, origin, direction, 20.0).collect();
@@ -209,7 +210,7 @@ proptest! {
             .take_while(|c| c.cell.z < nz)
             .count();
         let (d, layers) = (d.as_dvec3(), nz as f64);
-        // Each sideways axis is crossed once more than its whole cells if the start lies near a face.
+        // If the start lies near a face, each sideways axis is crossed once more than its whole cells.
         let most = layers * (1.0 + (d.x / d.z).abs() + (d.y / d.z).abs()) + 2.0;
         prop_assert!(met as f64 <= most * (1.0 + ROUNDING), "{met} cells, at most {most}");
         prop_assert!(met as f64 >= most - 4.0 - layers * ROUNDING, "{met} cells of {most}");
@@ -228,7 +229,7 @@ fn a_zero_component_of_either_sign_never_steps() {
     for zero in [0.0, -0.0] {
         let along_z = cells([0.5, 0.5, 0.0], [zero, zero, 1.0], 2.0);
         assert_eq!(along_z, [([0, 0, 0], 0.0, 1.0), ([0, 0, 1], 1.0, 2.0)]);
-        // On a face too: the cell above it.
+        // This holds on a face too, in the cell above it.
         assert_eq!(cells([2.0, 0.5, 0.5], [zero, 0.0, 1.0], 0.5), [([2, 0, 0], 0.0, 0.5)]);
         assert_eq!(cells([2.0, 1.0, 3.0], [zero, zero, zero], 9.0), [([2, 1, 3], 0.0, 9.0)]);
     }
@@ -238,7 +239,7 @@ fn a_zero_component_of_either_sign_never_steps() {
 fn a_start_on_a_face_belongs_to_the_cell_the_ray_goes_into() {
     assert_eq!(cells([1.0, 0.5, 0.5], [1.0, 0.0, 0.0], 1.0), [([1, 0, 0], 0.0, 1.0)]);
     assert_eq!(cells([1.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 1.0), [([0, 0, 0], 0.0, 1.0)]);
-    // Over the tile's end the neighbouring copy begins; z leaves the slab.
+    // Beyond the end of the tile its neighbouring copy begins. Along z the ray leaves the slab.
     assert_eq!(cells([0.0, 0.5, 0.5], [-1.0, 0.0, 0.0], 1.0), [([3, 0, 0], 0.0, 1.0)]);
     assert_eq!(cells([4.0, 0.5, 0.5], [1.0, 0.0, 0.0], 1.0), [([0, 0, 0], 0.0, 1.0)]);
     assert_eq!(cells([0.5, 0.5, 0.0], [0.0, 0.0, -1.0], 1.0), [([0, 0, -1], 0.0, 1.0)]);

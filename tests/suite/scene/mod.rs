@@ -1,4 +1,4 @@
-//! Scene files and `--set`: every key of the parameter table can be set, every wrong value is refused with
+//! Scene files and `--set`. Every key of the parameter table can be set, every wrong value is refused with
 //! its key, range and line, and no text makes the reader panic.
 
 pub mod animation;
@@ -15,7 +15,7 @@ use taki::scene::{Kind, Limits, PARAMS, Param, Place, Raw, Scene, Source, Value,
 use tempfile::tempdir;
 
 const FIG5: &str = include_str!("../../../assets/scenes/fig5.toml");
-/// One of everything that a scene can name.
+/// A scene with one of everything that a scene can name.
 const ONE_OF_EACH: &str = "version = 1
 [lights.a]
 kind = \"directional\"
@@ -62,13 +62,13 @@ fn preset(name: &str, sets: &[&str]) -> Result<Scene, String> {
     })
 }
 
-/// The error of what must be refused, which has all of `words`.
+/// Asserts that the result is an error that contains all of `words`.
 fn refused<T>(result: Result<T, String>, words: &[&str]) {
     let Err(error) = result else { panic!("accepted: {words:?}") };
     words.iter().for_each(|word| assert!(error.contains(word), "no {word:?} in: {error}"));
 }
 
-/// A parameter's key in `ONE_OF_EACH`.
+/// Key of a parameter in `ONE_OF_EACH`.
 fn concrete(param: &Param) -> String {
     param.key.replace(
         '*',
@@ -82,7 +82,7 @@ fn another(param: &Param) -> String {
         Kind::Float(min, max, d) => Value::Float(if d == min { 0.5 * max } else { min }).to_toml(),
         Kind::Int(min, max, d) => (if d == min { max.min(min + 1) } else { min }).to_string(),
         Kind::Choice(words) => words[1].into(),
-        // Albedos.
+        // Colours of pools are albedos.
         Kind::Color(_) if param.key.starts_with("pools") => "[0.25, 0.5, 1.0]".into(),
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
@@ -125,7 +125,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
     let file = dir.path().join("one.toml");
     fs::write(&file, ONE_OF_EACH).unwrap();
     for param in PARAMS {
-        // The scene keeps neither the kind of its environment nor the animation.
+        // The scene's values do not tell the kind of its environment or its animation.
         let is_kept = !["environment.kind", "animate.tracks.*.interpolation"].contains(&param.key);
         let Kind::Choice(words) = param.kind else { continue };
         for word in words.iter().filter(|_| is_kept) {
@@ -235,7 +235,7 @@ fn list(c: [f64; 3]) -> Raw {
     Raw::List(c.map(Raw::Float).into())
 }
 
-/// Lists that are no triple inside a range.
+/// Lists that are not three numbers inside a range.
 fn odd_triples(below: f64, above: f64) -> Vec<Raw> {
     let wrong = [below, above, f64::NAN, f64::INFINITY, 1e-40];
     let mut lists: Vec<Raw> = wrong.map(|x| list([0.5, x, 0.5])).into();
@@ -318,7 +318,7 @@ fn set_makes_no_new_names() {
 fn tables_without_keys_are_defaults_or_mistakes() {
     let scene = read("version = 1\n[curves]\n[lights.a]\n[lights]\n[materials.m]\n").unwrap();
     assert_eq!((scene.lights.len(), scene.values().unwrap().names("materials")), (1, vec!["m".into()]));
-    // Over a base it changes nothing.
+    // Tables without keys change nothing over a base.
     let base = "version = 1\nbase = \"fig5\"\n";
     let same = read(&format!("{base}[lights.sun]\n[rocks.wall]\n")).unwrap();
     assert_eq!(same.lights, preset("fig5", &[]).unwrap().lights);
@@ -369,7 +369,7 @@ fn no_prefix_of_a_scene_makes_the_reader_panic() {
     let prefixes: Vec<&str> = FIG5.char_indices().map(|(end, _)| &FIG5[..end]).collect();
     assert!(prefixes.len() > 2000);
     let faults = prefixes.iter().filter(|text| read(text).is_err()).count();
-    // Those that end between two lines are scenes, the others are not.
+    // Prefixes that end between two lines are scenes, the others are not.
     assert!((prefixes.len() / 2..prefixes.len()).contains(&faults), "{faults}");
     read(FIG5).unwrap();
 }
@@ -384,7 +384,7 @@ fn no_flipped_byte_makes_the_reader_panic() {
             let at = rng.random_range(0..bytes.len());
             bytes[at] = rng.random_range(0..128u8);
         }
-        // What is not UTF-8 is refused before it is parsed.
+        // Bytes that are not UTF-8 are refused before they are parsed.
         faults += usize::from(read(&String::from_utf8_lossy(&bytes)).is_err());
     }
     assert!((50..500).contains(&faults), "{faults}");
@@ -421,7 +421,7 @@ fn scenes_with_many_parts_are_read_in_time_that_grows_with_their_size() {
         read(&format!("version = 1\n[materials.m]\nrepeat_u = 2.0\n{}", quad.repeat(20_000))).unwrap();
     assert_eq!(scene.quads.len(), 20_000);
     assert_eq!(source(&scene.to_toml()).values().unwrap().names("quads").len(), 20_000);
-    // Milliseconds; a minute when each part looks at all others.
+    // This takes milliseconds. It would take a minute if each part looked at all others.
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
     refused(read(&format!("version = 1\n{}", quad.repeat(65_537))), &["65537 quads", "at most 65536"]);
     let lights: String = (0..4097).map(|i| format!("[lights.l{i}]\n")).collect();
@@ -478,7 +478,7 @@ fn scenes_that_contradict_themselves_are_refused() {
     ] {
         refused(preset("fig5", sets), &[words]);
     }
-    // A number a little above 0 is no direction either, one far below the rest still is.
+    // A number slightly above 0 gives no direction. A number far below the others still does.
     preset("fig5", &["lights.sun.direction=[0, 1e-9, 0]"]).unwrap();
 }
 

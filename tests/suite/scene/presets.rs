@@ -1,6 +1,6 @@
 //! Preset scenes: the figures show what they promise, and pictures match snapshots, the weakest kind of test.
 //!
-//! `TAKI_BLESS=1 tests/run presets` writes the snapshots anew. Look at each before you keep it.
+//! `TAKI_BLESS=1 tests/run presets` rewrites the snapshots. Look at each before you keep it.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use taki::picture::Frame;
 use taki::scene::{Scene, presets};
 use taki::util::monitor::Unwatched;
 
-/// Small enough that a snapshot stays under 64 KiB.
+/// Settings of a picture so small that its snapshot stays under 64 KiB.
 const SMALL: [&str; 3] = ["image.width=96", "image.height=154", "image.samples=2"];
 const FIGURES: [&str; 3] = ["fig5", "fig6", "fig7"];
 const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
@@ -29,7 +29,8 @@ fn snapshot(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots").join(format!("{name}.png"))
 }
 
-/// Two steps of 255 for other compilers' and drivers' rounding; a hundredth of the pixels for edges.
+/// Asserts that a frame matches its snapshot, within two steps of 255 for the rounding of other compilers and
+/// drivers. A hundredth of the pixels may differ more, because of edges.
 fn assert_like_snapshot(name: &str, frame: &Frame) {
     let (width, height, golden) = read_png(&snapshot(name)).expect("a snapshot");
     assert_eq!((width, height), (frame.width, frame.height));
@@ -80,7 +81,7 @@ fn every_preset_renders_light_and_no_pixel_that_is_not_finite() {
     for (name, _) in presets() {
         let frame = on_cpu(&scene(name, &["image.width=48", "image.height=40", "image.samples=1"]));
         assert_eq!(frame.non_finite_pixels(), 0, "{name}");
-        assert!(frame.covered_pixels() > 40 * 48 / 20, "{name}: the water covers hardly anything");
+        assert!(frame.covered_pixels() > 40 * 48 / 20, "{name}: the water covers almost nothing");
         let brightest = encoded(&frame).into_iter().flatten().fold(0.0, f32::max);
         assert!(brightest > 0.5, "{name} is dark");
     }
@@ -89,11 +90,11 @@ fn every_preset_renders_light_and_no_pixel_that_is_not_finite() {
 /// The scenes of falling water besides the default one.
 const PLACES: [&str; 4] = ["cascade", "curtain", "spout", "night"];
 
-/// A preset whose place is coarse, as `COARSE_PLACE` is the default's and for its reason.
+/// A preset with a coarse place, for the same reason as `COARSE_PLACE`.
 fn coarse(name: &str, more: &[&str]) -> Scene {
     let scene_of_all = scene(name, &[]);
     let values = scene_of_all.values().expect("a preset has values");
-    // The film's lobe is a 32nd power: it magnifies what is left.
+    // The film's lobe is a 32nd power, which magnifies the remaining differences.
     let rock = |rock: String| [format!("rocks.{rock}.levels=1"), format!("rocks.{rock}.wet=0")];
     let rocks = values.names("rocks").into_iter().flat_map(rock);
     let pools = values.names("pools").into_iter().map(|pool| format!("pools.{pool}.foam=0"));
@@ -133,7 +134,7 @@ fn figure_six_is_denser_and_figure_seven_smoother_than_figure_five() {
         water.iter().sum::<f32>() / water.len() as f32
     };
     assert!(mean_t(&six) < 0.8 * mean_t(&five), "6 lets less light through");
-    // Less complex curves keep closer to the flow.
+    // Less complex curves stay closer to the flow.
     let along = |s: &Scene| s.volume(1 << 30, &Unwatched).expect("a volume").statistics().v_mean[1];
     assert!(along(&seven) > along(&five) + 0.02, "{} against {}", along(&seven), along(&five));
 }

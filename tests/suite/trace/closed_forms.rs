@@ -1,4 +1,4 @@
-//! §4 and §5: rays with a known answer. `truth` compares the whole trace of a ray with float64.
+//! §4 and §5: rays with a known result. `truth` compares the whole trace of a ray with float64.
 
 mod truth;
 
@@ -13,7 +13,7 @@ use taki::scene::{Limits, Scene};
 use taki::trace::Attenuation;
 use taki::volume::{Cell, VolumeTexture};
 
-/// The benchmark scene with one quad of our own, no lights, no ambient, every cell walked.
+/// The scene `front` with a single quad, without lights and ambient light. Every cell is walked.
 fn scene(corners: [Vec3; 4], material: Material) -> Scene {
     let mut scene = Scene::load(Path::new("front"), &[], &Limits::default()).unwrap();
     scene.edit().quads = vec![Quad::new(corners, material).unwrap()];
@@ -35,13 +35,13 @@ fn material(thickness_m: f32, repeat_u: f32, repeat_v: f32) -> Material {
     Material { thickness_m, repeat_u, repeat_v }
 }
 
-/// A volume of one cell over and over.
+/// A volume with the same cell everywhere.
 fn uniform(size: [u32; 3], v: Vec3, rho: f32, k_d: f32, k_s: f32) -> VolumeTexture {
     let cell = Cell::from_direction(v).with_density(rho, k_d, k_s);
     VolumeTexture { size, alpha: 1.0, cells: vec![cell; size.iter().product::<u32>() as usize].into() }
 }
 
-/// Cells with and without flow, of every density and direction.
+/// A volume of cells with and without flow, of every density and direction.
 fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
     use rand::{RngExt, SeedableRng};
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
@@ -57,7 +57,7 @@ fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
     VolumeTexture { size, alpha: 0.8, cells: cells.into() }
 }
 
-/// The direction at `degrees` from the normal of `rectangle`, turned by `around` about it.
+/// Direction at `degrees` from the normal of `rectangle`, turned by `around` about that normal.
 fn slanted(degrees: f64, around: f64) -> Vec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     Vec3::new((sin * around.cos()) as f32, (sin * around.sin()) as f32, -cos as f32)
@@ -73,7 +73,7 @@ fn an_empty_volume_shows_what_is_behind_unchanged() {
     scene.edit().ambient = Vec3::ONE;
     scene.edit().lights = vec![Light::Directional { to_light: Vec3::Z, intensity: Vec3::ONE }];
     let behind = Vec3::new(0.1, 0.7, 12.5);
-    // Without directions, and with directions but without density.
+    // One volume has no directions. The other has directions but no density.
     for volume in [uniform([5, 7, 3], Vec3::ZERO, 0.0, 0.0, 0.0), uniform([5, 7, 3], Vec3::Y, 0.0, 1.0, 1.0)]
     {
         for degrees in [0.0, 30.0, 60.0, 85.0] {
@@ -105,7 +105,7 @@ fn a_uniform_medium_transmits_by_the_length_of_the_ray_alone() {
                     close(got, want, CLOSED_FORM_RELATIVE, 0.0),
                     "{size:?} at {degrees}°: {got}, not {want}"
                 );
-                // No light: what is seen is what is behind.
+                // Without light, only the background is seen.
                 assert_eq!(traced.radiance, Vec3::splat(traced.transmittance));
             }
         }
@@ -147,8 +147,8 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
         let mut scene = rectangle(material(0.4, 1.5, 2.0));
         scene.edit().trace.attenuation = attenuation;
         for seed in 0..200 {
-            // Fibres along the flow, light across them: Ψ is k_d = 1 in every cell, so that the light
-            // adds the bare weights up one by one.
+            // The fibres lie along the flow and the light across them, so Ψ is k_d = 1 in every cell. The
+            // light then adds up the bare weights one by one.
             let mut volume = noise([5, 7, 9], seed);
             volume.cells.change(|_, _, cell| match cell.has_direction() {
                 true => Cell::from_direction(Vec3::Y).with_density(cell.rho(), 1.0, 0.0),
@@ -161,20 +161,20 @@ fn weights_and_end_transmittance_sum_to_one_on_every_ray() {
             let lit = trace(&scene, &volume, d, uv, Vec3::ZERO);
             let sum = lit.radiance.x as f64 + lit.transmittance as f64;
             assert!(close(sum, 1.0, 2e-6, 0.0), "{i}, seed {seed}: the weights and T sum to {sum}");
-            // Ambient light alone sees the same weights.
+            // Ambient light alone has the same weights.
             scene.edit().lights.clear();
             scene.edit().ambient = Vec3::ONE;
             let ambient = trace(&scene, &volume, d, uv, Vec3::ZERO);
             assert_eq!(ambient.transmittance, lit.transmittance);
             assert!(close(ambient.radiance.x as f64, 1.0 - lit.transmittance as f64, 1e-6, 1e-7));
-            assert!(lit.transmittance < 0.9, "the ray meets something");
+            assert!(lit.transmittance < 0.9, "the ray meets water");
         }
     }
 }
 
 #[test]
 fn light_reaches_a_uniform_slab_by_the_depth_of_each_cells_centre() {
-    // Light along the normal, fibres across it: the sum is known in closed form.
+    // The light comes along the normal, with the fibres across it: the sum has a closed form.
     let (sigma, thickness, nz) = (4.0f64, 0.5f64, 20);
     let mut scene = rectangle(material(thickness as f32, 1.0, 1.0));
     scene.edit().trace.attenuation = Attenuation::PathLength { sigma: sigma as f32 };
@@ -212,7 +212,7 @@ fn max_cells_ends_a_ray_and_a_light_ray() {
     scene.edit().trace.max_cells = 3;
     scene.edit().visibility = Visibility::March;
     scene.edit().lights = vec![Light::Directional { to_light: Vec3::NEG_Z, intensity: Vec3::ONE }];
-    // The light comes from behind the slab: each of the three cells looks through three.
+    // The light comes from behind the slab, so each of the three cells looks through three cells.
     assert_eq!(trace(&scene, &volume, Vec3::NEG_Z, [0.4, 0.4], Vec3::ONE).cells, [3, 9]);
 }
 
@@ -229,7 +229,7 @@ fn early_end_stops_a_dark_ray_and_zero_turns_it_off() {
     let whole = walk(0.0);
     assert_eq!(whole.cells[0], 100);
     assert!(close(whole.transmittance as f64, (-50.0f64).exp(), 2.0 * CLOSED_FORM_RELATIVE, 0.0));
-    // e^(−n/2) falls below 0.01 after ten cells, below 0.5 after two.
+    // e^(−n/2) falls below 0.01 after ten cells and below 0.5 after two.
     for (early_end, cells) in [(0.01, 10), (0.5, 2), (1.0, 1)] {
         let ended = walk(early_end);
         assert_eq!(ended.cells[0], cells);

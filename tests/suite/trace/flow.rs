@@ -1,5 +1,5 @@
-//! The volume moves down the flow: whole tile lengths change nothing, whole layers equal a volume with its
-//! layers moved, and down is the direction in which v increases.
+//! The volume moves down the flow. Whole tile lengths change nothing, whole layers equal a volume with moved
+//! layers, and down is the direction in which v increases.
 
 use crate::engine::gpu::{renderer, scene};
 use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};
@@ -25,7 +25,7 @@ fn flowing(flow: &str) -> Scene {
     scene("front", &SETS.into_iter().chain([flow.as_str()]).collect::<Vec<_>>())
 }
 
-/// On the CPU, and on the GPU where there is one.
+/// Frames of the CPU and, if there is one, of the GPU.
 fn frames(gpu: &mut Option<GpuRenderer>, scene: &Scene, volume: &VolumeTexture) -> Vec<Frame> {
     let mesh = scene.mesh();
     let mut frames = vec![cpu::render(scene, volume, &mesh, true, &Unwatched).expect("a frame")];
@@ -36,7 +36,7 @@ fn frames(gpu: &mut Option<GpuRenderer>, scene: &Scene, volume: &VolumeTexture) 
     frames
 }
 
-/// The volume with every layer `by` cells further down the flow.
+/// The volume with every layer moved `by` cells further down the flow.
 fn rolled(volume: &VolumeTexture, by: u32) -> VolumeTexture {
     let [nx, ny, nz] = volume.size;
     let mut cells: Vec<Cell> = volume.cells.iter().copied().collect();
@@ -54,7 +54,7 @@ fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
     frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect()
 }
 
-/// Share of pixels of the same radiance.
+/// Share of pixels with equal radiance.
 fn likeness(a: &Frame, b: &Frame) -> f64 {
     let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
     1.0 - Difference::new(a.width, &rgb(a), &rgb(b), tolerance).share_outside()
@@ -87,7 +87,7 @@ fn a_part_of_a_length_is_a_volume_with_its_layers_moved_down() {
         for ((want, got), plain) in want.iter().zip(&got).zip(&plain) {
             assert!(likeness(want, got) >= PARITY_SHARE, "{flow}: {}", likeness(want, got));
             assert!(likeness(plain, got) < 0.9, "{flow} moves the picture");
-            // The face, its depth and its coordinates stay.
+            // The face, its depth and its coordinates stay the same.
             assert!(plain.surface == got.surface, "{flow}");
         }
     }
@@ -108,7 +108,7 @@ fn water_flows_down_the_quad_by_that_share_of_its_length() {
     let cells: Vec<Cell> =
         (0..nx * ny * nz).map(|i| if i / nx % ny == 10 { cell } else { Cell::default() }).collect();
     layer.cells = cells.into();
-    // Mean row of what hides the background.
+    // Mean row of the pixels that hide the background, weighted by how much they hide.
     let row = |frame: &Frame| {
         let (mut sum, mut weight) = (0.0, 0.0);
         for (i, r) in frame.radiance.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The cache on disk: it returns exactly what would have been built, whatever happened to its files.
+//! The cache on disk: it returns exactly what would have been built, whatever happens to its files.
 
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -17,7 +17,7 @@ use tempfile::tempdir;
 const ROOMY: u64 = 1 << 20;
 const SLOW: Duration = Duration::from_secs(60);
 
-/// The values of a key, and whether they had to be made.
+/// Values of a key, and whether they had to be made.
 fn get(cache: &Cache, key: &str) -> (Vec<u32>, bool) {
     let made = Cell::new(false);
     let make = || {
@@ -37,11 +37,11 @@ fn what_was_slow_to_make_is_found_again_and_what_was_quick_is_not_kept() {
     let dir = tempdir().unwrap();
     let cache = Cache::new(dir.path(), ROOMY);
     assert_eq!(get(&cache, "a"), (values(), true));
-    assert_eq!(get(&cache, "a"), (values(), true), "it took less time than reading does");
+    assert_eq!(get(&cache, "a"), (values(), true), "making them took less time than reading would");
     cache.keep_if_slow("things", "a", &values(), SLOW);
     assert_eq!(get(&cache, "a"), (values(), false));
     assert_eq!(get(&cache, "b"), (values(), true), "another key");
-    // 10 ms, and 2 ns a byte: 12.1 ms.
+    // The limit is 10 ms plus 2 ns per byte: 12.1 ms.
     let mebibyte = vec![0u8; 1 << 20];
     let cache = Cache::new(dir.path(), 1 << 40);
     cache.keep_if_slow("things", "c", &mebibyte, Duration::from_micros(12_000));
@@ -69,7 +69,7 @@ fn a_file_with_any_byte_changed_cut_off_or_added_is_as_if_it_were_not_there() {
     assert_eq!(get(&cache, "a"), (values(), true), "a byte more");
     fs::write(&path, &whole).unwrap();
     assert_eq!(get(&cache, "a"), (values(), false), "the whole file is read");
-    // Two names that came to be the same, or a file that somebody renamed.
+    // Two names may collide, or somebody may rename a file.
     fs::copy(&path, cache.path("things", "b")).unwrap();
     assert_eq!(get(&cache, "b"), (values(), true), "a whole file of another key");
     fs::remove_file(&path).unwrap();
@@ -102,7 +102,7 @@ fn what_was_used_longest_ago_makes_room() {
     let there = ["0", "1", "2", "3"].map(|key| cache.path("things", key).exists());
     assert_eq!(there, [true, false, true, true]);
     assert!(!stale.exists() && dir.path().join("things/readme.txt").exists());
-    // What does not fit at all leaves the others alone.
+    // Values larger than the whole cache do not evict the others.
     cache.keep_if_slow("things", "large", &vec![1u32; one as usize], SLOW);
     let there = ["0", "2", "3", "large"].map(|key| cache.path("things", key).exists());
     assert_eq!(there, [true, true, true, false]);
@@ -159,10 +159,10 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
         &["sheets.main.widths=[1,1,1,1,1,1]"],
         &["pools.plunge.foam=0.1"],
     ];
-    // Its light on itself would take all the time.
+    // The occlusion of the rocks would take nearly all of the time.
     let rocks = ["wall", "bed", "left", "right", "far_right", "boulder_a", "boulder_b", "boulder_c"];
     let open = rocks.map(|rock| format!("rocks.{rock}.occlusion=0"));
-    // Twice: made, and found.
+    // Each change runs twice: it is made first and found the second time.
     for sets in changes.iter().chain(&changes) {
         let sets = base.iter().chain(&place).chain(*sets).map(|s| s.to_string()).chain(open.clone());
         let sets: Vec<String> = sets.collect();
@@ -172,11 +172,11 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
         assert!(scene.cached_mesh(Some(&cache)) == scene.mesh(), "{sets:?}");
     }
     let files = |kind| fs::read_dir(dir.path().join(kind)).unwrap().count();
-    // α is not in the cells; the last six change no volume, the first nine no mesh.
+    // α is not stored in the cells. The last six changes leave the volume as it is, the first nine the mesh.
     assert_eq!((files("volumes"), files("meshes")), (8, 7));
 }
 
-/// A render of a scene whose mesh is slow to make, with this folder for caches.
+/// Command that renders a scene with a mesh that is slow to make, with its caches in the folder `cache`.
 fn render(cache: &Path, output: &Path, more: &[&str]) -> std::process::Command {
     let mut taki =
         faults::taki(["render", "waterfall", "--size", "32x18", "--samples", "1", "--engine", "cpu"]);
@@ -195,7 +195,7 @@ fn renders_with_a_new_a_used_a_damaged_and_no_cache_make_the_same_file() {
     let at = |name: &str| dir.path().join(name);
     done(render(&at("cache"), &at("plain.png"), &["--no-cache"]).output().unwrap());
     assert!(!at("cache").exists(), "--no-cache leaves nothing");
-    // Two processes at once find nothing there.
+    // Two processes start at once and find nothing in the cache.
     let both = ["one.png", "two.png"].map(|name| render(&at("cache"), &at(name), &[]).spawn().unwrap());
     both.into_iter().for_each(|child| done(child.wait_with_output().unwrap()));
     let mesh = fs::read_dir(at("cache/taki/meshes")).unwrap().next().expect("a mesh is kept").unwrap().path();
@@ -205,7 +205,7 @@ fn renders_with_a_new_a_used_a_damaged_and_no_cache_make_the_same_file() {
     bytes[middle] ^= 4;
     fs::write(&mesh, bytes).unwrap();
     done(render(&at("cache"), &at("four.png"), &[]).output().unwrap());
-    // A file where the folder should be.
+    // A file lies where the folder should be.
     fs::write(at("file"), "").unwrap();
     done(render(&at("file"), &at("five.png"), &[]).output().unwrap());
     let plain = fs::read(at("plain.png")).unwrap();
@@ -214,7 +214,7 @@ fn renders_with_a_new_a_used_a_damaged_and_no_cache_make_the_same_file() {
     }
 }
 
-/// Checksums of a volume with all that its spec can hold, and of a mesh of rock and pools.
+/// Compares checksums of a volume with everything that its spec can hold, and of a mesh of rock and pools.
 #[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 #[test]
 fn the_versions_of_the_builders_stand_for_what_they_make() {
@@ -228,6 +228,6 @@ fn the_versions_of_the_builders_stand_for_what_they_make() {
     let vertices = crc32fast::hash(bytemuck::cast_slice(&place.mesh().vertices));
     let made = format!("{:08x} {vertices:08x}", volume.checksum());
     let versions = [taki::volume::BUILDER_VERSION, taki::place::BUILDER_VERSION];
-    // A new checksum without a new version would give users their old volumes and meshes.
+    // Without a new version, a new checksum would leave users with their old volumes and meshes.
     assert_eq!((versions, made.as_str()), ([1, 1], "b972003d d3c98441"));
 }

@@ -1,3 +1,3 @@
-//! Parts that every other module may use.
+//! Utilities that every other module may use.
 
 pub mod cache;

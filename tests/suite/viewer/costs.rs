@@ -1,18 +1,18 @@
-//! The cost of each change, and that the picture always shows the document's values.
+//! The cost of each change. The picture must always show the document's values.
 
 use super::*;
 use taki::engine::cpu;
 use taki::scene::Cost;
 use taki::util::monitor::Unwatched;
 
-/// Radiance and bytes of what is shown.
+/// Radiance and bytes of the picture that is shown.
 fn shown(window: &Window) -> (Vec<[f32; 4]>, Vec<[u8; 4]>) {
     let picture = window.picture();
     assert_eq!(picture.scale, 1, "settled at full resolution");
     (picture.frame.radiance.clone(), picture.frame.picture.clone())
 }
 
-/// A key, another value, what it costs.
+/// Keys with another value and the cost of the change.
 fn changes() -> Vec<(&'static str, Raw, Cost)> {
     vec![
         ("curves.h", Raw::Float(0.3), Cost::Volume),
@@ -43,10 +43,10 @@ fn each_change_shows_and_undo_takes_it_back(mut window: Window) {
         assert_eq!(now != built, cost == Cost::Volume, "{key}: is the volume built again?");
         window.undo();
         window.settle();
-        assert!(shown(&window) == first, "{key} is taken back to the bit");
+        assert!(shown(&window) == first, "{key} is undone bit for bit");
         window.redo();
         window.settle();
-        assert!(shown(&window) == changed, "{key} is done again to the bit");
+        assert!(shown(&window) == changed, "{key} is redone bit for bit");
         window.undo();
         window.settle();
     }

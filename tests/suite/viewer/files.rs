@@ -72,7 +72,7 @@ fn what_is_saved_opens_with_the_same_values() {
 #[test]
 fn a_value_turned_away_and_back_by_hand_is_no_change() {
     let mut window = wide().open();
-    // The scene leaves it to the default.
+    // The scene leaves this value at its default.
     let Value::Float(first) = window.value("volume.k_noise") else { panic!("a number") };
     window.set("volume.k_noise", Raw::Float(0.7));
     assert!(is_changed(&window));
@@ -170,7 +170,7 @@ fn escape_goes_back_from_the_question_about_changes() {
     window.harness.state_mut().open(Path::new("front"));
     window.harness.run_steps(4);
     assert!(window.reads("Save the changes?"));
-    // No other key does anything under it.
+    // No other key has an effect while the question is open.
     window.chord(Modifiers::COMMAND, Key::Z);
     assert!(is_changed(&window));
     window.key(Key::Escape);
@@ -187,7 +187,7 @@ fn a_save_that_was_cancelled_leaves_nothing_for_the_next_one_to_do() {
     window.set("curves.h", Raw::Float(0.1));
     let small = window.path("small.toml");
     open(&mut window, &small);
-    // The preset has no file: it is asked for, and then thought better of.
+    // The preset has no file, so the viewer asks for one, and the user cancels.
     window.press("Save");
     window.press("Cancel");
     assert_eq!(window.viewer().document().name, "front");
@@ -447,7 +447,7 @@ fn an_environment_is_opened_by_dropping_its_map_on_the_window_and_saved_beside_i
     assert_eq!(window.value("environment.file"), Value::Text("even.hdr".into()));
     window.settle();
     assert!(environment(&window) && background(&window));
-    // A volume given by hand does not lead the map astray.
+    // A volume given by hand does not break the path of the map.
     let npz = window.path("v.npz");
     taki(&["volume", "build", beside.to_str().expect("UTF-8"), "-o", npz.to_str().expect("UTF-8")]);
     drop_on(&mut window, &npz);
@@ -464,7 +464,7 @@ fn a_scene_or_a_volume_is_opened_by_dropping_it_on_the_window() {
     window.settle();
     assert_eq!(window.viewer().document().name, "dropped");
 
-    // Another seed than the scene's, so that the picture tells where the volume comes from.
+    // The volume has another seed than the scene, so that the picture shows where the volume comes from.
     let volume = window.path("v.npz");
     let output = ["volume", "build", &text(&scene), "--seed", "99", "-o", &text(&volume)];
     taki(&output);
@@ -490,7 +490,7 @@ fn the_command_line_is_copied_to_the_clipboard() {
     let mut window = wide().open();
     window.set("trace.sigma", Raw::Float(3.5));
     window.harness.run_steps(1);
-    // One event, one frame: the harness keeps the last frame's output only.
+    // The event is sent in a single frame, because the harness keeps only the last frame's output.
     let (key, modifiers) = (Key::C, Modifiers::COMMAND | Modifiers::SHIFT);
     let event = egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
     window.harness.input_mut().events.push(event);

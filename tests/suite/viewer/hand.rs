@@ -1,4 +1,4 @@
-//! Camera, light and time, moved with the mouse.
+//! Camera, light and time, changed with the mouse.
 
 use glam::DVec3;
 
@@ -68,7 +68,7 @@ fn a_pan_takes_the_scene_along() {
         let after = camera(&window);
         let moved = after.target - before.target;
         assert!((after.eye - before.eye - moved).length() < 1e-4, "eye and target move alike");
-        // What lay under the pointer in the target's plane stays under it.
+        // The point in the target's plane under the pointer stays under it.
         let away = before.eye.distance(before.target);
         let fov = window.float("camera.fov").to_radians();
         let metres = 2.0 * (fov / 2.0).tan() * away / f64::from(rect.height());
@@ -87,7 +87,7 @@ fn scroll(window: &mut Window, lines: f32) {
         source: egui::MouseWheelSource::Wheel,
         modifiers: Modifiers::NONE,
     });
-    // A wheel's step is spread over some frames.
+    // A step of the wheel is spread over some frames.
     window.harness.run_steps(20);
 }
 

@@ -11,7 +11,7 @@ position = [0.5, 1.0, 2.0]
 intensity = 3.0
 "#;
 
-/// A window with a lamp and a sun, and room for the handles of both.
+/// A window with a lamp and a sun, and with room for the handles of both.
 fn window(select: &str) -> Window {
     let mut setup = Setup { size: [1000.0, 700.0], ..Setup::default() };
     setup.scene += LAMP;
@@ -44,17 +44,17 @@ fn a_dragged_lamp_stays_under_the_pointer_and_at_its_depth() {
     let text = window.viewer().document().scene().to_toml();
     for by in [egui::vec2(60.0, 0.0), egui::vec2(0.0, 45.0), egui::vec2(-33.0, -21.0)] {
         let (from, before) = (handle(&window, "Handle of lamp").center(), window.point(LAMP_AT));
-        // Taken beside its middle it does not jump.
+        // A handle that is grabbed off its centre does not jump.
         window.drag(from + egui::vec2(4.0, -3.0), by, Modifiers::NONE);
         let (to, after) = (handle(&window, "Handle of lamp").center(), window.point(LAMP_AT));
-        // Positions are float32 metres of a scene of ten: a thousandth of a point.
+        // Positions are float32 metres in a scene of ten metres: a thousandth of a point.
         assert!((to - from - by).length() < 0.01, "{to} for {}", from + by);
         assert!((depth(&window, after) - depth(&window, before)).abs() < 1e-5, "the plane of the image");
         let (moved, pose) = (after - before, pose(&window));
         let metres =
             2.0 * pose.tan_half_fov * depth(&window, before) / f64::from(window.image_rect().height());
         let want = f64::from(by.length()) * metres;
-        // The harness reckons the picture's height without rounding it to whole points.
+        // The harness computes the picture's height without rounding to whole points.
         assert!((moved.length() - want).abs() < 0.01 * want, "{moved} for {want} m");
         assert_eq!(window.point("camera.eye"), pose.eye, "the camera stays");
         window.undo();
@@ -75,7 +75,7 @@ fn with_shift_a_lamp_moves_along_the_line_of_sight() {
         let after = window.point(LAMP_AT);
         assert!(
             (handle(&window, "Handle of lamp").center() - from).length() < 0.01,
-            "it is seen where it was"
+            "it stays at the same place in the picture"
         );
         let now = depth(&window, after);
         let want = (3.0 * f64::from(up / height)).exp();
@@ -101,7 +101,7 @@ fn the_sun_is_turned_on_its_dial_under_the_pointer() {
         window.drag(dial.center() + by * 0.2, by * 0.8, Modifiers::NONE);
         let after = window.point(SUN_TO);
         assert!((after.length() - 1.0).abs() < 1e-6, "unit");
-        // The angle from the eye grows with the distance from the middle, to 180° at the rim.
+        // The angle from the eye grows with the distance from the middle, up to 180° at the rim.
         let angle = f64::from(by.length()) / radius * std::f64::consts::PI;
         let across = (right * f64::from(by.x) - up * f64::from(by.y)).normalize();
         let want = across * angle.sin() - forward * angle.cos();
@@ -111,7 +111,7 @@ fn the_sun_is_turned_on_its_dial_under_the_pointer() {
         assert_eq!(window.point(SUN_TO), before, "one drag is one step");
     }
     window.drag(dial.center(), egui::vec2(-900.0, 300.0), Modifiers::NONE);
-    assert!(window.point(SUN_TO).distance(forward) < 1e-5, "beyond the rim it comes from behind");
+    assert!(window.point(SUN_TO).distance(forward) < 1e-5, "beyond the rim the light comes from behind");
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn a_spot_light_is_aimed_by_the_point_it_shines_at() {
     let direction = window.point(key);
     assert!((direction.length() - 1.0).abs() < 1e-6, "unit");
     assert!((handle(&window, "Aim of spot").center() - from - by).length() < 0.01, "under the pointer");
-    // The new aim lies on the ray from the light against its direction, in the old aim's plane.
+    // The new aim lies on the ray from the light against its direction, in the plane of the old aim.
     let forward = (window.point("camera.target") - window.point("camera.eye")).normalize();
     let along = (position - aim).dot(forward) / direction.dot(forward);
     let moved = position - direction * along - aim;
@@ -263,7 +263,7 @@ fn a_spot_light_is_aimed_by_the_point_it_shines_at() {
     assert_eq!(window.point("lights.spot.position"), position, "the light stays");
     window.undo();
     assert_eq!(window.viewer().document().scene().to_toml(), text);
-    // The light itself takes its direction along.
+    // The light keeps its direction when it is moved.
     let place = handle(&window, "Handle of spot").center();
     window.drag(place, egui::vec2(20.0, 10.0), Modifiers::NONE);
     assert!(window.point("lights.spot.position") != position);

@@ -6,7 +6,7 @@ use super::*;
 use taki::scene::{Place, Values};
 use taki::viewer::lights::edit;
 
-/// A window in which the whole list is seen.
+/// A window so large that the whole list is visible.
 fn with_list() -> Setup {
     Setup { size: [700.0, 900.0], ..Setup::default() }
 }
@@ -94,7 +94,7 @@ fn the_last_light_is_removed_and_comes_back() {
     assert!(window.viewer().document().fault().is_none() && window.viewer().document().is_changed());
     let dark = shown(&window);
     assert!(dark.0.iter().zip(&picture.0).all(|(new, old)| new[1] <= old[1]) && dark.0 != picture.0);
-    // Nothing is left that a drag could turn.
+    // No light is left that a drag could turn.
     window.key(Key::L);
     let centre = window.image_rect().center();
     window.drag(centre, egui::vec2(40.0, 10.0), Modifiers::NONE);
@@ -296,7 +296,7 @@ fn keys_rename_copy_and_remove_the_selected_light_only() {
     window.press("Light sun");
     window.key(Key::F2);
     window.enter("Name of sun", "moon");
-    // In the field the key belongs to the text.
+    // While the field is edited, the key belongs to its text.
     window.key(Key::Delete);
     window.key(Key::Enter);
     assert_eq!(lights(&window), ["moon"]);
@@ -304,7 +304,7 @@ fn keys_rename_copy_and_remove_the_selected_light_only() {
     window.press("Light sun");
     window.press("Light sun");
     window.key(Key::Delete);
-    assert_eq!(lights(&window), ["sun"], "a second click lets go");
+    assert_eq!(lights(&window), ["sun"], "a second click deselects");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use taki::viewer::lobes::{
     Curve, DECADES, Incidence, Plane, STEPS, Scale, Setting, alpha, curves, flow, incidence,
 };
 
-/// Smooth strands: every lobe stands out.
+/// Setting of smooth strands, whose lobes all stand out.
 fn strand(theta_i: f64, plane: Plane) -> Setting {
     let params = StrandParams { aeration: 0.4, ..StrandParams::default() };
     Setting { reflection: Reflection::Strand(params), k_d: 0.5, k_s: 0.5, p: 12.0, theta_i, plane }
@@ -25,7 +25,7 @@ fn curve<'a>(curves: &'a [Curve], name: &str) -> &'a [f64] {
     &curves.iter().find(|curve| curve.name == name).expect(name).values
 }
 
-/// The direction of the largest value.
+/// Index of the direction with the largest value.
 fn brightest(values: &[f64]) -> usize {
     (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).expect("values")
 }
@@ -37,8 +37,8 @@ fn light_through_the_strand_goes_away_from_the_light() {
         assert_eq!(brightest(curve(&around, "TT")), STEPS / 2, "φ = π at θ_i = {theta_i}");
         assert!(curve(&around, "TRT")[0] > curve(&around, "TRT")[STEPS / 2], "TRT goes back");
         assert_eq!(brightest(curve(&around, "aerated")), STEPS / 2, "bubbles send light on");
-        // Straight through, α is the light's and a half turn; the shift of M's peak from the mirror is less than the
-        // standard deviation of the lobe, 9° at this roughness.
+        // Straight through, α is the light's angle plus a half turn. The peak of M is shifted from the mirror
+        // direction by less than the lobe's standard deviation, 9° at this roughness.
         let along = curves(&strand(theta_i, Plane::Along));
         let through = brightest(curve(&along, "TT")) as f64 - theta_i.to_degrees();
         assert!((through - 180.0).abs() < 9.0, "{through} at θ_i = {theta_i}");
@@ -55,7 +55,7 @@ fn the_last_curve_is_the_sum_of_the_others() {
             assert!(total.peak() > 0.0 && parts.iter().all(|part| part.peak() > 0.0));
             for i in 0..STEPS {
                 let sum: f64 = parts.iter().map(|part| part.values[i]).sum();
-                // Sums of the same few numbers in another order, in float64.
+                // Both are float64 sums of the same few numbers in different orders.
                 assert!((sum - total.values[i]).abs() <= 1e-14 * sum, "{i}: {sum} and {}", total.values[i]);
             }
         }
@@ -67,7 +67,7 @@ fn right_and_left_of_the_light_are_alike_around_the_strand() {
     for curve in curves(&strand(0.7, Plane::Around)) {
         for i in 1..STEPS / 2 {
             let [a, b] = [curve.values[i], curve.values[STEPS - i]];
-            // The lobes' sums over offsets are in another order for −φ.
+            // For −φ, the lobes' sums over offsets have another order.
             assert!((a - b).abs() <= 1e-12 * a, "{} {i}: {a} {b}", curve.name);
         }
     }
@@ -75,11 +75,12 @@ fn right_and_left_of_the_light_are_alike_around_the_strand() {
 
 #[test]
 fn the_fibres_curves_are_the_models_closed_form_over_pi() {
-    // k_d·cos θ_i/π all around, k_s/π on the mirror cone, and the specular peak there in the other plane.
+    // The closed forms are k_d·cos θ_i/π all around and k_s/π on the mirror cone. In the other plane the
+    // specular peak lies on that cone.
     let setting = fibre(0.5, Plane::Around);
     let all = curves(&setting);
     let diffuse: f64 = curve(&all, "diffuse").iter().sum::<f64>() * 2.0 * PI / STEPS as f64;
-    // Float32 of the fibre model.
+    // The fibre model computes in float32.
     assert!((diffuse - 2.0 * 0.5 * 0.5f64.cos()).abs() < 1e-6, "{diffuse}");
     let specular = curve(&all, "specular");
     assert!(specular.iter().all(|s| (s - 0.5 * FRAC_1_PI).abs() < 1e-5), "{}", specular[0]);
@@ -110,7 +111,7 @@ fn a_light_along_the_strand_and_every_other_gives_finite_lobes() {
 
 #[test]
 fn the_planes_meet_where_they_cross() {
-    // θ_o = −θ_i at φ = 0 and π lies on both.
+    // The directions θ_o = −θ_i at φ = 0 and φ = π lie on both planes.
     let theta_i = 30f64.to_radians();
     for [around, along] in [
         [strand(theta_i, Plane::Around), strand(theta_i, Plane::Along)],
@@ -119,7 +120,7 @@ fn the_planes_meet_where_they_cross() {
         for (a, b) in curves(&around).iter().zip(&curves(&along)) {
             for (on_around, on_along) in [(0, 330), (180, 210)] {
                 let [x, y] = [a.values[on_around], b.values[on_along]];
-                // Float32 of the fibre model, to the twelfth power.
+                // The fibre model computes in float32, to the twelfth power.
                 assert!((x - y).abs() <= 1e-5 * x.max(y), "{} {on_around}: {x} {y}", a.name);
             }
         }
@@ -131,7 +132,7 @@ fn air_and_strand_have_the_shares_of_the_cell() {
     let air = |k_d: f32, k_s: f32| {
         curve(&curves(&Setting { k_d, k_s, ..strand(0.2, Plane::Around) }), "aerated")[0]
     };
-    // 2·k_d/(k_d + k_s) of the aeration of 0.4.
+    // The share of air is 2·k_d/(k_d + k_s) times the aeration of 0.4.
     assert!((air(0.2, 0.8) / air(0.5, 0.5) - 0.4).abs() < 1e-6);
     let none = curves(&Setting { k_d: 0.0, ..strand(0.2, Plane::Around) });
     assert_eq!(none.iter().find(|c| c.name == "aerated").expect("air").peak(), 0.0);
@@ -145,7 +146,7 @@ fn the_radius_is_the_logarithm_from_the_middle_to_the_rim() {
         assert_eq!(scale.middle, middle, "{peak}");
         let value = |radius: f64| 10f64.powf(f64::from(middle) + radius * (scale.rim - f64::from(middle)));
         for radius in [0.0, 0.25, 0.6, 1.0] {
-            // Logarithms of float64.
+            // The bound is the rounding of float64 logarithms.
             assert!((scale.radius(value(radius)) - radius).abs() < 1e-12, "{peak} {radius}");
         }
         assert!(peak == 0.0 || scale.radius(peak) == 1.0);
@@ -178,7 +179,7 @@ fn the_inclination_is_that_to_the_first_quads_flow() {
         let (sin, cos) = f64::sin_cos(theta);
         let to = (down * sin + across * cos) * 3.0;
         let scene = load(&[&format!("lights.sun.direction=[{},{},{}]", to.x, to.y, to.z)]);
-        // Directions of a scene are float32.
+        // A scene's directions are float32.
         assert!((of(&scene, None).theta_i - theta).abs() < 1e-5, "{theta}");
         let at = (a + b + c + d) / 4.0 + to;
         let place = format!("lights.sun.position=[{},{},{}]", at.x, at.y, at.z);
@@ -203,7 +204,7 @@ fn the_light_is_the_selected_one_or_the_first_that_shines() {
     assert!(incidence(&dark, &taki::scene::Values::default(), None).is_none());
 }
 
-/// A window in which the plot is in sight.
+/// A window in which the plot is visible.
 fn window() -> Window {
     Setup { size: [760.0, 1500.0], ..Setup::default() }.open()
 }

@@ -53,11 +53,12 @@ fn the_picture_has_the_same_place_while_the_renderer_works_and_at_rest() {
     }
 }
 
-/// Small enough that a snapshot stays under 64 KiB.
+/// Size of a window so small that its snapshot stays under 64 KiB.
 const SIZE: [f32; 2] = [860.0, 520.0];
 const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
 
-/// The picture itself is tested elsewhere; some of it is kept, to see that it is there.
+/// Compares the window with its snapshot. Other tests check the picture itself; the snapshot shows only some
+/// of it, to check that it is there.
 fn snapshot(theme: egui::Theme, name: &str, prepare: impl FnOnce(&mut Window)) {
     if crate::engine::gpu::renderer(name).is_none() {
         return;
@@ -73,7 +74,7 @@ fn snapshot(theme: egui::Theme, name: &str, prepare: impl FnOnce(&mut Window)) {
         let whole = window.harness.render().expect("an adapter to draw with");
         whole.save(Path::new(&folder).join(format!("{name}.png"))).expect("saved");
     }
-    // Times and memory are never the same.
+    // Times and memory differ in every run.
     let status = Rect::from_min_max(pos2(0.0, SIZE[1] - 26.0), pos2(SIZE[0], SIZE[1]));
     window.harness.mask(status);
     let image = window.harness.render().expect("an adapter to draw with");
@@ -122,12 +123,12 @@ fn the_snapshot_of_one_theme_is_not_that_of_the_other() {
 }
 
 fn is_alike(width: u32, a: &[[f32; 3]], b: &[[f32; 3]]) -> bool {
-    // Text may be a step of grey different with another driver; a moved widget is hundreds of pixels.
+    // Another driver may draw text a step of grey differently. A moved widget changes hundreds of pixels.
     let tolerance = Tolerance { relative: 0.0, absolute: 6.5 / 255.0 };
     Difference::new(width, a, b, tolerance).share_outside() <= 0.002
 }
 
-/// `TAKI_LOOK=FOLDER cargo test --release -- look` writes pictures of the window there, to look at.
+/// `TAKI_LOOK=FOLDER cargo test --release -- look` writes pictures of the window to that folder.
 #[test]
 fn pictures_of_the_window_on_demand() {
     let Some(folder) = std::env::var_os("TAKI_LOOK").map(PathBuf::from) else { return };

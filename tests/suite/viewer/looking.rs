@@ -1,7 +1,7 @@
 //! Views of a frame, a volume and its curves. Panels are driven by the labels of their controls, without a
 //! window.
 //!
-//! `TAKI_LOOK=FOLDER cargo test --release -- looking` writes pictures of all of them to the folder.
+//! `TAKI_LOOK=FOLDER cargo test --release -- looking` writes pictures of all panels to the folder.
 
 use glam::{IVec3, Vec3};
 use taki::curve::CurveShape;
@@ -32,7 +32,7 @@ fn the_shown_curve_is_the_curve_the_volume_is_built_from() {
         let mut points = vec![Vec3::NAN; 3];
         curve_points(&spec, 0, &mut points);
         assert_eq!(points.len(), 129);
-        // The builder's sum in its own order: parts of a cell first, then the cell.
+        // The builder sums in this order: first the parts in a cell, then the cell.
         let mut directions = vec![Vec3::ZERO; volume.cells.len()];
         let mut open: Option<(IVec3, Vec3)> = None;
         let mut parts = Vec::new();
@@ -68,7 +68,7 @@ fn fewer_levels_give_points_of_the_same_curve() {
         curve_points(&fine, curve, &mut all);
         curve_points(&coarse, curve, &mut some);
         assert!(all.iter().step_by(8).eq(some.iter()), "curve {curve}");
-        // In its own square of the grid.
+        // Each curve starts in its own square of the grid.
         assert_eq!((all[0].x / 24.0 * 5.0) as usize, curve % 5);
         assert_eq!((all[0].z / 18.0 * 3.0) as usize, curve / 5);
     }

@@ -29,10 +29,11 @@ use taki::viewer::worker::Picture;
 use taki::viewer::{Loss, Options, Viewer, metrics};
 use tempfile::TempDir;
 
-/// A picture of so few pixels takes milliseconds; one that takes this long hangs.
+/// Longest time to wait for a picture. With so few pixels it takes milliseconds, so a picture that takes this
+/// long hangs.
 const LONGEST: Duration = Duration::from_secs(60);
 
-/// Eight quads, four rocks and a light, all of them coarse.
+/// A scene of eight quads, four rocks and a light, all of them coarse.
 pub const SCENE: &str = r#"
 version = 1
 base = "fig5"
@@ -57,10 +58,10 @@ height = 90
 samples = 1
 "#;
 
-/// Of the scene's image.
+/// Aspect ratio of the scene's image.
 const ASPECT: f32 = 160.0 / 90.0;
 
-/// What a test may choose about its window.
+/// Settings of a window that a test may choose.
 pub struct Setup {
     pub scene: String,
     pub settings: String,
@@ -75,7 +76,7 @@ impl Default for Setup {
     fn default() -> Self {
         Setup {
             scene: SCENE.into(),
-            // One sample a pixel: what these tests see is there after the first.
+            // One sample per pixel, because these tests need no more than the first.
             settings: r#"{"refine_to": 1}"#.into(),
             engine: EngineChoice::Cpu,
             device: DeviceOptions::default(),
@@ -87,7 +88,7 @@ impl Default for Setup {
 }
 
 impl Setup {
-    /// A window without the parameters beside the picture.
+    /// A window that hides the parameters beside the picture.
     pub fn bare() -> Setup {
         Setup {
             settings: r#"{"refine_to": 1, "parameters": false}"#.into(),
@@ -135,7 +136,7 @@ fn options(scene: &Path, settings: &Path) -> Options {
     }
 }
 
-/// A viewer and the folder of its scene and settings.
+/// A viewer, with the folder of its scene and settings.
 pub struct Window {
     pub harness: Harness<'static, Viewer>,
     pub folder: TempDir,
@@ -162,17 +163,17 @@ impl Window {
         self.folder.path().join(name)
     }
 
-    /// Draws frames until what was asked for is shown.
+    /// Draws frames until the current picture is shown.
     pub fn settle(&mut self) {
         self.until("the picture", |viewer| viewer.is_settled());
-        // The frame that shows what the render thread left last.
+        // This frame shows the render thread's last result.
         self.harness.run_steps(2);
         if !self.viewer().is_settled() {
             self.settle();
         }
     }
 
-    /// Draws frames until `done`.
+    /// Draws frames until `done` returns true.
     #[track_caller]
     pub fn until(&mut self, what: &str, done: impl Fn(&Viewer) -> bool) {
         let start = Instant::now();
@@ -227,13 +228,13 @@ impl Window {
         self.chord(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     }
 
-    /// The one widget of this role and name, wherever it is scrolled to.
+    /// The only widget of this role and name, even if it is scrolled out of view.
     #[track_caller]
     pub fn widget<'a>(&'a self, role: Role, label: &'a str) -> Node<'a> {
         self.harness.get_by_role_and_label(role, label)
     }
 
-    /// All widgets of a role with a name, in the order of the window.
+    /// Names of all widgets of a role, in the order of the window.
     pub fn names(&self, role: Role) -> Vec<String> {
         let nodes = self.harness.root().children_recursive();
         nodes
@@ -243,7 +244,7 @@ impl Window {
             .collect()
     }
 
-    /// Chooses an option of a combo box as a user does: opens it, then clicks.
+    /// Chooses an option of a combo box as a user does: opens the box, then clicks the option.
     #[track_caller]
     pub fn choose(&mut self, combo: &str, option: &str) {
         self.widget(Role::ComboBox, combo).click_accesskit();
@@ -257,21 +258,21 @@ impl Window {
         found[0].click_accesskit();
         drop(found);
         self.harness.run_steps(2);
-        // A screen reader's click leaves the list open.
+        // The click of a screen reader leaves the list open.
         if self.names(Role::Button).iter().any(|name| name == option) {
             self.widget(Role::ComboBox, combo).click_accesskit();
             self.harness.run_steps(2);
         }
     }
 
-    /// Types into a field and leaves it.
+    /// Types into a field and leaves the field.
     #[track_caller]
     pub fn enter(&mut self, field: &str, text: &str) {
         self.widget(Role::TextInput, field).set_text_value_accesskit(text);
         self.harness.run_steps(2);
     }
 
-    /// Whether some text is on the window.
+    /// Whether the window shows a text.
     pub fn reads(&self, text: &str) -> bool {
         self.harness.query_all_by_label_contains(text).next().is_some()
     }
@@ -283,7 +284,7 @@ impl Window {
         self.harness.run_steps(4);
     }
 
-    /// The picture's rectangle in the window.
+    /// Rectangle of the picture in the window.
     pub fn image_rect(&self) -> Rect {
         let outer = self.harness.get_by_label("Picture").rect();
         let [width, height] =
@@ -291,7 +292,7 @@ impl Window {
         Rect::from_center_size(outer.center(), egui::vec2(width, height))
     }
 
-    /// A drag of the pointer, frame by frame.
+    /// Drags the pointer, frame by frame.
     pub fn drag(&mut self, from: Pos2, by: Vec2, modifiers: Modifiers) {
         self.press_at(from, modifiers);
         for part in 1..=4 {

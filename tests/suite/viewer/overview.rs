@@ -33,7 +33,7 @@ fn file(width: u32, height: u32, more: &[&str]) -> Environment {
         .collect::<Vec<_>>())
 }
 
-/// Mean over the sphere.
+/// Mean of the texels over the sphere.
 fn mean(texels: &[glam::Vec3], columns: usize, rows: usize) -> DVec3 {
     let edge = |j: usize| (PI * j as f64 / rows as f64).cos();
     let of = |i: usize| {
@@ -44,13 +44,13 @@ fn mean(texels: &[glam::Vec3], columns: usize, rows: usize) -> DVec3 {
 
 #[test]
 fn the_overview_has_all_of_the_maps_power() {
-    // Sizes with whole cells in each texel: larger and smaller than the cells, and as large.
+    // Maps in which each texel has whole cells: more cells than texels, fewer, and as many.
     for (width, height) in [(1024, 512), (512, 256), (256, 128)] {
         let environment = file(width, height, &["environment.intensity=2.5", "environment.turn=33.75"]);
         let mean = mean(&environment.overview(256, 128), 256, 128);
-        // E/π of a direction, in the mean over all.
+        // Mean of E/π over all directions.
         let right = environment.irradiance.0[0].as_dvec3();
-        // Both are stored in float32.
+        // Both values are stored in float32.
         assert!((mean - right).abs().max_element() < 1e-5 * right.max_element(), "{mean} {right}");
     }
 }
@@ -63,7 +63,8 @@ fn each_texel_of_the_overview_is_the_background_there() {
         let (x, y) = (i % columns, i / columns);
         let d = direction_at((x as f64 + 0.5) / columns as f64, (y as f64 + 0.5) / rows as f64);
         let right = environment.radiance(d.as_vec3());
-        // Over 1.4° the spot of `uneven` bends by at most 40·0.025²/8 of itself from its tangent; a byte a texel of .hdr.
+        // Over 1.4° the spot of `uneven` departs from its tangent by at most 40·0.025²/8 of itself. An .hdr
+        // file stores one byte per texel and component.
         assert!(
             (radiance - right).abs().max_element() < 0.02 * right.max_element(),
             "{x} {y}: {radiance} {right}"
@@ -100,7 +101,7 @@ fn the_mark_is_the_sun_or_the_brightest_light_of_the_map() {
     let i = brightest.expect("texels");
     let spot = direction_at(((i % 256) as f64 + 0.5) / 256.0, ((i / 256) as f64 + 0.5) / 128.0);
     let mark = direction_at(f64::from(u), f64::from(v));
-    // The spot's half width is 11°; a light stands for a piece of it.
+    // The half width of the spot is 11°, and a light stands for a part of the spot.
     assert!(mark.dot(spot) > 11f64.to_radians().cos(), "{mark} {spot}");
 }
 

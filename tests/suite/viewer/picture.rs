@@ -1,4 +1,4 @@
-//! Layers, pixels, faults, lost devices and windows of any size.
+//! Layers, pixels, faults, lost devices, and windows of any size.
 
 use super::*;
 use rand::{RngExt, SeedableRng};
@@ -43,7 +43,7 @@ fn a_layer_is_the_layer_of_a_render() {
     assert!(frame.surface == want.surface && frame.surface.is_some());
 }
 
-/// Everything a banner says now.
+/// Whether a banner shows all of these words.
 fn banner(window: &Window, words: &[&str]) -> bool {
     words.iter().all(|word| window.reads(word))
 }
@@ -70,7 +70,7 @@ fn a_scene_that_is_not_valid_is_told_and_undone_and_the_picture_stays() {
 fn a_volume_beyond_the_memory_budget_is_refused_and_undone() {
     let mut window = Setup { size: [700.0, 400.0], ..Setup::bare() }.open();
     let first = window.picture().frame.radiance.clone();
-    // Sparse it would fit.
+    // In sparse storage the volume would fit.
     window.set("volume.storage", Raw::Text("dense".into()));
     window.settle();
     for key in ["volume.nx", "volume.ny"] {
@@ -127,7 +127,7 @@ fn a_lost_device_is_replaced_and_after_four_in_a_minute_the_cpu_takes_over() {
     window.viewer().worker().lose_device();
     window.set("trace.sigma", Raw::Float(1.0));
     window.settle();
-    assert_eq!(window.viewer().worker().state().devices_lost, 4, "the CPU has none to lose");
+    assert_eq!(window.viewer().worker().state().devices_lost, 4, "the CPU engine has no device to lose");
 }
 
 #[test]
@@ -235,7 +235,7 @@ fn a_click_shows_the_ray_of_its_pixel_and_a_drag_of_the_inspector_follows() {
     let centre = window.image_rect().center();
     window.drag(centre - egui::vec2(20.0, 0.0), egui::vec2(20.0, 0.0), Modifiers::NONE);
     window.settle();
-    // The inspector took some of the picture's room: the place stays where it was in the scene.
+    // The inspector takes some of the picture's room, but the place stays at the same point of the scene.
     let ray = window.viewer().ray().expect("a ray");
     let picture = window.picture();
     let i = (ray.pixel[1] * picture.frame.width + ray.pixel[0]) as usize;
@@ -276,7 +276,7 @@ fn a_double_click_brings_what_is_under_the_pointer_to_the_middle() {
     window.harness.run_steps(2);
     window
         .until("the focus", |viewer| viewer.document().values().triple("camera.target").as_dvec3() != before);
-    assert!(window.point("camera.target").y < before.y - 0.3, "what was below is in the middle");
+    assert!(window.point("camera.target").y < before.y - 0.3, "the part below is now in the middle");
     window.undo();
     assert_eq!(window.point("camera.target"), before);
 }

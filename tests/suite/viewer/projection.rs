@@ -6,7 +6,8 @@ use taki::scene::Scene;
 use taki::viewer::lights::projection::View;
 use taki::viewer::navigate::Pose;
 
-/// Float64 carries 16 digits; a window has a thousand points, and a chain of ten operations.
+/// Rounding error: float64 has 16 digits, a window has a thousand points, and ten operations follow one
+/// another.
 const ROUNDING: f64 = 1e-11;
 
 const CORNER: DVec2 = DVec2::new(340.5, 62.0);
@@ -48,7 +49,8 @@ fn what_is_unprojected_is_seen_where_it_came_from_and_at_that_depth() {
             for depth in [0.01, 1.0, 7.3, 1e4] {
                 let (seen, deep) = view.project(view.unproject(at, depth));
                 let seen = seen.expect("before the eye");
-                // Coordinates are metres from the world's origin: what they round is seen at this depth.
+                // Coordinates are metres from the world's origin. At this depth, their rounding has the size
+                // of so many points.
                 let points = ROUNDING * SIZE.y * (1.0 + far / depth) / pose.tan_half_fov;
                 assert!(seen.distance(at) < points, "{seen} for {at}");
                 assert!((deep - depth).abs() < ROUNDING * (depth + far) * 10.0, "{deep} for {depth}");
@@ -105,7 +107,7 @@ fn a_place_unprojects_onto_the_ray_that_the_renderer_sends_through_it() {
         let ray = scene.camera.view_ray(width, height, pixel, [0.5, 0.5]).as_dvec3();
         let at = DVec2::new(f64::from(pixel[0]) + 0.5, f64::from(pixel[1]) + 0.5);
         let mine = (view.unproject(at, 3.0) - pose.eye).normalize();
-        // The renderer's ray is made of float32: 24 bits, a few operations.
+        // The renderer's ray is computed with a few operations in float32, which has 24 bits.
         assert!(mine.distance(ray) < 1e-6, "{mine} for {ray}");
     }
 }
@@ -130,7 +132,7 @@ fn a_direction_stays_under_the_pointer_that_drags_it() {
     for at in places().map(|at| ((at - CORNER) / SIZE * 2.0 - 1.0) * 0.9) {
         let direction = view.dial_direction(at);
         assert!((direction.length() - 1.0).abs() < ROUNDING);
-        // Beyond the rim it is that of the rim: straight from behind.
+        // Beyond the rim, the direction is that of the rim: straight from behind.
         let want = if at.length() < 1.0 { at } else { DVec2::Y };
         let got = view.dial_place(direction);
         if at.length() < 1.0 {

@@ -8,11 +8,12 @@ use taki::picture::Layer;
 use taki::scene::{Kind, Param};
 
 const CHANGES: usize = 2_000;
-/// From here on everything that is kept has its size: buffers, textures, most of the steps of undo.
+/// After this number of changes, everything that is kept has its final size: buffers, textures, most of the
+/// undo steps.
 const WARM: usize = 500;
-/// Steps of undo still grow, and the allocator keeps what it likes; a leaked picture or volume a change
-/// would be ten times this. Largest is compared with largest: at one moment the renderer may hold the targets of
-/// a large picture, and at another those of a small one.
+/// Allowed growth. Undo steps still grow, and the allocator keeps memory at its discretion. A leaked picture
+/// or volume per change would be ten times this. The test compares the largest values, because the renderer
+/// may hold the targets of a large picture at one moment and those of a small one at another.
 const MAX_GROWTH_MIB: f64 = 60.0;
 const ALONE: &str = "TAKI_TEST_SOAK_ALONE";
 
@@ -27,7 +28,7 @@ fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
     Some(match param.kind {
         Kind::Float(min, max, _) => {
             let (low, high) = param.slider.unwrap_or((min, max));
-            // Some begin above what is otherwise large enough: kelvins.
+            // Some ranges, such as that of kelvins, begin above the limit for other values.
             let most = if low < 1e3 { high.min(1e3) } else { high };
             Raw::Float(rng.random_range(low.max(-1e3)..=most))
         }
@@ -43,12 +44,12 @@ fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
 fn soak() {
     let mut window = Setup { size: [260.0, 220.0], ..Setup::bare() }.open();
     let mut keys = window.viewer().document().scene().keys();
-    // How much light volumes may take is a parameter: as large as it may be by default, what lamps that come near
-    // a quad need would be taken for a leak.
-    // A rock of ten levels is a hundred MiB on host and device, one of seven a few.
+    // The memory of light volumes is a parameter. At its default, the light volumes of lamps that come near a
+    // quad would look like a leak. A rock of ten levels takes a hundred MiB on host and device, a rock of
+    // seven levels a few.
     keys.retain(|key| key != "light.cache" && !(key.starts_with("rocks.") && key.ends_with(".levels")));
     window.set("light.cache", Raw::Int(8));
-    // What is large and kept is there before it counts: a sky, light volumes, tables.
+    // Large things that are kept exist before the measurement starts: a sky, light volumes, tables.
     for (key, word) in [
         ("environment.kind", "sky"),
         ("light.reflection", "strand"),
@@ -114,7 +115,7 @@ fn soak() {
     window.settle();
     assert!(window.viewer().document().fault().is_none() && !window.viewer().document().is_changed());
     assert_eq!(window.picture().scale, 1);
-    assert!(!window.reads("bug"), "nothing went wrong under the renderer");
+    assert!(!window.reads("bug"), "the renderer reports no fault");
 }
 
 #[test]
@@ -122,7 +123,7 @@ fn thousands_of_changes_neither_panic_nor_fill_the_memory() {
     if std::env::var_os(ALONE).is_some() {
         return soak();
     }
-    // In a process of its own: the other tests' memory is not the viewer's.
+    // The test runs in a process of its own, so that it does not measure the memory of other tests.
     let mut alone = Command::new(std::env::current_exe().expect("this program"));
     alone.args(["--exact", "--nocapture", "--test-threads=1"]);
     alone.arg("viewer::soak::thousands_of_changes_neither_panic_nor_fill_the_memory").env(ALONE, "1");

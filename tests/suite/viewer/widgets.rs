@@ -6,7 +6,7 @@ use taki::scene::{Kind, Param, Values};
 /// A window with all groups and all corners open.
 fn open_groups() -> Window {
     let mut window = Setup::default().open();
-    // Every description ends with a full stop.
+    // Every description ends with a full stop, so this search finds all.
     window.enter("Search parameters", ".");
     let closed: Vec<_> = window.harness.query_all_by_label_contains("corners").collect();
     closed.iter().for_each(|header| header.click_accesskit());
@@ -19,7 +19,7 @@ fn values(window: &Window) -> Values {
     window.viewer().document().values().clone()
 }
 
-/// All but those of lights that mean nothing for their kind.
+/// All keys, except those of lights that have no meaning for their kind.
 fn keys(window: &Window) -> Vec<(String, &'static Param)> {
     let keys = window.viewer().document().scene().keys();
     let shown = |key: &String| {
@@ -37,7 +37,7 @@ fn is_material(key: &str) -> bool {
     key.ends_with(".material")
 }
 
-/// Whether a number is shown with a slider, and not as a number alone.
+/// Whether a number has a slider, not just a number field.
 fn has_slider(param: &Param) -> bool {
     match param.kind {
         Kind::Float(..) => true,
@@ -60,7 +60,7 @@ fn every_parameter_has_a_widget_of_its_name() {
             Kind::Text(_) => vec![(Role::TextInput, key.clone())],
             Kind::Color(_) => vec![(Role::ColorWell, key.clone())],
             Kind::Point(_) => axes.map(|axis| (Role::SpinButton, format!("{key} {axis}"))).into(),
-            // Of keyframes, which no preset has.
+            // These belong to keyframes, which no preset has.
             Kind::Frames | Kind::Series => Vec::new(),
             Kind::Corners => {
                 let names = ["A", "B", "C", "D"].into_iter();
@@ -77,7 +77,7 @@ fn every_parameter_has_a_widget_of_its_name() {
     assert_eq!(window.harness.unnamed_widgets(), Vec::<String>::new());
 }
 
-/// A value a little away from `now` on a slider from `low` to `high`.
+/// A value slightly away from `now` on a slider from `low` to `high`.
 fn another(now: f64, low: f64, high: f64, whole: bool) -> f64 {
     let step = if whole { 1.0 } else { ((high - low) * 0.01 * 1e3).round().max(1.0) / 1e3 };
     if now + step <= high { now + step } else { now - step }
@@ -185,7 +185,7 @@ fn a_typed_number_is_taken_when_the_field_is_left_and_may_lie_beyond_the_slider(
         window.harness.step();
         let before = window.float("trace.sigma");
         window.key(Key::Enter);
-        assert_ne!(before, want, "half a number is no number");
+        assert_ne!(before, want, "half a number is not accepted");
         assert_eq!(window.float("trace.sigma"), want);
     }
 }
@@ -316,7 +316,7 @@ fn the_search_shows_matches_only() {
     window.enter("Search parameters", "glassy threads");
     let found = shown(&window);
     let has = |key: &str| found.iter().any(|name| name == key);
-    assert!(has("curves.h") && !has("curves.amplitude"), "when to turn it is searched: {found:?}");
+    assert!(has("curves.h") && !has("curves.amplitude"), "its advice is searched: {found:?}");
     window.enter("Search parameters", "no such thing");
     assert!(window.reads("No parameter matches"));
     window.press("✖");

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const SIZE: [u32; 2] = [900, 560];
-/// A window opens within seconds, on software Vulkan too.
+/// A window opens within seconds, even on software Vulkan.
 const LONGEST: Duration = Duration::from_secs(60);
-/// The middle of the picture, right of the parameters.
+/// Middle of the picture, right of the parameters.
 const PICTURE: [u32; 2] = [620, 320];
 
 /// A process that does not outlive its test.
@@ -20,13 +20,13 @@ struct Owned(Child);
 
 impl Drop for Owned {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The process may have ended by itself.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// A display of its own, with a viewer in it.
+/// A display of its own with a viewer on it.
 struct Desk {
     viewer: Owned,
     name: String,
@@ -48,10 +48,10 @@ fn has(program: &str) -> bool {
     found
 }
 
-/// Starts a server on a free display; its name.
+/// Starts a server on a free display. Returns it with the display's name.
 fn server() -> (Owned, String) {
     let mut server = Command::new("Xvfb")
-        // Without -noreset the server starts anew when xdotool leaves, and refuses the viewer meanwhile.
+        // Without -noreset the server restarts when xdotool leaves, and refuses the viewer meanwhile.
         .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -65,7 +65,7 @@ fn server() -> (Owned, String) {
 }
 
 impl Desk {
-    /// Opens a viewer with these arguments; none where a program is missing.
+    /// Opens a viewer with these arguments. Returns `None` if a program is missing.
     fn open(arguments: &[&str]) -> Option<Desk> {
         if !(has("Xvfb") && has("xdotool")) {
             return None;
@@ -112,7 +112,7 @@ impl Desk {
         Some(desk)
     }
 
-    /// What xdotool prints.
+    /// Output of xdotool.
     fn xdotool(&self, words: &[&str]) -> String {
         let out =
             Command::new("xdotool").args(words).env("DISPLAY", &self.name).output().expect("xdotool runs");
@@ -131,7 +131,7 @@ impl Desk {
     }
 
     fn key(&self, key: &str) {
-        // There is no window manager that would give the window the keyboard once it is there.
+        // No window manager runs that would give the keyboard focus to a new window.
         self.xdotool(&["windowfocus", &self.window, "key", key]);
         std::thread::sleep(Duration::from_millis(150));
     }
@@ -149,7 +149,7 @@ impl Desk {
         }
     }
 
-    /// Waits for the viewer's end: its code, and what it printed.
+    /// Waits until the viewer ends. Returns its exit code and its output.
     fn end(&mut self) -> (Option<i32>, String) {
         let start = Instant::now();
         let code = loop {
@@ -171,7 +171,7 @@ impl Desk {
     }
 }
 
-/// Colours in a part of a picture, as 5 bits each.
+/// Number of different colours in a part of a picture, at 5 bits per channel.
 fn colours(width: u32, pixels: &[[f32; 3]], from: [u32; 2], to: [u32; 2]) -> usize {
     let mut seen = std::collections::BTreeSet::new();
     for y in from[1]..to[1] {
@@ -186,7 +186,7 @@ fn colours(width: u32, pixels: &[[f32; 3]], from: [u32; 2], to: [u32; 2]) -> usi
 fn a_window_is_worked_with_mouse_and_keys_and_leaves_a_screenshot_and_its_measurements() {
     let arguments = ["--exit-after", "14", "--screenshot", "shot.png"];
     let Some(mut desk) = Desk::open(&arguments) else { return };
-    desk.until_changed("the sets are changes");
+    desk.until_changed("values set on the command line are changes");
     std::thread::sleep(Duration::from_millis(1500));
     desk.drag(PICTURE, [60, 12]);
     let [x, y] = PICTURE.map(|x| x.to_string());
@@ -215,7 +215,7 @@ fn a_window_is_worked_with_mouse_and_keys_and_leaves_a_screenshot_and_its_measur
     assert!(leftovers(desk.folder.path()).is_empty(), "{:?}", leftovers(desk.folder.path()));
 }
 
-/// Files that nobody asked for.
+/// Files that were not asked for.
 fn leftovers(folder: &Path) -> Vec<std::ffi::OsString> {
     let files = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("a file").file_name());
     files.filter(|name| name != "taki" && name != "shot.png").collect()
@@ -224,18 +224,18 @@ fn leftovers(folder: &Path) -> Vec<std::ffi::OsString> {
 #[test]
 fn a_window_without_changes_closes_when_asked_and_one_with_changes_asks_first() {
     let Some(mut desk) = Desk::open(&[]) else { return };
-    desk.until_changed("the sets are changes");
+    desk.until_changed("values set on the command line are changes");
     std::thread::sleep(Duration::from_millis(1500));
     let [x, y] = PICTURE.map(|x| x.to_string());
     desk.xdotool(&["mousemove", &x, &y]);
     desk.key("ctrl+q");
     std::thread::sleep(Duration::from_millis(1000));
     assert!(desk.viewer.0.try_wait().expect("a process").is_none(), "unsaved changes are asked about");
-    // Saved under the name it proposes, nothing is left to ask about.
+    // After a save under the proposed name, nothing is left to ask about.
     let start = Instant::now();
     while desk.title().starts_with('•') {
         assert!(start.elapsed() < LONGEST, "not saved: the title is {:?}", desk.title());
-        // A frame of a software GPU on a busy machine takes its time: the dialog may not be there yet.
+        // A frame of a software GPU takes long on a busy machine, so the dialog may not be open yet.
         desk.key("Escape");
         desk.key("ctrl+s");
         std::thread::sleep(Duration::from_millis(800));
@@ -263,7 +263,7 @@ fn a_window_whose_device_is_lost_is_opened_anew_with_its_scene() {
     let (code, said) = desk.end();
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("the window is reopened"), "{said}");
-    // The second window's picture: the scene still has the changes of the command line.
+    // The second window shows the scene with the changes of the command line.
     let shot = desk.folder.path().join("shot.png");
     let (width, height, pixels) = taki::output::frame::read_png(&shot).expect("a screenshot");
     assert_eq!([width, height], SIZE);
@@ -275,7 +275,7 @@ fn a_window_whose_device_is_lost_is_opened_anew_with_its_scene() {
 fn an_interrupted_window_closes_with_the_signals_own_code() {
     for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
         let Some(mut desk) = Desk::open(&[]) else { return };
-        desk.until_changed("the sets are changes");
+        desk.until_changed("values set on the command line are changes");
         let pid = desk.viewer.0.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().expect("kill runs").success());
         let (ended, said) = desk.end();

@@ -1,4 +1,4 @@
-//! Sparse storage: equal to dense storage cell for cell and picture for picture, in less memory.
+//! Sparse storage: it equals dense storage cell for cell and picture for picture, in less memory.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn cases(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Water of any kind in a volume of odd sizes.
+/// Water of any kind in volumes of odd sizes.
 fn spec() -> impl Strategy<Value = WaterSpec> {
     let size = [1u32..34, 1u32..34, 1u32..34];
     let curves = (1u32..20, 1u32..20, 0.0f32..2.0, 0.0f32..0.6);
@@ -75,7 +75,8 @@ fn packed(volume: &VolumeTexture) -> VolumeTexture {
     VolumeTexture { cells, ..volume.clone() }
 }
 
-/// Cell by cell, in every way to ask for one, and in what is worked out of all.
+/// Asserts that both volumes are equal: cell by cell, with every way to read a cell, and in everything
+/// computed from all cells.
 fn assert_same(dense: &VolumeTexture, sparse: &VolumeTexture) {
     assert!(sparse.is_sparse() && !dense.is_sparse());
     let [nx, ny, nz] = dense.size;
@@ -92,7 +93,7 @@ fn assert_same(dense: &VolumeTexture, sparse: &VolumeTexture) {
     assert_eq!(dense.rho_histogram(10), sparse.rho_histogram(10));
     let [a, b] = [dense, sparse].map(VolumeTexture::statistics);
     assert_eq!((a.cells, a.flow_cells, a.occupied_cells), (b.cells, b.flow_cells, b.occupied_cells));
-    // Sums of the same numbers below 1 in another order.
+    // Both are sums of the same numbers below 1, in different orders.
     assert!((a.rho_mean - b.rho_mean).abs() < 1e-12 && (a.k_d_mean - b.k_d_mean).abs() < 1e-12);
     assert_eq!(b.stored_cells as usize, sparse.cells.stored().len());
     assert!(b.stored_cells <= a.cells && b.stored_cells >= b.flow_cells);
@@ -145,7 +146,8 @@ proptest! {
 
 #[test]
 fn many_rounds_of_curves_on_any_number_of_threads_are_the_dense_volume() {
-    // Several tasks and rounds, a depth that its slabs do not divide, strands that cross in most cells.
+    // The spec needs several tasks and rounds, has a depth that its slabs do not divide, and has strands that
+    // cross in most cells.
     let structure = Structure { coherence: 0.6, strand_length: 0.1, coverage: 0.5, ..Default::default() };
     let spec = WaterSpec {
         size: [23, 40, 75],
@@ -189,12 +191,12 @@ fn on_cpu(scene: &Scene, volume: &VolumeTexture) -> Frame {
 }
 
 fn on_gpu(renderer: &mut GpuRenderer, scene: &Scene, volume: &VolumeTexture) -> Frame {
-    // Codes of light volumes are rounded otherwise on the host, which never fills those of sparse volumes.
+    // The host rounds codes of light volumes differently, and it never fills those of sparse volumes.
     let options = RenderOptions { filling: Filling::Device, ..Default::default() };
     renderer.render(scene, volume, &scene.mesh(), &options, &Unwatched).expect("a frame")
 }
 
-/// Pictures and counts of dense and sparse storage, on either engine.
+/// Asserts that pictures and counts of dense and sparse storage are equal, on both engines.
 fn assert_alike(renderer: &mut Option<GpuRenderer>, what: &str, scene: &Scene, volume: &VolumeTexture) {
     let volumes = [volume.clone(), packed(volume)];
     let alike = |engine: &str, [a, b]: [Frame; 2]| {
@@ -223,7 +225,7 @@ fn every_preset_is_the_same_bit_for_bit_in_sparse_storage() {
 #[test]
 fn every_way_to_look_up_and_to_light_is_the_same_in_sparse_storage() {
     let mut renderer = renderer("ways in bricks");
-    // Sizes that bricks do not divide, so that copies of the volume meet inside bricks.
+    // Bricks do not divide these sizes, so copies of the volume meet inside bricks.
     let odd = ["curves.across=7", "curves.deep=6", "volume.nx=37", "volume.ny=41", "volume.nz=22"];
     let ways: [&[&str]; 9] = [
         &["light.visibility=none"],
@@ -242,7 +244,7 @@ fn every_way_to_look_up_and_to_light_is_the_same_in_sparse_storage() {
         let volume = scene.volume(MEMORY, &Unwatched).expect("a volume");
         assert_alike(&mut renderer, &way.join(" "), &scene, &volume);
     }
-    // Mist gives every empty cell a density, erosion takes it from thin ones.
+    // Mist gives every empty cell a density. Erosion takes it from thin cells.
     for preset in ["cascade", "curtain"] {
         let scene = scene(preset, &[&SMALL[..], &odd, &["light.visibility=march"]].concat());
         assert!(scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]), "{preset}");
@@ -281,16 +283,16 @@ fn load(sets: &[&str], memory: u64) -> taki::Result<Scene> {
 fn auto_is_dense_where_that_fits_and_sparse_where_only_that_does() {
     const LARGE: [&str; 3] = ["volume.nx=128", "volume.ny=128", "volume.nz=128"];
     let storage = |sets: &[&str], memory: u64| load(&[&LARGE[..], sets].concat(), memory).map(|s| s.storage);
-    // 128³ · 24 bytes, one more and one less.
+    // Dense storage needs 128³ · 24 bytes. The test uses that budget and one byte less.
     const DENSE: u64 = 24 << 21;
     assert_eq!(storage(&[], DENSE).unwrap(), Storage::Dense);
     assert_eq!(storage(&[], DENSE - 1).unwrap(), Storage::Sparse);
     assert_eq!(storage(&["volume.storage=sparse"], 1 << 32).unwrap(), Storage::Sparse);
     assert_eq!(storage(&["volume.storage=dense"], 1 << 32).unwrap(), Storage::Dense);
-    // Building a dense one takes 20 bytes a cell.
+    // Building a dense volume takes 20 bytes a cell.
     let refused = storage(&["volume.storage=dense"], (20 << 21) - 1).unwrap_err();
     assert_eq!(refused.exit_code(), 33);
-    // Coarse levels need all cells.
+    // Coarse levels need all cells, so the volume stays dense.
     assert_eq!(storage(&["trace.filter=pyramid"], DENSE - 1).unwrap(), Storage::Dense);
     let refused = storage(&["trace.filter=pyramid", "volume.storage=sparse"], 1 << 32).unwrap_err();
     assert_eq!(refused.exit_code(), 65);
@@ -303,7 +305,8 @@ fn a_sparse_volume_that_does_not_fit_is_refused_before_its_cells_are_made() {
     let sets = ["volume.nx=96", "volume.ny=96", "volume.nz=96", "volume.storage=sparse"];
     let scene = load(&sets, 1 << 32).unwrap();
     let stored = scene.volume(1 << 32, &Unwatched).unwrap().cells.stored().len() as u64;
-    // Sums of the builder: 12 bytes of masks and bases a brick, 8 of the cell and 12 of its sum.
+    // Memory of the builder: 12 bytes of masks and bases per brick; 8 for each stored cell and 12 for its
+    // sum.
     let need = 24u64.pow(3) * 12 + stored * (8 + 12);
     assert_eq!(sparse_bytes(scene.water.size, stored, 12), u128::from(need));
     assert!(scene.volume(need, &Unwatched).is_ok());
@@ -312,8 +315,8 @@ fn a_sparse_volume_that_does_not_fit_is_refused_before_its_cells_are_made() {
     for word in ["96×96×96", "curves.across", "--memory", &stored.to_string()] {
         assert!(refused.to_string().contains(word), "{word}: {refused}");
     }
-    // What a picture is reckoned with. The ways of curves differ by a tenth, so 32 tell their mean to 2 %; starts are
-    // jittered, so curves meet less often than by chance.
+    // The estimate for a picture. The lengths of curves differ by a tenth, so 32 curves give their mean to 2
+    // %. Starts are jittered, so curves meet less often than by chance.
     let expected = expected_cells(&scene.water);
     assert!(expected.abs_diff(stored) < stored / 20, "{expected} for {stored}");
 }
@@ -361,22 +364,23 @@ fn a_volume_of_several_uploads_and_planes_of_stored_cells_is_drawn_as_the_cpu_en
         "curves.deep=60",
         "trace.sigma=40",
         "trace.max_cells=4096",
-        // From the side, so that rays go through copies too.
+        // The camera looks from the side, so that rays pass through copies of the volume too.
         "camera.eye=[1.5, 1.0, 3.0]",
     ];
     let scene = scene("front", &[&SMALL[..], &sets].concat());
     let volume = scene.volume(MEMORY, &Unwatched).expect("a volume");
-    // Each 64 MiB go up at once: 16 bytes a brick, 8 a stored cell, of which 2²⁰ make a plane of their texture.
+    // An upload takes 64 MiB at a time: 16 bytes per brick and 8 per stored cell. 2²⁰ stored cells make one
+    // plane of their texture.
     let bricks = taki::volume::brick_grid(volume.size).map(u64::from).iter().product::<u64>();
     let stored = volume.cells.stored().len();
     assert!(bricks * 16 > 64 << 20 && stored * 8 > 64 << 20, "{bricks} bricks, {stored} cells");
     assert!(
         stored > 9 << 20 && !stored.is_multiple_of(1 << 20),
-        "whole planes go up after the first slab, and a part of one"
+        "whole planes and a part of one are uploaded after the first slab"
     );
     let frames = both(&mut renderer, &scene);
     assert_parity("a large volume in bricks", &frames);
-    // Cells of the last layers are met, and hide what is behind them.
+    // Rays meet cells of the last layers, which hide the background.
     let mut thinner = volume.clone();
     let last = u64::from(volume.size[0]) * u64::from(volume.size[1]) * 200;
     thinner.cells.change(|i, _, cell| if i >= last { Cell::default() } else { cell });

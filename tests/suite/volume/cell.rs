@@ -6,11 +6,11 @@ use rand_distr::{Distribution, UnitSphere};
 use rand_pcg::Pcg64Mcg;
 use taki::volume::{Cell, V_SCALE};
 
-/// The figure that the docs of `Cell` state, in degrees.
+/// Largest angle that the docs of `Cell` state, in degrees.
 const LARGEST_ANGLE_DEGREES: f64 = 0.0793;
 
 fn error_degrees(v: Vec3) -> f64 {
-    // By the cross product: near 0 the arc cosine loses all digits.
+    // The cross product is used because near 0 the arc cosine loses all digits.
     let (a, b) = (v.as_dvec3().normalize(), Cell::from_direction(v).v_code().as_dvec3().normalize());
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
@@ -18,7 +18,7 @@ fn error_degrees(v: Vec3) -> f64 {
 #[test]
 fn packing_turns_a_direction_by_no_more_than_the_docs_state() {
     let docs = include_str!("../../../src/volume/cell.rs");
-    assert!(docs.contains(&format!("{LARGEST_ANGLE_DEGREES}°")), "the docs state another figure");
+    assert!(docs.contains(&format!("{LARGEST_ANGLE_DEGREES}°")), "the docs state another angle");
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     for _ in 0..2_000_000 {
         let v = Vec3::from_array(UnitSphere.sample(&mut rng));
@@ -42,7 +42,7 @@ fn an_unpacked_direction_is_unit_and_points_the_same_way() {
     let mut rng = Pcg64Mcg::seed_from_u64(2);
     for _ in 0..100_000 {
         let v = Vec3::from_array(UnitSphere.sample(&mut rng));
-        // Any length, for sums of segments are packed as they are.
+        // The length is arbitrary, because sums of segments are packed as they are.
         let cell = Cell::from_direction(v * (rng.random::<f32>() * 40.0 - 20.0).exp2());
         assert!((cell.v().length() - 1.0).abs() < 1e-6 && cell.v().dot(v) > 0.999_99);
     }
@@ -66,7 +66,7 @@ fn packing_what_was_unpacked_gives_the_same_code() {
     let most = V_SCALE as i32;
     for _ in 0..500_000 {
         let mut code = [0; 3].map(|_: i32| rng.random_range(-most..=most) as f32);
-        // One component of every code has the largest magnitude.
+        // In every code, one component has the largest magnitude.
         code[rng.random_range(0..3)] = if rng.random() { V_SCALE } else { -V_SCALE };
         let v = Cell::from_direction(Vec3::from_array(code));
         assert_eq!(v.v_code().to_array(), code);

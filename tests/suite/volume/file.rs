@@ -34,13 +34,13 @@ fn read_bytes(dir: &TempDir, bytes: &[u8]) -> taki::Result<VolumeTexture> {
     read_npz(&path, StorageChoice::Auto, BUDGET)
 }
 
-/// The four arrays of a hand-made file; a valid one of 4×3×2 cells unless changed.
+/// The four arrays of a hand-made file. Unless changed, it is a valid file of 4×3×2 cells.
 struct Arrays {
     rho: (Vec<u64>, Vec<f32>),
     v: (Vec<u64>, Vec<f32>),
     k: (Vec<u64>, Vec<f32>),
     alpha: Option<(Vec<u64>, Vec<f32>)>,
-    /// Name of an array to leave out, or to write as float64.
+    /// Names of an array to leave out and of an array to write as float64.
     left_out: &'static str,
     doubled: &'static str,
 }
@@ -69,7 +69,7 @@ impl Arrays {
                 continue;
             }
             zip.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
-            // Through a buffer: the array's own length need not fit the shape it claims.
+            // A buffer is used, because the array's length need not fit the shape that it claims.
             let mut array = Vec::new();
             if name == self.doubled {
                 let options = npyz::WriteOptions::new().default_dtype().shape(shape);
@@ -96,7 +96,7 @@ impl Arrays {
     }
 }
 
-/// Puts another shape into the header of an array, keeping the header's length (it is padded).
+/// Replaces the shape in an array's header and keeps the header's length, which is padded.
 fn with_shape(array: &[u8], len: usize, shape: &[u64]) -> Vec<u8> {
     let header_len = 10 + u16::from_le_bytes([array[8], array[9]]) as usize;
     let header = String::from_utf8(array[10..header_len].to_vec()).unwrap();
@@ -156,7 +156,7 @@ fn flipped_bytes_never_panic_and_never_change_a_value_unseen() {
         let at = rng.random_range(0..bytes.len());
         flipped[at] ^= 1 << rng.random_range(0..8);
         match read_bytes(&dir, &flipped) {
-            // Dates, versions and the like are not looked at; array data has a checksum.
+            // Dates, versions and the like are ignored. Array data has a checksum.
             Ok(read) => assert_eq!(read, volume, "bit flipped in byte {at}"),
             Err(fault) => {
                 assert!([65, 33].contains(&fault.exit_code()), "byte {at}: {fault}");
@@ -208,12 +208,12 @@ fn faulty_arrays_are_refused_with_exit_code_65_and_the_arrays_name() {
     for value in [0.7, -0.5, 0.0, f32::NAN, f32::INFINITY, 1e30] {
         refused("v", Arrays { v: (ok().v.0, change(ok().v.1, 4, value)), ..ok() });
     }
-    // A cell with density needs a direction; no density is more than α.
+    // A cell with density needs a direction, and no density may exceed α.
     let mut v = ok().v.1;
     v[3..6].fill(0.0);
     refused("rho", Arrays { v: (ok().v.0, v), ..ok() });
     refused("rho", Arrays { alpha: Some((vec![], vec![0.25])), ..ok() });
-    // Shapes that contradict one another or the data.
+    // These shapes contradict one another or the data.
     refused("v", Arrays { v: (vec![2, 3, 3, 4], ok().v.1), ..ok() });
     refused("v", Arrays { v: (vec![4, 3, 2, 3], ok().v.1), ..ok() });
     refused("k", Arrays { k: (vec![2, 3, 4, 3], ok().k.1), ..ok() });
@@ -233,7 +233,7 @@ fn a_density_that_is_no_volume_is_refused_with_exit_code_65() {
 
 #[test]
 fn a_claimed_size_over_the_budget_is_refused_before_it_is_allocated() {
-    // 10^15 cells cannot be allocated: trying to would end the process.
+    // 10^15 cells cannot be allocated. An attempt would end the process.
     let n = 100_000;
     let huge = |shape: Vec<u64>| Arrays { rho: (shape, vec![0.5; CELLS]), ..Default::default() };
     assert_eq!(huge(vec![n, n, n]).read().expect_err("10^15 cells").exit_code(), 33);

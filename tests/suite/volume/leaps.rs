@@ -1,5 +1,5 @@
-//! Leaps over empty boxes end in states of the plain walk: boxes against brute force, leaps against the
-//! plain walk crossing by crossing, pictures bit for bit.
+//! Leaps over empty boxes end in states of the plain walk. Boxes are compared with brute force, leaps with
+//! the plain walk crossing by crossing, and pictures bit for bit.
 
 use crate::engine::gpu::{renderer, scene};
 use glam::{IVec3, Vec3};
@@ -23,7 +23,8 @@ fn cases(cases: u32) -> ProptestConfig {
     }
 }
 
-/// Any small volume: `full` of 256 cells have density; one in eight of the others has a direction all the same.
+/// A small random volume. `full` of 256 cells have density. One in eight of the others has a direction
+/// nevertheless.
 fn volume() -> impl Strategy<Value = VolumeTexture> {
     ([1u32..14, 1u32..14, 1u32..14], prop::sample::select(vec![0u8, 1, 4, 16, 60, 200]), any::<u64>())
         .prop_map(|(size, full, seed)| {
@@ -55,7 +56,7 @@ fn is_full(volume: &VolumeTexture, c: IVec3) -> bool {
     cell_at(volume, c).is_some_and(|cell| cell.rho_code() > 0)
 }
 
-/// For rays that look between cells: whether all they might meet there is empty.
+/// Whether a ray that looks between cells may meet density there.
 fn is_full_around(volume: &VolumeTexture, c: IVec3) -> bool {
     let near = |i: i32| IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
     cell_at(volume, c).is_some() && (0..27).any(|i| is_full(volume, c + near(i)))
@@ -100,7 +101,8 @@ proptest! {
     }
 }
 
-/// Crossings of cells with density, to the end of the slab or `most` cells, the number of all, and that of turns.
+/// Crossings of cells with density up to the end of the slab or `most` cells; the number of all cells; and
+/// the number of loop turns.
 fn met(
     volume: &VolumeTexture,
     origin: Vec3,
@@ -127,7 +129,7 @@ fn met(
     (met, cells.min(most), turns)
 }
 
-/// Anywhere, on a face, or where crossings coincide.
+/// A coordinate anywhere, on a face, or where crossings coincide.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![4 => 0.0f32..1.0, 1 => Just(0.0f32), 1 => (0i32..8).prop_map(|x| x as f32 / 8.0)]
 }
@@ -152,7 +154,7 @@ proptest! {
     ) {
         let direction = Vec3::from_array(direction);
         let [nx, ny, nz] = volume.size.map(|n| n as f32);
-        // On the near face, or inside.
+        // The start lies on the near face or inside the slab.
         let z = if direction.z < 0.0 { nz - start[2] } else { start[2] };
         let origin = Vec3::new(start[0] * nx, start[1] * ny, z);
         let boxed = with_boxes(&volume, false);
@@ -192,7 +194,7 @@ fn on_gpu(renderer: &mut GpuRenderer, scene: &Scene, volume: &VolumeTexture, lea
     renderer.render(scene, volume, &scene.mesh(), &options, &Unwatched).expect("a frame")
 }
 
-/// With and without leaps, on either engine.
+/// Asserts that frames with and without leaps are equal, on both engines.
 fn assert_alike(renderer: &mut Option<GpuRenderer>, what: &str, scene: &Scene) {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let alike = |engine: &str, [a, b]: [Frame; 2]| {

@@ -1,4 +1,4 @@
-//! §2 The volume texture: promises of its builder. Packing and files have modules of their own.
+//! §2 The volume texture: what its builder promises. Packing and files have modules of their own.
 
 pub mod bricks;
 pub mod cell;
@@ -40,7 +40,7 @@ fn on_threads(threads: usize, spec: &WaterSpec) -> VolumeTexture {
     pool.install(|| build(spec))
 }
 
-/// Mean of `of` over the flow cells, with the number of flow cells.
+/// Mean of `of` over the flow cells, and the number of flow cells.
 fn mean(volume: &VolumeTexture, of: impl Fn(&taki::volume::Cell) -> f64) -> (f64, f64) {
     let flow: Vec<f64> = volume.cells.iter().filter(|c| c.has_direction()).map(of).collect();
     (flow.iter().sum::<f64>() / flow.len() as f64, flow.len() as f64)
@@ -48,7 +48,7 @@ fn mean(volume: &VolumeTexture, of: impl Fn(&taki::volume::Cell) -> f64) -> (f64
 
 #[test]
 fn one_seed_gives_the_same_bytes_on_any_number_of_threads() {
-    // Enough curves for several tasks and rounds, a depth that its slabs do not divide.
+    // The spec has enough curves for several tasks and rounds, and a depth that its slabs do not divide.
     let spec = spec([23, 40, 37], 90);
     let one = on_threads(1, &spec);
     assert_eq!(one, on_threads(4, &spec));
@@ -61,14 +61,14 @@ fn density_over_the_flow_cells_is_a_clamped_normal() {
     let volume = build(&spec([60, 60, 60], 60));
     let (rho, n) = mean(&volume, |c| c.rho() as f64);
     assert!(n > 50_000.0, "{n} flow cells");
-    // Φ(−½) of the cells are clamped at either end; codes round 1/131070 more onto each.
+    // A share Φ(−½) of the cells is clamped at either end. The codes round another 1/131070 onto each end.
     let share = 0.308_537_538_7;
     let five = 5.0 * (share * (1.0 - share) / n).sqrt() + 1e-5;
     let (at_zero, _) = mean(&volume, |c| f64::from(c.rho_code() == 0));
     let (at_one, _) = mean(&volume, |c| f64::from(c.rho_code() == 65535));
     assert!((at_zero - share).abs() < five, "share at 0: {at_zero}");
     assert!((at_one - share).abs() < five, "share at 1: {at_one}");
-    // ½ is the largest standard deviation of anything in 0..=1; the true one is 0.41.
+    // ½ is the largest standard deviation of values in 0..=1. The true one is 0.41.
     assert!((rho - 0.5).abs() < 5.0 * 0.42 / n.sqrt(), "mean {rho}");
     let s = volume.statistics();
     assert_eq!(s.flow_cells as f64, n);
@@ -106,7 +106,7 @@ fn without_amplitude_the_flow_is_straight_columns() {
             columns += usize::from(column[0] == Vec3::Y);
         }
     }
-    // One curve in each square of the grid; the squares are larger than a cell.
+    // Each square of the grid has one curve, and the squares are larger than a cell.
     assert!((25..=36).contains(&columns), "{columns} columns");
 }
 
@@ -117,11 +117,11 @@ fn curves_wrap_in_x_and_y_and_are_dropped_in_z() {
     for seed in 0..60 {
         let mut spec = spec(size, 1);
         spec.seed = seed;
-        // Rough and wide: only tilted segments are displaced along y.
+        // The curve is rough and wide, because only tilted segments are displaced along y.
         spec.shape.sigma_g_cells = 12.0;
         spec.shape.h = 0.3;
         let volume = build(&spec);
-        // The same curve in unwrapped space, looked at point by point.
+        // The same curve in unwrapped space, sampled point by point.
         let points = only_curve(&spec);
         let mut seen = HashSet::new();
         for ends in points.windows(2) {
@@ -145,13 +145,13 @@ fn curves_wrap_in_x_and_y_and_are_dropped_in_z() {
             assert!(cell.has_direction(), "seed {seed}: the curve passes {c}, which is empty");
         }
         let flow = volume.cells.iter().filter(|c| c.has_direction()).count();
-        // What the points miss are corners cut by less than the step between them.
+        // The points miss only corners, which are cut by less than the step between points.
         assert!(flow >= seen.len() && flow <= seen.len() + seen.len() / 10 + 3, "{flow} of {}", seen.len());
     }
     assert!(over_x > 1000 && over_y > 1000 && over_z > 1000, "{over_x} {over_y} {over_z}");
 }
 
-/// The points of curve 0 of a jitter grid of one, from the crate's public parts.
+/// Points of curve 0 of a jitter grid of one square, computed with the crate's public functions.
 fn only_curve(spec: &WaterSpec) -> Vec<Vec3> {
     let mut rng = Family::new(spec.seed, Stream::Curve).member(0);
     let x = rng.random::<f32>() * spec.size[0] as f32;
@@ -169,10 +169,10 @@ fn a_cells_direction_is_the_length_weighted_sum_of_its_segments() {
     for seed in 0..20 {
         let mut spec = spec(size.to_array().map(|n| n as u32), 1);
         spec.seed = seed;
-        // Segments of several cells that meet at sharp angles.
+        // The segments are several cells long and meet at sharp angles.
         spec.shape = CurveShape { h: 0.3, sigma_g_cells: 4.0, levels: 4 };
         let volume = build(&spec);
-        // Each segment cut into short equal pieces, each piece added to the cell of its middle.
+        // Each segment is cut into short equal pieces. Each piece is added to the cell of its middle.
         let mut sums: HashMap<IVec3, [DVec3; 2]> = HashMap::new();
         for (i, ends) in only_curve(&spec).windows(2).enumerate() {
             let (start, d) = (ends[0].as_dvec3(), (ends[1] - ends[0]).as_dvec3());
@@ -188,7 +188,7 @@ fn a_cells_direction_is_the_length_weighted_sum_of_its_segments() {
         }
         for (c, parts) in sums {
             let sum = parts[0] + parts[1];
-            // A shorter way is known too badly from pieces of some 4e-4 cells.
+            // Pieces of some 4e-4 cells give a shorter way too inaccurately.
             if sum.length() < 0.2 {
                 continue;
             }
@@ -196,7 +196,7 @@ fn a_cells_direction_is_the_length_weighted_sum_of_its_segments() {
             assert!(v.angle_between(sum) < 1e-2, "seed {seed}, cell {c}: {v}, not along {sum}");
             checked += 1;
             let lengths = [parts[0].length(), parts[1].length()];
-            // Where two segments of unequal length lean apart, nothing but the weighted sum fits.
+            // Where two segments of unequal length diverge, only the weighted sum fits.
             mixed += usize::from(
                 lengths[0].min(lengths[1]) > 0.05
                     && (lengths[0] / lengths[1]).ln().abs() > 0.4
@@ -217,12 +217,12 @@ fn k_lies_around_its_base_and_is_clamped() {
     assert!((k_d - 0.5).abs() < five && (k_s - 0.5).abs() < five, "{k_d} {k_s}");
     let (square, _) = mean(&volume, |c| (c.k().0 as f64 - 0.5).powi(2));
     assert!((square.sqrt() - 0.1).abs() < 5.0 * 0.1 / (2.0 * n).sqrt() + 1e-4, "noise {}", square.sqrt());
-    // The two are drawn apart.
+    // The two values are drawn independently.
     let (both, _) = mean(&volume, |c| (c.k().0 as f64 - 0.5) * (c.k().1 as f64 - 0.5));
     assert!(both.abs() < 5.0 * 0.01 / n.sqrt(), "covariance {both}");
 
     let high = build(&WaterSpec { k_d: 1.0, k_s: 0.0, k_noise: 0.5, ..base });
-    // Half of the draws are clamped at the base, Φ(−2) at the other end.
+    // Half of the draws are clamped at the base, and Φ(−2) of them at the other end.
     let want = 0.5 + (0.5 - 0.022_750_1) + 0.5 * (0.053_991_0 - 0.398_942_3);
     let (k_d, n) = mean(&high, |c| c.k().0 as f64);
     let (k_s, _) = mean(&high, |c| c.k().1 as f64);

@@ -18,7 +18,7 @@ use taki::util::monitor::Unwatched;
 use taki::volume::{Cell, LevelAtlas, Moments, VolumeTexture, coarse_levels, level_count, level_size};
 use taki::walk::Walk;
 
-/// Angles as they are.
+/// The metric that leaves angles as they are.
 const WORLD: Metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
 
 fn volume(size: [u32; 3], cell: impl Fn(IVec3) -> Cell) -> VolumeTexture {
@@ -46,14 +46,15 @@ fn one_direction_stays_one_in_the_word_of_a_coarse_cell() {
     for _ in 0..20_000 {
         let v = random_unit(&mut rng);
         let seen = Moments::unpacked(Moments::of(v).packed());
-        // S·v = v where S = v·vᵀ. Codes of √xx and √zz are good to half a 127th; where √yy is small it takes
-        // their error times √xx/√yy, at most the root of it.
+        // For S = v·vᵀ, S·v = v. The codes of √xx and √zz are good to half a 127th. √yy receives their error
+        // times √xx/√yy if it is small, at most the square root of their error.
         let back = seen.times(v);
         assert!((back - v).length() < 0.1, "{v} became {back}");
         if v.y.abs() > 0.3 {
             assert!((back - v).length() < 0.03, "{v} became {back}");
         }
-        // No variance: correlations of ±1 have codes. An axis of code 0 has lost its part of the direction.
+        // There is no variance, because correlations of ±1 have codes. An axis with code 0 has lost its part
+        // of the direction.
         let spread = Spread::new(&WORLD, seen, Vec3::Z);
         assert!(spread.variance() < 1e-4, "{v}: {}", spread.variance());
     }
@@ -72,7 +73,7 @@ fn moments_of_crossing_strands_keep_both_directions() {
     for _ in 0..2000 {
         let l = random_unit(&mut rng);
         let want = 0.5 * (a.dot(l).powi(2) + b.dot(l).powi(2));
-        // Correlations are good to half a 31st, roots to half a 127th.
+        // Correlations are good to half a 31st, and square roots to half a 127th.
         assert!((seen.times(l).dot(l) - want).abs() < 0.03, "{l}");
     }
 }
@@ -102,8 +103,9 @@ fn light_of_a_bundle_is_the_mean_of_its_strands() {
                 sum += f64::from(want);
             }
         }
-        // One direction is what the fibre model says. Of a highlight as narrow as the bundle is wide (p = 40: 9°), which
-        // is no Gaussian any more, the folding is off by up to 0.07 of its 0.5; taken for one direction it would be by 0.3.
+        // For one direction the result is that of the fibre model. A highlight as narrow as the bundle is
+        // wide (p = 40: 9°) is no longer a Gaussian, so the folding is off by up to 0.07 of its 0.5. With a
+        // single direction instead it would be off by 0.3.
         let [most, share] = if spread_of == 0.0 { [1e-4, 1e-5] } else { [0.09, 0.03] };
         assert!(worst < most && error / sum < share, "{spread_of}: worst {worst}, share {}", error / sum);
     }
@@ -111,10 +113,10 @@ fn light_of_a_bundle_is_the_mean_of_its_strands() {
 
 #[test]
 fn a_coarse_cell_lets_as_much_pass_as_its_columns() {
-    // Every other column is solid: half the light passes, though the mean density would let e^(−mean).
+    // Every other column is solid, so half of the light passes. The mean density would let e^(−mean) pass.
     let solid = Cell::from_direction(Vec3::Y).with_density(1.0, 0.5, 0.5);
     let stripes = volume([16, 16, 8], |c| if c.x % 2 == 0 { solid } else { Cell::default() });
-    // 4 bits of transmittance over each cell's depth: a column of 8 lets 2^(−32) pass.
+    // Each cell's depth has 4 bits of transmittance, so a column of 8 cells lets 2^(−32) pass.
     let bits = 4.0 / 65535.0;
     let levels = coarse_levels(&stripes, bits);
     assert_eq!(levels.len(), 4);
@@ -122,13 +124,13 @@ fn a_coarse_cell_lets_as_much_pass_as_its_columns() {
         let [.., nz] = level.size;
         let deep = 8.0 / nz as f32;
         for cell in level.cells.iter() {
-            // Level 1 has T = (1 + 2^(−8))/2 over two cells; below that all columns are alike.
+            // Level 1 has T = (1 + 2^(−8))/2 over two cells. On the levels below, all columns are alike.
             let passed = (-(cell.rho_code() as f32) * bits * 2.0).exp2();
             assert!(close(passed.into(), 0.5 * (1.0 + 2f64.powi(-8)), 1e-3, 0.0), "{passed}, {deep}");
             assert_eq!(cell.k_codes(), solid.k_codes());
         }
     }
-    // Where little is hidden the mean is right.
+    // Where little is hidden, the mean density is right.
     let thin = coarse_levels(&stripes, 1e-9);
     assert!(thin.iter().flat_map(|l| l.cells.iter()).all(|c| c.rho_code().abs_diff(32768) <= 1));
 }
@@ -155,7 +157,7 @@ fn levels_of_odd_volumes_join_without_a_seam_and_lose_no_water() {
     };
     for (number, level) in coarse_levels(&odd, 1e-9).iter().zip(1..).map(|(l, n)| (n, l)) {
         assert_eq!(level.size, level_size(odd.size, number));
-        // A code's rounding.
+        // The bound is a code's rounding.
         assert!((mean(level) - mean(&odd)).abs() < 1.0, "level {number}");
         assert!((k_d(level) - k_d(&odd)).abs() < 0.5, "level {number}: {} and {}", k_d(level), k_d(&odd));
     }
@@ -183,7 +185,8 @@ fn levels_lie_beside_one_another_in_their_texture() {
     }
 }
 
-/// Rays straight into a quad through a volume, from `distance` metres; the filter's level grows with it.
+/// Radiances of rays straight into a quad through a volume, from `distance` metres. The filter's level grows
+/// with the distance.
 fn radiance(
     mut scene: Scene,
     volume: &VolumeTexture,
@@ -211,13 +214,13 @@ fn even_water_looks_alike_at_every_level_and_between_cells() {
         &["light.visibility=march", "light.scattering=multiple"],
         &["light.visibility=cached", "light.scattering=multiple", "light.reflection=strand"],
     ] {
-        // The light comes along the view, so that its way into a cell is half the cell's at every level: only steps
-        // of the sum over cells differ. Depth 16 halves evenly four times.
+        // The light comes along the view, so its way into a cell is half the cell at every level. Only the
+        // steps of the sum over cells differ. A depth of 16 halves evenly four times.
         let even = volume([16, 16, 16], |_| cell);
         let base = scene("front", &[&["lights.key.direction=[0,0,1]", "trace.sigma=0.8"][..], sets].concat());
         let near = radiance(base.clone(), &even, Prefilter::None, Lookup::Nearest, 3.0);
         let between = radiance(base.clone(), &even, Prefilter::Pyramid, Lookup::Trilinear, 3.0);
-        // Half a level, then two, then three and a half.
+        // The distances give half a level, then two, then three and a half.
         for distance in [12.0, 40.0, 80.0, 240.0] {
             let far = radiance(base.clone(), &even, Prefilter::Pyramid, Lookup::Nearest, distance);
             for (a, b) in near.iter().zip(far) {
@@ -225,7 +228,7 @@ fn even_water_looks_alike_at_every_level_and_between_cells() {
             }
         }
         for (a, b) in near.iter().zip(between) {
-            // Moments are exact at the finest level.
+            // At the finest level, moments are exact.
             assert!((*a - b).abs().max_element() < 2e-4, "{sets:?}: {a} and {b}");
         }
     }
@@ -242,7 +245,7 @@ fn a_view_that_magnifies_every_cell_is_not_filtered() {
     };
     let plain = render(&scene);
     scene.edit().trace.filter = Prefilter::Pyramid;
-    // Ψ of moments is Ψ of their one direction but for rounding and `powf`.
+    // Ψ of the moments is Ψ of their one direction, except for rounding and `powf`.
     for (a, b) in plain.iter().zip(render(&scene)) {
         assert!((0..4).all(|c| close(a[c].into(), b[c].into(), 1e-4, 1e-5)), "{a:?}, {b:?}");
     }
@@ -278,14 +281,14 @@ fn between_cells_lies_what_their_centres_say() {
                 k_d += weight * f64::from(at(low.as_ivec3() + away)[1]);
             }
             let found = level.sample_trilinear(&crossing, origin, direction, &SheetDensity::WHOLE);
-            // Codes of ρ are good to 2^(−17), of k to 2^(−9).
+            // The codes of ρ are good to 2^(−17), those of k to 2^(−9).
             assert!(close((found.rho / 65535.0).into(), rho, 1e-3, 1e-3), "{} {rho}", found.rho / 65535.0);
             assert!(close((found.k[0] / 255.0).into(), k_d / rho, 0.0, 4e-3));
         }
     }
 }
 
-/// A fall so far away that a pixel sees some six cells across, and nothing else.
+/// A fall that fills the picture from so far away that a pixel is about six cells wide.
 fn distant(sets: &[&str]) -> Scene {
     let far = [
         "image.width=14",

@@ -7,7 +7,7 @@ use glam::Vec3;
 use taki::util::random::{Family, Stream};
 use taki::volume::{Ripple, Structure, VolumeTexture, WaterSpec, build_water, curve_points};
 
-/// With everything on.
+/// A spec with every addition turned on.
 fn rich(size: [u32; 3], grid: u32) -> WaterSpec {
     let structure = Structure {
         bundles: 9,
@@ -47,7 +47,7 @@ fn curves_of_bundles_end_where_they_began_so_that_copies_join() {
     let spec = rich([30, 64, 20], 12);
     for points in curves(&spec) {
         let way = points[points.len() - 1] - points[0];
-        // Float32 sums of numbers below 128.
+        // These are float32 sums of numbers below 128.
         assert!((way - Vec3::new(0.0, 64.0, 0.0)).abs().max_element() < 1e-4, "{way}");
     }
 }
@@ -61,7 +61,7 @@ fn without_a_spread_of_their_own_all_curves_of_a_bundle_are_one() {
         .iter()
         .map(|points| points.iter().map(|p| p.to_array().map(|x| (x * 256.0).round() as i64)).collect())
         .collect();
-    // 144 curves choose among 9 parents: that one is left out has a chance of 4e-7.
+    // 144 curves choose among 9 parents. The chance that one parent is left out is 4e-7.
     assert_eq!(different.len(), 9);
     let straight = different.iter().filter(|points| points.iter().all(|p| p[0] == points[0][0]));
     assert_eq!(straight.count(), 0, "parents wander");
@@ -94,14 +94,14 @@ fn ripples_have_variance_1_and_the_wrapped_gaussian_covariance() {
     let gauss = |d: f64| (-2..=2).map(|n| (-0.5 * ((d + f64::from(n)) / length).powi(2)).exp()).sum::<f64>();
     for (i, sum) in sums.iter().enumerate() {
         let truth = gauss(i as f64 / steps as f64) / gauss(0.0);
-        // A product of two normal numbers has variance 1 + R²; five standard errors.
+        // A product of two normal numbers has variance 1 + R². The tolerance is five standard errors.
         let tolerance = 5.0 * ((1.0 + truth * truth) / seeds as f64).sqrt();
         let covariance = sum / seeds as f64;
         assert!((covariance - truth).abs() < tolerance, "{i}: {covariance} {truth}");
     }
 }
 
-/// Correlation of ρ in cells `steps` apart along y, both with flow.
+/// Correlation of ρ between cells `steps` apart along y that both have flow.
 fn along_y(volume: &VolumeTexture, steps: u32) -> f64 {
     let [nx, ny, nz] = volume.size;
     let (mut n, mut sums) = (0.0, [0.0f64; 3]);
@@ -130,8 +130,8 @@ fn coherent_density_follows_the_strands_and_keeps_its_distribution() {
         "directions stay"
     );
     let half = WaterSpec { structure: Structure { coherence: 0.5, ..spec.structure }, ..spec };
-    // 1600 strands of 1/(2.5·0.1) independent pieces each: the mean of numbers between 0 and 1 with a standard
-    // deviation of 0.42 is known to 0.0053, the share to 0.0058.
+    // There are 1600 strands of 1/(2.5·0.1) independent pieces each. The mean of numbers between 0 and 1 with
+    // a standard deviation of 0.42 is then known to 0.0053, and the share to 0.0058.
     for volume in [&volume, &build(&half)] {
         let (rho, _) = mean(volume, |c| f64::from(c.rho()));
         assert!((rho - 0.5).abs() < 4.0 * 0.0053, "{rho}");
@@ -140,7 +140,7 @@ fn coherent_density_follows_the_strands_and_keeps_its_distribution() {
             assert!((share - 0.3085).abs() < 4.0 * 0.0058, "{share}");
         }
     }
-    // Cells next to one another hold the same strands, most of them.
+    // Neighbouring cells mostly hold the same strands.
     let (near, far) = (along_y(&volume, 1), along_y(&volume, 40));
     assert!(near > 0.75 && far.abs() < 0.1, "{near} {far}");
     let none = along_y(&paper, 1);
@@ -150,7 +150,7 @@ fn coherent_density_follows_the_strands_and_keeps_its_distribution() {
 #[test]
 fn coverage_is_by_the_length_of_the_strands_in_a_cell() {
     let mut spec = spec([1, 16, 1], 1);
-    // One straight line through all 16 cells, 1 cell of it in each; with two lines 2.
+    // A straight line passes through all 16 cells, with 1 cell of its length in each. Two lines give 2.
     spec.shape.sigma_g_cells = 0.0;
     for lines in [1, 2] {
         spec.across = lines;
@@ -159,7 +159,7 @@ fn coverage_is_by_the_length_of_the_strands_in_a_cell() {
             build(&WaterSpec { structure: Structure { coverage: 1.0, ..Structure::default() }, ..spec });
         for (a, b) in whole.cells.iter().zip(covered.cells.iter()) {
             let truth = a.rho() * (1.0 - (-(lines as f32)).exp());
-            // One step of the code.
+            // The bound is one step of the code.
             assert!((b.rho() - truth).abs() <= 1.6e-5, "{} {truth}", b.rho());
         }
     }
@@ -173,7 +173,7 @@ fn crests_are_bright_where_the_water_is_dense() {
     let volume = build(&spec);
     for cell in volume.cells.iter().filter(|c| c.has_direction()) {
         let (k_d, k_s) = cell.k();
-        // One step of k's code and one of ρ's.
+        // The bound is one step of k's code and one of ρ's.
         assert!((k_d - (0.5 + 0.6 * (cell.rho() - 0.5))).abs() < 0.5 / 255.0 + 1e-5);
         assert!((k_s - 0.5).abs() < 0.5 / 255.0 + 1e-6);
     }
@@ -184,7 +184,7 @@ fn a_coherent_volume_tiles_along_the_flow() {
     let mut spec = rich([20, 64, 20], 30);
     spec.structure = Structure { coherence: 1.0, coverage: 0.0, ..spec.structure };
     let volume = build_water(&spec, &taki::util::monitor::Unwatched).unwrap();
-    // Mean |Δρ| between neighbours along y, by the first one's y: the seam is a place like others.
+    // Mean |Δρ| between neighbours along y, by the y of the first. The seam must not stand out.
     let step = |y: u32| {
         let next = (y + 1) % 64;
         let (mut n, mut sum) = (0.0, 0.0f64);

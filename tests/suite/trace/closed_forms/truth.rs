@@ -1,5 +1,5 @@
-//! The whole trace of one ray, written again in float64 from the method alone with the brute-force walker,
-//! and compared on random volumes, quads, rays and lights.
+//! The whole trace of one ray, written a second time in float64 from the method alone with the brute-force
+//! walker, and compared on random volumes, quads, rays and lights.
 
 use super::{material, noise, scene};
 use crate::tolerance::close;
@@ -13,18 +13,18 @@ use taki::scene::Scene;
 use taki::trace::Attenuation;
 use taki::volume::VolumeTexture;
 
-/// Crossings nearer than this part of the way are a near-tie: float32 may order them the other way.
+/// Crossings that are closer than this share of the way are a near-tie: float32 may swap their order.
 const TIE: f64 = 1e-4;
 
-/// Radiance, transmittance and, where a tie may change the answer, a mark.
+/// Radiance, transmittance, and whether a tie may change the result.
 struct Truth {
     radiance: DVec3,
     transmittance: f64,
     near_tie: bool,
 }
 
-/// Cells with the length inside them, while z is inside the slab; and whether two crossings nearly
-/// coincide.
+/// Cells that a ray meets while z is inside the slab, with the ray's length inside each, and whether two
+/// crossings nearly coincide.
 fn walk(size: IVec3, origin: DVec3, d: DVec3) -> (Vec<(IVec3, f64)>, bool) {
     let far = if d.z > 0.0 { size.z as f64 } else { 0.0 };
     let t_end = (far - origin.z) / d.z;
@@ -97,7 +97,7 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: DVec3, uv: [f64; 2], x: DVec3
                 AngleFrame::Texture => (v, cell_from_world * l, cell_from_world * -d),
             };
             let (angle_l, angle_e) = (t.angle_between(l_frame), t.angle_between(e_frame));
-            // sin·sin − cos·cos = −cos of the sum.
+            // sin·sin − cos·cos is −cos of the sum of both angles.
             let specular = (-(angle_l + angle_e).cos()).max(0.0).powf(scene.p as f64);
             let psi = k_d * angle_l.sin() + k_s * specular;
             let seen = match scene.visibility {
@@ -117,11 +117,11 @@ fn trace(scene: &Scene, volume: &VolumeTexture, d: DVec3, uv: [f64; 2], x: DVec3
     Truth { radiance: lit + behind * transmittance, transmittance, near_tie }
 }
 
-/// Largest relative error of a ray: Ψ's specular base is good to some 1e-6 and is raised to p, and
-/// 1 − cos² loses more where a fibre points at the light or the eye.
+/// Largest relative error of a ray. Ψ's specular base is good to about 1e-6 and is raised to the power p. 1 −
+/// cos² loses more where a fibre points at the light or the eye.
 const RELATIVE: f64 = 2e-4;
 
-/// Rays of one kind compared; returns how many.
+/// Compares rays of one kind. Returns their number.
 fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, seed: u64) -> usize {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut compared = 0;
@@ -144,7 +144,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
         for ray in 0..20 {
             let mut direction = || Vec3::new(span(-1.0, 1.0), span(-1.0, 1.0), span(-1.0, 1.0)).normalize();
             let (d, to_light) = (direction(), direction());
-            // Rays and light nearly in the plane of the quad cross cells by the thousand.
+            // Rays and light that are nearly in the plane of the quad cross thousands of cells.
             if d.dot(n).abs() < 0.1 || to_light.dot(n).abs() < 0.1 {
                 continue;
             }
@@ -152,7 +152,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
             let map = scene.quads[0].map;
             let x = map.point_world(uv[0], uv[1]);
             scene.edit().camera.eye = x - d * distance;
-            // The point light stands off the plane, on either side.
+            // The point light lies on either side of the plane, away from it.
             let above = n * span(0.6, 2.0) * if ray % 2 == 0 { 1.0 } else { -1.0 };
             let position = x + above + map.e1_world * span(-1.0, 1.0);
             scene.edit().lights = vec![
@@ -163,7 +163,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
             let own = Integrator::new(&scene, &volume).trace(0, d, [uv[0], uv[1], distance], behind, &mut ());
             let x = x.as_dvec3();
             let truth = trace(&scene, &volume, d.as_dvec3(), uv.map(f64::from), x, behind.as_dvec3());
-            // A cell met for no length has no weight but with per-cell attenuation.
+            // A cell with a length of zero has no weight, except with per-cell attenuation.
             if truth.near_tie && matches!(attenuation, Attenuation::PerCell { .. }) {
                 continue;
             }

@@ -81,7 +81,7 @@ fn a_moved_plane_shows_its_own_flow_cells() {
 fn a_click_or_drag_in_a_slice_moves_the_other_two_planes() {
     for width in [240.0, 420.0, 900.0] {
         let mut harness = inspector(volume([20, 30, 12]), [width, 1200.0]);
-        // Right and down, in cells, of each slice.
+        // Name of each slice, its axis, and the axes of cells that run right and down in it.
         for (name, axis, right, down) in [("x", 0, 2, 1), ("y", 1, 0, 2), ("z", 2, 0, 1)] {
             let before = harness.state().panel.cell();
             let rect = harness.get_by_label(&format!("Slice across {name}")).rect();
@@ -98,7 +98,7 @@ fn a_click_or_drag_in_a_slice_moves_the_other_two_planes() {
             want[right] = 7;
             want[down] = 9;
             assert_eq!(harness.state().panel.cell(), want, "width {width}, slice {name}: drag");
-            // Beyond the edge the plane stays at the edge.
+            // While the pointer is beyond the edge, the plane stays at the edge.
             harness.hover_at(rect.max + egui::vec2(500.0, 500.0));
             harness.run();
             want[right] = size[right] as u32 - 1;
@@ -128,7 +128,7 @@ fn the_pointer_over_a_slice_reads_the_cell() {
     let rect = harness.get_by_label("Slice across z").rect();
     let scale = rect.width() / 20.0;
     harness.hover_at(rect.min + egui::vec2((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale));
-    // A tool tip waits for the pointer to rest.
+    // A tool tip appears once the pointer rests.
     harness.run_steps(60);
     let rho = volume.cells[i].rho() * volume.alpha;
     let words = format!("cell ({x}, {y}, 6)\nρ {rho:.3}");
@@ -141,7 +141,7 @@ fn another_volume_is_counted_anew_and_a_large_one_beside_the_frames() {
     harness.get_by_label("20 × 30 × 12");
     harness.get_by_role_and_label(Role::Slider, "x").set_value_accesskit(2.0);
     harness.run();
-    // The same size: the planes stay.
+    // The new volume has the same size, so the planes stay.
     harness.state_mut().volume = volume([20, 30, 12]);
     harness.run();
     assert_eq!(harness.state().panel.cell()[0], 2);
@@ -173,12 +173,12 @@ fn curves(spec: WaterSpec) -> Harness<'static, Curves> {
     let state = Curves { panel: CurvesPanel::default(), spec };
     Harness::builder()
         .with_size([420.0, 640.0])
-        // Two clicks of a double click are four steps.
+        // The two clicks of a double click take four steps.
         .with_step_dt(0.02)
         .build_ui_state(|ui, state: &mut Curves| state.panel.show(ui, &state.spec), state)
 }
 
-/// How many line points a panel draws.
+/// Number of line points that a panel draws.
 fn points_drawn(harness: &Harness<'_, Curves>) -> usize {
     let points = |shape: &egui::Shape| match shape {
         egui::Shape::Path(path) if !path.closed => path.points.len(),
@@ -193,18 +193,18 @@ fn the_slider_sets_how_many_curves_are_drawn() {
     let slider = |harness: &mut Harness<'_, Curves>, count: f64| {
         harness.get_by_role_and_label(Role::Slider, "Curves shown").set_value_accesskit(count);
         harness.run();
-        // The points change at the next frame.
+        // The points change in the next frame.
         harness.step();
         points_drawn(harness)
     };
     let one = slider(&mut harness, 1.0);
-    // 128 segments in runs, whose ends are drawn twice.
+    // A curve has 128 segments in runs. The ends of runs are drawn twice.
     assert!((129..=200).contains(&one), "{one}");
     let many = slider(&mut harness, 24.0);
     assert!((24 * 129..=24 * 200).contains(&many), "{many}");
     let most = slider(&mut harness, 200.0);
     assert!((10_000..=24_000).contains(&most), "{most} points of 200 curves: levels are left out");
-    // A volume with few curves shows all it has.
+    // A volume with few curves shows all of them.
     harness.state_mut().spec = spec([40, 40, 40], 2, 1);
     harness.run();
     let two = points_drawn(&harness);
@@ -222,7 +222,7 @@ fn levels_are_drawn_over_the_curves_when_asked_for() {
     assert!(with > without);
     harness.get_by_role_and_label(Role::Slider, "Level").set_value_accesskit(0.0);
     harness.run();
-    // Levels 1 and 2 of four curves: 3 + 5 points each.
+    // Levels 1 and 2 of four curves have 3 + 5 points each.
     assert_eq!(points_drawn(&harness), with - 4 * 8);
     harness.get_by_label_contains("Level 0");
 }
@@ -274,7 +274,7 @@ fn a_drag_turns_the_curves_and_a_double_click_turns_them_back() {
     assert_ne!(first, shapes(&harness), "scroll zooms");
 }
 
-/// Where pictures are wanted.
+/// Folder for pictures, if any are wanted.
 fn folder() -> Option<PathBuf> {
     std::env::var_os("TAKI_LOOK").map(PathBuf::from)
 }
@@ -388,6 +388,7 @@ fn a_layer_of_a_large_frame_is_drawn_in_a_few_milliseconds() {
     });
     let seconds = seconds.fold(f64::INFINITY, f64::min);
     eprintln!("depth at 1280×720: {:.1} ms", seconds * 1e3);
-    // A few milliseconds on idle cores; this is for a busy machine and an accident of another order.
+    // This takes a few milliseconds on idle cores. The bound allows for a busy machine and catches errors of
+    // another order.
     assert!(seconds < 1.0, "{seconds} s");
 }

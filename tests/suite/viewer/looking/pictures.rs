@@ -7,7 +7,7 @@ use taki::viewer::layer_image::{LayerImage, Legend, layer_image, quad_colour, sh
 
 const MAGENTA: [u8; 4] = [255, 0, 255, 255];
 
-/// 8 × 8 pixels without anything in them.
+/// A frame of 8 × 8 empty pixels.
 fn empty() -> Frame {
     let mut frame = Frame::new(8, 8, true);
     frame.radiance.fill([0.0, 0.0, 0.0, 1.0]);
@@ -71,7 +71,7 @@ fn near_is_brighter_and_one_far_pixel_does_not_darken_the_rest() {
     }
     let image = layer_image(&frame, Layer::Depth, 1);
     let (low, high, unit) = scale(&image);
-    assert_eq!((low, high, unit), (2.0 + 1.0 / 63.0, 3.0, "m"), "all of the range when nothing is far off");
+    assert_eq!((low, high, unit), (2.0 + 1.0 / 63.0, 3.0, "m"), "the whole range if nothing is far off");
     assert!(is_nothing(image.pixels[0]));
     assert!(sum(image.pixels[1]) > sum(image.pixels[30]) && sum(image.pixels[30]) > sum(image.pixels[63]));
 
