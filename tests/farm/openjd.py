@@ -15,7 +15,7 @@ import yaml
 TAKI = str(pathlib.Path(sys.argv[1]).resolve())
 OPENJD = str(pathlib.Path(sys.executable).with_name("openjd"))
 
-# Runs `count` times as told by the file `fault` (SHARD CODE TIMES) before it is the real program.
+# A program that fails as the file `fault` says (SHARD CODE TIMES), and then runs taki.
 FAULTY = """#!/bin/bash
 [ "$1 $2" = "batch --shard" ] || exit 2
 shard=${3%/*}
@@ -23,13 +23,13 @@ echo run >>"runs.$shard"
 read -r faulty code times <fault
 if [ "$shard" = "$faulty" ] && [ "$(wc -l <"runs.$shard")" -le "$times" ]; then
     [ "$code" != 137 ] || kill -KILL $$
-    # Until it is cancelled.
+    # Waits until it is cancelled.
     [ "$code" != 143 ] || { trap 'echo stopped; kill $!; exit 143' TERM; sleep 600 & wait; }
     exit "$code"
 fi
 exec TAKI "$@"
 """
-# Keeps its arguments.
+# A program that stores its arguments.
 ECHO = """#!/bin/bash
 printf '%s\\0' "$@" >words
 """
@@ -38,8 +38,9 @@ HARD = [
     b"{{Param.Folder}}", b"}}", b"{", b"!", b"*", b"~", b"#x", b"a: b", b"no", b"\x1b[2J", "滝".encode(),
     "\u2028\u0085\ufeff\uffff".encode(), b"&", b";", b"|", b">f", b"%s", b"'\"'\"'",
 ]
-# taki reads its own words; what they say is the scene's business.
-WORDS = [word for hard in HARD for word in (b"--set", hard)] + [b"--set=- a", b"-o", b"\xff\xfe {{#}}.png", b"front"]
+# taki checks its own options only. The scene checks their values.
+WORDS = [word for hard in HARD for word in (b"--set", hard)]
+WORDS += [b"--set=- a", b"-o", b"\xff\xfe {{#}}.png", b"front"]
 
 
 def run(*command, code=0):
@@ -64,7 +65,8 @@ def template(folder, taki, options, batch):
 
 
 def batch(folder, frames):
-    return ["front", "--size", "24x16", "--engine", "cpu", "--frames", frames, "-o", f"{folder}/o'f $HOME.####.png"]
+    pattern = f"{folder}/o'f $HOME.####.png"
+    return ["front", "--size", "24x16", "--engine", "cpu", "--frames", frames, "-o", pattern]
 
 
 def case(root, name, fault, shards, frames, retries, code, change=lambda job: None):
@@ -95,18 +97,18 @@ with tempfile.TemporaryDirectory() as temporary:
     alone.mkdir()
     run(TAKI, "batch", *batch(alone, "0-23"))
 
-    # One device is lost once: its shard is run again, and the farm's frames are the batch's.
+    # One shard loses its device once. It runs again, and the farm's frames equal those of the batch.
     folder, text, runs = case(root, "lost", "5 75 1", 8, "0-23", 3, 0)
     assert runs == {shard: 2 if shard == 5 else 1 for shard in range(8)}, (runs, text)
     frames = pictures(folder / "out")
     assert len(frames) == 24 and frames == pictures(alone), sorted(frames)
 
-    # Bad input is not tried again, and its exit code is the task's.
+    # Bad input is not tried again. The task has its exit code.
     folder, text, runs = case(root, "bad", "0 65 9", 1, "0-0", 3, 1)
     assert runs == {0: 1}, runs
     assert "exited with code: 65 " in text and "openjd_fail: taki ended with exit code 65" in text, text
 
-    # Nor is a fault that may pass tried for ever.
+    # A temporary fault is not tried for ever.
     folder, text, runs = case(root, "always", "0 137 9", 1, "0-0", 1, 1)
     assert runs == {0: 2}, runs
     assert "exited with code: 137 " in text, text
@@ -118,7 +120,7 @@ with tempfile.TemporaryDirectory() as temporary:
     folder, text, runs = case(root, "overdue", "0 143 9", 1, "0-0", 3, 1, soon)
     assert runs == {0: 1} and "stopped" in text and "exited with code: 143 " in text, (runs, text)
 
-    # Any word arrives as it was, through YAML, the format strings and bash.
+    # YAML, the format strings and bash leave every word unchanged.
     folder = root / "words"
     folder.mkdir()
     path = template(folder, program(folder, ECHO), ["--shards", "1"], WORDS)
@@ -126,10 +128,10 @@ with tempfile.TemporaryDirectory() as temporary:
     words = (folder / "words").read_bytes().split(b"\0")[:-1]
     assert words == [b"batch", b"--shard", b"0/1", *WORDS], words
 
-    # The check can fail.
+    # The check must be able to fail.
     job = yaml.safe_load(path.read_text())
-    for broken in [{**job, "unknown": 1}, {**job, "specificationVersion": "jobtemplate-1999-01"}, {**job, "steps": []}]:
-        path.write_text(yaml.safe_dump(broken))
+    for change in [{"unknown": 1}, {"specificationVersion": "jobtemplate-1999-01"}, {"steps": []}]:
+        path.write_text(yaml.safe_dump({**job, **change}))
         run(OPENJD, "check", str(path), code=1)
 
 print("openjd.py: ok")

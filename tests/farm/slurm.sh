@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Job files of `taki farm slurm` on a Slurm of their own: munged, slurmctld and slurmd on the loopback
+# Runs job files of `taki farm slurm` on a temporary Slurm: munged, slurmctld and slurmd on the loopback
 # interface, in a temporary folder, as any user, without systemd and cgroups.
 #
 #     tests/farm/slurm.sh TAKI
@@ -9,10 +9,12 @@ set -euo pipefail
 taki=$(realpath "$1")
 PATH=$PATH:/usr/sbin:/sbin
 for tool in munged slurmctld slurmd sbatch scontrol squeue scancel shellcheck python3 setpriv; do
-    command -v "$tool" >/dev/null || { echo "$tool is not installed (Debian: slurm-wlm munge shellcheck)" >&2; exit 77; }
+    command -v "$tool" >/dev/null && continue
+    echo "$tool is not installed (Debian: slurm-wlm munge shellcheck)" >&2
+    exit 77
 done
 
-# Short: the path of a socket has at most 107 bytes.
+# The name is short, because the path of a socket has at most 107 bytes.
 work=$(mktemp -d /tmp/taki-slurm.XXXXXX)
 chmod 755 "$work"
 daemons=()
@@ -30,9 +32,9 @@ cleanup() {
             sleep 0.2
         done
     fi
-    # A task that does not want to go would hold its slurmstepd for ever: its script lies in this folder.
+    # A task that does not end would hold its slurmstepd for ever. Its script lies in this folder.
     pgrep -f "$work/spool/job" | xargs -r kill -KILL || true
-    # The last one started first: slurmd says good-bye to slurmctld, and both need munged.
+    # Stops the daemon that started last first: slurmd signs off from slurmctld, and both need munged.
     for ((i = ${#daemons[@]} - 1; i >= 0; i--)); do
         kill "${daemons[i]}" 2>/dev/null || true
         wait "${daemons[i]}" 2>/dev/null || true
@@ -44,7 +46,7 @@ trap cleanup EXIT
 trap 'exit 143' TERM INT HUP
 
 fail() { echo "slurm.sh: $*" >&2; exit 1; }
-# Waits SECONDS at most until COMMAND succeeds.
+# Waits at most SECONDS until COMMAND succeeds.
 await() {
     local seconds=$1 what=$2
     shift 2
@@ -54,7 +56,7 @@ await() {
     done
     fail "after $seconds s still not so: $what"
 }
-# The daemons go down with this script, even if it is killed.
+# The daemons end with this script, even if it is killed.
 daemon() {
     local log=$1
     shift
@@ -110,14 +112,14 @@ dead() { ! kill -0 "${daemons[-1]}"; }
 daemon slurmd.log slurmd -D
 await 30 "slurmd is ready or has given up" eval 'idle || dead'
 if dead 2>/dev/null; then
-    # Newer ones want to hear that they should do without cgroups; older ones do not know the word.
+    # Newer versions must be told to do without cgroups. Older versions do not know the option.
     echo "CgroupPlugin=disabled" >"$work/cgroup.conf"
     daemon slurmd.log slurmd -D
     await 30 "slurmd is ready" idle
 fi
 
-# A program on the nodes that counts its runs and fails as the folder's file `fault` says:
-# SHARD CODE TIMES. The code 143 waits for SIGTERM.
+# The program on the nodes counts its runs and fails as the folder's file `fault` says (SHARD CODE TIMES). With
+# the code 143 it waits for SIGTERM.
 cat >"$work/taki" <<PROGRAM
 #!/bin/bash
 set -u
@@ -137,7 +139,7 @@ exec "$taki" "\$@"
 PROGRAM
 chmod +x "$work/taki"
 
-# shellcheck disable=SC2016 # A path that would suffer from a second reading by the shell.
+# shellcheck disable=SC2016 # A second expansion by the shell would change this path.
 arguments=(front --size 24x16 --engine cpu -o 'out dir/it'\''s $HOME.####.png')
 # Submits the batch in a folder of its own: CASE FAULT SHARDS FRAMES OPTION…; the job's number is in `job`.
 submit() {
@@ -146,8 +148,8 @@ submit() {
     mkdir -p "$work/$case/out dir"
     cd "$work/$case"
     echo "$fault" >fault
-    "$taki" farm slurm --shards "$shards" --name "$case" --taki "$work/taki" --cpus 1 --memory 500 --output job.sbatch "$@" \
-        -- "${arguments[@]}" --frames "$frames"
+    "$taki" farm slurm --shards "$shards" --name "$case" --taki "$work/taki" --cpus 1 --memory 500 \
+        --output job.sbatch "$@" -- "${arguments[@]}" --frames "$frames"
     shellcheck --exclude=SC2016 job.sbatch || fail "shellcheck: $case"
     sbatch --parsable job.sbatch >job
 }
@@ -172,7 +174,7 @@ cd "$work/alone"
 "$taki" batch "${arguments[@]}" --frames 0-23 || fail "the batch alone: exit code $?"
 expect "frames of the batch alone" "$(find "$work/alone/out dir" -name '*.png' | wc -l)" 24
 
-# Cancelled while it waits for SIGTERM: it ends with 143, and stays away.
+# A task that is cancelled while it waits for SIGTERM ends with 143 and does not come back.
 started() { [ -n "$(runs "$1" 0)" ]; }
 await 60 "the task to be cancelled runs" started cancelled
 scancel "$(cat "$work/cancelled/job")"
@@ -186,7 +188,7 @@ expect "the bad shard's neighbour" "$(field bad 0 JobState)" COMPLETED
 await 100 "the shard of the lost device has ended" ended lost
 for shard in 0 1 2 3 4 5 6 7; do
     expect "shard $shard" "$(field lost "$shard" JobState)" COMPLETED
-    # The last task's number is the array's: only one task may have been requeued.
+    # The number of the last task is that of the array, but only one task may have been requeued.
     expect "runs of shard $shard" "$(runs lost "$shard")" $((shard == 7 ? 2 : 1))
 done
 expect "requeues of shard 7" "$(field lost 7 Restarts)" 1
@@ -200,7 +202,7 @@ expect "its exit code" "$(field always 1 ExitCode)" 75:0
 expect "its runs" "$(runs always 1)" 2
 expect "its neighbour's runs" "$(runs always 0)" 1
 
-# The limit of a minute comes with SIGTERM 30 s before, or some more.
+# The limit of a minute sends SIGTERM 30 s before it, or somewhat more.
 await 110 "the time limit has come and the next run is done" ended limit
 expect "the state after the time limit" "$(field limit 0 JobState)" COMPLETED
 expect "runs around the time limit" "$(runs limit 0)" 2

@@ -285,9 +285,10 @@ fn the_map_of_the_readme_is_that_of_the_crates_front_page() {
     }
 }
 
-/// Paths and texts of the source, shader and documentation files.
+/// Paths and texts of the sources, shaders, documentation, tests and examples.
 fn lines_of_the_house() -> Vec<(String, String)> {
-    let mut folders: Vec<_> = ["src", "shaders", "docs"].map(|name| path(name).into()).to_vec();
+    let mut folders: Vec<_> =
+        ["src", "shaders", "docs", "tests", "examples"].map(|name| path(name).into()).to_vec();
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir::<std::path::PathBuf>(folder).expect("a folder") {

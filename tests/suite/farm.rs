@@ -70,7 +70,8 @@ proptest! {
     fn any_words_go_through_bash_as_they_are(words in prop::collection::vec(word(), 1..20)) {
         let quoted: Vec<String> = words.iter().map(|w| bash_word(w).expect("no NUL")).collect();
         for word in &quoted {
-            prop_assert!(!word.contains("{{") && !word.contains("}}") && !word.contains(char::is_control), "{word:?}");
+            let plain = !word.contains("{{") && !word.contains("}}") && !word.contains(char::is_control);
+            prop_assert!(plain, "{word:?}");
         }
         prop_assert_eq!(read_by_bash(&quoted.join(" ")), words);
     }
@@ -80,16 +81,20 @@ proptest! {
         let text = openjd::template(&job(words.clone())).expect("a template");
         let template: serde_json::Value = serde_saphyr::from_str(&text).expect("YAML");
         let script = template["steps"][0]["script"]["embeddedFiles"][0]["data"].as_str().expect("text");
-        let line = script.lines().find_map(|l| l.trim().strip_prefix("\"$program\" batch --shard \"$shard/8\"")).expect("a command");
+        let start = "\"$program\" batch --shard \"$shard/8\"";
+        let line = script.lines().find_map(|l| l.trim().strip_prefix(start)).expect("a command");
         prop_assert_eq!(read_by_bash(line.strip_suffix(" &").expect("in the background")), words);
     }
 
     #[test]
     fn any_text_goes_through_a_manifest_as_it_is(texts in prop::collection::vec(text(), 1..20)) {
-        let manifest = kubernetes::manifest(&job(texts.iter().map(OsString::from).collect()), &cluster()).expect("a manifest");
+        let job = job(texts.iter().map(OsString::from).collect());
+        let manifest = kubernetes::manifest(&job, &cluster()).expect("a manifest");
         let manifest: serde_json::Value = serde_saphyr::from_str(&manifest).expect("YAML");
-        let command = manifest["spec"]["template"]["spec"]["containers"][0]["command"].as_array().expect("a list");
-        let shown: Vec<String> = command.iter().map(|w| w.as_str().expect("text").replace("$$", "$")).collect();
+        let container = &manifest["spec"]["template"]["spec"]["containers"][0];
+        let command = container["command"].as_array().expect("a list");
+        let shown: Vec<String> =
+            command.iter().map(|w| w.as_str().expect("text").replace("$$", "$")).collect();
         prop_assert_eq!(&shown[..4], ["taki", "batch", "--shard", "$(JOB_COMPLETION_INDEX)/8"]);
         prop_assert_eq!(&shown[4..], texts);
     }

@@ -169,7 +169,8 @@ fn the_engines_agree_with_many_lights_and_a_volume_of_unequal_sides() {
             })
             .collect();
         let text = format!(
-            "version = 1\nbase = \"front\"\n{lights}[volume]\nnx = 17\nny = 40\nnz = 5\n[image]\nwidth = 64\nheight = 64\n"
+            "version = 1\nbase = \"front\"\n{lights}[volume]\nnx = 17\nny = 40\nnz = 5\n\
+             [image]\nwidth = 64\nheight = 64\n"
         );
         std::fs::write(&file, text).expect("written");
         let scene = Scene::load(&file, &[], &Limits::default()).expect("valid");

@@ -155,16 +155,17 @@ macro_rules! fields {
 #[test]
 fn host_structs_have_the_layout_the_shaders_read() {
     let module = validate(&stage("integrate")).expect("valid");
-    let frame = fields!(FrameUniforms: clip_from_world eye_world jitter_x right jitter_y up sample_index forward samples
-        zenith light_count horizon p ambient early_end cells max_cells image_width image_height extinction
-        texture_frame haze_density haze_falloff window_x window_y window_width window_height flow_cells layers
-        haze_color haze_far shadow_light levels footprint pad_c);
+    let frame = fields!(FrameUniforms: clip_from_world eye_world jitter_x right jitter_y up sample_index
+        forward samples zenith light_count horizon p ambient early_end cells max_cells image_width
+        image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
+        window_height flow_cells layers haze_color haze_far shadow_light levels footprint pad_c);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
-    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset erosion mist pad_a pad_b pad_c);
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset
+        erosion mist pad_a pad_b pad_c);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));

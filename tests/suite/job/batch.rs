@@ -167,7 +167,12 @@ fn pictures_of_another_scene_are_kept_unless_they_may_be_replaced() {
 fn faults_are_known_before_any_picture() {
     let dir = folder();
     fs::create_dir(dir.path().join("f.0002.png")).unwrap();
-    fs::write(dir.path().join("bad.toml"), "version = 1\nbase = \"front\"\n[[animate.tracks]]\nkey = \"camera.eye\"\nframes = [0, 8]\nvalues = [[0, 0, 2], [0, 0, -2]]\n").unwrap();
+    fs::write(
+        dir.path().join("bad.toml"),
+        "version = 1\nbase = \"front\"\n[[animate.tracks]]\nkey = \"camera.eye\"\nframes = [0, 8]\n\
+         values = [[0, 0, 2], [0, 0, -2]]\n",
+    )
+    .unwrap();
     let cases: [(&[&str], i32, &[&str]); 16] = [
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),

@@ -129,7 +129,8 @@ proptest! {
             dv / (material.repeat_v as f64 * size[1] as f64),
             map.n_world.as_dvec3() * -(material.thickness_m as f64 / size[2] as f64),
         ];
-        let plane = DMat3::from_cols(map.e1_world.as_dvec3(), map.e2_world.as_dvec3(), map.n_world.as_dvec3());
+        let plane =
+            DMat3::from_cols(map.e1_world.as_dvec3(), map.e2_world.as_dvec3(), map.n_world.as_dvec3());
         let j = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let in_plane = plane.transpose() * j;
         let own = Mat3::from_cols(
@@ -150,7 +151,9 @@ proptest! {
         let error = frame.transposed(d).as_dvec3().distance(transposed);
         let largest = (0..3).map(|axis| own.col(axis).length()).fold(0.0, f64::max);
         prop_assert!(error < 1e-6 * largest, "Jᵀd is off by {error}");
-        prop_assert!((frame.det as f64 / own.determinant() * -frame.depth as f64 - 1.0).abs() < 2e-5 * condition);
+        prop_assert!(
+            (frame.det as f64 / own.determinant() * -frame.depth as f64 - 1.0).abs() < 2e-5 * condition
+        );
     }
 
     #[test]

@@ -37,8 +37,8 @@ fn plumb(more: &str) -> Scene {
 /// A ragged sheet that bends over a lip and sideways, and that is wider at its foot.
 const CURVED: &str = "[materials.water]\nrepeat_u = 1.5\nrepeat_v = 2.5
 [sheets.a]\npoints = [[0, 1.2, -1.4], [0.1, 1.2, -0.6], [0.2, 0.4, 0.3], [0.1, -1.2, 0.8]]
-widths = [0.8, 0.8, 1.1, 1.7]\nsegments = 13\ncolumns = 4\nround = 0.3\noffset_u = 0.3\noffset_v = 0.7\nv0 = 0.7
-edge = 0.6\nbreakup = 0.5\nfade = 0.2\nhead = 0.1\n";
+widths = [0.8, 0.8, 1.1, 1.7]\nsegments = 13\ncolumns = 4\nround = 0.3\noffset_u = 0.3\noffset_v = 0.7
+v0 = 0.7\nedge = 0.6\nbreakup = 0.5\nfade = 0.2\nhead = 0.1\n";
 
 /// Corners of a quad with their texture coordinates and erosion.
 fn corners(quad: &Quad) -> [(Vec3, Vec2, f32); 4] {
@@ -218,7 +218,8 @@ fn streaks_go_on_across_the_borders_of_quads() {
 #[test]
 fn a_tube_is_round_and_closed() {
     let scene = scene(
-        "[sheets.a]\npoints = [[3, 2, 1], [3, 0, 1]]\nwidths = [0.4, 0.8]\nround = 1.0\ncolumns = 12\nsegments = 4\n",
+        "[sheets.a]\npoints = [[3, 2, 1], [3, 0, 1]]\nwidths = [0.4, 0.8]\n\
+         round = 1.0\ncolumns = 12\nsegments = 4\n",
     );
     assert_eq!(scene.quads.len(), 48);
     for row in scene.quads.chunks(12) {

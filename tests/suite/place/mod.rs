@@ -175,7 +175,8 @@ fn a_border_is_no_straight_line_but_keeps_its_corners() {
 }
 
 const POOL: &str = "[pools.p]\ncorners = [[-9,0,9],[9,0,9],[9,0,-9],[-9,0,-9]]\n";
-const VIEW: &str = "[camera]\neye = [0.5, 3, 12]\ntarget = [0, 0, 0]\n[image]\nwidth = 64\nheight = 48\nsamples = 1\n\
+const VIEW: &str = "[camera]\neye = [0.5, 3, 12]\ntarget = [0, 0, 0]\n\
+     [image]\nwidth = 64\nheight = 48\nsamples = 1\n\
      [background]\nzenith = [0.1, 0.4, 1.0]\nhorizon = [0.9, 0.7, 0.5]\n";
 
 /// Radiance and depth, and coordinates, of every pixel that shows the pool.
@@ -206,8 +207,9 @@ fn a_still_pool_without_light_mirrors_the_background_by_fresnels_share() {
 fn below_the_surface_light_fades_with_depth() {
     for depth in [0.1f64, 1.0, 30.0] {
         let text = format!(
-            "{POOL}height = 0.0\nfoam = 0.0\ndepth = {depth}\ncolor = [0.02,0.03,0.04]\nbottom = [0.3,0.2,0.1]\n\
-             absorption = [2.0,0.5,0.1]\n[light]\nambient = [1,1,1]\n[camera]\neye = [0,3,4]\ntarget = [0,0,0]\n\
+            "{POOL}height = 0.0\nfoam = 0.0\ndepth = {depth}\ncolor = [0.02,0.03,0.04]\n\
+             bottom = [0.3,0.2,0.1]\nabsorption = [2.0,0.5,0.1]\n[light]\nambient = [1,1,1]\n\
+             [camera]\neye = [0,3,4]\ntarget = [0,0,0]\n\
              [image]\nwidth = 64\nheight = 48\nsamples = 1\n"
         );
         let scene = of(&text);

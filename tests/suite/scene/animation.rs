@@ -51,8 +51,8 @@ fn keyframes_are_met_and_between_them_lies_what_was_asked_for() {
 #[test]
 fn a_smooth_track_never_overshoots_and_has_no_corner() {
     let a = animation(
-        "[[animate.tracks]]\nkey = \"trace.tau\"\nframes = [0, 40, 80, 120, 160]\nvalues = [0, 1, 1.2, 5, 0]\n\
-         interpolation = \"smooth\"\n",
+        "[[animate.tracks]]\nkey = \"trace.tau\"\nframes = [0, 40, 80, 120, 160]\n\
+         values = [0, 1, 1.2, 5, 0]\ninterpolation = \"smooth\"\n",
     )
     .unwrap();
     let values: Vec<f32> = (0..=160).map(|f| float(&a, f, "trace.tau")).collect();
@@ -69,7 +69,8 @@ fn every_kind_of_number_can_move() {
         "[[animate.tracks]]\nkey = \"trace.max_cells\"\nframes = [0, 4]\nvalues = [1, 4]\n\
          [[animate.tracks]]\nkey = \"lights.sun.color\"\nframes = [0, 4]\nvalues = [[0, 0, 0], [1, 2, 4]]\n\
          [[animate.tracks]]\nkey = \"quads.0.corners\"\nframes = [0, 4]\n\
-         values = [[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 0, 4], [1, 0, 4], [1, 1, 4], [0, 1, 4]]]\n",
+         values = [[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], \
+         [[0, 0, 4], [1, 0, 4], [1, 1, 4], [0, 1, 4]]]\n",
     )
     .unwrap();
     let scene = a.at(1).unwrap();
@@ -178,7 +179,8 @@ fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
 #[test]
 fn a_frame_is_a_scene_of_its_own() {
     let a = animation(
-        "[animate]\nloop = 24\nturn = 24\n[[animate.tracks]]\nkey = \"curves.h\"\nframes = [0, 12]\nvalues = [0.5, 1.5]\n",
+        "[animate]\nloop = 24\nturn = 24\n[[animate.tracks]]\nkey = \"curves.h\"\nframes = [0, 12]\n\
+         values = [0.5, 1.5]\n",
     )
     .unwrap();
     let scene = a.at(7).unwrap();

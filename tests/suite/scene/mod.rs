@@ -430,7 +430,8 @@ fn scenes_with_many_parts_are_read_in_time_that_grows_with_their_size() {
 
 #[test]
 fn the_printed_scene_is_the_same_scene() {
-    let odd = "version = 1\n[lights.\"a b\"]\n[lights.007]\n[lights.\"x]\\n\\\"\\u007f\"]\n[lights.\"滝\"]\n[lights.7]\n";
+    let odd = "version = 1\n[lights.\"a b\"]\n[lights.007]\n\
+               [lights.\"x]\\n\\\"\\u007f\"]\n[lights.\"滝\"]\n[lights.7]\n";
     let mut texts: Vec<(String, String)> = presets()
         .map(|(name, _)| (name.into(), fs::read_to_string(format!("assets/scenes/{name}.toml")).unwrap()))
         .collect();

@@ -44,7 +44,8 @@ fn mean(texels: &[glam::Vec3], columns: usize, rows: usize) -> DVec3 {
 
 #[test]
 fn the_overview_has_all_of_the_maps_power() {
-    // Maps in which each texel has whole cells: more cells than texels, fewer, and as many.
+    // Maps with more texels than cells (512×256), as many, and fewer. Each texel of the overview has a whole
+    // number of cells.
     for (width, height) in [(1024, 512), (512, 256), (256, 128)] {
         let environment = file(width, height, &["environment.intensity=2.5", "environment.turn=33.75"]);
         let mean = mean(&environment.overview(256, 128), 256, 128);

@@ -83,7 +83,9 @@ proptest! {
                 let empty = |l: [u32; 3]| {
                     let [x, y, z] = l.map(|l| 1 << l);
                     x <= nx.max(1) && y <= ny.max(1) && l.iter().all(|&l| l < 4)
-                        && (0..x * y * z).all(|i| !full(&volume, c + way * IVec3::new(i % x, i / x % y, i / x / y)))
+                        && (0..x * y * z)
+                            .map(|i| IVec3::new(i % x, i / x % y, i / x / y))
+                            .all(|at| !full(&volume, c + way * at))
                 };
                 let l = box_exponents(seen, octant as u32);
                 if full(&volume, c) {
@@ -94,7 +96,10 @@ proptest! {
                 for axis in 0..3 {
                     let mut longer = l;
                     longer[axis] += 1;
-                    prop_assert!(!empty(longer), "{:?} at {} of {} could be longer along {}", l, c, octant, axis);
+                    prop_assert!(
+                        !empty(longer),
+                        "{:?} at {} of {} could be longer along {}", l, c, octant, axis
+                    );
                 }
             }
         }

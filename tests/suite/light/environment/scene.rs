@@ -367,7 +367,8 @@ fn scene_folder(map: &str) -> (TempDir, std::path::PathBuf) {
     std::fs::create_dir(&folder).expect("made");
     hdr(&folder, 8, 4, uneven);
     let text = format!(
-        "version = 1\nbase = \"front\"\n[environment]\nkind = \"file\"\nfile = {map:?}\n[image]\nwidth = 16\nheight = 16\n"
+        "version = 1\nbase = \"front\"\n[environment]\nkind = \"file\"\nfile = {map:?}\n\
+         [image]\nwidth = 16\nheight = 16\n"
     );
     std::fs::write(folder.join("s.toml"), text).expect("written");
     (dir, folder)

@@ -86,7 +86,8 @@ fn on_gpu(gpu: &Gpu, shading: &StrandShading, inputs: &[[f32; 4]]) -> Vec<Vec3> 
         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             if id.x < arrayLength(&values) {
                 let v = values[id.x];
-                values[id.x] = vec4<f32>(strand_psi(table, linear, strand, v.w, 1.0 - v.w, v.x, v.y, v.z), 0.0);
+                values[id.x] = vec4<f32>(\
+                    strand_psi(table, linear, strand, v.w, 1.0 - v.w, v.x, v.y, v.z), 0.0);
             }
         }";
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
