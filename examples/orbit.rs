@@ -1,4 +1,4 @@
-//! Renders the frames of a turn around a preset: the volume and the mesh are built once.
+//! Renders the frames of a turn around a preset. The volume and the mesh are built only once.
 //!
 //! `cargo run --release --example orbit [PRESET] [FRAMES]`
 

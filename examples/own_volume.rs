@@ -1,6 +1,6 @@
-//! Fills the cells of a volume by hand, and renders it on the quad of the preset `front`.
+//! Fills the cells of a volume by hand and renders it on the quad of the preset `front`.
 //!
-//! The cells hold a rope: two strands that wind around one another, down the flow.
+//! The cells hold a rope of two strands that wind around each other along the flow.
 //!
 //! `cargo run --release --example own_volume`
 
@@ -16,7 +16,7 @@ const SIZE: u32 = 48;
 const ROPE: f32 = 9.0;
 const STRAND: f32 = 6.0;
 
-/// Density and flow direction in the cell at `p`, from the axis of whichever strand is nearer.
+/// Flow direction in the cell at `p`: along the axis of the first strand that contains it.
 fn rope(p: Vec3) -> Option<Vec3> {
     let turn = TAU * p.y / SIZE as f32;
     let middle = SIZE as f32 / 2.0;

@@ -118,8 +118,8 @@ if dead 2>/dev/null; then
     await 30 "slurmd is ready" idle
 fi
 
-# The program on the nodes counts its runs and fails as the folder's file `fault` says (SHARD CODE TIMES). With
-# the code 143 it waits for SIGTERM.
+# The program on the nodes counts its runs and fails as the folder's file `fault` says (SHARD CODE TIMES).
+# With the code 143 it waits for SIGTERM.
 cat >"$work/taki" <<PROGRAM
 #!/bin/bash
 set -u
