@@ -8,13 +8,13 @@ use crate::light::{AngleFrame, LightKind, ReflectionKind, Scattering, Visibility
 pub(super) const LIGHT: Group = Group {
     title: "Light",
     about: "Light reaches a cell from every light of the scene, attenuated by the water on its way, and the \
-            cell reflects a part of it to the eye. These parameters choose the models of both. The defaults \
-            are the paper's, except for `light.frame`.",
+         cell reflects a part of it to the eye. These parameters choose the models of both. The defaults \
+         are the paper's, except for `light.frame`.",
     params: &[
         p("light.frame", "", "", Choice(AngleFrame::WORDS), Uniform)
             .doc(
-                "Space in which angles are measured: `world`, or `texture`, the volume's own space as in the \
-                 paper.",
+                "Space in which angles are measured: `world`, or `texture`, the volume's own space as in \
+                 the paper.",
             )
             .when(
                 "Choose `texture` only to reproduce the paper; `world` keeps highlights right where the \
@@ -22,13 +22,13 @@ pub(super) const LIGHT: Group = Group {
             ),
         p("light.visibility", "V", "", Choice(Visibility::WORDS), Uniform)
             .doc(
-                "Attenuation between a cell and a light: `march` walks from one to the other for every cell \
-                 of every ray; `cached` makes that walk once for every cell of the volume and keeps the \
-                 result; `none` leaves it out.",
+                "Attenuation between a cell and a light: `march` walks from one to the other for every \
+                 cell of every ray; `cached` makes that walk once for every cell of the volume and keeps \
+                 the result; `none` leaves it out.",
             )
             .when(
-                "Choose `cached` for several lights or an environment; choose `none` for quick drafts, in \
-                 which the water is lit alike through and through.",
+                "Choose `cached` for several lights or an environment; choose `none` for quick drafts; \
+                 the water is then lit evenly all the way through.",
             ),
         p("light.cache", "", "MiB", Int(1, 65536, 512), Uniform)
             .slider(16.0, 4096.0)
@@ -38,36 +38,36 @@ pub(super) const LIGHT: Group = Group {
                  counts.",
             )
             .when(
-                "Raise it when taki refuses a scene because of it, or when shadows look doubled; lower it to \
-                 save memory.",
+                "Raise it when taki refuses a scene because of it, or when shadows look doubled; lower it \
+                 to save memory.",
             ),
         p("light.reflection", "Ψ", "", Choice(ReflectionKind::WORDS), Uniform)
             .doc(
-                "Reflection of a cell: `kajiya-kay` takes the paper's fibres, with k_d, k_s and p; `strand` \
-                 takes strands of water with air between them.",
+                "Reflection of a cell: `kajiya-kay` takes the paper's fibres, with k_d, k_s and p; \
+                 `strand` takes strands of water with air between them.",
             )
             .when(
-                "Choose `strand` when light should shine through the water, as that of a low sun behind a \
-                 fall.",
+                "Choose `strand` when light should shine through the water, as the light of a low sun \
+                 behind a fall.",
             ),
         p("light.scattering", "", "", Choice(Scattering::WORDS), Uniform)
             .doc(
                 "Scattering in the volume: `single` follows light that is scattered once, `multiple` any \
-                 number of times. `multiple` excludes `light.visibility=none`.",
+                 number of times. `multiple` cannot be combined with `light.visibility=none`.",
             )
             .when("Choose `multiple` when thick water is too dark; shadows are filled and foam turns white."),
         p("light.p", "p", "", Float(1.0, 1e4, 20.0), Uniform)
             .slider(1.0, 200.0)
             .doc(
-                "Exponent of the specular term of `light.reflection=kajiya-kay`. Whole numbers up to 255 are \
-                 fastest.",
+                "Exponent of the specular term of `light.reflection=kajiya-kay`. Whole numbers up to 255 \
+                 are fastest.",
             )
             .when("Raise it for narrow, sharp highlights; lower it for a broad sheen."),
         p("light.ambient", "", "", Color([0.1, 0.1, 0.1]), Uniform)
             .doc("Light from everywhere, added in every cell and on rocks and pools.")
             .when(
-                "Raise it when shadows are too black; lower it to 0 under an environment, which fills them \
-                 itself.",
+                "Raise it when shadows are too black; lower it to 0 under an environment, which fills \
+                 them itself.",
             ),
     ],
 };
@@ -75,11 +75,11 @@ pub(super) const LIGHT: Group = Group {
 pub(super) const STRAND: Group = Group {
     title: "Strand",
     about: "These parameters have an effect with `light.reflection=strand`. A cell then holds dielectric \
-            cylinders of water along its flow, and bubbles of air between them.",
+         cylinders of water along its flow, and bubbles of air between them.",
     params: &[
         p("strand.radius", "", "m", Float(1e-5, 1.0, 5e-4), Uniform)
             .slider(1e-5, 0.1)
-            .doc("Radius of a strand of water. Light that goes through is absorbed in proportion to it.")
+            .doc("Radius of a strand of water. The thicker the strand, the more light it absorbs.")
             .when("Raise it for bluer water; at half a millimetre the water has almost no colour."),
         p("strand.roughness_m", "β_m", "", Float(0.1, 1.0, 0.3), Uniform)
             .doc("Roughness along the strands. Small values reflect a sharp cone of light.")
@@ -93,8 +93,8 @@ pub(super) const STRAND: Group = Group {
             .when("Raise it to tint the water blue; lower it to 0 for strands without colour."),
         p("strand.aeration", "", "", Float(0.0, 1.0, 0.5), Uniform)
             .doc(
-                "Share of the light that meets bubbles of air instead of strands, in a cell with k_d = k_s. \
-                 It grows with the cell's ratio k_d : k_s.",
+                "Share of the light that meets bubbles of air instead of strands, in a cell with k_d = \
+                 k_s. In other cells the share grows with the ratio k_d : k_s.",
             )
             .when("Raise it for white, foaming water; lower it for clear water that passes most light."),
         p("strand.g", "g", "", Float(-0.99, 0.99, 0.8), Uniform)
@@ -103,8 +103,8 @@ pub(super) const STRAND: Group = Group {
                  send it straight on.",
             )
             .when(
-                "Raise it for foam that glows in front of the light; lower it for foam that is bright on its \
-                 lit side.",
+                "Raise it for foam that glows in front of the light; lower it for foam that is bright on \
+                 its lit side.",
             ),
     ],
 };
@@ -112,7 +112,7 @@ pub(super) const STRAND: Group = Group {
 pub(super) const LIGHTS: Group = Group {
     title: "Lights",
     about: "Each light has a name of your choice. A white surface that faces a directional light of colour 1 \
-            and intensity 1 has a radiance of 1.",
+         and intensity 1 has a radiance of 1.",
     params: &[
         p("lights.*.kind", "", "", Choice(LightKind::WORDS), Uniform)
             .doc(
@@ -122,8 +122,8 @@ pub(super) const LIGHTS: Group = Group {
             .when("Choose `directional` for sun and moon, `point` for lanterns, and `spot` for beams."),
         p("lights.*.direction", "l", "", Point([0.5, 0.8, 0.6]), Uniform)
             .doc(
-                "Direction towards a directional light, or against the beam of a spot light. Its length must \
-                 not be 0.",
+                "Direction towards a directional light, or against the beam of a spot light. Its length \
+                 must not be 0.",
             )
             .when("Turn it to the side of the view for relief, and behind the water to let the water glow."),
         p("lights.*.position", "", "m", Point([0.0, 10.0, 10.0]), Uniform)
@@ -141,8 +141,8 @@ pub(super) const LIGHTS: Group = Group {
         p("lights.*.intensity", "I", "", Float(0.0, 1e9, 1.0), Uniform)
             .slider(0.0, 100.0)
             .doc(
-                "Factor on the colour. For a point or spot light it holds at a distance of 1 m; the light \
-                 falls with the square of the distance.",
+                "Factor on the colour. For a point or spot light it is the intensity at a distance of 1 \
+                 m, and the light falls with the square of the distance.",
             )
             .when("Raise it when what the light shines on is too dark; 0 switches the light off."),
     ],

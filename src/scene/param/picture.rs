@@ -9,8 +9,8 @@ use crate::scene::keyframes::Interpolation;
 pub(super) const IMAGE: Group = Group {
     title: "Image",
     about: "These parameters set the size of the picture, its samples, and the way from linear radiance to \
-            what is shown. Exposure, bloom, white balance and tone curve change PNGs and movies; an EXR \
-            holds the radiance without them.",
+         what is shown. Exposure, bloom, white balance and tone curve change PNGs and movies; an EXR \
+         holds the radiance without them.",
     params: &[
         p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform)
             .slider(16.0, 8192.0)
@@ -26,8 +26,9 @@ pub(super) const IMAGE: Group = Group {
             .when("Raise it when edges are jagged or strands flicker; the time grows with it."),
         p("image.filter", "", "", Choice(Filter::WORDS), Uniform)
             .doc(
-                "Spread of a pixel's samples: `box` is even over the pixel; `gaussian` and `blackman-harris` \
-                 are three pixels wide and denser in the middle. A single sample is not spread.",
+                "Spread of a pixel's samples: `box` is even over the pixel; `gaussian` and \
+                 `blackman-harris` are three pixels wide and denser in the middle. A single sample is not \
+                 spread.",
             )
             .when(
                 "Choose `gaussian` or `blackman-harris` when edges look hard; keep `box` for the sharpest \
@@ -46,8 +47,8 @@ pub(super) const IMAGE: Group = Group {
             .when("Raise it when the picture is too dark; lower it when bright water burns out."),
         p("image.auto_exposure", "", "", Choice(AutoExposure::WORDS), Uniform)
             .doc(
-                "Stops added to the exposure, measured on frame 0: `average` brings the logarithmic mean to \
-                 middle grey; `highlights` lets the brightest hundredth of the pixels begin at 1.",
+                "Stops added to the exposure, measured on frame 0: `average` brings the logarithmic mean \
+                 to middle grey; `highlights` lets the brightest hundredth of the pixels begin at 1.",
             )
             .when(
                 "Choose `average` for a first look at a new scene, `highlights` to keep white water from \
@@ -56,8 +57,8 @@ pub(super) const IMAGE: Group = Group {
         p("image.bloom", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .slider(0.0, 0.5)
             .doc(
-                "Share of the light that is spread around bright things. It needs the whole picture, not a \
-                 crop.",
+                "Share of the light that is spread around bright things. It needs the whole picture, not \
+                 a crop.",
             )
             .when(
                 "Raise it to about 0.1 or 0.2 for lamps and glints that should glow; 0 leaves every edge \
@@ -70,12 +71,13 @@ pub(super) const IMAGE: Group = Group {
             .slider(2500.0, 12000.0)
             .doc("White balance: light of this colour temperature is shown as light of 6500 K.")
             .when(
-                "Lower it to take away the yellow of lamps or evening light; raise it for a warmer picture.",
+                "Lower it to take away the yellow of lamps or evening light; raise it for a warmer \
+                 picture.",
             ),
         p("image.tint", "", "Duv/1000", Float(-50.0, 50.0, 0.0), Uniform)
             .doc(
-                "White balance: distance of the light of `image.temperature` from a black body. Above 0 that \
-                 light is greener, and the picture turns magenta.",
+                "White balance: how far the light lies from that of a black body of `image.temperature`. \
+                 Above 0 that light is greener, and the picture turns magenta.",
             )
             .when("Raise it against a green cast; lower it against a magenta one."),
         p("image.tone", "", "", Choice(Tone::WORDS), Uniform)
@@ -84,8 +86,8 @@ pub(super) const IMAGE: Group = Group {
                  what is brighter than 1.",
             )
             .when(
-                "Choose `agx` when bright coloured light should turn white, `none` when pixel values should \
-                 be compared.",
+                "Choose `agx` when bright coloured light should turn white, `none` when pixel values \
+                 should be compared.",
             ),
     ],
 };
@@ -93,8 +95,8 @@ pub(super) const IMAGE: Group = Group {
 pub(super) const ANIMATION: Group = Group {
     title: "Animation",
     about: "`taki batch` renders a scene in time; `taki render --frame` renders one moment of it. The water \
-            moves by itself, a turntable or a path moves the camera, and tracks move other parameters. \
-            Frames are counted from 0.",
+         moves by itself, a turntable or a path moves the camera, and tracks move other parameters. \
+         Frames are counted from 0.",
     params: &[
         p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform)
             .slider(1.0, 1000.0)
@@ -107,11 +109,12 @@ pub(super) const ANIMATION: Group = Group {
         p("animate.loop", "", "frames", Int(0, 1_000_000, 0), Uniform)
             .slider(0.0, 1000.0)
             .doc(
-                "Number of frames after which the animation comes round exactly, which is then its length. \
-                 Keyframes lie within it and lead back to the first. 0 means that it does not come round.",
+                "Length of a loop in frames: after so many frames the animation repeats exactly. \
+                 Keyframes lie within it and lead back to the first. 0 means no loop.",
             )
             .when(
-                "Set it for a film that repeats without a jump; a few seconds are enough for falling water.",
+                "Set it for a film that repeats without a jump; a few seconds are enough for falling \
+                 water.",
             ),
         p("animate.speed", "", "lengths/s", Float(-1000.0, 1000.0, 0.5), Uniform)
             .slider(0.0, 4.0)
@@ -141,14 +144,14 @@ pub(super) const ANIMATION: Group = Group {
             .when("Set them when the camera should travel; in a loop the path closes by itself."),
         p("animate.path.targets", "", "m", Series, Uniform)
             .doc(
-                "Points that the camera looks at, one for each point of the path. Without them it looks at \
-                 `camera.target`.",
+                "Points that the camera looks at, one for each point of the path. Without them it looks \
+                 at `camera.target`.",
             )
             .when("Set them when the camera should turn its view on the way."),
         p("animate.tracks.*.key", "", "", Text(""), Uniform)
             .doc(
-                "Key of the parameter that the track moves. It holds numbers, and is neither the size of the \
-                 image nor a parameter of the animation.",
+                "Key of the parameter that the track moves. It holds numbers, and is neither the size of \
+                 the image nor a parameter of the animation.",
             )
             .when("Add a track when something besides the water and the camera should change in time."),
         p("animate.tracks.*.frames", "", "frames", Frames, Uniform)
@@ -159,12 +162,12 @@ pub(super) const ANIMATION: Group = Group {
             .when("Set the same value at two keyframes in a row to let the parameter rest between them."),
         p("animate.tracks.*.interpolation", "", "", Choice(Interpolation::WORDS), Uniform)
             .doc(
-                "Course between keyframes: `linear` is straight, `smooth` is a curve that never overshoots, \
-                 `hold` keeps the value until the next keyframe.",
+                "Course between keyframes: `linear` is straight, `smooth` is a curve that never \
+                 overshoots, `hold` keeps the value until the next keyframe.",
             )
             .when(
-                "Choose `smooth` when a change should start and end gently, `hold` when it should happen at \
-                 once.",
+                "Choose `smooth` when a change should start and end gently, `hold` when it should happen \
+                 at once.",
             ),
     ],
 };

@@ -8,7 +8,7 @@ use crate::scene::build::EnvironmentKind;
 pub(super) const ROCKS: Group = Group {
     title: "Rocks",
     about: "A rock is a fractal height field, raised on a patch of four corners by midpoint displacement. \
-            Ridges, layers, ragged sides, wetness and shade are off unless a scene sets them.",
+         Ridges, layers, ragged sides, wetness and shade are off unless a scene sets them.",
     params: &[
         p("rocks.*.corners", "", "m", Corners, Upload)
             .doc(
@@ -42,23 +42,23 @@ pub(super) const ROCKS: Group = Group {
             .doc("Relative fractal variation of the albedo.")
             .when("Raise it for stained or mossy rock; lower it for even stone."),
         p("rocks.*.cavity", "", "", Float(0.0, 1.0, 0.6), Upload)
-            .doc("Share by which the deepest hollows are darker.")
+            .doc("Share of the albedo that the deepest hollows lose.")
             .when("Raise it when relief looks flat; lower it when hollows are too black."),
         p("rocks.*.ridges", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Share of the height field that is folded into ridges. They come from the absolute value of \
-                 a second field, which is sharp where that field passes 0.",
+                "Share of the height field that is folded into ridges. A ridge lies where a second \
+                 fractal field passes 0, because its absolute value has a sharp bend there.",
             )
             .when("Raise it for sharp crests; lower it for rounded rock."),
         p("rocks.*.strata", "", "", Float(0.0, 10.0, 0.0), Upload)
             .slider(0.0, 2.0)
             .doc(
-                "Distance by which layers of rock, and the blocks they are broken into, step out and back, \
-                 in heights of a layer. 0 leaves layers out.",
+                "Distance by which layers of rock, and the blocks they are broken into, step out and \
+                 back, in heights of a layer. 0 leaves layers out.",
             )
             .when(
-                "Raise it to about 0.5 for cliffs, to about 0.2 for boulders; leave it at 0 for rock without \
-                 layers.",
+                "Raise it to about 0.5 for cliffs, to about 0.2 for boulders; leave it at 0 for rock \
+                 without layers.",
             ),
         p("rocks.*.strata_height", "", "m", Float(1e-3, 1e4, 0.6), Upload)
             .slider(0.05, 5.0)
@@ -76,15 +76,15 @@ pub(super) const ROCKS: Group = Group {
             .when("Raise it when a rock shows the straight sides of its patch."),
         p("rocks.*.wet", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(
-                "Strength of the film of water on the rock near quads that are not mist, below them, and at \
-                 pools. Wet rock is darker and shines.",
+                "Strength of the film of water on the rock near quads that are not mist, below them, and \
+                 at pools. Wet rock is darker and shines.",
             )
             .when("Raise it to 1 for rock that water runs over or splashes; leave it at 0 for dry rock."),
         p("rocks.*.wet_reach", "", "m", Float(1e-3, 1e4, 1.0), Upload)
             .slider(0.05, 5.0)
             .doc(
-                "Distance from falling water at which the rock is dry. Below the water it is four times as \
-                 far.",
+                "Distance from falling water at which the rock is dry. Below the water it is four times \
+                 as far.",
             )
             .when("Raise it for a broad wet margin; lower it in small scenes."),
         p("rocks.*.occlusion", "", "", Float(0.0, 1.0, 0.0), Upload)
@@ -99,8 +99,8 @@ pub(super) const ROCKS: Group = Group {
                  rock loses in the shadow of rock. Only rocks with a value above 0 cast it.",
             )
             .when(
-                "Raise it when rock should cast shadows on rock; leave it at 0 for far hills, since they \
-                 would coarsen the shadows of all.",
+                "Raise it when rock should cast shadows on rock; leave it at 0 for far hills, which would \
+                 make all shadows coarser.",
             ),
     ],
 };
@@ -108,14 +108,14 @@ pub(super) const ROCKS: Group = Group {
 pub(super) const POOLS: Group = Group {
     title: "Pools",
     about: "A pool is a level patch of water with waves and foam. It mirrors the sky and a coarse picture of \
-            the rocks and falls around it, and the ground shows through. A scene has at most 8 pools.",
+         the rocks and falls around it, and the ground shows through. A scene has at most 8 pools.",
     params: &[
         p("pools.*.corners", "", "m", Corners, Upload)
             .doc("Corners of the patch, all at one height, counter-clockwise seen from above.")
             .when("Put the borders inside rock or outside the picture, so that no edge of water shows."),
         p("pools.*.depth", "", "m", Float(1e-3, 1e4, 1.2), Upload)
             .slider(0.05, 5.0)
-            .doc("Depth of the water where no rock reaches into it.")
+            .doc("Depth of the water where no rock rises from the ground.")
             .when("Lower it for a basin whose ground shows; raise it for a dark plunge pool."),
         p("pools.*.color", "", "", Color([0.016, 0.026, 0.02]), Upload)
             .doc("Albedo of the water itself where nothing is seen below it, at most 1 in each component.")
@@ -126,7 +126,8 @@ pub(super) const POOLS: Group = Group {
         p("pools.*.absorption", "", "1/m", Color([1.5, 0.7, 0.9]), Upload)
             .doc("Absorption of the water, linear RGB.")
             .when(
-                "Raise it to hide the ground; raise red against the others for bluer and greener shallows.",
+                "Raise it to hide the ground; raise red against the others for bluer and greener \
+                 shallows.",
             ),
         p("pools.*.height", "", "m", Float(0.0, 10.0, 0.008), Upload)
             .slider(0.0, 0.1)
@@ -146,8 +147,8 @@ pub(super) const POOLS: Group = Group {
         p("pools.*.period", "", "s", Float(0.01, 1e4, 2.0), Upload)
             .slider(0.1, 10.0)
             .doc(
-                "Time in which `volume.flow` grows by 1. Every wave makes a whole number of turns in it, so \
-                 that loops close.",
+                "Time in which `volume.flow` grows by 1. Every wave makes a whole number of turns in that \
+                 time, so that loops close.",
             )
             .when("Set it to 1 divided by `animate.speed`; then the waves run at their natural speed."),
         p("pools.*.foam", "", "", Float(0.0, 1.0, 0.9), Upload)
@@ -166,7 +167,7 @@ pub(super) const POOLS: Group = Group {
 pub(super) const CAMERA: Group = Group {
     title: "Camera",
     about: "The camera is a pinhole at `camera.eye` that looks at `camera.target`. In the viewer the mouse \
-            moves it.",
+         moves it.",
     params: &[
         p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform)
             .doc("Position of the camera.")
@@ -185,8 +186,8 @@ pub(super) const CAMERA: Group = Group {
             .slider(0.001, 10.0)
             .doc("Distance along the view axis within which geometry is cut off.")
             .when(
-                "Raise it to look through something close to the camera; lower it when a near thing is cut \
-                 open.",
+                "Raise it to look through something close to the camera; lower it when a near thing is \
+                 cut open.",
             ),
     ],
 };
@@ -205,10 +206,11 @@ pub(super) const BACKGROUND_AND_HAZE: Group = Group {
             .when("Raise it above the zenith's for daylight; lower it for night."),
         p("haze.density", "β₀", "1/m", Float(0.0, 1000.0, 0.0), Uniform)
             .slider(0.0, 0.2)
-            .doc("Extinction of the haze between the eye and rock and water. 0 leaves haze out.")
+            .doc("Extinction of the haze in front of rock and water. 0 means no haze.")
             .when("Raise it when near and far look equally clear; begin with 0.01 in scenes of some 20 m."),
         p("haze.color", "", "", Color([0.6, 0.68, 0.75]), Uniform).doc("Radiance of endless haze.").when(
-            "Bring it near `background.horizon`, so that far rock melts into the sky; darken it for night.",
+            "Bring it near `background.horizon`, so that far rock melts into the sky; darken it for \
+             night.",
         ),
         p("haze.scale_height", "H", "m", Float(0.0, 1e5, 0.0), Uniform)
             .slider(0.0, 20.0)
@@ -231,27 +233,27 @@ pub(super) const BACKGROUND_AND_HAZE: Group = Group {
 pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
     title: "Environment and sky",
     about: "An environment is light from all directions, of a clear sky or of a map from a file. It lights \
-            rock and water and is seen in place of the background. Set the scene's own sun and \
-            `light.ambient` to 0 with it, unless you want both.",
+         rock and water and replaces the background. With an environment, set the scene's own sun and \
+         `light.ambient` to 0, unless you want both.",
     params: &[
         p("environment.kind", "", "", Choice(EnvironmentKind::WORDS), Upload)
             .doc(
-                "Source of the environment: `none`, the clear `sky` of the parameters below, or a map from a \
-                 `file`.",
+                "Source of the environment: `none`, the clear `sky` of the parameters below, or a map \
+                 from a `file`.",
             )
             .when("Choose `sky` for daylight at any hour, `file` for the light of a real place."),
         p("environment.file", "", "", Text(""), Upload)
             .doc(
-                "Path of an equirectangular map of linear radiance, .hdr or .exr. Its middle is seen looking \
-                 along −z, and +y is up.",
+                "Path of an equirectangular map of linear radiance, .hdr or .exr. Its middle is seen \
+                 looking along −z, and +y is up.",
             )
             .when("Set it together with `environment.kind=file`."),
         p("environment.intensity", "", "", Float(0.0, 1e4, 1.0), Uniform)
             .slider(0.0, 4.0)
             .doc("Factor on the light of the environment, its sun included.")
             .when(
-                "Change it when the environment is too bright or too dark beside the scene's own lights; for \
-                 the whole picture change `image.exposure`.",
+                "Change it when the environment is too bright or too dark beside the scene's own lights; \
+                 for the whole picture change `image.exposure`.",
             ),
         p("environment.turn", "", "°", Float(-36_000.0, 36_000.0, 0.0), Uniform)
             .slider(-180.0, 180.0)
@@ -259,7 +261,7 @@ pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
             .when("Turn it to bring the brightest part of a map to the side that it should light."),
         p("environment.lights", "", "", Int(1, 1024, 24), Uniform)
             .slider(1.0, 256.0)
-            .doc("Most directional lights that stand for the environment in the water.")
+            .doc("Largest number of directional lights that represent the environment in the water.")
             .when("Raise it when the light in the water looks coarse; lower it to render faster."),
         p("sky.elevation", "", "°", Float(0.0, 90.0, 45.0), Upload)
             .doc("Height of the sun above the horizon.")
@@ -276,8 +278,8 @@ pub(super) const ENVIRONMENT_AND_SKY: Group = Group {
             .when("Raise it for a milky sky and a weaker sun; lower it for a deep blue one."),
         p("sky.ground", "", "", Color([0.2, 0.2, 0.2]), Upload)
             .doc(
-                "Albedo of the ground below the horizon, at most 1 in each component. Sun and sky light it, \
-                 and it lights the sky.",
+                "Albedo of the ground below the horizon, at most 1 in each component. Sun and sky light \
+                 it, and it lights the sky.",
             )
             .when("Raise it for snow or sand, which light the scene from below; lower it for woods."),
         p("sky.sun", "", "", Float(0.0, 1e4, 1.0), Upload)

@@ -6,19 +6,21 @@ use super::{Group, p};
 
 pub(super) const SHEETS: Group = Group {
     title: "Sheets",
-    about: "A sheet is a band of falling water along a profile from over the lip down to the foot. taki cuts \
-            it into quads that share their corners, their texture and their erosion. Erosion takes the same \
-            amount from every density ρ, so faint strands vanish first and borders run along strands.",
+    about: "A sheet is a band of falling water along a profile that runs from above the lip down to the \
+         foot. taki cuts it into quads that share their corners, their texture and their erosion. Erosion \
+         takes the same amount from every density ρ, so faint strands vanish first and borders run along \
+         strands.",
     params: &[
         p("sheets.*.points", "", "m", Series, Uniform)
             .doc(
-                "Profile of the sheet: at least two points from over the lip down to the foot, joined by a \
-                 smooth curve.",
+                "Profile of the sheet: at least two points from over the lip down to the foot, joined by \
+                 a smooth curve.",
             )
             .when("Begin it upstream of the lip; add points where the water should keep clear of the rock."),
         p("sheets.*.widths", "", "m", Series, Uniform)
             .doc(
-                "Width of the sheet at each of its points, or one width for all. Without any it is 1 m wide.",
+                "Width of the sheet at each of its points, or one width for all. Without any it is 1 m \
+                 wide.",
             )
             .when("Let the widths grow downwards when falling water should spread."),
         p("sheets.*.across", "", "", Point([1.0, 0.0, 0.0]), Uniform)
@@ -26,8 +28,8 @@ pub(super) const SHEETS: Group = Group {
             .when("Turn it when the fall does not face along the z axis."),
         p("sheets.*.material", "", "", Text("water"), Uniform)
             .doc(
-                "Name of the sheet's material. Its `materials.*.repeat_u` and `materials.*.repeat_v` count \
-                 copies of the volume over the whole sheet.",
+                "Name of the sheet's material. Its `materials.*.repeat_u` and `materials.*.repeat_v` \
+                 count copies of the volume over the whole sheet.",
             )
             .when("Name another material for another thickness, for finer strands, or for mist."),
         p("sheets.*.segments", "", "", Int(1, 1024, 16), Uniform)
@@ -36,11 +38,8 @@ pub(super) const SHEETS: Group = Group {
             .when("Raise it when the bend over the lip looks angular; lower it to save quads."),
         p("sheets.*.columns", "", "", Int(1, 256, 1), Uniform)
             .slider(1.0, 32.0)
-            .doc("Least number of quads across. Eroded sides add borders of their own.")
-            .when(
-                "Raise it for a round sheet, since a tube needs 3 or more, and for mist that fades on all \
-                 sides.",
-            ),
+            .doc("Smallest number of quads across the flow. Eroded sides add further columns.")
+            .when("Raise it for mist that fades on all sides, and for round sheets: a tube needs 3 or more."),
         p("sheets.*.round", "", "turns", Float(0.0, 1.0, 0.0), Uniform)
             .doc(
                 "Bend of the sheet across the flow, in `sheets.*.columns` pieces: 0 is flat, 0.5 half a \
@@ -70,14 +69,14 @@ pub(super) const SHEETS: Group = Group {
             .when("Change it when two sheets show the same streaks at the same height."),
         p("sheets.*.edge", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc(
-                "Share of the half width over which the sides are eroded, so that they end along strands. 0 \
-                 leaves the sides straight.",
+                "Share of the half width over which the sides are eroded, so that they end along strands. \
+                 0 leaves the sides straight.",
             )
             .when("Raise it when a sheet shows straight borders; 1 suits thin jets and mist."),
         p("sheets.*.breakup", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc(
-                "Erosion at the foot. It grows with the square of the way, so the water breaks up as it \
-                 falls.",
+                "Erosion at the foot. Erosion grows with the square of the distance from the head, so the \
+                 water breaks up as it falls.",
             )
             .when("Raise it for high falls that dissolve into strands; lower it for short or heavy ones."),
         p("sheets.*.fade", "", "", Float(0.0, 1.0, 0.0), Uniform)

@@ -7,7 +7,7 @@ use super::{Group, p};
 pub(super) const SPLASHES: Group = Group {
     title: "Splashes",
     about: "A splash throws up arcs of drops along a line where water hits. The drops leave with a share of \
-            the speed of impact and fly parabolas; each arc is a short sheet whose borders are eroded.",
+         the speed of impact and fly parabolas; each arc is a short sheet whose borders are eroded.",
     params: &[
         p("splashes.*.from", "", "m", Point([0.0, 0.0, 0.0]), Uniform)
             .doc("One end of the line where water hits.")
@@ -34,8 +34,8 @@ pub(super) const SPLASHES: Group = Group {
             .when("Set it to the real height of the fall; raise it for a stronger splash."),
         p("splashes.*.restitution", "", "", Float(0.01, 1.0, 0.35), Uniform)
             .doc(
-                "Share of the speed of impact that the fastest drops leave with. No drop rises above its \
-                 square times `splashes.*.drop`.",
+                "Speed of the fastest drops as a share of the speed of impact. No drop rises higher than \
+                 the square of this share times `splashes.*.drop`.",
             )
             .when("Raise it when drops should fly higher and further; lower it for a flat splash."),
         p("splashes.*.elevation", "", "°", Float(0.0, 90.0, 60.0), Uniform)

@@ -8,8 +8,8 @@ use crate::trace::{AttenuationKind, Lookup, Prefilter};
 pub(super) const MATERIALS_AND_QUADS: Group = Group {
     title: "Materials and quads",
     about: "A material says how the volume lies on quads, sheets and splashes; the material `water` always \
-            exists. A quad is a flat piece of water given by its corners; sheets and splashes make their \
-            own.",
+         exists. A quad is a flat piece of water given by its corners; sheets and splashes make their \
+         own.",
     params: &[
         p("materials.*.thickness", "H", "m", Float(1e-4, 1e4, 0.4), Uniform)
             .slider(0.01, 10.0)
@@ -25,14 +25,14 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
             .when("Raise it for shorter streaks; lower it for longer ones, as on a short sheet."),
         p("materials.*.mist", "", "", Float(0.0, 4.0, 0.0), Uniform)
             .doc(
-                "Ψ of droplets without a direction, which fill the volume in place of its strands. 0 keeps \
-                 the strands.",
+                "Ψ of droplets without a direction, which fill the volume in place of its strands. 0 \
+                 keeps the strands.",
             )
             .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
         p("quads.*.corners", "A B C D", "m", Corners, Upload)
             .doc(
-                "Corners at (u,v) = (0,0), (1,0), (1,1) and (0,1). They lie in one plane and are convex; v \
-                 runs down the flow.",
+                "Corners at (u,v) = (0,0), (1,0), (1,1) and (0,1). They lie in one plane and are convex; \
+                 v runs down the flow.",
             )
             .when("Add quads for a form that sheets do not have, as in the paper's figures."),
         p("quads.*.material", "", "", Text("water"), Upload)
@@ -44,17 +44,17 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
 pub(super) const TRACE: Group = Group {
     title: "Trace",
     about: "A view ray walks from cell to cell through copies of the volume, and through one sheet after \
-            another. These parameters set how much light a cell takes away, and how far and how finely rays \
-            look.",
+         another. These parameters set how much light a cell takes away, and how far and how finely rays \
+         look.",
     params: &[
         p("trace.attenuation", "", "", Choice(AttenuationKind::WORDS), Uniform)
             .doc(
-                "Attenuation of a cell: `path-length` is τ_k = σ·ρ·Δs over the metres Δs of the ray inside \
-                 it; `per-cell` is τ_k = τ·ρ, however short the way.",
+                "Attenuation of a cell: `path-length` gives τ_k = σ·ρ·Δs, where Δs is the length of the \
+                 ray inside the cell in metres; `per-cell` gives τ_k = τ·ρ, whatever that length is.",
             )
             .when(
-                "Choose `per-cell` to reproduce the paper; keep `path-length` otherwise: it does not depend \
-                 on the number of cells.",
+                "Choose `per-cell` to reproduce the paper; keep `path-length` otherwise: it does not \
+                 depend on the number of cells.",
             ),
         p("trace.sigma", "σ", "1/m", Float(0.0, 1e5, 10.0), Uniform)
             .slider(0.0, 200.0)
@@ -67,21 +67,27 @@ pub(super) const TRACE: Group = Group {
             .slider(0.0, 2.0)
             .doc("Optical depth of one cell at ρ = 1, with `trace.attenuation=per-cell`.")
             .when(
-                "Raise it when too much shows through the water; lower it for a veil. A volume of twice as \
-                 many layers needs half as much.",
+                "Raise it when too much shows through the water; lower it for a veil. A volume of twice \
+                 as many layers needs half as much.",
             ),
         p("trace.max_cells", "", "cells", Int(1, 65536, 512), Uniform)
             .slider(1.0, 2048.0)
-            .doc("Most cells that one view ray, and one light ray, may meet.")
+            .doc(
+                "Largest number of cells that a view ray may meet; the same limit holds for each light \
+                 ray.",
+            )
             .when(
-                "Raise it for large volumes and grazing views, where rays would end inside the water; lower \
-                 it to limit the time.",
+                "Raise it for large volumes and grazing views, where rays would end inside the water; \
+                 lower it to limit the time.",
             ),
         p("trace.early_end", "", "", Float(0.0, 1.0, 1.0 / 1024.0), Uniform)
             .doc("Transmittance below which a view ray ends. 0 never ends it early.")
             .when("Raise it to save time in dense water; lower it to 0 for exact sums."),
         p("trace.layers", "", "sheets", Int(1, 16, 4), Uniform)
-            .doc("Most quads that one view ray goes through, the nearest first. Those behind are left out.")
+            .doc(
+                "Largest number of quads that one view ray goes through, the nearest first. Those behind \
+                 are left out.",
+            )
             .when("Raise it when water behind other water disappears; lower it to save time."),
         p("trace.filter", "", "", Choice(Prefilter::WORDS), Upload)
             .doc(
@@ -94,8 +100,8 @@ pub(super) const TRACE: Group = Group {
             ),
         p("trace.lookup", "", "", Choice(Lookup::WORDS), Uniform)
             .doc(
-                "Values that a ray finds in a cell: `nearest` takes the cell's own, `trilinear` interpolates \
-                 ρ, k and v between eight cells.",
+                "Values that a ray finds in a cell: `nearest` takes the cell's own, `trilinear` \
+                 interpolates ρ, k and v between eight cells.",
             )
             .when(
                 "Choose `trilinear` for close views in which cells show as blocks; the walk takes 2 to 5 \

@@ -7,9 +7,9 @@ use crate::volume::StorageChoice;
 
 pub(super) const CURVES: Group = Group {
     title: "Curves",
-    about: "Spatial fractal curves run from the face y = 0 of the volume to their twins on y = ny and give \
-            the cells that they pass their flow direction. These parameters set how many curves there are, \
-            how rough they are, and whether they gather into bundles.",
+    about: "Spatial fractal curves run from the face y = 0 of the volume to the points opposite on y = ny. \
+         Each cell takes its flow direction from the curves that pass it. These parameters set how many \
+         curves there are, how rough they are, and whether they gather into bundles.",
     params: &[
         p("curves.across", "", "", Int(1, 65536, 32), Volume)
             .slider(1.0, 128.0)
@@ -45,14 +45,14 @@ pub(super) const CURVES: Group = Group {
                  segment spans at most half a cell.",
             )
             .when(
-                "Leave it at 0 for pictures; set a small number to see the first steps of the recursion, or \
-                 for strands of straight pieces.",
+                "Leave it at 0 for pictures; set a small number to see the first steps of the recursion, \
+                 or for strands of straight pieces.",
             ),
         p("curves.bundles", "", "", Int(0, 65536, 0), Volume)
             .slider(0.0, 64.0)
             .doc(
-                "Number of parent curves that the curves gather around. With 0 every curve is independent, \
-                 as in the paper.",
+                "Number of parent curves that the curves gather around. With 0 every curve is \
+                 independent, as in the paper.",
             )
             .when(
                 "Set it to about 5 to 20 when the water should part and let the rock show through; more \
@@ -67,12 +67,16 @@ pub(super) const CURVES: Group = Group {
             .when("Lower it for tight ropes with clear gaps; raise it to let bundles merge into one sheet."),
         p("curves.wander", "", "flow lengths", Float(0.0, 1.0, 0.08), Volume)
             .slider(0.0, 0.3)
-            .doc("Standard deviation of g of the parent curves, as a fraction of the flow length ny.")
+            .doc(
+                "Standard deviation of g, the displacement of midpoints, for the parent curves, as a \
+                 fraction of the flow length ny.",
+            )
             .when(
-                "Raise it to let whole bundles swing from side to side; lower it to let them fall straight.",
+                "Raise it to let whole bundles swing from side to side; lower it to let them fall \
+                 straight.",
             ),
         p("curves.breathe", "", "", Float(0.0, 2.0, 0.4), Volume)
-            .doc("Relative standard deviation of a bundle's width along its way.")
+            .doc("Relative variation (standard deviation) of a bundle's width along the flow.")
             .when("Raise it when bundles look like cables of constant width; lower it for even ropes."),
         p("curves.loose", "", "", Float(0.0, 1.0, 0.15), Volume)
             .doc("Share of the curves that belong to no bundle.")
@@ -83,8 +87,8 @@ pub(super) const CURVES: Group = Group {
 pub(super) const VOLUME: Group = Group {
     title: "Volume",
     about: "The volume texture is a box of nx × ny × nz cells whose copies join without a seam across and \
-            along the flow. Each cell holds a density ρ, a flow direction v, and the reflection coefficients \
-            k_d and k_s.",
+         along the flow. Each cell holds a density ρ, a flow direction v, and the reflection coefficients \
+         k_d and k_s.",
     params: &[
         p("volume.nx", "nx", "cells", Int(1, 1_000_000, 40), Volume)
             .slider(1.0, 256.0)
@@ -105,36 +109,37 @@ pub(super) const VOLUME: Group = Group {
             .doc(
                 "Storage of the cells: `dense` keeps all of them, `sparse` only the blocks that strands \
                  pass. `auto` is sparse only where dense does not fit into `--memory`. Pictures do not \
-                 depend on it. `sparse` excludes `trace.filter=pyramid`.",
+                 depend on it. `sparse` cannot be combined with `trace.filter=pyramid`.",
             )
             .when(
-                "Leave it at `auto`; choose `sparse` for volumes of 256 cells a side or more that are mostly \
-                 empty.",
+                "Leave it at `auto`; choose `sparse` for volumes of 256 cells a side or more that are \
+                 mostly empty.",
             ),
         p("volume.seed", "", "", Int(0, i64::MAX, 1), Volume)
             .doc("Seed of all randomness in the volume. Equal seeds give equal volumes, bit for bit.")
             .when("Change it for other water of the same kind."),
         p("volume.coherence", "", "", Float(0.0, 1.0, 0.0), Volume)
             .doc(
-                "Dependence of the density on the strands: 0 draws ρ independently in every cell, as in the \
-                 paper; 1 lets each strand carry its density along.",
+                "Dependence of the density on the strands: 0 draws ρ independently in every cell, as in \
+                 the paper; 1 keeps the density of a strand from cell to cell.",
             )
             .when("Raise it when the water looks like grain instead of streaks; lower it for fine spray."),
         p("volume.strand_length", "", "flow lengths", Float(0.005, 1.0, 0.08), Volume)
             .slider(0.005, 0.5)
             .doc(
-                "Correlation length of the density along a strand, as a fraction of the flow length ny. It \
-                 has an effect where `volume.coherence` is above 0.",
+                "Correlation length of the density along a strand, as a fraction of the flow length ny. \
+                 It has an effect where `volume.coherence` is above 0.",
             )
             .when("Raise it for long, unbroken streaks; lower it for water that breaks into short pieces."),
         p("volume.coverage", "", "", Float(0.0, 1.0, 0.0), Volume)
             .doc(
-                "Dependence of the density on the length of the strands in a cell: 0 gives every cell that a \
-                 strand touches its whole density, as in the paper; 1 thins the cells that strands only \
-                 clip.",
+                "Dependence of the density on the length of the strands in a cell: 0 gives the whole \
+                 density to every cell that a strand touches, as in the paper; 1 thins the cells that \
+                 strands only clip.",
             )
             .when(
-                "Raise it when single cells stand out as specks or blocks; lower it for hard, full strands.",
+                "Raise it when single cells stand out as specks or blocks; lower it for hard, full \
+                 strands.",
             ),
         p("volume.crest", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc("Difference of k_d between the densest cells and the thinnest.")
@@ -142,14 +147,14 @@ pub(super) const VOLUME: Group = Group {
         p("volume.alpha", "α", "", Float(0.0, 1.0, 1.0), Uniform)
             .doc("Factor on the density ρ of all cells.")
             .when(
-                "Lower it for a transparent veil; raise it for dense water. If 1 is not dense enough, raise \
-                 `trace.sigma` or `trace.tau`.",
+                "Lower it for a transparent veil; raise it for dense water. If 1 is not dense enough, \
+                 raise `trace.sigma` or `trace.tau`.",
             ),
         p("volume.flow", "", "lengths", Float(-1e6, 1e6, 0.0), Uniform)
             .slider(0.0, 1.0)
             .doc(
-                "Distance by which the volume has moved down the flow, in lengths of the volume. Every whole \
-                 number gives the same picture.",
+                "Distance by which the volume has moved down the flow, in lengths of the volume. Every \
+                 whole number gives the same picture.",
             )
             .when("Change it to choose the moment of a still; in an animation `animate.speed` moves it."),
         p("volume.k_d", "k_d", "", Float(0.0, 1.0, 0.5), Upload)
