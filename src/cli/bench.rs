@@ -105,7 +105,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     let (engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
     terminal.note(&format!("taki: {line}"));
     let mut gpu = match engine {
-        Engine::Gpu(renderer, _) => Some(GpuBench::new(*renderer)),
+        Engine::Gpu { renderer, .. } => Some(GpuBench::new(*renderer)),
         Engine::Cpu(_) => None,
     };
     let volumes: Vec<Vec<String>> = match &args.volume {

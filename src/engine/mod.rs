@@ -4,6 +4,7 @@ pub mod cpu;
 pub mod exposure;
 mod frame;
 pub mod gpu;
+mod long_walks;
 mod options;
 pub mod overlap;
 pub mod pool_surface;
@@ -32,8 +33,16 @@ pub enum EngineChoice {
 
 /// An engine that is ready to render.
 pub enum Engine {
-    /// The GPU engine, and the options that opened its device.
-    Gpu(Box<GpuRenderer>, DeviceOptions),
+    /// The GPU engine.
+    Gpu {
+        /// The renderer on the device.
+        renderer: Box<GpuRenderer>,
+        /// The options that opened the device.
+        device: DeviceOptions,
+        /// Light volumes of the CPU engine, which renders what this device cannot. `None` makes that an
+        /// error.
+        spare: Option<cpu::LightVolumeCache>,
+    },
     /// The CPU engine, which uses all cores.
     Cpu(cpu::LightVolumeCache),
 }
@@ -47,6 +56,11 @@ impl Engine {
         Engine::Cpu(cpu::LightVolumeCache::default())
     }
 
+    /// Returns a GPU engine on an open device. What the device cannot do is an error.
+    pub fn gpu(renderer: GpuRenderer) -> Engine {
+        Engine::Gpu { renderer: Box::new(renderer), device: DeviceOptions::default(), spare: None }
+    }
+
     /// Opens the chosen engine. Returns it with one line that says which engine was opened and why.
     ///
     /// # Errors
@@ -58,8 +72,8 @@ impl Engine {
         };
         match choice {
             EngineChoice::Cpu => Ok(cpu("")),
-            EngineChoice::Gpu => Engine::open_gpu(device),
-            EngineChoice::Auto => match Engine::open_gpu(device) {
+            EngineChoice::Gpu => Engine::open_gpu(device, None),
+            EngineChoice::Auto => match Engine::open_gpu(device, Some(Default::default())) {
                 Ok(opened) => Ok(opened),
                 // A named adapter that is missing is a user error, not a reason to fall back.
                 Err(e) if device.adapter.is_some() => Err(e),
@@ -71,16 +85,16 @@ impl Engine {
         }
     }
 
-    fn open_gpu(device: &DeviceOptions) -> Result<(Engine, String)> {
+    fn open_gpu(device: &DeviceOptions, spare: Option<cpu::LightVolumeCache>) -> Result<(Engine, String)> {
         let renderer = GpuRenderer::new(Gpu::open(device)?);
         renderer.gpu.check()?;
         let line = format!("engine gpu on {}", renderer.gpu.name());
-        Ok((Engine::Gpu(Box::new(renderer), device.clone()), line))
+        Ok((Engine::Gpu { renderer: Box::new(renderer), device: device.clone(), spare }, line))
     }
 
     /// Compiles the passes that a scene needs, as far as they are known without its volume.
     pub fn prepare(&mut self, scene: &Scene) {
-        if let Engine::Gpu(renderer, _) = self {
+        if let Engine::Gpu { renderer, .. } = self {
             renderer.prepare(scene);
         }
     }
@@ -90,7 +104,7 @@ impl Engine {
     /// # Errors
     /// [`Error::NoAdapter`] if no device can be opened.
     pub fn renew(&mut self) -> Result<()> {
-        if let Engine::Gpu(renderer, device) = self {
+        if let Engine::Gpu { renderer, device, .. } = self {
             **renderer = GpuRenderer::new(Gpu::open(device)?);
         }
         Ok(())
@@ -99,7 +113,7 @@ impl Engine {
     /// Returns `gpu` or `cpu`.
     pub fn word(&self) -> &'static str {
         match self {
-            Engine::Gpu(..) => "gpu",
+            Engine::Gpu { .. } => "gpu",
             Engine::Cpu(_) => "cpu",
         }
     }
@@ -107,13 +121,14 @@ impl Engine {
     /// Returns the adapter's name; `None` on the CPU engine.
     pub fn adapter(&self) -> Option<String> {
         match self {
-            Engine::Gpu(renderer, _) => Some(renderer.gpu.name()),
+            Engine::Gpu { renderer, .. } => Some(renderer.gpu.name()),
             Engine::Cpu(_) => None,
         }
     }
 
     /// Renders a frame. After a lost device or exhausted device memory, it tries once more on a new device
-    /// with smaller tiles.
+    /// with smaller tiles. An engine opened by [`EngineChoice::Auto`] renders on the CPU what the device
+    /// cannot, with a warning.
     ///
     /// # Errors
     /// Errors of [`cpu::render_with`] or [`GpuRenderer::render`], and those of `monitor`.
@@ -129,23 +144,53 @@ impl Engine {
             Engine::Cpu(light_volumes) => {
                 cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
             }
-            Engine::Gpu(renderer, device) => {
-                let result = renderer.render(scene, volume, mesh, options, monitor);
-                let again = match &result {
-                    Err(Error::DeviceLost(_)) => true,
-                    // A budget that refused the frame before the device was used would refuse it again.
-                    Err(Error::Memory { .. }) => renderer.gpu.check().is_err(),
-                    _ => false,
-                };
-                let Err(e) = &result else { return result };
-                if !again {
-                    return result;
+            Engine::Gpu { renderer, device, spare } => {
+                let mut result = render_once(renderer, scene, volume, mesh, options, monitor);
+                if let Err(e) = &result
+                    && is_the_devices(e, renderer)
+                    && !matches!(e, Error::Device { .. } | Error::Watchdog { .. })
+                {
+                    monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
+                    **renderer = GpuRenderer::new(Gpu::open(device)?);
+                    let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
+                    result = renderer.render(scene, volume, mesh, &careful, monitor);
                 }
-                monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
-                **renderer = GpuRenderer::new(Gpu::open(device)?);
-                let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
-                renderer.render(scene, volume, mesh, &careful, monitor)
+                match (&result, spare) {
+                    (Err(e), Some(light_volumes)) if is_the_devices(e, renderer) => {
+                        monitor.warn(&format!("{e}: the CPU engine renders instead"));
+                        cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
+                    }
+                    _ => result,
+                }
             }
         }
+    }
+}
+
+/// Renders a frame on the GPU, unless the device is known to end its walks early.
+///
+/// # Errors
+/// Those of [`GpuRenderer::render`].
+pub fn render_once(
+    renderer: &mut GpuRenderer,
+    scene: &Scene,
+    volume: &VolumeTexture,
+    mesh: &Mesh,
+    options: &RenderOptions,
+    monitor: &dyn Monitor,
+) -> Result<Frame> {
+    if renderer.gpu.is_software() {
+        long_walks::check(scene, volume, &renderer.gpu.name())?;
+    }
+    renderer.render(scene, volume, mesh, options, monitor)
+}
+
+/// Whether an error comes from the device, so that the CPU engine may do better.
+fn is_the_devices(e: &Error, renderer: &GpuRenderer) -> bool {
+    match e {
+        Error::Device { .. } | Error::DeviceLost(_) | Error::Watchdog { .. } => true,
+        // A budget that refused the frame before the device was used would refuse it on the CPU too.
+        Error::Memory { .. } => renderer.gpu.check().is_err(),
+        _ => false,
     }
 }

@@ -31,6 +31,14 @@ pub enum Error {
         /// Advice: how to mend it.
         fix: String,
     },
+    /// The scene is valid, but beyond what the GPU device can do. The CPU engine can render it.
+    #[error("{what}; {fix}")]
+    Device {
+        /// Description of the limit, with the device's name.
+        what: String,
+        /// Advice: how to mend it.
+        fix: String,
+    },
     /// The command asks for `--engine gpu` and no adapter can do the work.
     #[error("{0}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu")]
     NoAdapter(String),
@@ -93,6 +101,11 @@ impl Error {
         Error::Input { what: what.into(), fix: fix.into() }
     }
 
+    /// [`Error::Device`]: more than the device can do.
+    pub fn device(what: impl Into<String>, fix: impl Into<String>) -> Self {
+        Error::Device { what: what.into(), fix: fix.into() }
+    }
+
     /// [`Error::Memory`]: more memory than allowed. `need` and `budget` are bytes.
     pub fn memory(what: impl Into<String>, need: u128, budget: u64, fix: impl Into<String>) -> Self {
         Error::Memory {
@@ -129,7 +142,7 @@ impl Error {
             Error::Comparison(_) => 1,
             Error::Usage(_) => 2,
             Error::Memory { .. } => 33,
-            Error::Input { .. } => 65,
+            Error::Input { .. } | Error::Device { .. } => 65,
             Error::NoAdapter(_) | Error::NoWindow(_) | Error::NoFfmpeg(_) => 69,
             Error::CannotCreate { .. } => 73,
             Error::Io { .. } => 74,

@@ -16,7 +16,7 @@ const FLOORS: &[&[&str]] = &[
     &["scene"],
     &["engine/options", "engine/overlap", "engine/pool_surface"],
     &["engine/cpu", "engine/gpu"],
-    &["engine/exposure"],
+    &["engine/exposure", "engine/long_walks"],
     &["engine"],
     &["job", "farm"],
     &["viewer"],

@@ -32,14 +32,14 @@ pub fn none(gpu: &Gpu) -> wgpu::TextureView {
 /// Uploads a sparse volume. Returns the textures of its stored cells and of its bricks.
 ///
 /// # Errors
-/// [`Error::Input`] if the device's largest 3-D texture cannot hold them, and errors of [`Gpu::run`].
+/// [`Error::Device`] if the device's largest 3-D texture cannot hold them, and errors of [`Gpu::run`].
 pub fn upload(gpu: &Gpu, bricks: &Bricks) -> Result<[wgpu::TextureView; 2]> {
     let most = gpu.device.limits().max_texture_dimension_3d;
     let (grid, stored) = (bricks.grid(), bricks.stored());
     let extent = stored_extent(stored.len());
     if grid.iter().chain(&extent).any(|&n| n > most) {
         let [nx, ny, nz] = bricks.size();
-        return Err(Error::input(
+        return Err(Error::device(
             format!(
                 "a volume of {nx}×{ny}×{nz} cells, {} of them stored, is too large for {}",
                 stored.len(),

@@ -17,13 +17,13 @@ use super::resolve::{Resolve, ResolveInputs};
 use super::targets::TargetShape;
 use super::timing::Timer;
 use super::visibility::{FilledVolumes, VisibilityInputs};
-use super::{Inputs, readback};
+use super::{Inputs, readback, walks_ended};
 use crate::engine::options::RenderOptions;
 use crate::picture::resolve::develop;
 use crate::picture::{Develop, Frame, Seconds};
 use crate::place::Mesh;
 use crate::scene::Scene;
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
@@ -252,10 +252,7 @@ impl<'a> FrameRun<'a> {
         })?;
         let cut = (0..wanted.height).flat_map(range).filter(|&i| frame.counts[i][0] == CUT).count();
         if cut > 0 {
-            return Err(Error::input(
-                format!("{} stopped the walks of {cut} pixels early: they cross too many cells", gpu.name()),
-                "use light.visibility=cached, fewer lights, a smaller trace.max_cells, or --engine cpu",
-            ));
+            return Err(walks_ended(&gpu.name(), &format!("{cut} pixels are unfinished")));
         }
         readback::read_rows(gpu, picture, 4, window.width, area, |row, bytes| {
             bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);

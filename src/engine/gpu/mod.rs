@@ -42,8 +42,17 @@ pub use visibility::{FilledVolumes, Filling, VisibilityInputs, VisibilityPass, s
 
 use std::borrow::Cow;
 
+use crate::util::error::Error;
 use crate::util::window::Window;
 use layout::Tile;
+
+/// The error of a device that ends walks early. `what` tells how far a walk went or what is missing.
+pub fn walks_ended(device: &str, what: &str) -> Error {
+    Error::device(
+        format!("{device} ends walks through so many cells early ({what})"),
+        "use light.visibility=cached, fewer lights, a smaller trace.max_cells, or --engine cpu",
+    )
+}
 
 /// Compiles a compute pipeline of a stage's shader, specialised to `constants`.
 fn compute_pipeline(

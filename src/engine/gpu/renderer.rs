@@ -94,11 +94,11 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// - Errors of `monitor`, which may stop the work.
-    /// - [`Error::Input`] if the scene is too large for the device, or the device ends walks early.
+    /// - [`Error::Device`] if the scene is too large for the device, or the device ends walks early.
     /// - [`Error::Memory`] if light volumes or textures do not fit into memory.
     /// - [`Error::DeviceLost`] or [`Error::Watchdog`] if the device fails.
     ///
-    /// [`Error::Input`]: crate::util::error::Error::Input
+    /// [`Error::Device`]: crate::util::error::Error::Device
     /// [`Error::Memory`]: crate::util::error::Error::Memory
     /// [`Error::DeviceLost`]: crate::util::error::Error::DeviceLost
     /// [`Error::Watchdog`]: crate::util::error::Error::Watchdog

@@ -99,7 +99,7 @@ impl Uploaded {
     /// Uploads the parts of a scene that are not resident yet.
     ///
     /// # Errors
-    /// [`Error::Input`] if a part is too large for the device, and errors of [`Gpu::run`].
+    /// [`Error::Device`] if a part is too large for the device, and errors of [`Gpu::run`].
     pub fn new(
         gpu: &Gpu,
         resident: &mut Resident,
@@ -121,7 +121,7 @@ impl Uploaded {
         let largest =
             [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<VertexMaterial>()];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
-            return Err(Error::input(
+            return Err(Error::device(
                 format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
                 "lower their number or use --engine cpu",
             ));
@@ -233,7 +233,7 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
     let [nx, ny, nz] = atlas.extent();
     let most = gpu.device.limits().max_texture_dimension_3d;
     if [nx, ny, nz].iter().any(|&n| n > most) {
-        return Err(Error::input(
+        return Err(Error::device(
             format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
             format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
         ));
@@ -296,7 +296,7 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
     let Map { width, height, .. } = *map;
     let most = gpu.device.limits().max_texture_dimension_2d;
     if width.max(height) > most {
-        return Err(Error::input(
+        return Err(Error::device(
             format!("an environment map of {width}×{height} texels is too large for {}", gpu.name()),
             format!("at most {most} texels on a side fit there; make it smaller or use --engine cpu"),
         ));

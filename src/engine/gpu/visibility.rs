@@ -140,10 +140,10 @@ impl VisibilityPass {
     /// each submission or light volume with the work done so far and in total; its error stops the work.
     ///
     /// # Errors
-    /// Errors of `between` and of the device (see [`Gpu::run`]); [`Error::Input`] if the device's largest
+    /// Errors of `between` and of the device (see [`Gpu::run`]); [`Error::Device`] if the device's largest
     /// texture cannot hold the light volumes.
     ///
-    /// [`Error::Input`]: crate::util::error::Error::Input
+    /// [`Error::Device`]: crate::util::error::Error::Device
     pub fn get(
         &mut self,
         inputs: &VisibilityInputs,

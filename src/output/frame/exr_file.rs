@@ -1,4 +1,4 @@
-//! EXR files: linear float32 in one part, with dotted channel names and the resolved scene as an attribute.
+//! EXR files: linear float32 in one part, with dotted channel names and the resolved scene in attributes.
 //!
 //! Scan lines are in increasing order, one per block, and compressed by run lengths. That is lossless and
 //! fast, and the bytes do not depend on how the rows are divided.
@@ -27,6 +27,9 @@ use crate::util::window::Window;
 const BATCH_BYTES: usize = 8 << 20;
 /// Largest line of a file that is read, bytes. A line of the widest picture with all layers has 48 MB.
 const LINE_BYTES: u64 = 64 << 20;
+/// Longest text in an attribute that is written, bytes. FFmpeg before 6 loses its place in the header after a
+/// longer attribute, takes what follows for the table of lines, and shows black rows without an error.
+const TEXT_BYTES: usize = 255;
 /// Largest header of a file that is read, bytes.
 const HEADER_BYTES: u64 = 64 << 20;
 
@@ -88,19 +91,10 @@ impl<W: Write + Seek> ExrWriter<W> {
         channels: &[String],
         texts: &[(String, String)],
     ) -> std::result::Result<Self, exr::error::Error> {
-        let mut attributes = LayerAttributes {
+        let attributes = LayerAttributes {
             layer_position: Vec2(window.x as i32, window.y as i32),
             ..LayerAttributes::default()
         };
-        for (key, text) in texts {
-            if key == "Software" {
-                attributes.software_name = Some(Text::from(text.as_str()));
-            } else {
-                // `other` is a hash map. A second text would make the order of the attributes random.
-                let value = AttributeValue::Text(Text::from(text.as_str()));
-                attributes.other.insert(Text::from(key.as_str()), value);
-            }
-        }
         let channels = channels.iter().map(|name| ChannelDescription::named(name.as_str(), SampleType::F32));
         let size = Vec2(window.width as usize, window.height as usize);
         let header = Header::new(Text::from(""), size, channels.collect())
@@ -111,7 +105,22 @@ impl<W: Write + Seek> ExrWriter<W> {
         let requirements = MetaData::validate(&headers, true)?;
         magic_number::write(&mut out)?;
         requirements.write(&mut out)?;
-        Header::write_all(&headers, &mut out, false)?;
+        let mut bytes = Vec::new();
+        Header::write_all(&headers, &mut bytes, false)?;
+        // The header ends with an empty name. The texts are written here, because the library keeps further
+        // attributes in a hash map and their order would be random.
+        let end = bytes.pop();
+        for (key, text) in texts {
+            if key == "Software" {
+                push_text(&mut bytes, "software", text);
+                continue;
+            }
+            for (name, piece) in pieces(key, text) {
+                push_text(&mut bytes, &name, piece);
+            }
+        }
+        bytes.extend(end);
+        out.write_all(&bytes)?;
         let table = out.stream_position()?;
         // Space for the offsets of the blocks, which are known once the blocks are written.
         let bytes = 8 * u64::from(window.height);
@@ -166,6 +175,36 @@ impl<W: Write + Seek> ExrWriter<W> {
         }
         Ok(self.out.flush()?)
     }
+}
+
+/// Adds an attribute to the bytes of a header.
+fn push_text(header: &mut Vec<u8>, name: &str, text: &str) {
+    for word in [name, "string"] {
+        header.extend_from_slice(word.as_bytes());
+        header.push(0);
+    }
+    header.extend_from_slice(&(text.len() as u32).to_le_bytes());
+    header.extend_from_slice(text.as_bytes());
+}
+
+/// Cuts a text into attributes of at most [`TEXT_BYTES`]: NAME if one is enough, otherwise NAME.0001 and so
+/// on. Each piece ends with a line of the text, where a line fits.
+fn pieces<'a>(name: &str, text: &'a str) -> Vec<(String, &'a str)> {
+    if text.len() <= TEXT_BYTES {
+        return vec![(name.to_owned(), text)];
+    }
+    let (mut out, mut rest) = (Vec::new(), text);
+    while !rest.is_empty() {
+        let most = rest.floor_char_boundary(TEXT_BYTES);
+        let end = match rest[..most].rfind('\n') {
+            Some(line_end) if most < rest.len() => line_end + 1,
+            _ => most,
+        };
+        let (piece, after) = rest.split_at(end);
+        out.push((format!("{name}.{:04}", out.len() + 1), piece));
+        rest = after;
+    }
+    out
 }
 
 /// Names and values of an EXR file's channels; values row by row.
@@ -298,12 +337,17 @@ impl ExrLines {
         })
     }
 
-    /// Returns the text of the scene.
+    /// Returns the text of the scene, from one attribute or from its pieces.
     pub fn scene(&self) -> Option<String> {
-        match self.meta.headers[0].own_attributes.other.get(&Text::from(SCENE_TEXT)) {
+        let attributes = &self.meta.headers[0].own_attributes.other;
+        let text = |name: &str| match attributes.get(&Text::from(name)) {
             Some(AttributeValue::Text(text)) => Some(text.to_string()),
             _ => None,
-        }
+        };
+        text(SCENE_TEXT).or_else(|| {
+            let pieces = (1..).map_while(|number| text(&format!("{SCENE_TEXT}.{number:04}")));
+            Some(pieces.collect::<String>()).filter(|whole| !whole.is_empty())
+        })
     }
 
     /// Reads the next line into `line`: channel by channel, native float32.

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::engine::gpu::DeviceOptions;
-use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
+use crate::engine::{self, Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
 use crate::picture::resolve::develop;
 use crate::picture::{AutoExposure, Frame, Look};
@@ -128,7 +128,7 @@ impl Renderer {
             match self.next() {
                 Task::Quit => return,
                 Task::LoseDevice => {
-                    if let Some(Engine::Gpu(renderer, _)) = &self.engine {
+                    if let Some(Engine::Gpu { renderer, .. }) = &self.engine {
                         renderer.gpu.device.destroy();
                     }
                 }
@@ -386,7 +386,9 @@ impl Renderer {
         watch: &dyn Monitor,
     ) -> Result<Frame> {
         match self.engine.get_or_insert(Engine::cpu()) {
-            Engine::Gpu(renderer, _) => renderer.render(scene, volume, mesh, options, watch),
+            Engine::Gpu { renderer, .. } => {
+                engine::render_once(renderer, scene, volume, mesh, options, watch)
+            }
             cpu => cpu.render_volume(scene, volume, mesh, options, watch),
         }
     }

@@ -312,8 +312,8 @@ fn a_destroyed_device_is_an_error_and_the_engine_recovers_on_a_new_one() {
     let scene = scene("front", &["image.width=32", "image.height=32"]);
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
-    let mut engine = taki::engine::Engine::Gpu(Box::new(renderer), DeviceOptions::default());
-    if let taki::engine::Engine::Gpu(renderer, _) = &mut engine {
+    let mut engine = taki::engine::Engine::gpu(renderer);
+    if let taki::engine::Engine::Gpu { renderer, .. } = &mut engine {
         let lost = renderer.render(&scene, &volume, &mesh, &SURFACE, &Unwatched);
         assert!(matches!(lost, Err(Error::DeviceLost(_))), "{lost:?}");
     }
@@ -329,8 +329,7 @@ fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
     let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
     let mesh = scene.mesh();
     let mut engines = vec![taki::engine::Engine::cpu()];
-    engines
-        .extend(renderer("parts").map(|r| taki::engine::Engine::Gpu(Box::new(r), DeviceOptions::default())));
+    engines.extend(renderer("parts").map(taki::engine::Engine::gpu));
     for engine in &mut engines {
         let mut part = |samples| {
             let options = RenderOptions { samples, ..Default::default() };

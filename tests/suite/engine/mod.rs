@@ -3,6 +3,7 @@
 pub mod exposure;
 pub mod gpu;
 pub mod layers;
+pub mod long_walks;
 pub mod overlap;
 pub mod ray;
 pub mod shaders;

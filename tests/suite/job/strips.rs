@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use crate::cli::faults::{run, taki};
 use crate::engine::gpu::{renderer, scene};
 use rand::{RngExt, SeedableRng};
-use taki::engine::gpu::DeviceOptions;
 use taki::engine::{Engine, RenderOptions};
 use taki::job::{Still, stitch, strips};
 use taki::output::frame::{Figures, figures_of, read_exr, verify};
@@ -122,7 +121,7 @@ fn crops(size: [u32; 2], count: usize) -> Vec<Window> {
 fn a_part_of_an_image_is_that_part_of_the_whole_bit_for_bit_on_both_engines() {
     let subject = Subject::small();
     let mut engines = vec![Engine::cpu()];
-    engines.extend(renderer("crops").map(|r| Engine::Gpu(Box::new(r), DeviceOptions::default())));
+    engines.extend(renderer("crops").map(Engine::gpu));
     // The small grid gives as many device windows as a picture of gigapixels has.
     for grid in [Grid { side: 32, pixels: 32 * 16 }, Grid { side: 64, pixels: 64 * 64 }, Grid::default()] {
         for engine in &mut engines {

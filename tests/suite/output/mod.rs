@@ -2,5 +2,6 @@
 
 pub mod contact_sheet;
 pub mod difference;
+pub mod exr;
 pub mod movie;
 pub mod streaks;

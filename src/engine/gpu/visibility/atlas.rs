@@ -16,7 +16,7 @@ impl LightVolumeAtlas {
     /// Arranges `count` light volumes of `size` texels.
     ///
     /// # Errors
-    /// [`Error::Input`] if they do not fit into the device's largest 3-D texture.
+    /// [`Error::Device`] if they do not fit into the device's largest 3-D texture.
     pub fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
         let most = gpu.device.limits().max_texture_dimension_3d;
         // z comes first: it is the order of the volume's own slices.
@@ -28,7 +28,7 @@ impl LightVolumeAtlas {
         }
         if unplaced > 1 {
             let [nx, ny, nz] = size;
-            return Err(Error::input(
+            return Err(Error::device(
                 format!("{count} light volumes of {nx}×{ny}×{nz} cells are too many for {}", gpu.name()),
                 "use light.visibility=march, or --engine cpu",
             ));

@@ -21,12 +21,17 @@ impl Renderer {
                 self.lost(&e);
                 return true;
             }
+            Ok(Err(e @ Error::Device { .. })) if self.choice == EngineChoice::Auto => {
+                self.say(MessageKind::Warning, format!("{e}. The CPU engine takes over"));
+                self.take_cpu();
+                return true;
+            }
             Ok(Err(e)) => lock(&self.shared.state).fault = Some(e.to_string()),
             Err(panic) => {
                 let text = panic.downcast_ref::<String>().map(String::as_str);
                 let why = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
                 let bug = format!("a bug ended the renderer ({why}); please report this");
-                if matches!(self.engine, Some(Engine::Gpu(..))) {
+                if matches!(self.engine, Some(Engine::Gpu { .. })) {
                     self.say(MessageKind::Error, format!("{bug}. The CPU engine takes over"));
                     self.take_cpu();
                     return true;

@@ -145,7 +145,7 @@ fn a_lost_device_is_replaced_once_with_a_warning() {
         || engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;
     let before = picture();
     assert!(warnings.0.lock().unwrap().is_empty());
-    if let Engine::Gpu(renderer, _) = &engine {
+    if let Engine::Gpu { renderer, .. } = &engine {
         renderer.gpu.device.destroy();
     }
     let after = engine.render_volume(&scene, &volume, &scene.mesh(), &options, &warnings).unwrap().picture;

@@ -16,7 +16,7 @@ use taki::util::window::Window;
 #[test]
 fn the_order_of_the_quads_in_the_scene_does_not_matter() {
     let mut engines = vec![taki::engine::Engine::cpu()];
-    engines.extend(renderer("order").map(|r| taki::engine::Engine::Gpu(Box::new(r), Default::default())));
+    engines.extend(renderer("order").map(taki::engine::Engine::gpu));
     for mut scene in [heap(6, 1), heap(6, 2), folded()] {
         let volume = curves(&scene);
         for engine in &mut engines {

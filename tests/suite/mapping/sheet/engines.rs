@@ -19,7 +19,7 @@ fn small(mut scene: Scene) -> Scene {
 
 fn engines(what: &str) -> Vec<Engine> {
     let mut engines = vec![Engine::cpu()];
-    engines.extend(renderer(what).map(|r| Engine::Gpu(Box::new(r), Default::default())));
+    engines.extend(renderer(what).map(Engine::gpu));
     engines
 }
 
