@@ -82,8 +82,8 @@ struct SceneOptions {
     /// Name of a preset (see `taki presets`) or path of a scene file, such as fall.toml.
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
-    /// Sets a parameter of the scene, such as `--set curves.h=1.4`. Can be given more than once.
-    /// docs/parameters.md explains all parameters; `taki scene` prints their values.
+    /// Sets a parameter of the scene, such as `--set curves.h=1.4`. The last part of a key is enough where it
+    /// means one parameter: `--set h=1.4`. Can be given more than once. docs/parameters.md explains all parameters; `taki scene` prints their values.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// Seed of the volume's random numbers. Short for --set volume.seed=N.

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use glam::{DQuat, DVec3};
 
 use super::keyframes::{CameraPath, Interpolation, Keyframes};
+use super::names::check_names;
 use super::param::{Kind, Param};
-use super::read::{Source, apply_sets, check_names};
+use super::read::{Source, apply_sets};
 use super::value::{Place, Raw, Value, Values};
 use super::{Limits, Scene, expose};
 use crate::util::error::{Error, Result};

@@ -4,6 +4,7 @@ mod animation;
 mod build;
 mod ground;
 mod keyframes;
+mod names;
 mod open;
 mod param;
 mod presets;
@@ -19,9 +20,10 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use build::resolve;
+pub use names::{check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{REFERENCES, Source, check_names, parse_value, set_by_hand};
+pub use read::{REFERENCES, Source, parse_value, set_by_hand};
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::light::environment::{self, Environment, EnvironmentMemo};

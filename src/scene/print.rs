@@ -19,6 +19,14 @@ use crate::place::{Mesh, Vertex};
 impl Values {
     /// Returns every concrete key of the values, in the table's order.
     pub fn keys(&self) -> Vec<String> {
+        let mut keys = self.known_keys();
+        // An absent list has no value to print.
+        keys.retain(|key| self.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
+        keys
+    }
+
+    /// Returns every key that `--set` can give, absent lists among them, in the table's order.
+    pub fn known_keys(&self) -> Vec<String> {
         let mut keys = Vec::new();
         for param in PARAMS {
             match param.key.split_once(".*.") {
@@ -32,8 +40,6 @@ impl Values {
                 }
             }
         }
-        // An absent list has no value to print.
-        keys.retain(|key| self.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
         keys
     }
 

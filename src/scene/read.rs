@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
@@ -20,9 +21,6 @@ pub const VERSION: i64 = 1;
 
 /// Key of the list of keyframed parameters.
 const TRACKS: &str = "animate.tracks";
-
-/// Sections whose keys have a name of the scene's choice as their second part.
-const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
 
 /// The text of a scene, with its name and the folder in which its references resolve.
 pub struct Source {
@@ -305,11 +303,13 @@ pub fn apply_sets(
     Ok(None)
 }
 
-/// Applies one `--set key=value`. The value is TOML; text that is not TOML is taken as a word.
+/// Applies one `--set key=value`. The last part of the key is enough where it means one parameter. The value
+/// is TOML; text that is not TOML is taken as a word.
 ///
 /// # Errors
-/// [`Error::Usage`] where there is no `=`, [`Error::Input`] where the table has no such key or does not allow
-/// the value, or the scene has no such name.
+/// [`Error::Usage`] where there is no `=` or the last part of a key means several parameters,
+/// [`Error::Input`] where the table has no such key or does not allow the value, or the scene has no such
+/// name.
 pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     // A name in the key may contain an = itself. The key ends at the first = that makes it a known one.
     let splits = || setting.match_indices('=').map(|(at, _)| (&setting[..at], &setting[at + 1..]));
@@ -318,36 +318,16 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
     let (key, text) = (key.trim(), text.trim());
-    let parsed = parse_value(text);
-    check_names(values, key).map_err(|(what, fix)| Error::input(format!("--set {key}: {what}"), fix))?;
-    values.set(key, &parsed, &Place("--set".into()))
+    let key = full_key(key, values).map_err(|why| Error::Usage(format!("--set {setting}: {why}")))?;
+    let place = Place("--set".into());
+    if Param::find(&key).is_none() {
+        return Err(unknown_key(&key, values, &place));
+    }
+    check_names(values, &key).map_err(|(what, fix)| Error::input(format!("--set {key}: {what}"), fix))?;
+    values.set(&key, &parse_value(text), &place)
 }
 
 /// Parses a value of `--set`: TOML, otherwise a word.
 pub fn parse_value(text: &str) -> Raw {
     DeValue::parse(text).map_or_else(|_| Raw::Text(text.into()), |v| raw(v.get_ref()))
-}
-
-/// Checks that the scene has the name in `key`, so that a misspelt one does not add a second light. The error
-/// is the fault and the list of the names there are.
-pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (String, String)> {
-    let mut parts = key.split('.');
-    let (Some(section), Some(name)) = (parts.next(), parts.next()) else { return Ok(()) };
-    if !NAMED.contains(&section) && section != "quads" {
-        return Ok(());
-    }
-    let mut names = values.names(section);
-    if section == "materials" {
-        for user in ["quads", "sheets", "splashes"] {
-            names.extend(values.names(user).iter().map(|n| values.text(&format!("{user}.{n}.material"))));
-        }
-    }
-    if names.iter().any(|n| n == name) {
-        return Ok(());
-    }
-    names.sort_unstable();
-    names.dedup();
-    let known =
-        if names.is_empty() { "there are none".into() } else { format!("there are: {}", names.join(", ")) };
-    Err((format!("the scene has no {name} in {section}"), known))
 }

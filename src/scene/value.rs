@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param, nearest};
+use super::names::unknown_key_in_file;
+use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
 use crate::util::error::{Error, Result};
 
 /// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
@@ -92,11 +93,7 @@ impl Values {
     /// `place`.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
         let Some(param) = Param::find(key) else {
-            let fix = match nearest(key) {
-                Some(near) => format!("did you mean {near}?"),
-                None => "docs/parameters.md lists every key".into(),
-            };
-            return Err(Error::input(format!("{}: unknown key {key}", place.0), fix));
+            return Err(unknown_key_in_file(key, self, place));
         };
         let value = check(param, raw).map_err(|got| {
             Error::input(format!("{}: {key} = {got}", place.0), format!("allowed: {}", param.range()))

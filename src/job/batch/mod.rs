@@ -118,12 +118,12 @@ impl Batch {
     /// for pictures that do not fit, or an error of the monitor.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
         let (base, measured) = exposed(base, monitor)?;
-        let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
-        let keys = first.keys();
+        // A scene that is not valid is reported before the sweeps are read.
+        base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
         let sweeps = request
             .sweeps
             .iter()
-            .map(|text| Sweep::parse(text, &keys, base.values()))
+            .map(|text| Sweep::parse(text, base.values()))
             .collect::<Result<Vec<Sweep>>>()?;
         if sweeps.iter().any(|sweep| sweep.key == "image.auto_exposure") {
             return Err(Error::Usage(

@@ -1,6 +1,6 @@
 //! Sweeps: a parameter and the values to try, such as `alpha=0.25:1:0.25` or `h=0.6,1,1.4`.
 
-use crate::scene::{PARAMS, Param, Raw, Values, check_names, parse_value};
+use crate::scene::{Param, Place, Raw, Values, check_names, full_key, parse_value, unknown_key};
 use crate::util::error::{Error, Result};
 
 /// Most values in one sweep.
@@ -18,26 +18,21 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Parses `KEY=VALUES`. The last part of the key is enough if only one parameter has it. `keys` are all
-    /// keys of the scene, `values` its values.
+    /// Parses `KEY=VALUES`. The last part of the key is enough if only one parameter has it. `values` are
+    /// those of the scene.
     ///
     /// # Errors
     /// [`Error::Usage`] or [`Error::Input`] if the key is unknown or cannot be swept, or if the values are
     /// malformed, too many or given twice.
-    pub fn parse(text: &str, keys: &[String], values: &Values) -> Result<Sweep> {
+    pub fn parse(text: &str, values: &Values) -> Result<Sweep> {
         let usage = |why: String| Error::Usage(format!("--sweep {text}: {why}"));
         let how = "write KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,…, such as alpha=0.25:1:0.25";
         let (name, list) =
             text.split_once('=').ok_or_else(|| usage(format!("the values are missing; {how}")))?;
         let (name, list) = (name.trim(), list.trim());
-        let key = full_key(name, keys).map_err(&usage)?;
+        let key = full_key(name, values).map_err(&usage)?;
         let Some(param) = Param::find(&key) else {
-            // Setting an unknown key gives the error that names similar keys.
-            let place = crate::scene::Place("--sweep".into());
-            return Err(match values.clone().set(&key, &Raw::Int(0), &place) {
-                Err(e) => e,
-                Ok(()) => usage("unknown key".into()),
-            });
+            return Err(unknown_key(&key, values, &Place("--sweep".into())));
         };
         check_names(values, &key)
             .map_err(|(what, fix)| Error::input(format!("--sweep {key}: {what}"), fix))?;
@@ -75,27 +70,6 @@ impl Sweep {
         match param {
             Some(p) if !p.unit.is_empty() => format!("{name}, {}", p.unit),
             _ => name,
-        }
-    }
-}
-
-/// The full key that `name` stands for: `name` itself, or the one key that ends with it. Parameters that a
-/// scene has once take precedence over those of lights, rocks and materials.
-fn full_key(name: &str, keys: &[String]) -> std::result::Result<String, String> {
-    if name.contains('.') {
-        return Ok(name.into());
-    }
-    let ends = |key: &&String| key.rsplit('.').next() == Some(name) && !key.starts_with("animate.");
-    let single = |key: &&String| PARAMS.iter().any(|p| p.key == key.as_str());
-    let all: Vec<&String> = keys.iter().filter(ends).collect();
-    let once: Vec<&String> = all.iter().copied().filter(single).collect();
-    match (once.as_slice(), all.as_slice()) {
-        ([key], _) | ([], [key]) => Ok((*key).clone()),
-        // Setting an unknown key gives the error that names similar keys.
-        ([], []) => Ok(name.into()),
-        (_, several) => {
-            let several: Vec<&str> = several.iter().map(|k| k.as_str()).collect();
-            Err(format!("{name} can mean {}; write one of them in full", several.join(", ")))
         }
     }
 }

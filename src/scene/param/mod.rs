@@ -176,33 +176,8 @@ fn matches(pattern: &str, key: &str) -> bool {
 }
 
 /// The part of a key after its last dot. In no pattern it is `*`.
-fn last_part(key: &str) -> &str {
+pub fn last_part(key: &str) -> &str {
     key.rsplit('.').next().unwrap_or(key)
-}
-
-/// Returns the known key nearest to a misspelt one, with the misspelt key's own names in place of `*`.
-pub fn nearest(key: &str) -> Option<String> {
-    let parts: Vec<&str> = key.split('.').collect();
-    PARAMS
-        .iter()
-        .map(|param| {
-            let named: Vec<&str> = param
-                .key
-                .split('.')
-                .enumerate()
-                .map(|(i, want)| if want == "*" { parts.get(i).copied().unwrap_or("NAME") } else { want })
-                .collect();
-            named.join(".")
-        })
-        .map(|candidate| {
-            // The commonest slip is a bare last part, such as `sigma` for `trace.sigma`.
-            let last = last_part(&candidate).to_owned();
-            let score = strsim::jaro_winkler(key, &candidate).max(strsim::jaro_winkler(key, &last));
-            (score, candidate)
-        })
-        .filter(|(score, _)| *score > 0.7)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
 }
 
 impl Param {

@@ -3,6 +3,7 @@
 
 pub mod animation;
 pub mod presets;
+pub mod slips;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -282,7 +283,7 @@ fn a_wrong_value_is_refused_with_its_file_line_and_range() {
 fn misspelt_keys_and_presets_suggest_the_right_one() {
     for (wrong, right) in [
         ("curves.hh", "curves.h"),
-        ("sigma", "trace.sigma"),
+        ("sgima", "trace.sigma"),
         ("light.ambiant", "light.ambient"),
         ("volume.aplha", "volume.alpha"),
         ("lights.sun.colour", "lights.sun.color"),

@@ -1,0 +1,70 @@
+//! What a user types by slip in `--set` or a scene file is understood, or answered with the right way to
+//! write it.
+
+use std::fs;
+
+use crate::cli::faults::{Run, run, taki};
+use tempfile::tempdir;
+
+/// `taki scene` of a scene with settings.
+fn scene(name: &str, sets: &[&str]) -> Run {
+    run(taki(["scene", name]).args(sets.iter().flat_map(|set| ["--set", set])))
+}
+
+/// The error line of a scene file with this text.
+fn fault(text: &str) -> Run {
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    fs::write(&file, text).unwrap();
+    run(taki(["scene"]).arg(&file))
+}
+
+#[test]
+fn the_last_part_of_a_key_is_enough_for_set() {
+    for (short, full) in [
+        ("sigma=7.5", "trace.sigma=7.5"),
+        // A scene has these once, and other things have keys of the same last part.
+        ("h=1.2", "curves.h=1.2"),
+        ("seed=9", "volume.seed=9"),
+        // The scene has one light.
+        ("softness=0.5", "lights.sun.softness=0.5"),
+        ("fps=12", "animate.fps=12"),
+        ("eyes=[[0, 1, 9], [4, 2, 7]]", "animate.path.eyes=[[0, 1, 9], [4, 2, 7]]"),
+    ] {
+        assert_eq!(scene("fig5", &[short]).done(), scene("fig5", &[full]).done(), "{short}");
+    }
+    assert_ne!(scene("fig5", &["h=1.2"]).done(), scene("fig5", &[]).done());
+    // The message names the key in full.
+    scene("fig5", &["h=9"]).refused(65, &["--set: curves.h = 9", "allowed: 0 to 8"]);
+}
+
+#[test]
+fn a_last_part_of_several_keys_is_refused_with_the_candidates() {
+    let two_walls = ["rocks.foot.wet", "rocks.wall.wet", "write one of them in full"];
+    scene("fig5", &["wet=1"]).refused(2, &two_walls);
+    scene("fig5", &["file=v.npz"]).refused(2, &["file can mean volume.file, environment.file"]);
+    // Twenty rocks are not listed one by one.
+    let rock = |i: usize| format!("[rocks.r{i}]\ncorners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]\n");
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    fs::write(&file, "version = 1\n".to_owned() + &(0..20).map(rock).collect::<String>()).unwrap();
+    run(taki(["scene"]).arg(&file).args(["--set", "wet=1"])).refused(2, &["rocks.r0.wet", "and 12 more"]);
+}
+
+#[test]
+fn suggestions_are_keys_of_the_scene() {
+    for (wrong, right) in [
+        ("sgima=1", "did you mean trace.sigma?"),
+        // No light is named NAME, or after the key's own parts.
+        ("softnes=1", "did you mean lights.sun.softness?"),
+        ("lights.intensity=1", "did you mean lights.sun.intensity?"),
+        ("light.sun.color=1", "did you mean lights.sun.color?"),
+        ("animate.pth.eyes=1", "did you mean animate.path.eyes?"),
+        ("xyzzy=1", "docs/parameters.md lists every key"),
+    ] {
+        scene("fig5", &[wrong]).refused(65, &["unknown key", right]);
+    }
+    // A scene file may name a light as it likes.
+    fault("version = 1\n[lights.moon]\ncolour = 1\n").refused(65, &["did you mean lights.moon.color?"]);
+    fault("version = 1\n[[quads]]\ncorner = 1\n").refused(65, &["did you mean quads.0.corners?"]);
+}
