@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, CommandFactory, Subcommand};
 
 use super::Cli;
+use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
@@ -103,9 +104,9 @@ struct JobArgs {
     /// CPU cores for each shard. Default: the site's default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     cpus: Option<u32>,
-    /// Memory for each shard, in MiB. Default: the site's default. The budget of taki batch is another
-    /// option, --memory after --.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    /// Memory for each shard, such as 8GiB, 8GB or 512MiB, rounded up to whole MiB. A number alone counts
+    /// MiB. Default: the site's default. The budget of taki batch is another option, --memory after --.
+    #[arg(long, value_name = "SIZE", value_parser = shard_memory)]
     memory: Option<u32>,
     /// GPUs for each shard. Default: the site's default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]

@@ -6,6 +6,7 @@ mod choice;
 mod compare;
 mod devices;
 mod farm;
+mod parse;
 mod render;
 mod scene;
 mod stitch;
@@ -26,6 +27,7 @@ use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
+use parse::{crop, memory, seconds, size};
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
@@ -92,18 +94,15 @@ struct SceneOptions {
     /// Allows the scene to read files in this folder too. Can be given more than once.
     #[arg(long = "allow-path", value_name = "DIR")]
     allow_paths: Vec<PathBuf>,
-    /// Memory budget in MiB. Work that would need more is refused before it starts.
-    #[arg(long, value_name = "MIB", default_value_t = 4096)]
+    /// Memory budget, such as 6GiB (2^30 bytes each), 6GB (10^9 bytes each) or 512MiB. A number alone counts
+    /// MiB. Work that would need more is refused before it starts.
+    #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
     memory: u64,
 }
 
 impl SceneOptions {
     fn limits(&self) -> Limits {
-        Limits {
-            allow_paths: self.allow_paths.clone(),
-            memory: self.memory.saturating_mul(1 << 20),
-            ..Limits::default()
-        }
+        Limits { allow_paths: self.allow_paths.clone(), memory: self.memory, ..Limits::default() }
     }
 
     /// Loads the scene. `more` holds settings from other options; they override --set.
@@ -158,28 +157,6 @@ impl EngineOptions {
     fn device(&self) -> DeviceOptions {
         DeviceOptions { adapter: self.adapter.clone(), watchdog: Duration::from_secs_f64(self.watchdog) }
     }
-}
-
-/// Parses a number of seconds, up to one day.
-fn seconds(text: &str) -> std::result::Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
-        _ => Err("give a number of seconds from 0 to 86400".into()),
-    }
-}
-
-/// Parses `WIDTHxHEIGHT`.
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
-    let parts = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-    parts.ok_or_else(|| "give WIDTHxHEIGHT in pixels, such as 1280x720".into())
-}
-
-/// Parses `X,Y,W,H`.
-fn crop(text: &str) -> std::result::Result<[u32; 4], String> {
-    let numbers = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<Vec<u32>>>();
-    numbers
-        .and_then(|n| n.try_into().ok())
-        .ok_or_else(|| "give column, row, width and height in pixels, such as 0,0,640,360".into())
 }
 
 /// Formats the exposure that was measured automatically.

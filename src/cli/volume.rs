@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::terminal::{Terminal, say};
-use super::{SceneOptions, default_output};
+use super::{SceneOptions, default_output, memory};
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -34,8 +34,9 @@ enum VolumeCommand {
         /// Prints the statistics as one JSON object.
         #[arg(long)]
         json: bool,
-        /// Memory budget in MiB. A volume that would need more is refused.
-        #[arg(long, value_name = "MIB", default_value_t = 4096)]
+        /// Memory budget, such as 6GiB (2^30 bytes each), 6GB (10^9 bytes each) or 512MiB. A number alone
+        /// counts MiB. A volume that would need more is refused.
+        #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
         memory: u64,
     },
 }
@@ -58,8 +59,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
         VolumeCommand::Info { file, json, memory } => {
-            let statistics =
-                read_npz(file, StorageChoice::Auto, memory.saturating_mul(1 << 20))?.statistics();
+            let statistics = read_npz(file, StorageChoice::Auto, *memory)?.statistics();
             say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
             Ok(())
         }

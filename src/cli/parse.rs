@@ -1,0 +1,61 @@
+//! Values of options as users write them.
+
+/// Result of a parser; the error tells how to write the value.
+type Parsed<T> = std::result::Result<T, String>;
+
+/// Parses a number of seconds, up to one day.
+pub fn seconds(text: &str) -> Parsed<f64> {
+    match text.parse::<f64>() {
+        Ok(s) if (0.0..=86_400.0).contains(&s) => Ok(s),
+        _ => Err("give a number of seconds from 0 to 86400".into()),
+    }
+}
+
+/// Parses `WIDTHxHEIGHT`; the sign between them may also be `X` or `×`.
+pub fn size(text: &str) -> Parsed<[u32; 2]> {
+    let parts = text.split_once(['x', 'X', '×']);
+    let sides = parts.and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));
+    sides.ok_or_else(|| "give WIDTHxHEIGHT in pixels, such as 1280x720".into())
+}
+
+/// Parses `X,Y,W,H`.
+pub fn crop(text: &str) -> Parsed<[u32; 4]> {
+    let numbers = text.split(',').map(|n| n.trim().parse().ok()).collect::<Option<Vec<u32>>>();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "give column, row, width and height in pixels, such as 0,0,640,360".into())
+}
+
+/// Parses an amount of memory, and returns bytes. A number alone counts MiB. `KiB`, `MiB`, `GiB` and `TiB`
+/// are powers of 1024, and so are the letters alone; `KB`, `MB`, `GB` and `TB` are powers of 1000.
+pub fn memory(text: &str) -> Parsed<u64> {
+    let how = || "give an amount such as 4GiB, 4GB or 512MiB; a number alone counts MiB".to_owned();
+    let text = text.trim();
+    let unit_at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = (text[..unit_at].trim_end(), text[unit_at..].to_lowercase());
+    let bytes: u64 = match unit.as_str() {
+        "b" => 1,
+        "k" | "kib" => 1 << 10,
+        "" | "m" | "mib" => 1 << 20,
+        "g" | "gib" => 1 << 30,
+        "t" | "tib" => 1 << 40,
+        "kb" => 1_000,
+        "mb" => 1_000_000,
+        "gb" => 1_000_000_000,
+        "tb" => 1_000_000_000_000,
+        _ => return Err(how()),
+    };
+    if let Ok(whole) = number.parse::<u64>() {
+        return Ok(whole.saturating_mul(bytes));
+    }
+    let amount = number.parse::<f64>().ok().filter(|x| x.is_finite() && *x >= 0.0).ok_or_else(how)?;
+    // A float that is too large becomes the largest number.
+    Ok((amount * bytes as f64) as u64)
+}
+
+/// Parses the memory of a farm's shard as [`memory`] does, and returns whole MiB, rounded up.
+pub fn shard_memory(text: &str) -> Parsed<u32> {
+    let mib = memory(text)?.div_ceil(1 << 20);
+    let given = u32::try_from(mib).ok().filter(|mib| (1..=1_000_000_000).contains(mib));
+    given.ok_or_else(|| "give from 1 to 1000000000 MiB".into())
+}

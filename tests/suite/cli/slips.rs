@@ -1,0 +1,56 @@
+//! Options and arguments that a user types by slip: they are understood, or answered with the right way to
+//! write them.
+
+use super::faults::{Run, run, taki};
+
+/// `taki batch --dry-run` of a small scene, whose report tells sizes and frames and whose work is refused
+/// without memory.
+fn planned(arguments: &[&str]) -> Run {
+    run(taki(["batch", "front", "--frames", "0", "-o", "####.png", "--dry-run"]).args(arguments))
+}
+
+#[test]
+fn a_size_may_have_any_of_three_signs_between_its_sides() {
+    let plain = planned(&["--size", "320x200"]);
+    assert!(plain.done().contains("320"), "{plain:?}");
+    for size in ["320X200", "320×200", "320 x 200"] {
+        assert_eq!(planned(&["--size", size]).done(), plain.done(), "{size}");
+    }
+    for size in ["320", "320,200", "320x", "x", "320x200x3", "-1x5"] {
+        let refused = planned(&[&format!("--size={size}")]);
+        assert_eq!(refused.exit_code(), Some(2), "{size}");
+        assert!(refused.stderr().contains("give WIDTHxHEIGHT in pixels, such as 1280x720"), "{refused:?}");
+    }
+}
+
+#[test]
+fn memory_may_have_a_unit() {
+    let needs = |memory: &str| {
+        let mut command = taki(["volume", "build", "front", "-o", "/proc/v.npz"]);
+        run(command.args(["--set=nx=100000", "--set=ny=100000", "--set=nz=100000", "--memory", memory]))
+    };
+    for (memory, budget) in [
+        ("4096", "4.0 GiB"),
+        ("4GiB", "4.0 GiB"),
+        ("4g", "4.0 GiB"),
+        ("4GB", "3.7 GiB"),
+        ("4 gb", "3.7 GiB"),
+        ("512MB", "488.3 MiB"),
+        ("512MiB", "512.0 MiB"),
+        ("1.5GiB", "1.5 GiB"),
+        ("2T", "2.0 TiB"),
+    ] {
+        needs(memory).refused(33, &[&format!("the budget is {budget};")]);
+    }
+    run(&mut taki(["scene", "front", "--memory", "99999999999999999999GiB"])).done();
+    for memory in ["lots", "", "GiB", "-1", "4GiBs", "nan", "4,5GiB"] {
+        let refused = run(taki(["scene", "front"]).arg(format!("--memory={memory}")));
+        assert_eq!(refused.exit_code(), Some(2), "{memory:?}");
+        assert!(refused.stderr().contains("4GiB, 4GB or 512MiB; a number alone counts MiB"), "{refused:?}");
+    }
+    let farm = |memory: &str| run(&mut taki(["farm", "slurm", "--memory", memory, "--", "front"]));
+    for (memory, mib) in [("500", "--mem=500M"), ("8GiB", "--mem=8192M"), ("1GB", "--mem=954M")] {
+        assert!(farm(memory).done().contains(mib), "{memory}");
+    }
+    assert_eq!(farm("0").exit_code(), Some(2));
+}
