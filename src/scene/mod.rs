@@ -11,6 +11,7 @@ mod presets;
 mod print;
 mod quads;
 mod read;
+mod typed;
 mod value;
 
 use std::ops::Deref;
@@ -23,7 +24,8 @@ pub use build::resolve;
 pub use names::{check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{REFERENCES, Source, parse_value, set_by_hand};
+pub use read::{REFERENCES, Source, set_by_hand};
+pub use typed::parse_value;
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::light::environment::{self, Environment, EnvironmentMemo};

@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
+use super::typed::parse_for;
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
 use crate::util::error::{Error, Result};
@@ -260,7 +261,7 @@ impl File<'_> {
 }
 
 /// Converts a TOML value, without its positions.
-fn raw(value: &DeValue) -> Raw {
+pub fn raw(value: &DeValue) -> Raw {
     match value {
         DeValue::String(s) => Raw::Text(s.to_string()),
         DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix())
@@ -304,7 +305,7 @@ pub fn apply_sets(
 }
 
 /// Applies one `--set key=value`. The last part of the key is enough where it means one parameter. The value
-/// is TOML; text that is not TOML is taken as a word.
+/// is TOML, in which a point or colour needs no brackets; text that is not TOML is taken as a word.
 ///
 /// # Errors
 /// [`Error::Usage`] where there is no `=` or the last part of a key means several parameters,
@@ -320,14 +321,9 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     let (key, text) = (key.trim(), text.trim());
     let key = full_key(key, values).map_err(|why| Error::Usage(format!("--set {setting}: {why}")))?;
     let place = Place("--set".into());
-    if Param::find(&key).is_none() {
+    let Some(param) = Param::find(&key) else {
         return Err(unknown_key(&key, values, &place));
-    }
+    };
     check_names(values, &key).map_err(|(what, fix)| Error::input(format!("--set {key}: {what}"), fix))?;
-    values.set(&key, &parse_value(text), &place)
-}
-
-/// Parses a value of `--set`: TOML, otherwise a word.
-pub fn parse_value(text: &str) -> Raw {
-    DeValue::parse(text).map_or_else(|_| Raw::Text(text.into()), |v| raw(v.get_ref()))
+    values.set(&key, &parse_for(param, text), &place)
 }

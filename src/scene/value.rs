@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
+use super::typed::hex_color;
 use crate::util::error::{Error, Result};
 
 /// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
@@ -96,7 +97,8 @@ impl Values {
             return Err(unknown_key_in_file(key, self, place));
         };
         let value = check(param, raw).map_err(|got| {
-            Error::input(format!("{}: {key} = {got}", place.0), format!("allowed: {}", param.range()))
+            let hex = if let Kind::Color(_) = param.kind { " or \"#rrggbb\"" } else { "" };
+            Error::input(format!("{}: {key} = {got}", place.0), format!("allowed: {}{hex}", param.range()))
         })?;
         self.0.insert(Key::new(key), value);
         Ok(())
@@ -270,7 +272,13 @@ fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
             Raw::Text(t) => Ok(Value::Text(t.clone())),
             _ => Err(words()),
         },
-        Kind::Color(_) => Ok(Value::Triple(triple(raw, 0.0, COLOR_MAX).ok_or_else(words)?)),
+        Kind::Color(_) => {
+            let color = match raw {
+                Raw::Text(t) => hex_color(t).map(|c| c.map(round_f32)),
+                list => triple(list, 0.0, COLOR_MAX),
+            };
+            Ok(Value::Triple(color.ok_or_else(words)?))
+        }
         Kind::Point(_) => Ok(Value::Triple(triple(raw, -POINT_MAX, POINT_MAX).ok_or_else(words)?)),
         Kind::Corners => {
             let Raw::List(list) = raw else { return Err(words()) };

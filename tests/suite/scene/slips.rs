@@ -68,3 +68,44 @@ fn suggestions_are_keys_of_the_scene() {
     fault("version = 1\n[lights.moon]\ncolour = 1\n").refused(65, &["did you mean lights.moon.color?"]);
     fault("version = 1\n[[quads]]\ncorner = 1\n").refused(65, &["did you mean quads.0.corners?"]);
 }
+
+/// The scene that is printed has this line.
+fn has(run: &Run, line: &str) {
+    assert!(run.done().lines().any(|l| l == line), "no {line:?} in {}", run.done());
+}
+
+#[test]
+fn points_and_colours_of_set_need_no_brackets() {
+    for form in ["0,0,5", "[0,0,5]", "0, 0, 5", "0.0,0e3,5.0"] {
+        has(&scene("fig5", &[&format!("camera.eye={form}")]), "eye = [0, 0, 5]");
+    }
+    has(&scene("fig5", &["eye=-1,0.5,9"]), "eye = [-1, 0.5, 9]");
+    has(&scene("fig5", &["lights.sun.color=1,0.5,0"]), "color = [1, 0.5, 0]");
+    for form in ["0,5", "0,0,5,1", "0;0;5", "1,nan,0", "a,b,c"] {
+        scene("fig5", &[&format!("camera.eye={form}")])
+            .refused(65, &["camera.eye", "allowed: three numbers"]);
+    }
+}
+
+#[test]
+fn hexadecimal_colours_are_decoded_from_srgb() {
+    // Values of IEC 61966-2-1: 0x80 is 0.2158605, 0x0a lies on the straight part.
+    for (hex, linear) in [
+        ("#ffffff", "color = [1, 1, 1]"),
+        ("#000000", "color = [0, 0, 0]"),
+        ("#80FF00", "color = [0.2158605, 1, 0]"),
+        ("#0a0a0b", "color = [0.00303527, 0.00303527, 0.003346536]"),
+    ] {
+        has(&scene("fig5", &[&format!("lights.sun.color={hex}")]), linear);
+        let dir = tempdir().unwrap();
+        let file = dir.path().join("s.toml");
+        fs::write(&file, format!("version = 1\n[lights.a]\ncolor = \"{hex}\"\n")).unwrap();
+        has(&run(taki(["scene"]).arg(&file)), linear);
+    }
+    for wrong in ["#fff", "#ffffffff", "#ggffff", "ffffff", "#+fffff", "red", "#"] {
+        let allowed = "allowed: three numbers, 0 to 10000 or \"#rrggbb\"";
+        scene("fig5", &[&format!("lights.sun.color={wrong}")]).refused(65, &["lights.sun.color", allowed]);
+    }
+    // A point is no colour.
+    scene("fig5", &["eye=#ffffff"]).refused(65, &["camera.eye", "allowed: three numbers, ±1e7"]);
+}
