@@ -11,6 +11,7 @@ mod presets;
 mod print;
 mod quads;
 mod read;
+mod slips;
 mod typed;
 mod value;
 

@@ -8,8 +8,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
+use super::slips::slip_at;
 use super::typed::parse_for;
-use super::value::{Key, Place, Raw, Values};
+use super::value::{Key, Place, Raw, Values, not_allowed};
 use super::{Limits, build, presets};
 use crate::util::error::{Error, Result};
 
@@ -108,6 +109,11 @@ impl Source {
         let file = File { source: self, newlines: self.text.match_indices('\n').map(|(i, _)| i).collect() };
         let root = DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
+            if let Some((key, value, advice)) = slip_at(&self.text, at)
+                && let Some(param) = Param::find(&key)
+            {
+                return not_allowed(&file.place(at), &key, &value, param, Some(advice));
+            }
             let message = e.message().lines().collect::<Vec<_>>().join(", ");
             Error::input(
                 format!("{}: {message}", file.place(at).0),

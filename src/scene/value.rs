@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
+use super::slips;
 use super::typed::hex_color;
 use crate::util::error::{Error, Result};
 
@@ -97,8 +98,8 @@ impl Values {
             return Err(unknown_key_in_file(key, self, place));
         };
         let value = check(param, raw).map_err(|got| {
-            let hex = if let Kind::Color(_) = param.kind { " or \"#rrggbb\"" } else { "" };
-            Error::input(format!("{}: {key} = {got}", place.0), format!("allowed: {}{hex}", param.range()))
+            let advice = slips::advice(param, raw);
+            not_allowed(place, key, &got, param, advice)
         })?;
         self.0.insert(Key::new(key), value);
         Ok(())
@@ -255,8 +256,26 @@ fn round_f32(x: f64) -> f64 {
     (x as f32).to_string().parse().unwrap_or(f64::NAN)
 }
 
+/// The error for a value that a parameter does not allow.
+pub fn not_allowed(place: &Place, key: &str, got: &str, param: &Param, advice: Option<String>) -> Error {
+    let advice = advice.map_or(String::new(), |advice| advice + "; ");
+    let hex = if let Kind::Color(_) = param.kind { " or \"#rrggbb\"" } else { "" };
+    Error::input(
+        format!("{}: {key} = {}", place.0, cut(got)),
+        format!("{advice}allowed: {}{hex}", param.range()),
+    )
+}
+
+/// Cuts a text to 60 characters.
+fn cut(text: &str) -> String {
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.into(),
+    }
+}
+
 /// Checks a raw value against a parameter's kind. The error is the value as text.
-fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
+pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
     let words = || raw.words();
     match param.kind {
         Kind::Float(min, max, _) => Ok(Value::Float(float(raw, min, max).ok_or_else(words)?)),
@@ -358,10 +377,7 @@ impl Raw {
             }
             Raw::Other(name) => (*name).into(),
         };
-        match text.char_indices().nth(60) {
-            Some((cut, _)) => format!("{}…", &text[..cut]),
-            None => text,
-        }
+        cut(&text)
     }
 }
 

@@ -94,7 +94,7 @@ fn hexadecimal_colours_are_decoded_from_srgb() {
         ("#ffffff", "color = [1, 1, 1]"),
         ("#000000", "color = [0, 0, 0]"),
         ("#80FF00", "color = [0.2158605, 1, 0]"),
-        ("#0a0a0b", "color = [0.00303527, 0.00303527, 0.003346536]"),
+        ("#0a0a0b", "color = [0.00303527, 0.00303527, 0.0033465358]"),
     ] {
         has(&scene("fig5", &[&format!("lights.sun.color={hex}")]), linear);
         let dir = tempdir().unwrap();
@@ -108,4 +108,77 @@ fn hexadecimal_colours_are_decoded_from_srgb() {
     }
     // A point is no colour.
     scene("fig5", &["eye=#ffffff"]).refused(65, &["camera.eye", "allowed: three numbers, ±1e7"]);
+}
+
+#[test]
+fn a_slip_in_a_value_is_named_with_the_right_way_to_write_it() {
+    for (set, advice) in [
+        ("h=0,5", "use a decimal point: 0.5; allowed: 0 to 8"),
+        ("fov=90deg", "no unit: 90 (in degrees)"),
+        ("fov=90 °", "no unit: 90 (in degrees)"),
+        ("camera.near=0,5m", "no unit: 0.5 (in metres)"),
+        ("camera.near=10cm", "no unit: the number is in metres"),
+        ("curves.h=5m", "no unit: 5;"),
+        ("width=640px", "no unit: 640 (in pixels)"),
+        ("width=640.5", "write a whole number"),
+        ("width=640,5", "write a whole number"),
+        ("h='1.2'", "write the number without quotes: 1.2"),
+        ("camera.eye=0 0 5", "write the list in brackets: [0, 0, 5]"),
+        ("camera.eye=(0; 0; 5)", "write the list in brackets: [0, 0, 5]"),
+        ("lights.sun.color=ffffff", "write \"#ffffff\""),
+        ("lights.sun.color=#fff", "give six hexadecimal digits"),
+        ("light.visibility=Cache", "did you mean cached?"),
+        ("animate.path.eyes=[0, 1, 9], [4, 2, 7]", "in brackets: [[0, 1, 9], [4, 2, 7]]"),
+    ] {
+        scene("fig5", &[set]).refused(65, &[" = ", advice, "allowed: "]);
+    }
+    for (set, understood) in [("h=.5", "h = 0.5"), ("h=+1.", "h = 1.0"), ("fov=045", "fov = 45.0")] {
+        has(&scene("fig5", &[set]), understood);
+    }
+    // What is no known slip gets no advice.
+    for set in ["h=x", "h=1/2", "h=", "h=inf", "camera.eye=1 2", "light.visibility=xyz"] {
+        let refused = scene("fig5", &[set]);
+        refused.refused(65, &["; allowed: "]);
+        assert_eq!(refused.stderr().matches("; ").count(), 1, "{refused:?}");
+    }
+}
+
+#[test]
+fn a_slip_in_a_scene_file_is_named_with_its_line() {
+    let wall = "[rocks.wall]\ncorners = [\n    [0, 0, 0], [1, 0, 0],\n    [1, 1, 0], [0, 1, 0],\n]\n";
+    for (section, line, advice) in [
+        ("[curves]", "h = 0,5", "curves.h = 0,5; use a decimal point: 0.5; allowed: 0 to 8"),
+        ("[curves]", "h = 0,5  # a comment", "curves.h = 0,5; use a decimal point: 0.5"),
+        ("[curves]", "h = .5", "curves.h = .5; write 0.5"),
+        ("[curves]", "h = \"1.2\"", "write the number without quotes: 1.2"),
+        ("[camera]", "fov = 90deg", "camera.fov = 90deg; no unit: 90 (in degrees)"),
+        ("[camera] # the eye", "near = 5 m", "camera.near = 5 m; no unit: 5 (in metres)"),
+        ("[camera]", "eye = 0, 0, 5", "camera.eye = 0, 0, 5; write the list in brackets: [0, 0, 5]"),
+        ("[camera]", "eye = (0, 0, 5)", "write the list in brackets: [0, 0, 5]"),
+        (
+            "[lights.sun]",
+            "color = #ff8000",
+            "lights.sun.color = #ff8000; write the colour in quotes: \"#ff8000\"",
+        ),
+        ("[lights.sun]", "kind = point", "lights.sun.kind = point; write the word in quotes: \"point\""),
+        ("[volume]", "file = v.npz", "volume.file = v.npz; write the text in quotes: \"v.npz\""),
+        (
+            "[sheets.fall]",
+            "widths = 1, 2.5",
+            "sheets.fall.widths = 1, 2.5; write the list in brackets: [1, 2.5]",
+        ),
+        ("[[quads]]", "material = water", "quads.0.material = water; write the text in quotes"),
+    ] {
+        let text = format!("version = 1\n{wall}{section}\n{line}\n");
+        fault(&text).refused(65, &["s.toml:8: ", advice]);
+    }
+    // A fault that is no slip of a value keeps the parser's words.
+    for (text, words) in [
+        ("h = [1", "a scene file is TOML"),
+        ("h", "a scene file is TOML"),
+        ("x = 0,5", "TOML"),
+        ("h = 1.0\nh = 1.0", "TOML"),
+    ] {
+        fault(&format!("version = 1\n[curves]\n{text}\n")).refused(65, &["s.toml:", words]);
+    }
 }

@@ -1,0 +1,145 @@
+//! Advice for values that were written by slip: what was meant, and how to write it.
+
+use toml::de::DeValue;
+
+use super::param::{Kind, Param};
+use super::typed::{hex_color, in_brackets, parse_value};
+use super::value::{Raw, check};
+
+/// Least likeness of a word to one of a choice that makes it worth a suggestion.
+const ALIKE: f64 = 0.8;
+
+/// Returns advice on a value that the parameter does not allow.
+pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
+    match (param.kind, raw) {
+        (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),
+        (_, Raw::Text(text)) => advice_on_text(param, text.trim()),
+        _ => None,
+    }
+}
+
+/// Returns the key and value on the line of a scene file that holds byte `at`, and advice on that value.
+/// `None` where the line is no key and value, or the slip is none that is known.
+pub fn slip_at(text: &str, at: usize) -> Option<(String, String, String)> {
+    let line = text.bytes().take(at).filter(|&b| b == b'\n').count();
+    let section = text.lines().take(line).filter_map(section).last().unwrap_or_default();
+    let (name, value) = text.lines().nth(line)?.split_once('=')?;
+    let value = value.trim();
+    // A # begins a comment, unless it begins a colour without quotes.
+    let value = match value.split_once('#') {
+        Some(("", _)) => value.split_whitespace().next()?,
+        Some((before, _)) => before.trim_end(),
+        None => value,
+    };
+    // The fault is another one where the value is good TOML, as that of a key that is given twice.
+    if DeValue::parse(value).is_ok() {
+        return None;
+    }
+    let key = format!("{section}{}", name.trim());
+    let advice = advice_on_unquoted(Param::find(&key)?, value)?;
+    Some((key, value.into(), advice))
+}
+
+/// Returns the beginning of the keys below a line such as `[lights.sun]` or `[[quads]]`.
+fn section(line: &str) -> Option<String> {
+    let line = line.split('#').next()?.trim();
+    let name = line.strip_prefix('[')?.strip_suffix(']')?;
+    let is_name = |name: &str| name.chars().all(|c| c.is_alphanumeric() || "._-".contains(c));
+    match name.strip_prefix('[').and_then(|name| name.strip_suffix(']')) {
+        Some(list) => is_name(list).then(|| format!("{list}.0.")),
+        None => is_name(name).then(|| format!("{name}.")),
+    }
+}
+
+/// Returns advice on a value that stands in a scene file without quotes, and is no TOML.
+fn advice_on_unquoted(param: &Param, text: &str) -> Option<String> {
+    match param.kind {
+        Kind::Color(_) if hex_color(text).is_some() => Some(format!("write the colour in quotes: {text:?}")),
+        Kind::Choice(words) if words.contains(&text) => Some(format!("write the word in quotes: {text:?}")),
+        Kind::Text(_) if !text.contains(['"', '\'']) => Some(format!("write the text in quotes: {text:?}")),
+        _ => advice_on_text(param, text),
+    }
+}
+
+fn advice_on_text(param: &Param, text: &str) -> Option<String> {
+    match param.kind {
+        Kind::Float(..) | Kind::Int(..) => advice_on_number(param, text),
+        Kind::Choice(words) => {
+            let alike = |word: &&str| strsim::jaro_winkler(&text.to_lowercase(), word);
+            let near = words.iter().copied().max_by(|a, b| alike(a).total_cmp(&alike(b)))?;
+            (alike(&near) > ALIKE).then(|| format!("did you mean {near}?"))
+        }
+        Kind::Text(_) => None,
+        Kind::Color(_) if text.starts_with('#') => Some("give six hexadecimal digits".into()),
+        Kind::Color(_) if hex_color(&format!("#{text}")).is_some() => Some(format!("write \"#{text}\"")),
+        Kind::Color(_) | Kind::Point(_) => {
+            let between = |c: char| c.is_whitespace() || ",;()[]{}".contains(c);
+            let parts: Vec<&str> = text.split(between).filter(|part| !part.is_empty()).collect();
+            let list = parts.join(", ");
+            let good = in_brackets(&list).is_some_and(|list| check(param, &list).is_ok());
+            good.then(|| format!("write the list in brackets: [{list}]"))
+        }
+        Kind::Corners | Kind::Frames | Kind::Series => {
+            let good = in_brackets(text).is_some_and(|list| check(param, &list).is_ok());
+            good.then(|| format!("write the list in brackets: [{text}]"))
+        }
+    }
+}
+
+fn advice_on_number(param: &Param, text: &str) -> Option<String> {
+    let (number, unit) = split(text)?;
+    let whole = number.fract() == 0.0;
+    if matches!(param.kind, Kind::Int(..)) && !whole {
+        return Some("write a whole number".into());
+    }
+    if unit.is_empty() {
+        return match parse_value(text) {
+            _ if text.contains(',') => Some(format!("use a decimal point: {number}")),
+            Raw::Text(_) => Some(format!("write {number}")),
+            _ => Some(format!("write the number without quotes: {number}")),
+        };
+    }
+    let is_unit = |c: char| c.is_alphabetic() || "°%".contains(c);
+    if !unit.starts_with(is_unit) {
+        return None;
+    }
+    let (words, same) = units(param.unit);
+    Some(match param.unit {
+        "" => format!("no unit: {number}"),
+        own if own == unit || same.contains(&unit.to_lowercase().as_str()) => {
+            format!("no unit: {number} (in {words})")
+        }
+        _ => format!("no unit: the number is in {words}"),
+    })
+}
+
+/// Splits text into the number it begins with, which may have a decimal comma, and the rest.
+fn split(text: &str) -> Option<(f64, &str)> {
+    let number = |text: &str| {
+        let begins =
+            text.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit() || c == '.');
+        let one = text.matches(',').count() + text.matches('.').count() <= 1;
+        text.replace(',', ".").parse::<f64>().ok().filter(|x| begins && one && x.is_finite())
+    };
+    // No number has more characters; a longer text would take long.
+    let ends = text.char_indices().map(|(at, c)| at + c.len_utf8()).take(40);
+    let ends: Vec<usize> = ends.collect();
+    ends.into_iter().rev().find_map(|end| Some((number(text[..end].trim_end())?, text[end..].trim())))
+}
+
+/// Returns the name of a parameter's unit in a sentence, and its other spellings in small letters.
+fn units(unit: &str) -> (&str, &'static [&'static str]) {
+    match unit {
+        "m" => ("metres", &["m", "metre", "metres", "meter", "meters"]),
+        "°" => ("degrees", &["deg", "degs", "degree", "degrees"]),
+        "s" => ("seconds", &["s", "sec", "second", "seconds"]),
+        "m/s" => ("metres per second", &["m/s", "mps"]),
+        "1/s" => ("1/s", &["fps", "hz", "/s"]),
+        "1/m" => ("1/m", &["/m"]),
+        "K" => ("kelvins", &["k", "kelvin", "kelvins"]),
+        "pixels" => ("pixels", &["px", "pixel", "pixels"]),
+        "frames" => ("frames", &["f", "frame", "frames"]),
+        "MiB" => ("MiB", &["mib"]),
+        other => (other, &[]),
+    }
+}
