@@ -15,10 +15,11 @@ mod terminal;
 mod view;
 mod volume;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::engine::EngineChoice;
@@ -190,6 +191,11 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
+            if let Some(scene) = scene_as_command(&e) {
+                let what = format!("{scene} is a scene, not a command; to render it: taki render {scene}");
+                Terminal::new().error(&Error::Usage(what));
+                return ExitCode::from(2);
+            }
             // Help and version are not errors and go to stdout.
             let text = e.render().to_string();
             if e.use_stderr() {
@@ -216,6 +222,16 @@ pub fn main() -> ExitCode {
             ExitCode::from(e.exit_code())
         }
     }
+}
+
+/// The scene that stands where a command is expected: a preset, or a scene file that exists.
+fn scene_as_command(e: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return None };
+    // A command's own subcommands have the same error.
+    let first = std::env::args_os().nth(1)? == word.as_str();
+    let path = Path::new(word);
+    let is_file = || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) && path.is_file();
+    (first && (presets().any(|(name, _)| name == word) || is_file())).then(|| word.clone())
 }
 
 fn run(cli: Cli, terminal: &Terminal) -> Result<()> {

@@ -1,7 +1,10 @@
 //! Options and arguments that a user types by slip: they are understood, or answered with the right way to
 //! write them.
 
+use std::fs;
+
 use super::faults::{Run, run, taki};
+use tempfile::tempdir;
 
 /// `taki batch --dry-run` of a small scene, whose report tells sizes and frames and whose work is refused
 /// without memory.
@@ -53,4 +56,19 @@ fn memory_may_have_a_unit() {
         assert!(farm(memory).done().contains(mib), "{memory}");
     }
     assert_eq!(farm("0").exit_code(), Some(2));
+}
+
+#[test]
+fn a_scene_in_place_of_a_command_is_told_how_to_be_rendered() {
+    run(&mut taki(["fig5"])).refused(2, &["fig5 is a scene, not a command", "taki render fig5"]);
+    let dir = tempdir().unwrap();
+    fs::write(dir.path().join("my.toml"), "version = 1\n").unwrap();
+    let given = run(taki(["my.toml", "--set", "h=1"]).current_dir(&dir));
+    given.refused(2, &["to render it: taki render my.toml"]);
+    // What is no scene keeps the usual message.
+    for words in [&["fig55"][..], &["absent.toml"], &["volume", "fig5"], &["farm", "fig5"]] {
+        let refused = run(&mut taki(words));
+        assert_eq!(refused.exit_code(), Some(2), "{words:?}");
+        assert!(refused.stderr().contains("unrecognized subcommand"), "{refused:?}");
+    }
 }
