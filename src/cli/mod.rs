@@ -6,6 +6,7 @@ mod choice;
 mod compare;
 mod devices;
 mod farm;
+mod new;
 mod parse;
 mod render;
 mod scene;
@@ -38,8 +39,8 @@ const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usag
 
 /// Renders water, and other matter too fine for geometry, as volume textures on the GPU.
 ///
-/// To start, run `taki render` for a first picture, `taki presets` for more scenes, or `taki view` to try out
-/// parameters. `taki COMMAND --help` explains the options of a command.
+/// To start, run `taki render` for a first picture, `taki presets` for more scenes, `taki view` to try out
+/// parameters, or `taki new my.toml` for a scene of your own. `taki COMMAND --help` explains the options of a command.
 #[derive(Parser)]
 #[command(version, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
@@ -56,6 +57,8 @@ enum Command {
     /// Opens the viewer, where you change parameters and see the picture change.
     #[cfg(feature = "viewer")]
     View(view::ViewArgs),
+    /// Writes a scene file to start from, with comments that explain it.
+    New(new::NewArgs),
     /// Checks a scene and prints it with all its parameters.
     Scene(scene::SceneArgs),
     /// Builds a volume texture or prints its statistics.
@@ -240,6 +243,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Batch(args) => batch::run(&args, terminal),
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(&args, terminal),
+        Command::New(args) => new::run(&args, terminal),
         Command::Scene(args) => scene::run(&args),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Farm(args) => farm::run(&args),

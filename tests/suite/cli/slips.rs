@@ -72,3 +72,30 @@ fn a_scene_in_place_of_a_command_is_told_how_to_be_rendered() {
         assert!(refused.stderr().contains("unrecognized subcommand"), "{refused:?}");
     }
 }
+
+#[test]
+fn a_new_scene_renders_as_it_is_and_replaces_nothing_unasked() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    let wrote = at(&["new", "my.toml"]);
+    wrote.done();
+    assert!(wrote.stderr().contains("taki render my.toml"), "{wrote:?}");
+    let text = fs::read_to_string(dir.path().join("my.toml")).unwrap();
+    assert_eq!(at(&["new", "-"]).done(), text);
+    at(&["new", "-"]).done();
+    let small = ["render", "my.toml", "--engine", "cpu", "--size", "64x36", "--samples", "1", "--json"];
+    let rendered = at(&small);
+    let report: serde_json::Value = serde_json::from_str(rendered.done()).unwrap();
+    assert_eq!(rendered.lines("taki: warning"), [""; 0]);
+    // Water is seen in a part of the picture that is neither small nor all of it.
+    let covered = report["covered_pixels"].as_u64().unwrap();
+    assert!((100..1500).contains(&covered), "{covered}");
+
+    fs::write(dir.path().join("my.toml"), "mine").unwrap();
+    at(&["new", "my.toml"]).refused(73, &["my.toml", "the file exists", "--overwrite"]);
+    assert_eq!(fs::read_to_string(dir.path().join("my.toml")).unwrap(), "mine");
+    at(&["new", "my.toml", "--overwrite"]).done();
+    assert_eq!(fs::read_to_string(dir.path().join("my.toml")).unwrap(), text);
+    at(&["new", "my"]).refused(2, &["ends with .toml; write taki new my.toml"]);
+    at(&["new", "absent/my.toml"]).refused(73, &["absent/my.toml"]);
+}
