@@ -10,6 +10,7 @@ use super::Cli;
 use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::output::frame::Output;
+use crate::scene::STDIN;
 use crate::util::error::{Error, Result};
 
 #[derive(Args)]
@@ -153,6 +154,10 @@ fn check_batch(job: &Job) -> Result<()> {
         Error::Usage(format!("taki batch would refuse the arguments after --: {line}; see taki batch --help"))
     })?;
     let Some((_, batch)) = matches.subcommand() else { return Ok(()) };
+    if batch.get_one::<PathBuf>("scene").is_some_and(|scene| scene == Path::new(STDIN)) {
+        let what = "the shards of a job cannot read their scene from stdin; give a preset or a scene file";
+        return Err(Error::Usage(what.into()));
+    }
     let whole = |path: &&PathBuf| {
         let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
         let name = path.file_name().unwrap_or_default().to_string_lossy();

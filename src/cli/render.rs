@@ -1,5 +1,6 @@
 //! `taki render`: renders one picture.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -11,7 +12,7 @@ use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
 use crate::engine::exposure::exposed;
 use crate::engine::{Engine, RenderOptions};
-use crate::job::{Still, check_bloom, strips};
+use crate::job::{STDOUT, Still, check_bloom, strips};
 use crate::output::frame::Figures;
 use crate::picture::Layer;
 use crate::scene::Scene;
@@ -24,7 +25,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneOptions,
     /// File to write: .png (sRGB, 8 bits) or .exr (linear, float32, with layers). Give -o twice to write
-    /// both. Default: the scene's name with .png, in the current folder.
+    /// both; - is stdout, as PNG. Default: the scene's name with .png, in the current folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
     /// Size of the picture in pixels, such as 1280x720.
@@ -68,6 +69,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         [] => vec![default_output(&scene, "png")],
         given => given.to_vec(),
     };
+    check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
     let still = Still::create(&outputs)?;
     let has_exr = still.has_exr();
     if args.layers.is_some() && !has_exr {
@@ -130,10 +132,30 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         report["seconds_total"] = json!(total);
         say(&report.to_string());
     } else {
-        let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
+        let name = |p: &PathBuf| if is_stdout(p) { "stdout".into() } else { p.display().to_string() };
+        let names: Vec<String> = outputs.iter().map(name).collect();
         terminal.note(&format!("taki: wrote {} in {total:.2} s", names.join(", ")));
     }
     Ok(())
+}
+
+fn is_stdout(path: &PathBuf) -> bool {
+    path.as_os_str() == STDOUT
+}
+
+/// Checks that at most one picture goes to stdout, alone, and not to a terminal.
+fn check_stdout(outputs: &[PathBuf], json: bool, is_terminal: bool) -> Result<()> {
+    let pictures = outputs.iter().filter(|path| is_stdout(path)).count();
+    let why = match pictures {
+        0 => return Ok(()),
+        1 if json => "and --json would both write to stdout; leave out one of them",
+        1 if is_terminal => {
+            "would print a PNG on the terminal; give a file, or send stdout to a program or file"
+        }
+        1 => return Ok(()),
+        _ => "is given twice",
+    };
+    Err(Error::Usage(format!("-o {STDOUT} {why}")))
 }
 
 fn report(

@@ -1,7 +1,7 @@
 //! The files of a still: opened before the work, written row by row, named only when complete.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,8 +24,56 @@ pub(crate) const SOFTWARE: &str = concat!("taki ", env!("CARGO_PKG_VERSION"));
 /// Lines of an EXR that are prepared at a time, on all cores.
 const LINES: usize = 8;
 
+/// Path that stands for stdout, which gets a PNG.
+pub const STDOUT: &str = "-";
+
 /// The open outputs of one still.
-pub struct Still(Vec<(Kind, Output)>);
+pub struct Still(Vec<(Kind, Target)>);
+
+/// The place that a picture goes to.
+pub(crate) enum Target {
+    File(Output),
+    /// A temporary file without a name, whose contents go to stdout once they are complete.
+    Stdout(File),
+}
+
+impl Target {
+    fn stdout() -> Result<Target> {
+        let fail = |e: std::io::Error| Error::CannotCreate {
+            path: std::env::temp_dir(),
+            why: format!("no temporary file: {e}"),
+            fix: "choose another folder with TMPDIR".into(),
+        };
+        tempfile::tempfile().map(Target::Stdout).map_err(fail)
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Target::File(output) => output.path(),
+            Target::Stdout(_) => Path::new("stdout"),
+        }
+    }
+
+    /// Returns a second handle of the file that is written.
+    fn handle(&mut self) -> Result<File> {
+        let file = match self {
+            Target::File(output) => output.file().try_clone(),
+            Target::Stdout(file) => file.try_clone(),
+        };
+        file.map_err(|e| Error::write(self.path(), e))
+    }
+
+    fn finish(self) -> Result<()> {
+        match self {
+            Target::File(output) => output.finish(),
+            Target::Stdout(mut file) => {
+                let mut out = std::io::stdout().lock();
+                let copied = file.rewind().and_then(|()| std::io::copy(&mut file, &mut out));
+                copied.and_then(|_| out.flush()).map_err(|e| Error::write(Path::new("stdout"), e))
+            }
+        }
+    }
+}
 
 /// The format of an output.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -36,13 +84,17 @@ enum Kind {
 
 impl Still {
     /// Opens every output, so that a missing folder is noticed before any work. Removes temporary files that
-    /// dead processes left in the folders.
+    /// dead processes left in the folders. The path [`STDOUT`] is stdout, which gets a PNG.
     ///
     /// # Errors
     /// [`Error::Usage`] if a path ends with neither .png nor .exr, [`Error::CannotCreate`] if a file cannot
     /// be created.
     pub fn create(paths: &[PathBuf]) -> Result<Still> {
-        paths.iter().map(|path| open(path, Output::create)).collect::<Result<Vec<_>>>().map(Still)
+        let target = |path: &PathBuf| match path.to_str() {
+            Some(STDOUT) => Ok((Kind::Png, Target::stdout()?)),
+            _ => open(path, Output::create),
+        };
+        paths.iter().map(target).collect::<Result<Vec<_>>>().map(Still)
     }
 
     /// Does as [`Still::create`], but leaves other files of the folders alone.
@@ -129,7 +181,7 @@ pub(crate) fn scene_text(scene: &Scene) -> String {
     map.unwrap_or_default() + &values.to_toml()
 }
 
-fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Output)> {
+fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Target)> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let kind = match extension.as_deref() {
         Some("png") => Kind::Png,
@@ -139,7 +191,7 @@ fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Ou
             return Err(Error::Usage(what));
         }
     };
-    Ok((kind, open(path)?))
+    Ok((kind, Target::File(open(path)?)))
 }
 
 /// Description of a file besides its pixels.
@@ -167,8 +219,8 @@ impl About {
 
 /// A file that is being written.
 pub(crate) enum Sink {
-    Png(Output, PngWriter),
-    Exr(Output, Box<ExrWriter<BufWriter<File>>>),
+    Png(Target, PngWriter),
+    Exr(Target, Box<ExrWriter<BufWriter<File>>>),
 }
 
 impl Sink {
@@ -178,8 +230,8 @@ impl Sink {
         Sink::begin(kind, output, about)
     }
 
-    fn begin(kind: Kind, mut output: Output, about: &About) -> Result<Sink> {
-        let file = output.file().try_clone().map_err(|e| Error::write(output.path(), e))?;
+    fn begin(kind: Kind, mut output: Target, about: &About) -> Result<Sink> {
+        let file = output.handle()?;
         let texts = about.texts(kind);
         match kind {
             Kind::Png => {

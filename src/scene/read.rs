@@ -1,7 +1,9 @@
 //! Reading of scene files, their bases and `--set`. The TOML is checked strictly, and every error names its
 //! line.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -21,6 +23,9 @@ pub const MAX_QUADS: usize = 65_536;
 /// Version of the scene format that this program reads and writes.
 pub const VERSION: i64 = 1;
 
+/// Name that stands for a scene on stdin.
+pub const STDIN: &str = "-";
+
 /// Key of the list of keyframed parameters.
 const TRACKS: &str = "animate.tracks";
 
@@ -37,7 +42,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Finds a preset of this name, otherwise a scene file at this path.
+    /// Finds a preset of this name, otherwise a scene file at this path. `-` stands for stdin.
     ///
     /// # Errors
     /// [`Error::Input`] where there is neither, or the file is no regular file, too large or not UTF-8;
@@ -52,6 +57,9 @@ impl Source {
                 folder: PathBuf::from("."),
                 text: text.into(),
             });
+        }
+        if scene == Path::new(STDIN) {
+            return Source::stdin();
         }
         let meta = std::fs::metadata(scene).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => {
@@ -83,18 +91,33 @@ impl Source {
             ));
         }
         let bytes = std::fs::read(scene).map_err(|e| Error::read(scene, e))?;
-        let text = String::from_utf8(bytes).map_err(|e| {
-            Error::input(
-                format!("{}: byte {} is not UTF-8", scene.display(), e.utf8_error().valid_up_to()),
-                "a scene file is UTF-8 text",
-            )
-        })?;
+        let text = utf8(bytes, &scene.display().to_string())?;
         Ok(Source {
             name: scene.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             origin: scene.display().to_string(),
             folder: scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned(),
             text,
         })
+    }
+
+    /// Reads the scene from stdin. Its references resolve in the current folder.
+    fn stdin() -> Result<Source> {
+        // Some commands read their scene twice, but stdin can be read only once.
+        static BYTES: LazyLock<std::result::Result<Vec<u8>, String>> = LazyLock::new(|| {
+            let mut bytes = Vec::new();
+            let read = std::io::stdin().lock().take(MAX_BYTES + 1).read_to_end(&mut bytes);
+            read.map(|_| bytes).map_err(|e| e.to_string())
+        });
+        let name = "stdin";
+        let bytes = BYTES.as_ref().map_err(|e| Error::read(Path::new(name), e))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(Error::input(
+                format!("{name} has more than {MAX_BYTES} bytes"),
+                "a scene file has no more",
+            ));
+        }
+        let text = utf8(bytes.clone(), name)?;
+        Ok(Source { name: name.into(), origin: name.into(), folder: PathBuf::from("."), text })
     }
 
     /// Parses the text. Its values override those of its base.
@@ -153,6 +176,14 @@ impl Source {
         }
         Ok(values)
     }
+}
+
+/// Decodes the text of a scene.
+fn utf8(bytes: Vec<u8>, origin: &str) -> Result<String> {
+    String::from_utf8(bytes).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        Error::input(format!("{origin}: byte {at} is not UTF-8"), "a scene file is UTF-8 text")
+    })
 }
 
 struct File<'a> {

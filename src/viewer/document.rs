@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::scene::{
-    Key, Kind, Limits, Param, Place, REFERENCES, Raw, Scene, Source, Value, Values, resolve, set_by_hand,
+    Key, Kind, Limits, Param, Place, REFERENCES, Raw, STDIN, Scene, Source, Value, Values, resolve,
+    set_by_hand,
 };
 use crate::util::error::{Error, Result};
 
@@ -17,7 +18,7 @@ const MAX_UNDO: usize = 500;
 pub struct Document {
     /// Name of the preset, or stem of the file name.
     pub name: String,
-    /// The file it was read from or last saved to. `None` for a preset.
+    /// The file it was read from or last saved to. `None` for a preset and for stdin.
     pub path: Option<PathBuf>,
     /// The folder that references are relative to and must lie in. `None` once the user has named a file by
     /// hand: references are then trusted.
@@ -48,10 +49,11 @@ impl Document {
         let plain = Scene::load(source, &[], limits)?;
         let scene = if sets.is_empty() { plain.clone() } else { Scene::load(source, sets, limits)? };
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
+        let is_file = !is_preset && source != Path::new(STDIN);
         let by_hand = REFERENCES.iter().any(|key| set_by_hand(sets, key));
         Ok(Document {
             name: origin.name,
-            path: (!is_preset).then(|| source.to_owned()),
+            path: is_file.then(|| source.to_owned()),
             folder: (!by_hand).then_some(origin.folder),
             limits: limits.clone(),
             values: scene.written().clone(),

@@ -2,6 +2,7 @@
 //! write them.
 
 use std::fs;
+use std::path::Path;
 
 use super::faults::{Run, run, taki};
 use tempfile::tempdir;
@@ -98,4 +99,79 @@ fn a_new_scene_renders_as_it_is_and_replaces_nothing_unasked() {
     assert_eq!(fs::read_to_string(dir.path().join("my.toml")).unwrap(), text);
     at(&["new", "my"]).refused(2, &["ends with .toml; write taki new my.toml"]);
     at(&["new", "absent/my.toml"]).refused(73, &["absent/my.toml"]);
+}
+
+/// Runs with `input` on stdin; how it ended, its stdout and its stderr.
+fn piped(arguments: &[&str], folder: &Path, input: &[u8]) -> (Option<i32>, Vec<u8>, String) {
+    let given = folder.join("given");
+    fs::write(&given, input).unwrap();
+    let mut command = taki(arguments);
+    let child = command.current_dir(folder).stdin(fs::File::open(given).unwrap());
+    let out = child.output().unwrap();
+    (out.status.code(), out.stdout, String::from_utf8(out.stderr).unwrap())
+}
+
+const TINY: [&str; 6] = ["--engine", "cpu", "--size", "16x16", "--samples", "1"];
+
+#[test]
+fn a_scene_is_read_from_stdin() {
+    let dir = tempdir().unwrap();
+    let input = b"version = 1\nbase = \"front\"\n[curves]\nh = 1.25\n";
+    let (code, out, err) = piped(&["scene", "-"], dir.path(), input);
+    assert_eq!(code, Some(0), "{err}");
+    assert!(String::from_utf8(out).unwrap().contains("h = 1.25"));
+    for arguments in [&["render", "-"][..], &["batch", "-", "--frames", "0"], &["volume", "build", "-"]] {
+        let tiny = if arguments[0] == "volume" { &[][..] } else { &TINY };
+        let (code, _, err) = piped(&[arguments, tiny].concat(), dir.path(), input);
+        assert_eq!(code, Some(0), "{arguments:?}: {err}");
+    }
+    for made in ["stdin.png", "stdin.0000.png", "stdin.npz"] {
+        assert!(dir.path().join(made).exists(), "{made}");
+    }
+    for (input, words) in [
+        (&b""[..], "stdin: the scene has no version"),
+        (b"version = 1\n[curves]\nh = 9\n", "stdin:3: curves.h = 9"),
+        (b"version = 1\n# \xff\n", "stdin: byte 14 is not UTF-8"),
+        (&vec![b'#'; 17 << 20], "stdin has more than 16777216 bytes"),
+    ] {
+        let (code, _, err) = piped(&["scene", "-"], dir.path(), input);
+        assert_eq!(code, Some(65), "{err}");
+        assert!(err.contains(words), "no {words:?} in {err}");
+    }
+    run(&mut taki(["farm", "slurm", "--", "-"])).refused(2, &["cannot read their scene from stdin"]);
+}
+
+#[test]
+fn a_picture_goes_to_stdout_alone_and_whole() {
+    let dir = tempdir().unwrap();
+    let render = |more: &[&str]| piped(&[&["render", "front"], &TINY[..], more].concat(), dir.path(), b"");
+    let (code, out, err) = render(&["-o", "-", "-o", "x.png"]);
+    assert_eq!(code, Some(0), "{err}");
+    // Nothing else is on stdout: the bytes are those of the file.
+    assert!(out == fs::read(dir.path().join("x.png")).unwrap());
+    assert_eq!(image::load_from_memory(&out).unwrap().width(), 16);
+    assert!(err.contains("wrote stdout, x.png"), "{err}");
+    for (more, words) in [
+        (&["-o", "-", "--json"][..], "-o - and --json would both write to stdout"),
+        (&["-o", "-", "-o", "-"], "-o - is given twice"),
+        (&["-o", "-", "--layers", "rgb"], "--layers needs an EXR file"),
+    ] {
+        let (code, out, err) = render(more);
+        assert_eq!((code, out.len()), (Some(2), 0), "{err}");
+        assert!(err.contains(words), "no {words:?} in {err}");
+    }
+    // An error leaves stdout empty too.
+    let (code, out, _) = render(&["-o", "-", "--memory", "0"]);
+    assert_eq!((code, out.len()), (Some(33), 0));
+    assert!(!dir.path().join("-").exists());
+}
+
+#[test]
+fn a_picture_that_stdout_does_not_take_is_an_error() {
+    let full = fs::File::create("/dev/full").unwrap();
+    let mut command = taki(["render", "front"]);
+    let out = command.args(TINY).args(["-o", "-"]).stdout(full).output().unwrap();
+    let err = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(74), "{err}");
+    assert!(err.contains("cannot write stdout"), "{err}");
 }
