@@ -46,9 +46,10 @@ pub struct BatchArgs {
     outputs: Vec<PathBuf>,
     /// Frames to render, such as 0-239, or 0-239:10 for every tenth, or 1,5,9. Default: all frames of the
     /// animation, or frame 0 if there is a sweep.
-    #[arg(long, value_name = "LIST", value_parser = frames)]
+    // Hyphens are allowed so that a negative frame is answered by the parser.
+    #[arg(long, value_name = "LIST", value_parser = frames, allow_hyphen_values = true)]
     frames: Option<FrameList>,
-    /// Frames per second. Short for --set animate.fps=N.
+    /// Frames per second, such as 25 or 24000/1001. Short for --set animate.fps=N.
     #[arg(long, value_name = "N")]
     fps: Option<String>,
     /// Makes the animation a seamless loop of N frames. Short for --set animate.loop=N.
@@ -128,7 +129,10 @@ const MAX_FRAMES: u64 = 1_000_000;
 fn frames(text: &str) -> std::result::Result<FrameList, String> {
     let how = || "give frames such as 0-239, 1,5,9 or 0-239:10, from 0 to 999999999".to_owned();
     let mut list = Vec::new();
-    for part in text.split(',') {
+    for part in text.split(',').map(str::trim) {
+        if part.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+            return Err(format!("{part} begins before frame 0, the first; give frames such as 0-239"));
+        }
         let number = |n: &str| n.trim().parse::<u32>().ok().filter(|&n| n <= 999_999_999).ok_or_else(how);
         let (range, step) = part.split_once(':').map_or((part, Ok(1)), |(range, step)| (range, number(step)));
         let step = step.ok().filter(|&s| s > 0).ok_or_else(how)?;

@@ -39,7 +39,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
     /// Frame of the scene's animation to render.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
     frame: u32,
     #[command(flatten)]

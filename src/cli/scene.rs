@@ -12,7 +12,8 @@ pub struct SceneArgs {
     scene: SceneOptions,
     /// Prints the scene at this frame of its animation, as a scene file without animation that gives the same
     /// picture.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
     frame: Option<u32>,
     /// Prints JSON, which also has what follows from the parameters: camera basis, lights, rock mesh.
     #[arg(long)]

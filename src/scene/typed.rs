@@ -30,6 +30,14 @@ pub fn in_brackets(text: &str) -> Option<Raw> {
     matches!(&list, Raw::List(items) if items.len() > 1).then_some(list)
 }
 
+/// Returns the value of a fraction of two numbers, such as `24000/1001`.
+pub fn fraction(text: &str) -> Option<f64> {
+    let (above, below) = text.split_once('/')?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let value = number(above)? / number(below)?;
+    value.is_finite().then_some(value)
+}
+
 /// Returns the linear RGB of a colour that is written `#rrggbb`, whose digits are sRGB (IEC 61966-2-1).
 pub fn hex_color(text: &str) -> Option<[f64; 3]> {
     let digits =

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
 use super::slips;
-use super::typed::hex_color;
+use super::typed::{fraction, hex_color};
 use crate::util::error::{Error, Result};
 
 /// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
@@ -278,6 +278,14 @@ fn cut(text: &str) -> String {
 pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
     let words = || raw.words();
     match param.kind {
+        // The rates of film and television are fractions.
+        Kind::Float(min, max, _) if param.key == "animate.fps" => {
+            let rate = match raw {
+                Raw::Text(text) => fraction(text).and_then(|rate| float(&Raw::Float(rate), min, max)),
+                number => float(number, min, max),
+            };
+            Ok(Value::Float(rate.ok_or_else(words)?))
+        }
         Kind::Float(min, max, _) => Ok(Value::Float(float(raw, min, max).ok_or_else(words)?)),
         Kind::Int(min, max, _) => match raw {
             Raw::Int(x) if (min..=max).contains(x) => Ok(Value::Int(*x)),

@@ -105,9 +105,17 @@ fn absent(program: &Path, e: &std::io::Error) -> Error {
     }
 }
 
+/// Formats frames per second. Those of film and television that are 1000/1001 of a whole number, such as 24,
+/// are written as this fraction, which ffmpeg would not find in the float32 of the scene.
+fn rate(fps: f64) -> String {
+    let whole = (fps * 1.001).round();
+    let is_fraction = fps.fract() != 0.0 && (whole * 1000.0 / 1001.0) as f32 == fps as f32;
+    if is_fraction { format!("{whole}000/1001") } else { fps.to_string() }
+}
+
 /// Returns the arguments after those of [`quiet`]: frames on stdin, the file on stdout.
 fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions) -> Vec<String> {
-    let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), options.fps.to_string());
+    let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), rate(options.fps));
     let comment = format!("comment={}", options.mark_text());
     let mut all: Vec<&str> = Vec::new();
     all.extend([

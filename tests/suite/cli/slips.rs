@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use super::faults::{Run, run, taki};
 use tempfile::tempdir;
@@ -174,4 +175,38 @@ fn a_picture_that_stdout_does_not_take_is_an_error() {
     let err = String::from_utf8(out.stderr).unwrap();
     assert_eq!(out.status.code(), Some(74), "{err}");
     assert!(err.contains("cannot write stdout"), "{err}");
+}
+
+#[test]
+fn a_rate_may_be_a_fraction() {
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    fs::write(&file, "version = 1\n[animate]\nfps = \"24000/1001\"\n").unwrap();
+    let printed = |command: &mut Command| {
+        let text = run(command).done().to_owned();
+        text.lines().find(|line| line.starts_with("fps = ")).unwrap_or_default().to_owned()
+    };
+    assert_eq!(printed(taki(["scene"]).arg(&file)), "fps = 23.976025");
+    assert_eq!(printed(&mut taki(["scene", "front", "--set", "fps=30000/1001"])), "fps = 29.97003");
+    assert_eq!(printed(&mut taki(["scene", "front", "--set", "fps=25"])), "fps = 25.0");
+    planned(&["--fps", "24000/1001"]).done();
+    for wrong in ["24/0", "1e9/1", "/1001", "24/", "a/b", "-24/1"] {
+        planned(&["--fps", wrong]).refused(65, &["animate.fps", "allowed: 0.01 to 1000"]);
+    }
+    // Only a rate is a fraction.
+    planned(&["--set", "h=1/2"]).refused(65, &["curves.h", "allowed: 0 to 8"]);
+}
+
+#[test]
+fn frames_before_the_first_are_refused_in_plain_words() {
+    for frames in ["-10-10", "-1", "0-5,-3", "-5--1"] {
+        let refused = run(&mut taki(["batch", "front", "-o", "####.png", "--dry-run", "--frames", frames]));
+        assert_eq!(refused.exit_code(), Some(2), "{refused:?}");
+        assert!(refused.stderr().contains("begins before frame 0, the first"), "{refused:?}");
+    }
+    for command in ["render", "scene"] {
+        let refused = run(&mut taki([command, "front", "--frame", "-3"]));
+        assert_eq!(refused.exit_code(), Some(2), "{refused:?}");
+        assert!(refused.stderr().contains("-3 is not in 0..=999999999"), "{refused:?}");
+    }
 }

@@ -137,6 +137,20 @@ fn a_gif_shows_its_frames_for_the_right_time() {
 }
 
 #[test]
+fn a_video_has_the_exact_rate_of_film() {
+    let dir = tempdir().unwrap();
+    let path = dir.path().join("m.mp4");
+    // The float32 that a scene keeps of 24000/1001 is 23.976025; 23.976 is another rate.
+    for (fps, rate) in
+        [(23.976025, "24000/1001"), (29.97003, "30000/1001"), (25.0, "25/1"), (23.976, "2997/125")]
+    {
+        write(&path, MovieKind::Mp4, &options([16, 16], fps, 2)).unwrap();
+        let told = probe(&path, "stream=r_frame_rate");
+        assert_eq!(told.trim(), format!("r_frame_rate={rate}"), "{fps}");
+    }
+}
+
+#[test]
 fn a_gif_of_few_colours_is_exact() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("m.gif");
