@@ -40,7 +40,8 @@ const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usag
 /// Renders water, and other matter too fine for geometry, as volume textures on the GPU.
 ///
 /// To start, run `taki render` for a first picture, `taki presets` for more scenes, `taki view` to try out
-/// parameters, or `taki new my.toml` for a scene of your own. `taki COMMAND --help` explains the options of a command.
+/// parameters, or `taki new my.toml` for a scene of your own. `taki COMMAND --help` explains the options of a
+/// command.
 #[derive(Parser)]
 #[command(version, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
@@ -90,7 +91,8 @@ struct SceneOptions {
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
     /// Sets a parameter of the scene, such as `--set curves.h=1.4`. The last part of a key is enough where it
-    /// means one parameter: `--set h=1.4`. Can be given more than once. docs/parameters.md explains all parameters; `taki scene` prints their values.
+    /// means one parameter: `--set h=1.4`. Can be given more than once. docs/parameters.md explains all
+    /// parameters; `taki scene` prints their values.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// Seed of the volume's random numbers. Short for --set volume.seed=N.

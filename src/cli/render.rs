@@ -1,7 +1,7 @@
 //! `taki render`: renders one picture.
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -139,7 +139,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     Ok(())
 }
 
-fn is_stdout(path: &PathBuf) -> bool {
+fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == STDOUT
 }
 
