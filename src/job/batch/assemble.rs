@@ -10,7 +10,7 @@ use super::report::{Event, Watcher, word, words};
 use super::{Batch, Pattern, Sweep, existing};
 use crate::job::still::{SOFTWARE, scene_text};
 use crate::output::contact_sheet::{Axis, Sheet, draw};
-use crate::output::frame::{Output, figures_of, read_exr, read_png, rgb_rows};
+use crate::output::frame::{Output, figures_of, read_exr, read_png, real_file, rgb_rows};
 use crate::output::movie::{Movie, MovieKind, MovieOptions, mark_of};
 use crate::picture::resolve::develop;
 use crate::picture::{Frame, Layer, Look};
@@ -102,7 +102,7 @@ impl Batch {
         for movie in &self.movies {
             for point in 0..self.points() {
                 let path = self.movie_path(movie, point);
-                if path.symlink_metadata().is_ok() && !self.request.overwrite {
+                if real_file(&path)?.symlink_metadata().is_ok() && !self.request.overwrite {
                     let why = match mark_of(&path) {
                         Some(mark) if mark == self.marks[point] => {
                             self.fresh.insert(path);
@@ -308,7 +308,7 @@ fn png_of(sheet: &RgbImage) -> std::result::Result<Vec<u8>, png::EncodingError> 
 
 /// Refuses to replace a file that is not a sheet or manifest written by this program.
 pub(super) fn check_replaced(path: &Path) -> Result<()> {
-    if path.symlink_metadata().is_err() {
+    if real_file(path)?.symlink_metadata().is_err() {
         return Ok(());
     }
     let start = existing::start_of(path).unwrap_or_default();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Batch, stamp};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
 use crate::job::{Claims, VolumeMemo};
-use crate::output::frame::{Kind, Verified, verify};
+use crate::output::frame::{Kind, Verified, real_file, verify};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -130,7 +130,8 @@ impl Batch {
     }
 
     fn state_of(&self, file: &Path, scene: &Scene) -> Result<FileState> {
-        if file.symlink_metadata().is_err() {
+        // A link to a file that does not exist yet is as good as nothing.
+        if real_file(file)?.symlink_metadata().is_err() {
             return Ok(FileState::Nothing);
         }
         if file.is_dir() {

@@ -34,7 +34,7 @@ use assemble::MovieFile;
 
 use super::Still;
 use crate::engine::exposure::exposed;
-use crate::output::frame::{Output, folder_of, remove_stale};
+use crate::output::frame::{Output, folder_of, real_file, remove_stale};
 use crate::output::movie::MovieKind;
 use crate::picture::Layer;
 use crate::scene::{Animation, Place, Scene};
@@ -338,6 +338,7 @@ impl Batch {
         if self.request.layers != Layer::ALL && !self.has_exr() {
             return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
         }
+        let files = files.iter().map(|file| real_file(file)).collect::<Result<Vec<PathBuf>>>()?;
         let folders: BTreeSet<&Path> = files.iter().map(|file| folder_of(file)).collect();
         folders.iter().for_each(|folder| remove_stale(folder, |_| true));
         Ok(())

@@ -13,7 +13,7 @@ mod verify;
 pub use difference::{Difference, Tolerance};
 pub use exr_file::{ExrLines, ExrWriter, channel_names, lines_of, read_exr};
 pub use figures::{Figures, KnownFigures, figures_of};
-pub use output::{Output, folder_of, remove_left_by, remove_stale};
+pub use output::{Output, folder_of, real_file, remove_left_by, remove_stale};
 pub use owner::{Life, Owner};
 pub use png_file::{PngRows, PngWriter, crop_text, encode_png, read_png, rgb_rows};
 pub use verify::{Kind, Verified, verify};

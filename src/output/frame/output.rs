@@ -1,9 +1,10 @@
 //! Atomic outputs: a file is complete or absent. The data goes to a temporary file beside the target, which
-//! is synced and renamed at the end.
+//! is synced and renamed at the end. Symbolic links are followed first, so that a link stays and the file
+//! behind it is replaced. A file that is replaced hands on its permissions.
 //!
 //! The temporary file of `fall.png` is `.fall.png.taki-XXXXXX.MACHINE-PID.tmp`.
 
-use std::fs::File;
+use std::fs::{File, Permissions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,7 +16,12 @@ use crate::util::error::{Error, Result};
 
 /// A file that appears under its name only once it is finished.
 pub struct Output {
+    /// Path as it was given, for messages.
     path: PathBuf,
+    /// Path of the file that is written; see [`real_file`].
+    real: PathBuf,
+    /// Permissions of the file that is replaced.
+    kept: Option<Permissions>,
     temp: NamedTempFile,
 }
 
@@ -26,8 +32,9 @@ impl Output {
     /// # Errors
     /// [`Error::CannotCreate`] where the file cannot be created, [`Error::Io`] where the disk is full.
     pub fn create(path: &Path) -> Result<Output> {
-        if let Some(name) = path.file_name() {
-            remove_stale(folder_of(path), |target| target == name.as_encoded_bytes());
+        let real = real_file(path)?;
+        if let Some(name) = real.file_name() {
+            remove_stale(folder_of(&real), |target| target == name.as_encoded_bytes());
         }
         Output::open(path)
     }
@@ -39,39 +46,53 @@ impl Output {
     pub fn open(path: &Path) -> Result<Output> {
         let fail =
             |why: String, fix: &str| Error::CannotCreate { path: path.to_owned(), why, fix: fix.into() };
-        let Some(name) = path.file_name() else {
+        let real = real_file(path)?;
+        let Some(name) = real.file_name() else {
             return Err(fail("it has no file name".into(), "give a file, such as -o fall.png"));
         };
-        let folder = folder_of(path);
-        if path.is_dir() {
-            return Err(fail("a folder has this name".into(), "choose another name with -o"));
-        }
+        let kept = match std::fs::metadata(path) {
+            Ok(meta) if meta.is_dir() => {
+                return Err(fail("a folder has this name".into(), "choose another name with -o"));
+            }
+            // A device or a pipe cannot be replaced by a file.
+            Ok(meta) if !meta.is_file() => {
+                return Err(fail("it is not a regular file".into(), "choose another name with -o"));
+            }
+            Ok(meta) => Some(meta.permissions()),
+            // Nothing is there yet. A folder that is missing is noticed below.
+            Err(_) => None,
+        };
         let mut prefix = std::ffi::OsString::from(".");
         prefix.push(name);
         prefix.push(".taki-");
+        let suffix = format!(".{}-{}.tmp", Owner::me().machine, std::process::id());
         let mut builder = tempfile::Builder::new();
-        readable(&mut builder);
-        let temp = builder
+        let made = builder
             .prefix(&prefix)
-            .suffix(&format!(".{}-{}.tmp", Owner::me().machine, std::process::id()))
-            .tempfile_in(folder)
-            .map_err(|e| {
-                use std::io::ErrorKind::{QuotaExceeded, StorageFull};
-                if matches!(e.kind(), StorageFull | QuotaExceeded) {
-                    return Error::write(path, e);
-                }
-                let fix = match e.kind() {
-                    std::io::ErrorKind::NotFound => "make the folder first, or choose another with -o",
-                    _ => "choose a place you may write to with -o",
-                };
-                fail(e.to_string(), fix)
-            })?;
-        Ok(Output { path: path.to_owned(), temp })
+            .suffix(&suffix)
+            .make_in(folder_of(&real), |temp| new_file(kept.is_some()).open(temp));
+        let temp = made.map_err(|e| {
+            use std::io::ErrorKind::{NotFound, QuotaExceeded, StorageFull};
+            if matches!(e.kind(), StorageFull | QuotaExceeded) {
+                return Error::write(path, e);
+            }
+            let fix = match e.kind() {
+                NotFound => "make the folder first, or choose another with -o",
+                _ => "choose a place you may write to with -o",
+            };
+            fail(e.to_string(), fix)
+        })?;
+        Ok(Output { path: path.to_owned(), real, kept, temp })
     }
 
     /// Returns the path at which the file will appear.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the folder of the file that is written.
+    pub fn folder(&self) -> &Path {
+        folder_of(&self.real)
     }
 
     /// Returns the open temporary file.
@@ -93,28 +114,66 @@ impl Output {
     /// # Errors
     /// [`Error::Io`] where the disk fails.
     pub fn finish(self) -> Result<()> {
-        let Output { path, temp } = self;
+        let Output { path, real, kept, temp } = self;
         let done = (|| {
+            if let Some(kept) = kept {
+                keep(temp.as_file(), &kept);
+            }
             temp.as_file().sync_all()?;
-            temp.persist(&path).map_err(|e| e.error)?;
+            temp.persist(&real).map_err(|e| e.error)?;
             // The new name is only safe once the folder is synced, which not every file system supports.
-            let _ = File::open(folder_of(&path)).and_then(|f| f.sync_all());
+            let _ = File::open(folder_of(&real)).and_then(|f| f.sync_all());
             Ok::<(), std::io::Error>(())
         })();
         done.map_err(|e| Error::write(&path, e))
     }
 }
 
-/// Gives a temporary file the permissions of any new file under the umask. Temporary files are private by
-/// default, but this one becomes a picture.
+/// Options that create a temporary file: with the permissions of any new file under the umask, or `private`
+/// until it is known whose permissions it gets.
+fn new_file(private: bool) -> std::fs::OpenOptions {
+    let mut options = File::options();
+    options.read(true).write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, if private { 0o600 } else { 0o666 });
+    #[cfg(not(unix))]
+    let _ = private;
+    options
+}
+
+/// Gives a file the permissions of the one that it replaces. A file system that refuses has no permissions
+/// of its own, or the file stays private.
 #[cfg(unix)]
-fn readable(builder: &mut tempfile::Builder) {
+fn keep(file: &File, kept: &Permissions) {
     use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
+    // The bits that make a program run as another user are not for data.
+    let _ = file.set_permissions(Permissions::from_mode(kept.mode() & 0o777));
 }
 
 #[cfg(not(unix))]
-fn readable(_: &mut tempfile::Builder) {}
+fn keep(_: &File, _: &Permissions) {}
+
+/// Most symbolic links that are followed one after another, as on Linux.
+const MAX_LINKS: u32 = 40;
+
+/// Returns the file that an output's name stands for: follows symbolic links to a file, which need not exist.
+///
+/// # Errors
+/// [`Error::CannotCreate`] where the links form a loop.
+pub fn real_file(path: &Path) -> Result<PathBuf> {
+    let mut real = path.to_owned();
+    for _ in 0..=MAX_LINKS {
+        match std::fs::read_link(&real) {
+            Ok(target) => real = folder_of(&real).join(target),
+            Err(_) => return Ok(real),
+        }
+    }
+    Err(Error::CannotCreate {
+        path: path.to_owned(),
+        why: "its symbolic links form a loop".into(),
+        fix: "remove the link, or choose another name with -o".into(),
+    })
+}
 
 /// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
@@ -148,7 +207,8 @@ pub fn remove_stale(folder: &Path, mine: impl Fn(&[u8]) -> bool) {
 
 /// Removes the temporary files for `target` of a process that is known to have ended.
 pub fn remove_left_by(owner: &Owner, target: &Path) {
-    let Ok(entries) = std::fs::read_dir(folder_of(target)) else { return };
+    let Ok(target) = real_file(target) else { return };
+    let Ok(entries) = std::fs::read_dir(folder_of(&target)) else { return };
     let target_name = target.file_name().unwrap_or_default().as_encoded_bytes();
     for entry in entries.flatten() {
         let name = entry.file_name();

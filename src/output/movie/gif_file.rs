@@ -26,10 +26,8 @@ pub(super) struct GifWriter {
 
 impl GifWriter {
     pub(super) fn create(output: Output, options: &MovieOptions) -> Result<Self> {
-        let path = output.path();
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
-        let waiting = tempfile::tempfile_in(folder).map_err(|e| Error::CannotCreate {
-            path: path.to_owned(),
+        let waiting = tempfile::tempfile_in(output.folder()).map_err(|e| Error::CannotCreate {
+            path: output.path().to_owned(),
             why: e.to_string(),
             fix: "choose a place you may write to with -o".into(),
         })?;

@@ -3,6 +3,7 @@
 //! leaves no incomplete file.
 
 mod device;
+mod outputs;
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;

@@ -1,0 +1,152 @@
+//! Outputs onto what is there already: links, files with permissions of their own, devices.
+
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+use std::path::Path;
+use std::process::Command;
+
+use tempfile::tempdir;
+
+use super::{Run, TINY, has_only, is_picture, names, render, run, taki};
+
+/// Writes a job file: the quickest output that passes through the one place that makes outputs.
+fn job(folder: &Path, output: &str) -> Run {
+    let farm = ["farm", "slurm", "-o", output, "--", "front", "-o", "x.####.png"];
+    run(taki(farm).current_dir(folder))
+}
+
+fn is_job(path: &Path) {
+    assert!(fs::read_to_string(path).unwrap().starts_with("#!"), "{}", path.display());
+}
+
+fn mode(path: &Path) -> u32 {
+    fs::metadata(path).unwrap().permissions().mode() & 0o7777
+}
+
+#[test]
+fn an_output_through_a_link_replaces_the_file_behind_it() {
+    let dir = tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::create_dir_all(at("links")).unwrap();
+    fs::create_dir_all(at("disk/deep")).unwrap();
+    fs::write(at("disk/old.sh"), "old").unwrap();
+    // A relative link starts in its own folder, not in the current one.
+    symlink("../disk/old.sh", at("links/relative.sh")).unwrap();
+    symlink(at("disk/deep/absent.sh"), at("links/dangling.sh")).unwrap();
+    symlink("dangling.sh", at("links/chain.sh")).unwrap();
+    symlink("disk", at("folder")).unwrap();
+    let cases = [
+        ("links/relative.sh", "disk/old.sh"),
+        ("links/dangling.sh", "disk/deep/absent.sh"),
+        ("links/chain.sh", "disk/deep/absent.sh"),
+        ("folder/new.sh", "disk/new.sh"),
+    ];
+    for (link, file) in cases {
+        fs::write(at("disk/old.sh"), "old").unwrap();
+        let _ = fs::remove_file(at("disk/deep/absent.sh"));
+        job(dir.path(), link).done();
+        assert!(!at(file).is_symlink(), "{link}");
+        is_job(&at(file));
+    }
+    for link in ["links/relative.sh", "links/dangling.sh", "links/chain.sh", "folder"] {
+        assert!(at(link).is_symlink(), "{link} was replaced");
+    }
+    has_only(&at("links"), &["chain.sh", "dangling.sh", "relative.sh"]);
+    has_only(&at("disk"), &["deep", "new.sh", "old.sh"]);
+    has_only(&at("disk/deep"), &["absent.sh"]);
+}
+
+#[test]
+fn every_writer_follows_links_and_keeps_the_mode() {
+    let dir = tempdir().unwrap();
+    let disk = dir.path().join("disk");
+    fs::create_dir(&disk).unwrap();
+    let linked = |names: &[&str]| {
+        for name in names {
+            fs::write(disk.join(name), "").unwrap();
+            fs::set_permissions(disk.join(name), PermissionsExt::from_mode(0o600)).unwrap();
+            symlink(Path::new("disk").join(name), dir.path().join(name)).unwrap();
+        }
+    };
+    let command = |arguments: &[&str]| {
+        run(taki(arguments).current_dir(&dir)).done();
+    };
+    let stills = ["p.png", "p.exr", "whole.png", "d.png", "v.npz", "j.sh"];
+    let batches = ["m.gif", "m.apng", "f.1.png", "f.2.png", "f.sheet.png", "f.csv", "f.json"];
+    let all = [&stills[..], &batches].concat();
+    linked(&all);
+    let picture = [&["render", "front"], &TINY[..]].concat();
+    command(&[&picture[..], &["-o", "p.png", "-o", "p.exr"]].concat());
+    command(&["volume", "build", "front", "-o", "v.npz"]);
+    command(&["farm", "slurm", "-o", "j.sh", "--", "front", "-o", "x.####.png"]);
+    command(&["compare", "p.png", "p.png", "--difference", "d.png"]);
+    command(&["stitch", "p.png", "-o", "whole.png"]);
+    let batch = [&["batch", "front"], &TINY[..]].concat();
+    command(&[&batch[..], &["--frames", "0-1", "-o", "m.gif", "-o", "m.apng", "--overwrite"]].concat());
+    let sweep = ["--sweep", "light.p=1,2", "-o", "f.{p}.png", "--overwrite"];
+    let wholes = ["--sheet", "f.sheet.png", "--manifest", "f.csv", "--manifest", "f.json"];
+    command(&[&batch[..], &sweep, &wholes].concat());
+    for name in &all {
+        assert!(dir.path().join(name).is_symlink(), "{name} was replaced");
+        assert!(fs::metadata(disk.join(name)).unwrap().len() > 0, "{name} was not written");
+        assert_eq!(mode(&disk.join(name)), 0o600, "{name}");
+    }
+    is_picture(&disk.join("p.png"));
+    is_picture(&disk.join("whole.png"));
+    assert_eq!(names(&disk).len(), all.len(), "{:?}", names(&disk));
+}
+
+#[test]
+fn a_batch_takes_a_link_to_nothing_for_a_missing_picture() {
+    let dir = tempdir().unwrap();
+    let (disk, link) = (dir.path().join("disk"), dir.path().join("f.0000.png"));
+    fs::create_dir(&disk).unwrap();
+    symlink("disk/a.png", &link).unwrap();
+    let batch = || {
+        let mut command = taki(["batch", "front"]);
+        command.args(TINY).args(["--frames", "0", "-o", "f.####.png", "--json"]).current_dir(&dir);
+        serde_json::from_str::<serde_json::Value>(run(&mut command).done()).unwrap()
+    };
+    assert_eq!(batch()["rendered"], 1);
+    assert!(link.is_symlink());
+    is_picture(&disk.join("a.png"));
+    assert_eq!(batch()["kept"], 1);
+}
+
+#[test]
+fn a_replaced_file_hands_on_its_mode() {
+    let dir = tempdir().unwrap();
+    let path = dir.path().join("j.sh");
+    for wanted in [0o600, 0o640, 0o755, 0o444] {
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, PermissionsExt::from_mode(wanted)).unwrap();
+        job(dir.path(), "j.sh").done();
+        is_job(&path);
+        assert_eq!(mode(&path), wanted, "{wanted:o}");
+        fs::remove_file(&path).unwrap();
+    }
+}
+
+#[test]
+fn a_loop_of_links_is_refused_before_work() {
+    let dir = tempdir().unwrap();
+    symlink("b.png", dir.path().join("a.png")).unwrap();
+    symlink("a.png", dir.path().join("b.png")).unwrap();
+    run(&mut render("front", dir.path().join("a.png"))).refused(73, &["a.png", "links form a loop"]);
+    let mut batch = taki(["batch", "front", "--frames", "0", "-o"]);
+    run(batch.arg(dir.path().join("a.png"))).refused(73, &["a.png", "links form a loop"]);
+    has_only(dir.path(), &["a.png", "b.png"]);
+}
+
+#[test]
+fn a_device_or_pipe_is_not_replaced() {
+    let dir = tempdir().unwrap();
+    let pipe = dir.path().join("p.sh");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    job(dir.path(), "p.sh").refused(73, &["p.sh", "not a regular file"]);
+    assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    symlink("/dev/null", dir.path().join("n.sh")).unwrap();
+    job(dir.path(), "n.sh").refused(73, &["n.sh", "not a regular file"]);
+    assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+    has_only(dir.path(), &["n.sh", "p.sh"]);
+}
