@@ -1,7 +1,7 @@
 //! Exclusive claims on work, for any number of processes that share a folder.
 //!
-//! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it. Only one process can
-//! create that file. Its owner updates the file's modification time four times within the stale time. A
+//! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it; a name too long for that is
+//! replaced by its hash. Only one process can create that file. Its owner updates the file's modification time four times within the stale time. A
 //! claim is stale if its owner is known to be dead (only processes of the same machine can tell) or if the
 //! modification time has not changed for the stale time. The observer measures that time with its own clock,
 //! because clocks of machines differ.
@@ -16,6 +16,8 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant, SystemTime};
+
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::output::frame::{Life, Owner, folder_of};
 use crate::util::error::{Error, Result};
@@ -59,10 +61,19 @@ fn lock(held: &Mutex<Vec<Held>>) -> std::sync::MutexGuard<'_, Vec<Held>> {
     held.lock().unwrap_or_else(|e| e.into_inner())
 }
 
+/// Longest name of a target, bytes, that its claim file can repeat: file systems allow names of 255 bytes.
+const LONGEST_NAME: usize = 200;
+
 /// Path of a target's claim file. Each takeover has the next generation.
 fn claim_path(target: &Path, generation: u32) -> PathBuf {
+    let target_name = target.file_name().unwrap_or_default();
+    let bytes = target_name.as_encoded_bytes();
     let mut name = std::ffi::OsString::from(".");
-    name.push(target.file_name().unwrap_or_default());
+    if bytes.len() <= LONGEST_NAME {
+        name.push(target_name);
+    } else {
+        name.push(format!("{:016x}", xxh3_64(bytes)));
+    }
     name.push(format!(".taki-claim-{generation}"));
     folder_of(target).join(name)
 }
@@ -120,10 +131,10 @@ impl Claims {
                     }
                     taken_from.extend(owner);
                 }
-                Err(e) if e.kind() == std::io::ErrorKind::StorageFull => return Err(Error::write(&path, e)),
+                Err(e) if e.kind() == std::io::ErrorKind::StorageFull => return Err(Error::write(target, e)),
                 Err(e) => {
                     return Err(Error::CannotCreate {
-                        path,
+                        path: target.to_owned(),
                         why: e.to_string(),
                         fix: "choose a folder you may write to with -o".into(),
                     });

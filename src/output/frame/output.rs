@@ -2,14 +2,17 @@
 //! is synced and renamed at the end. Symbolic links are followed first, so that a link stays and the file
 //! behind it is replaced. A file that is replaced hands on its permissions.
 //!
-//! The temporary file of `fall.png` is `.fall.png.taki-XXXXXX.MACHINE-PID.tmp`.
+//! Temporary files are named `.taki-XXXXXX.MACHINE-PID.TARGET.tmp`, where TARGET is a hash of the target's
+//! name: the name itself would make that of the temporary file longer than a file system allows.
 
+use std::ffi::OsStr;
 use std::fs::{File, Permissions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use tempfile::NamedTempFile;
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::owner::{Life, Owner, life_of};
 use crate::util::error::{Error, Result};
@@ -34,7 +37,8 @@ impl Output {
     pub fn create(path: &Path) -> Result<Output> {
         let real = real_file(path)?;
         if let Some(name) = real.file_name() {
-            remove_stale(folder_of(&real), |target| target == name.as_encoded_bytes());
+            let own = target_hash(name);
+            remove_stale(folder_of(&real), |target| target == own);
         }
         Output::open(path)
     }
@@ -59,16 +63,18 @@ impl Output {
                 return Err(fail("it is not a regular file".into(), "choose another name with -o"));
             }
             Ok(meta) => Some(meta.permissions()),
+            // The temporary name is short, so only the final one tells.
+            Err(e) if e.kind() == std::io::ErrorKind::InvalidFilename => {
+                return Err(fail(e.to_string(), "choose a shorter name with -o"));
+            }
             // Nothing is there yet. A folder that is missing is noticed below.
             Err(_) => None,
         };
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(name);
-        prefix.push(".taki-");
-        let suffix = format!(".{}-{}.tmp", Owner::me().machine, std::process::id());
+        let (machine, process) = (&Owner::me().machine, std::process::id());
+        let suffix = format!(".{machine}-{process}.{}.tmp", target_hash(name));
         let mut builder = tempfile::Builder::new();
         let made = builder
-            .prefix(&prefix)
+            .prefix(PREFIX)
             .suffix(&suffix)
             .make_in(folder_of(&real), |temp| new_file(kept.is_some()).open(temp));
         let temp = made.map_err(|e| {
@@ -184,13 +190,21 @@ pub fn folder_of(path: &Path) -> &Path {
 /// known.
 const ELSEWHERE_STALE: Duration = Duration::from_secs(24 * 3600);
 
-/// Removes temporary files in `folder` that dead processes left for the targets that `mine` accepts (file
-/// names as encoded bytes). Files that cannot be removed are harmless and stay.
-pub fn remove_stale(folder: &Path, mine: impl Fn(&[u8]) -> bool) {
+/// Start of the names of temporary files.
+const PREFIX: &str = ".taki-";
+
+/// Returns the hash that stands for a target's name in the names of its temporary files.
+fn target_hash(name: &OsStr) -> String {
+    format!("{:016x}", xxh3_64(name.as_encoded_bytes()))
+}
+
+/// Removes temporary files in `folder` that dead processes left for the targets whose hash `mine` accepts.
+/// Files that cannot be removed are harmless and stay.
+pub fn remove_stale(folder: &Path, mine: impl Fn(&str) -> bool) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let Some((target, machine, pid)) = parse(name.as_encoded_bytes()) else { continue };
+        let Some((target, machine, pid)) = name.to_str().and_then(parse) else { continue };
         let stale = || match life_of(machine, pid) {
             Life::Alive => false,
             Life::Dead => true,
@@ -209,21 +223,18 @@ pub fn remove_stale(folder: &Path, mine: impl Fn(&[u8]) -> bool) {
 pub fn remove_left_by(owner: &Owner, target: &Path) {
     let Ok(target) = real_file(target) else { return };
     let Ok(entries) = std::fs::read_dir(folder_of(&target)) else { return };
-    let target_name = target.file_name().unwrap_or_default().as_encoded_bytes();
+    let own = target_hash(target.file_name().unwrap_or_default());
     for entry in entries.flatten() {
         let name = entry.file_name();
-        if parse(name.as_encoded_bytes()) == Some((target_name, owner.machine.as_str(), owner.pid)) {
+        if name.to_str().and_then(parse) == Some((own.as_str(), owner.machine.as_str(), owner.pid)) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
-/// Parses target, machine and process number from the name of a temporary file.
-fn parse(name: &[u8]) -> Option<(&[u8], &str, u32)> {
-    let rest = name.strip_prefix(b".")?.strip_suffix(b".tmp")?;
-    let dot = rest.iter().rposition(|&b| b == b'.')?;
-    let (machine, pid) = std::str::from_utf8(&rest[dot + 1..]).ok()?.split_once('-')?;
-    let infix = b".taki-";
-    let at = rest[..dot].windows(infix.len()).rposition(|w| w == infix)?;
-    Some((&rest[..at], machine, pid.parse().ok()?))
+/// Parses the target's hash, machine and process number from the name of a temporary file.
+fn parse(name: &str) -> Option<(&str, &str, u32)> {
+    let (rest, target) = name.strip_prefix(PREFIX)?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    let (machine, pid) = rest.rsplit_once('.')?.1.split_once('-')?;
+    Some((target, machine, pid.parse().ok()?))
 }

@@ -229,12 +229,12 @@ fn temporary_files_of_the_dead_are_removed_and_those_of_the_living_kept() {
     let mut dead = Command::new("true").spawn().unwrap();
     dead.wait().unwrap();
     let machine = &taki::output::frame::Owner::me().machine;
-    let name = |target: &str, pid: u32| format!(".{target}.taki-abc.{machine}-{pid}.tmp");
+    let hash = |target: &str| xxhash_rust::xxh3::xxh3_64(target.as_bytes());
+    let name = |target: &str, pid: u32| format!(".taki-abc.{machine}-{pid}.{:016x}.tmp", hash(target));
     let (stale, living) = (name("x.png", dead.id()), name("x.png", std::process::id()));
     let (other, foreign) = (name("y.png", dead.id()), ".x.png.taki-notes".to_owned());
-    // The processes of another machine cannot be checked, so its files count as stale after a day without a
-    // write.
-    let elsewhere = |n: &str| format!(".x.png.taki-{n}.00000000-{}.tmp", dead.id());
+    // Another machine's processes cannot be asked: its files are stale after a day without a write.
+    let elsewhere = |n: &str| format!(".taki-{n}.00000000-{}.{:016x}.tmp", dead.id(), hash("x.png"));
     let (recent, ancient) = (elsewhere("a"), elsewhere("b"));
     for file in [&stale, &living, &other, &foreign, &recent, &ancient] {
         fs::write(dir.path().join(file), "").unwrap();

@@ -150,3 +150,44 @@ fn a_device_or_pipe_is_not_replaced() {
     assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
     has_only(dir.path(), &["n.sh", "p.sh"]);
 }
+
+#[test]
+fn names_as_long_as_the_file_system_allows_work() {
+    let dir = tempdir().unwrap();
+    let named = |length: usize, end: &str| format!("{}{end}", "n".repeat(length - end.len()));
+    for length in [224, 225, 255] {
+        let name = named(length, ".png");
+        run(&mut render("front", dir.path().join(&name))).done();
+        is_picture(&dir.path().join(&name));
+        fs::remove_file(dir.path().join(&name)).unwrap();
+    }
+    // A batch claims its pictures too. Its pattern has as many characters as the name.
+    let batch = |name: &str| {
+        let mut command = taki(["batch", "front"]);
+        command.args(TINY).args(["--frames", "0-1", "-o", name]).current_dir(&dir);
+        run(&mut command)
+    };
+    batch(&named(255, ".####.png")).done();
+    batch(&named(255, ".gif")).done();
+    is_picture(&dir.path().join(named(255, ".0001.png")));
+    assert_eq!(names(dir.path()).len(), 3, "{:?}", names(dir.path()));
+    // A longer name is known before the work.
+    let long = named(256, ".png");
+    run(&mut render("front", dir.path().join(&long))).refused(73, &[&long, "choose a shorter name"]);
+    batch(&named(256, ".####.png")).refused(73, &["choose a shorter name"]);
+    assert_eq!(names(dir.path()).len(), 3, "{:?}", names(dir.path()));
+}
+
+#[test]
+fn messages_name_the_output_and_no_temporary_file() {
+    let dir = tempdir().unwrap();
+    fs::write(dir.path().join("file"), "").unwrap();
+    for output in ["absent/x.png", "file/x.png", "/proc/x.png"] {
+        for command in ["render", "batch"] {
+            let mut command = taki([command, "front"]);
+            let run = run(command.args(TINY).args(["-o", output]).current_dir(&dir));
+            run.refused(73, &[output]);
+            assert!(!run.stderr().contains("taki-") && !run.stderr().contains(".tmp"), "{}", run.stderr());
+        }
+    }
+}

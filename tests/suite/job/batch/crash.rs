@@ -149,7 +149,8 @@ fn a_claim_of_another_machine_is_taken_over_when_it_is_not_touched() {
     let elsewhere = r#"{"host":"far","machine":"00000000","pid":7,"started":1}"#;
     let arguments = ["--frames", "0-2", "-o", "f.####.png", "--events", "json", "--stale", "1.5"];
     fs::write(claim(1), elsewhere).unwrap();
-    fs::write(dir.path().join(".f.0001.png.taki-abc.00000000-7.tmp"), "half").unwrap();
+    let target = xxhash_rust::xxh3::xxh3_64(b"f.0001.png");
+    fs::write(dir.path().join(format!(".taki-abc.00000000-7.{target:016x}.tmp")), "half").unwrap();
     let begun = Instant::now();
     let ended = run(&mut batch(dir.path(), arguments));
     assert_eq!(counts(&ended), [3, 0, 3, 0, 0]);
