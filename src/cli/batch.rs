@@ -1,6 +1,5 @@
 //! `taki batch`: renders the frames of an animation or the grid of a sweep.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -14,7 +13,7 @@ use crate::engine::Engine;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::picture::Layer;
 use crate::scene::Animation;
-use crate::util::error::Result;
+use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
 const EXAMPLES: &str = "\
@@ -234,19 +233,15 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     if args.json
         && let Some(summary) = screen.summary()
     {
-        say(&serde_json::json!(summary).to_string());
+        screen.say(&serde_json::json!(summary));
     }
-    result.map(|_| ())
+    result.and(screen.unsaid())
 }
 
 fn dry_run(args: &BatchArgs, batch: &Batch) -> Result<()> {
     let needs = batch.needs()?;
-    if args.json || args.events.is_some() {
-        say(&serde_json::json!(needs).to_string());
-    } else {
-        say(&needs.to_string());
-    }
-    Ok(())
+    let as_json = args.json || args.events.is_some();
+    say(&if as_json { serde_json::json!(needs).to_string() } else { needs.to_string() })
 }
 
 /// Shows the progress of a batch: a bar on a terminal, otherwise one line per picture. With --events, prints
@@ -255,6 +250,8 @@ struct Screen<'a> {
     terminal: &'a Terminal,
     events: bool,
     state: Mutex<State>,
+    /// The first error of writing to stdout. The batch goes on to write its files.
+    unsaid: Mutex<Option<Error>>,
 }
 
 struct State {
@@ -283,7 +280,7 @@ impl<'a> Screen<'a> {
             told: None,
             summary: None,
         };
-        Screen { terminal, events, state: Mutex::new(state) }
+        Screen { terminal, events, state: Mutex::new(state), unsaid: Mutex::new(None) }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
@@ -292,6 +289,18 @@ impl<'a> Screen<'a> {
 
     fn summary(&self) -> Option<Summary> {
         self.lock().summary.clone()
+    }
+
+    /// Prints an event or the summary, and keeps the first error.
+    fn say(&self, value: &serde_json::Value) {
+        if let Err(e) = say(&value.to_string()) {
+            self.unsaid.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(e);
+        }
+    }
+
+    /// Returns the first error of [`Screen::say`].
+    fn unsaid(&self) -> Result<()> {
+        self.unsaid.lock().unwrap_or_else(|e| e.into_inner()).take().map_or(Ok(()), Err)
     }
 
     fn bar(&self, state: &State) {
@@ -326,7 +335,7 @@ impl Monitor for Screen<'_> {
 
     fn warn(&self, text: &str) {
         if self.events {
-            print_event(&serde_json::json!({"event": "warning", "text": text}));
+            self.say(&serde_json::json!({"event": "warning", "text": text}));
         }
         self.terminal.warn(text);
     }
@@ -381,7 +390,7 @@ impl Watcher for Screen<'_> {
             }
         }
         if self.events {
-            print_event(&serde_json::json!(event));
+            self.say(&serde_json::json!(event));
         } else {
             self.bar(&state);
         }
@@ -392,12 +401,6 @@ impl Watcher for Screen<'_> {
             self.terminal.note(&format!("taki: {line}"));
         }
     }
-}
-
-/// Prints an event and flushes it, so that a reader gets it at once.
-fn print_event(event: &serde_json::Value) {
-    let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{event}").and_then(|()| out.flush());
 }
 
 /// Formats the summary as one line.

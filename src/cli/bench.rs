@@ -143,8 +143,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
         processes(args, terminal, &mut rows)?;
     }
     terminal.close();
-    print(args.json, &line, &rows);
-    Ok(())
+    print(args.json, &line, &rows)
 }
 
 fn direct_limits() -> Limits {
@@ -366,14 +365,13 @@ fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resu
     Ok(())
 }
 
-fn print(json: bool, line: &str, rows: &[Row]) {
+fn print(json: bool, line: &str, rows: &[Row]) -> Result<()> {
     if json {
-        say(&serde_json::json!({"engine": line, "cores": rayon::current_num_threads(), "rows": rows})
-            .to_string());
-        return;
+        let table = serde_json::json!({"engine": line, "cores": rayon::current_num_threads(), "rows": rows});
+        return say(&table.to_string());
     }
-    say("| scene | volume | size | engine | pass | ms | fastest | cells | core-ns per cell |");
-    say("|---|---|---|---|---|--:|--:|--:|--:|");
+    say("| scene | volume | size | engine | pass | ms | fastest | cells | core-ns per cell |")?;
+    say("|---|---|---|---|---|--:|--:|--:|--:|")?;
     for r in rows {
         let cells = if r.cells == 0 { "–".into() } else { r.cells.to_string() };
         let ns = if r.cells == 0 { "–".into() } else { format!("{:.2}", r.ns_per_cell) };
@@ -386,7 +384,7 @@ fn print(json: bool, line: &str, rows: &[Row]) {
             r.pass,
             r.seconds * 1e3,
             r.fastest * 1e3
-        ));
+        ))?;
     }
     let integrate_of_cube = |n: u32| {
         let volume = format!("{n}×{n}×{n}");
@@ -401,7 +399,7 @@ fn print(json: bool, line: &str, rows: &[Row]) {
                 large.size,
                 large.seconds / row.seconds,
                 large.cells as f64 / row.cells as f64
-            ));
+            ))?;
         }
     }
     for bare in rows.iter().filter(|r| ["bare walk", "bare leaping walk"].contains(&r.pass)) {
@@ -411,7 +409,11 @@ fn print(json: bool, line: &str, rows: &[Row]) {
         };
         if let Some(integrate) = rows.iter().find(same) {
             let ratio = integrate.seconds / bare.seconds;
-            say(&format!("\n{} {}: integrate is {ratio:.2} times the {}", bare.volume, bare.size, bare.pass));
+            say(&format!(
+                "\n{} {}: integrate is {ratio:.2} times the {}",
+                bare.volume, bare.size, bare.pass
+            ))?;
         }
     }
+    Ok(())
 }

@@ -81,11 +81,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let share = d.share_outside();
     if args.json {
-        say(&json!({"figures": d, "share_outside": share}).to_string());
+        say(&json!({"figures": d, "share_outside": share}).to_string())?;
     } else {
         let [x, y] = d.worst;
-        say(&format!("rmse {:.6}  mean {:.6}  max {:.6} at ({x}, {y})", d.rmse, d.mean, d.max));
-        say(&format!("{} of {} pixels outside the tolerance ({:.4} %)", d.outside, d.pixels, share * 100.0));
+        say(&format!("rmse {:.6}  mean {:.6}  max {:.6} at ({x}, {y})", d.rmse, d.mean, d.max))?;
+        say(&format!("{} of {} pixels outside the tolerance ({:.4} %)", d.outside, d.pixels, share * 100.0))?;
     }
     if share > args.share {
         return Err(Error::Comparison(format!(
@@ -144,7 +144,7 @@ fn eye(args: &CompareArgs) -> Result<()> {
     }
     if args.json {
         let (mean, flicker) = (flicker.mean(), flicker.share());
-        say(&json!({"pictures": pictures, "mean_luminance": mean, "flicker": flicker}).to_string());
+        say(&json!({"pictures": pictures, "mean_luminance": mean, "flicker": flicker}).to_string())?;
         return Ok(());
     }
     let ratio = |s: &Streaks| s.ratio.map_or("–".into(), |ratio| format!("{ratio:.4}"));
@@ -152,10 +152,10 @@ fn eye(args: &CompareArgs) -> Result<()> {
         let down: Vec<String> = bands.iter().map(ratio).collect();
         let down = if down.is_empty() { String::new() } else { format!("  bands {}", down.join(" ")) };
         let (across, along) = (streaks.across, streaks.along);
-        say(&format!("{file}: streaks {}  across {across:.6}  along {along:.6}{down}", ratio(streaks)));
+        say(&format!("{file}: streaks {}  across {across:.6}  along {along:.6}{down}", ratio(streaks)))?;
     }
     if let Some(share) = flicker.share() {
-        say(&format!("flicker {share:.6} of the mean luminance {:.6}", flicker.mean()));
+        say(&format!("flicker {share:.6} of the mean luminance {:.6}", flicker.mean()))?;
     }
     Ok(())
 }

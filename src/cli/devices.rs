@@ -10,7 +10,7 @@ pub fn run() -> Result<()> {
         say(
             "no GPU adapter: taki renders on the CPU. A Vulkan driver (Debian: mesa-vulkan-drivers) enables \
              the GPU engine.",
-        );
+        )?;
     }
     for adapter in adapters {
         let (info, limits) = (adapter.get_info(), adapter.limits());
@@ -24,7 +24,7 @@ pub fn run() -> Result<()> {
             limits.max_texture_dimension_3d,
             limits.max_texture_dimension_2d,
             if adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY) { "yes" } else { "no" },
-        ));
+        ))?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, Subcommand};
 
@@ -189,11 +189,11 @@ pub fn run(args: &FarmArgs) -> Result<()> {
     };
     match output {
         Some(path) => Output::create(path)?.finish_with(text.as_bytes()),
-        // Half a job file in a pipe is useless, so unlike other output on stdout a failed write is an error.
+        // Half a job file in a pipe is useless, so unlike with other output a broken pipe is an error too.
         None => {
             let mut out = std::io::stdout();
             let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-            written.map_err(|e| Error::write(Path::new("stdout"), e))
+            written.map_err(Error::stdout)
         }
     }
 }

@@ -205,9 +205,10 @@ pub fn main() -> ExitCode {
             // Help and version are not errors and go to stdout.
             let text = e.render().to_string();
             if e.use_stderr() {
-                terminal::complain_raw(&text)
-            } else {
-                say(text.trim_end())
+                terminal::complain_raw(&text);
+            } else if let Err(e) = say(text.trim_end()) {
+                terminal::complain(&e);
+                return ExitCode::from(e.exit_code());
             }
             return ExitCode::from(e.exit_code() as u8);
         }
@@ -254,15 +255,11 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::run(),
-        Command::Presets => {
-            presets().for_each(|(name, what)| say(&format!("{name:<12} {what}")));
-            Ok(())
-        }
+        Command::Presets => presets().try_for_each(|(name, what)| say(&format!("{name:<12} {what}"))),
         Command::Completions { shell } => {
             let mut bytes = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "taki", &mut bytes);
-            say(String::from_utf8_lossy(&bytes).trim_end());
-            Ok(())
+            say(String::from_utf8_lossy(&bytes).trim_end())
         }
     }
 }

@@ -130,7 +130,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         report["auto_exposure"] = json!(measured);
         report["seconds"] = json!(seconds);
         report["seconds_total"] = json!(total);
-        say(&report.to_string());
+        say(&report.to_string())?;
     } else {
         let name = |p: &PathBuf| if is_stdout(p) { "stdout".into() } else { p.display().to_string() };
         let names: Vec<String> = outputs.iter().map(name).collect();

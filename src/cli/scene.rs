@@ -27,6 +27,5 @@ pub fn run(args: &SceneArgs) -> Result<()> {
         Some(frame) => animation.at(frame)?,
         None => args.scene.load(&[])?,
     };
-    say(&if args.json { scene.to_json().to_string() } else { scene.to_toml() });
-    Ok(())
+    say(&if args.json { scene.to_json().to_string() } else { scene.to_toml() })
 }

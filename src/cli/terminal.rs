@@ -1,6 +1,6 @@
 //! Output for the user (progress bar, warnings, error line) and the signals that stop work.
 
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -10,15 +10,26 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// Prints a line on stdout. If stdout is closed, the line is lost, but the command goes on to write its
-/// files.
-pub fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+/// Prints a line on stdout at once. A reader that has gone wants no more of it, so a broken pipe is no error.
+///
+/// # Errors
+/// [`Error::Io`] where the line cannot be written.
+pub fn say(line: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::stdout(e)),
+        _ => Ok(()),
+    }
 }
 
 /// Prints text on stderr unchanged. If stderr is closed, the text is lost.
 pub fn complain_raw(text: &str) {
     let _ = write!(std::io::stderr(), "{text}");
+}
+
+/// Prints an error line before there is a [`Terminal`].
+pub fn complain(e: &Error) {
+    complain_raw(&format!("taki: error: {e}\n"));
 }
 
 /// The terminal, shared by all that one command prints.

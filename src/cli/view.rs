@@ -59,7 +59,7 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         lose_window_after: args.lose_window_after.map(Duration::from_secs_f64),
     })?;
     if args.json || args.measure {
-        say(&serde_json::json!(report).to_string());
+        say(&serde_json::json!(report).to_string())?;
     }
     Ok(())
 }

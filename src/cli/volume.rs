@@ -59,9 +59,9 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
         VolumeCommand::Info { file, json, memory } => {
-            let statistics = read_npz(file, StorageChoice::Auto, *memory)?.statistics();
-            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
-            Ok(())
+            let statistics =
+                read_npz(file, StorageChoice::Auto, memory.saturating_mul(1 << 20))?.statistics();
+            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) })
         }
     }
 }

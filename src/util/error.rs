@@ -136,6 +136,16 @@ impl Error {
         }
     }
 
+    /// [`Error::Io`] of a failed write to stdout.
+    pub fn stdout(why: impl ToString) -> Self {
+        Error::Io {
+            what: "cannot write",
+            path: "stdout".into(),
+            why: why.to_string(),
+            fix: "free some space or send it elsewhere",
+        }
+    }
+
     /// Exit code of the process, as docs/scenes-and-files.md lists them.
     pub fn exit_code(&self) -> u8 {
         match self {
