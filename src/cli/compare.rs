@@ -200,6 +200,7 @@ fn extension(path: &Path) -> Option<String> {
 }
 
 fn read(path: &Path) -> Result<Picture> {
+    std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !is_exr(path) {
         return read_png(path);
     }

@@ -62,7 +62,7 @@ impl Source {
             return Source::stdin();
         }
         let meta = std::fs::metadata(scene).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => {
+            std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
                 let given = scene.display().to_string();
                 let near = presets::names().max_by(|a, b| {
                     strsim::jaro_winkler(a, &given).total_cmp(&strsim::jaro_winkler(b, &given))

@@ -116,6 +116,19 @@ impl Error {
         }
     }
 
+    /// Error about an input that cannot be opened: [`Error::Input`] where there is none, because no later try
+    /// will find it, and [`Error::Io`] where it is there.
+    pub fn open(path: &Path, why: std::io::Error) -> Self {
+        use std::io::ErrorKind::{NotADirectory, NotFound};
+        match why.kind() {
+            NotFound | NotADirectory => Error::input(
+                format!("there is no file {}", path.display()),
+                "check the path, which starts in the current folder or in that of the scene",
+            ),
+            _ => Error::read(path, why),
+        }
+    }
+
     /// [`Error::Io`] of a failed read.
     pub fn read(path: &Path, why: impl ToString) -> Self {
         Error::Io {

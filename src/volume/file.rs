@@ -113,17 +113,17 @@ fn write_array<W: Write + Seek>(
 /// `asked` sets the storage; with [`StorageChoice::Auto`] it is sparse if a dense volume does not fit.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if it is not a valid volume file, and
-/// [`Error::Memory`] if the volume does not fit into the budget.
+/// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if there is none or it is not a valid volume
+/// file, and [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<VolumeTexture> {
-    let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
+    let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !meta.is_file() {
         return Err(Error::input(
             format!("{} is not a regular file", path.display()),
             "give an .npz file made by `taki volume build` or NumPy's savez",
         ));
     }
-    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let file = File::open(path).map_err(|e| Error::open(path, e))?;
     let mut reader = Reader {
         path,
         asked,

@@ -131,7 +131,8 @@ impl Batch {
 
     fn state_of(&self, file: &Path, scene: &Scene) -> Result<FileState> {
         // A link to a file that does not exist yet is as good as nothing.
-        if real_file(file)?.symlink_metadata().is_err() {
+        let real = real_file(file)?;
+        if real.symlink_metadata().is_err() {
             return Ok(FileState::Nothing);
         }
         if file.is_dir() {
@@ -143,6 +144,8 @@ impl Batch {
         }
         let verified = match verify(file) {
             Ok(verified) => verified,
+            // It has been removed since.
+            Err(_) if real.symlink_metadata().is_err() => return Ok(FileState::Nothing),
             Err(Error::Input { what, .. }) => {
                 // A file of another program must stay. A damaged one of ours, or an empty one, may be the
                 // rest of an interrupted run.

@@ -48,7 +48,7 @@ pub struct FileMap {
 /// - [`Error::Io`] if the file cannot be read.
 pub fn read(path: &Path, budget: u64) -> Result<FileMap> {
     let meta = std::fs::metadata(path).map_err(|e| match e.kind() {
-        ErrorKind::NotFound => bad(path, e),
+        ErrorKind::NotFound | ErrorKind::NotADirectory => bad(path, e),
         _ => Error::read(path, e),
     })?;
     if !meta.is_file() {

@@ -38,9 +38,9 @@ impl Kind {
     /// Detects the format of a file by its first bytes.
     ///
     /// # Errors
-    /// [`Error::Input`] where the file is neither, [`Error::Io`] where it cannot be read.
+    /// [`Error::Input`] where the file is neither or missing, [`Error::Io`] where it cannot be read.
     pub fn of(path: &Path) -> Result<Kind> {
-        let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
+        let metadata = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
         let foreign =
             |why: &str| Error::input(format!("{}: {why}", path.display()), "give a PNG or EXR of taki");
         if !metadata.is_file() {

@@ -3,6 +3,7 @@
 //! leaves no incomplete file.
 
 mod device;
+mod inputs;
 mod outputs;
 mod streams;
 

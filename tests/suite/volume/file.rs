@@ -250,7 +250,7 @@ fn what_is_no_file_is_refused() {
     let dir = folder();
     assert_eq!(
         read_npz(&dir.path().join("none.npz"), StorageChoice::Auto, BUDGET).unwrap_err().exit_code(),
-        74
+        65
     );
     assert_eq!(read_npz(dir.path(), StorageChoice::Auto, BUDGET).unwrap_err().exit_code(), 65);
     assert_eq!(read_bytes(&dir, b"PK\x03\x04 no archive").unwrap_err().exit_code(), 65);
