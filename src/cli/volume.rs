@@ -46,6 +46,12 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         VolumeCommand::Build { scene: options, output } => {
             let scene = options.load(&[])?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
+            if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+                let npz = path.with_extension("npz");
+                let what =
+                    format!("-o {}: a volume is an .npz file; use -o {}", path.display(), npz.display());
+                return Err(Error::Usage(what));
+            }
             let mut out = Output::create(&path)?;
             let volume = scene.volume(options.limits().memory, terminal)?;
             scene.notes(&volume).iter().for_each(|n| terminal.note(&format!("taki: {n}")));

@@ -394,6 +394,17 @@ impl Scene {
     /// Returns warnings about what is valid but probably a mistake.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
+        if let Some(values) = self.values.as_ref().filter(|v| v.is_set("volume.alpha"))
+            && self.volume_file.is_some()
+            && values.float("volume.alpha") != volume.alpha
+        {
+            warnings.push(format!(
+                "volume.alpha = {} has no effect: volume.file brings its own alpha, {}; change trace.sigma or \
+                 trace.tau, or write the file with another alpha",
+                values.float("volume.alpha"),
+                volume.alpha
+            ));
+        }
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
         let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
         if self.quads.is_empty() && self.rocks.is_empty() && self.pools.is_empty() {

@@ -129,7 +129,8 @@ impl Source {
     }
 
     fn values_at_depth(&self, depth: u32) -> Result<Values> {
-        let file = File { source: self, newlines: self.text.match_indices('\n').map(|(i, _)| i).collect() };
+        let newlines = self.text.match_indices('\n').map(|(i, _)| i).collect();
+        let mut file = File { source: self, newlines, base: "" };
         let root = DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             if let Some((key, value, advice)) = slip_at(&self.text, at)
@@ -165,6 +166,7 @@ impl Source {
                     folder: self.folder.clone(),
                     text: text.into(),
                 };
+                file.base = name;
                 base.values_at_depth(depth + 1)?
             }
         };
@@ -191,6 +193,8 @@ struct File<'a> {
     /// Offsets of the line ends. Every value needs its line number; a search avoids reading the text again
     /// for each.
     newlines: Vec<usize>,
+    /// Name of the base; empty without one.
+    base: &'a str,
 }
 
 impl File<'_> {
@@ -280,6 +284,17 @@ impl File<'_> {
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
+        // No key of this file can lie under an empty table, so what is there belongs to the base.
+        if NAMED.contains(&path) && values.has_under(path) {
+            return Err(Error::input(
+                format!("{}: the empty {path} removes nothing of the base", place.0),
+                format!(
+                    "leave it out, or replace the line `base` by what `taki scene {}` prints, and delete \
+                     {path} there",
+                    self.base
+                ),
+            ));
+        }
         match Param::find(&key).map(|param| param.kind) {
             Some(_) if values.is_set(&key) => Ok(()),
             Some(Kind::Corners) => Err(Error::input(
