@@ -28,6 +28,9 @@ pub struct RenderArgs {
     /// both; - is stdout, as PNG. Default: the scene's name with .png, in the current folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
+    /// Replaces an existing file even if it is no picture.
+    #[arg(long)]
+    overwrite: bool,
     /// Size of the picture in pixels, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -71,6 +74,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     };
     check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
     let still = Still::create(&outputs)?;
+    if !args.overwrite {
+        still.check_replaced()?;
+    }
     let has_exr = still.has_exr();
     if args.layers.is_some() && !has_exr {
         return Err(Error::Usage("--layers needs an EXR file; add -o FILE.exr".into()));

@@ -18,11 +18,14 @@ pub struct StitchArgs {
     /// File of the whole picture, with the same extension as the parts.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Replaces an existing file even if it is no picture.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 pub fn run(args: &StitchArgs, terminal: &Terminal) -> Result<()> {
     let start = Instant::now();
-    stitch(&args.parts, &args.output, terminal)?;
+    stitch(&args.parts, &args.output, args.overwrite, terminal)?;
     terminal.close();
     let (parts, seconds) = (args.parts.len(), start.elapsed().as_secs_f64());
     terminal.note(&format!("taki: wrote {} from {parts} parts in {seconds:.2} s", args.output.display()));

@@ -1,7 +1,7 @@
 //! The files of a still: opened before the work, written row by row, named only when complete.
 
 use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufWriter, Read};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -105,6 +105,14 @@ impl Still {
         paths.iter().map(|path| open(path, Output::open)).collect::<Result<Vec<_>>>().map(Still)
     }
 
+    /// Refuses to replace files that are no pictures.
+    ///
+    /// # Errors
+    /// [`Error::CannotCreate`] if there is such a file.
+    pub fn check_replaced(&self) -> Result<()> {
+        self.0.iter().try_for_each(|(_, output)| check_replaced(output.path()))
+    }
+
     /// Whether an output is an EXR, which holds layers.
     pub fn has_exr(&self) -> bool {
         self.0.iter().any(|(kind, _)| *kind == Kind::Exr)
@@ -158,6 +166,30 @@ impl Still {
         writer.push(frame)?;
         writer.finish()
     }
+}
+
+/// First bytes of the pictures that taki writes: PNG, EXR and GIF.
+const PICTURES: [&[u8]; 3] = [b"\x89PNG", b"\x76\x2f\x31\x01", b"GIF8"];
+
+/// Refuses to replace a file that is no picture. An empty file may be replaced.
+///
+/// # Errors
+/// [`Error::CannotCreate`] if the file is no picture.
+pub(crate) fn check_replaced(path: &Path) -> Result<()> {
+    // Whatever is no file is refused where the output is opened.
+    if !path.is_file() {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
+    if read.is_ok() && (start.is_empty() || PICTURES.iter().any(|picture| start.starts_with(picture))) {
+        return Ok(());
+    }
+    Err(Error::CannotCreate {
+        path: path.to_owned(),
+        why: "the file of this name is no picture".into(),
+        fix: "choose another name, or remove the file; taki replaces it with --overwrite".into(),
+    })
 }
 
 /// The text that a file stores about its scene: the volume's checksum, then the scene file.

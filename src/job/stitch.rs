@@ -3,7 +3,7 @@
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
-use super::{About, Sink};
+use super::{About, Sink, check_replaced};
 use crate::output::frame::{ExrLines, Figures, Kind, PngRows, SCENE_TEXT};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -15,7 +15,8 @@ const PIECE_BYTES: usize = 1 << 20;
 /// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
 /// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
 /// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
-/// crop, plus the rows that wait for the PNG encoder (about 1 MiB).
+/// crop, plus the rows that wait for the PNG encoder (about 1 MiB). A file that is no picture is replaced only
+/// with `overwrite`.
 ///
 /// Returns the figures of a PNG: the sum of its crops' figures, without crops that lie wholly inside another.
 /// If the remaining crops overlap, or one carries no figures, the sum is unknown: the file gets none and the
@@ -25,7 +26,12 @@ const PIECE_BYTES: usize = 1 << 20;
 /// [`Error::Input`] if the crops belong to different pictures, leave a gap, or differ where they overlap.
 /// [`Error::Usage`] if `parts` is empty or the extension of `output` does not match the crops.
 /// Otherwise an error of reading, of creating or writing `output`, or of the monitor.
-pub fn stitch(parts: &[PathBuf], output: &Path, monitor: &dyn Monitor) -> Result<Option<Figures>> {
+pub fn stitch(
+    parts: &[PathBuf],
+    output: &Path,
+    overwrite: bool,
+    monitor: &dyn Monitor,
+) -> Result<Option<Figures>> {
     let parts =
         parts.iter().map(|path| Part::open(path).map(|(part, _)| part)).collect::<Result<Vec<_>>>()?;
     let Some(first) = parts.first() else {
@@ -34,6 +40,9 @@ pub fn stitch(parts: &[PathBuf], output: &Path, monitor: &dyn Monitor) -> Result
     let (kind, whole) = (first.kind, first.whole);
     check_parts(first, &parts)?;
     check_extension(output, kind)?;
+    if !overwrite {
+        check_replaced(output)?;
+    }
     let about = About {
         whole,
         window: Window::whole(whole),

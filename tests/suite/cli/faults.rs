@@ -188,7 +188,11 @@ fn a_full_disk_leaves_the_old_file_and_no_other() {
         let path = dir.path().join(name);
         fs::write(&path, "old").unwrap();
         let command = match start {
-            "render" => render("front", &path),
+            "render" => {
+                let mut command = render("front", &path);
+                command.arg("--overwrite");
+                command
+            }
             _ => {
                 let mut command = taki(["volume", "build", "front", "-o"]);
                 command.arg(&path);
@@ -208,7 +212,7 @@ fn a_full_disk_leaves_the_old_file_and_no_other() {
 fn an_output_is_replaced_by_a_whole_file() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("x.png");
-    fs::write(&path, "old").unwrap();
+    run(&mut render("fig5", &path)).done();
     run(&mut render("front", &path)).done();
     is_picture(&path);
     has_only(dir.path(), &["x.png"]);
@@ -222,6 +226,8 @@ fn an_output_may_be_read_as_the_umask_says() {
     for (umask, mode) in [("022", 0o644), ("077", 0o600), ("002", 0o664)] {
         run(&mut in_shell(&format!("umask {umask};"), "", &render("front", &path))).done();
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode, "umask {umask}");
+        // A file that is there keeps its own.
+        fs::remove_file(&path).unwrap();
     }
 }
 

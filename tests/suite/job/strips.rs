@@ -296,7 +296,7 @@ fn crops_stitch_to_the_file_of_the_whole() {
         for (windows, figures) in [(&tiles[..], true), (&inside, true), (&lapped, false)] {
             let (dir, parts, whole) = pieces(extension, windows);
             let joined = dir.path().join(format!("joined.{extension}"));
-            let known = stitch(&parts, &joined, &Unwatched).expect("stitched");
+            let known = stitch(&parts, &joined, false, &Unwatched).expect("stitched");
             let same = std::fs::read(&joined).expect("joined") == std::fs::read(&whole).expect("whole");
             // Where crops overlap, the sums of a PNG cannot be derived from its parts.
             assert_eq!(same, figures || extension == "exr", "{extension} {windows:?}");
@@ -314,7 +314,7 @@ fn parts_that_make_no_whole_are_refused() {
         let (dir, parts, whole) = pieces(extension, &windows);
         let out = dir.path().join(format!("out.{extension}"));
         let refused = |parts: &[PathBuf], words: &[&str]| {
-            let e = stitch(parts, &out, &Unwatched).expect_err("refused");
+            let e = stitch(parts, &out, false, &Unwatched).expect_err("refused");
             assert_eq!(e.exit_code(), 65, "{e}");
             words.iter().for_each(|word| assert!(e.to_string().contains(word), "no {word} in {e}"));
             assert!(!out.exists());
@@ -344,7 +344,7 @@ fn parts_that_make_no_whole_are_refused() {
         let window = Window { x: 30, y: 10, width: 50, height: 40 };
         wrong.write(&file, window, &[61]);
         refused(&[whole.clone(), file], &["whole.", "other.", "differ at the pixel ("]);
-        let e = stitch(&[whole], &dir.path().join("out.jpg"), &Unwatched).expect_err("refused");
+        let e = stitch(&[whole], &dir.path().join("out.jpg"), false, &Unwatched).expect_err("refused");
         assert_eq!(e.exit_code(), 2, "{e}");
     }
 }

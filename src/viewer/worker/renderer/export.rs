@@ -36,6 +36,7 @@ impl Renderer {
 
     fn export_files(&mut self, export: &Export) -> Result<()> {
         let still = Still::create(&export.paths)?;
+        still.check_replaced()?;
         let request = Request {
             // No request is newer, so the volume of the export is never abandoned.
             serial: u64::MAX,

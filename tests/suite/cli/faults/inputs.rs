@@ -98,7 +98,7 @@ fn an_empty_table_over_parts_of_the_base_is_refused_with_the_way_out() {
     fs::write(&scene, "version = 1\nbase = \"front\"\n[rocks]\n[splashes]\n").unwrap();
     run(taki(["scene"]).arg(&scene)).done();
     // The way out works.
-    let printed = run(taki(["scene", "waterfall"])).done().to_owned();
+    let printed = run(&mut taki(["scene", "waterfall"])).done().to_owned();
     let mut kept = true;
     let bare: Vec<&str> = printed
         .lines()

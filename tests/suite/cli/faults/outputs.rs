@@ -36,10 +36,10 @@ fn an_output_through_a_link_replaces_the_file_behind_it() {
     symlink("dangling.sh", at("links/chain.sh")).unwrap();
     symlink("disk", at("folder")).unwrap();
     let cases = [
+        ("folder/new.sh", "disk/new.sh"),
         ("links/relative.sh", "disk/old.sh"),
         ("links/dangling.sh", "disk/deep/absent.sh"),
         ("links/chain.sh", "disk/deep/absent.sh"),
-        ("folder/new.sh", "disk/new.sh"),
     ];
     for (link, file) in cases {
         fs::write(at("disk/old.sh"), "old").unwrap();
@@ -190,4 +190,34 @@ fn messages_name_the_output_and_no_temporary_file() {
             assert!(!run.stderr().contains("taki-") && !run.stderr().contains(".tmp"), "{}", run.stderr());
         }
     }
+}
+
+#[test]
+fn a_still_replaces_pictures_but_no_other_file_unless_told_to() {
+    let dir = tempdir().unwrap();
+    let (path, exr) = (dir.path().join("x.png"), dir.path().join("y.exr"));
+    let render = |more: &[&str]| run(render("front", &path).arg("-o").arg(&exr).args(more));
+    render(&[]).done();
+    render(&[]).done();
+    let part = dir.path().join("part.png");
+    fs::copy(&path, &part).unwrap();
+    let stitch = |more: &[&str]| run(taki(["stitch"]).arg(&part).arg("-o").arg(&path).args(more));
+    stitch(&[]).done();
+    for other in ["notes", "P", "GIMP"] {
+        fs::write(&path, other).unwrap();
+        for run in [render(&[]), stitch(&[])] {
+            run.refused(73, &["x.png", "no picture", "--overwrite"]);
+            assert_eq!(fs::read_to_string(&path).unwrap(), other);
+        }
+    }
+    stitch(&["--overwrite"]).done();
+    is_picture(&path);
+    fs::write(&exr, "notes").unwrap();
+    render(&[]).refused(73, &["y.exr", "no picture"]);
+    render(&["--overwrite"]).done();
+    // An empty file holds nothing that could be lost.
+    fs::write(&path, "").unwrap();
+    render(&[]).done();
+    is_picture(&path);
+    has_only(dir.path(), &["part.png", "x.png", "y.exr"]);
 }
