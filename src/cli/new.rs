@@ -23,8 +23,7 @@ pub struct NewArgs {
 pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<()> {
     let path = &args.file;
     if path == Path::new("-") {
-        say(SCENE.trim_end());
-        return Ok(());
+        return say(SCENE.trim_end());
     }
     let name = path.display();
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {

@@ -39,9 +39,8 @@ pub enum Engine {
         renderer: Box<GpuRenderer>,
         /// The options that opened the device.
         device: DeviceOptions,
-        /// Light volumes of the CPU engine, which renders what this device cannot. `None` makes that an
-        /// error.
-        spare: Option<cpu::LightVolumeCache>,
+        /// Whether the CPU engine takes over when this device cannot render a scene.
+        falls_back: bool,
     },
     /// The CPU engine, which uses all cores.
     Cpu(cpu::LightVolumeCache),
@@ -58,7 +57,7 @@ impl Engine {
 
     /// Returns a GPU engine on an open device. What the device cannot do is an error.
     pub fn gpu(renderer: GpuRenderer) -> Engine {
-        Engine::Gpu { renderer: Box::new(renderer), device: DeviceOptions::default(), spare: None }
+        Engine::Gpu { renderer: Box::new(renderer), device: DeviceOptions::default(), falls_back: false }
     }
 
     /// Opens the chosen engine. Returns it with one line that says which engine was opened and why.
@@ -72,8 +71,8 @@ impl Engine {
         };
         match choice {
             EngineChoice::Cpu => Ok(cpu("")),
-            EngineChoice::Gpu => Engine::open_gpu(device, None),
-            EngineChoice::Auto => match Engine::open_gpu(device, Some(Default::default())) {
+            EngineChoice::Gpu => Engine::open_gpu(device, false),
+            EngineChoice::Auto => match Engine::open_gpu(device, device.adapter.is_none()) {
                 Ok(opened) => Ok(opened),
                 // A named adapter that is missing is a user error, not a reason to fall back.
                 Err(e) if device.adapter.is_some() => Err(e),
@@ -85,11 +84,11 @@ impl Engine {
         }
     }
 
-    fn open_gpu(device: &DeviceOptions, spare: Option<cpu::LightVolumeCache>) -> Result<(Engine, String)> {
+    fn open_gpu(device: &DeviceOptions, falls_back: bool) -> Result<(Engine, String)> {
         let renderer = GpuRenderer::new(Gpu::open(device)?);
         renderer.gpu.check()?;
         let line = format!("engine gpu on {}", renderer.gpu.name());
-        Ok((Engine::Gpu { renderer: Box::new(renderer), device: device.clone(), spare }, line))
+        Ok((Engine::Gpu { renderer: Box::new(renderer), device: device.clone(), falls_back }, line))
     }
 
     /// Compiles the passes that a scene needs, as far as they are known without its volume.
@@ -127,8 +126,8 @@ impl Engine {
     }
 
     /// Renders a frame. After a lost device or exhausted device memory, it tries once more on a new device
-    /// with smaller tiles. An engine opened by [`EngineChoice::Auto`] renders on the CPU what the device
-    /// cannot, with a warning.
+    /// with smaller tiles. Where the device cannot render the scene, an engine opened by
+    /// [`EngineChoice::Auto`] becomes the CPU engine, with a warning.
     ///
     /// # Errors
     /// Errors of [`cpu::render_with`] or [`GpuRenderer::render`], and those of `monitor`.
@@ -144,7 +143,7 @@ impl Engine {
             Engine::Cpu(light_volumes) => {
                 cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
             }
-            Engine::Gpu { renderer, device, spare } => {
+            Engine::Gpu { renderer, device, falls_back } => {
                 let mut result = render_once(renderer, scene, volume, mesh, options, monitor);
                 if let Err(e) = &result
                     && is_the_devices(e, renderer)
@@ -155,13 +154,14 @@ impl Engine {
                     let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
                     result = renderer.render(scene, volume, mesh, &careful, monitor);
                 }
-                match (&result, spare) {
-                    (Err(e), Some(light_volumes)) if is_the_devices(e, renderer) => {
-                        monitor.warn(&format!("{e}: the CPU engine renders instead"));
-                        cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
-                    }
-                    _ => result,
+                let Err(e) = &result else { return result };
+                if !*falls_back || !is_the_devices(e, renderer) {
+                    return result;
                 }
+                // It stays, so that the strips of one picture come from one engine and are warned of once.
+                monitor.warn(&format!("{e}: the CPU engine takes over"));
+                *self = Engine::cpu();
+                self.render_volume(scene, volume, mesh, options, monitor)
             }
         }
     }

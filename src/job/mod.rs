@@ -10,6 +10,6 @@ mod strips;
 pub use claim::{Asked, Claim, Claims};
 pub use memo::VolumeMemo;
 pub(crate) use still::{About, Sink, check_replaced};
-pub use still::{Still, StillWriter};
+pub use still::{STDOUT, Still, StillWriter};
 pub use stitch::stitch;
 pub use strips::{check_bloom, memory_of, spare_for_rasters, strips};

@@ -1,7 +1,7 @@
 //! The files of a still: opened before the work, written row by row, named only when complete.
 
 use std::fs::File;
-use std::io::{BufWriter, Read};
+use std::io::{BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -69,7 +69,7 @@ impl Target {
             Target::Stdout(mut file) => {
                 let mut out = std::io::stdout().lock();
                 let copied = file.rewind().and_then(|()| std::io::copy(&mut file, &mut out));
-                copied.and_then(|_| out.flush()).map_err(|e| Error::write(Path::new("stdout"), e))
+                copied.and_then(|_| out.flush()).map_err(Error::stdout)
             }
         }
     }
@@ -110,7 +110,10 @@ impl Still {
     /// # Errors
     /// [`Error::CannotCreate`] if there is such a file.
     pub fn check_replaced(&self) -> Result<()> {
-        self.0.iter().try_for_each(|(_, output)| check_replaced(output.path()))
+        self.0.iter().try_for_each(|(_, target)| match target {
+            Target::File(output) => check_replaced(output.path()),
+            Target::Stdout(_) => Ok(()),
+        })
     }
 
     /// Whether an output is an EXR, which holds layers.

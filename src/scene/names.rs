@@ -5,7 +5,7 @@ use super::value::{Place, Values};
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
-const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
+pub(super) const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;

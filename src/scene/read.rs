@@ -8,6 +8,7 @@ use std::sync::LazyLock;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::names::NAMED;
 use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
 use super::slips::slip_at;

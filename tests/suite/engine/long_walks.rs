@@ -76,14 +76,15 @@ fn the_cpu_renders_what_an_automatic_engine_cannot_and_says_so() {
     let (mut engine, _) = Engine::open(EngineChoice::Auto, &DeviceOptions::default()).expect("an engine");
     let scene = along_the_face(65536);
     let watch = Watch::default();
-    let frame = render(&mut engine, &scene, &watch).expect("a frame");
     let software = matches!(&engine, Engine::Gpu { renderer, .. } if renderer.gpu.is_software());
+    let frame = render(&mut engine, &scene, &watch).expect("a frame");
     let warnings = watch.warnings.into_inner().unwrap();
     if software {
+        assert_eq!(engine.word(), "cpu");
         let on_cpu = render(&mut Engine::cpu(), &scene, &Watch::default()).expect("a frame");
         assert!(frame.radiance == on_cpu.radiance && frame.counts == on_cpu.counts);
         assert_eq!(warnings.len(), 1, "{warnings:?}");
-        assert!(warnings[0].ends_with("the CPU engine renders instead"), "{warnings:?}");
+        assert!(warnings[0].ends_with("the CPU engine takes over"), "{warnings:?}");
     } else {
         assert!(warnings.is_empty(), "{warnings:?}");
     }
