@@ -13,8 +13,8 @@ pub const GRAVITY: f64 = 9.81;
 /// Number of straight pieces that stand for each span of the spline. Where a span turns by a right angle,
 /// their length is 1e-4 shorter than the arc's.
 const PIECES: usize = 64;
-/// Smallest speed, as a share of the speed at the first point. The steepest arc of a splash, 87°, has 0.052
-/// of it at the top.
+/// Smallest speed of thrown water, as a share of the speed at the first point. The steepest arc of a splash,
+/// 87°, has 0.052 of it at the top.
 const MIN_SPEED: f64 = 0.05;
 
 /// Description of a sheet.
@@ -105,29 +105,22 @@ pub struct SheetFault {
 impl Sheet {
     /// Ends of the profile's straight pieces, with arc length and time.
     ///
-    /// The speed is v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point. Water that rises
-    /// higher than its speed allows keeps a twentieth of v0. On a straight piece the acceleration is
-    /// constant, so the time ∫ds/v is exactly 2Δs/(v + v′).
+    /// The speed is v(s) = √(v0² + 2 g Δh), where Δh is the fall since the first point. A profile that rises
+    /// higher than this speed allows is no path of thrown water: a stream pushes the water over the rise. Its
+    /// speed is never below v0. Otherwise the texture would pile up there, and little of it would be left for
+    /// the fall. On a straight piece the acceleration is constant, so the time ∫ds/v is exactly 2Δs/(v + v′).
     pub fn stations(&self) -> Vec<Station> {
+        let spline = spline(&self.points, &self.widths);
+        let speed = Speed::new(self, spline.iter().map(|(point, _)| point.y));
         let mut stations: Vec<Station> = Vec::new();
-        for (point, width) in spline(&self.points, &self.widths) {
+        for (point, width) in spline {
             let next = match stations.last() {
-                Some(last) => self.next(last, point, width),
+                Some(last) => speed.next(last, point, width),
                 None => Station { point, width, arc: 0.0, time: 0.0 },
             };
             stations.push(next);
         }
         stations
-    }
-
-    /// Station at the end `point` of the straight piece that begins at `last`.
-    fn next(&self, last: &Station, point: DVec3, width: f64) -> Station {
-        let (v0, top) = (f64::from(self.v0), f64::from(self.points[0].y));
-        let min_square = (MIN_SPEED * v0).powi(2);
-        let speed = |point: DVec3| (v0 * v0 + 2.0 * GRAVITY * (top - point.y)).max(min_square).sqrt();
-        let step = point.distance(last.point);
-        let time = last.time + 2.0 * step / (speed(last.point) + speed(point));
-        Station { point, width, arc: last.arc + step, time }
     }
 
     /// Texture position, 0 to 1, of the station `at` on a profile that ends at `last`.
@@ -141,6 +134,7 @@ impl Sheet {
     pub fn rows(&self) -> Vec<Station> {
         let stations = self.stations();
         let last = stations[stations.len() - 1];
+        let speed = Speed::new(self, stations.iter().map(|at| at.point.y));
         let position = |at: &Station| 0.5 * at.arc / last.arc + 0.5 * self.along(at, &last);
         let mut piece = 0;
         let row = |n: u32| {
@@ -153,7 +147,7 @@ impl Sheet {
             }
             let (a, b) = (&stations[piece], &stations[piece + 1]);
             let part = ((wanted - position(a)) / (position(b) - position(a))).clamp(0.0, 1.0);
-            self.next(a, a.point.lerp(b.point, part), a.width + (b.width - a.width) * part)
+            speed.next(a, a.point.lerp(b.point, part), a.width + (b.width - a.width) * part)
         };
         (0..=self.segments).map(row).collect()
     }
@@ -221,6 +215,41 @@ impl Sheet {
             }
         }
         Ok(quads)
+    }
+}
+
+/// Speed of the water along a profile.
+struct Speed {
+    /// Square of the speed at the first point, m²/s².
+    square: f64,
+    /// Height of the first point, metres.
+    top: f64,
+    /// Square of the smallest speed, m²/s².
+    min_square: f64,
+}
+
+impl Speed {
+    /// Speed along a profile with points at the given `heights`, metres.
+    fn new(sheet: &Sheet, heights: impl Iterator<Item = f64>) -> Self {
+        let (square, top) = (f64::from(sheet.v0).powi(2), f64::from(sheet.points[0].y));
+        let mut speed = Speed { square, top, min_square: square * MIN_SPEED * MIN_SPEED };
+        let highest = heights.fold(top, f64::max);
+        if square + 2.0 * GRAVITY * (top - highest) < speed.min_square {
+            speed.min_square = square;
+        }
+        speed
+    }
+
+    /// Speed at a point, m/s.
+    fn at(&self, point: DVec3) -> f64 {
+        (self.square + 2.0 * GRAVITY * (self.top - point.y)).max(self.min_square).sqrt()
+    }
+
+    /// Station at the end `point` of the straight piece that begins at `last`.
+    fn next(&self, last: &Station, point: DVec3, width: f64) -> Station {
+        let step = point.distance(last.point);
+        let time = last.time + 2.0 * step / (self.at(last.point) + self.at(point));
+        Station { point, width, arc: last.arc + step, time }
     }
 }
 
