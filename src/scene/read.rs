@@ -11,9 +11,9 @@ use toml::de::{DeTable, DeValue};
 use super::names::NAMED;
 use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
-use super::slips::slip_at;
+use super::slips::{not_allowed, slip_at};
 use super::typed::parse_for;
-use super::value::{Key, Place, Raw, Values, not_allowed};
+use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
 use crate::util::error::{Error, Result};
 

@@ -4,10 +4,29 @@ use toml::de::DeValue;
 
 use super::param::{Kind, Param};
 use super::typed::{hex_color, in_brackets, parse_value};
-use super::value::{Raw, check};
+use super::value::{Place, Raw, check};
+use crate::util::error::Error;
 
 /// Least likeness of a word to one of a choice that makes it worth a suggestion.
 const ALIKE: f64 = 0.8;
+
+/// The error for a value that a parameter does not allow.
+pub fn not_allowed(place: &Place, key: &str, got: &str, param: &Param, advice: Option<String>) -> Error {
+    let advice = advice.map_or(String::new(), |advice| advice + "; ");
+    let hex = if let Kind::Color(_) = param.kind { " or \"#rrggbb\"" } else { "" };
+    Error::input(
+        format!("{}: {key} = {}", place.0, cut(got)),
+        format!("{advice}allowed: {}{hex}", param.range()),
+    )
+}
+
+/// Cuts a text to 60 characters.
+pub fn cut(text: &str) -> String {
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.into(),
+    }
+}
 
 /// Returns advice on a value that the parameter does not allow.
 pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
@@ -22,7 +41,14 @@ pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
 /// `None` where the line is no key and value, or the slip is none that is known.
 pub fn slip_at(text: &str, at: usize) -> Option<(String, String, String)> {
     let line = text.bytes().take(at).filter(|&b| b == b'\n').count();
-    let section = text.lines().take(line).filter_map(section).last().unwrap_or_default();
+    let sections: Vec<Section> = text.lines().take(line).filter_map(section).collect();
+    let section = sections.last().map_or(String::new(), |last| match last {
+        Section::Table(name) => format!("{name}."),
+        Section::List(name) => {
+            let before = sections.iter().filter(|s| *s == last).count() - 1;
+            format!("{name}.{before}.")
+        }
+    });
     let (name, value) = text.lines().nth(line)?.split_once('=')?;
     let value = value.trim();
     // A # begins a comment, unless it begins a colour without quotes.
@@ -40,14 +66,22 @@ pub fn slip_at(text: &str, at: usize) -> Option<(String, String, String)> {
     Some((key, value.into(), advice))
 }
 
-/// Returns the beginning of the keys below a line such as `[lights.sun]` or `[[quads]]`.
-fn section(line: &str) -> Option<String> {
+/// The table that the keys below a line belong to.
+#[derive(PartialEq)]
+enum Section<'a> {
+    /// `[lights.sun]`
+    Table(&'a str),
+    /// `[[quads]]`: the next item of the list.
+    List(&'a str),
+}
+
+fn section(line: &str) -> Option<Section<'_>> {
     let line = line.split('#').next()?.trim();
     let name = line.strip_prefix('[')?.strip_suffix(']')?;
     let is_name = |name: &str| name.chars().all(|c| c.is_alphanumeric() || "._-".contains(c));
     match name.strip_prefix('[').and_then(|name| name.strip_suffix(']')) {
-        Some(list) => is_name(list).then(|| format!("{list}.0.")),
-        None => is_name(name).then(|| format!("{name}.")),
+        Some(list) => is_name(list).then_some(Section::List(list)),
+        None => is_name(name).then_some(Section::Table(name)),
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
-use super::slips;
+use super::slips::{advice, cut, not_allowed};
 use super::typed::{fraction, hex_color};
 use crate::util::error::{Error, Result};
 
@@ -97,10 +97,8 @@ impl Values {
         let Some(param) = Param::find(key) else {
             return Err(unknown_key_in_file(key, self, place));
         };
-        let value = check(param, raw).map_err(|got| {
-            let advice = slips::advice(param, raw);
-            not_allowed(place, key, &got, param, advice)
-        })?;
+        let value =
+            check(param, raw).map_err(|got| not_allowed(place, key, &got, param, advice(param, raw)))?;
         self.0.insert(Key::new(key), value);
         Ok(())
     }
@@ -254,24 +252,6 @@ impl Values {
 /// Rounds to the renderer's float32, as its shortest decimal.
 fn round_f32(x: f64) -> f64 {
     (x as f32).to_string().parse().unwrap_or(f64::NAN)
-}
-
-/// The error for a value that a parameter does not allow.
-pub fn not_allowed(place: &Place, key: &str, got: &str, param: &Param, advice: Option<String>) -> Error {
-    let advice = advice.map_or(String::new(), |advice| advice + "; ");
-    let hex = if let Kind::Color(_) = param.kind { " or \"#rrggbb\"" } else { "" };
-    Error::input(
-        format!("{}: {key} = {}", place.0, cut(got)),
-        format!("{advice}allowed: {}{hex}", param.range()),
-    )
-}
-
-/// Cuts a text to 60 characters.
-fn cut(text: &str) -> String {
-    match text.char_indices().nth(60) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.into(),
-    }
 }
 
 /// Checks a raw value against a parameter's kind. The error is the value as text.

@@ -191,7 +191,7 @@ fn a_rate_may_be_a_fraction() {
     assert_eq!(printed(&mut taki(["scene", "front", "--set", "fps=25"])), "fps = 25.0");
     planned(&["--fps", "24000/1001"]).done();
     for wrong in ["24/0", "1e9/1", "/1001", "24/", "a/b", "-24/1"] {
-        planned(&["--fps", wrong]).refused(65, &["animate.fps", "allowed: 0.01 to 1000"]);
+        planned(&[&format!("--fps={wrong}")]).refused(65, &["animate.fps", "allowed: 0.01 to 1000"]);
     }
     // Only a rate is a fraction.
     planned(&["--set", "h=1/2"]).refused(65, &["curves.h", "allowed: 0 to 8"]);

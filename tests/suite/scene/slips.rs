@@ -168,9 +168,11 @@ fn a_slip_in_a_scene_file_is_named_with_its_line() {
             "sheets.fall.widths = 1, 2.5; write the list in brackets: [1, 2.5]",
         ),
         ("[[quads]]", "material = water", "quads.0.material = water; write the text in quotes"),
+        ("[[quads]]", "\n[[quads]]\nmaterial = water", "quads.1.material = water; write the text in quotes"),
     ] {
         let text = format!("version = 1\n{wall}{section}\n{line}\n");
-        fault(&text).refused(65, &["s.toml:8: ", advice]);
+        let place = format!("s.toml:{}: ", 8 + line.matches('\n').count());
+        fault(&text).refused(65, &[&place, advice]);
     }
     // A fault that is no slip of a value keeps the parser's words.
     for (text, words) in [
