@@ -1,29 +1,19 @@
 //! Cuts a large picture into strips that fit the memory.
 
 use crate::engine::overlap;
-use crate::picture::{Grid, PIXEL_BYTES, SURFACE_BYTES, canvas, check_image};
-use crate::place::{Pool, Vertex};
+use crate::picture::{Grid, LEAST_ROWS, WORK_BYTES, check_image, row_bytes};
 use crate::scene::Scene;
 use crate::trace::Prefilter;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use crate::volume::{Storage, dense_bytes, expected_cells, sparse_bytes};
 
-/// Bytes per pixel that bloom adds on the host. Its pyramid takes a third of 12 bytes per pixel, of a
-/// picture that may be widened to a whole multiple of the coarsest level; 12 bytes leave room for that.
-const BLOOM_BYTES: u64 = 12;
-/// Bytes that engines and encoders need at any picture size: staging buffers for read-back (at most 2 × 16
-/// MiB), lines of an EXR before and after compression (3 × 8 MiB), and small buffers.
-const WORK_BYTES: u64 = 64 << 20;
 /// Bytes for the program and the driver: libraries and compiled shaders. Lavapipe with its compiler takes
 /// about 150 MiB. At most a quarter of the budget is set aside for this.
 const PROGRAM_BYTES: u64 = 256 << 20;
 /// Most pixels of a strip, unless one row of raster windows or bloom needs more. Larger strips would take
 /// more memory and save no time.
 const STRIP_PIXELS: u64 = 1 << 23;
-/// Least rows of a strip: every strip rasterises its whole window again, so thin strips waste time.
-const LEAST_ROWS: u64 = 64;
-
 /// Cuts the part `window` of a scene's image into strips of its full width, from the top. Each strip can be
 /// rendered within `memory` bytes, together with the device's targets, the scene's volume, its rocks and its
 /// environment. Strips end between raster windows (see [`Grid`]) where that fits; else they divide one
@@ -64,19 +54,10 @@ pub fn memory_of(
         (None, Storage::Sparse) => sparse_bytes(water.size, expected_cells(water), 0),
     };
     let volume = u64::try_from(volume).unwrap_or(u64::MAX);
-    let vertices: u64 = scene.rocks.iter().map(|rock| rock.vertex_count()).sum();
-    let vertices = vertices + (scene.pools.len() * Pool::VERTICES) as u64;
-    let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
-    let environment = scene.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
-    let parts = canvas(image, overlap::sheets(scene))
-        .saturating_add(volume)
-        .saturating_add(rocks)
-        .saturating_add(environment);
+    let parts = scene.bytes_beside_volume(overlap::sheets(scene)).saturating_add(volume);
     let available = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let blooms = image.look.bloom > 0.0;
-    let pixel =
-        PIXEL_BYTES + if surface_layers { SURFACE_BYTES } else { 0 } + if blooms { BLOOM_BYTES } else { 0 };
-    let row = u64::from(window.width) * pixel;
+    let row = row_bytes(image, window.width, surface_layers);
     let [_, drawn] = Grid::default().size([image.width, image.height]);
     let wanted = (STRIP_PIXELS / u64::from(window.width)).max(u64::from(drawn));
     let wanted = if blooms { u64::from(window.height) } else { wanted };

@@ -10,6 +10,24 @@ pub(crate) const PIXEL_BYTES: u64 = 28 + 6;
 /// Additional host memory per pixel for the raster pass's layers, bytes: depth 4, uv 8, quad 4, normal 12.
 pub(crate) const SURFACE_BYTES: u64 = 28;
 
+/// Bytes per pixel that bloom adds on the host. Its pyramid takes a third of 12 bytes per pixel, of a
+/// picture that may be widened to a whole multiple of the coarsest level; 12 bytes leave room for that.
+const BLOOM_BYTES: u64 = 12;
+
+/// Bytes that engines and encoders need at any picture size: staging buffers for read-back (at most 2 × 16
+/// MiB), lines of an EXR before and after compression (3 × 8 MiB), and small buffers.
+pub(crate) const WORK_BYTES: u64 = 64 << 20;
+
+/// Least rows of a strip: every strip rasterises its whole window again, so thin strips waste time.
+pub(crate) const LEAST_ROWS: u64 = 64;
+
+/// Host memory of a row of `width` pixels, bytes, with the raster pass's layers if `surface_layers`.
+pub(crate) fn row_bytes(image: &Image, width: u32, surface_layers: bool) -> u64 {
+    let surface = if surface_layers { SURFACE_BYTES } else { 0 };
+    let bloom = if image.look.bloom > 0.0 { BLOOM_BYTES } else { 0 };
+    u64::from(width) * (PIXEL_BYTES + surface + bloom)
+}
+
 /// Maximum number of pixels in an image.
 const MAX_PIXELS: u64 = 1 << 36;
 /// Maximum device memory of the raster pass's targets per pixel, bytes, where up to `layers` quads lie under

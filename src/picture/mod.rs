@@ -10,8 +10,8 @@ mod image;
 pub mod resolve;
 pub mod white_balance;
 
+pub(crate) use budget::{LEAST_ROWS, WORK_BYTES, row_bytes};
 pub use budget::{PICTURE_BYTES, canvas, canvas_bytes, check_image, target_bytes};
-pub(crate) use budget::{PIXEL_BYTES, SURFACE_BYTES};
 pub use camera::Camera;
 pub use develop::{Develop, TONE_AGX, TONE_FILMIC};
 pub use frame::{Frame, Layer, Seconds, Surface};

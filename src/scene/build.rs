@@ -97,9 +97,14 @@ pub(super) fn asked_storage(v: &Values) -> Result<StorageChoice> {
     }
 }
 
-/// Returns the storage of a water volume within `memory` bytes, and checks the number of its curve points.
-pub(super) fn water_storage(water: &WaterSpec, asked: StorageChoice, memory: u64) -> Result<Storage> {
-    let storage = storage_of(water, asked, memory)?;
+/// Returns the storage of a water volume within `memory` bytes, of which the picture needs `beside` for other
+/// things, and checks the number of its curve points.
+pub(super) fn water_storage(
+    water: &WaterSpec,
+    asked: StorageChoice,
+    memory: u64,
+    beside: u64,
+) -> Result<Storage> {
     let curves = water.across as u128 * water.deep as u128;
     let points = curves << water.shape.levels;
     if points > 1 << 36 {
@@ -108,7 +113,7 @@ pub(super) fn water_storage(water: &WaterSpec, asked: StorageChoice, memory: u64
             "lower curves.across, curves.deep or curves.levels: at most 6.8e10",
         ));
     }
-    Ok(storage)
+    storage_of(water, asked, memory, beside)
 }
 
 pub(super) fn image(v: &Values) -> Image {

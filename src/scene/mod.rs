@@ -1,6 +1,7 @@
 //! Reading of scenes: files, presets and `--set`, all checked before any work begins.
 
 mod animation;
+mod budget;
 mod build;
 mod ground;
 mod keyframes;
@@ -190,21 +191,21 @@ impl Scene {
         let water = build::water(v);
         let volume_file = build::volume_file(v, folder, limits)?;
         let asked_storage = build::asked_storage(v)?;
-        let storage = match volume_file {
-            Some(_) => Storage::Dense,
-            None => build::water_storage(&water, asked_storage, limits.memory)?,
-        };
+        if volume_file.is_none() {
+            // A volume that is too large by itself is refused with its own numbers.
+            build::water_storage(&water, asked_storage, limits.memory, 0)?;
+        }
         let image = build::image(v);
         check_image(&image, limits.memory)?;
         let camera = build::camera(v)?;
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
-        let parts = Parts {
+        let mut parts = Parts {
             name: name.into(),
             water,
             volume_file,
-            storage,
+            storage: Storage::Dense,
             asked_storage,
             flow: v.float("volume.flow"),
             quads: quads::quads(v)?,
@@ -226,6 +227,10 @@ impl Scene {
             haze: build::haze(v),
             image,
         };
+        if parts.volume_file.is_none() {
+            let beside = parts.least_bytes_beside_volume();
+            parts.storage = build::water_storage(&parts.water, asked_storage, limits.memory, beside)?;
+        }
         Ok(Scene { values: Some(values), parts })
     }
 
@@ -399,8 +404,8 @@ impl Scene {
             && values.float("volume.alpha") != volume.alpha
         {
             warnings.push(format!(
-                "volume.alpha = {} has no effect: volume.file brings its own alpha, {}; change trace.sigma or \
-                 trace.tau, or write the file with another alpha",
+                "volume.alpha = {} has no effect: volume.file brings its own alpha, {}; change trace.sigma \
+                 or trace.tau, or write the file with another alpha",
                 values.float("volume.alpha"),
                 volume.alpha
             ));

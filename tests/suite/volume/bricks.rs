@@ -9,10 +9,11 @@ use proptest::test_runner::RngSeed;
 use taki::curve::{CurveShape, levels_for};
 use taki::engine::gpu::{Filling, GpuRenderer};
 use taki::engine::{RenderOptions, cpu};
-use taki::job::VolumeMemo;
+use taki::job::{VolumeMemo, memory_of, strips};
 use taki::picture::Frame;
 use taki::scene::{Limits, Scene, presets};
 use taki::util::monitor::Unwatched;
+use taki::util::window::Window;
 use taki::volume::{
     Bricks, Cell, Cells, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, build_sparse_water,
     build_water, expected_cells, read_npz, sparse_bytes, write_npz,
@@ -281,12 +282,16 @@ fn load(sets: &[&str], memory: u64) -> taki::Result<Scene> {
 
 #[test]
 fn auto_is_dense_where_that_fits_and_sparse_where_only_that_does() {
-    const LARGE: [&str; 3] = ["volume.nx=128", "volume.ny=128", "volume.nz=128"];
+    const LARGE: [&str; 5] =
+        ["volume.nx=128", "volume.ny=128", "volume.nz=128", "image.width=16", "image.height=16"];
     let storage = |sets: &[&str], memory: u64| load(&[&LARGE[..], sets].concat(), memory).map(|s| s.storage);
-    // Dense storage needs 128³ · 24 bytes. The test uses that budget and one byte less.
+    // 24 bytes for each of 128³ cells, and what the picture takes besides: one byte more and one less.
     const DENSE: u64 = 24 << 21;
-    assert_eq!(storage(&[], DENSE).unwrap(), Storage::Dense);
-    assert_eq!(storage(&[], DENSE - 1).unwrap(), Storage::Sparse);
+    let dense = load(&[&LARGE[..], &["volume.storage=dense"]].concat(), 1 << 32).unwrap();
+    let (need, _) = memory_of(&dense, Window::whole([16, 16]), true, 1 << 32).unwrap();
+    assert!((DENSE + (64 << 20)..DENSE + (65 << 20)).contains(&need), "{need}");
+    assert_eq!(storage(&[], need).unwrap(), Storage::Dense);
+    assert_eq!(storage(&[], need - 1).unwrap(), Storage::Sparse);
     assert_eq!(storage(&["volume.storage=sparse"], 1 << 32).unwrap(), Storage::Sparse);
     assert_eq!(storage(&["volume.storage=dense"], 1 << 32).unwrap(), Storage::Dense);
     // Building a dense volume takes 20 bytes a cell.
@@ -298,6 +303,29 @@ fn auto_is_dense_where_that_fits_and_sparse_where_only_that_does() {
     assert_eq!(refused.exit_code(), 65);
     assert!(refused.to_string().contains("trace.filter=none"), "{refused}");
     assert_eq!(storage(&["volume.storage=spares"], 1 << 32).unwrap_err().exit_code(), 65);
+}
+
+#[test]
+fn auto_is_refused_only_where_either_storage_is() {
+    let whole = Window::whole([16, 16]);
+    let size = ["image.width=16", "image.height=16"];
+    let thin = ["volume.nx=160", "volume.ny=160", "volume.nz=160"];
+    // So many strands that sparse storage takes more than dense.
+    let full = ["volume.nx=96", "volume.ny=96", "volume.nz=96", "curves.across=150", "curves.deep=150"];
+    for (name, volume, limits) in [("thin", &thin[..], 80..170), ("full", &full[..], 60..100)] {
+        let works = |storage: &str, memory: u64| {
+            let sets = [volume, &size, &[storage]].concat();
+            load(&sets, memory).and_then(|scene| strips(&scene, whole, true, memory)).is_ok()
+        };
+        let mut refused = 0;
+        for mib in limits {
+            let [auto, dense, sparse] =
+                ["auto", "dense", "sparse"].map(|word| works(&format!("volume.storage={word}"), mib << 20));
+            assert_eq!(auto, dense || sparse, "{name} {mib}: dense {dense}, sparse {sparse}");
+            refused += u32::from(!auto);
+        }
+        assert!((1..40).contains(&refused), "{name}: {refused}");
+    }
 }
 
 #[test]
