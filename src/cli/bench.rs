@@ -329,7 +329,7 @@ fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<
 
 /// Measures whole processes, from start to written PNG: a figure, and the default scene with one sample.
 fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
-    let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e))?;
+    let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e.kind()))?;
     let program = std::env::current_exe().map_err(|e| Error::read("taki".as_ref(), e))?;
     let engine = match args.engine.engine {
         EngineChoice::Auto => "auto",

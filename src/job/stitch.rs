@@ -15,8 +15,8 @@ const PIECE_BYTES: usize = 1 << 20;
 /// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
 /// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
 /// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
-/// crop, plus the rows that wait for the PNG encoder (about 1 MiB). A file that is no picture is replaced only
-/// with `overwrite`.
+/// crop, plus the rows that wait for the PNG encoder (about 1 MiB). A file that is no picture is replaced
+/// only with `overwrite`.
 ///
 /// Returns the figures of a PNG: the sum of its crops' figures, without crops that lie wholly inside another.
 /// If the remaining crops overlap, or one carries no figures, the sum is unknown: the file gets none and the
