@@ -6,7 +6,7 @@ use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
 use super::slips::{advice, cut, not_allowed};
 use super::typed::{fraction, hex_color};
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 
 /// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
 #[derive(Clone, Debug, PartialEq)]
