@@ -31,6 +31,8 @@ pub struct Baked {
     pub brightest: f32,
     /// Number of values in the file that were below zero.
     pub negative: u64,
+    /// What a user should know about the file, a sentence each.
+    pub notes: Vec<String>,
     lights: Mutex<Option<Lights>>,
 }
 
@@ -49,7 +51,7 @@ const MIN_SUMMED: [u32; 2] = [128, 64];
 
 impl Baked {
     /// Computes everything that depends on the map alone.
-    pub fn new(map: Map, sun: DVec3, negative: u64) -> Baked {
+    pub fn new(map: Map, sun: DVec3, negative: u64, notes: Vec<String>) -> Baked {
         let enlarged = map.enlarged(MIN_SUMMED[0], MIN_SUMMED[1]);
         let summed = enlarged.as_ref().unwrap_or(&map);
         Baked {
@@ -58,6 +60,7 @@ impl Baked {
             sun,
             brightest: map.texels.iter().flatten().copied().fold(0.0, f32::max),
             negative,
+            notes,
             map: Arc::new(map),
             lights: Mutex::default(),
         }
@@ -128,11 +131,11 @@ impl EnvironmentMemo {
         let baked = Arc::new(match source {
             Source::Sky(sky) => {
                 let baked = sky.bake();
-                Baked::new(baked.map, baked.sun, 0)
+                Baked::new(baked.map, baked.sun, 0, Vec::new())
             }
             Source::File(path) => {
                 let read = file::read(path, memory)?;
-                Baked::new(read.map, DVec3::ZERO, read.negative)
+                Baked::new(read.map, DVec3::ZERO, read.negative, read.notes)
             }
         });
         cache.insert(0, (key, baked.clone()));

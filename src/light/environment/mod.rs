@@ -203,7 +203,8 @@ impl Environment {
     pub fn warnings(&self) -> Vec<String> {
         let Source::File(path) = &self.source else { return Vec::new() };
         let path = path.display();
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> =
+            self.baked.notes.iter().map(|note| format!("environment map {path}: {note}")).collect();
         if self.baked.negative > 0 {
             let n = self.baked.negative;
             warnings.push(format!("environment map {path}: {n} values below zero were replaced by 0"));

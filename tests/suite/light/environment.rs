@@ -1,7 +1,8 @@
-//! Environments against closed forms in float64. `file` tests map files and their faults, `sky` the sky, and
-//! `scene` both engines.
+//! Environments against closed forms in float64. `file` tests map files and their faults, `foreign` maps of
+//! other programs, `sky` the sky, `scene` both engines.
 
 mod file;
+mod foreign;
 mod scene;
 mod sky;
 

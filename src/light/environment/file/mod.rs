@@ -1,0 +1,140 @@
+//! Environment maps in files: Radiance `.hdr` (RGBE) and OpenEXR `.exr`.
+//!
+//! [`radiance`] and [`open_exr`] decode. [`channels`] finds the picture among the channels of an EXR, and
+//! [`colour`] leads from the file's colour space to linear Rec. 709, which a file without a word about its
+//! colours is taken for.
+//!
+//! Values of an `.hdr` file are divided by its EXPOSURE and COLORCORR. An alpha channel is ignored, because the
+//! colours of an EXR are multiplied by it already. Values below zero, which resampling leaves beside bright
+//! texels, are replaced by 0 and counted. An infinite value of an EXR becomes the largest that a half can hold.
+//! A file with a value that is not a number or larger than [`MAX_RADIANCE`] is refused.
+
+mod channels;
+mod colour;
+mod open_exr;
+mod radiance;
+
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::path::Path;
+
+use super::map::Map;
+use crate::util::error::{Error, Result};
+
+/// Maximum radiance of a texel. The sun's disc has 2e5.
+pub const MAX_RADIANCE: f32 = 1e9;
+/// Maximum size of a file's header, bytes.
+const HEADER_BYTES: u64 = 1 << 20;
+/// Maximum number of columns or rows. A texture coordinate in float32 cannot distinguish more.
+const MAX_SIDE: u64 = 1 << 17;
+/// Memory per texel, bytes: on the host, on the device, and in the decoder's own copy.
+const TEXEL_BYTES: u128 = 16 + 16 + 16;
+
+/// Map read from a file.
+#[derive(Debug)]
+pub struct FileMap {
+    /// The map.
+    pub map: Map,
+    /// Number of values below zero that were replaced by 0.
+    pub negative: u64,
+    /// What a user should know about the file, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a map. The size that the file states is compared with `budget`, in bytes, before memory is allocated
+/// for it.
+///
+/// # Errors
+/// - [`Error::Input`], which names the file, if the file is missing, of another format or broken, or if it
+///   holds a value that is not a radiance.
+/// - [`Error::Memory`] if the map is too large.
+/// - [`Error::Io`] if the file cannot be read.
+pub fn read(path: &Path, budget: u64) -> Result<FileMap> {
+    let meta = std::fs::metadata(path).map_err(|e| match e.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => bad(path, e),
+        _ => Error::read(path, e),
+    })?;
+    if !meta.is_file() {
+        return Err(bad(path, "not a regular file"));
+    }
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let file = || File::open(path).map(BufReader::new).map_err(|e| Error::read(path, e));
+    match extension.as_deref() {
+        Some("hdr") => radiance::read(path, file()?, budget),
+        Some("exr") => open_exr::read(path, file()?, budget),
+        _ => Err(bad(path, "its name ends in neither .hdr nor .exr")),
+    }
+}
+
+fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
+    bad_with(path, why, "give an equirectangular map as Radiance .hdr or as .exr with channels R, G and B")
+}
+
+/// An error with its own way out.
+fn bad_with(path: &Path, why: impl std::fmt::Display, fix: &str) -> Error {
+    // Messages of libraries may span several lines.
+    let why = why.to_string().replace(['\n', '\r'], " ");
+    Error::input(format!("environment map {}: {why}", path.display()), fix)
+}
+
+/// Reads the bytes that may hold the header.
+fn start_of(path: &Path, file: &mut BufReader<File>) -> Result<Vec<u8>> {
+    let mut start = Vec::new();
+    file.take(HEADER_BYTES).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
+    Ok(start)
+}
+
+/// Says how many texels lie outside Rec. 709.
+fn outside(texels: u64) -> Option<String> {
+    (texels > 0).then(|| format!("{texels} texels lie outside Rec. 709: they were moved to its border"))
+}
+
+/// Turns an error of reading into one of the program. A file that ends too early or contains impossible
+/// offsets is broken; any other failure is an I/O error.
+fn unreadable(path: &Path, e: std::io::Error) -> Error {
+    match e.kind() {
+        ErrorKind::UnexpectedEof | ErrorKind::InvalidInput | ErrorKind::InvalidData => bad(path, e),
+        _ => Error::read(path, e),
+    }
+}
+
+fn check_size(path: &Path, width: u64, height: u64, more_bytes: u128, budget: u64) -> Result<()> {
+    if width == 0 || height == 0 {
+        return Err(bad(path, format!("{width}×{height} texels")));
+    }
+    let need = u128::from(width) * u128::from(height) * TEXEL_BYTES + more_bytes;
+    if need > u128::from(budget) {
+        return Err(Error::memory(
+            format!("environment map {} of {width}×{height} texels", path.display()),
+            need,
+            budget,
+            "make it smaller or raise --memory",
+        ));
+    }
+    if width.max(height) > MAX_SIDE {
+        return Err(bad(path, format!("{width}×{height} texels: at most {MAX_SIDE} on a side")));
+    }
+    Ok(())
+}
+
+/// Replaces negative and subnormal values by 0, and refuses a map with a value that is not a radiance.
+fn checked(path: &Path, mut map: Map, notes: Vec<String>) -> Result<FileMap> {
+    let mut negative = 0;
+    for (i, texel) in map.texels.iter_mut().enumerate() {
+        for value in &mut texel[..3] {
+            if !value.is_finite() || *value > MAX_RADIANCE {
+                let (x, y) = (i % map.width as usize, i / map.width as usize);
+                return Err(bad(
+                    path,
+                    format!("texel ({x}, {y}) has the radiance {value}: 0 to {MAX_RADIANCE:e} are allowed"),
+                ));
+            }
+            negative += u64::from(*value < 0.0);
+            *value = value.max(0.0);
+            if !value.is_normal() {
+                *value = 0.0;
+            }
+        }
+    }
+    Ok(FileMap { map, negative, notes })
+}
