@@ -146,6 +146,13 @@ impl Space {
         Some(Space { curve, rec709, luminance: xyz.row(1) })
     }
 
+    /// The space of Radiance's XYZE: X, Y and Z whose white has equal energy.
+    pub fn radiance_xyz() -> Option<Space> {
+        let rgb = xyz_from_rgb(&REC709)?.inverse();
+        let rec709 = rgb * adapted(DVec3::ONE, white(&REC709));
+        Some(Space { curve: Curve::Linear, rec709: Some(rec709), luminance: DVec3::Y })
+    }
+
     /// Converts texels to linear Rec. 709. A colour outside it loses its negative components. Returns the
     /// number of texels that lose more than a thousandth of their largest component.
     pub fn convert(&self, texels: &mut [[f32; 4]]) -> u64 {

@@ -1,4 +1,4 @@
-//! Environment maps in files: Radiance `.hdr` (RGBE) and OpenEXR `.exr`.
+//! Environment maps in files: Radiance `.hdr` (RGBE, XYZE) and OpenEXR `.exr`.
 //!
 //! [`radiance`] and [`open_exr`] decode. [`channels`] finds the picture among the channels of an EXR, and
 //! [`colour`] leads from the file's colour space to linear Rec. 709, which a file without a word about its

@@ -1,4 +1,4 @@
-//! Maps from other programs: windows, colour spaces, compressions, channel names and suns.
+//! Maps from other programs: windows, colour spaces, compressions, channel names, suns and orientations.
 
 use std::io::Cursor;
 
@@ -263,4 +263,67 @@ fn a_cube_is_refused_as_one() {
     layer.attributes.environment_map = Some(attribute::EnvironmentMap::Cube);
     let (what, fix) = refusal(read("a.exr", &exr(plain(), vec![layer])));
     assert!(what.contains("cube") && fix.contains("-latlong"), "{what}: {fix}");
+}
+
+/// Six texels, 3 wide and 2 high, whose red is 1 to 6 in the order of the file.
+fn hdr(header: &str, size: &str) -> Vec<u8> {
+    let texels = (1..=6u8).flat_map(|i| [i * 32, 64, 128, 128]);
+    format!("#?RADIANCE\n{header}\n{size}").into_bytes().into_iter().chain(texels).collect()
+}
+
+#[test]
+fn a_radiance_picture_is_read_in_its_eight_orientations() {
+    let orientations = [
+        ("-Y 2 +X 3", [1, 2, 3, 4, 5, 6]),
+        ("-Y 2 -X 3", [3, 2, 1, 6, 5, 4]),
+        ("+Y 2 +X 3", [4, 5, 6, 1, 2, 3]),
+        ("+Y 2 -X 3", [6, 5, 4, 3, 2, 1]),
+        ("+X 3 -Y 2", [1, 3, 5, 2, 4, 6]),
+        ("-X 3 -Y 2", [5, 3, 1, 6, 4, 2]),
+        ("+X 3 +Y 2", [2, 4, 6, 1, 3, 5]),
+        ("-X 3 +Y 2", [6, 4, 2, 5, 3, 1]),
+    ];
+    for (size, right) in orientations {
+        let map = read("a.hdr", &hdr("FORMAT=32-bit_rle_rgbe\n", &format!("{size}\n"))).unwrap().map;
+        assert_eq!((map.width, map.height), (3, 2), "{size}");
+        let red: Vec<u8> = map.texels.iter().map(|t| (t[0] * 8.0) as u8).collect();
+        assert_eq!(red, right, "{size}");
+    }
+    for size in ["-Y 2 +Y 3", "Y 2 X 3", "-Y 2", "-Y 2 +X 3 4", "-Y -2 +X 3"] {
+        let (what, _) = refusal(read("a.hdr", &hdr("", &format!("{size}\n"))));
+        assert!(what.contains(size), "{what}");
+    }
+}
+
+#[test]
+fn line_ends_of_other_systems_end_a_line() {
+    let header = "FORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n";
+    let plain = read("a.hdr", &hdr(header, "-Y 2 +X 3\n")).unwrap().map;
+    let text = "#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\nEXPOSURE=2\r\n\r\n-Y 2 +X 3\r\n";
+    let file: Vec<u8> = text.bytes().chain((1..=6u8).flat_map(|i| [i * 32, 64, 128, 128])).collect();
+    assert_eq!(read("a.hdr", &file).unwrap().map.texels, plain.texels);
+}
+
+#[test]
+fn xyze_and_primaries_become_rec_709() {
+    // An equal X, Y and Z is white. Luminance is in cd/m², 179 to a unit of radiance.
+    let text = "#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 2\n";
+    let texels = [179, 179, 179, 136, 100, 50, 20, 136];
+    let map = read("a.hdr", &[text.as_bytes(), &texels].concat()).unwrap();
+    assert_near([map.map.texels[0][0], map.map.texels[0][1], map.map.texels[0][2]], [1.0; 3]);
+    let [r, g, b, _] = map.map.texels[1];
+    assert!(r > 1.0 && g < 0.3 && b < 0.2, "{r} {g} {b}");
+    // Another white: grey stays grey. Zeros say nothing.
+    let with = |line: &str| first(read("a.hdr", &hdr(line, "-Y 2 +X 3\n")));
+    let grey = |line: &str| {
+        let text = format!("#?RADIANCE\n{line}\n-Y 1 +X 1\n");
+        first(read("a.hdr", &[text.as_bytes(), &[128, 128, 128, 129]].concat()))
+    };
+    assert_near(grey("PRIMARIES=.64 .33 .29 .6 .15 .06 .333333 .333333\n"), [1.0; 3]);
+    assert_eq!(with("PRIMARIES=0 0 0 0 0 0 0 0\n"), with(""));
+    assert_eq!(with("PRIMARIES= .64 .33 .3 .6 .15 .06 .3127 .329\n"), with(""));
+    let wide = with("PRIMARIES=.708 .292 .17 .797 .131 .046 .3127 .329\n");
+    assert!(wide[2] > with("")[2], "{wide:?}");
+    let (what, _) = refusal(read("a.hdr", &hdr("FORMAT=16-bit_cmyk\n", "-Y 2 +X 3\n")));
+    assert!(what.contains("16-bit_cmyk"), "{what}");
 }
