@@ -17,7 +17,7 @@ use crate::output::frame::Figures;
 use crate::picture::Layer;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
-use crate::util::monitor::Monitor;
+use crate::util::monitor::{Monitor, Unwarned};
 use crate::util::window::Window;
 
 #[derive(Args)]
@@ -65,7 +65,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
-    let (animation, measured) = exposed(args.scene.animation(&more, &limits)?, terminal)?;
+    // The volume is made once more for the picture and warns then.
+    let (animation, measured) = exposed(args.scene.animation(&more, &limits)?, &Unwarned(terminal))?;
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {

@@ -9,7 +9,7 @@ use super::{SceneOptions, default_output, memory};
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
-use crate::volume::{Statistics, StorageChoice, read_npz, write_npz};
+use crate::volume::{ReadOptions, Statistics, read_npz, write_npz};
 
 #[derive(Args)]
 pub struct VolumeArgs {
@@ -65,9 +65,10 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
         VolumeCommand::Info { file, json, memory } => {
-            let statistics =
-                read_npz(file, StorageChoice::Auto, memory.saturating_mul(1 << 20))?.statistics();
-            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) })
+            let options = ReadOptions { budget: memory.saturating_mul(1 << 20), ..Default::default() };
+            let statistics = read_npz(file, &options, terminal)?.statistics();
+            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
+            Ok(())
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, set_density_and_reflection,
+    Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection, set_density_and_reflection,
 };
 
 /// Keeps the volume texture of the last scene.
@@ -23,8 +23,15 @@ pub struct VolumeMemo {
 #[derive(Clone, PartialEq)]
 enum Source {
     Water(WaterSpec, Storage),
-    /// Path, requested storage, and modification time and size in bytes of the file, to notice changes.
-    File(PathBuf, StorageChoice, Option<SystemTime>, u64),
+    File {
+        path: PathBuf,
+        storage: StorageChoice,
+        /// Modification time and size in bytes, to notice changes.
+        modified: Option<SystemTime>,
+        bytes: u64,
+        /// k_d and k_s that the scene gives to a file without them.
+        k: Option<[f32; 2]>,
+    },
 }
 
 impl VolumeMemo {
@@ -53,8 +60,13 @@ impl VolumeMemo {
             None => Source::Water(scene.water, scene.storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();
-                let changed = meta.as_ref().and_then(|m| m.modified().ok());
-                Source::File(path.clone(), scene.asked_storage, changed, meta.map_or(0, |m| m.len()))
+                Source::File {
+                    path: path.clone(),
+                    storage: scene.asked_storage,
+                    modified: meta.as_ref().and_then(|m| m.modified().ok()),
+                    bytes: meta.map_or(0, |m| m.len()),
+                    k: (!has_reflection(path)).then_some([scene.water.k_d, scene.water.k_s]),
+                }
             }
         };
         let (volume, cost) = match (self.last.take(), &source) {

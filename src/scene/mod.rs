@@ -43,8 +43,8 @@ use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    PyramidSpec, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water,
-    kept_water, read_npz,
+    PyramidSpec, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water,
+    build_water, kept_water, read_npz,
 };
 
 /// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
@@ -272,7 +272,10 @@ impl Scene {
     /// those of `monitor`.
     pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
         match (&self.volume_file, self.storage) {
-            (Some(path), _) => read_npz(path, self.asked_storage, memory),
+            (Some(path), _) => {
+                let k = [self.water.k_d, self.water.k_s];
+                read_npz(path, &ReadOptions { storage: self.asked_storage, budget: memory, k }, monitor)
+            }
             (None, Storage::Dense) => build_water(&self.water, monitor),
             (None, Storage::Sparse) => build_sparse_water(&self.water, memory, monitor),
         }

@@ -22,3 +22,13 @@ impl Monitor for Unwatched {
     }
     fn warn(&self, _: &str) {}
 }
+
+/// Monitor that passes on progress but no warnings, for work that is done once more later.
+pub struct Unwarned<'a>(pub &'a dyn Monitor);
+
+impl Monitor for Unwarned<'_> {
+    fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()> {
+        self.0.progress(stage, done, total)
+    }
+    fn warn(&self, _: &str) {}
+}

@@ -4,6 +4,12 @@
 //! The arrays hold the values that the renderer uses, as they are after packing. `rho` includes α; `v` is
 //! unit or zero. `alpha` makes reading exact, because the cells hold ρ/α. A file without it is read with α =
 //! 1.
+//!
+//! Files of other programs may hold numbers of other types, in Fortran order, and no `k`. They are converted
+//! while they are read, with a note. An array in C order is read number by number. An array in Fortran order
+//! is read several times if memory is short: each time the numbers of one range of cells are kept.
+
+mod array;
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
@@ -13,18 +19,30 @@ use glam::Vec3;
 use npyz::WriterBuilder;
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
+use self::array::{Number, Numbers, open_array};
 use super::bricks::{BRICK, Bricks, Packer};
 use super::storage::{Storage, StorageChoice, check_stored, file_storage};
 use super::{Cell, Cells, VolumeTexture};
 use crate::util::error::{Error, Result};
-
-/// Longest header of an array, bytes. NumPy pads the headers of arrays of numbers to 128 bytes. The bound
-/// protects the recursive parser of headers from hostile files.
-const MAX_HEADER_BYTES: u64 = 512;
+use crate::util::monitor::Monitor;
 
 /// Largest distance of |v| from 1 at which v counts as a unit vector: float32 rounding, with room for files
 /// that other programs wrote in lower precision.
 const UNIT_TOLERANCE: f32 = 1e-3;
+
+/// Largest distance of |v| from 1 at which v is normalised. Interpolated and averaged directions lie farther
+/// away, and so do velocities.
+const NEAR_UNIT: f32 = 1e-2;
+
+/// Advice that shows the whole format.
+const FORMAT: &str = "a volume file is an .npz with rho [nz,ny,nx] and v [nz,ny,nx,3], and perhaps k \
+                      [nz,ny,nx,2] and alpha; see docs/scenes-and-files.md#volume-files";
+const FIX_V: &str = "divide v by its length where it has one: n = numpy.linalg.norm(v, axis=-1, \
+                     keepdims=True); v = v / numpy.where(n > 0, n, 1)";
+const FIX_V_FINITE: &str = "empty such cells: bad = ~numpy.isfinite(v).all(-1); v[bad] = 0; rho[bad] = 0";
+const FIX_K: &str = "k = numpy.clip(numpy.nan_to_num(k), 0, 1) brings it into the range; without k all cells \
+                     take volume.k_d and volume.k_s";
+const FIX_ALPHA: &str = "save alpha as one number from 0 to 1, or leave alpha out, which means 1";
 
 /// Writes `volume` to `out` as `.npz`. The bytes depend on the volume alone.
 ///
@@ -107,90 +125,168 @@ fn write_array<W: Write + Seek>(
     buffered.flush()
 }
 
-/// Reads a volume file into at most `budget` bytes. Every value is checked, and nothing of the size that the
-/// file claims is allocated before that size is compared with the budget.
-///
-/// `asked` sets the storage; with [`StorageChoice::Auto`] it is sparse if a dense volume does not fit.
+/// How a volume file is read.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadOptions {
+    /// Storage of the cells. [`StorageChoice::Auto`] is sparse if a dense volume does not fit.
+    pub storage: StorageChoice,
+    /// Memory that reading and the volume may take, bytes.
+    pub budget: u64,
+    /// k_d and k_s of every cell, for a file without `k`.
+    pub k: [f32; 2],
+}
+
+/// The defaults of `--memory`, `volume.k_d` and `volume.k_s`.
+impl Default for ReadOptions {
+    fn default() -> Self {
+        ReadOptions { storage: StorageChoice::Auto, budget: 4 << 30, k: [0.5; 2] }
+    }
+}
+
+/// Reads a volume file. Every value is checked, and nothing of the size that the file claims is allocated
+/// before that size is compared with the budget. `monitor` is told what was converted.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if there is none or it is not a valid volume
-/// file, and [`Error::Memory`] if the volume does not fit into the budget.
-pub fn read_npz(path: &Path, asked: StorageChoice, budget: u64) -> Result<VolumeTexture> {
-    let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
+/// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if it is not a valid volume file, and
+/// [`Error::Memory`] if the volume does not fit into the budget.
+pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+    let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
     if !meta.is_file() {
         return Err(Error::input(
             format!("{} is not a regular file", path.display()),
             "give an .npz file made by `taki volume build` or NumPy's savez",
         ));
     }
-    let file = File::open(path).map_err(|e| Error::open(path, e))?;
-    let mut reader = Reader {
-        path,
-        asked,
-        budget,
-        zip: ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string()))?,
-    };
-    reader.volume()
+    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string(), FORMAT))?;
+    let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
+    let volume = reader.volume()?;
+    reader.notes.iter().for_each(|note| monitor.warn(&format!("{}: {note}", path.display())));
+    Ok(volume)
+}
+
+/// Whether the volume file has reflection coefficients of its own. A file that cannot be read counts as one
+/// that has.
+pub fn has_reflection(path: &Path) -> bool {
+    let zip = File::open(path).ok().and_then(|file| ZipArchive::new(BufReader::new(file)).ok());
+    zip.is_none_or(|zip| zip.index_for_name("k.npy").is_some())
 }
 
 /// Error about the contents of the file.
-fn invalid(path: &Path, what: String) -> Error {
-    Error::input(
-        format!("{}: {what}", path.display()),
-        "a volume file is an .npz with rho float32 [nz,ny,nx], v float32 [nz,ny,nx,3], \
-         k float32 [nz,ny,nx,2]",
-    )
+fn invalid(path: &Path, what: String, fix: impl Into<String>) -> Error {
+    Error::input(format!("{}: {what}", path.display()), fix)
+}
+
+/// A fault in a cell and advice on how to mend it.
+struct Fault(String, String);
+
+type Checked = std::result::Result<(), Fault>;
+
+/// What the header of an array says.
+struct Head {
+    name: &'static str,
+    shape: Vec<u64>,
+    number: Number,
+    /// Whether the first index varies fastest, not the last.
+    fortran: bool,
+    /// Whether the numbers are codes 0 to 255 of 0 to 1.
+    codes: bool,
+}
+
+impl Head {
+    /// Tells how the array differs from one that taki writes.
+    fn note(&self) -> Option<String> {
+        let number = (self.number != Number::FLOAT32).then(|| self.number.words());
+        let from = match (number, self.fortran) {
+            (None, false) => return None,
+            (None, true) => "Fortran order".into(),
+            (Some(number), false) => number,
+            (Some(number), true) => format!("{number} in Fortran order"),
+        };
+        let codes = if self.codes { ": codes 0 to 255 mean 0 to 1" } else { "" };
+        Some(format!("{} is converted from {from}{codes}", self.name))
+    }
 }
 
 /// Reader of one volume file.
 struct Reader<'a> {
     path: &'a Path,
-    asked: StorageChoice,
-    budget: u64,
+    options: &'a ReadOptions,
+    /// Memory for numbers of arrays in Fortran order, bytes.
+    spare: u64,
     zip: ZipArchive<BufReader<File>>,
+    /// What was converted.
+    notes: Vec<String>,
 }
 
 impl Reader<'_> {
     fn volume(&mut self) -> Result<VolumeTexture> {
-        let alpha = self.alpha()?;
-        let shape = self.each("rho", None, |_, _: [f32; 1]| Ok(()))?;
+        let (alpha, mut slack) = self.alpha()?;
+        let rho = self.head("rho")?;
+        let shape = &rho.shape;
         let &[nz, ny, nx] = shape.as_slice() else {
-            return Err(invalid(self.path, format!("rho has shape {shape:?}, not [nz,ny,nx]")));
+            return Err(self.fault(&rho, format!("shape is {shape:?}, not [nz,ny,nx]"), FORMAT));
         };
         let size = [nx, ny, nz].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         if size.contains(&0) {
-            return Err(invalid(
-                self.path,
-                format!("rho has shape {shape:?}: a volume has at least one cell"),
-            ));
+            let what = format!("shape is {shape:?}: a volume has at least one cell");
+            return Err(self.fault(&rho, what, FORMAT));
         }
-        let mut cells = match file_storage(size, self.asked, self.budget)? {
-            Storage::Dense => self.directions(size)?,
-            Storage::Sparse => self.packed_directions(size)?,
+        let ReadOptions { storage, budget, k } = *self.options;
+        let mut cells = match file_storage(size, storage, budget)? {
+            Storage::Dense => {
+                let cells = nx * ny * nz * size_of::<Cell>() as u64;
+                // This holds the largest array, v: `file_storage` has asked for a vector beside each cell.
+                self.spare = budget - cells;
+                self.directions(size)?
+            }
+            Storage::Sparse => {
+                // Bricks may fill half of the budget, because a copy on the device is to fit beside them.
+                self.spare = budget / 4;
+                self.packed_directions(size)?
+            }
         };
+        slack += alpha * 1e-6 + rho.number.rounding(alpha, rho.codes);
         let mut cursor = CellCursor::new(size);
-        self.each("rho", Some(&[nz, ny, nx]), |_, [value]: [f32; 1]| {
+        self.each(&rho, size, |_, [value]: [f32; 1]| {
             let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&value) {
-                return Err(format!("{value} is outside 0..=1"));
+                return Err(Fault(
+                    format!("{value} is outside 0..=1"),
+                    format!("rho = numpy.clip(numpy.nan_to_num(rho), 0, {alpha}) brings it into the range"),
+                ));
             }
-            if value > alpha * 1.000001 {
-                return Err(format!("{value} is more than the file's alpha {alpha}"));
+            if value > alpha + slack {
+                return Err(Fault(
+                    format!("{value} is more than the file's alpha {alpha}"),
+                    "leave alpha out, or save the largest rho as alpha".into(),
+                ));
             }
             let cell = cell.filter(|cell| cell.has_direction());
             if value > 0.0 && cell.is_none() {
-                return Err(format!("{value} where v is zero: a cell with density needs a direction"));
+                return Err(Fault(
+                    format!("{value} where v is zero: a cell with density needs a direction"),
+                    "empty such cells: rho[(v == 0).all(-1)] = 0".into(),
+                ));
             }
             if let Some(cell) = cell {
-                *cell = cell.with_density(if alpha > 0.0 { value / alpha } else { 0.0 }, 0.0, 0.0);
+                *cell = cell.with_density(if alpha > 0.0 { value / alpha } else { 0.0 }, k[0], k[1]);
             }
             Ok(())
         })?;
+        if self.zip.index_for_name("k.npy").is_none() {
+            self.notes.push(format!(
+                "k is missing: all cells take k_d = {} and k_s = {} (volume.k_d, volume.k_s)",
+                k[0], k[1]
+            ));
+            return Ok(VolumeTexture { size, alpha, cells: cells.into() });
+        }
+        let head = self.head("k")?;
         let mut cursor = CellCursor::new(size);
-        self.each("k", Some(&[nz, ny, nx, 2]), |_, [k_d, k_s]: [f32; 2]| {
+        self.each(&head, size, |_, [k_d, k_s]: [f32; 2]| {
             let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&k_d) || !(0.0..=1.0).contains(&k_s) {
-                return Err(format!("({k_d}, {k_s}) is outside 0..=1"));
+                return Err(Fault(format!("({k_d}, {k_s}) is outside 0..=1"), FIX_K.into()));
             }
             if let Some(cell) = cell.filter(|cell| cell.has_direction()) {
                 *cell = cell.with_reflection(k_d, k_s);
@@ -215,7 +311,7 @@ impl Reader<'_> {
     fn packed_directions(&mut self, size: [u32; 3]) -> Result<CellBuffer> {
         let area = size[0] as usize * size[1] as usize;
         let (all, slab) = (area * size[2] as usize, area * BRICK as usize);
-        let budget = self.budget;
+        let budget = self.options.budget;
         let mut packer = Packer::new(size);
         let mut layers: Vec<Cell> = Vec::with_capacity(slab.min(all));
         let mut too_large = None;
@@ -226,7 +322,7 @@ impl Reader<'_> {
                 layers.clear();
                 if let Err(e) = check_stored(size, packer.count(), 0, budget) {
                     too_large = Some(e);
-                    return Err(String::new());
+                    return Err(Fault(String::new(), String::new()));
                 }
             }
             Ok(())
@@ -236,83 +332,177 @@ impl Reader<'_> {
     }
 
     /// Gives each direction to `take`, packed, with the linear index of its cell.
-    fn each_direction(
-        &mut self,
-        size: [u32; 3],
-        mut take: impl FnMut(usize, Cell) -> std::result::Result<(), String>,
-    ) -> Result<()> {
-        let [nx, ny, nz] = size.map(u64::from);
-        self.each("v", Some(&[nz, ny, nx, 3]), |i, v: [f32; 3]| {
+    fn each_direction(&mut self, size: [u32; 3], mut take: impl FnMut(usize, Cell) -> Checked) -> Result<()> {
+        let (mut normalised, mut shortest, mut longest) = (0u64, f32::INFINITY, 0f32);
+        let head = self.head("v")?;
+        self.each(&head, size, |i, v: [f32; 3]| {
             let v = Vec3::from_array(v);
             let length = v.length();
-            if v == Vec3::ZERO || (length - 1.0).abs() <= UNIT_TOLERANCE {
-                take(i, Cell::from_direction(v))
-            } else {
-                Err(format!("{v:?} has length {length}: v is unit or zero"))
+            let off = (length - 1.0).abs();
+            if v != Vec3::ZERO && off > UNIT_TOLERANCE {
+                normalised += 1;
+                (shortest, longest) = (shortest.min(length), longest.max(length));
             }
-        })
-        .map(drop)
-    }
-
-    /// Reads α, or 1 from a file that has none.
-    fn alpha(&mut self) -> Result<f32> {
-        if self.zip.index_for_name("alpha.npy").is_none() {
-            return Ok(1.0);
-        }
-        let mut alpha = 1.0;
-        self.each("alpha", Some(&[]), |_, [value]: [f32; 1]| {
-            alpha = value;
-            if (0.0..=1.0).contains(&value) { Ok(()) } else { Err(format!("{value} is outside 0..=1")) }
+            if v == Vec3::ZERO || off <= NEAR_UNIT {
+                // The code of a direction does not depend on its length.
+                take(i, Cell::from_direction(v))
+            } else if v.is_finite() {
+                Err(Fault(format!("{v} has length {length}: v is unit or zero"), FIX_V.into()))
+            } else {
+                Err(Fault(format!("{v} is no direction"), FIX_V_FINITE.into()))
+            }
         })?;
-        Ok(alpha)
+        let length = match format!("{shortest:.4}") {
+            least if least == format!("{longest:.4}") => least,
+            least => format!("{least} to {longest:.4}"),
+        };
+        let cells = if normalised == 1 { "cell" } else { "cells" };
+        if normalised > 0 {
+            self.notes.push(format!("v is normalised in {normalised} {cells}, where its length is {length}"));
+        }
+        Ok(())
     }
 
-    /// Reads the array `name` as float32 in rows of N, gives each row to `row` with its index, and returns
-    /// the array's shape. Without an expected shape it reads the header only.
-    fn each<const N: usize>(
-        &mut self,
-        name: &str,
-        expected: Option<&[u64]>,
-        mut row: impl FnMut(usize, [f32; N]) -> std::result::Result<(), String>,
-    ) -> Result<Vec<u64>> {
+    /// Reads α, and the largest error that its rounding made. A file without alpha has α = 1.
+    fn alpha(&mut self) -> Result<(f32, f32)> {
+        if self.zip.index_for_name("alpha.npy").is_none() {
+            return Ok((1.0, 0.0));
+        }
+        let head = self.head("alpha")?;
+        if head.shape.iter().any(|&n| n != 1) {
+            let what = format!("shape is {:?}: α is one number", head.shape);
+            return Err(self.fault(&head, what, FIX_ALPHA));
+        }
+        let mut numbers = self.numbers(&head, 1)?;
+        let value = numbers.next();
+        let value = value.and_then(|value| numbers.finish().map(|()| value));
+        let value = value.map_err(|e| self.fault(&head, e.to_string(), FIX_ALPHA))?;
+        if !(0.0..=1.0).contains(&value) {
+            return Err(self.fault(&head, format!("{value} is outside 0..=1"), FIX_ALPHA));
+        }
+        self.notes.extend(head.note());
+        Ok((value, head.number.rounding(value, head.codes)))
+    }
+
+    /// Error about an array.
+    fn fault(&self, head: &Head, what: String, fix: impl Into<String>) -> Error {
+        invalid(self.path, format!("{}: {what}", head.name), fix)
+    }
+
+    /// Reads the header of an array.
+    fn head(&mut self, name: &'static str) -> Result<Head> {
         let path = self.path;
-        let fault = |what: String| invalid(path, format!("{name}: {what}"));
+        let fault = |what: String, fix: String| invalid(path, format!("{name}: {what}"), fix);
+        let file = npyz::npz::file_name_from_array_name(name);
+        if self.zip.index_for_name(&file).is_none() {
+            let files = self.zip.file_names().filter_map(|file| file.ok());
+            let names: Vec<String> =
+                files.take(8).map(|file| file.trim_end_matches(".npy").chars().take(32).collect()).collect();
+            let what = match names.as_slice() {
+                [] => "there is no such array".into(),
+                names => format!("there is no such array, but {}", names.join(", ")),
+            };
+            return Err(fault(what, format!("numpy.savez(file, rho=rho, v=v) names arrays; {FORMAT}")));
+        }
+        let entry = self.zip.by_name(&file).map_err(|e| fault(e.to_string(), FORMAT.into()))?;
+        let (header, _) = open_array(entry).map_err(|e| fault(e.to_string(), FORMAT.into()))?;
+        let dtype = header.dtype();
+        let number = Number::of(&dtype).ok_or_else(|| {
+            fault(
+                format!("dtype is {}, which taki does not read", dtype.descr()),
+                "save it as float32; bool, integers, float16 and float64 are converted".into(),
+            )
+        })?;
+        Ok(Head {
+            name,
+            shape: header.shape().to_vec(),
+            number,
+            fortran: header.order() == npyz::Order::Fortran,
+            codes: number.is_uint8() && matches!(name, "rho" | "k"),
+        })
+    }
+
+    /// Opens an array and returns its numbers.
+    fn numbers(&mut self, head: &Head, count: u64) -> Result<Numbers<impl Read>> {
+        let fault = |e: String| invalid(self.path, format!("{}: {e}", head.name), FORMAT);
         let entry = self
             .zip
-            .by_name(&npyz::npz::file_name_from_array_name(name))
+            .by_name(&npyz::npz::file_name_from_array_name(head.name))
             .map_err(|e| fault(e.to_string()))?;
-        let (header, mut bytes) = open_array(entry).map_err(|e| fault(e.to_string()))?;
-        let shape = header.shape().to_vec();
-        let dtype = header.dtype().descr();
-        if dtype != "'<f4'" {
-            return Err(fault(format!("dtype is {dtype}, not '<f4' (float32)")));
+        let (_, bytes) = open_array(entry).map_err(|e| fault(e.to_string()))?;
+        Ok(Numbers::new(bytes, head.number, head.codes, count))
+    }
+
+    /// Gives the N numbers of every cell to `cell`, with the linear index of the cell and in its order.
+    fn each<const N: usize>(
+        &mut self,
+        head: &Head,
+        size: [u32; 3],
+        mut cell: impl FnMut(usize, [f32; N]) -> Checked,
+    ) -> Result<()> {
+        let path = self.path;
+        let fault = |what: String, fix: &str| invalid(path, format!("{}: {what}", head.name), fix);
+        let [nx, ny, nz] = size.map(u64::from);
+        let expected = [nz, ny, nx, N as u64];
+        let expected = &expected[..if N > 1 { 4 } else { 3 }];
+        if head.shape != expected {
+            let what = format!("shape is {:?}, not {expected:?}", head.shape);
+            let name = head.name;
+            return Err(match N > 1 && head.shape == [N as u64, nz, ny, nx] {
+                true => fault(what, &format!("{name} = numpy.moveaxis({name}, 0, -1) mends it")),
+                false => fault(what, FORMAT),
+            });
         }
-        if header.order() != npyz::Order::C {
-            return Err(fault("the array is in Fortran order; save it with numpy.ascontiguousarray".into()));
-        }
-        let Some(expected) = expected else { return Ok(shape) };
-        if shape != expected {
-            return Err(fault(format!("shape is {shape:?}, not {expected:?}")));
-        }
-        let npy = npyz::NpyFile::with_header(header, &mut bytes);
-        let mut values = npy.data::<f32>().map_err(|e| fault(e.to_string()))?;
-        let rows = expected.iter().product::<u64>() as usize / N;
-        for i in 0..rows {
-            let mut out = [0.0; N];
-            for slot in &mut out {
-                *slot = match values.next() {
-                    Some(Ok(x)) => x,
-                    Some(Err(e)) => return Err(fault(format!("row {i}: {e}"))),
-                    None => return Err(fault(format!("ends after {i} of {rows} rows"))),
-                };
+        let (nx, ny, nz) = (nx as usize, ny as usize, nz as usize);
+        let cells = nx * ny * nz;
+        let mut largest = 0f32;
+        let mut give = |i: usize, values: [f32; N]| {
+            largest = values.iter().fold(largest, |a, &b| a.max(b));
+            cell(i, values).map_err(|Fault(what, fix)| {
+                let at = [i / (nx * ny), i / nx % ny, i % nx];
+                fault(format!("at {at:?}: {what}"), &fix)
+            })
+        };
+        let count = (cells * N) as u64;
+        let broken = |e: std::io::Error| fault(e.to_string(), FORMAT);
+        if head.fortran {
+            let most = (self.spare as usize / size_of::<[f32; N]>()).clamp(1, cells);
+            let mut range = vec![[0f32; N]; most];
+            for start in (0..cells).step_by(most) {
+                let range = &mut range[..most.min(cells - start)];
+                let mut numbers = self.numbers(head, count)?;
+                for part in 0..N {
+                    for column in (0..nx).flat_map(|x| (0..ny).map(move |y| y * nx + x)) {
+                        for z in 0..nz {
+                            let number = numbers.next().map_err(broken)?;
+                            let i = z * (nx * ny) + column;
+                            if let Some(values) = range.get_mut(i.wrapping_sub(start)) {
+                                values[part] = number;
+                            }
+                        }
+                    }
+                }
+                numbers.finish().map_err(broken)?;
+                for (i, &values) in range.iter().enumerate() {
+                    give(start + i, values)?;
+                }
             }
-            row(i, out).map_err(|e| fault(format!("row {i}: {e}")))?;
+        } else {
+            let mut numbers = self.numbers(head, count)?;
+            for i in 0..cells {
+                let mut values = [0.0; N];
+                for value in &mut values {
+                    *value = numbers.next().map_err(broken)?;
+                }
+                give(i, values)?;
+            }
+            numbers.finish().map_err(broken)?;
         }
-        // The archive compares an entry's checksum only when the entry is read to its end.
-        if bytes.read(&mut [0]).map_err(|e| fault(e.to_string()))? != 0 {
-            return Err(fault(format!("has more than {rows} rows")));
+        self.notes.extend(head.note());
+        if head.codes && largest > 0.0 && largest < 1.5 / 255.0 {
+            self.notes.push(format!("{} has no code above 1: a mask of 0 and 1 is saved as bool", head.name));
         }
-        Ok(shape)
+        Ok(())
     }
 }
 
@@ -359,19 +549,4 @@ impl CellCursor {
             CellBuffer::Sparse(bricks) => bricks.at_mut(x, y, z),
         }
     }
-}
-
-/// Opens an array. Its header is parsed only if it has a sane length.
-fn open_array<R: Read>(mut entry: R) -> std::io::Result<(npyz::NpyHeader, impl Read)> {
-    let mut prefix = [0u8; 12];
-    entry.read_exact(&mut prefix)?;
-    let header_bytes = match prefix[6] {
-        1 => u16::from_le_bytes([prefix[8], prefix[9]]) as u64,
-        _ => u32::from_le_bytes([prefix[8], prefix[9], prefix[10], prefix[11]]) as u64,
-    };
-    if &prefix[..6] != b"\x93NUMPY" || header_bytes > MAX_HEADER_BYTES {
-        return Err(std::io::Error::other("not a NumPy array"));
-    }
-    let mut bytes = BufReader::with_capacity(1 << 16, std::io::Cursor::new(prefix).chain(entry));
-    Ok((npyz::NpyHeader::from_reader(&mut bytes)?, bytes))
 }

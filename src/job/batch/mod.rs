@@ -39,7 +39,7 @@ use crate::output::movie::MovieKind;
 use crate::picture::Layer;
 use crate::scene::{Animation, Place, Scene};
 use crate::util::error::{Error, Result};
-use crate::util::monitor::Monitor;
+use crate::util::monitor::{Monitor, Unwarned};
 use crate::util::window::Window;
 
 /// Most pictures of one batch.
@@ -117,9 +117,10 @@ impl Batch {
     /// [`Error::CannotCreate`] for outputs that cannot be written or are other pictures, [`Error::Memory`]
     /// for pictures that do not fit, or an error of the monitor.
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
-        let (base, measured) = exposed(base, monitor)?;
-        // A scene that is not valid is reported before the sweeps are read.
-        base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
+        // The volume is made once more for the first picture and warns then.
+        let (base, measured) = exposed(base, &Unwarned(monitor))?;
+        let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
+        let keys = first.keys();
         let sweeps = request
             .sweeps
             .iter()

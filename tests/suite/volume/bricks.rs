@@ -15,8 +15,8 @@ use taki::scene::{Limits, Scene, presets};
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
 use taki::volume::{
-    Bricks, Cell, Cells, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, build_sparse_water,
-    build_water, expected_cells, read_npz, sparse_bytes, write_npz,
+    Bricks, Cell, Cells, ReadOptions, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec,
+    build_sparse_water, build_water, expected_cells, read_npz, sparse_bytes, write_npz,
 };
 
 const MEMORY: u64 = 1 << 30;
@@ -136,7 +136,10 @@ proptest! {
         let files = [&volume, &bricks].map(|volume| {
             let path = folder.path().join("v.npz");
             write_npz(volume, std::fs::File::create(&path).unwrap()).unwrap();
-            let read = |choice| read_npz(&path, choice, MEMORY).unwrap();
+            let read = |storage| {
+                let options = ReadOptions { storage, budget: MEMORY, ..Default::default() };
+                read_npz(&path, &options, &Unwatched).unwrap()
+            };
             assert_eq!(read(StorageChoice::Auto), read(StorageChoice::Dense));
             assert_same(&read(StorageChoice::Auto), &read(StorageChoice::Sparse));
             std::fs::read(path).unwrap()
