@@ -1,10 +1,10 @@
 //! Exclusive claims on work, for any number of processes that share a folder.
 //!
 //! A claim on `fall.0007.exr` is the file `.fall.0007.exr.taki-claim-0` beside it; a hash replaces a name
-//! that is too long for that. Only one process can create that file. Its owner updates the file's modification
-//! time four times within the stale time. A claim is stale if its owner is known to be dead (only processes
-//! of the same machine can tell) or if the modification time has not changed for the stale time. The observer
-//! measures that time with its own clock, because clocks of machines differ.
+//! that is too long for that. Only one process can create that file. Its owner updates the file's
+//! modification time four times within the stale time. A claim is stale if its owner is known to be dead
+//! (only processes of the same machine can tell) or if the modification time has not changed for the stale
+//! time. The observer measures that time with its own clock, because clocks of machines differ.
 //!
 //! The next process then creates `.fall.0007.exr.taki-claim-1`. Again only one process can, so two never
 //! hold the same claim. The highest number owns the work. Claims are removed once the work is done; a

@@ -78,8 +78,8 @@ pub(super) fn file_storage(size: [u32; 3], asked: StorageChoice, memory: u64) ->
     choose(asked, check_budget(size, 0, memory), true, check_stored(size, 0, 0, memory))
 }
 
-/// Chooses between the two forms. `dense` and `sparse` say whether each can be built, `is_dense_best` whether
-/// a dense volume can also be rendered, or is the smaller one. Auto is dense if both hold, or if sparse storage
+/// Chooses between the two forms. `dense` and `sparse` say whether each can be built, `is_dense_best` whether a
+/// dense volume can also be rendered, or is the smaller one. Auto is dense if both hold, or if sparse storage
 /// does not fit either.
 fn choose(
     asked: StorageChoice,

@@ -340,14 +340,16 @@ impl ExrLines {
     /// Returns the text of the scene, from one attribute or from its pieces.
     pub fn scene(&self) -> Option<String> {
         let attributes = &self.meta.headers[0].own_attributes.other;
-        let text = |name: &str| match attributes.get(&Text::from(name)) {
-            Some(AttributeValue::Text(text)) => Some(text.to_string()),
+        let bytes = |name: &str| match attributes.get(&Text::from(name)) {
+            Some(AttributeValue::Text(text)) => Some(text.as_slice().to_vec()),
             _ => None,
         };
-        text(SCENE_TEXT).or_else(|| {
-            let pieces = (1..).map_while(|number| text(&format!("{SCENE_TEXT}.{number:04}")));
-            Some(pieces.collect::<String>()).filter(|whole| !whole.is_empty())
-        })
+        let text = bytes(SCENE_TEXT).or_else(|| {
+            let pieces = (1..).map_while(|number| bytes(&format!("{SCENE_TEXT}.{number:04}")));
+            Some(pieces.flatten().collect()).filter(|whole: &Vec<u8>| !whole.is_empty())
+        })?;
+        // The library takes every byte for a character.
+        Some(String::from_utf8_lossy(&text).into_owned())
     }
 
     /// Reads the next line into `line`: channel by channel, native float32.
