@@ -67,8 +67,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         VolumeCommand::Info { file, json, memory } => {
             let options = ReadOptions { budget: memory.saturating_mul(1 << 20), ..Default::default() };
             let statistics = read_npz(file, &options, terminal)?.statistics();
-            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) });
-            Ok(())
+            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) })
         }
     }
 }

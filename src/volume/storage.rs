@@ -1,6 +1,6 @@
 //! Choice between dense and sparse storage, and the memory that each takes.
 
-use super::{Bricks, Cell, WaterSpec, expected_cells};
+use super::{Bricks, Cell, WaterSpec};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 
@@ -57,17 +57,8 @@ fn cells(size: [u32; 3]) -> u128 {
 /// [`super::build_sparse_water`] checks again.
 pub fn storage_of(spec: &WaterSpec, asked: StorageChoice, memory: u64, beside: u64) -> Result<Storage> {
     let fits = check_budget(spec.size, spec.strand_bytes(), memory);
-    let sparse = check_sparse(spec, 0, memory);
-    let dense = dense_bytes(spec.size, false);
-    let is_best = || dense + u128::from(beside) <= u128::from(memory) || dense <= expected_bytes(spec);
-    // Without the other two there is no choice, and nothing to be estimated.
-    let choice = asked == StorageChoice::Auto && fits.is_ok() && sparse.is_ok();
-    choose(asked, fits, choice && is_best(), sparse)
-}
-
-/// Estimates the bytes that a sparse water volume takes.
-fn expected_bytes(spec: &WaterSpec) -> u128 {
-    sparse_bytes(spec.size, expected_cells(spec), size_of::<glam::Vec3>() + spec.strand_bytes())
+    let is_drawable = dense_bytes(spec.size, false) + u128::from(beside) <= u128::from(memory);
+    choose(asked, fits, is_drawable, check_sparse(spec, 0, memory))
 }
 
 /// Chooses the storage of a volume file of `size` cells within `memory` bytes.
@@ -78,19 +69,13 @@ pub(super) fn file_storage(size: [u32; 3], asked: StorageChoice, memory: u64) ->
     choose(asked, check_budget(size, 0, memory), true, check_stored(size, 0, 0, memory))
 }
 
-/// Chooses between the two forms. `dense` and `sparse` say whether each can be built, `is_dense_best` whether a
-/// dense volume can also be rendered, or is the smaller one. Auto is dense if both hold, or if sparse storage
-/// does not fit either.
-fn choose(
-    asked: StorageChoice,
-    dense: Result<()>,
-    is_dense_best: bool,
-    sparse: Result<()>,
-) -> Result<Storage> {
+/// Chooses between the two forms. `dense` and `sparse` say whether each can be built, `is_drawable` whether a
+/// dense volume can also be rendered. Auto is dense if both hold, or if sparse storage does not fit either.
+fn choose(asked: StorageChoice, dense: Result<()>, is_drawable: bool, sparse: Result<()>) -> Result<Storage> {
     match asked {
         StorageChoice::Dense => dense.map(|()| Storage::Dense),
         StorageChoice::Sparse => sparse.map(|()| Storage::Sparse),
-        StorageChoice::Auto if sparse.is_err() || (dense.is_ok() && is_dense_best) => {
+        StorageChoice::Auto if sparse.is_err() || (dense.is_ok() && is_drawable) => {
             dense.map(|()| Storage::Dense)
         }
         StorageChoice::Auto => Ok(Storage::Sparse),

@@ -119,8 +119,8 @@ impl Batch {
     pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
         // The volume is made once more for the first picture and warns then.
         let (base, measured) = exposed(base, &Unwarned(monitor))?;
-        let first = base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
-        let keys = first.keys();
+        // A scene that is not valid is reported before the sweeps are read.
+        base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;
         let sweeps = request
             .sweeps
             .iter()
