@@ -91,8 +91,8 @@ impl Values {
     /// Checks `raw` against the table and stores it.
     ///
     /// # Errors
-    /// [`Error::Input`] where the table has no such key or does not allow the value. The message begins with
-    /// `place`.
+    /// [`Error::Input`](crate::util::error::Error::Input) where the table has no such key or does not allow
+    /// the value. The message begins with `place`.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
         let Some(param) = Param::find(key) else {
             return Err(unknown_key_in_file(key, self, place));

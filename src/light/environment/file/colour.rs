@@ -1,7 +1,7 @@
 //! Colour spaces of files, and the way from them to linear Rec. 709.
 //!
-//! A space has a curve and primaries. Primaries with another white than D65 are adapted to it by the transform
-//! of Bradford, so that grey stays grey.
+//! A space has a curve and primaries. Primaries with another white than D65 are adapted to it by the
+//! transform of Bradford, so that grey stays grey.
 
 use glam::{DMat3, DVec3};
 

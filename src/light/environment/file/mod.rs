@@ -4,10 +4,10 @@
 //! [`colour`] leads from the file's colour space to linear Rec. 709, which a file without a word about its
 //! colours is taken for.
 //!
-//! Values of an `.hdr` file are divided by its EXPOSURE and COLORCORR. An alpha channel is ignored, because the
-//! colours of an EXR are multiplied by it already. Values below zero, which resampling leaves beside bright
-//! texels, are replaced by 0 and counted. An infinite value of an EXR becomes the largest that a half can hold.
-//! A file with a value that is not a number or larger than [`MAX_RADIANCE`] is refused.
+//! Values of an `.hdr` file are divided by its EXPOSURE and COLORCORR. An alpha channel is ignored, because
+//! the colours of an EXR are multiplied by it already. Values below zero, which resampling leaves beside
+//! bright texels, are replaced by 0 and counted. An infinite value of an EXR becomes the largest that a half
+//! can hold. A file with a value that is not a number or larger than [`MAX_RADIANCE`] is refused.
 
 mod channels;
 mod colour;

@@ -1,7 +1,7 @@
 //! Radiance pictures: RGBE and XYZE in the format's eight orientations.
 //!
-//! The header is read here. The decoder sees the pixels behind a header of its own kind, and its lines are put
-//! where the picture's orientation wants them.
+//! The header is read here. The decoder sees the pixels behind a header of its own kind, and its lines are
+//! put where the picture's orientation wants them.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
