@@ -144,7 +144,8 @@ impl Engine {
                 cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
             }
             Engine::Gpu { renderer, device, falls_back } => {
-                let mut result = render_once(renderer, scene, volume, mesh, options, monitor);
+                let mut result = check_walks(renderer, scene, volume, *falls_back)
+                    .and_then(|()| renderer.render(scene, volume, mesh, options, monitor));
                 if let Err(e) = &result
                     && is_the_devices(e, renderer)
                     && !matches!(e, Error::Device { .. } | Error::Watchdog { .. })
@@ -167,22 +168,21 @@ impl Engine {
     }
 }
 
-/// Renders a frame on the GPU, unless the device is known to end its walks early.
+/// Checks that the device does not end the scene's walks early. A `cautious` check refuses walks that come
+/// near the limit.
 ///
 /// # Errors
-/// Those of [`GpuRenderer::render`].
-pub fn render_once(
-    renderer: &mut GpuRenderer,
+/// [`Error::Device`], and errors of [`cpu::render`].
+pub fn check_walks(
+    renderer: &GpuRenderer,
     scene: &Scene,
     volume: &VolumeTexture,
-    mesh: &Mesh,
-    options: &RenderOptions,
-    monitor: &dyn Monitor,
-) -> Result<Frame> {
-    if renderer.gpu.is_software() {
-        long_walks::check(scene, volume, &renderer.gpu.name())?;
+    cautious: bool,
+) -> Result<()> {
+    match renderer.gpu.is_software() {
+        true => long_walks::check(scene, volume, &renderer.gpu.name(), cautious),
+        false => Ok(()),
     }
-    renderer.render(scene, volume, mesh, options, monitor)
 }
 
 /// Whether an error comes from the device, so that the CPU engine may do better.

@@ -386,8 +386,9 @@ impl Renderer {
         watch: &dyn Monitor,
     ) -> Result<Frame> {
         match self.engine.get_or_insert(Engine::cpu()) {
-            Engine::Gpu { renderer, .. } => {
-                engine::render_once(renderer, scene, volume, mesh, options, watch)
+            Engine::Gpu { renderer, falls_back, .. } => {
+                engine::check_walks(renderer, scene, volume, *falls_back)?;
+                renderer.render(scene, volume, mesh, options, watch)
             }
             cpu => cpu.render_volume(scene, volume, mesh, options, watch),
         }
