@@ -6,7 +6,7 @@
 //! 1.
 //!
 //! Files of other programs may hold numbers of other types, in Fortran order, and no `k`. They are converted
-//! while they are read, with a note. An array in C order is read number by number. An array in Fortran order
+//! while they are read, with a note. An array in C order is read once. An array in Fortran order
 //! is read several times if memory is short: each time the numbers of one range of cells are kept.
 
 mod array;

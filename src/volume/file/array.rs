@@ -1,6 +1,6 @@
 //! Numbers of NumPy's arrays, read as float32.
 
-use std::io::{BufReader, Cursor, Error, ErrorKind, Read, Result};
+use std::io::{BufReader, Cursor, Error, Read, Result};
 
 use npyz::{DType, Endianness, NpyHeader, TypeChar};
 
@@ -86,8 +86,10 @@ impl Number {
         }
     }
 
-    /// Decodes one number.
-    fn decode(self, mut raw: [u8; 8]) -> f32 {
+    /// Decodes the bytes of one number.
+    fn decode(self, bytes: &[u8]) -> f32 {
+        let mut raw = [0; 8];
+        raw[..self.bytes].copy_from_slice(bytes);
         if self.big_endian {
             raw[..self.bytes].reverse();
         }
@@ -116,39 +118,60 @@ fn float16(bits: u16) -> f32 {
     }
 }
 
+/// Most numbers that are decoded at once. Decoding them one by one takes twice as long.
+const BLOCK: u64 = 4096;
+
 /// Numbers of one array, in the order of the file.
 pub(super) struct Numbers<R> {
     bytes: R,
     number: Number,
     /// Number that is read as 1.
     one: f32,
-    read: u64,
+    /// Numbers of the array, and those of them that were decoded.
     count: u64,
+    decoded: u64,
+    raw: Vec<u8>,
+    block: std::vec::IntoIter<f32>,
 }
 
 impl<R: Read> Numbers<R> {
     /// The `count` numbers of `bytes`. With `codes` 255 is read as 1.
     pub(super) fn new(bytes: R, number: Number, codes: bool, count: u64) -> Self {
-        Numbers { bytes, number, one: if codes { 255.0 } else { 1.0 }, read: 0, count }
+        let one = if codes { 255.0 } else { 1.0 };
+        Numbers { bytes, number, one, count, decoded: 0, raw: Vec::new(), block: Vec::new().into_iter() }
     }
 
     /// Reads the next number.
     #[inline]
     pub(super) fn next(&mut self) -> Result<f32> {
-        let mut raw = [0; 8];
-        match self.bytes.read_exact(&mut raw[..self.number.bytes]) {
-            Ok(()) => {}
-            Err(e) if e.kind() == ErrorKind::UnexpectedEof => {
-                return Err(Error::other(format!("ends after {} of {} numbers", self.read, self.count)));
-            }
-            Err(e) => return Err(e),
+        if let Some(number) = self.block.next() {
+            return Ok(number);
         }
-        self.read += 1;
-        Ok(self.number.decode(raw) / self.one)
+        self.fill()?;
+        let ended = || Error::other(format!("ends after {} of {} numbers", self.decoded, self.count));
+        self.block.next().ok_or_else(ended)
     }
 
-    /// Checks that all numbers were read. The archive compares an entry's checksum only when the entry is
-    /// read to its end.
+    /// Decodes the next block, of fewer numbers at the end of the array and of none behind it.
+    fn fill(&mut self) -> Result<()> {
+        let Number { kind, bytes, big_endian } = self.number;
+        let wanted = BLOCK.min(self.count - self.decoded) * bytes as u64;
+        self.raw.clear();
+        (&mut self.bytes).take(wanted).read_to_end(&mut self.raw)?;
+        let chunks = self.raw.chunks_exact(bytes);
+        let block: Vec<f32> = match (kind, big_endian, self.raw.as_chunks().0) {
+            (Kind::Float, false, floats) if bytes == 4 => {
+                floats.iter().map(|&bits| f32::from_le_bytes(bits)).collect()
+            }
+            _ => chunks.map(|chunk| self.number.decode(chunk) / self.one).collect(),
+        };
+        self.decoded += block.len() as u64;
+        self.block = block.into_iter();
+        Ok(())
+    }
+
+    /// Checks that the array has no more numbers. The archive compares an entry's checksum only when the
+    /// entry is read to its end.
     pub(super) fn finish(mut self) -> Result<()> {
         match self.bytes.read(&mut [0])? {
             0 => Ok(()),
