@@ -1,6 +1,7 @@
 //! `taki volume`: writes volume textures as NumPy arrays and prints their statistics.
 
 use std::path::PathBuf;
+use std::sync::Mutex;
 
 use clap::{Args, Subcommand};
 
@@ -66,9 +67,40 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         }
         VolumeCommand::Info { file, json, memory } => {
             let options = ReadOptions { budget: memory.saturating_mul(1 << 20), ..Default::default() };
-            let statistics = read_npz(file, &options, terminal)?.statistics();
-            say(&if *json { serde_json::json!(statistics).to_string() } else { in_words(&statistics) })
+            let notes = Notes { terminal, texts: Mutex::default() };
+            let statistics = read_npz(file, &options, &notes)?.statistics();
+            let prefix = format!("{}: ", file.display());
+            let notes = notes.texts.into_inner().unwrap_or_else(|e| e.into_inner());
+            let converted: Vec<&str> = notes.iter().map(|n| n.strip_prefix(&prefix).unwrap_or(n)).collect();
+            if *json {
+                let mut object = serde_json::json!(statistics);
+                object["converted"] = serde_json::json!(converted);
+                say(&object.to_string());
+                return Ok(());
+            }
+            say(&in_words(&statistics));
+            if !converted.is_empty() {
+                say("converted on reading:");
+                converted.iter().for_each(|text| say(&format!("  {text}")));
+            }
+            Ok(())
         }
+    }
+}
+
+/// Monitor that keeps the notes, to print them with the statistics.
+struct Notes<'a> {
+    terminal: &'a Terminal,
+    texts: Mutex<Vec<String>>,
+}
+
+impl Monitor for Notes<'_> {
+    fn progress(&self, stage: &'static str, done: u64, total: u64) -> Result<()> {
+        self.terminal.progress(stage, done, total)
+    }
+
+    fn warn(&self, text: &str) {
+        self.texts.lock().unwrap_or_else(|e| e.into_inner()).push(text.into());
     }
 }
 

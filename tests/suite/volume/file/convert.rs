@@ -573,6 +573,28 @@ fn arrays_under_other_names_are_told() {
 }
 
 #[test]
+fn info_tells_what_was_converted() {
+    let file = Foreign { rho: ok().rho.of(">f8"), k: None, ..ok() };
+    let (_dir, path) = file.written();
+    let said = run(taki(["volume", "info"]).arg(&path));
+    let (head, notes) = said.done().split_once("\nconverted on reading:\n").expect("notes");
+    assert!(head.starts_with("size            4 × 3 × 2 cells"));
+    let lines: Vec<&str> = notes.lines().collect();
+    assert_eq!(lines.len(), 2, "{lines:?}");
+    assert_eq!(lines[0], "  rho is converted from big-endian float64");
+    assert!(lines[1].starts_with("  k is missing: "), "{lines:?}");
+    let json = |path: &Path| -> serde_json::Value {
+        serde_json::from_str(run(taki(["volume", "info", "--json"]).arg(path)).done()).unwrap()
+    };
+    assert_eq!(json(&path)["converted"].as_array().unwrap().len(), 2);
+    assert_eq!(json(&path)["size"], serde_json::json!([4, 3, 2]));
+    // A file that needs no conversion.
+    ok().write(&path);
+    assert_eq!(json(&path)["converted"], serde_json::json!([]));
+    assert!(!run(taki(["volume", "info"]).arg(&path)).done().contains("converted"));
+}
+
+#[test]
 fn a_picture_of_a_converted_volume_is_made_with_one_warning_for_each_note() {
     let file = Foreign { rho: ok().rho.of("<f8"), v: ok().v.in_fortran_order(), k: None, ..ok() };
     let (dir, path) = file.written();
