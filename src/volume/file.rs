@@ -150,14 +150,14 @@ impl Default for ReadOptions {
 /// [`Error::Io`] if the file cannot be opened, [`Error::Input`] if it is not a valid volume file, and
 /// [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
-    let meta = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
+    let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !meta.is_file() {
         return Err(Error::input(
             format!("{} is not a regular file", path.display()),
             "give an .npz file made by `taki volume build` or NumPy's savez",
         ));
     }
-    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let file = File::open(path).map_err(|e| Error::open(path, e))?;
     let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string(), FORMAT))?;
     let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
     let volume = reader.volume()?;

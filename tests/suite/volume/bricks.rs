@@ -315,7 +315,7 @@ fn auto_is_refused_only_where_either_storage_is() {
     let thin = ["volume.nx=160", "volume.ny=160", "volume.nz=160"];
     // So many strands that sparse storage takes more than dense.
     let full = ["volume.nx=96", "volume.ny=96", "volume.nz=96", "curves.across=150", "curves.deep=150"];
-    for (name, volume, limits) in [("thin", &thin[..], 80..170), ("full", &full[..], 60..100)] {
+    for (name, volume, limits) in [("thin", &thin[..], 60..170), ("full", &full[..], 60..100)] {
         let works = |storage: &str, memory: u64| {
             let sets = [volume, &size, &[storage]].concat();
             load(&sets, memory).and_then(|scene| strips(&scene, whole, true, memory)).is_ok()
