@@ -75,13 +75,12 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             if *json {
                 let mut object = serde_json::json!(statistics);
                 object["converted"] = serde_json::json!(converted);
-                say(&object.to_string());
-                return Ok(());
+                return say(&object.to_string());
             }
-            say(&in_words(&statistics));
+            say(&in_words(&statistics))?;
             if !converted.is_empty() {
-                say("converted on reading:");
-                converted.iter().for_each(|text| say(&format!("  {text}")));
+                say("converted on reading:")?;
+                converted.iter().try_for_each(|text| say(&format!("  {text}")))?;
             }
             Ok(())
         }
