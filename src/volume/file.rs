@@ -147,8 +147,8 @@ impl Default for ReadOptions {
 /// before that size is compared with the budget. `monitor` is told what was converted.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if it is missing or not a valid volume file, and
-/// [`Error::Memory`] if the volume does not fit into the budget.
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if it is missing or not a valid volume file,
+/// and [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !meta.is_file() {
