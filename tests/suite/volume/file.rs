@@ -243,7 +243,7 @@ fn a_claimed_size_over_the_budget_is_refused_before_it_is_allocated() {
 #[test]
 fn what_is_no_file_is_refused() {
     let dir = folder();
-    assert_eq!(read_npz(&dir.path().join("none.npz"), &ROOMY, &Unwatched).unwrap_err().exit_code(), 74);
+    assert_eq!(read_npz(&dir.path().join("none.npz"), &ROOMY, &Unwatched).unwrap_err().exit_code(), 65);
     assert_eq!(read_npz(dir.path(), &ROOMY, &Unwatched).unwrap_err().exit_code(), 65);
     assert_eq!(read_bytes(&dir, b"PK\x03\x04 no archive").unwrap_err().exit_code(), 65);
 }
