@@ -19,7 +19,7 @@ impl Engine {
 
     /// Builds the scene's volume and mesh, and renders its image.
     ///
-    /// For many frames of one volume, build both once and call [`Engine::render_volume`].
+    /// To render many frames of one volume, build both once and call [`Engine::render_volume`].
     ///
     /// # Errors
     /// Errors of [`Scene::volume`] with the memory of [`Limits::default`], and of [`Engine::render_volume`].

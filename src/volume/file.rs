@@ -182,7 +182,7 @@ struct Fault(String, String);
 
 type Checked = std::result::Result<(), Fault>;
 
-/// What the header of an array says.
+/// Header of an array.
 struct Head {
     name: &'static str,
     shape: Vec<u64>,
@@ -215,7 +215,7 @@ struct Reader<'a> {
     /// Memory for numbers of arrays in Fortran order, bytes.
     spare: u64,
     zip: ZipArchive<BufReader<File>>,
-    /// What was converted.
+    /// Conversions so far, a sentence each.
     notes: Vec<String>,
 }
 

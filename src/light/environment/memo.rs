@@ -31,7 +31,7 @@ pub struct Baked {
     pub brightest: f32,
     /// Number of values in the file that were below zero.
     pub negative: u64,
-    /// What a user should know about the file, a sentence each.
+    /// Notes on the file for the user, a sentence each.
     pub notes: Vec<String>,
     lights: Mutex<Option<Lights>>,
 }

@@ -29,7 +29,7 @@ pub enum MovieKind {
 
 impl MovieKind {
     /// Returns the format of a file extension: `.gif`, `.apng`, `.mp4` or `.webm`, in upper or lower case.
-    /// For `.png`, which may be animated or not, the caller decides.
+    /// The caller decides for `.png`, which may be animated or not.
     pub fn of(path: &Path) -> Option<MovieKind> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {

@@ -1,5 +1,4 @@
-//! What a user types by slip in `--set` or a scene file is understood, or answered with the right way to
-//! write it.
+//! Slips in `--set` or a scene file are understood, or answered with the right way to write the value.
 
 use std::fs;
 

@@ -13,7 +13,7 @@ const WHOLE: [&str; 6] = ["combined", "beauty", "rgba", "rgb", "image", "composi
 /// Maximum number of channels in a message.
 const LISTED: usize = 16;
 
-/// What three channels hold.
+/// Meaning of three channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Red, green and blue.

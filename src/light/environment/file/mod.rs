@@ -37,7 +37,7 @@ pub struct FileMap {
     pub map: Map,
     /// Number of values below zero that were replaced by 0.
     pub negative: u64,
-    /// What a user should know about the file, a sentence each.
+    /// Notes on the file for the user, a sentence each.
     pub notes: Vec<String>,
 }
 

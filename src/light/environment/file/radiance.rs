@@ -18,7 +18,7 @@ use crate::util::error::{Error, Result};
 /// Luminance of a unit of radiance, lm/W: XYZE holds cd/m².
 const LUMENS_PER_WATT: f32 = 179.0;
 
-/// What stands before the pixels.
+/// Header of a file: the lines before the pixels.
 struct Header {
     /// Length, bytes.
     length: u64,

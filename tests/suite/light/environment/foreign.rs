@@ -19,7 +19,7 @@ fn read(name: &str, bytes: &[u8]) -> taki::Result<FileMap> {
     read_map(&path, BUDGET)
 }
 
-/// What is wrong and how to mend it.
+/// Fault and advice of a refusal.
 fn refusal(result: taki::Result<FileMap>) -> (String, String) {
     match result {
         Err(Error::Input { what, fix }) => (what, fix),

@@ -89,7 +89,7 @@ impl Array {
     }
 }
 
-/// For each place in Fortran order the index in C order.
+/// Index in C order of each place in Fortran order.
 fn fortran_order(shape: &[u64]) -> Vec<usize> {
     let count = shape.iter().product::<u64>() as usize;
     let index = |mut place: usize| {
