@@ -61,7 +61,8 @@ struct FrameUniforms {
     levels: u32,
     // Solid angle of the pixel in the middle of the image, divided by the number of samples, sr.
     footprint: f32,
-    pad_c: f32,
+    // 1: the background is transparent. 0: it is seen.
+    alpha: u32,
 }
 
 struct Light {

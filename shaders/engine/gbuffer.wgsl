@@ -47,7 +47,8 @@ struct MeshTile {
     pitch: u32,
     // Squares on a side.
     side: u32,
-    pad: u32,
+    // 1: a hole in a picture with alpha.
+    holdout: u32,
 }
 
 // Vertices in a row of the largest tile.
@@ -71,11 +72,14 @@ struct OpaquePoint {
     albedo: vec3<f32>,
     // Occlusion, shadow and film of water, 0 to 1 each.
     shade: vec3<f32>,
+    // Whether a picture with alpha has a hole here.
+    holdout: bool,
 }
 
 struct OpaqueTargets {
     // Radiance, and metres from the eye.
     @location(0) radiance: vec4<f32>,
+    // Unit normal, and the share of a backdrop behind the opaque scene that shows.
     @location(1) normal: vec4<f32>,
 }
 
@@ -125,6 +129,7 @@ fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     var out: OpaquePoint;
     out.pixel = pixel;
     out.position_world = frame.eye_world + d * (near / (drawn.w * dot3(d, frame.forward)));
+    out.holdout = tile.holdout != 0u;
     out = add_coat(out, first, 1.0 - high);
     out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
     return add_coat(out, first + tile.pitch + 1u, low);
@@ -186,23 +191,26 @@ fn behind_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<
     return vec4<f32>(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Radiance of the background. Distance and normal 0 mark the absence of opaque geometry.
+// Targets where no opaque geometry is, marked by distance and normal 0. `d_y` is the view direction's y
+// component. Twin: WindowFrame::shade_background.
+fn background_targets(radiance: vec3<f32>, d_y: f32) -> OpaqueTargets {
+    let seen = select(radiance, vec3<f32>(0.0), frame.alpha != 0u);
+    var out: OpaqueTargets;
+    out.radiance = vec4<f32>(haze_over(frame, seen, d_y, frame.haze_far), 0.0);
+    out.normal = vec4<f32>(0.0, 0.0, 0.0, haze_passes(frame, d_y, frame.haze_far));
+    return out;
+}
+
+// Radiance of the background.
 @fragment
 fn background_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
-    var out: OpaqueTargets;
-    out.radiance = vec4<f32>(haze_over(frame, background_radiance(d), d.y, frame.haze_far), 0.0);
-    out.normal = vec4<f32>(0.0);
-    return out;
+    return background_targets(background_radiance(d), d.y);
 }
 
 // As `background_fragment`, under an environment. Twin: Environment::radiance.
 @fragment
 fn background_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
     let d = view_ray(frame, frame.window_x + u32(clip.x), frame.window_y + u32(clip.y));
-    var out: OpaqueTargets;
-    let radiance = environment_radiance(environment, environment_map, d);
-    out.radiance = vec4<f32>(haze_over(frame, radiance, d.y, frame.haze_far), 0.0);
-    out.normal = vec4<f32>(0.0);
-    return out;
+    return background_targets(environment_radiance(environment, environment_map, d), d.y);
 }

@@ -31,6 +31,8 @@ override STRAND: bool = false;
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
 override IN_COLOUR: bool = STRAND || MULTIPLE;
+// The picture has an alpha channel.
+override ALPHA: bool = false;
 // Mist has its own walk, in which no cell is empty and all reflect alike.
 override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 
@@ -59,6 +61,10 @@ override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 @group(0) @binding(16) var<storage, read> group_list: array<u32>;
 // Bricks of sparse storage: shaders/volume/cells.wgsl.
 @group(0) @binding(17) var bricks: texture_storage_3d<rgba32uint, read>;
+// Normal of the opaque scene, and in w the share of a backdrop behind it that shows.
+@group(0) @binding(18) var opaque_normal: texture_2d<f32>;
+// Sums over samples of the share of a backdrop that shows through the whole scene: 1 − alpha.
+@group(0) @binding(19) var<storage, read_write> uncovered: array<f32>;
 
 // Marker in place of the numbers of cells if the device ended a walk early: software Vulkan limits all loops
 // of a pixel to 65535 turns. Twin: CUT of src/engine/gpu/integrate.rs.
@@ -107,6 +113,10 @@ fn dry(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lo
 // Adds a sample to the sums of a pixel; the first sample begins them.
 fn add_sample(pixel: vec2<u32>, sample: vec4<f32>, cells: vec2<u32>) {
     let index = pixel.y * frame.window_width + pixel.x;
+    if ALPHA {
+        let shows = sample.w * textureLoad(opaque_normal, pixel, 0).w;
+        uncovered[index] = shows + select(0.0, uncovered[index], frame.sample_index != 0u);
+    }
     var result = sample;
     var count = cells;
     if frame.sample_index != 0u {

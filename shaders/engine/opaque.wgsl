@@ -50,10 +50,18 @@ fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32
     if in.shade.z > 0.0 {
         radiance += (sum.gloss + sky * (open * fresnel(dot3(n, e)))) * in.shade.z;
     }
-    var out: OpaqueTargets;
+    return opaque_targets(radiance, n, to_eye, in.holdout);
+}
+
+// Targets of a point with this radiance, behind haze. Twin: WindowFrame::shade_point.
+fn opaque_targets(radiance: vec3<f32>, n: vec3<f32>, to_eye: vec3<f32>, holdout: bool) -> OpaqueTargets {
+    let distance = sqrt(dot3(to_eye, to_eye));
     let d_y = -to_eye.y / max(distance, 1e-20);
-    out.radiance = vec4<f32>(haze_over(frame, radiance, d_y, distance), distance);
-    out.normal = vec4<f32>(n, 1.0);
+    let hole = holdout & (frame.alpha != 0u);
+    let seen = select(radiance, vec3<f32>(0.0), hole);
+    var out: OpaqueTargets;
+    out.radiance = vec4<f32>(haze_over(frame, seen, d_y, distance), distance);
+    out.normal = vec4<f32>(n, select(0.0, haze_passes(frame, d_y, distance), hole));
     return out;
 }
 

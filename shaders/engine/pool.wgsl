@@ -31,7 +31,8 @@ struct Surface {
     // Radius in metres of the sphere that the surroundings are projected on.
     radius: f32,
     bottom: vec3<f32>,
-    pad_a: f32,
+    // 1: a hole in a picture with alpha.
+    holdout: f32,
     absorption: vec3<f32>,
     pad_b: f32,
     middle: vec3<f32>,
@@ -207,13 +208,8 @@ fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>)
     let noise = 0.45 * value_noise(p * 2.3) + 0.27 * value_noise(p * 5.1) + 0.17 * value_noise(p * 11.0)
         + 0.11 * value_noise(p * 23.0);
     let cover = clamp((1.6 * in.albedo.y + noise - 1.05) * 2.2, 0.0, 1.0);
-    var out: OpaqueTargets;
     let foam = sum.irradiance * ((0.25 + 0.5 * noise) * cover);
-    let distance = sqrt(dot3(to_eye, to_eye));
-    let d_y = -to_eye.y / max(distance, 1e-20);
-    out.radiance = vec4<f32>(haze_over(frame, clear * (1.0 - cover) + foam, d_y, distance), distance);
-    out.normal = vec4<f32>(n, 1.0);
-    return out;
+    return opaque_targets(clear * (1.0 - cover) + foam, n, to_eye, pool.holdout != 0.0);
 }
 
 // Values in full vectors, because software Vulkan interpolates whole vectors.

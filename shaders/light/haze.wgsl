@@ -12,11 +12,19 @@ fn haze_transmittance(density: f32, falloff: f32, d_y: f32, t: f32) -> f32 {
     return exp(-(density * t * mean));
 }
 
+// Transmittance of the frame's haze.
+fn haze_passes(frame: FrameUniforms, d_y: f32, t: f32) -> f32 {
+    if frame.haze_density == 0.0 {
+        return 1.0;
+    }
+    return haze_transmittance(frame.haze_density, frame.haze_falloff, d_y, t);
+}
+
 fn haze_over(frame: FrameUniforms, radiance: vec3<f32>, d_y: f32, t: f32) -> vec3<f32> {
     if frame.haze_density == 0.0 {
         return radiance;
     }
-    let transmittance = haze_transmittance(frame.haze_density, frame.haze_falloff, d_y, t);
+    let transmittance = haze_passes(frame, d_y, t);
     return radiance * transmittance + frame.haze_color * (1.0 - transmittance);
 }
 

@@ -1,5 +1,5 @@
-// Development of the picture from the linear frame: mean of the samples, white balance, exposure, tone curve,
-// sRGB encoding and rounding to 8 bits. Twin: src/picture/resolve.rs; Develop is in src/picture/develop.rs.
+// Development of the picture from the linear frame: mean of the samples, division by alpha, white balance,
+// exposure, tone curve, sRGB encoding and rounding to 8 bits. Twin: src/picture/resolve.rs; Develop is in src/picture/develop.rs.
 
 #import layout
 
@@ -14,13 +14,17 @@ struct Develop {
 
 const TONE_FILMIC: u32 = 1u;
 const TONE_AGX: u32 = 2u;
+// Alpha below which a pixel keeps its premultiplied colour: it rounds to 0 in 8 and in 16 bits.
+const LEAST_ALPHA: f32 = 1e-6;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> radiance: array<vec4<f32>>;
-// One pixel per word, with red in the lowest byte and alpha 255 in the highest.
+// One pixel per word, with red in the lowest byte and alpha in the highest.
 @group(0) @binding(2) var<storage, read_write> picture: array<u32>;
 @group(0) @binding(3) var<uniform> tile: Tile;
 @group(0) @binding(4) var<uniform> develop: Develop;
+// Sums of the share of a backdrop that shows, 1 − alpha; used if the picture has an alpha channel.
+@group(0) @binding(5) var<storage, read> uncovered: array<f32>;
 
 // Filmic tone curve (Narkowicz, "ACES Filmic Tone Mapping Curve", 2015).
 fn filmic(x: f32) -> f32 {
@@ -70,6 +74,11 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let index = (tile.y + id.y) * frame.window_width + tile.x + id.x;
     var linear = radiance[index].rgb / f32(frame.samples);
+    var alpha = 1.0;
+    if frame.alpha != 0u {
+        alpha = 1.0 - uncovered[index] / f32(frame.samples);
+        linear /= max(alpha, LEAST_ALPHA);
+    }
     if develop.balanced != 0u {
         linear = vec3<f32>(
             dot3(develop.balance[0].xyz, linear),
@@ -84,5 +93,5 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
         let v = agx(x);
         bytes = vec3<u32>(byte(v.r), byte(v.g), byte(v.b));
     }
-    picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | 0xff000000u;
+    picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | (byte(alpha) << 24u);
 }

@@ -40,6 +40,8 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     let longest = image.width.max(image.height).max(SIDE);
     let side = |n: u32| ((u64::from(n) * u64::from(SIDE)).div_ceil(u64::from(longest)) as u32).max(1);
     (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
+    // A picture with an alpha channel is exposed as the same picture with its background.
+    image.alpha = false;
     let frame = cpu::render(&small, volume, mesh, false, &Quiet(monitor))?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }

@@ -99,7 +99,7 @@ fn mirrored(i: isize, n: usize) -> usize {
 
 impl<'a> Bloom<'a> {
     /// Bloom of a whole picture of `width`×`height` pixels.
-    pub fn new(radiance: &'a [[f32; 4]], width: usize, height: usize, look: &Look) -> Self {
+    pub fn new(radiance: &'a [[f32; 4]], [width, height]: [usize; 2], look: &Look) -> Self {
         let shares = shares(f64::from(look.bloom_radius) * height as f64);
         let share = |level: usize| (shares[level] * f64::from(look.bloom)) as f32;
         let own_share = (1.0 - f64::from(look.bloom) * (1.0 - shares[0])) as f32;
@@ -135,12 +135,10 @@ impl<'a> Bloom<'a> {
         Bloom { radiance, width, own_share, glow }
     }
 
-    /// Radiance of pixel `i` with bloom. The fourth component is unchanged.
-    pub fn pixel(&self, i: usize) -> [f32; 4] {
-        let [r, g, b, a] = self.radiance[i];
+    /// Radiance of pixel `i` with bloom.
+    pub fn pixel(&self, i: usize) -> [f32; 3] {
+        let [r, g, b, _] = self.radiance[i];
         let glow = self.glow.as_ref().map_or([0.0; 3], |glow| glow.up(i % self.width, i / self.width));
-        let [r, g, b] =
-            [(r, glow[0]), (g, glow[1]), (b, glow[2])].map(|(own, glow)| self.own_share * own + glow);
-        [r, g, b, a]
+        [(r, glow[0]), (g, glow[1]), (b, glow[2])].map(|(own, glow)| self.own_share * own + glow)
     }
 }

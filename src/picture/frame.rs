@@ -68,7 +68,10 @@ pub struct Frame {
     pub radiance: Vec<[f32; 4]>,
     /// Cells walked by view rays and by light rays, summed over the samples.
     pub counts: Vec<[u32; 2]>,
-    /// Developed picture: sRGB bytes R, G, B, A.
+    /// Share of what is put behind the picture that it hides, 0 to 1: the alpha by which R, G, B of
+    /// `radiance` are multiplied already. `None` if the picture has no alpha channel.
+    pub alpha: Option<Vec<f32>>,
+    /// Developed picture: sRGB bytes R, G, B, A. The colour is not multiplied by alpha.
     pub picture: Vec<[u8; 4]>,
     /// Layers of the raster pass, if requested.
     pub surface: Option<Surface>,
@@ -124,6 +127,7 @@ impl Frame {
             height,
             radiance: vec![[0.0; 4]; pixels],
             counts: vec![[0; 2]; pixels],
+            alpha: None,
             picture: vec![[0; 4]; pixels],
             surface: surface.then(|| Surface::new(pixels)),
             seconds: Seconds::default(),

@@ -13,6 +13,8 @@ pub struct Image {
     pub samples: u32,
     /// Filter by which samples are distributed around a pixel.
     pub filter: Filter,
+    /// Whether the background is transparent, so that the picture has an alpha channel.
+    pub alpha: bool,
     /// Maximum error of simplified rock, in distances between samples. A larger error takes fewer triangles.
     pub rock_error: f32,
     /// Development of the picture from the radiance.

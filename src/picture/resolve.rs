@@ -43,6 +43,9 @@ fn agx_curve(x: f32) -> f32 {
     (((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x - 0.00232
 }
 
+/// Alpha below which a pixel keeps its premultiplied colour: it rounds to 0 in 8 and in 16 bits.
+const LEAST_ALPHA: f32 = 1e-6;
+
 /// Rounds an encoded value to 8 bits.
 fn byte(encoded: f32) -> u8 {
     (encoded.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
@@ -58,11 +61,11 @@ impl Resolver {
         Resolver(Develop::new(look))
     }
 
-    /// Develops one pixel: white balance, exposure, tone curve, sRGB encoding and rounding to 8 bits. Alpha
-    /// is 255.
-    pub fn pixel(&self, linear: [f32; 4]) -> [u8; 4] {
+    /// Develops one pixel: division by alpha, white balance, exposure, tone curve, sRGB encoding and rounding
+    /// to 8 bits. `linear` is multiplied by `alpha`, 0 to 1; the result is not.
+    pub fn pixel(&self, linear: [f32; 3], alpha: f32) -> [u8; 4] {
         let develop = &self.0;
-        let mut rgb = [linear[0], linear[1], linear[2]];
+        let mut rgb = linear.map(|x| x / alpha.max(LEAST_ALPHA));
         if develop.balanced != 0 {
             rgb = develop.balance.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]);
         }
@@ -73,19 +76,28 @@ impl Resolver {
             TONE_FILMIC => x.map(|x| byte(srgb(filmic(x).clamp(0.0, 1.0)))),
             _ => x.map(|x| byte(srgb(x.clamp(0.0, 1.0)))),
         };
-        [r, g, b, 255]
+        [r, g, b, byte(alpha)]
     }
 }
 
 /// Develops the picture of a frame from its radiance. Only a `whole` image gets bloom, because bloom needs
-/// all pixels.
+/// all pixels. Bloom spreads alpha as it spreads light, so that a backdrop is hidden where light arrives.
 pub fn develop(frame: &mut Frame, look: &Look, whole: bool) {
     let resolver = Resolver::new(look);
     let picture = frame.picture.par_iter_mut().enumerate();
+    let alpha = frame.alpha.as_deref();
     if whole && look.bloom > 0.0 {
-        let bloom = Bloom::new(&frame.radiance, frame.width as usize, frame.height as usize, look);
-        picture.for_each(|(i, picture)| *picture = resolver.pixel(bloom.pixel(i)));
+        let size = [frame.width as usize, frame.height as usize];
+        let bloom = Bloom::new(&frame.radiance, size, look);
+        let alpha: Option<Vec<[f32; 4]>> = alpha.map(|alpha| alpha.iter().map(|&a| [a; 4]).collect());
+        let alpha = alpha.as_ref().map(|alpha| Bloom::new(alpha, size, look));
+        picture.for_each(|(i, picture)| {
+            *picture = resolver.pixel(bloom.pixel(i), alpha.as_ref().map_or(1.0, |alpha| alpha.pixel(i)[0]));
+        });
     } else {
-        picture.for_each(|(i, picture)| *picture = resolver.pixel(frame.radiance[i]));
+        picture.for_each(|(i, picture)| {
+            let [r, g, b, _] = frame.radiance[i];
+            *picture = resolver.pixel([r, g, b], alpha.map_or(1.0, |alpha| alpha[i]));
+        });
     }
 }

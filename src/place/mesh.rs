@@ -23,9 +23,10 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Makes a mesh of consecutive grids. `squares` are the squares on a side of each, powers of two.
-    pub fn new(vertices: Vec<Vertex>, squares: impl IntoIterator<Item = u32>) -> Mesh {
-        let tiles = tiles::cut(&vertices, squares.into_iter());
+    /// Makes a mesh of consecutive grids. `grids` are the squares on a side of each, powers of two, and whether
+    /// it is a holdout.
+    pub fn new(vertices: Vec<Vertex>, grids: impl IntoIterator<Item = (u32, bool)>) -> Mesh {
+        let tiles = tiles::cut(&vertices, grids.into_iter());
         Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
     }
 
@@ -61,7 +62,7 @@ pub struct Ground {
 impl Ground {
     /// Builds the mesh.
     pub fn mesh(&self) -> Mesh {
-        Mesh::new(self.vertices(), self.squares())
+        Mesh::new(self.vertices(), self.grids())
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
@@ -69,13 +70,13 @@ impl Ground {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
         let make = || Ok::<_, Infallible>(self.vertices());
         let Ok(vertices) = cache.get("meshes", &key("mesh", BUILDER_VERSION, self), count, make);
-        Mesh::new(vertices, self.squares())
+        Mesh::new(vertices, self.grids())
     }
 
-    /// Returns the number of squares on a side of each grid.
-    fn squares(&self) -> impl Iterator<Item = u32> {
-        let pools = self.pools.iter().map(|_| Pool::SQUARES as u32);
-        self.rocks.iter().map(|rock| 1 << rock.levels).chain(pools)
+    /// Returns the number of squares on a side of each grid, and whether it is a holdout.
+    fn grids(&self) -> impl Iterator<Item = (u32, bool)> {
+        let pools = self.pools.iter().map(|pool| (Pool::SQUARES as u32, pool.holdout));
+        self.rocks.iter().map(|rock| (1 << rock.levels, rock.holdout)).chain(pools)
     }
 
     fn vertices(&self) -> Vec<Vertex> {

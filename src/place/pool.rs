@@ -18,6 +18,8 @@ const SHORE: f32 = 0.05;
 pub struct Pool {
     /// Name in the scene.
     pub name: String,
+    /// Whether a picture with an alpha channel has a hole in its place.
+    pub holdout: bool,
     /// Corners, counter-clockwise seen from above, at one height; metres.
     pub corners: [Vec3; 4],
     /// Greatest depth, metres. Rock makes the water shallower.

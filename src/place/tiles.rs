@@ -30,6 +30,8 @@ pub struct Tile {
     pub side: u32,
     /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
+    /// Whether a picture with an alpha channel has a hole in its place.
+    pub holdout: bool,
     /// Neighbours in the same grid at the edges y = 0, x = side, y = side and x = 0.
     pub neighbours: [Option<u32>; 4],
     /// Lower corner of the bounding box, metres.
@@ -43,11 +45,12 @@ pub struct Tile {
     lost: [Vec2; STEPS],
 }
 
-/// Cuts consecutive grids into tiles. `squares` are the squares on a side of each grid, powers of two.
-pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile> {
+/// Cuts consecutive grids into tiles. `grids` are the squares on a side of each, powers of two, and whether it
+/// is a holdout.
+pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec<Tile> {
     let mut tiles = Vec::new();
     let mut first = 0;
-    for squares in squares {
+    for (squares, holdout) in grids {
         let (side, pitch) = (squares.min(SIDE), squares + 1);
         let (across, number) = (squares / side, tiles.len() as u32);
         let corner = |x, y| Vec3::from(vertices[(first + y * pitch + x) as usize].position);
@@ -61,6 +64,7 @@ pub fn cut(vertices: &[Vertex], squares: impl Iterator<Item = u32>) -> Vec<Tile>
                     pitch,
                     side,
                     pool: vertices[first as usize].pool,
+                    holdout,
                     neighbours: [
                         (y > 0).then(|| own - across),
                         (x + 1 < across).then_some(own + 1),

@@ -242,7 +242,7 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
             "all frames share the picture's size and the animation's own parameters".into(),
         );
     }
-    if matches!(param.kind, Kind::Text(_) | Kind::Choice(_)) || param.is_list() {
+    if matches!(param.kind, Kind::Text(_) | Kind::Choice(_) | Kind::Switch(_)) || param.is_list() {
         return bad(
             format!("{key} is no number"),
             "only numbers, colours, points and corners can move".into(),

@@ -122,6 +122,7 @@ pub(super) fn image(v: &Values) -> Image {
         height: v.count("image.height"),
         samples: v.count("image.samples"),
         filter: v.choice("image.filter", Filter::from_word),
+        alpha: v.is_on("image.alpha"),
         rock_error: v.float("image.rock_error"),
         look: look(v),
     }

@@ -3,7 +3,7 @@
 
 use super::Values;
 use crate::mapping::QuadMap;
-use crate::place::{MAX_POOLS, Pool, Rock, Vertex};
+use crate::place::{MAX_POOLS, Pool, Rock, Show, Vertex};
 use crate::util::error::{Error, Result};
 
 pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
@@ -16,7 +16,12 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
                 format!("give {} four points", key("corners")),
             ));
         }
+        let show = v.choice(&key("show"), Show::from_word);
+        if show == Show::Hidden {
+            continue;
+        }
         rocks.push(Rock {
+            holdout: show == Show::Holdout,
             corners: v.corners(&key("corners")),
             levels: v.count(&key("levels")),
             h: v.float(&key("h")),
@@ -87,8 +92,13 @@ pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
                 ));
             }
         }
+        let show = v.choice(&key("show"), Show::from_word);
+        if show == Show::Hidden {
+            continue;
+        }
         let float = |what: &str| v.float(&key(what));
         pools.push(Pool {
+            holdout: show == Show::Holdout,
             corners,
             depth: float("depth"),
             color,

@@ -321,7 +321,7 @@ pub fn raw(value: &DeValue) -> Raw {
             .map_or(Raw::Other("a whole number too large"), Raw::Int),
         DeValue::Float(f) => f.as_str().parse().map_or(Raw::Other("a number out of range"), Raw::Float),
         DeValue::Array(list) => Raw::List(list.iter().map(|v| raw(v.get_ref())).collect()),
-        DeValue::Boolean(_) => Raw::Other("a boolean"),
+        DeValue::Boolean(on) => Raw::Switch(*on),
         DeValue::Datetime(_) => Raw::Other("a date"),
         DeValue::Table(_) => Raw::Other("a table"),
     }

@@ -32,6 +32,7 @@ pub fn cut(text: &str) -> String {
 pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
     match (param.kind, raw) {
         (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),
+        (Kind::Switch(_), Raw::Int(number @ 0..=1)) => Some(format!("write {}", *number == 1)),
         (_, Raw::Text(text)) => advice_on_text(param, text.trim()),
         _ => None,
     }
@@ -103,6 +104,11 @@ fn advice_on_text(param: &Param, text: &str) -> Option<String> {
             let near = words.iter().copied().max_by(|a, b| alike(a).total_cmp(&alike(b)))?;
             (alike(&near) > ALIKE).then(|| format!("did you mean {near}?"))
         }
+        Kind::Switch(_) => match text.to_lowercase().as_str() {
+            "true" | "yes" | "on" | "1" => Some("write true, without quotes".into()),
+            "false" | "no" | "off" | "0" => Some("write false, without quotes".into()),
+            _ => None,
+        },
         Kind::Text(_) => None,
         Kind::Color(_) if text.starts_with('#') => Some("give six hexadecimal digits".into()),
         Kind::Color(_) if hex_color(&format!("#{text}")).is_some() => Some(format!("write \"#{text}\"")),

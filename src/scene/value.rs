@@ -15,6 +15,8 @@ pub enum Value {
     Float(f64),
     /// A whole number.
     Int(i64),
+    /// On or off.
+    Switch(bool),
     /// A word, path or name.
     Text(String),
     /// A colour, point or direction.
@@ -34,6 +36,8 @@ pub enum Raw {
     Float(f64),
     /// A whole number.
     Int(i64),
+    /// A boolean.
+    Switch(bool),
     /// A string.
     Text(String),
     /// A list.
@@ -164,6 +168,7 @@ impl Values {
             Kind::Float(.., d) => Value::Float(round_f32(d)),
             Kind::Int(.., d) => Value::Int(d),
             Kind::Choice(words) => Value::Text(words[0].into()),
+            Kind::Switch(on) => Value::Switch(on),
             Kind::Text(t) => Value::Text(t.into()),
             Kind::Color(c) | Kind::Point(c) => Value::Triple(c),
             Kind::Frames => Value::Frames(Vec::new()),
@@ -196,6 +201,14 @@ impl Values {
     /// Returns a whole number whose range fits 32 bits.
     pub fn count(&self, key: &str) -> u32 {
         u32::try_from(self.int(key)).unwrap_or_else(|_| panic!("{key} does not fit 32 bits"))
+    }
+
+    /// Whether a switch is on.
+    pub fn is_on(&self, key: &str) -> bool {
+        match self.get(key) {
+            Value::Switch(on) => on,
+            other => panic!("{key} is no switch: {other:?}"),
+        }
     }
 
     /// Returns a word, path or name.
@@ -273,6 +286,10 @@ pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
         },
         Kind::Choice(options) => match raw {
             Raw::Text(t) if options.contains(&t.as_str()) => Ok(Value::Text(t.clone())),
+            _ => Err(words()),
+        },
+        Kind::Switch(_) => match raw {
+            Raw::Switch(on) => Ok(Value::Switch(*on)),
             _ => Err(words()),
         },
         Kind::Text(_) => match raw {
@@ -359,6 +376,7 @@ impl Raw {
         let text = match self {
             Raw::Float(x) => format!("{x:?}"),
             Raw::Int(x) => x.to_string(),
+            Raw::Switch(on) => on.to_string(),
             Raw::Text(t) => format!("{t:?}"),
             Raw::List(list) => {
                 format!("[{}]", list.iter().take(5).map(Raw::words).collect::<Vec<_>>().join(", "))
@@ -392,6 +410,7 @@ impl Value {
             ),
             Value::Float(x) => toml::Value::Float(*x).to_string(),
             Value::Int(x) => x.to_string(),
+            Value::Switch(on) => on.to_string(),
             Value::Text(t) => toml::Value::String(t.clone()).to_string(),
             Value::Triple(t) => format!("[{}, {}, {}]", t[0], t[1], t[2]),
             Value::Corners(c) => {
@@ -405,6 +424,7 @@ impl Value {
         match self {
             Value::Float(x) => serde_json::json!(x),
             Value::Int(x) => serde_json::json!(x),
+            Value::Switch(on) => serde_json::json!(on),
             Value::Text(t) => serde_json::json!(t),
             Value::Triple(t) => serde_json::json!(t),
             Value::Corners(c) => serde_json::json!(c),

@@ -3,7 +3,7 @@
 
 mod raster;
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::opaque::{Opaque, shade_opaque};
@@ -25,8 +25,9 @@ pub struct Gbuffer {
     pub window: Window,
     /// Linear radiance of the opaque scene or background, and metres from the eye (0: background).
     pub opaque: Vec<[f32; 4]>,
-    /// Unit normal of the opaque scene (0: background).
-    pub normal: Vec<Vec3>,
+    /// Unit normal of the opaque scene (0: background), and the share of a backdrop behind the opaque scene
+    /// that shows: 0 on what is visible, otherwise what haze lets through.
+    pub normal: Vec<Vec4>,
     /// Volume quads kept per pixel.
     pub layers: usize,
     /// u, v and metres from the eye of each quad under a pixel: `layers` entries per pixel, the nearest
@@ -68,7 +69,7 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
     let mut out = Gbuffer {
         window,
         opaque: vec![[0.0; 4]; width * height],
-        normal: vec![Vec3::ZERO; width * height],
+        normal: vec![Vec4::ZERO; width * height],
         layers,
         surface: vec![[0.0; 3]; width * height * layers],
         quad_id: vec![0; width * height * layers],
@@ -199,11 +200,11 @@ impl<'a> WindowFrame<'a> {
         covered: &[Covered],
         band: Window,
         opaque: &mut [[f32; 4]],
-        normal: &mut [Vec3],
+        normal: &mut [Vec4],
     ) {
         for (k, &(depth, id)) in covered.iter().enumerate() {
             if id == 0 {
-                opaque[k] = self.shade_background(self.ray(band, k));
+                (opaque[k], normal[k]) = self.shade_background(self.ray(band, k));
             } else {
                 let triangle = &rock.triangles[id as usize - 1];
                 let centre = self.pixel(band, k).map(|p| p as f64 + 0.5);
@@ -212,24 +213,29 @@ impl<'a> WindowFrame<'a> {
         }
     }
 
-    /// Radiance of the background along a ray, with distance 0. Twin: `background_fragment`.
-    fn shade_background(&self, d: Vec3) -> [f32; 4] {
+    /// Radiance of the background along a ray, with distance and normal 0; in a picture with alpha only that of
+    /// the haze in front of it. Twin: `background_targets`.
+    fn shade_background(&self, d: Vec3) -> ([f32; 4], Vec4) {
         let radiance = match &self.scene.environment {
+            _ if self.scene.image.alpha => Vec3::ZERO,
             None => self.scene.background.radiance(d),
             Some(environment) => environment.radiance(d),
         };
-        hazed(&self.haze, radiance, d.y, self.haze.far).extend(0.0).to_array()
+        let passes = self.haze.passes(d.y, self.haze.far);
+        let radiance = self.haze.in_front_of(radiance, d.y, self.haze.far);
+        (radiance.extend(0.0).to_array(), Vec3::ZERO.extend(passes))
     }
 
     /// Radiance, metres from the eye, and normal of the opaque point under a pixel whose centre is `centre`.
-    /// `d` is its view ray, `depth` the reversed depth of `triangle` there.
+    /// `d` is its view ray, `depth` the reversed depth of `triangle` there. Of a holdout in a picture with
+    /// alpha, only the haze in front of it has a radiance.
     fn shade_point(
         &self,
         triangle: &ScreenTriangle,
         centre: [f64; 2],
         d: Vec3,
         depth: f32,
-    ) -> ([f32; 4], Vec3) {
+    ) -> ([f32; 4], Vec4) {
         let (scene, mesh) = (self.scene, self.mesh);
         let weights = triangle.weights_at(centre).to_array();
         let in_tile = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
@@ -242,8 +248,11 @@ impl<'a> WindowFrame<'a> {
         };
         let distance = radiance[3];
         let d_y = (point.position.y - scene.camera.eye.y) / distance.max(1e-20);
-        let radiance = hazed(&self.haze, Vec3::from_slice(&radiance), d_y, distance);
-        (radiance.extend(distance).to_array(), n)
+        let hole = point.holdout && scene.image.alpha;
+        let seen = if hole { Vec3::ZERO } else { Vec3::from_slice(&radiance) };
+        let passes = if hole { self.haze.passes(d_y, distance) } else { 0.0 };
+        let radiance = self.haze.in_front_of(seen, d_y, distance);
+        (radiance.extend(distance).to_array(), n.extend(passes))
     }
 
     /// Maps the volume quads under each pixel of a band, `layers` per pixel.
@@ -286,13 +295,4 @@ pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
     let hh = eye_plane.truncate() + Vec2::new(d.dot(map.e1_world), d.dot(map.e2_world)) * t;
     let uv = map.uv(hh);
     [uv.x, uv.y, t]
-}
-
-/// Radiance behind `t` metres of haze along a ray whose direction has the vertical component `d_y`. Twin:
-/// `haze_over` of `shaders/light/haze.wgsl`.
-fn hazed(haze: &EyeHaze, radiance: Vec3, d_y: f32, t: f32) -> Vec3 {
-    if haze.density == 0.0 {
-        return radiance;
-    }
-    haze.over(radiance, haze.transmittance(d_y, t))
 }

@@ -55,6 +55,9 @@ pub struct RayResult {
     pub radiance: Vec3,
     /// T at the end of the walk.
     pub transmittance: f32,
+    /// Share of a backdrop behind the scene that shows through all of it: 1 − alpha of a picture that has an
+    /// alpha channel.
+    pub uncovered: f32,
     /// Number of cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
 }
@@ -183,13 +186,14 @@ impl<'a> Integrator<'a> {
         let image = &self.scene.image;
         let i = gbuffer.window.index(pixel);
         let behind = Vec3::from_slice(&gbuffer.opaque[i]);
+        let shows = gbuffer.normal[i].w;
         let mut faces = gbuffer.faces(i).peekable();
         if faces.peek().is_none() {
-            return RayResult { radiance: behind, transmittance: 1.0, cells: [0, 0] };
+            return RayResult { radiance: behind, transmittance: 1.0, uncovered: shows, cells: [0, 0] };
         }
         let offset = sample_offset(image, sample);
         let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
-        let mut all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, cells: [0, 0] };
+        let mut all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
         while let Some((quad, hit)) = faces.next() {
             observer.sheet();
             let is_last = faces.peek().is_none();
@@ -208,6 +212,7 @@ impl<'a> Integrator<'a> {
             let haze = self.haze.transmittance(d.y, t);
             all.radiance = self.haze.over_water(all.radiance, behind, all.transmittance, haze);
         }
+        all.uncovered = all.transmittance * shows;
         all
     }
 
@@ -251,7 +256,7 @@ impl<'a> Integrator<'a> {
             let sum = if self.in_colour() { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
             radiance += light.intensity * sum;
         }
-        RayResult { radiance, transmittance, cells }
+        RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
 
     /// Whether the light of a cell has a colour of its own.

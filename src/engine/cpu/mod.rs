@@ -64,6 +64,8 @@ pub fn render_with(
     let samples = options.samples.clone().unwrap_or(0..image.samples);
     let width = window.width as usize;
     let mut frame = Frame::new(window.width, window.height, options.surface);
+    // Until the end it holds sums of 1 − alpha.
+    frame.alpha = image.alpha.then(|| vec![0.0; frame.radiance.len()]);
     let mut seconds = Seconds::default();
     let clock = Instant::now();
     let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;
@@ -85,7 +87,7 @@ pub fn render_with(
                 for i in 0..gbuffer.opaque.len() {
                     let nearest = i * gbuffer.layers;
                     let [u, v, t] = gbuffer.surface[nearest];
-                    let behind = (gbuffer.opaque[i][3], gbuffer.normal[i]);
+                    let behind = (gbuffer.opaque[i][3], gbuffer.normal[i].truncate());
                     surface.set(
                         first + i,
                         (&scene.quads, scene.camera.eye),
@@ -96,17 +98,25 @@ pub fn render_with(
                 }
             }
             let clock = Instant::now();
+            let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {
+                Some(alpha) => alpha[pixels.clone()].chunks_mut(width).collect(),
+                None => (0..band.height).map(|_| <&mut [f32]>::default()).collect(),
+            };
             frame.radiance[pixels.clone()]
                 .par_chunks_mut(width)
                 .zip(frame.counts[pixels.clone()].par_chunks_mut(width))
+                .zip(uncovered)
                 .zip(band.y..band.bottom())
-                .try_for_each(|((radiance, counts), y)| {
+                .try_for_each(|(((radiance, counts), uncovered), y)| {
                     for x in 0..width {
                         let pixel = [band.x + x as u32, y];
                         let result = integrator.pixel(&gbuffer, pixel, sample, &mut ());
                         let new = result.radiance.extend(result.transmittance).to_array();
                         radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
                         counts[x] = [0, 1].map(|c| counts[x][c] + result.cells[c]);
+                        if let Some(sum) = uncovered.get_mut(x) {
+                            *sum += result.uncovered;
+                        }
                     }
                     let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
                     monitor.progress("pixels", pixels, total)
@@ -117,6 +127,7 @@ pub fn render_with(
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;
     frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));
+    frame.alpha.par_iter_mut().flatten().for_each(|sum| *sum = 1.0 - *sum * inverse);
     develop(&mut frame, &image.look, window == Window::whole([image.width, image.height]));
     seconds.resolve = clock.elapsed().as_secs_f64();
     frame.seconds = seconds;

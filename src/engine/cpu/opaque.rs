@@ -19,6 +19,8 @@ pub struct Opaque {
     pub shade: Vec3,
     /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
+    /// Whether a picture with an alpha channel has a hole here.
+    pub holdout: bool,
 }
 
 impl Opaque {
@@ -36,6 +38,7 @@ impl Opaque {
             albedo: mix(|v| v.albedo),
             shade: mix(|v| [v.occlusion, v.shadow, v.wet]),
             pool: tile.pool,
+            holdout: tile.holdout,
         }
     }
 }

@@ -124,11 +124,15 @@ impl GpuBench {
             }
             add(name, integrate(Integrate::new(gpu, prepared.variant)), &prepared, &filled);
         }
-        let shape =
-            TargetShape { size: [window.width, window.height], layers, pools: !first.pools.is_empty() };
+        let shape = TargetShape {
+            size: [window.width, window.height],
+            layers,
+            pools: !first.pools.is_empty(),
+            alpha: first.image.alpha,
+        };
         self.prepared = Some(Prepared {
             targets: Targets::new(gpu, shape),
-            sums: Sums::new(gpu, window.pixels()),
+            sums: Sums::new(gpu, window.pixels(), shape.alpha),
             groups: GroupList::new(gpu, first, window, Tile::whole(window)),
             window,
             passes,

@@ -50,6 +50,8 @@ bindings! {
         PROFILES = 15
         GROUP_LIST = 16
         BRICKS = 17
+        OPAQUE_NORMAL = 18
+        UNCOVERED = 19
     }
     /// `shaders/picture/resolve.wgsl`.
     resolve {
@@ -58,6 +60,7 @@ bindings! {
         PICTURE = 2
         TILE = 3
         DEVELOP = 4
+        UNCOVERED = 5
     }
     /// `shaders/light/visibility.wgsl`.
     visibility {

@@ -26,7 +26,7 @@ impl Canvas {
         Canvas {
             shape,
             targets: Targets::new(gpu, shape),
-            sums: Sums::new(gpu, pixels),
+            sums: Sums::new(gpu, pixels, shape.alpha),
             picture: gpu.buffer("picture", pixels * PICTURE_BYTES, usage),
         }
     }

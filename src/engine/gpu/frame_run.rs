@@ -88,7 +88,12 @@ impl<'a> FrameRun<'a> {
 
         let whole = [scene.image.width, scene.image.height];
         let part = options.window.unwrap_or(Window::whole(whole));
-        let shape = TargetShape { size: options.grid.size(whole), layers, pools: !scene.pools.is_empty() };
+        let shape = TargetShape {
+            size: options.grid.size(whole),
+            layers,
+            pools: !scene.pools.is_empty(),
+            alpha: scene.image.alpha,
+        };
         let canvas = lru_get_or_insert(
             &mut renderer.canvases,
             KEPT_CANVASES,
@@ -246,6 +251,14 @@ impl<'a> FrameRun<'a> {
                 .zip(bytes.chunks_exact(16))
                 .for_each(|(out, sum)| *out = mean(bytemuck::pod_read_unaligned(sum)));
         })?;
+        if let Some(alpha) = &mut frame.alpha {
+            readback::read_rows(gpu, &sums.uncovered, 4, window.width, area, |row, bytes| {
+                alpha[range(row)]
+                    .iter_mut()
+                    .zip(bytes.chunks_exact(4))
+                    .for_each(|(out, sum)| *out = 1.0 - bytemuck::pod_read_unaligned::<f32>(sum) * inverse);
+            })?;
+        }
         self.monitor.progress("pixels", self.done, self.total)?;
         readback::read_rows(gpu, &sums.counts, 8, window.width, area, |row, bytes| {
             bytemuck::cast_slice_mut(&mut frame.counts[range(row)]).copy_from_slice(bytes);

@@ -50,6 +50,7 @@ pub struct Variant {
     trilinear: bool,
     leaps: bool,
     sparse: bool,
+    alpha: bool,
     many: bool,
     exponent: u32,
 }
@@ -78,6 +79,7 @@ impl Variant {
             trilinear: scene.trace.lookup == Lookup::Trilinear,
             leaps,
             sparse,
+            alpha: scene.image.alpha,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -94,15 +96,18 @@ pub struct Sums {
     pub radiance: wgpu::Buffer,
     /// Cells walked by view rays and by light rays, `vec2<u32>`.
     pub counts: wgpu::Buffer,
+    /// Share of a backdrop that shows, 1 − alpha, `f32`; one item if the picture has no alpha channel.
+    pub uncovered: wgpu::Buffer,
 }
 
 impl Sums {
-    /// Allocates sums for `pixels` pixels.
-    pub fn new(gpu: &Gpu, pixels: u64) -> Self {
+    /// Allocates sums for `pixels` pixels, with those of alpha if `alpha`.
+    pub fn new(gpu: &Gpu, pixels: u64, alpha: bool) -> Self {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         Sums {
             radiance: gpu.buffer("radiance", pixels * 16, usage),
             counts: gpu.buffer("counts", pixels * 8, usage),
+            uncovered: gpu.buffer("uncovered", if alpha { pixels * 4 } else { 4 }, usage),
         }
     }
 }
@@ -175,6 +180,7 @@ impl Integrate {
             ("TRILINEAR", number(variant.trilinear)),
             ("LEAPS", number(variant.leaps)),
             ("SPARSE", number(variant.sparse)),
+            ("ALPHA", number(variant.alpha)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
@@ -223,7 +229,7 @@ impl Integrate {
             wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         );
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
-        let (surface, opaque) = (view(&targets.surface), view(&targets.opaque));
+        let [surface, opaque, normal] = [&targets.surface, &targets.opaque, &targets.normal].map(view);
         let quad_id = targets.ids(0..frame.layers);
         let entries = [
             bind_buffer(at::FRAME, &uniform),
@@ -244,6 +250,8 @@ impl Integrate {
             bind_buffer(at::PROFILES, &reflection.profiles),
             bind_buffer(at::GROUP_LIST, &groups.buffer),
             bind_texture(at::BRICKS, &up.bricks),
+            bind_texture(at::OPAQUE_NORMAL, &normal),
+            bind_buffer(at::UNCOVERED, &sums.uncovered),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -288,7 +296,7 @@ impl Integrate {
 }
 
 /// The layout of the bindings.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 20] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
         TextureSampleType, TextureViewDimension,
@@ -327,6 +335,8 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 18] {
         (at::PROFILES, list),
         (at::GROUP_LIST, list),
         (at::BRICKS, cells(TextureFormat::Rgba32Uint)),
+        (at::OPAQUE_NORMAL, floats),
+        (at::UNCOVERED, sums),
     ];
     types.map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
         binding,

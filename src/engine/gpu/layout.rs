@@ -56,7 +56,7 @@ pub struct FrameUniforms {
     pub shadow_light: u32,
     pub levels: u32,
     pub footprint: f32,
-    pub pad_c: f32,
+    pub alpha: u32,
 }
 
 /// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
@@ -98,7 +98,7 @@ pub struct MeshTile {
     pub first: u32,
     pub pitch: u32,
     pub side: u32,
-    pub pad: u32,
+    pub holdout: u32,
 }
 
 /// One light.
@@ -326,7 +326,7 @@ impl FrameUniforms {
             shadow_light: scene.shadow_light().map_or(u32::MAX, |i| i as u32),
             levels: level_atlas(&scene.trace, volume.size).count,
             footprint: footprint(camera, image),
-            pad_c: 0.0,
+            alpha: u32::from(image.alpha),
         }
     }
 }

@@ -114,6 +114,7 @@ impl GpuRenderer {
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut run = FrameRun::prepare(self, scene, volume, mesh, options, monitor)?;
         let mut frame = Frame::new(part.width, part.height, options.surface);
+        frame.alpha = scene.image.alpha.then(|| vec![0.0; frame.radiance.len()]);
         for window in options.grid.windows(whole, part) {
             run.window(window, &mut frame)?;
         }

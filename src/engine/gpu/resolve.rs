@@ -56,6 +56,7 @@ impl Resolve {
                 bind_buffer(at::PICTURE, picture),
                 bind_buffer(at::TILE, &tile),
                 bind_buffer(at::DEVELOP, &develop),
+                bind_buffer(at::UNCOVERED, &sums.uncovered),
             ],
         });
         timer.run(gpu, "resolve", |encoder, span| {

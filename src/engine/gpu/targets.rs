@@ -16,13 +16,16 @@ pub struct TargetShape {
     pub layers: u32,
     /// Whether the scene has pools, which may be redrawn alone.
     pub pools: bool,
+    /// Whether the picture has an alpha channel.
+    pub alpha: bool,
 }
 
 /// The targets of one window.
 pub struct Targets {
     /// Linear radiance of the opaque scene or the background, and metres from the eye (0: background).
     pub opaque: wgpu::Texture,
-    /// Unit normal of the opaque scene (0: background).
+    /// Unit normal of the opaque scene (0: background), and the share of a backdrop behind the opaque scene
+    /// that shows.
     pub normal: wgpu::Texture,
     /// u, v and metres from the eye of the nearest volume quad. Until the quads are drawn it holds the
     /// visible rock's position on the mesh.
@@ -38,7 +41,7 @@ pub struct Targets {
 impl Targets {
     /// Allocates the targets of a window.
     pub fn new(gpu: &Gpu, shape: TargetShape) -> Self {
-        let TargetShape { size: [width, height], layers, pools } = shape;
+        let TargetShape { size: [width, height], layers, pools, .. } = shape;
         let texture = |label, format, usage, layers| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -59,7 +62,7 @@ impl Targets {
         };
         Targets {
             opaque: texture("opaque radiance", FLOATS, read, 1),
-            normal: texture("opaque normal", FLOATS, wgpu::TextureUsages::COPY_SRC, 1),
+            normal: texture("opaque normal", FLOATS, read, 1),
             surface: texture("surface", FLOATS, read, 1),
             quad_id: texture("quad id", wgpu::TextureFormat::R32Uint, read, layers),
             depth: (0..depths).map(|_| texture("depth", DEPTH, depth_usage, 1)).collect(),

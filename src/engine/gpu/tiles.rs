@@ -36,7 +36,9 @@ pub fn lists() -> (Vec<u32>, Vec<Range<u32>>) {
 
 /// Returns the tiles as shaders read them.
 pub fn packed(tiles: &[Tile]) -> Vec<MeshTile> {
-    tiles.iter().map(|t| MeshTile { first: t.first, pitch: t.pitch, side: t.side, pad: 0 }).collect()
+    let packed =
+        |t: &Tile| MeshTile { first: t.first, pitch: t.pitch, side: t.side, holdout: u32::from(t.holdout) };
+    tiles.iter().map(packed).collect()
 }
 
 /// Returns the parts of the rock, and those of each pool, that are drawn with these steps of the tiles'

@@ -60,8 +60,8 @@ pub struct Surface {
     pub radius: f32,
     /// Linear albedo of the ground.
     pub bottom: [f32; 3],
-    /// Padding.
-    pub pad_a: f32,
+    /// 1: a hole in a picture with alpha. 0: none.
+    pub holdout: f32,
     /// Absorption of the water, 1/m.
     pub absorption: [f32; 3],
     /// Padding.
@@ -110,6 +110,7 @@ impl Surface {
         let mut surface = Surface {
             color: pool.color.to_array(),
             bottom: pool.bottom.to_array(),
+            holdout: f32::from(u8::from(pool.holdout)),
             absorption: pool.absorption.to_array(),
             middle: middle.to_array(),
             waves: waves(pool, &scene.falls(), flow),

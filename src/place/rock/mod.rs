@@ -21,6 +21,8 @@ pub const MAX_LEVELS: u32 = 10;
 pub struct Rock {
     /// Name in the scene.
     pub name: String,
+    /// Whether a picture with an alpha channel has a hole in its place.
+    pub holdout: bool,
     /// Patch corners (u,v) = (0,0) (1,0) (1,1) (0,1), counter-clockwise seen from the outside; metres.
     pub corners: [Vec3; 4],
     /// Number of subdivisions: the mesh has 2^levels squares a side.

@@ -51,6 +51,8 @@ pub enum Kind {
     Int(i64, i64, i64),
     /// One of the words; the first is the default.
     Choice(&'static [&'static str]),
+    /// On or off: the default.
+    Switch(bool),
     /// Linear RGB, each 0 to 10000.
     Color([f64; 3]),
     /// A point or direction, each component −1e7 to 1e7.
@@ -218,6 +220,7 @@ impl Param {
             Int(min, i64::MAX, _) => format!("{min} to 2^63−1"),
             Int(min, max, _) => format!("{min} to {max}"),
             Choice(words) => words.join(", "),
+            Switch(_) => "true, false".into(),
             Color(_) => format!("three numbers, 0 to {}", number(COLOR_MAX)),
             Point(_) => format!("three numbers, ±{}", number(POINT_MAX)),
             Text(_) => "text".into(),
@@ -235,6 +238,7 @@ impl Param {
             Float(.., d) => number(d),
             Int(.., d) => d.to_string(),
             Choice(words) => words[0].into(),
+            Switch(on) => on.to_string(),
             Color(c) | Point(c) => format!("[{}, {}, {}]", number(c[0]), number(c[1]), number(c[2])),
             Text("") => "none".into(),
             Text(t) => t.into(),

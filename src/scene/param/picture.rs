@@ -41,6 +41,13 @@ pub(super) const IMAGE: Group = Group {
                  triangles are drawn; 0 draws all of them.",
             )
             .when("Raise it to draw rock faster; lower it to 0 for reference pictures."),
+        p("image.alpha", "", "", Switch(false), Uniform)
+            .doc(
+                "Transparent background: the picture holds water, rock, pools and haze, and its alpha tells \
+                 how much of what is put behind them they hide. The background and the environment give \
+                 light, but are not seen.",
+            )
+            .when("Set it to put the water over a photograph or another rendering; `--alpha` does the same."),
         p("image.exposure", "", "stops", Float(-32.0, 32.0, 0.0), Uniform)
             .slider(-8.0, 8.0)
             .doc("Exposure: the radiance is multiplied by 2^exposure.")

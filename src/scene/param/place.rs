@@ -3,6 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::place::Show;
 use crate::scene::build::EnvironmentKind;
 
 pub(super) const ROCKS: Group = Group {
@@ -16,6 +17,16 @@ pub(super) const ROCKS: Group = Group {
                  outside.",
             )
             .when("Let patches overlap at their borders, so that no gap shows between two rocks."),
+        p("rocks.*.show", "", "", Choice(Show::WORDS), Upload)
+            .doc(
+                "What the picture shows of the rock. With `image.alpha`, a `holdout` is a hole in the shape \
+                 of the rock: it hides what is behind it, and its alpha is 0. Without `image.alpha` it is \
+                 seen. `hidden` leaves the rock out of the scene, with its shade and its mirror image.",
+            )
+            .when(
+                "Choose `holdout` for a stand-in of the rock in a photograph that the water is put over, \
+                 `hidden` to look at the rest alone.",
+            ),
         p("rocks.*.levels", "", "", Int(0, crate::place::MAX_LEVELS as i64, 7), Upload)
             .slider(0.0, 9.0)
             .doc("Number of subdivisions: the mesh has 2^levels squares a side.")
@@ -113,6 +124,12 @@ pub(super) const POOLS: Group = Group {
         p("pools.*.corners", "", "m", Corners, Upload)
             .doc("Corners of the patch, all at one height, counter-clockwise seen from above.")
             .when("Put the borders inside rock or outside the picture, so that no edge of water shows."),
+        p("pools.*.show", "", "", Choice(Show::WORDS), Upload)
+            .doc(
+                "What the picture shows of the pool: `visible`, `holdout` or `hidden`, as for \
+                 `rocks.*.show`.",
+            )
+            .when("Choose `holdout` where the photograph behind the water has a pool of its own."),
         p("pools.*.depth", "", "m", Float(1e-3, 1e4, 1.2), Upload)
             .slider(0.05, 5.0)
             .doc("Depth of the water where no rock rises from the ground.")

@@ -64,7 +64,7 @@ impl Overview {
             let resolver = Resolver::new(&image.look);
             let pixels = environment.overview(SIZE[0], SIZE[1]);
             let pixels = pixels.iter().map(|radiance| {
-                let [r, g, b, _] = resolver.pixel(radiance.extend(1.0).to_array());
+                let [r, g, b, _] = resolver.pixel(radiance.to_array(), 1.0);
                 Color32::from_rgb(r, g, b)
             });
             let picture = ColorImage::new(SIZE, pixels.collect());

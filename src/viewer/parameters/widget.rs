@@ -79,6 +79,11 @@ impl Field<'_> {
             (Kind::Choice(options), Value::Text(text)) => {
                 self.choice(ui, options.iter().map(ToString::to_string), text)
             }
+            (Kind::Switch(_), Value::Switch(on)) => {
+                let mut new = *on;
+                name(&ui.checkbox(&mut new, ""), key);
+                (new != *on).then_some(Raw::Switch(new))
+            }
             (Kind::Color(_), Value::Triple(t)) => color(ui, key, *t),
             (Kind::Point(_), Value::Triple(t)) => {
                 let mut new = *t;

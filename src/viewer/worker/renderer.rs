@@ -475,6 +475,9 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
         .par_iter_mut()
         .zip(&part.radiance)
         .for_each(|(a, b)| *a = [0, 1, 2, 3].map(|c| a[c] + (b[c] - a[c]) * share));
+    if let (Some(sum), Some(part)) = (&mut sum.alpha, &part.alpha) {
+        sum.par_iter_mut().zip(part).for_each(|(a, b)| *a += (b - *a) * share);
+    }
     sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
     sum.seconds = part.seconds;
     develop(sum, look, true);

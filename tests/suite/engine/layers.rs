@@ -102,7 +102,7 @@ fn rock([x0, y0]: [f32; 2], [x1, y1]: [f32; 2], z: f32) -> Mesh {
         albedo: [0.4, 0.3, 0.2],
         ..Vertex::default()
     };
-    Mesh::new(vec![corner(x0, y0), corner(x1, y0), corner(x0, y1), corner(x1, y1)], [1])
+    Mesh::new(vec![corner(x0, y0), corner(x1, y0), corner(x0, y1), corner(x1, y1)], [(1, false)])
 }
 
 pub fn no_rock() -> Mesh {

@@ -158,7 +158,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let frame = fields!(FrameUniforms: clip_from_world eye_world jitter_x right jitter_y up sample_index
         forward samples zenith light_count horizon p ambient early_end cells max_cells image_width
         image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
-        window_height flow_cells layers haze_color haze_far shadow_light levels footprint pad_c);
+        window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
@@ -184,11 +184,11 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let environment =
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
     assert_eq!(members(&module, "Environment"), environment);
-    let surface = fields!(Surface: color radius bottom pad_a absorption pad_b middle pad_c waves around);
+    let surface = fields!(Surface: color radius bottom holdout absorption pad_b middle pad_c waves around);
     assert_eq!(members(&module, "Surface"), surface);
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
-    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side pad));
+    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 

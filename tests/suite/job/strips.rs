@@ -84,6 +84,7 @@ fn part_of(frame: &Frame, window: Window) -> Frame {
         height: window.height,
         radiance: pick(&places, &frame.radiance),
         counts: pick(&places, &frame.counts),
+        alpha: frame.alpha.as_ref().map(|alpha| pick(&places, alpha)),
         picture: pick(&places, &frame.picture),
         surface,
         seconds: Default::default(),
@@ -94,6 +95,7 @@ fn assert_same(what: &str, a: &Frame, b: &Frame) {
     let bits = |f: &Frame| f.radiance.iter().map(|r| r.map(f32::to_bits)).collect::<Vec<_>>();
     assert!(bits(a) == bits(b), "{what}: radiance");
     assert!(a.counts == b.counts, "{what}: counts");
+    assert!(a.alpha == b.alpha, "{what}: alpha");
     assert!(a.picture == b.picture, "{what}: picture");
     assert!(a.surface == b.surface, "{what}: surface");
 }

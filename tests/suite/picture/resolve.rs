@@ -9,7 +9,7 @@ fn look(tone: Tone) -> Look {
 }
 
 fn of(tone: Tone, linear: [f32; 3]) -> [u8; 3] {
-    let [r, g, b, _] = Resolver::new(&look(tone)).pixel([linear[0], linear[1], linear[2], 1.0]);
+    let [r, g, b, _] = Resolver::new(&look(tone)).pixel(linear, 1.0);
     [r, g, b]
 }
 

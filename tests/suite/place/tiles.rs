@@ -26,7 +26,7 @@ fn grid(squares: u32, size: f32, height: impl Fn(u32, u32) -> f32) -> Mesh {
         ..Vertex::default()
     };
     let rows = (0..=squares).flat_map(|y| (0..=squares).map(move |x| (x, y)));
-    Mesh::new(rows.map(|(x, y)| vertex(x, y)).collect(), [squares])
+    Mesh::new(rows.map(|(x, y)| vertex(x, y)).collect(), [(squares, false)])
 }
 
 /// A cliff with near and far, smooth and rough parts.

@@ -83,6 +83,7 @@ fn another(param: &Param) -> String {
         Kind::Float(min, max, d) => Value::Float(if d == min { 0.5 * max } else { min }).to_toml(),
         Kind::Int(min, max, d) => (if d == min { max.min(min + 1) } else { min }).to_string(),
         Kind::Choice(words) => words[1].into(),
+        Kind::Switch(on) => (!on).to_string(),
         // Colours of pools are albedos.
         Kind::Color(_) if param.key.starts_with("pools") => "[0.25, 0.5, 1.0]".into(),
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
@@ -175,6 +176,10 @@ fn ranges_include_their_ends_and_nothing_outside() {
             Kind::Choice(words) => (
                 words.iter().map(|w| Raw::Text((*w).into())).collect(),
                 ["", "None", "march "].map(|w| Raw::Text(w.into())).into(),
+            ),
+            Kind::Switch(_) => (
+                [false, true].map(Raw::Switch).into(),
+                vec![Raw::Int(1), Raw::Text("true".into()), Raw::Text(String::new())],
             ),
             Kind::Color(c) => (vec![list(c), list([0.0, 1e4, 1.0])], odd_triples(-1e-3, 10_000.1)),
             Kind::Point(c) => (vec![list(c), list([-1e7, 1e7, 0.0])], odd_triples(-1e7 - 1.0, 1e7 + 1.0)),

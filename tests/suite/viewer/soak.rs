@@ -35,6 +35,7 @@ fn some(rng: &mut rand_pcg::Pcg64Mcg, param: &Param) -> Option<Raw> {
         Kind::Int(_, i64::MAX, _) => Raw::Int(rng.random_range(0..1_000_000)),
         Kind::Int(min, max, _) => Raw::Int(rng.random_range(min..=max.min(12))),
         Kind::Choice(words) => Raw::Text(words[rng.random_range(0..words.len())].into()),
+        Kind::Switch(_) => Raw::Switch(rng.random_bool(0.5)),
         Kind::Color(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(0.0..2.0))).collect()),
         Kind::Point(_) => Raw::List((0..3).map(|_| Raw::Float(rng.random_range(-8.0..8.0))).collect()),
         Kind::Text(_) | Kind::Corners | Kind::Frames | Kind::Series => return None,

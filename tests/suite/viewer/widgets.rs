@@ -56,6 +56,7 @@ fn every_parameter_has_a_widget_of_its_name() {
             Kind::Float(..) | Kind::Int(..) if has_slider(param) => vec![(Role::Slider, key.clone())],
             Kind::Float(..) | Kind::Int(..) => vec![(Role::SpinButton, key.clone())],
             Kind::Choice(_) => vec![(Role::ComboBox, key.clone())],
+            Kind::Switch(_) => vec![(Role::CheckBox, key.clone())],
             Kind::Text(_) if is_material(&key) => vec![(Role::ComboBox, key.clone())],
             Kind::Text(_) => vec![(Role::TextInput, key.clone())],
             Kind::Color(_) => vec![(Role::ColorWell, key.clone())],
