@@ -90,6 +90,10 @@ pub struct BatchArgs {
     /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
+    /// Makes the backgrounds transparent: the same as --set image.alpha=true. They can then be put over
+    /// a photograph.
+    #[arg(long)]
+    alpha: bool,
     /// Renders only this part of every picture: column and row of its top left pixel, width and height.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
@@ -174,6 +178,7 @@ impl BatchArgs {
             more.extend([format!("image.width={w}"), format!("image.height={h}")]);
         }
         more.extend(self.samples.map(|n| format!("image.samples={n}")));
+        more.extend(self.alpha.then(|| "image.alpha=true".to_owned()));
         more.extend(self.fps.as_ref().map(|n| format!("animate.fps={n}")));
         more.extend(self.period.map(|n| format!("animate.loop={n}")));
         more

@@ -41,6 +41,10 @@ pub struct RenderArgs {
     /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
+    /// Makes the background transparent: the same as --set image.alpha=true. The picture can then be put over
+    /// a photograph.
+    #[arg(long)]
+    alpha: bool,
     /// Frame of the scene's animation to render.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
@@ -65,6 +69,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         more.extend([format!("image.width={w}"), format!("image.height={h}")]);
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
+    more.extend(args.alpha.then(|| "image.alpha=true".to_owned()));
     // The volume is made once more for the picture and warns then.
     let (animation, measured) = exposed(args.scene.animation(&more, &limits)?, &Unwarned(terminal))?;
     let scene = animation.at(args.frame)?;

@@ -10,6 +10,12 @@ pub(crate) const PIXEL_BYTES: u64 = 28 + 6;
 /// Additional host memory per pixel for the raster pass's layers, bytes: depth 4, uv 8, quad 4, normal 12.
 pub(crate) const SURFACE_BYTES: u64 = 28;
 
+/// Additional host memory per pixel for an alpha channel, bytes: alpha 4, and 2 in the encoded strips.
+const ALPHA_BYTES: u64 = 6;
+
+/// Bytes per pixel that bloom of an alpha channel adds: a copy of four floats, and a pyramid of its own.
+const ALPHA_BLOOM_BYTES: u64 = 16 + BLOOM_BYTES;
+
 /// Bytes per pixel that bloom adds on the host. Its pyramid takes a third of 12 bytes per pixel, of a
 /// picture that may be widened to a whole multiple of the coarsest level; 12 bytes leave room for that.
 const BLOOM_BYTES: u64 = 12;
@@ -24,8 +30,14 @@ pub(crate) const LEAST_ROWS: u64 = 64;
 /// Host memory of a row of `width` pixels, bytes, with the raster pass's layers if `surface_layers`.
 pub(crate) fn row_bytes(image: &Image, width: u32, surface_layers: bool) -> u64 {
     let surface = if surface_layers { SURFACE_BYTES } else { 0 };
-    let bloom = if image.look.bloom > 0.0 { BLOOM_BYTES } else { 0 };
-    u64::from(width) * (PIXEL_BYTES + surface + bloom)
+    let blooms = image.look.bloom > 0.0;
+    let bloom = if blooms { BLOOM_BYTES } else { 0 };
+    let alpha = match (image.alpha, blooms) {
+        (false, _) => 0,
+        (true, false) => ALPHA_BYTES,
+        (true, true) => ALPHA_BYTES + ALPHA_BLOOM_BYTES,
+    };
+    u64::from(width) * (PIXEL_BYTES + surface + bloom + alpha)
 }
 
 /// Maximum number of pixels in an image.
@@ -38,6 +50,8 @@ pub const fn target_bytes(layers: u32) -> u64 {
 
 /// Device memory of a pixel's sums, bytes: radiance 16 and counts 8.
 const SUM_BYTES: u64 = 16 + 8;
+/// Device memory of a pixel's sum of alpha, bytes.
+const ALPHA_SUM_BYTES: u64 = 4;
 /// Device memory per pixel of the picture, bytes.
 pub const PICTURE_BYTES: u64 = 4;
 
@@ -50,10 +64,11 @@ pub const fn canvas_bytes(layers: u32) -> u64 {
 /// Memory of the window that is drawn, bytes, where up to `layers` quads lie under a pixel.
 ///
 /// The GPU engine needs [`canvas_bytes`] per pixel. The targets of the CPU engine have at most as many
-/// pixels, with 28 bytes per pixel and 16 per layer.
+/// pixels, with 32 bytes per pixel and 16 per layer.
 pub fn canvas(image: &Image, layers: u32) -> u64 {
     let [columns, rows] = Grid::default().size([image.width, image.height]);
-    u64::from(columns) * u64::from(rows) * canvas_bytes(layers).max(28 + 16 * u64::from(layers))
+    let pixel = canvas_bytes(layers).max(32 + 16 * u64::from(layers));
+    u64::from(columns) * u64::from(rows) * (pixel + if image.alpha { ALPHA_SUM_BYTES } else { 0 })
 }
 
 /// Refuses an image that does not fit into `memory` bytes even when it is rendered in strips. One window and

@@ -51,7 +51,8 @@ pub enum Legend {
 /// Draws `layer` of `frame`, which has `samples` samples per pixel.
 ///
 /// Values that are not finite are magenta, also in the `rgb` layer. Pixels without a value (no quad, no
-/// surface, no cell) show a dark checkerboard, whose colours no map contains.
+/// surface, no cell) show a dark checkerboard, whose colours no map contains. It also shows through a picture
+/// with alpha.
 pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     let samples = samples.max(1) as f32;
     let radiance = |i: usize| frame.radiance.get(i).copied().unwrap_or([0.0; 4]);
@@ -105,7 +106,7 @@ pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     }
 }
 
-/// Applies `colour` to each pixel. A pixel without a colour shows the checkerboard.
+/// Applies `colour` to each pixel. A pixel without a colour, or with alpha below 255, shows the checkerboard.
 fn draw(frame: &Frame, colour: impl Fn(usize) -> Option<[u8; 4]> + Sync) -> Vec<[u8; 4]> {
     let width = frame.width.max(1) as usize;
     let pixels = frame.picture.len();
@@ -113,8 +114,20 @@ fn draw(frame: &Frame, colour: impl Fn(usize) -> Option<[u8; 4]> + Sync) -> Vec<
     (0..pixels)
         .into_par_iter()
         .with_min_len(PIXELS_PER_TASK)
-        .map(|i| colour(i).unwrap_or_else(|| nothing(i)))
+        .map(|i| match colour(i) {
+            Some(colour) if colour[3] == 255 => colour,
+            Some(colour) => over(colour, nothing(i)),
+            None => nothing(i),
+        })
         .collect()
+}
+
+/// A colour with alpha over an opaque one, mixed as displays mix them: in encoded values.
+fn over([r, g, b, a]: [u8; 4], below: [u8; 4]) -> [u8; 4] {
+    let mix = |c: u8, below: u8| {
+        ((u32::from(c) * u32::from(a) + u32::from(below) * u32::from(255 - a) + 127) / 255) as u8
+    };
+    [mix(r, below[0]), mix(g, below[1]), mix(b, below[2]), 255]
 }
 
 /// The colour of a value, or [`NON_FINITE`].

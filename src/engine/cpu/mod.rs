@@ -40,7 +40,7 @@ pub fn render(
     render_with(scene, volume, mesh, &options, &mut LightVolumeCache::default(), monitor)
 }
 
-/// Pixels rendered at once. Each takes 28 bytes, and 16 for every layer of quads, besides the frame.
+/// Pixels rendered at once. Each takes 32 bytes, and 16 for every layer of quads, besides the frame.
 const BAND_PIXELS: u64 = 1 << 21;
 
 /// Renders the options' part of the image and of the samples. A pixel has the same bits in every window.

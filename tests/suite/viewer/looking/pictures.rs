@@ -36,6 +36,18 @@ fn sum(p: [u8; 4]) -> u32 {
 }
 
 #[test]
+fn the_checker_shows_through_a_picture_with_alpha() {
+    let mut frame = empty();
+    frame.picture[0] = [250, 0, 0, 0];
+    frame.picture[1] = [240, 0, 0, 128];
+    let pixels = layer_image(&frame, Layer::Rgb, 1).pixels;
+    assert!(is_nothing(pixels[0]), "{:?}", pixels[0]);
+    let [r, g, _, a] = pixels[1];
+    assert!((138..=146).contains(&r) && (17..=26).contains(&g) && a == 255, "{:?}", pixels[1]);
+    assert_eq!(pixels[2..], frame.picture[2..]);
+}
+
+#[test]
 fn a_frame_without_anything_is_a_checker_without_a_legend() {
     let frame = empty();
     for layer in Layer::ALL {
