@@ -37,9 +37,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     }
     let mut small = scene.clone();
     let image = &mut small.edit().image;
-    let longest = image.width.max(image.height).max(SIDE);
-    let side = |n: u32| ((u64::from(n) * u64::from(SIDE)).div_ceil(u64::from(longest)) as u32).max(1);
-    (image.width, image.height, image.samples) = (side(image.width), side(image.height), 1);
+    image.shrink(SIDE);
     // A picture with an alpha channel is exposed as the same picture with its background.
     image.alpha = false;
     let frame = cpu::render(&small, volume, mesh, false, &Quiet(monitor))?;

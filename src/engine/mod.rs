@@ -41,6 +41,8 @@ pub enum Engine {
         device: DeviceOptions,
         /// Whether the CPU engine takes over when this device cannot render a scene.
         falls_back: bool,
+        /// Whether the user was told that the CPU engine finishes pixels.
+        told: bool,
     },
     /// The CPU engine, which uses all cores.
     Cpu(cpu::LightVolumeCache),
@@ -57,7 +59,12 @@ impl Engine {
 
     /// Returns a GPU engine on an open device. What the device cannot do is an error.
     pub fn gpu(renderer: GpuRenderer) -> Engine {
-        Engine::Gpu { renderer: Box::new(renderer), device: DeviceOptions::default(), falls_back: false }
+        Engine::Gpu {
+            renderer: Box::new(renderer),
+            device: DeviceOptions::default(),
+            falls_back: false,
+            told: false,
+        }
     }
 
     /// Opens the chosen engine. Returns it with one line that says which engine was opened and why.
@@ -88,7 +95,10 @@ impl Engine {
         let renderer = GpuRenderer::new(Gpu::open(device)?);
         renderer.gpu.check()?;
         let line = format!("engine gpu on {}", renderer.gpu.name());
-        Ok((Engine::Gpu { renderer: Box::new(renderer), device: device.clone(), falls_back }, line))
+        Ok((
+            Engine::Gpu { renderer: Box::new(renderer), device: device.clone(), falls_back, told: false },
+            line,
+        ))
     }
 
     /// Compiles the passes that a scene needs, as far as they are known without its volume.
@@ -139,49 +149,71 @@ impl Engine {
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
-        match self {
-            Engine::Cpu(light_volumes) => {
-                cpu::render_with(scene, volume, mesh, options, light_volumes, monitor)
-            }
-            Engine::Gpu { renderer, device, falls_back } => {
-                let mut result = check_walks(renderer, scene, volume, *falls_back)
-                    .and_then(|()| renderer.render(scene, volume, mesh, options, monitor));
-                if let Err(e) = &result
-                    && is_the_devices(e, renderer)
-                    && !matches!(e, Error::Device { .. } | Error::Watchdog { .. })
-                {
-                    monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
-                    **renderer = GpuRenderer::new(Gpu::open(device)?);
-                    let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
-                    result = renderer.render(scene, volume, mesh, &careful, monitor);
-                }
-                let Err(e) = &result else { return result };
-                if !*falls_back || !is_the_devices(e, renderer) {
-                    return result;
-                }
+        let mut result = self.render_once(scene, volume, mesh, options, monitor);
+        let is_the_devices = |e: &Error, engine: &Engine| match engine {
+            Engine::Gpu { renderer, .. } => is_the_devices(e, renderer),
+            Engine::Cpu(_) => false,
+        };
+        if let Err(e) = &result
+            && is_the_devices(e, self)
+            && !matches!(e, Error::Device { .. } | Error::Watchdog { .. })
+        {
+            monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
+            self.renew()?;
+            let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
+            result = self.render_once(scene, volume, mesh, &careful, monitor);
+        }
+        match &result {
+            Err(e) if matches!(self, Engine::Gpu { falls_back: true, .. }) && is_the_devices(e, self) => {
                 // It stays, so that the strips of one picture come from one engine and are warned of once.
                 monitor.warn(&format!("{e}: the CPU engine takes over"));
                 *self = Engine::cpu();
-                self.render_volume(scene, volume, mesh, options, monitor)
+                self.render_once(scene, volume, mesh, options, monitor)
             }
+            _ => result,
         }
     }
-}
 
-/// Checks that the device does not end the scene's walks early. A `cautious` check refuses walks that come
-/// near the limit.
-///
-/// # Errors
-/// [`Error::Device`], and errors of [`cpu::render`].
-pub fn check_walks(
-    renderer: &GpuRenderer,
-    scene: &Scene,
-    volume: &VolumeTexture,
-    cautious: bool,
-) -> Result<()> {
-    match renderer.gpu.is_software() {
-        true => long_walks::check(scene, volume, &renderer.gpu.name(), cautious),
-        false => Ok(()),
+    /// Renders a frame without another try after a fault of the device. Pixels whose walks the device ended
+    /// early are finished by the CPU engine, with a warning.
+    ///
+    /// # Errors
+    /// Errors of [`cpu::render_with`] or [`GpuRenderer::render_marked`], and those of `monitor`. Where the
+    /// engine was opened by [`EngineChoice::Auto`] and the device would end most walks, [`Error::Device`]
+    /// before the work.
+    pub fn render_once(
+        &mut self,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+        options: &RenderOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<Frame> {
+        let (renderer, falls_back, told) = match self {
+            Engine::Cpu(light_volumes) => {
+                return cpu::render_with(scene, volume, mesh, options, light_volumes, monitor);
+            }
+            Engine::Gpu { renderer, falls_back, told, .. } => (renderer, *falls_back, told),
+        };
+        if falls_back && renderer.gpu.limits_loops() {
+            long_walks::check(scene, volume, &renderer.gpu.name())?;
+        }
+        let (mut frame, cut) = renderer.render_marked(scene, volume, mesh, options, monitor)?;
+        if !cut.is_empty() {
+            let levels = renderer.levels(scene, volume);
+            let integrator = cpu::integrate::Integrator::with_levels(scene, volume, levels);
+            cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
+            // Strips and frames would repeat it.
+            if !std::mem::replace(told, true) {
+                let (device, pixels) = (renderer.gpu.name(), frame.counts.len());
+                monitor.warn(&format!(
+                    "{device} ends walks through so many cells early: the CPU engine finished {} of {pixels} \
+                     pixels",
+                    cut.len()
+                ));
+            }
+        }
+        Ok(frame)
     }
 }
 

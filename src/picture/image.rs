@@ -21,6 +21,15 @@ pub struct Image {
     pub look: Look,
 }
 
+impl Image {
+    /// Makes the image a rough picture of itself: at most `side` pixels on its longer side, and one sample.
+    pub fn shrink(&mut self, side: u32) {
+        let longest = self.width.max(self.height).max(side);
+        let shrunk = |n: u32| ((u64::from(n) * u64::from(side)).div_ceil(u64::from(longest)) as u32).max(1);
+        (self.width, self.height, self.samples) = (shrunk(self.width), shrunk(self.height), 1);
+    }
+}
+
 /// Filter of a pixel's samples. The samples are distributed by it, so that they all have the same weight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {

@@ -47,6 +47,11 @@ impl Gbuffer {
     }
 }
 
+/// Bytes of the targets per pixel of a scene's image.
+pub fn pixel_bytes(scene: &Scene) -> u64 {
+    28 + 16 * u64::from(overlap::sheets(scene))
+}
+
 /// Fills the targets of the whole image with sample `sample`.
 pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
     let Image { width, height, .. } = scene.image;

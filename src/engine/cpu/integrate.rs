@@ -150,7 +150,8 @@ impl<'a> Integrator<'a> {
         Integrator::with_levels(scene, volume, levels_of(volume, scene.pyramid_spec(volume)))
     }
 
-    fn with_levels(scene: &'a Scene, volume: &VolumeTexture, levels: Levels) -> Self {
+    /// Prepares a scene, its volume and the levels of it for a few rays, as [`Integrator::new`].
+    pub fn with_levels(scene: &'a Scene, volume: &VolumeTexture, levels: Levels) -> Self {
         Integrator {
             scene,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
@@ -172,6 +173,11 @@ impl<'a> Integrator<'a> {
             haze: scene.haze.seen_from(scene.camera.eye),
             levels,
         }
+    }
+
+    /// Returns the scene.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
     }
 
     /// Traces sample `sample` of a pixel, given by column and row of the whole image. The pixel lies inside

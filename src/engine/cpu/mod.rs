@@ -4,6 +4,7 @@
 pub mod gbuffer;
 pub mod integrate;
 pub mod opaque;
+pub mod pixels;
 pub mod pool;
 pub mod ray;
 pub mod visibility;
@@ -13,6 +14,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+pub use pixels::render_pixels;
 pub use visibility::LightVolumeCache;
 
 use crate::engine::options::RenderOptions;

@@ -20,6 +20,9 @@ impl Default for DeviceOptions {
     }
 }
 
+/// Turns after which a driver that limits loops ends those of an invocation.
+pub const MOST_TURNS: u64 = 65_535;
+
 /// An open device.
 pub struct Gpu {
     /// The device.
@@ -136,6 +139,12 @@ impl Gpu {
     /// Whether the device is software Vulkan on the host's processor.
     pub fn is_software(&self) -> bool {
         is_software(&self.info)
+    }
+
+    /// Whether the driver ends all loops of an invocation after [`MOST_TURNS`] turns together. lavapipe does,
+    /// without a word (`findings/lavapipe-loops.sh`).
+    pub fn limits_loops(&self) -> bool {
+        self.info.driver == "llvmpipe"
     }
 
     /// Checks whether the device has reported a fault.

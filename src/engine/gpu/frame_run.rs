@@ -9,7 +9,7 @@ use super::device::Gpu;
 use super::gbuffer::{Gbuffer, Redraw};
 use super::groups::GroupList;
 use super::integrate::{CUT, Integrate, Tiler};
-use super::layout::{FrameUniforms, Tile};
+use super::layout::{FrameUniforms, Tile, WORKGROUP};
 use super::prepared::PreparedScene;
 use super::rasters::{Key, Rasters};
 use super::renderer::{GpuRenderer, KEPT_CANVASES, KEPT_PIPELINES, TileHint};
@@ -17,7 +17,7 @@ use super::resolve::{Resolve, ResolveInputs};
 use super::targets::TargetShape;
 use super::timing::Timer;
 use super::visibility::{FilledVolumes, VisibilityInputs};
-use super::{Inputs, readback, walks_ended};
+use super::{Inputs, readback};
 use crate::engine::options::RenderOptions;
 use crate::picture::resolve::develop;
 use crate::picture::{Develop, Frame, Seconds};
@@ -53,6 +53,8 @@ pub struct FrameRun<'a> {
     done: u64,
     total: u64,
     seconds: Seconds,
+    /// Pixels of the frame whose walks the device ended early, by index.
+    cut: Vec<usize>,
 }
 
 impl<'a> FrameRun<'a> {
@@ -144,6 +146,7 @@ impl<'a> FrameRun<'a> {
             total: part.pixels() * samples.len() as u64,
             samples,
             seconds,
+            cut: Vec::new(),
         })
     }
 
@@ -161,9 +164,11 @@ impl<'a> FrameRun<'a> {
             width: wanted.width,
             height: wanted.height,
         };
-        let groups = GroupList::new(self.gpu, self.scene, window, area);
+        // A device that ends long walks ends those of a SIMD group together, so a crop needs whole groups.
+        let drawn = if self.gpu.limits_loops() { whole_groups(area, window) } else { area };
+        let groups = GroupList::new(self.gpu, self.scene, window, drawn);
         for sample in self.samples.clone() {
-            self.sample(window, area, &groups, sample, frame)?;
+            self.sample(window, [area, drawn], &groups, sample, frame)?;
             self.done += wanted.pixels();
         }
         let inputs = ResolveInputs {
@@ -180,11 +185,12 @@ impl<'a> FrameRun<'a> {
         Ok(())
     }
 
-    /// Adds one sample of a window's area to the canvas's sums. The first sample also fills `frame.surface`.
+    /// Adds one sample of the `drawn` part of a window to the canvas's sums. The first sample also fills
+    /// `frame.surface` in the window's `area`.
     fn sample(
         &mut self,
         window: Window,
-        area: Tile,
+        [area, drawn]: [Tile; 2],
         groups: &GroupList,
         sample: u32,
         frame: &mut Frame,
@@ -203,7 +209,7 @@ impl<'a> FrameRun<'a> {
             up,
             targets,
             window,
-            area,
+            area: drawn,
             frame: &uniforms,
             groups,
             filled: &self.filled,
@@ -231,13 +237,15 @@ impl<'a> FrameRun<'a> {
         }
         self.seconds.integrate +=
             self.integrate.run(&inputs, &self.canvas.sums, &mut self.tiler, |pixels| {
-                monitor.progress("pixels", done + pixels, total)
+                // What is drawn beyond the area does not count.
+                monitor.progress("pixels", (done + pixels).min(total), total)
             })?;
         Ok(())
     }
 
     /// Copies radiance, counts and picture of a window's area, which is `wanted` in the image, into `frame`.
-    fn read_back(&self, window: Window, area: Tile, wanted: Window, frame: &mut Frame) -> Result<()> {
+    /// Notes the pixels whose walks the device ended early.
+    fn read_back(&mut self, window: Window, area: Tile, wanted: Window, frame: &mut Frame) -> Result<()> {
         let (gpu, Canvas { sums, picture, .. }) = (self.gpu, self.canvas);
         let inverse = 1.0 / self.samples.len() as f32;
         let range = |row: u32| {
@@ -263,17 +271,15 @@ impl<'a> FrameRun<'a> {
         readback::read_rows(gpu, &sums.counts, 8, window.width, area, |row, bytes| {
             bytemuck::cast_slice_mut(&mut frame.counts[range(row)]).copy_from_slice(bytes);
         })?;
-        let cut = (0..wanted.height).flat_map(range).filter(|&i| frame.counts[i][0] == CUT).count();
-        if cut > 0 {
-            return Err(walks_ended(&gpu.name(), &format!("{cut} pixels are unfinished")));
-        }
+        self.cut.extend((0..wanted.height).flat_map(range).filter(|&i| frame.counts[i][0] == CUT));
         readback::read_rows(gpu, picture, 4, window.width, area, |row, bytes| {
             bytemuck::cast_slice_mut(&mut frame.picture[range(row)]).copy_from_slice(bytes);
         })
     }
 
-    /// Adds bloom and times to a finished frame. Returns the size of tiles that suited it.
-    pub fn finish(mut self, frame: &mut Frame) -> Option<(TileHint, f64)> {
+    /// Adds bloom and times to a finished frame. Returns the size of tiles that suited it, and the indices of
+    /// the pixels whose walks the device ended early.
+    pub fn finish(mut self, frame: &mut Frame) -> (Option<(TileHint, f64)>, Vec<usize>) {
         let image = &self.scene.image;
         // Bloom needs the whole image, which may be drawn in several windows.
         if image.look.bloom > 0.0 && self.part == Window::whole([image.width, image.height]) {
@@ -282,6 +288,19 @@ impl<'a> FrameRun<'a> {
             self.seconds.resolve += clock.elapsed().as_secs_f64();
         }
         frame.seconds = self.seconds;
-        self.tiler.learned().map(|pixels| (self.hint, pixels))
+        (self.tiler.learned().map(|pixels| (self.hint, pixels)), self.cut)
+    }
+}
+
+/// Extends an area of a window to whole workgroups, counted from the window's corner.
+fn whole_groups(area: Tile, window: Window) -> Tile {
+    let down = |n: u32| n / WORKGROUP * WORKGROUP;
+    let up = |n: u32, most: u32| n.next_multiple_of(WORKGROUP).min(most);
+    let [x, y] = [down(area.x), down(area.y)];
+    Tile {
+        x,
+        y,
+        width: up(area.x + area.width, window.width) - x,
+        height: up(area.y + area.height, window.height) - y,
     }
 }

@@ -11,6 +11,7 @@ use super::resolve::Resolve;
 use super::timing::Timer;
 use super::upload::Resident;
 use super::visibility::VisibilityPass;
+use super::walks_ended;
 use crate::engine::options::RenderOptions;
 use crate::engine::overlap;
 use crate::light::Visibility;
@@ -20,7 +21,7 @@ use crate::scene::Scene;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
-use crate::volume::{Storage, VolumeTexture};
+use crate::volume::{Levels, Storage, VolumeTexture};
 
 /// A device with its compiled passes.
 pub struct GpuRenderer {
@@ -85,6 +86,11 @@ impl GpuRenderer {
         });
     }
 
+    /// Returns the levels of a scene's volume: those on the device, if it rendered the scene last.
+    pub fn levels(&mut self, scene: &Scene, volume: &VolumeTexture) -> Levels {
+        self.resident.levels.get(volume, scene.pyramid_spec(volume))
+    }
+
     /// Drops the light volumes of the last frame, so that the next one fills its own.
     pub fn forget_light_volumes(&mut self) {
         self.visibility.forget();
@@ -110,6 +116,26 @@ impl GpuRenderer {
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
+        let (frame, cut) = self.render_marked(scene, volume, mesh, options, monitor)?;
+        match cut.len() {
+            0 => Ok(frame),
+            count => Err(walks_ended(&self.gpu.name(), &format!("{count} pixels are unfinished"))),
+        }
+    }
+
+    /// Renders as [`GpuRenderer::render`], and also returns the indices of the pixels whose walks the device
+    /// ended early. They hold no radiance, cells or picture.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::render`], except for walks that the device ended.
+    pub fn render_marked(
+        &mut self,
+        scene: &Scene,
+        volume: &VolumeTexture,
+        mesh: &Mesh,
+        options: &RenderOptions,
+        monitor: &dyn Monitor,
+    ) -> Result<(Frame, Vec<usize>)> {
         let whole = [scene.image.width, scene.image.height];
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut run = FrameRun::prepare(self, scene, volume, mesh, options, monitor)?;
@@ -118,7 +144,8 @@ impl GpuRenderer {
         for window in options.grid.windows(whole, part) {
             run.window(window, &mut frame)?;
         }
-        self.learned = run.finish(&mut frame);
-        Ok(frame)
+        let (learned, cut) = run.finish(&mut frame);
+        self.learned = learned;
+        Ok((frame, cut))
     }
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::engine::gpu::DeviceOptions;
-use crate::engine::{self, Engine, EngineChoice, RenderOptions, exposure};
+use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
 use crate::picture::resolve::develop;
 use crate::picture::{AutoExposure, Frame, Look};
@@ -385,13 +385,7 @@ impl Renderer {
         options: &RenderOptions,
         watch: &dyn Monitor,
     ) -> Result<Frame> {
-        match self.engine.get_or_insert(Engine::cpu()) {
-            Engine::Gpu { renderer, falls_back, .. } => {
-                engine::check_walks(renderer, scene, volume, *falls_back)?;
-                renderer.render(scene, volume, mesh, options, watch)
-            }
-            cpu => cpu.render_volume(scene, volume, mesh, options, watch),
-        }
+        self.engine.get_or_insert(Engine::cpu()).render_once(scene, volume, mesh, options, watch)
     }
 
     /// Expected time of one sample at 1/`scale` of the size, seconds.

@@ -1,26 +1,24 @@
-//! Walks that the device would end early are refused before the work, or rendered by the CPU engine.
+//! Walks that the device ends early are finished by the CPU engine, or left to it before the work.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::engine::gpu::{renderer, scene};
+use crate::engine::gpu::{SURFACE, assert_parity, renderer, scene};
 use taki::engine::gpu::DeviceOptions;
 use taki::engine::{Engine, EngineChoice, RenderOptions, cpu};
 use taki::picture::Frame;
 use taki::scene::Scene;
-use taki::util::error::{Error, Result};
+use taki::util::error::Result;
 use taki::util::monitor::{Monitor, Unwatched};
+use taki::util::window::Window;
 
-/// Keeps the warnings, and whether there was any work.
+/// Keeps the warnings.
 #[derive(Default)]
 struct Watch {
     warnings: Mutex<Vec<String>>,
-    worked: AtomicBool,
 }
 
 impl Monitor for Watch {
     fn progress(&self, _: &'static str, _: u64, _: u64) -> Result<()> {
-        self.worked.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -56,32 +54,112 @@ fn turns(scene: &Scene) -> u64 {
     frame.counts.iter().map(|[own, light]| u64::from(*own) + u64::from(*light) / 4).max().expect("pixels")
 }
 
-#[test]
-fn a_chosen_device_refuses_long_walks_before_the_work() {
-    let Some(renderer) = renderer("long walks") else { return };
-    if !renderer.gpu.is_software() {
-        return;
+/// A device that ends long walks, as a chosen engine. `None`, with the reason, where there is none.
+fn limited(test: &str) -> Option<Engine> {
+    let renderer = renderer(test)?;
+    if !renderer.gpu.limits_loops() {
+        eprintln!("{test}: not run: {} ends no walks", renderer.gpu.name());
+        return None;
     }
-    let mut engine = Engine::gpu(renderer);
-    let watch = Watch::default();
-    let refused = render(&mut engine, &along_the_face(65536), &watch).expect_err("too long");
-    assert!(matches!(refused, Error::Device { .. }), "{refused:?}");
-    assert_eq!(refused.exit_code(), 65);
-    assert!(refused.to_string().contains("--engine cpu"), "{refused}");
-    assert!(!watch.worked.load(Ordering::Relaxed), "the device worked before it refused");
+    Some(Engine::gpu(renderer))
+}
+
+/// As [`along_the_face`], with walks on both sides of the limit and more than one sample.
+fn around_the_limit(sets: &[&str]) -> Scene {
+    const SETS: [&str; 8] = [
+        "lights.key.direction=[1,0,0]",
+        "light.visibility=march",
+        "image.width=37",
+        "image.height=29",
+        "image.samples=2",
+        "volume.nz=24",
+        "trace.max_cells=16384",
+        "trace.tau=0.05",
+    ];
+    scene("front", &[&SETS, sets].concat())
+}
+
+/// Renders with the device alone. Returns the indices of the pixels that it left.
+fn cut(engine: &mut Engine, scene: &Scene, options: &RenderOptions) -> (Frame, Vec<usize>) {
+    let Engine::Gpu { renderer, .. } = engine else { panic!("a device") };
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    renderer.render_marked(scene, &volume, &scene.mesh(), options, &Unwatched).expect("a frame")
 }
 
 #[test]
-fn the_cpu_renders_what_an_automatic_engine_cannot_and_says_so() {
+fn the_cpu_finishes_the_pixels_that_a_chosen_device_leaves() {
+    let Some(mut engine) = limited("finished pixels") else { return };
+    for look in [[].as_slice(), &["image.bloom=0.1", "image.tone=filmic", "trace.filter=pyramid"]] {
+        let scene = around_the_limit(look);
+        let (alone, left) = cut(&mut engine, &scene, &SURFACE);
+        let all = alone.radiance.len();
+        assert!(left.len() > all / 20 && left.len() < all - all / 20, "{} of {all}", left.len());
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let watch = Watch::default();
+        let (mesh, watched) = (scene.mesh(), &watch);
+        let frame = engine.render_volume(&scene, &volume, &mesh, &SURFACE, watched).expect("a frame");
+        let on_cpu = cpu::render(&scene, &volume, &mesh, true, &Unwatched).expect("a frame");
+        for &i in &left {
+            assert_eq!((frame.radiance[i], frame.counts[i]), (on_cpu.radiance[i], on_cpu.counts[i]), "{i}");
+        }
+        let others = (0..all).filter(|i| left.binary_search(i).is_err());
+        others.for_each(|i| assert_eq!(frame.radiance[i], alone.radiance[i], "{i}"));
+        let worst = frame.picture.iter().flatten().zip(on_cpu.picture.iter().flatten());
+        assert!(worst.map(|(a, b)| a.abs_diff(*b)).max().expect("pixels") <= 1, "{look:?}");
+        assert_parity("finished pixels", &[frame, on_cpu]);
+        let warnings = watch.warnings.into_inner().unwrap();
+        match look.len() {
+            0 => assert!(warnings.len() == 1 && warnings[0].contains(&format!("{} of {all}", left.len()))),
+            // A second picture does not say it again.
+            _ => assert!(warnings.is_empty(), "{warnings:?}"),
+        }
+    }
+}
+
+#[test]
+fn crops_with_finished_pixels_equal_the_whole() {
+    let Some(mut engine) = limited("finished crops") else { return };
+    let scene = around_the_limit(&[]);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mut render = |window| {
+        let options = RenderOptions { window, ..SURFACE };
+        engine.render_volume(&scene, &volume, &scene.mesh(), &options, &Unwatched).expect("a frame")
+    };
+    let whole = render(None);
+    for window in [
+        Window { x: 3, y: 5, width: 13, height: 11 },
+        Window { x: 12, y: 0, width: 25, height: 29 },
+        Window { x: 0, y: 17, width: 37, height: 4 },
+    ] {
+        let crop = render(Some(window));
+        for y in 0..window.height {
+            let row = |x: u32, y: u32, width: u32| (y * width + x) as usize;
+            let (a, b) = (row(0, y, window.width), row(window.x, window.y + y, 37));
+            let n = window.width as usize;
+            assert!(crop.radiance[a..a + n] == whole.radiance[b..b + n], "{window}, row {y}");
+            assert!(crop.counts[a..a + n] == whole.counts[b..b + n], "{window}, row {y}");
+            assert!(crop.picture[a..a + n] == whole.picture[b..b + n], "{window}, row {y}");
+        }
+    }
+}
+
+#[test]
+fn an_automatic_engine_leaves_a_picture_of_long_walks_to_the_cpu_before_the_work() {
     let (mut engine, _) = Engine::open(EngineChoice::Auto, &DeviceOptions::default()).expect("an engine");
-    let scene = along_the_face(65536);
+    let limited = matches!(&engine, Engine::Gpu { renderer, .. } if renderer.gpu.limits_loops());
+    let few = scene("front", &["light.visibility=march", "image.width=9", "image.height=9"]);
     let watch = Watch::default();
-    let software = matches!(&engine, Engine::Gpu { renderer, .. } if renderer.gpu.is_software());
-    let frame = render(&mut engine, &scene, &watch).expect("a frame");
+    let was = engine.word();
+    render(&mut engine, &few, &watch).expect("a frame");
+    assert_eq!(engine.word(), was);
+    assert!(watch.warnings.into_inner().unwrap().is_empty());
+    let most = along_the_face(65536);
+    let watch = Watch::default();
+    let frame = render(&mut engine, &most, &watch).expect("a frame");
     let warnings = watch.warnings.into_inner().unwrap();
-    if software {
+    if limited {
         assert_eq!(engine.word(), "cpu");
-        let on_cpu = render(&mut Engine::cpu(), &scene, &Watch::default()).expect("a frame");
+        let on_cpu = render(&mut Engine::cpu(), &most, &Watch::default()).expect("a frame");
         assert!(frame.radiance == on_cpu.radiance && frame.counts == on_cpu.counts);
         assert_eq!(warnings.len(), 1, "{warnings:?}");
         assert!(warnings[0].ends_with("the CPU engine takes over"), "{warnings:?}");
@@ -92,21 +170,14 @@ fn the_cpu_renders_what_an_automatic_engine_cannot_and_says_so() {
 
 #[test]
 fn the_limit_is_the_devices_own() {
-    let Some(mut renderer) = renderer("turns") else { return };
-    if !renderer.gpu.is_software() {
-        return;
-    }
+    let Some(mut engine) = limited("turns") else { return };
     const MOST: f64 = 65535.0;
     let per_cell = turns(&along_the_face(1000)) as f64 / 1000.0;
     for (share, fits) in [(0.95, true), (1.1, false)] {
         let scene = along_the_face((MOST * share / per_cell) as u64);
         let count = turns(&scene) as f64 / MOST;
         assert!((count - share).abs() < 0.03, "{count} for {share}");
-        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
-        let frame = renderer.render(&scene, &volume, &scene.mesh(), &RenderOptions::default(), &Unwatched);
-        assert_eq!(frame.is_ok(), fits, "{share}: {:?}", frame.err());
-        let checked = render(&mut Engine::gpu(renderer), &scene, &Watch::default());
-        assert_eq!(checked.is_ok(), fits, "{share}: {:?}", checked.err());
-        renderer = crate::engine::gpu::renderer("turns").expect("as before");
+        let (_, left) = cut(&mut engine, &scene, &RenderOptions::default());
+        assert_eq!(left.is_empty(), fits, "{share}: {left:?}");
     }
 }
