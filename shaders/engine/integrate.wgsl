@@ -224,7 +224,8 @@ fn trace(
     let walks = select(1u, 2u, share > 0.0);
     var end = 0.0;
     var light = vec3<f32>(0.0);
-    for (var i = 0u; i < walks; i++) {
+    var i = 0u;
+    for (; i < walks; i++) {
         let weight = select(share, 1.0 - share, i == 0u);
         view.level = level_new(frame.cells, u32(finer) + i);
         view.origin = face_point(quad, hit.xy, frame.cells, frame.flow_cells);
@@ -257,6 +258,10 @@ fn trace(
         if ray.cut | !ray.done {
             *count = vec2<u32>(CUT);
         }
+    }
+    // The device ends this loop too.
+    if i < walks {
+        *count = vec2<u32>(CUT);
     }
 
     // The weights of the ambient light add up: Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end.
@@ -439,7 +444,8 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
         // The terms of a light are recomputed in every cell: on software Vulkan an array indexed in a loop
         // becomes a tree of selects that takes seconds to compile.
         if seen.occupied {
-            for (var i = 0u; i < view.lights; i++) {
+            var i = 0u;
+            for (; i < view.lights; i++) {
                 let light = ray_light(i, view.hit, view.level, view.lights);
                 if IN_COLOUR {
                     (*ray).light += light.intensity * lit_in_colour(seen, light, view, ray);
@@ -447,6 +453,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
                     (*ray).light += light.intensity * (lit(seen, light, view, ray) * (1.0 / 255.0));
                 }
             }
+            (*ray).cut |= i < view.lights;
         }
     }
     if MULTIPLE {

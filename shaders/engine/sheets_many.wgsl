@@ -12,6 +12,7 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
     var quad_number = nearest;
     var hit = textureLoad(surface, pixel, 0).xyz;
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    var ended = false;
     for (var layer = 1u; quad_number != 0u; layer++) {
         var next = 0u;
         if layer < frame.layers {
@@ -22,10 +23,15 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
             hit = quad_hit(quad, d_world);
         }
         result = trace(quad, quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
-        if result.w < frame.early_end || (*count).x == CUT {
+        ended = result.w < frame.early_end || (*count).x == CUT;
+        if ended {
             break;
         }
         quad_number = next;
+    }
+    // The device ends this loop too.
+    if quad_number != 0u && !ended {
+        *count = vec2<u32>(CUT);
     }
     return result;
 }
