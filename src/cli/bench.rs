@@ -60,6 +60,35 @@ struct Row {
     cells: u64,
     /// Core-nanoseconds per cell: wall time × cores / cells.
     ns_per_cell: f64,
+    /// Why the row could not be measured; its times and cells are then 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
+/// The rows of the table, and the first error of those that could not be measured.
+#[derive(Default)]
+struct Rows {
+    rows: Vec<Row>,
+    first: Option<Error>,
+}
+
+impl Rows {
+    fn push(&mut self, row: Row) {
+        self.rows.push(row);
+    }
+
+    /// Adds a row that could not be measured, so that the others stand.
+    ///
+    /// # Errors
+    /// Returns `error` if a signal ended the measurement.
+    fn failed(&mut self, row: Row, error: Error) -> Result<()> {
+        if matches!(error, Error::Interrupted { .. }) {
+            return Err(error);
+        }
+        self.rows.push(Row { error: Some(error.to_string()), ..row });
+        self.first.get_or_insert(error);
+        Ok(())
+    }
 }
 
 /// Deepest volume, in cells, for rows that walk towards the light from every cell. Their cost grows with the
@@ -101,7 +130,7 @@ const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     let sizes = args.size.map_or(SIZES.to_vec(), |s| vec![s]);
-    let mut rows = Vec::new();
+    let mut rows = Rows::default();
     let (engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
     terminal.note(&format!("taki: {line}"));
     let mut gpu = match engine {
@@ -123,7 +152,17 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             }
             let mut sets = sets.clone();
             sets.extend(front(size));
-            let volume = load("front", &sets)?.volume(direct_limits().memory, terminal)?;
+            let front = load("front", &sets)?;
+            let volume = match front.volume(direct_limits().memory, terminal) {
+                Ok(volume) => volume,
+                Err(e) => {
+                    let [nx, ny, nz] = front.water.size;
+                    let cells = format!("{nx}×{ny}×{nz}");
+                    let none = row("front", cells, &front, "cpu", "volume build", [0.0; 2], 0);
+                    rows.failed(none, e)?;
+                    continue;
+                }
+            };
             let shallow = volume.size[2] <= MARCH_LAYERS;
             let mut scenes = Vec::new();
             for (pass, more) in PASSES {
@@ -143,7 +182,10 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
         processes(args, terminal, &mut rows)?;
     }
     terminal.close();
-    print(args.json, &line, &rows)
+    match rows.first {
+        Some(e) if rows.rows.iter().all(|row| row.error.is_some()) => Err(e),
+        _ => print(args.json, &line, &rows.rows),
+    }
 }
 
 fn direct_limits() -> Limits {
@@ -177,12 +219,7 @@ fn summary(mut times: Vec<f64>) -> [f64; 2] {
 }
 
 /// Measures the steps of light in water, at the figure's own size with one sample.
-fn steps(
-    args: &BenchArgs,
-    terminal: &Terminal,
-    gpu: &mut Option<GpuBench>,
-    rows: &mut Vec<Row>,
-) -> Result<()> {
+fn steps(args: &BenchArgs, terminal: &Terminal, gpu: &mut Option<GpuBench>, rows: &mut Rows) -> Result<()> {
     let mut scenes = Vec::new();
     let mut sets: Vec<String> = ["image.samples=1", "trace.tau=4"].map(String::from).to_vec();
     for (pass, more) in STEPS {
@@ -194,12 +231,7 @@ fn steps(
 }
 
 /// Measures frames of [`SCENES`] at 1280×720 pixels with one sample.
-fn scenes(
-    args: &BenchArgs,
-    terminal: &Terminal,
-    gpu: &mut Option<GpuBench>,
-    rows: &mut Vec<Row>,
-) -> Result<()> {
+fn scenes(args: &BenchArgs, terminal: &Terminal, gpu: &mut Option<GpuBench>, rows: &mut Rows) -> Result<()> {
     let size = ["image.width=1280", "image.height=720", "image.samples=1"].map(String::from);
     for name in SCENES {
         let scene = load(name, &size)?;
@@ -218,7 +250,7 @@ fn passes(
     name: &'static str,
     scenes: &[(&'static str, Scene)],
     volume: &VolumeTexture,
-    rows: &mut Vec<Row>,
+    rows: &mut Rows,
 ) -> Result<()> {
     let direct = &scenes[0].1;
     let mesh = direct.mesh();
@@ -228,20 +260,32 @@ fn passes(
             Some(m) => m.2.push(seconds),
             None => measured.push((engine, pass, vec![seconds], cells)),
         };
-    if let Some(gpu) = gpu {
+    let [nx, ny, nz] = volume.size;
+    let cells = format!("{nx}×{ny}×{nz}");
+    let mut failed: Vec<(&'static str, Error)> = Vec::new();
+    let mut is_ready = false;
+    if let Some(bench) = gpu {
         let scenes: Vec<_> = scenes.iter().map(|(name, scene)| (*name, scene)).collect();
-        gpu.prepare(&scenes, volume, &mesh)?;
+        match bench.prepare(&scenes, volume, &mesh) {
+            Ok(others) => (failed, is_ready) = (others, true),
+            Err(e) => failed = vec![("all", e)],
+        }
     }
     let mut light_volumes = cpu::LightVolumeCache::default();
     // The first round warms caches and settles tile sizes, so it does not count.
     for round in 0..=args.runs {
         terminal.progress("rounds", round as u64, args.runs as u64)?;
         let counted = round > 0;
-        if let Some(gpu) = gpu {
-            for (number, name) in gpu.names().into_iter().enumerate() {
-                let (seconds, cells) = gpu.run(number)?;
-                if counted {
-                    add("gpu", name, seconds, cells);
+        if let Some(bench) = gpu.as_mut().filter(|_| is_ready) {
+            for (number, name) in bench.names().into_iter().enumerate() {
+                match bench.run(number) {
+                    Ok((seconds, cells)) if counted => add("gpu", name, seconds, cells),
+                    Ok(_) => {}
+                    Err(e) => {
+                        failed.push((name, e));
+                        is_ready = false;
+                        break;
+                    }
                 }
             }
         }
@@ -261,9 +305,18 @@ fn passes(
             }
         }
     }
-    let [nx, ny, nz] = volume.size;
-    for (engine, pass, times, cells) in measured {
-        rows.push(row(name, format!("{nx}×{ny}×{nz}"), direct, engine, pass, summary(times), cells));
+    if gpu.is_some() && !is_ready {
+        // A device that has failed once is not trusted with the next scene.
+        *gpu = match Engine::open(args.engine.engine, &args.engine.device()) {
+            Ok((Engine::Gpu { renderer, .. }, _)) => Some(GpuBench::new(*renderer)),
+            _ => None,
+        };
+    }
+    for (pass, e) in failed {
+        rows.failed(row(name, cells.clone(), direct, "gpu", pass, [0.0; 2], 0), e)?;
+    }
+    for (engine, pass, times, walked) in measured {
+        rows.push(row(name, cells.clone(), direct, engine, pass, summary(times), walked));
     }
     Ok(())
 }
@@ -280,11 +333,11 @@ fn row(
     let cores = rayon::current_num_threads() as f64;
     let ns_per_cell = if cells == 0 { 0.0 } else { seconds * cores / cells as f64 * 1e9 };
     let size = format!("{}×{}", measured.image.width, measured.image.height);
-    Row { scene, volume, size, engine, pass, seconds, fastest, cells, ns_per_cell }
+    Row { scene, volume, size, engine, pass, seconds, fastest, cells, ns_per_cell, error: None }
 }
 
 /// Measures how long the host takes to turn radiance into a picture, without and with bloom.
-fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
+fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Rows) -> Result<()> {
     let sets = |bloom: f32| [front([1280, 720]), vec![format!("image.bloom={bloom}")]].concat();
     let scenes = [("resolve", load("front", &sets(0.0))?), ("resolve bloom", load("front", &sets(0.1))?)];
     let volume = scenes[0].1.volume(direct_limits().memory, terminal)?;
@@ -307,7 +360,7 @@ fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resul
 }
 
 /// Measures how long volumes take to build. The rows' cells are the cells of the volume.
-fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
+fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Rows) -> Result<()> {
     for n in [40, 256] {
         let scene = load("front", &cube(n))?;
         let mut times = Vec::new();
@@ -328,7 +381,7 @@ fn builds(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<
 }
 
 /// Measures whole processes, from start to written PNG: a figure, and the default scene with one sample.
-fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Result<()> {
+fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Rows) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e.kind()))?;
     let program = std::env::current_exe().map_err(|e| Error::read("taki".as_ref(), e))?;
     let engine = match args.engine.engine {
@@ -338,7 +391,12 @@ fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resu
     };
     for (preset, more) in [("fig5", &[][..]), ("waterfall", &["--size", "1280x720", "--samples", "1"])] {
         let scene = load(preset, &[])?;
+        let [nx, ny, nz] = scene.water.size;
+        let whole = |times| {
+            row(preset, format!("{nx}×{ny}×{nz}"), &scene, engine, "whole process", summary(times), 0)
+        };
         let mut times = Vec::new();
+        let mut failed = None;
         for round in 0..args.runs.min(5) {
             terminal.progress("processes", round as u64, args.runs as u64)?;
             let clock = Instant::now();
@@ -351,16 +409,16 @@ fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Vec<Row>) -> Resu
             match status {
                 Ok(status) if status.success() => times.push(clock.elapsed().as_secs_f64()),
                 other => {
-                    return Err(Error::input(
-                        format!("taki render {preset} failed ({other:?})"),
-                        "run it by hand to see why",
-                    ));
+                    let what = format!("taki render {preset} failed ({other:?})");
+                    failed = Some(Error::input(what, "run it by hand to see why"));
+                    break;
                 }
             }
         }
-        let [nx, ny, nz] = scene.water.size;
-        let row = row(preset, format!("{nx}×{ny}×{nz}"), &scene, engine, "whole process", summary(times), 0);
-        rows.push(row);
+        match failed {
+            None => rows.push(whole(times)),
+            Some(e) => rows.failed(whole(vec![0.0]), e)?,
+        }
     }
     Ok(())
 }
@@ -373,6 +431,11 @@ fn print(json: bool, line: &str, rows: &[Row]) -> Result<()> {
     say("| scene | volume | size | engine | pass | ms | fastest | cells | core-ns per cell |")?;
     say("|---|---|---|---|---|--:|--:|--:|--:|")?;
     for r in rows {
+        if let Some(why) = &r.error {
+            let place = [r.scene, &r.volume, &r.size, r.engine, r.pass].join(" | ");
+            say(&format!("| {place} | not measured: {why} |||||"))?;
+            continue;
+        }
         let cells = if r.cells == 0 { "–".into() } else { r.cells.to_string() };
         let ns = if r.cells == 0 { "–".into() } else { format!("{:.2}", r.ns_per_cell) };
         say(&format!(
@@ -388,7 +451,9 @@ fn print(json: bool, line: &str, rows: &[Row]) -> Result<()> {
     }
     let integrate_of_cube = |n: u32| {
         let volume = format!("{n}×{n}×{n}");
-        let is = move |r: &&Row| r.volume == volume && (r.engine, r.pass) == ("gpu", "integrate");
+        let is = move |r: &&Row| {
+            r.volume == volume && (r.engine, r.pass) == ("gpu", "integrate") && r.error.is_none()
+        };
         rows.iter().filter(is)
     };
     for large in integrate_of_cube(LARGE) {

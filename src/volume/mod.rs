@@ -24,7 +24,7 @@ pub use file::{ReadOptions, has_reflection, read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
     Leaps, LevelAtlas, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels, level_count,
-    level_size, levels_of,
+    level_size, levels_of, stored_levels,
 };
 pub use ripple::Ripple;
 pub use spec::{Structure, WaterSpec};

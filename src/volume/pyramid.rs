@@ -183,6 +183,11 @@ pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
     LevelsCache { leaps: Leaps::Never, last: None }.get(volume, spec)
 }
 
+/// Wraps a sparse volume, which has no coarser levels, as the levels of itself.
+pub fn stored_levels(volume: VolumeTexture) -> Levels {
+    Arc::new(Pyramid { levels: vec![volume], leaps: false })
+}
+
 /// Cache of the levels from frame to frame.
 #[derive(Default)]
 pub struct LevelsCache {

@@ -16,7 +16,7 @@ use super::{Gpu, Inputs, readback};
 use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::trace::Lookup;
-use crate::util::error::Result;
+use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use crate::volume::{Leaps, VolumeTexture};
 
@@ -63,8 +63,11 @@ impl GpuBench {
     /// also gets the raster pass and the walks without light (`shaders/engine/bare.wgsl`), cell by cell and
     /// leaping.
     ///
+    /// Returns the names of scenes that could not be prepared, and why. They have no passes.
+    ///
     /// # Errors
-    /// Errors of uploading the scenes and filling their light volumes, as in [`GpuRenderer::render`].
+    /// Errors of uploading the scenes and filling their light volumes, as in [`GpuRenderer::render`], if no
+    /// scene could be prepared.
     ///
     /// # Panics
     /// If `scenes` is empty.
@@ -73,7 +76,7 @@ impl GpuBench {
         scenes: &[(&'static str, &Scene)],
         volume: &VolumeTexture,
         mesh: &Mesh,
-    ) -> Result<()> {
+    ) -> Result<Vec<(&'static str, Error)>> {
         let GpuRenderer { gpu, timer, .. } = &self.renderer;
         let first = scenes[0].1;
         let window = Window::whole([first.image.width, first.image.height]);
@@ -81,9 +84,17 @@ impl GpuBench {
         let mut passes: Vec<(&'static str, Pass)> = Vec::new();
         let mut layers = 1;
         let mut light_volumes_measured = false;
-        for (number, &(name, scene)) in scenes.iter().enumerate() {
-            let prepared =
-                Rc::new(PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volume, mesh)?);
+        let mut failed = Vec::new();
+        self.prepared = None;
+        for &(name, scene) in scenes {
+            let prepared = match PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volume, mesh)
+            {
+                Ok(prepared) => Rc::new(prepared),
+                Err(e) => {
+                    failed.push((name, e));
+                    continue;
+                }
+            };
             layers = prepared.layers;
             let frame = FrameUniforms::new(scene, volume, window, &(0..1), 0, layers);
             let lights = scene.volume_lights().len();
@@ -94,16 +105,24 @@ impl GpuBench {
             let lookup = scene.trace.lookup;
             if let Some(plan) = &prepared.light_volumes {
                 let inputs = VisibilityInputs { gpu, timer, up: &prepared.up, frame: &frame, plan, lookup };
-                filled = visibility.get(&inputs, |_, _| Ok(()))?.0;
+                filled = match visibility.get(&inputs, |_, _| Ok(())) {
+                    Ok((filled, _)) => filled,
+                    Err(e) => {
+                        failed.push((name, e));
+                        continue;
+                    }
+                };
             }
+            let is_first = passes.is_empty();
             let mut add = |name, work, scene: &Rc<PreparedScene>, filled: &FilledVolumes| {
                 let (scene, filled) = (scene.clone(), filled.clone());
                 passes.push((name, Pass { work, scene, frame, filled }));
             };
-            if number == 0 {
+            if is_first {
                 add("gbuffer", Work::Gbuffer, &prepared, &filled);
                 // A large volume is on the device only once.
-                let is_large = volume.cells.bytes() > LARGE_BYTES || volume.is_sparse();
+                let is_sparse = prepared.up.levels[0].is_sparse();
+                let is_large = volume.cells.bytes() > LARGE_BYTES || is_sparse;
                 let walks = [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)];
                 for (name, leaps) in walks.into_iter().take(if is_large { 1 } else { 2 }) {
                     let scene_of_walk = if is_large {
@@ -113,7 +132,7 @@ impl GpuBench {
                         own.levels.leaps = leaps;
                         Rc::new(PreparedScene::new(gpu, &mut own, &mut reflections, scene, volume, mesh)?)
                     };
-                    let storage = [leaps == Leaps::Always, volume.is_sparse()];
+                    let storage = [leaps == Leaps::Always, is_sparse];
                     let variant = Variant::of(scene, layers, None, storage);
                     add(name, integrate(Integrate::bare(gpu, variant)), &scene_of_walk, &none);
                 }
@@ -123,6 +142,9 @@ impl GpuBench {
                 add("light volumes", Work::Visibility(lookup), &prepared, &filled);
             }
             add(name, integrate(Integrate::new(gpu, prepared.variant)), &prepared, &filled);
+        }
+        if passes.is_empty() {
+            return Err(failed.remove(0).1);
         }
         let shape = TargetShape {
             size: [window.width, window.height],
@@ -137,7 +159,8 @@ impl GpuBench {
             window,
             passes,
         });
-        self.run(0).map(drop)
+        self.run(0)?;
+        Ok(failed)
     }
 
     /// Returns the names of the passes, in the order of [`GpuBench::run`]'s indices.

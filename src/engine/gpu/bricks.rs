@@ -32,7 +32,8 @@ pub fn none(gpu: &Gpu) -> wgpu::TextureView {
 /// Uploads a sparse volume. Returns the textures of its stored cells and of its bricks.
 ///
 /// # Errors
-/// [`Error::Device`] if the device's largest 3-D texture cannot hold them, and errors of [`Gpu::run`].
+/// [`Error::Device`] if the device's largest 3-D texture or its memory cannot hold them, and errors of
+/// [`Gpu::run`].
 pub fn upload(gpu: &Gpu, bricks: &Bricks) -> Result<[wgpu::TextureView; 2]> {
     let most = gpu.device.limits().max_texture_dimension_3d;
     let (grid, stored) = (bricks.grid(), bricks.stored());
@@ -53,7 +54,14 @@ pub fn upload(gpu: &Gpu, bricks: &Bricks) -> Result<[wgpu::TextureView; 2]> {
             ),
         ));
     }
-    let brick_texture = texture(gpu, "bricks", wgpu::TextureFormat::Rgba32Uint, grid);
+    let what = || {
+        let [nx, ny, nz] = bricks.size();
+        format!("a volume of {nx}×{ny}×{nz} cells, {} of them stored,", stored.len())
+    };
+    let [brick_texture, cell_texture] = gpu.allocate(what, || {
+        let brick_texture = texture(gpu, "bricks", wgpu::TextureFormat::Rgba32Uint, grid);
+        [brick_texture, texture(gpu, "stored cells", wgpu::TextureFormat::Rg32Uint, extent)]
+    })?;
     let layer = grid[0] as usize * grid[1] as usize;
     let layers = (SLAB_BYTES / (layer * size_of::<[u32; 4]>())).max(1);
     for first in (0..grid[2] as usize).step_by(layers) {
@@ -61,7 +69,6 @@ pub fn upload(gpu: &Gpu, bricks: &Bricks) -> Result<[wgpu::TextureView; 2]> {
         let texels = bricks.texels(first * layer..end * layer);
         write_layers(gpu, &brick_texture, [0, 0, first as u32], [grid[0], grid[1]], &texels)?;
     }
-    let cell_texture = texture(gpu, "stored cells", wgpu::TextureFormat::Rg32Uint, extent);
     let layer = extent[0] as usize * extent[1] as usize;
     let layers = SLAB_BYTES / (layer * size_of::<Cell>());
     for (slab, cells) in stored.chunks(layers * layer).enumerate() {

@@ -41,7 +41,9 @@ pub struct Gpu {
 enum Fault {
     Lost(String),
     OutOfMemory(String),
-    /// A validation or internal error: a bug of this program.
+    /// The driver refused what the interface allows.
+    Refused(String),
+    /// A validation error: a bug of this program.
     Bug(String),
 }
 
@@ -120,6 +122,7 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(move |error| {
             let new = match error {
                 wgpu::Error::OutOfMemory { .. } => Fault::OutOfMemory(one_line(&error.to_string())),
+                wgpu::Error::Internal { .. } => Fault::Refused(one_line(&error.to_string())),
                 other => Fault::Bug(one_line(&other.to_string())),
             };
             note(&on_error, new);
@@ -150,7 +153,7 @@ impl Gpu {
     /// Checks whether the device has reported a fault.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`] or [`Error::Memory`] if it has.
+    /// [`Error::DeviceLost`], [`Error::Memory`] or [`Error::Device`] if it has.
     ///
     /// # Panics
     /// If the device refused a command, which is a bug of this program.
@@ -169,6 +172,9 @@ impl Gpu {
                 budget: "exhausted".into(),
                 fix: "lower the volume's or the image's size, or use --engine cpu".into(),
             }),
+            Some(Fault::Refused(why)) => {
+                Err(Error::device(format!("{} refuses to work ({why})", self.name()), "use --engine cpu"))
+            }
             Some(Fault::Bug(why)) => panic!("the GPU refused a command: {why}"),
         }
     }
@@ -206,6 +212,22 @@ impl Gpu {
     /// Creates a command encoder.
     pub fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// Creates something large. Devices limit the size of one allocation, and some do not tell the limit.
+    ///
+    /// # Errors
+    /// [`Error::Device`] about `what` if the device has no memory for it.
+    pub fn allocate<T>(&self, what: impl Fn() -> String, create: impl FnOnce() -> T) -> Result<T> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let made = create();
+        match pollster::block_on(scope.pop()) {
+            None => Ok(made),
+            Some(_) => Err(Error::device(
+                format!("{} is too large for {}, which has no memory for it", what(), self.name()),
+                "lower its size, or use --engine cpu",
+            )),
+        }
     }
 
     /// Creates a buffer of `size` bytes.

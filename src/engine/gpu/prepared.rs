@@ -43,7 +43,7 @@ impl PreparedScene {
         };
         let up = Uploaded::new(gpu, resident, scene, volume, mesh)?;
         let reflection = reflections.bind(gpu, scene, volume);
-        let storage = [up.levels.leaps, volume.is_sparse()];
+        let storage = [up.levels.leaps, up.levels[0].is_sparse()];
         let variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
         Ok(PreparedScene { up, layers, light_volumes, reflection, variant })
     }

@@ -17,7 +17,9 @@ use crate::place::tiles::steps;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
-use crate::volume::{Cell, LevelAtlas, Levels, LevelsCache, VolumeTexture};
+use crate::volume::{
+    Bricks, Cell, Cells, LevelAtlas, Levels, LevelsCache, StorageChoice, VolumeTexture, stored_levels,
+};
 
 /// Bytes handed to the queue at once. The queue keeps a copy of what it is given, so a volume is uploaded in
 /// slabs.
@@ -29,12 +31,22 @@ pub(super) const SLAB_BYTES: usize = 64 << 20;
 pub struct Resident {
     /// Levels of the last volume, and whether they are made for leaps.
     pub levels: LevelsCache,
-    volume: Option<(Levels, [wgpu::TextureView; 2])>,
+    volume: Option<ResidentVolume>,
     mesh: Option<ResidentMesh>,
     /// The environment's map and the number of its upload.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
     /// Number of uploads of meshes and maps so far.
     uploads: u64,
+}
+
+/// A volume on the device.
+struct ResidentVolume {
+    /// The levels that were to be uploaded.
+    asked: Levels,
+    /// The levels in the storage that the device holds.
+    held: Levels,
+    /// Textures of cells and bricks.
+    views: [wgpu::TextureView; 2],
 }
 
 /// A mesh on the device.
@@ -54,7 +66,7 @@ struct ResidentMesh {
 
 /// A scene on the device: everything that does not change from sample to sample.
 pub struct Uploaded {
-    /// The volume's levels.
+    /// The volume's levels, in the storage that the device holds.
     pub levels: Levels,
     /// The levels in one 3-D storage texture, `rg32uint`, arranged by [`LevelAtlas`]; for sparse storage the
     /// stored cells.
@@ -132,7 +144,8 @@ impl Uploaded {
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
         pool_parts.resize_with(pools.len(), Vec::new);
         let levels = resident.levels.get(volume, scene.pyramid_spec(volume));
-        let [cells, bricks] = resident.volume(gpu, &levels)?;
+        let packs = scene.asked_storage == StorageChoice::Auto;
+        let (levels, [cells, bricks]) = resident.volume(gpu, volume, levels, packs)?;
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
@@ -170,21 +183,38 @@ impl Uploaded {
 }
 
 impl Resident {
-    /// Returns the textures of cells and bricks, uploaded unless they are resident.
-    fn volume(&mut self, gpu: &Gpu, levels: &Levels) -> Result<[wgpu::TextureView; 2]> {
-        if let Some((old, views)) = &self.volume
-            && Arc::ptr_eq(old, levels)
+    /// Returns the levels as the device holds them, and the textures of cells and bricks, uploaded unless
+    /// they are resident. A dense volume that is too large for the device is stored sparse there if `packs`;
+    /// its cells, and so the pictures, stay the same.
+    fn volume(
+        &mut self,
+        gpu: &Gpu,
+        volume: &VolumeTexture,
+        asked: Levels,
+        packs: bool,
+    ) -> Result<(Levels, [wgpu::TextureView; 2])> {
+        if let Some(old) = &self.volume
+            && Arc::ptr_eq(&old.asked, &asked)
         {
-            return Ok(views.clone());
+            return Ok((old.held.clone(), old.views.clone()));
         }
         // The old volume is dropped first, because two large ones might not fit.
         self.volume = None;
-        let views = match levels[0].cells.bricks() {
-            Some(stored) => bricks::upload(gpu, stored)?,
-            None => [upload_volume(gpu, levels)?, bricks::none(gpu)],
+        let mut held = asked.clone();
+        let views = match (asked[0].cells.bricks(), volume.cells.dense()) {
+            (Some(stored), _) => bricks::upload(gpu, stored)?,
+            (None, dense) => match (upload_volume(gpu, &asked), dense) {
+                (Err(Error::Device { .. }), Some(cells)) if packs => {
+                    let stored = Arc::new(Bricks::of(volume.size, cells));
+                    let views = bricks::upload(gpu, &stored)?;
+                    held = stored_levels(VolumeTexture { cells: Cells::Sparse(stored), ..volume.clone() });
+                    views
+                }
+                (uploaded, _) => [uploaded?, bricks::none(gpu)],
+            },
         };
-        self.volume = Some((levels.clone(), views.clone()));
-        Ok(views)
+        self.volume = Some(ResidentVolume { asked, held: held.clone(), views: views.clone() });
+        Ok((held, views))
     }
 
     /// Returns the environment's map and the number of its upload, uploaded unless it is resident.
@@ -235,10 +265,15 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
     if [nx, ny, nz].iter().any(|&n| n > most) {
         return Err(Error::device(
             format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
-            format!("volume.nx, ny and nz are at most {most} there; use --engine cpu for more"),
+            format!(
+                "volume.nx, ny and nz are at most {most} there; use volume.storage=sparse or --engine cpu for \
+                 more"
+            ),
         ));
     }
-    let texture = bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
+    let what = || format!("a dense volume of {nx}×{ny}×{nz} cells");
+    let create = || bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
+    let texture = gpu.allocate(what, create)?;
     for (number, level) in levels.iter().enumerate() {
         upload_level(gpu, &texture, atlas.origin(number as u32), level)?;
     }

@@ -16,7 +16,7 @@ use super::timing::Timer;
 use super::upload::Uploaded;
 use crate::light::visibility::{CELLS_A_WORD, Form, LightVolumes};
 use crate::trace::Lookup;
-use crate::util::error::Result;
+use crate::util::error::{Error, Result};
 use crate::volume::{LevelAtlas, Levels};
 use atlas::{LightVolumeAtlas, light_places, texture};
 use host::fill_on_host;
@@ -162,8 +162,9 @@ impl VisibilityPass {
         self.cache = None;
         let size = plan.words(LevelAtlas::new(&up.levels).extent());
         let atlas = LightVolumeAtlas::new(gpu, size, plan.volumes.len() as u32)?;
-        let filled =
-            FilledVolumes { texture: texture(gpu, atlas.extent()), places: light_places(gpu, plan, &atlas) };
+        let what = || format!("the texture of {} light volumes", plan.volumes.len());
+        let texture = gpu.allocate(what, || texture(gpu, atlas.extent()))?;
+        let filled = FilledVolumes { texture, places: light_places(gpu, plan, &atlas) };
         gpu.check()?;
         let on_host = match self.filling {
             Filling::Auto => gpu.is_software() && !up.levels[0].is_sparse(),
@@ -190,7 +191,7 @@ impl VisibilityPass {
     ) -> Result<f64> {
         let VisibilityInputs { gpu, timer, up, frame, plan, lookup } = *inputs;
         let everywhere = lookup == Lookup::Trilinear;
-        let (occupied, count) = self.columns(gpu, &up.levels, everywhere);
+        let (occupied, count) = self.columns(gpu, &up.levels, everywhere)?;
         let pipeline = self.pipeline(
             gpu,
             Variant {
@@ -261,12 +262,15 @@ impl VisibilityPass {
 
     /// Returns the linear indices of the columns that are filled, and their number: columns with density, or
     /// all of them if `everywhere`.
-    fn columns(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> (wgpu::Buffer, u32) {
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device's largest buffer cannot hold the indices.
+    fn columns(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> Result<(wgpu::Buffer, u32)> {
         if let Some(known) = &self.columns
             && Arc::ptr_eq(&known.levels, levels)
             && known.everywhere == everywhere
         {
-            return (known.buffer.clone(), known.count);
+            return Ok((known.buffer.clone(), known.count));
         }
         let atlas = LevelAtlas::new(levels);
         let [width, height, _] = atlas.extent();
@@ -283,10 +287,16 @@ impl VisibilityPass {
                 indices.extend((0..ny).flat_map(row));
             }
         }
-        let (bytes, count) = (bytemuck::cast_slice(&indices), indices.len() as u32);
+        let (bytes, count): (&[u8], _) = (bytemuck::cast_slice(&indices), indices.len() as u32);
+        if bytes.len() as u64 > gpu.device.limits().max_storage_buffer_binding_size {
+            return Err(Error::device(
+                format!("the light volume of {count} columns is too large for {}", gpu.name()),
+                "use light.visibility=march or --engine cpu",
+            ));
+        }
         let buffer = gpu.buffer_with("occupied columns", bytes, wgpu::BufferUsages::STORAGE);
         self.columns = Some(Columns { levels: levels.clone(), everywhere, buffer: buffer.clone(), count });
-        (buffer, count)
+        Ok((buffer, count))
     }
 
     fn pipeline(&mut self, gpu: &Gpu, variant: Variant) -> wgpu::ComputePipeline {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};
+use crate::tolerance::Parity;
 use taki::engine::gpu::{DeviceOptions, Filling, Gpu, GpuRenderer, adapters};
 use taki::engine::{RenderOptions, cpu};
 use taki::output::frame::{Difference, Tolerance};
@@ -70,10 +70,11 @@ fn rgb(frame: &Frame) -> Vec<[f32; 3]> {
 
 /// Asserts parity of the final radiance and transmittance, and of the raster pass's layers.
 pub fn assert_parity(what: &str, [gpu, cpu]: &[Frame; 2]) {
-    let tolerance = Tolerance { relative: PARITY_RELATIVE, absolute: PARITY_ABSOLUTE };
+    let parity = Parity::of_adapter();
+    let tolerance = Tolerance { relative: parity.relative, absolute: parity.absolute };
     let least = |what: &str, a: &[[f32; 3]], b: &[[f32; 3]]| {
         let d = Difference::new(gpu.width, a, b, tolerance);
-        assert!(1.0 - d.share_outside() >= PARITY_SHARE, "{what}: {d:?}");
+        assert!(1.0 - d.share_outside() >= parity.share, "{what}: {d:?}");
     };
     least(what, &rgb(gpu), &rgb(cpu));
     let layer = |frame: &Frame, get: fn(&Frame, usize) -> [f32; 3]| {
@@ -197,9 +198,12 @@ fn the_engines_agree_at_odd_sizes_and_with_several_samples() {
         // shifted row.
         let mean =
             |f: &Frame| rgb(f).iter().flatten().map(|&x| x as f64).sum::<f64>() / (width * height) as f64;
-        assert!((mean(gpu) - mean(cpu)).abs() <= 0.02 * mean(cpu).abs() + 1e-4, "{width}×{height}");
+        // Coarse corners may move an edge over the samples of a whole row or column.
+        let coarse = Parity::of_adapter().is_coarse();
+        let (share, row) = if coarse { (0.1, u64::from(width.max(height))) } else { (0.02, 0) };
+        assert!((mean(gpu) - mean(cpu)).abs() <= share * mean(cpu).abs() + 1e-4, "{width}×{height}");
         let d = Difference::new(width, &rgb(gpu), &rgb(cpu), Tolerance { relative: 1e-3, absolute: 1e-4 });
-        assert!(d.outside <= 2, "{width}×{height}: {d:?}");
+        assert!(d.outside <= 2 + row, "{width}×{height}: {d:?}");
     }
 }
 

@@ -26,10 +26,10 @@ impl LightVolumeAtlas {
             along[axis] = unplaced.clamp(1, (most / size[axis]).max(1));
             unplaced = unplaced.div_ceil(along[axis]);
         }
-        if unplaced > 1 {
+        if unplaced > 1 || size.iter().any(|&n| n > most) {
             let [nx, ny, nz] = size;
             return Err(Error::device(
-                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too many for {}", gpu.name()),
+                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too large for {}", gpu.name()),
                 "use light.visibility=march, or --engine cpu",
             ));
         }
