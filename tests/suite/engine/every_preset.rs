@@ -85,7 +85,6 @@ fn every_preset_gives_a_picture_under_every_light_and_at_every_length_of_walks()
                 graze(&mut scene);
             }
             let what = format!("{preset}, {case}");
-            let clock = std::time::Instant::now();
             let on_cpu = cpu::render(&scene, &volume, &mesh, false, &Unwatched).expect("a frame");
             assert_picture(&what, &on_cpu, &on_cpu);
             if let Some(engine) = &mut gpu {
@@ -93,7 +92,6 @@ fn every_preset_gives_a_picture_under_every_light_and_at_every_length_of_walks()
                 let frame = engine.render_volume(&scene, &volume, &mesh, &options, &Unwatched).expect(&what);
                 assert_picture(&what, &frame, &on_cpu);
             }
-            eprintln!("{what} {:?}", clock.elapsed());
         }
     }
 }
