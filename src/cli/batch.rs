@@ -87,7 +87,7 @@ pub struct BatchArgs {
     /// Size of the pictures in pixels, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
+    /// Number of samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
     /// Makes the backgrounds transparent: the same as --set image.alpha=true. They can then be put over

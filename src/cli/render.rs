@@ -38,7 +38,7 @@ pub struct RenderArgs {
     /// pixels equal those of the whole picture bit for bit; `taki stitch` joins such parts.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
-    /// Number of jittered samples per pixel. More samples give smoother edges and take longer.
+    /// Number of samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
     /// Makes the background transparent: the same as --set image.alpha=true. The picture can then be put over

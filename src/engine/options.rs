@@ -12,7 +12,10 @@ use crate::volume::Leaps;
 pub struct RenderOptions {
     /// Whether the frame also holds depth, texture coordinates, quads and normals.
     pub surface: bool,
-    /// The scene's samples to render; `None` renders all. The radiance is their mean.
+    /// Numbers of the samples to render, as in [`sample_offset`]; `None` renders all of the scene's. The
+    /// radiance is their mean.
+    ///
+    /// [`sample_offset`]: crate::picture::camera::sample_offset
     pub samples: Option<Range<u32>>,
     /// Approximate pixels per submission; `None` chooses them by measured time.
     pub tile_pixels: Option<u32>,

@@ -1,5 +1,6 @@
 //! The pinhole camera: rays through pixels, and the matrix that projects geometry onto the same pixels.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use glam::{DMat4, DVec4, Mat4, Vec3, Vec4};
@@ -75,24 +76,46 @@ pub fn clip_to_window(clip_from_world: Mat4, [width, height]: [u32; 2], window: 
     (window_from_clip * clip_from_world.as_dmat4()).as_mat4()
 }
 
+/// Number of the sample at a pixel's centre. Layers, previews and inspectors take it for any number of
+/// samples, even if the picture's samples do not include it.
+pub const CENTRE: u32 = 0;
+
+/// Returns the numbers of an image's samples. They include [`CENTRE`] only if the number of samples is odd.
+pub fn sample_numbers(image: &Image) -> Range<u32> {
+    let first = u32::from(image.samples.is_multiple_of(2));
+    first..first + image.samples
+}
+
 /// Offset of sample `sample` from the top left corner of a pixel, in pixels.
 ///
-/// A single sample lies in the centre. Several follow the R2 sequence (Roberts 2018), which fills a square
-/// evenly for any number of samples without random numbers. A filter other than the box warps the square, so
-/// that the density of samples is proportional to the filter (Ernst, Stamminger and Greiner, "Filter
-/// Importance Sampling", 2006). Every pixel has its own samples, and its value is their unweighted mean.
+/// The mean of an image's samples is the pixel's centre, because every sample has a mirror image: otherwise
+/// pictures with different numbers of samples would not register. The samples are n successive points of the
+/// R2 sequence (Roberts 2018), ½ + kα, which fills a square evenly for any n without random numbers. k runs
+/// from −(n − 1)/2 to (n − 1)/2, so the points mirror each other. They are numbered from the middle outwards,
+/// k = 0, 1, −1, 2 … or k = ½, −½, 1½ …, so more samples continue fewer if both numbers are odd or even.
+///
+/// A filter other than the box warps the square, so that the density of samples is proportional to the filter
+/// (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006). Every pixel has its own samples, and
+/// its value is their unweighted mean.
 pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
-    if image.samples == 1 {
+    if sample == CENTRE {
         return [0.5, 0.5];
     }
     // First and second power of the plastic number's reciprocal.
     const A: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
-    let even = A.map(|a| (0.5 + a * sample as f64).fract());
-    match image.filter {
-        Filter::Box => even.map(|x| x as f32),
-        Filter::Gaussian => even.map(|x| (0.5 + GAUSSIAN.quantile(x)) as f32),
-        Filter::BlackmanHarris => even.map(|x| (0.5 + BLACKMAN_HARRIS.quantile(x)) as f32),
-    }
+    let first = if image.samples.is_multiple_of(2) { 0.5 } else { 0.0 };
+    let k = f64::from(sample.div_ceil(2)) - first;
+    // A point's mirror image is computed from the same number, so that it mirrors the point exactly.
+    let side = if sample.is_multiple_of(2) { -1.0 } else { 1.0 };
+    A.map(|a| {
+        let away = k * a - (k * a).round();
+        let away = match image.filter {
+            Filter::Box => away,
+            Filter::Gaussian => GAUSSIAN.quantile(0.5 + away),
+            Filter::BlackmanHarris => BLACKMAN_HARRIS.quantile(0.5 + away),
+        };
+        (0.5 + side * away) as f32
+    })
 }
 
 /// Radius of the filters other than the box, pixels.

@@ -44,7 +44,7 @@ impl std::ops::AddAssign for Seconds {
     }
 }
 
-/// Layers of the raster pass, at the first sample of each pixel.
+/// Layers of the raster pass, at the centre of each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Distance from the eye to the nearest water or opaque surface, metres; 0 in the background.

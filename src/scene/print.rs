@@ -12,7 +12,7 @@ use super::{Scene, Values};
 use crate::light::Light;
 use crate::light::environment::{ANGULAR_RADIUS, Environment};
 use crate::mapping::Quad;
-use crate::picture::camera::sample_offset;
+use crate::picture::camera::{sample_numbers, sample_offset};
 use crate::picture::{Camera, Image};
 use crate::place::{Mesh, Vertex};
 
@@ -150,7 +150,7 @@ fn camera_json(camera: &Camera, image: &Image) -> Json {
         "forward": camera.forward.to_array(),
         "tan_half_fov": camera.tan_half_fov,
         "near": camera.near,
-        "sample_offsets": (0..image.samples).map(|s| sample_offset(image, s)).collect::<Vec<_>>(),
+        "sample_offsets": sample_numbers(image).map(|s| sample_offset(image, s)).collect::<Vec<_>>(),
     })
 }
 

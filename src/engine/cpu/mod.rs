@@ -18,6 +18,7 @@ pub use pixels::render_pixels;
 pub use visibility::LightVolumeCache;
 
 use crate::engine::options::RenderOptions;
+use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::resolve::develop;
 use crate::picture::{Frame, Seconds};
 use crate::place::Mesh;
@@ -63,7 +64,7 @@ pub fn render_with(
 ) -> Result<Frame> {
     let image = &scene.image;
     let window = options.window.unwrap_or(Window::whole([image.width, image.height]));
-    let samples = options.samples.clone().unwrap_or(0..image.samples);
+    let samples = options.samples.clone().unwrap_or(sample_numbers(image));
     let width = window.width as usize;
     let mut frame = Frame::new(window.width, window.height, options.surface);
     // Until the end it holds sums of 1 − alpha.
@@ -79,11 +80,13 @@ pub fn render_with(
         let band = Window { y: window.y + y, height: rows.min(window.height - y), ..window };
         let first = y as usize * width;
         let pixels = first..first + band.pixels() as usize;
-        for sample in samples.clone() {
+        // Layers lie at the pixels' centres, where the picture need not have a sample.
+        let only_layers = frame.surface.is_some() && !samples.contains(&CENTRE);
+        for sample in only_layers.then_some(CENTRE).into_iter().chain(samples.clone()) {
             let clock = Instant::now();
             let gbuffer = gbuffer::run_window(scene, mesh, band, sample);
             seconds.gbuffer += clock.elapsed().as_secs_f64();
-            if sample == samples.start
+            if sample == CENTRE
                 && let Some(surface) = &mut frame.surface
             {
                 for i in 0..gbuffer.opaque.len() {
@@ -98,6 +101,9 @@ pub fn render_with(
                         behind,
                     );
                 }
+            }
+            if !samples.contains(&sample) {
+                continue;
             }
             let clock = Instant::now();
             let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {

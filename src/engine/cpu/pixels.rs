@@ -9,6 +9,7 @@ use super::gbuffer;
 use super::integrate::Integrator;
 use crate::engine::options::RenderOptions;
 use crate::picture::Frame;
+use crate::picture::camera::sample_numbers;
 use crate::picture::resolve::{Resolver, develop};
 use crate::place::Mesh;
 use crate::util::error::Result;
@@ -36,7 +37,7 @@ pub fn render_pixels(
     let image = &scene.image;
     let whole = Window::whole([image.width, image.height]);
     let window = options.window.unwrap_or(whole);
-    let samples = options.samples.clone().unwrap_or(0..image.samples);
+    let samples = options.samples.clone().unwrap_or(sample_numbers(image));
     let inverse = 1.0 / samples.len() as f32;
     let pixel = |i: usize| [window.x + i as u32 % window.width, window.y + i as u32 / window.width];
     let row_bytes = u64::from(window.width) * gbuffer::pixel_bytes(scene);

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::gbuffer;
 use super::integrate::{Integrator, Observer};
-use crate::picture::camera::sample_offset;
+use crate::picture::camera::{CENTRE, sample_offset};
 use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::trace::{Lookup, Prefilter};
@@ -103,13 +103,11 @@ pub struct RayStep {
 /// edge. Radiance, transmittance and cells equal those of [`super::render`]'s frame bit for bit if the scene
 /// has one sample per pixel, no filter and nearest lookup.
 pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 2]) -> RayReport {
-    // The first sample lies at the pixel's centre for any number of samples.
-    const SAMPLE: u32 = 0;
     let image = &scene.image;
     let pixel = [pixel[0].min(image.width - 1), pixel[1].min(image.height - 1)];
     let window = Window { x: pixel[0], y: pixel[1], width: 1, height: 1 };
-    let gbuffer = gbuffer::run_window(scene, mesh, window, SAMPLE);
-    let offset = sample_offset(image, SAMPLE);
+    let gbuffer = gbuffer::run_window(scene, mesh, window, CENTRE);
+    let offset = sample_offset(image, CENTRE);
     let d_world = scene.camera.view_ray(image.width, image.height, pixel, offset);
     let at = |metres: f32| scene.camera.eye + d_world * metres;
     let opaque_m = gbuffer.opaque[0][3];
@@ -125,7 +123,7 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let mut plain = scene.clone();
     let trace = &mut plain.edit().trace;
     (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
-    let result = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, SAMPLE, &mut recorder);
+    let result = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, CENTRE, &mut recorder);
     RayReport {
         pixel,
         faces,

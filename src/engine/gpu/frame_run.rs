@@ -19,6 +19,7 @@ use super::timing::Timer;
 use super::visibility::{FilledVolumes, VisibilityInputs};
 use super::{Inputs, readback};
 use crate::engine::options::RenderOptions;
+use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::resolve::develop;
 use crate::picture::{Develop, Frame, Seconds};
 use crate::place::Mesh;
@@ -105,7 +106,7 @@ impl<'a> FrameRun<'a> {
         gpu.check()?;
         rasters.begin();
 
-        let samples = options.samples.clone().unwrap_or(0..scene.image.samples);
+        let samples = options.samples.clone().unwrap_or(sample_numbers(&scene.image));
         let filled = match &prepared.light_volumes {
             None => {
                 visibility.forget();
@@ -151,7 +152,10 @@ impl<'a> FrameRun<'a> {
     }
 
     fn uniforms(&self, window: Window, sample: u32) -> FrameUniforms {
-        FrameUniforms::new(self.scene, self.volume, window, &self.samples, sample, self.prepared.layers)
+        // The sums run over the samples of the picture. A sample that gives only layers stands alone.
+        let own = sample..sample + 1;
+        let samples = if self.samples.contains(&sample) { &self.samples } else { &own };
+        FrameUniforms::new(self.scene, self.volume, window, samples, sample, self.prepared.layers)
     }
 
     /// Renders one window of the grid, as far as it lies in the rendered part, into `frame`.
@@ -167,6 +171,11 @@ impl<'a> FrameRun<'a> {
         // A device that ends long walks ends those of a SIMD group together, so a crop needs whole groups.
         let drawn = if self.gpu.limits_loops() { whole_groups(area, window) } else { area };
         let groups = GroupList::new(self.gpu, self.scene, window, drawn);
+        // Layers lie at the pixels' centres, where the picture need not have a sample.
+        let only_layers = frame.surface.is_some() && !self.samples.contains(&CENTRE);
+        if only_layers {
+            self.sample(window, [area, drawn], &groups, CENTRE, frame)?;
+        }
         for sample in self.samples.clone() {
             self.sample(window, [area, drawn], &groups, sample, frame)?;
             self.done += wanted.pixels();
@@ -185,8 +194,8 @@ impl<'a> FrameRun<'a> {
         Ok(())
     }
 
-    /// Adds one sample of the `drawn` part of a window to the canvas's sums. The first sample also fills
-    /// `frame.surface` in the window's `area`.
+    /// Adds one sample of the `drawn` part of a window to the canvas's sums, if it is one of the picture's. The
+    /// sample at the pixels' centres also fills `frame.surface` in the window's `area`.
     fn sample(
         &mut self,
         window: Window,
@@ -228,12 +237,15 @@ impl<'a> FrameRun<'a> {
         if let Some(kept) = kept {
             kept.waves.set(waves);
         }
-        if sample == self.samples.start
+        if sample == CENTRE
             && let Some(surface) = &mut frame.surface
         {
             let first = self.part.index([window.x + area.x, window.y + area.y]);
             let row = self.part.width as usize;
             readback::read_surface(gpu, self.scene, targets, area, surface, first, row)?;
+        }
+        if !self.samples.contains(&sample) {
+            return Ok(());
         }
         self.seconds.integrate +=
             self.integrate.run(&inputs, &self.canvas.sums, &mut self.tiler, |pixels| {

@@ -6,6 +6,7 @@ use super::Batch;
 use super::report::word;
 use crate::engine::overlap;
 use crate::job::{check_bloom, memory_of, spare_for_rasters};
+use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::canvas_bytes;
 use crate::util::error::{Result, human_bytes};
 
@@ -50,8 +51,9 @@ impl Batch {
         let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
         let memory = self.base.limits().memory;
         let (needed, strips) = memory_of(&scene, window, surface, memory)?;
-        let rasters =
-            canvas_bytes(overlap::sheets(&scene)) * window.pixels() * u64::from(scene.image.samples);
+        let passes =
+            scene.image.samples + u32::from(surface && !sample_numbers(&scene.image).contains(&CENTRE));
+        let rasters = canvas_bytes(overlap::sheets(&scene)) * window.pixels() * u64::from(passes);
         let kept_rasters = if strips.len() > 1 || to_render < 2 {
             0
         } else {

@@ -22,7 +22,7 @@ pub(super) const IMAGE: Group = Group {
             .when("Lower it for drafts, raise it for the final picture; the field of view stays as it is."),
         p("image.samples", "", "", Int(1, 4096, 1), Uniform)
             .slider(1.0, 256.0)
-            .doc("Number of jittered samples in a pixel. A single one lies in the pixel's centre.")
+            .doc("Number of samples in a pixel. Their mean position is the pixel's centre.")
             .when("Raise it when edges are jagged or strands flicker; the time grows with it."),
         p("image.filter", "", "", Choice(Filter::WORDS), Uniform)
             .doc(

@@ -16,8 +16,9 @@ use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::engine::gpu::DeviceOptions;
 use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
+use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::resolve::develop;
-use crate::picture::{AutoExposure, Frame, Look};
+use crate::picture::{AutoExposure, Frame, Image, Look};
 use crate::place::{Ground, Mesh};
 use crate::scene::{Cost, Scene, Values};
 use crate::util::cache::Cache;
@@ -238,16 +239,16 @@ impl Renderer {
     /// Adds samples to the full-size picture, until it has as many as requested.
     fn refine(&mut self, job: &Job) -> Result<()> {
         let request = job.request;
-        // Each step doubles the number of samples, so that the last one takes half of the time.
         while let Some(samples) = self.rendered.as_ref().map(|r| r.samples)
             && samples < request.samples
         {
-            let more = samples.min(request.samples - samples);
-            let part = self.render(job, 1, samples..samples + more, "refining")?;
+            let (kept, samples) = next_step(samples, request.samples);
+            let first = sample_numbers(&Image { samples, ..request.scene.image }).start;
+            let part = self.render(job, 1, first + kept..first + samples, "refining")?;
             if let Some(rendered) = self.rendered.take() {
                 let mut frame = rendered.frame;
-                add(Arc::make_mut(&mut frame), samples, &part, more, &job.look);
-                self.keep(job, Rendered { frame, samples: samples + more, ..rendered }, false);
+                add(Arc::make_mut(&mut frame), kept, &part, samples - kept, &job.look);
+                self.keep(job, Rendered { frame, samples, ..rendered }, false);
             }
         }
         Ok(())
@@ -278,9 +279,10 @@ impl Renderer {
         Some(Rendered { scene: request.scene.clone(), look: *look, frame, ..old })
     }
 
-    /// Renders and shows sample 0 at 1/`scale` of the size.
+    /// Renders and shows the sample at the pixels' centres at 1/`scale` of the size.
     fn picture(&mut self, job: &Job, scale: u32, first: bool) -> Result<()> {
-        let frame = self.render(job, scale, 0..1, if first { "preview" } else { "refining" })?;
+        let frame =
+            self.render(job, scale, CENTRE..CENTRE + 1, if first { "preview" } else { "refining" })?;
         let frame = Arc::new(frame);
         if scale == 1 {
             let rendered = Rendered {
@@ -355,7 +357,7 @@ impl Renderer {
         let patience = if what == "preview" { PATIENCE } else { Duration::ZERO };
         let watch = self.watch(what, job.request.serial, patience);
         let options = RenderOptions {
-            surface: job.request.layer.of_surface() && samples.start == 0,
+            surface: job.request.layer.of_surface() && samples.start == CENTRE,
             samples: Some(samples.clone()),
             keep_rasters: RASTER_CACHE_BYTES,
             ..Default::default()
@@ -462,8 +464,25 @@ struct Job<'a> {
     look: Look,
 }
 
-/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`.
+/// Returns how many of `samples` samples the next picture keeps on the way to `most`, and how many it has.
+///
+/// Each step doubles the number of samples, so that the last one takes half of the time. A picture has the
+/// samples that a render of their number has. These continue fewer samples only if both numbers are even or
+/// odd, so the step from one to the other keeps none.
+fn next_step(samples: u32, most: u32) -> (u32, u32) {
+    if samples % 2 == most % 2 { (samples, most.min(2 * samples + samples % 2)) } else { (0, samples + 1) }
+}
+
+/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`. If that is 0, `part` replaces
+/// everything but the layers.
 fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
+    if samples == 0 {
+        sum.radiance.copy_from_slice(&part.radiance);
+        sum.counts.copy_from_slice(&part.counts);
+        sum.alpha.clone_from(&part.alpha);
+        sum.seconds = part.seconds;
+        return develop(sum, look, true);
+    }
     let share = more as f32 / (samples + more) as f32;
     sum.radiance
         .par_iter_mut()

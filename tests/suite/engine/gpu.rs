@@ -6,6 +6,7 @@ use crate::tolerance::Parity;
 use taki::engine::gpu::{DeviceOptions, Filling, Gpu, GpuRenderer, adapters};
 use taki::engine::{RenderOptions, cpu};
 use taki::output::frame::{Difference, Tolerance};
+use taki::picture::camera::sample_numbers;
 use taki::picture::{Frame, Grid};
 use taki::scene::{Limits, Scene};
 use taki::util::error::Error;
@@ -340,7 +341,9 @@ fn samples_rendered_in_parts_have_the_mean_of_the_whole() {
             engine.render_volume(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
         };
         let whole = part(None);
-        let parts = [part(Some(0..1)), part(Some(1..4))];
+        let numbers = sample_numbers(&scene.image);
+        let middle = numbers.start + 1;
+        let parts = [part(Some(numbers.start..middle)), part(Some(middle..numbers.end))];
         for i in 0..whole.radiance.len() {
             let counts = [0, 1].map(|c| parts[0].counts[i][c] + parts[1].counts[i][c]);
             assert_eq!(whole.counts[i], counts, "pixel {i}");

@@ -5,6 +5,7 @@ use glam::Vec3;
 use rand::{RngExt, SeedableRng};
 use taki::engine::cpu::gbuffer;
 use taki::engine::overlap::covered;
+use taki::picture::camera::sample_numbers;
 use taki::util::window::Window;
 
 #[test]
@@ -30,7 +31,7 @@ fn no_square_under_water_is_left_out_wherever_the_eye_is() {
             scene.edit().camera.up = scene.camera.right.cross(scene.camera.forward);
             let window = Window { x: 5, y: 3, width: 80, height: 45 };
             let squares = covered(&scene, [window.x, window.y], [10, 6], 8);
-            for sample in 0..4 {
+            for sample in sample_numbers(&scene.image) {
                 let raster = gbuffer::run_window(&scene, &mesh, window, sample);
                 for y in 0..window.height {
                     for x in 0..window.width {

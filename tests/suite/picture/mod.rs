@@ -5,4 +5,5 @@ pub mod alpha;
 pub mod bloom;
 pub mod filter;
 pub mod resolve;
+pub mod samples;
 pub mod white_balance;

@@ -133,3 +133,28 @@ fn a_picture_is_refined_to_the_samples_asked_for() {
     window.settle();
     assert_eq!(window.picture().samples, 8, "the scene asks for more");
 }
+
+#[test]
+fn a_refined_picture_is_a_render_of_its_samples() {
+    let mut window = Setup { size: [500.0, 300.0], ..Setup::bare() }.open();
+    // From even to odd and back, no sample of the last picture is kept.
+    for samples in [2, 4, 7, 9, 10] {
+        window.set("image.samples", Raw::Int(samples));
+        // A layer is shown between, which must not change with the samples.
+        window.key(if samples % 2 == 0 { Key::Num3 } else { Key::Num1 });
+        window.settle();
+        let picture = window.picture();
+        assert_eq!(i64::from(picture.samples), samples);
+        let mut scene = (**window.viewer().document().scene()).clone();
+        [scene.edit().image.width, scene.edit().image.height] = [picture.frame.width, picture.frame.height];
+        let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+        let want = cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame");
+        assert!(picture.frame.counts == want.counts, "{samples} samples have other rays");
+        for (i, (got, want)) in picture.frame.radiance.iter().zip(&want.radiance).enumerate() {
+            for (got, want) in got.iter().zip(want) {
+                assert!((got - want).abs() <= 1e-5 * want.abs() + 1e-6, "{samples}, {i}: {got} for {want}");
+            }
+        }
+        assert!(picture.frame.surface.is_none() || picture.frame.surface == want.surface);
+    }
+}
