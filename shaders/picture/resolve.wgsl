@@ -1,5 +1,6 @@
 // Development of the picture from the linear frame: mean of the samples, division by alpha, white balance,
-// exposure, tone curve, sRGB encoding and rounding to 8 bits. Twin: src/picture/resolve.rs; Develop is in src/picture/develop.rs.
+// exposure, tone curve, sRGB encoding and rounding to 8 bits. Twin: src/picture/resolve.rs; Develop is in
+// src/picture/develop.rs.
 
 #import layout
 

@@ -194,8 +194,8 @@ impl<'a> FrameRun<'a> {
         Ok(())
     }
 
-    /// Adds one sample of the `drawn` part of a window to the canvas's sums, if it is one of the picture's. The
-    /// sample at the pixels' centres also fills `frame.surface` in the window's `area`.
+    /// Adds one sample of the `drawn` part of a window to the canvas's sums, if it is one of the picture's.
+    /// The sample at the pixels' centres also fills `frame.surface` in the window's `area`.
     fn sample(
         &mut self,
         window: Window,

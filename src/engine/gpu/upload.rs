@@ -266,8 +266,8 @@ fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
         return Err(Error::device(
             format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
             format!(
-                "volume.nx, ny and nz are at most {most} there; use volume.storage=sparse or --engine cpu for \
-                 more"
+                "volume.nx, ny and nz are at most {most} there; use volume.storage=sparse or --engine cpu \
+                 for more"
             ),
         ));
     }

@@ -473,8 +473,8 @@ fn next_step(samples: u32, most: u32) -> (u32, u32) {
     if samples % 2 == most % 2 { (samples, most.min(2 * samples + samples % 2)) } else { (0, samples + 1) }
 }
 
-/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`. If that is 0, `part` replaces
-/// everything but the layers.
+/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`. If that is 0, `part`
+/// replaces everything but the layers.
 fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
     if samples == 0 {
         sum.radiance.copy_from_slice(&part.radiance);

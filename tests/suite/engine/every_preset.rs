@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use crate::engine::gpu::renderer;
+use crate::tolerance::Parity;
 use taki::engine::{Engine, RenderOptions, cpu};
 use taki::picture::Frame;
 use taki::scene::{Limits, Scene, presets};
@@ -52,9 +53,11 @@ fn assert_picture(what: &str, frame: &Frame, other: &Frame) {
     assert_eq!(frame.non_finite_pixels(), 0, "{what}");
     assert!(frame.covered_pixels() > 0, "{what}: no water");
     let mean = |frame: &Frame, c: usize| frame.radiance.iter().map(|r| f64::from(r[c])).sum::<f64>() / pixels;
+    // On small pictures, corners that are snapped coarsely move edges over many of the pixels.
+    let share = if Parity::of_adapter().is_coarse() { 0.1 } else { 0.03 };
     for c in 0..4 {
         let (a, b) = (mean(frame, c), mean(other, c));
-        assert!((a - b).abs() <= 0.03 * b.abs() + 1e-3, "{what}, channel {c}: {a} and {b}");
+        assert!((a - b).abs() <= share * b.abs() + 1e-3, "{what}, channel {c}: {a} and {b}");
     }
 }
 

