@@ -38,14 +38,13 @@ pub struct BatchArgs {
     #[command(flatten)]
     cache: CacheOptions,
     /// Files to write. Pictures are .png or .exr; in their names, #### stands for the frame's number and
-    /// {NAME} for a sweep's value, such as `-o out/fall.####.png`. Movies are .gif, .apng (or .png without
-    /// ####), .mp4 or .webm. Can be given more than once. Default: PNG files with the scene's name in the
-    /// current folder.
+    /// {NAME} for a sweep's value, such as `-o out/fall.####.png`. '%04d', '$F4' and '@@@@' stand for the
+    /// number too. Movies are .gif, .apng (or .png without a number), .mp4 or .webm. Can be given more than
+    /// once. Default: PNG files with the scene's name in the current folder.
     #[arg(short, long = "output", value_name = "PATTERN")]
     outputs: Vec<PathBuf>,
-    /// Frames to render, such as 0-239, or 0-239:10 for every tenth, or 1,5,9. Default: all frames of the
-    /// animation, or frame 0 if there is a sweep.
-    // Hyphens are allowed so that a negative frame is answered by the parser.
+    /// Frames to render, such as 0-239, or 0-239:10 for every tenth, or 1,5,9, or -10-10 to begin before
+    /// frame 0. Default: all frames of the animation, or frame 0 if there is a sweep.
     #[arg(long, value_name = "LIST", value_parser = frames, allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// Frames per second, such as 25 or 24000/1001. Short for --set animate.fps=N.
@@ -122,31 +121,40 @@ enum EventFormat {
 
 /// Frame numbers. This is a type of its own because clap treats a plain Vec as an option given several times.
 #[derive(Clone, Debug)]
-struct FrameList(Vec<u32>);
+struct FrameList(Vec<i32>);
 
 /// Most frames in a list.
 const MAX_FRAMES: u64 = 1_000_000;
 
-/// Parses `0-239`, `7`, `0-239:10` and lists of these, separated by commas. The result is sorted, each frame
-/// once.
+/// Frame with the largest number; the smallest has the opposite sign.
+const LAST_FRAME: i32 = 999_999_999;
+
+/// Parses `0-239`, `7`, `-10-10`, `0-239:10` and lists of these, separated by commas. The result is sorted,
+/// each frame once.
 fn frames(text: &str) -> std::result::Result<FrameList, String> {
-    let how = || "give frames such as 0-239, 1,5,9 or 0-239:10, from 0 to 999999999".to_owned();
+    let how = || {
+        let range = format!("from -{LAST_FRAME} to {LAST_FRAME}");
+        format!("give frames such as 0-239, -10-10, 1,5,9 or 0-239:10, {range}")
+    };
+    let number = |n: &str| {
+        let within = |n: &i32| (-LAST_FRAME..=LAST_FRAME).contains(n);
+        n.trim().parse::<i32>().ok().filter(within).ok_or_else(how)
+    };
     let mut list = Vec::new();
     for part in text.split(',').map(str::trim) {
-        if part.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
-            return Err(format!("{part} begins before frame 0, the first; give frames such as 0-239"));
-        }
-        let number = |n: &str| n.trim().parse::<u32>().ok().filter(|&n| n <= 999_999_999).ok_or_else(how);
         let (range, step) = part.split_once(':').map_or((part, Ok(1)), |(range, step)| (range, number(step)));
         let step = step.ok().filter(|&s| s > 0).ok_or_else(how)?;
-        let (first, last) = match range.split_once('-') {
-            Some((a, b)) => (number(a)?, number(b)?),
+        // The first character may be the sign of the first frame.
+        let dash = range.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at);
+        let (first, last) = match dash {
+            Some(at) => (number(&range[..at])?, number(&range[at + 1..])?),
             None => (number(range)?, number(range)?),
         };
         if last < first {
             return Err(format!("{part} ends before it begins"));
         }
-        if u64::from((last - first) / step) + 1 + list.len() as u64 > MAX_FRAMES {
+        let count = u64::from(last.abs_diff(first) / step.unsigned_abs()) + 1;
+        if count + list.len() as u64 > MAX_FRAMES {
             return Err(format!("more than {MAX_FRAMES} frames; split the list"));
         }
         list.extend((first..=last).step_by(step as usize));

@@ -9,6 +9,7 @@ use clap::{Args, CommandFactory, Subcommand};
 use super::Cli;
 use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
+use crate::job::batch::Pattern;
 use crate::output::frame::Output;
 use crate::scene::STDIN;
 use crate::util::error::{Error, Result};
@@ -160,8 +161,9 @@ fn check_batch(job: &Job) -> Result<()> {
     }
     let whole = |path: &&PathBuf| {
         let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        !path.extension().is_some_and(picture) || !name.contains(['#', '{'])
+        let sweeps = path.file_name().unwrap_or_default().to_string_lossy().contains('{');
+        let frames = || Pattern::new(path, &[]).is_ok_and(|pattern| pattern.has_frame());
+        !path.extension().is_some_and(picture) || !sweeps && !frames()
     };
     let given = |id| batch.get_many::<PathBuf>(id).into_iter().flatten();
     let (mut outputs, mut wholes) = (given("outputs"), given("sheet").chain(given("manifests")));

@@ -45,10 +45,10 @@ pub struct RenderArgs {
     /// a photograph.
     #[arg(long)]
     alpha: bool,
-    /// Frame of the scene's animation to render.
+    /// Frame of the scene's animation to render. It may lie before 0.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
-    frame: u32,
+    #[arg(value_parser = clap::value_parser!(i32).range(-999_999_999..=999_999_999))]
+    frame: i32,
     #[command(flatten)]
     engine: EngineOptions,
     #[command(flatten)]

@@ -13,8 +13,8 @@ pub struct SceneArgs {
     /// Prints the scene at this frame of its animation, as a scene file without animation that gives the same
     /// picture.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    #[arg(value_parser = clap::value_parser!(u32).range(..=999_999_999))]
-    frame: Option<u32>,
+    #[arg(value_parser = clap::value_parser!(i32).range(-999_999_999..=999_999_999))]
+    frame: Option<i32>,
     /// Prints JSON, which also has what follows from the parameters: camera basis, lights, rock mesh.
     #[arg(long)]
     json: bool,

@@ -1,7 +1,7 @@
 //! A scene in time, as one scene for each frame.
 //!
 //! The scene of a frame depends only on the animation and the number of the frame. In a loop of N frames,
-//! frame f is frame f mod N, so frame N equals frame 0 to the last bit.
+//! frame f is frame f mod N, so frame N equals frame 0 to the last bit. Frames before 0 are as good as others.
 
 use std::path::{Path, PathBuf};
 
@@ -168,11 +168,11 @@ impl Animation {
     ///
     /// # Errors
     /// The errors of [`Scene::from_values`]; from frame 1 on the message names the frame.
-    pub fn at(&self, frame: u32) -> Result<Scene> {
+    pub fn at(&self, frame: i32) -> Result<Scene> {
         let mut values = self.values.clone();
         values.clear_under("animate");
         let place = |key: &str| Place(format!("frame {frame}, animation of {key}"));
-        let number = self.period.map_or(frame, |n| frame % n);
+        let number = self.period.map_or(frame, |n| frame.rem_euclid(n as i32));
         let time = f64::from(number);
         let moves_flow = self.tracks.iter().any(|(key, _)| key == "volume.flow");
         if self.flow.0 != 0.0 && number != 0 && !moves_flow {
@@ -209,7 +209,7 @@ impl Animation {
 }
 
 /// Adds the number of the frame to an error.
-fn at_frame(error: Error, frame: u32) -> Error {
+fn at_frame(error: Error, frame: i32) -> Error {
     match error {
         Error::Input { what, fix } => Error::Input { what: format!("frame {frame}: {what}"), fix },
         other => other,

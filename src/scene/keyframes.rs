@@ -125,7 +125,8 @@ impl Keyframes {
 
 /// Checks that the keyframes of a loop lie inside it.
 fn check_loop(frames: &[i64], period: f64) -> Result<(), String> {
-    match frames.iter().find(|&&f| f as f64 > period) {
+    match frames.iter().find(|&&f| f < 0 || f as f64 > period) {
+        Some(f) if *f < 0 => Err(format!("have frame {f}, which is before the loop, whose first frame is 0")),
         Some(f) => Err(format!("have frame {f}, which is past the loop of {period} frames")),
         None => Ok(()),
     }

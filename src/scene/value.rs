@@ -319,7 +319,7 @@ pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
 fn frames(raw: &Raw) -> Option<Vec<i64>> {
     let Raw::List(list) = raw else { return None };
     let numbers = list.iter().map(|x| match x {
-        Raw::Int(n) if (0..=MAX_FRAME).contains(n) => Some(*n),
+        Raw::Int(n) if (-MAX_FRAME..=MAX_FRAME).contains(n) => Some(*n),
         _ => None,
     });
     let numbers: Vec<i64> = numbers.collect::<Option<_>>()?;

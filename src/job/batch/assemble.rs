@@ -31,7 +31,7 @@ pub struct MovieFile {
 #[derive(Serialize)]
 struct Row {
     number: usize,
-    frame: u32,
+    frame: i32,
     #[serde(skip_serializing_if = "serde_json::Map::is_empty")]
     parameters: serde_json::Map<String, serde_json::Value>,
     files: Vec<String>,

@@ -52,7 +52,7 @@ const CHECKED_FRAMES: usize = 2000;
 #[derive(Clone, Debug)]
 pub struct Request {
     /// Frames to render. `None`: all frames of the animation, or frame 0 if there is a sweep.
-    pub frames: Option<Vec<u32>>,
+    pub frames: Option<Vec<i32>>,
     /// Sweeps, as `KEY=VALUES`; see [`Sweep::parse`].
     pub sweeps: Vec<String>,
     /// Name patterns of pictures and movies; see [`Pattern`].
@@ -84,7 +84,7 @@ pub struct Batch {
     measured: Option<f32>,
     request: Request,
     sweeps: Vec<Sweep>,
-    frames: Vec<u32>,
+    frames: Vec<i32>,
     pictures: Vec<Pattern>,
     movies: Vec<MovieFile>,
     sheet: Option<PathBuf>,
@@ -144,7 +144,7 @@ impl Batch {
         let frames = match &request.frames {
             Some(frames) => frames.clone(),
             None if !sweeps.is_empty() => vec![0],
-            None => (0..base.frames).collect(),
+            None => (0..base.frames as i32).collect(),
         };
         let points = sweeps.iter().try_fold(1usize, |n, s| n.checked_mul(s.values.len()));
         let count = points.and_then(|n| n.checked_mul(frames.len())).filter(|&n| n <= MAX_PICTURES);
@@ -237,7 +237,7 @@ impl Batch {
     }
 
     /// Frame number of a picture.
-    pub fn frame(&self, number: usize) -> u32 {
+    pub fn frame(&self, number: usize) -> i32 {
         self.frames[number % self.frames.len()]
     }
 
@@ -415,8 +415,8 @@ fn check_pattern(pattern: &Pattern, sweeps: &[Sweep], frames: usize) -> Result<(
     let given = pattern.given().display();
     if frames > 1 && !pattern.has_frame() {
         return Err(Error::Usage(format!(
-            "-o {given}: {frames} frames would share one name; put #### where the frame's number goes, \
-             such as fall.####.png"
+            "-o {given}: {frames} frames would share one name; put #### (or %04d, $F4, @@@@) where the \
+             frame's number goes, such as fall.####.png"
         )));
     }
     for (i, sweep) in sweeps.iter().enumerate() {

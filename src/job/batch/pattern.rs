@@ -1,9 +1,12 @@
-//! Name patterns for many files, such as `out/fall.####.exr` or `h{h}.png`.
+//! Name patterns for many files, such as `out/fall.####.exr`, `fall.%04d.png` or `h{h}.png`.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::util::error::{Error, Result};
+
+/// Most digits that a placeholder may ask for. File systems allow names of 255 bytes.
+const MOST_DIGITS: usize = 200;
 
 /// A file name with placeholders for the frame's number and the values of sweeps.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,15 +19,67 @@ pub struct Pattern {
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
     Text(OsString),
-    /// The frame's number, padded with zeros to at least this many digits.
+    /// The frame's number, padded with zeros to at least this many characters.
     Frame(usize),
     /// The value of the sweep with this index.
     Sweep(usize),
 }
 
+/// Notation of the frame's number in a file name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Notation {
+    /// `####`: one digit for each.
+    Hashes,
+    /// `%04d` or `%d`, as in C, FFmpeg and Nuke.
+    Percent,
+    /// `$F4` or `$F`, as in Houdini.
+    Dollar,
+    /// `@@@@`: one digit for each, at least two, as in Houdini's and RV's file sequences.
+    Ats,
+}
+
+impl Notation {
+    /// All notations. The first one that a name contains counts; the others are text in it.
+    const ALL: [Notation; 4] = [Notation::Hashes, Notation::Percent, Notation::Dollar, Notation::Ats];
+
+    /// Parses a placeholder at the start of a text. Returns its digits and its length in bytes.
+    fn parse(self, text: &str) -> Option<(usize, usize)> {
+        let run = |c: char, least: usize| {
+            let count = text.len() - text.trim_start_matches(c).len();
+            (count >= least).then_some((count, count))
+        };
+        let digits = |text: &str| text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let found = match self {
+            Notation::Hashes => run('#', 1),
+            Notation::Ats => run('@', 2),
+            Notation::Percent => {
+                let rest = text.strip_prefix('%')?;
+                let count = digits(rest);
+                let wide = count == 0 || rest.starts_with('0');
+                (wide && rest[count..].starts_with('d'))
+                    .then(|| (rest[..count].parse().unwrap_or(1), count + 2))
+            }
+            Notation::Dollar => {
+                let rest = text.strip_prefix("$F")?;
+                let count = digits(rest);
+                let ends = !rest[count..].starts_with(|c: char| c.is_alphanumeric());
+                (count > 0 || ends).then(|| (rest[..count].parse().unwrap_or(1), count + 2))
+            }
+        };
+        found.map(|(digits, bytes)| (digits.clamp(1, MOST_DIGITS), bytes))
+    }
+
+    /// Returns the notation of a file name, if it has one.
+    fn of(name: &str) -> Option<Notation> {
+        let occurs =
+            |notation: &Notation| name.char_indices().any(|(i, _)| notation.parse(&name[i..]).is_some());
+        Notation::ALL.into_iter().find(occurs)
+    }
+}
+
 impl Pattern {
-    /// Parses a path. In its file name, `####` stands for the frame's number and, if there are sweeps,
-    /// `{NAME}` for a sweep's value. `names` lists by sweep every name it may have.
+    /// Parses a path. In its file name, `####`, `%04d`, `$F4` or `@@@@` stands for the frame's number and, if
+    /// there are sweeps, `{NAME}` for a sweep's value. `names` lists by sweep every name it may have.
     ///
     /// # Errors
     /// [`Error::Usage`] if the path has no file name, or names a sweep that does not exist.
@@ -64,11 +119,12 @@ impl Pattern {
     }
 
     /// Path of the file of a frame at the sweeps' `values`.
-    pub fn at(&self, frame: u32, values: &[String]) -> PathBuf {
+    pub fn at(&self, frame: i32, values: &[String]) -> PathBuf {
         let mut name = OsString::new();
         for part in &self.parts {
             match part {
                 Part::Text(text) => name.push(text),
+                // As in C, the sign of a frame before 0 counts among the characters.
                 Part::Frame(digits) => name.push(format!("{frame:0digits$}")),
                 Part::Sweep(sweep) => name.push(safe(&values[*sweep])),
             }
@@ -85,6 +141,7 @@ fn safe(value: &str) -> String {
 
 /// Splits a file name into its parts.
 fn read(text: &str, names: &[Vec<String>], parts: &mut Vec<Part>) -> std::result::Result<(), String> {
+    let notation = Notation::of(text);
     let mut rest = text;
     let mut literal = String::new();
     let flush = |literal: &mut String, parts: &mut Vec<Part>| {
@@ -93,11 +150,10 @@ fn read(text: &str, names: &[Vec<String>], parts: &mut Vec<Part>) -> std::result
         }
     };
     while let Some(c) = rest.chars().next() {
-        if c == '#' {
-            let digits = rest.len() - rest.trim_start_matches('#').len();
+        if let Some((digits, bytes)) = notation.and_then(|notation| notation.parse(rest)) {
             flush(&mut literal, parts);
             parts.push(Part::Frame(digits));
-            rest = &rest[digits..];
+            rest = &rest[bytes..];
         } else if let Some((name, after)) = rest.strip_prefix('{').and_then(|r| r.split_once('}'))
             && !names.is_empty()
         {

@@ -91,7 +91,7 @@ pub enum Event<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Name {
     /// Frame number.
-    pub frame: u32,
+    pub frame: i32,
     /// Values of the sweeps, each as `KEY=VALUE`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sweep: Vec<String>,

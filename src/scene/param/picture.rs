@@ -103,7 +103,7 @@ pub(super) const ANIMATION: Group = Group {
     title: "Animation",
     about: "`taki batch` renders a scene in time; `taki render --frame` renders one moment of it. The water \
          moves by itself, a turntable or a path moves the camera, and tracks move other parameters. \
-         Frames are counted from 0.",
+         Frames are counted from 0; there are frames before it, too.",
     params: &[
         p("animate.frames", "", "frames", Int(1, 1_000_000, 96), Uniform)
             .slider(1.0, 1000.0)

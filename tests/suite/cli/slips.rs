@@ -196,17 +196,3 @@ fn a_rate_may_be_a_fraction() {
     // Only a rate is a fraction.
     planned(&["--set", "h=1/2"]).refused(65, &["curves.h", "allowed: 0 to 8"]);
 }
-
-#[test]
-fn frames_before_the_first_are_refused_in_plain_words() {
-    for frames in ["-10-10", "-1", "0-5,-3", "-5--1"] {
-        let refused = run(&mut taki(["batch", "front", "-o", "####.png", "--dry-run", "--frames", frames]));
-        assert_eq!(refused.exit_code(), Some(2), "{refused:?}");
-        assert!(refused.stderr().contains("begins before frame 0, the first"), "{refused:?}");
-    }
-    for command in ["render", "scene"] {
-        let refused = run(&mut taki([command, "front", "--frame", "-3"]));
-        assert_eq!(refused.exit_code(), Some(2), "{refused:?}");
-        assert!(refused.stderr().contains("-3 is not in 0..=999999999"), "{refused:?}");
-    }
-}

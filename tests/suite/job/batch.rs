@@ -2,6 +2,7 @@
 
 mod crash;
 mod moving;
+mod numbers;
 mod sweep;
 
 use std::collections::BTreeMap;

@@ -18,7 +18,7 @@ fn animation(animate: &str) -> Result<Animation, String> {
     })
 }
 
-fn float(animation: &Animation, frame: u32, key: &str) -> f32 {
+fn float(animation: &Animation, frame: i32, key: &str) -> f32 {
     animation.at(frame).unwrap().values().unwrap().float(key)
 }
 
@@ -121,7 +121,7 @@ fn a_track_of_a_loop_comes_round() {
 #[test]
 fn a_turntable_goes_round_its_target_at_one_distance() {
     let a = animation("[animate]\nturn = 24\n").unwrap();
-    let place = |frame: u32| {
+    let place = |frame: i32| {
         let scene = a.at(frame).unwrap();
         let v = scene.values().unwrap();
         v.triple("camera.eye") - v.triple("camera.target")
@@ -145,11 +145,11 @@ const PATH: &str = "[animate.path]\neyes = [[0, 0, 10], [10, 0, 0], [0, 0, -10],
 #[test]
 fn a_path_goes_through_its_points_smoothly() {
     let a = animation(&format!("[animate]\nframes = 91\n{PATH}")).unwrap();
-    let eye = |frame: u32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
+    let eye = |frame: i32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
     let points = [[0, 0, 10], [10, 0, 0], [0, 0, -10], [-10, 0, 0]];
     for (i, p) in points.into_iter().enumerate() {
         let want = Vec3::from_array(p.map(|x: i32| x as f32));
-        assert!(eye(30 * i as u32).distance(want) < 1e-4, "{i}: {}", eye(30 * i as u32));
+        assert!(eye(30 * i as i32).distance(want) < 1e-4, "{i}: {}", eye(30 * i as i32));
     }
     let steps: Vec<Vec3> = (0..90).map(|f| eye(f + 1) - eye(f)).collect();
     for (f, w) in steps.windows(2).enumerate() {
@@ -163,7 +163,7 @@ fn a_path_goes_through_its_points_smoothly() {
 fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
     let targets = "targets = [[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 1, 0]]\n";
     let a = animation(&format!("[animate]\nloop = 80\n{PATH}{targets}")).unwrap();
-    let eye = |frame: u32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
+    let eye = |frame: i32| a.at(frame).unwrap().values().unwrap().triple("camera.eye");
     let steps: Vec<Vec3> = (0..80).map(|f| eye(f + 1) - eye(f)).collect();
     let turn = |a: Vec3, b: Vec3| a.angle_between(b).to_degrees();
     for f in 0..80 {
@@ -171,7 +171,7 @@ fn a_path_in_a_loop_is_closed_and_targets_move_with_it() {
         // With straight lines it would turn by 90°.
         let angle = turn(steps[f], steps[(f + 1) % 80]);
         assert!(angle < 15.0, "{f}: {angle}");
-        assert!((8.5..10.1).contains(&eye(f as u32).length()), "{f}: {}", eye(f as u32));
+        assert!((8.5..10.1).contains(&eye(f as i32).length()), "{f}: {}", eye(f as i32));
     }
     assert_eq!(a.at(40).unwrap().values().unwrap().triple("camera.target"), Vec3::new(0.0, 2.0, 0.0));
 }
