@@ -10,7 +10,8 @@ struct Develop {
     exposure: f32,
     tone: u32,
     balanced: u32,
-    pad_a: u32,
+    // 1: rounded by a pattern. 0: rounded to the nearest value.
+    dither: u32,
 }
 
 const TONE_FILMIC: u32 = 1u;
@@ -56,16 +57,23 @@ fn agx(x: vec3<f32>) -> vec3<f32> {
     );
 }
 
-fn channel(exposed: f32) -> u32 {
+fn channel(exposed: f32, rounding: f32) -> u32 {
     var x = exposed;
     if develop.tone == TONE_FILMIC {
         x = filmic(x);
     }
-    return byte(srgb(clamp(x, 0.0, 1.0)));
+    return byte(srgb(clamp(x, 0.0, 1.0)), rounding);
 }
 
-fn byte(encoded: f32) -> u32 {
-    return u32(clamp(encoded, 0.0, 1.0) * 255.0 + 0.5);
+fn byte(encoded: f32, rounding: f32) -> u32 {
+    return u32(clamp(encoded, 0.0, 1.0) * 255.0 + rounding);
+}
+
+// Threshold of the dither at a pixel of the whole image.
+fn threshold(x: u32, y: u32) -> f32 {
+    let u = x * 288237660u + y * 25070368u;
+    let noise = u * 52u + (u >> 16u) * 64417u;
+    return (f32(noise >> 24u) + 0.5) / 256.0;
 }
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
@@ -89,10 +97,14 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     // All curves are flat above 10⁴. The bound keeps their squares finite.
     let x = clamp(linear * develop.exposure, vec3<f32>(0.0), vec3<f32>(1e4));
-    var bytes = vec3<u32>(channel(x.r), channel(x.g), channel(x.b));
+    var t = 0.5;
+    if develop.dither != 0u {
+        t = threshold(frame.window_x + tile.x + id.x, frame.window_y + tile.y + id.y);
+    }
+    var bytes = vec3<u32>(channel(x.r, t), channel(x.g, t), channel(x.b, t));
     if develop.tone == TONE_AGX {
         let v = agx(x);
-        bytes = vec3<u32>(byte(v.r), byte(v.g), byte(v.b));
+        bytes = vec3<u32>(byte(v.r, t), byte(v.g, t), byte(v.b, t));
     }
-    picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | (byte(alpha) << 24u);
+    picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | (byte(alpha, 0.5) << 24u);
 }

@@ -14,7 +14,7 @@ use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
 use crate::engine::gpu::GpuBench;
 use crate::engine::{Engine, EngineChoice, RenderOptions, cpu};
-use crate::picture::resolve::develop;
+use crate::picture::resolve::develop_whole;
 use crate::scene::{Limits, Scene};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::{Monitor, Unwatched};
@@ -347,7 +347,7 @@ fn pictures(args: &BenchArgs, terminal: &Terminal, rows: &mut Rows) -> Result<()
         terminal.progress("pictures", round as u64, args.runs as u64)?;
         for ((_, scene), times) in scenes.iter().zip(&mut times) {
             let clock = Instant::now();
-            develop(&mut frame, &scene.image.look, true);
+            develop_whole(&mut frame, &scene.image.look);
             if round > 0 {
                 times.push(clock.elapsed().as_secs_f64());
             }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{Look, Tone, white_balance};
+use super::{Dither, Look, Tone, white_balance};
 
 /// Value of [`Develop::tone`] for Narkowicz's curve.
 pub const TONE_FILMIC: u32 = 1;
@@ -21,8 +21,8 @@ pub struct Develop {
     pub tone: u32,
     /// 1 if the white balance changes anything, else 0.
     pub balanced: u32,
-    /// Padding.
-    pub pad_a: u32,
+    /// 1 if 8-bit values are rounded by a pattern, 0 if to the nearest.
+    pub dither: u32,
 }
 
 impl Develop {
@@ -39,7 +39,7 @@ impl Develop {
                 Tone::Agx => TONE_AGX,
             },
             balanced: u32::from(balanced),
-            pad_a: 0,
+            dither: u32::from(look.dither == Dither::Pattern),
         }
     }
 }

@@ -60,7 +60,20 @@ pub struct Look {
     pub tint: f32,
     /// Tone curve.
     pub tone: Tone,
+    /// Way in which values are rounded to 8 bits.
+    pub dither: Dither,
 }
+
+/// Way in which values are rounded to 8 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dither {
+    /// Up or down by a fixed pattern over the image, so that smooth colours have no bands.
+    Pattern,
+    /// To the nearest value.
+    None,
+}
+
+words! { Dither { Pattern => "pattern", None => "none" } }
 
 /// Method that chooses an exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

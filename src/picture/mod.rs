@@ -16,4 +16,4 @@ pub use camera::Camera;
 pub use develop::{Develop, TONE_AGX, TONE_FILMIC};
 pub use frame::{Frame, Layer, Seconds, Surface};
 pub use grid::Grid;
-pub use image::{AutoExposure, Filter, Image, Look, Tone};
+pub use image::{AutoExposure, Dither, Filter, Image, Look, Tone};

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::bloom::Bloom;
 use super::{Develop, Frame, Look, TONE_AGX, TONE_FILMIC};
+use crate::util::window::Window;
 
 /// Filmic tone curve (Narkowicz, "ACES Filmic Tone Mapping Curve", 2015).
 fn filmic(x: f32) -> f32 {
@@ -11,7 +12,7 @@ fn filmic(x: f32) -> f32 {
 }
 
 /// Encodes a linear value from 0 to 1 as sRGB (IEC 61966-2-1).
-fn srgb(x: f32) -> f32 {
+pub fn srgb(x: f32) -> f32 {
     if x <= 0.0031308 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
@@ -46,9 +47,20 @@ fn agx_curve(x: f32) -> f32 {
 /// Alpha below which a pixel keeps its premultiplied colour: it rounds to 0 in 8 and in 16 bits.
 const LEAST_ALPHA: f32 = 1e-6;
 
-/// Rounds an encoded value to 8 bits.
-fn byte(encoded: f32) -> u8 {
-    (encoded.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+/// Rounds an encoded value to 8 bits, up if its fraction and `threshold` add up to 1.
+fn byte(encoded: f32, threshold: f32) -> u8 {
+    (encoded.clamp(0.0, 1.0) * 255.0 + threshold) as u8
+}
+
+/// Returns the threshold of the dither at a pixel of the whole image, 0 to 1: interleaved gradient noise
+/// (Jimenez 2014), in whole numbers so that both engines get the same. Its grain is fine and even. The 256
+/// thresholds keep 1/512 away from 0 and 1, so that a value that rounding errors move stays what it is.
+fn threshold(x: u32, y: u32) -> f32 {
+    // 0.06711056 and 0.00583715, in units of 2⁻³². Wrapping leaves the fraction.
+    let u = x.wrapping_mul(288_237_660).wrapping_add(y.wrapping_mul(25_070_368));
+    // Times 52.98292.
+    let noise = u.wrapping_mul(52).wrapping_add((u >> 16).wrapping_mul(64_417));
+    ((noise >> 24) as f32 + 0.5) / 256.0
 }
 
 /// Develops the pixels of a picture.
@@ -62,42 +74,84 @@ impl Resolver {
     }
 
     /// Develops one pixel: division by alpha, white balance, exposure, tone curve, sRGB encoding and rounding
-    /// to 8 bits. `linear` is multiplied by `alpha`, 0 to 1; the result is not.
-    pub fn pixel(&self, linear: [f32; 3], alpha: f32) -> [u8; 4] {
+    /// to 8 bits. `lit` is R, G, B multiplied by alpha, and alpha, as of [`lit`]; the result is not multiplied.
+    /// `at` is the pixel's column and row in the whole image, on which the dither depends.
+    pub fn pixel(&self, lit: [f32; 4], at: [u32; 2]) -> [u8; 4] {
+        let [r, g, b] = self.bytes(self.encoded(lit), at);
+        // Alpha is not dithered, so that what is solid or empty stays so.
+        [r, g, b, byte(lit[3], 0.5)]
+    }
+
+    /// Rounds encoded values to 8 bits, dithered as in [`Resolver::pixel`].
+    pub fn bytes(&self, encoded: [f32; 3], at: [u32; 2]) -> [u8; 3] {
+        let threshold = if self.0.dither != 0 { threshold(at[0], at[1]) } else { 0.5 };
+        encoded.map(|x| byte(x, threshold))
+    }
+
+    /// Develops one pixel as [`Resolver::pixel`] does, without rounding: values for a display, 0 to 1.
+    pub fn encoded(&self, lit: [f32; 4]) -> [f32; 3] {
+        let x = self.exposed(lit);
+        let encoded = match self.0.tone {
+            TONE_AGX => agx(x),
+            TONE_FILMIC => x.map(|x| srgb(filmic(x).clamp(0.0, 1.0))),
+            _ => x.map(|x| srgb(x.clamp(0.0, 1.0))),
+        };
+        encoded.map(|x| x.clamp(0.0, 1.0))
+    }
+
+    /// Returns the linear values that the tone curve gets: alpha is divided out, white balance and exposure
+    /// are applied.
+    pub fn exposed(&self, [r, g, b, alpha]: [f32; 4]) -> [f32; 3] {
         let develop = &self.0;
-        let mut rgb = linear.map(|x| x / alpha.max(LEAST_ALPHA));
+        let mut rgb = [r, g, b].map(|x| x / alpha.max(LEAST_ALPHA));
         if develop.balanced != 0 {
             rgb = develop.balance.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]);
         }
         // All curves are flat above 10⁴. The bound keeps their squares finite.
-        let x = rgb.map(|x| (x * develop.exposure).clamp(0.0, 1e4));
-        let [r, g, b] = match develop.tone {
-            TONE_AGX => agx(x).map(byte),
-            TONE_FILMIC => x.map(|x| byte(srgb(filmic(x).clamp(0.0, 1.0)))),
-            _ => x.map(|x| byte(srgb(x.clamp(0.0, 1.0)))),
-        };
-        [r, g, b, byte(alpha)]
+        rgb.map(|x| (x * develop.exposure).clamp(0.0, 1e4))
     }
 }
 
-/// Develops the picture of a frame from its radiance. Only a `whole` image gets bloom, because bloom needs
-/// all pixels. Bloom spreads alpha as it spreads light, so that a backdrop is hidden where light arrives.
-pub fn develop(frame: &mut Frame, look: &Look, whole: bool) {
-    let resolver = Resolver::new(look);
-    let picture = frame.picture.par_iter_mut().enumerate();
+/// Returns the light that the pixels of a frame are developed from: R, G, B multiplied by alpha, and alpha,
+/// which is 1 in a frame without an alpha channel.
+///
+/// Bloom spreads it, which needs all pixels: only a `whole` image gets it. Alpha is spread as light is, so
+/// that a backdrop is hidden where light arrives.
+pub fn lit<'a>(frame: &'a Frame, look: &Look, whole: bool) -> impl Fn(usize) -> [f32; 4] + Sync + use<'a> {
+    let size = [frame.width as usize, frame.height as usize];
     let alpha = frame.alpha.as_deref();
-    if whole && look.bloom > 0.0 {
-        let size = [frame.width as usize, frame.height as usize];
-        let bloom = Bloom::new(&frame.radiance, size, look);
-        let alpha: Option<Vec<[f32; 4]>> = alpha.map(|alpha| alpha.iter().map(|&a| [a; 4]).collect());
-        let alpha = alpha.as_ref().map(|alpha| Bloom::new(alpha, size, look));
-        picture.for_each(|(i, picture)| {
-            *picture = resolver.pixel(bloom.pixel(i), alpha.as_ref().map_or(1.0, |alpha| alpha.pixel(i)[0]));
-        });
-    } else {
-        picture.for_each(|(i, picture)| {
-            let [r, g, b, _] = frame.radiance[i];
-            *picture = resolver.pixel([r, g, b], alpha.map_or(1.0, |alpha| alpha[i]));
-        });
+    let blooms = whole && look.bloom > 0.0;
+    let bloom = blooms.then(|| Bloom::new(&frame.radiance, size, look));
+    let bloom_of_alpha = alpha.filter(|_| blooms).map(|alpha| {
+        let alpha = alpha.iter().map(|&a| [a; 4]).collect::<Vec<_>>();
+        let bloom = Bloom::new(&alpha, size, look);
+        (0..alpha.len()).into_par_iter().map(|i| bloom.pixel(i)[0]).collect::<Vec<f32>>()
+    });
+    move |i| {
+        let [r, g, b, _] = frame.radiance[i];
+        let [r, g, b] = bloom.as_ref().map_or([r, g, b], |bloom| bloom.pixel(i));
+        let alpha = bloom_of_alpha.as_deref().or(alpha);
+        [r, g, b, alpha.map_or(1.0, |alpha| alpha[i])]
     }
+}
+
+/// Develops the picture of a frame from its radiance. The frame is the part `window` of an image of `size`
+/// pixels; only the whole image gets bloom.
+pub fn develop(frame: &mut Frame, look: &Look, window: Window, size: [u32; 2]) {
+    let resolver = Resolver::new(look);
+    let mut picture = std::mem::take(&mut frame.picture);
+    let lit = lit(frame, look, window == Window::whole(size));
+    let width = window.width as usize;
+    picture.par_iter_mut().enumerate().for_each(|(i, picture)| {
+        let at = [window.x + (i % width) as u32, window.y + (i / width) as u32];
+        *picture = resolver.pixel(lit(i), at);
+    });
+    drop(lit);
+    frame.picture = picture;
+}
+
+/// Develops the picture of a whole image from its radiance.
+pub fn develop_whole(frame: &mut Frame, look: &Look) {
+    let size = [frame.width, frame.height];
+    develop(frame, look, Window::whole(size), size);
 }

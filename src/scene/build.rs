@@ -10,7 +10,7 @@ use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
 use crate::light::strand::StrandParams;
 use crate::light::{Background, Cone, Light, LightKind, Reflection, ReflectionKind, Scattering, Visibility};
-use crate::picture::{AutoExposure, Camera, Filter, Image, Look, Tone};
+use crate::picture::{AutoExposure, Camera, Dither, Filter, Image, Look, Tone};
 use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
@@ -137,6 +137,7 @@ fn look(v: &Values) -> Look {
         temperature: v.float("image.temperature"),
         tint: v.float("image.tint"),
         tone: v.choice("image.tone", Tone::from_word),
+        dither: v.choice("image.dither", Dither::from_word),
     }
 }
 

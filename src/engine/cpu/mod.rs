@@ -136,7 +136,7 @@ pub fn render_with(
     let inverse = 1.0 / samples.len() as f32;
     frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));
     frame.alpha.par_iter_mut().flatten().for_each(|sum| *sum = 1.0 - *sum * inverse);
-    develop(&mut frame, &image.look, window == Window::whole([image.width, image.height]));
+    develop(&mut frame, &image.look, window, [image.width, image.height]);
     seconds.resolve = clock.elapsed().as_secs_f64();
     frame.seconds = seconds;
     Ok(frame)

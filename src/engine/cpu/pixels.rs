@@ -10,7 +10,7 @@ use super::integrate::Integrator;
 use crate::engine::options::RenderOptions;
 use crate::picture::Frame;
 use crate::picture::camera::sample_numbers;
-use crate::picture::resolve::{Resolver, develop};
+use crate::picture::resolve::{Resolver, develop_whole, lit};
 use crate::place::Mesh;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -73,12 +73,12 @@ pub fn render_pixels(
         }
     }
     if image.look.bloom > 0.0 && window == whole {
-        develop(frame, &image.look, true);
+        develop_whole(frame, &image.look);
     } else {
         let resolver = Resolver::new(&image.look);
         for i in pixels {
-            let [r, g, b, _] = frame.radiance[i];
-            frame.picture[i] = resolver.pixel([r, g, b], frame.alpha.as_ref().map_or(1.0, |alpha| alpha[i]));
+            let light = lit(frame, &image.look, false)(i);
+            frame.picture[i] = resolver.pixel(light, pixel(i));
         }
     }
     Ok(())

@@ -20,7 +20,7 @@ use super::visibility::{FilledVolumes, VisibilityInputs};
 use super::{Inputs, readback};
 use crate::engine::options::RenderOptions;
 use crate::picture::camera::{CENTRE, sample_numbers};
-use crate::picture::resolve::develop;
+use crate::picture::resolve::develop_whole;
 use crate::picture::{Develop, Frame, Seconds};
 use crate::place::Mesh;
 use crate::scene::Scene;
@@ -296,7 +296,7 @@ impl<'a> FrameRun<'a> {
         // Bloom needs the whole image, which may be drawn in several windows.
         if image.look.bloom > 0.0 && self.part == Window::whole([image.width, image.height]) {
             let clock = Instant::now();
-            develop(frame, &image.look, true);
+            develop_whole(frame, &image.look);
             self.seconds.resolve += clock.elapsed().as_secs_f64();
         }
         frame.seconds = self.seconds;

@@ -13,7 +13,7 @@ use crate::output::contact_sheet::{Axis, Sheet, draw};
 use crate::output::frame::{Output, figures_of, read_exr, read_png, real_file, rgb_rows};
 use crate::output::movie::{Movie, MovieKind, MovieOptions, mark_of};
 use crate::picture::resolve::develop;
-use crate::picture::{Frame, Layer, Look};
+use crate::picture::{Frame, Image, Layer};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
@@ -201,9 +201,7 @@ impl Batch {
             Some(i) => picture_of_png(&files[i]),
             None => {
                 let scene = self.scene(number)?;
-                let image = &scene.image;
-                let whole = self.window(&scene) == Window::whole([image.width, image.height]);
-                picture_of_exr(&files[0], &image.look, whole)
+                picture_of_exr(&files[0], &scene.image, self.window(&scene))
             }
         }
     }
@@ -340,8 +338,8 @@ fn picture_of_png(path: &Path) -> Result<RgbImage> {
         .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
 }
 
-/// Develops the EXR's colour into the 8-bit picture that a PNG would hold.
-fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
+/// Develops the EXR's colour, the part `window` of an image, into the 8-bit picture that a PNG would hold.
+fn picture_of_exr(path: &Path, image: &Image, window: Window) -> Result<RgbImage> {
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
         let values = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
@@ -355,7 +353,7 @@ fn picture_of_exr(path: &Path, look: &Look, whole: bool) -> Result<RgbImage> {
     let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
     let mut frame = Frame::new(width, height, false);
     frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
-    develop(&mut frame, look, whole);
+    develop(&mut frame, &image.look, window, [image.width, image.height]);
     RgbImage::from_raw(width, height, rgb_rows(&frame))
         .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
 }

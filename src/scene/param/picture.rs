@@ -3,13 +3,13 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
-use crate::picture::{AutoExposure, Filter, Tone};
+use crate::picture::{AutoExposure, Dither, Filter, Tone};
 use crate::scene::keyframes::Interpolation;
 
 pub(super) const IMAGE: Group = Group {
     title: "Image",
     about: "These parameters set the size of the picture, its samples, and the way from linear radiance to \
-         what is shown. Exposure, bloom, white balance and tone curve change PNGs and movies; an EXR \
+         what is shown. Exposure, bloom, white balance, tone curve and dither change what is shown; an EXR \
          holds the radiance without them.",
     params: &[
         p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform)
@@ -95,6 +95,15 @@ pub(super) const IMAGE: Group = Group {
             .when(
                 "Choose `agx` when bright coloured light should turn white, `none` when pixel values \
                  should be compared.",
+            ),
+        p("image.dither", "", "", Choice(Dither::WORDS), Uniform)
+            .doc(
+                "Rounding to 8 bits: `pattern` rounds up or down by a fixed fine pattern, whose mean is the \
+                 exact colour; `none` rounds to the nearest value. 16-bit pictures are not dithered.",
+            )
+            .when(
+                "Choose `none` for the smallest files, or when pixel values should be compared; smooth \
+                 skies then show bands.",
             ),
     ],
 };

@@ -63,8 +63,9 @@ impl Overview {
         if self.cached.as_ref().is_none_or(|cached| cached.key != key) {
             let resolver = Resolver::new(&image.look);
             let pixels = environment.overview(SIZE[0], SIZE[1]);
-            let pixels = pixels.iter().map(|radiance| {
-                let [r, g, b, _] = resolver.pixel(radiance.to_array(), 1.0);
+            let pixels = pixels.iter().zip(0..).map(|(radiance, i)| {
+                let at = [i % SIZE[0] as u32, i / SIZE[0] as u32];
+                let [r, g, b, _] = resolver.pixel(radiance.extend(1.0).to_array(), at);
                 Color32::from_rgb(r, g, b)
             });
             let picture = ColorImage::new(SIZE, pixels.collect());

@@ -17,7 +17,7 @@ use crate::engine::gpu::DeviceOptions;
 use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
 use crate::picture::camera::{CENTRE, sample_numbers};
-use crate::picture::resolve::develop;
+use crate::picture::resolve::develop_whole;
 use crate::picture::{AutoExposure, Frame, Image, Look};
 use crate::place::{Ground, Mesh};
 use crate::scene::{Cost, Scene, Values};
@@ -274,7 +274,7 @@ impl Renderer {
         }
         let mut frame = old.frame;
         if old.look != *look {
-            develop(Arc::make_mut(&mut frame), look, true);
+            develop_whole(Arc::make_mut(&mut frame), look);
         }
         Some(Rendered { scene: request.scene.clone(), look: *look, frame, ..old })
     }
@@ -481,7 +481,7 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
         sum.counts.copy_from_slice(&part.counts);
         sum.alpha.clone_from(&part.alpha);
         sum.seconds = part.seconds;
-        return develop(sum, look, true);
+        return develop_whole(sum, look);
     }
     let share = more as f32 / (samples + more) as f32;
     sum.radiance
@@ -493,5 +493,5 @@ fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
     }
     sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
     sum.seconds = part.seconds;
-    develop(sum, look, true);
+    develop_whole(sum, look);
 }

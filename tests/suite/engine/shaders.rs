@@ -174,7 +174,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Similarity"), similarity);
     assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity));
     let module = validate(&stage("resolve")).expect("valid");
-    assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced pad_a));
+    assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced dither));
     let module = validate(&stage("visibility")).expect("valid");
     // The host pads this struct to the size that a uniform needs.
     let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);

@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::engine::gpu::{both, renderer, scene};
 use taki::job::check_bloom;
 use taki::picture::bloom::{Bloom, OCTAVES, shares};
-use taki::picture::resolve::develop;
+use taki::picture::resolve::{develop, develop_whole};
 use taki::picture::{Frame, Look};
 use taki::util::window::Window;
 
@@ -108,7 +108,8 @@ fn bloom_is_a_share_and_none_of_it_changes_no_byte() {
     let picture = |bloom: f32, whole: bool| {
         let mut frame = Frame::new(96, 54, false);
         frame.radiance = radiance.clone();
-        develop(&mut frame, &look(bloom, 0.05), whole);
+        let image = [96, if whole { 54 } else { 55 }];
+        develop(&mut frame, &look(bloom, 0.05), Window::whole([96, 54]), image);
         frame.picture
     };
     assert_eq!(picture(0.0, true), picture(0.3, false));
@@ -134,7 +135,7 @@ fn both_engines_bloom_the_picture_and_leave_the_radiance() {
         assert_eq!(plain.radiance, blooming.radiance);
         assert_ne!(plain.picture, blooming.picture);
         let mut again = plain.clone();
-        develop(&mut again, &of("image.bloom=0.4").image.look, true);
+        develop_whole(&mut again, &of("image.bloom=0.4").image.look);
         assert_eq!(again.picture, blooming.picture);
     }
 }

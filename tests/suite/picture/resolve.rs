@@ -1,16 +1,51 @@
-//! Tone curves: grey stays grey, and brighter light is never shown darker.
+//! Tone curves: grey stays grey, and brighter light is never shown darker. Dither: the mean is exact.
 
 use crate::engine::gpu::scene;
 use taki::picture::resolve::Resolver;
-use taki::picture::{Look, Tone};
+use taki::picture::{Dither, Look, Tone};
 
 fn look(tone: Tone) -> Look {
-    Look { tone, ..scene("front", &[]).image.look }
+    Look { tone, dither: Dither::None, ..scene("front", &[]).image.look }
 }
 
 fn of(tone: Tone, linear: [f32; 3]) -> [u8; 3] {
-    let [r, g, b, _] = Resolver::new(&look(tone)).pixel(linear, 1.0);
+    let [r, g, b, _] = Resolver::new(&look(tone)).pixel([linear[0], linear[1], linear[2], 1.0], [0; 2]);
     [r, g, b]
+}
+
+#[test]
+fn a_dithered_gradient_has_no_bands_and_the_right_mean_in_every_row_and_column() {
+    let dithered = Resolver::new(&Look { dither: Dither::Pattern, ..look(Tone::None) });
+    // 128 rows of one step of 255: without dither two flat bands.
+    let exact = |row: u32| dithered.encoded([0.2 + row as f32 * 2.7e-5; 4])[0] * 255.0;
+    let (first, last) = (exact(0), exact(127));
+    assert!(last - first > 0.5 && last - first < 1.5, "{first} to {last}");
+    let mut columns = [0.0; 128];
+    let mut means = Vec::new();
+    for row in 0..128 {
+        let linear = 0.2 + row as f32 * 2.7e-5;
+        let bytes = (0..128).map(|x| dithered.pixel([linear; 4], [x + 7000, row + 300]));
+        let mut sum = 0.0;
+        for (x, [r, g, b, a]) in bytes.enumerate() {
+            assert!(r == g && g == b && a == 255, "grey stays grey");
+            let error = f32::from(r) - exact(row);
+            assert!(error.abs() <= 1.0, "{r} for {}", exact(row));
+            columns[x] += error;
+            sum += f32::from(r);
+        }
+        means.push(sum / 128.0);
+        assert!((sum / 128.0 - exact(row)).abs() < 0.06, "row {row}: {} for {}", sum / 128.0, exact(row));
+    }
+    columns.iter().for_each(|sum| assert!((sum / 128.0).abs() < 0.06, "{columns:?}"));
+    // What is exact stays as it is, black and white above all.
+    for (linear, byte) in [(0.0, 0), (1.0, 255), (9.0, 255)] {
+        assert!((0..4000).all(|i| dithered.pixel([linear; 4], [i, 3 * i])[1] == byte), "{linear}");
+    }
+    // The twin: rounding to the nearest value shows bands.
+    let flat = Resolver::new(&look(Tone::None));
+    let rows: std::collections::BTreeSet<u8> =
+        (0..128).map(|row| flat.pixel([0.2 + row as f32 * 2.7e-5; 4], [0, row])[0]).collect();
+    assert!(rows.len() == 2, "{rows:?}");
 }
 
 #[test]
