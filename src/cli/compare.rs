@@ -9,6 +9,7 @@ use serde_json::json;
 use super::terminal::say;
 use super::{crop, window};
 use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
+use crate::job::check_replaced;
 use crate::output::frame::{Difference, Output, Tolerance, encode_png, read_exr, read_png};
 use crate::picture::Frame;
 use crate::util::error::{Error, Result};
@@ -36,6 +37,9 @@ pub struct CompareArgs {
     /// Writes a PNG of the absolute difference, scaled so that the largest difference is white.
     #[arg(long, value_name = "FILE.png")]
     difference: Option<PathBuf>,
+    /// Replaces an existing file of --difference even if it is no picture.
+    #[arg(long, requires = "difference")]
+    overwrite: bool,
     /// Instead of comparing, measures how the pictures look to the eye. Streaks: the mean difference of
     /// luminance between horizontal neighbours, divided by that between vertical neighbours, for water that
     /// flows down the picture. Flicker: of three pictures or more, how much the luminance flickers in time.
@@ -63,6 +67,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         let what = format!("{} pictures given; compare two, or use --eye for any number", args.files.len());
         return Err(Error::Usage(what));
     };
+    if let Some(path) = args.difference.as_ref().filter(|_| !args.overwrite) {
+        check_replaced(path)?;
+    }
     let (width, height, a) = read(path_a)?;
     let (other_width, other_height, b) = read(path_b)?;
     if (width, height) != (other_width, other_height) {

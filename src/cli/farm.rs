@@ -10,6 +10,7 @@ use super::Cli;
 use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::job::batch::Pattern;
+use crate::job::check_kind;
 use crate::output::frame::Output;
 use crate::scene::STDIN;
 use crate::util::error::{Error, Result};
@@ -87,9 +88,12 @@ struct JobArgs {
     #[arg(long, value_name = "N", default_value_t = 8)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     shards: u32,
-    /// Job file to write; an existing file is replaced. Default: stdout.
+    /// Job file to write; an existing job file is replaced. Default: stdout.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Replaces an existing file even if it is no job file of this kind.
+    #[arg(long, requires = "output")]
+    overwrite: bool,
     /// Name of the job.
     #[arg(long, default_value = "taki", value_parser = name)]
     name: String,
@@ -178,19 +182,27 @@ fn check_batch(job: &Job) -> Result<()> {
 }
 
 pub fn run(args: &FarmArgs) -> Result<()> {
-    let (output, text) = match &args.engine {
+    // The last is a word that all job files of the kind begin with.
+    let (job, text, mark) = match &args.engine {
         Engine::Slurm { job, partition } => {
-            (&job.output, slurm::script(&job.job()?, &slurm::Options { partition: partition.clone() })?)
+            let options = slurm::Options { partition: partition.clone() };
+            (job, slurm::script(&job.job()?, &options)?, "#SBATCH")
         }
-        Engine::Openjd { job } => (&job.output, openjd::template(&job.job()?)?),
+        Engine::Openjd { job } => (job, openjd::template(&job.job()?)?, "specificationVersion"),
         Engine::Kubernetes { job, image, claim, mount } => {
             let options =
                 kubernetes::Options { image: image.clone(), claim: claim.clone(), mount: mount.clone() };
-            (&job.output, kubernetes::manifest(&job.job()?, &options)?)
+            (job, kubernetes::manifest(&job.job()?, &options)?, "apiVersion")
         }
     };
-    match output {
-        Some(path) => Output::create(path)?.finish_with(text.as_bytes()),
+    match &job.output {
+        Some(path) => {
+            if !job.overwrite {
+                let marked = |start: &[u8]| start.windows(mark.len()).any(|w| w == mark.as_bytes());
+                check_kind(path, "job file of this kind", marked)?;
+            }
+            Output::create(path)?.finish_with(text.as_bytes())
+        }
         // Half a job file in a pipe is useless, so unlike with other output a broken pipe is an error too.
         None => {
             let mut out = std::io::stdout();

@@ -7,6 +7,8 @@ use clap::Args;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, choice, seconds};
+use crate::job::check_replaced;
+use crate::output::frame::Output;
 use crate::util::error::Result;
 use crate::viewer::settings::Settings;
 use crate::viewer::{self, Options, WindowChoice};
@@ -29,6 +31,9 @@ pub struct ViewArgs {
     /// Saves a picture of the window to this PNG before --exit-after closes it.
     #[arg(long, value_name = "FILE", requires = "exit_after")]
     screenshot: Option<PathBuf>,
+    /// Replaces an existing file of --screenshot even if it is no picture.
+    #[arg(long, requires = "screenshot")]
+    overwrite: bool,
     /// Measures how quickly the viewer responds: changes parameters by itself, draws while it renders, then
     /// closes the window and prints the times.
     #[arg(long, conflicts_with = "exit_after")]
@@ -42,6 +47,13 @@ pub struct ViewArgs {
 }
 
 pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
+    if let Some(path) = &args.screenshot {
+        if !args.overwrite {
+            check_replaced(path)?;
+        }
+        // Opening and dropping the output finds a missing folder before the window opens.
+        drop(Output::open(path)?);
+    }
     let mut sets = args.scene.sets.clone();
     sets.extend(args.scene.seed.map(|n| format!("volume.seed={n}")));
     let report = viewer::run(Options {

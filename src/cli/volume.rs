@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output, memory};
+use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -27,6 +28,9 @@ enum VolumeCommand {
         /// File to write. Default: the scene's name with .npz, in the current folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
+        /// Replaces an existing file even if it is no volume.
+        #[arg(long)]
+        overwrite: bool,
     },
     /// Prints statistics of a volume file.
     Info {
@@ -44,7 +48,7 @@ enum VolumeCommand {
 
 pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
     match &args.command {
-        VolumeCommand::Build { scene: options, output } => {
+        VolumeCommand::Build { scene: options, output, overwrite } => {
             let scene = options.load(&[])?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
@@ -52,6 +56,9 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
                 let what =
                     format!("-o {}: a volume is an .npz file; use -o {}", path.display(), npz.display());
                 return Err(Error::Usage(what));
+            }
+            if !overwrite {
+                check_volume_replaced(&path)?;
             }
             let mut out = Output::create(&path)?;
             let volume = scene.volume(options.limits().memory, terminal)?;

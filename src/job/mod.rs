@@ -9,7 +9,7 @@ mod strips;
 
 pub use claim::{Asked, Claim, Claims};
 pub use memo::VolumeMemo;
-pub(crate) use still::{About, Sink, check_replaced};
+pub(crate) use still::{About, Sink, check_kind, check_replaced, check_volume_replaced};
 pub use still::{STDOUT, Still, StillWriter};
 pub use stitch::stitch;
 pub use strips::{check_bloom, memory_of, spare_for_rasters, strips};

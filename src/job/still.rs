@@ -179,18 +179,34 @@ const PICTURES: [&[u8]; 3] = [b"\x89PNG", b"\x76\x2f\x31\x01", b"GIF8"];
 /// # Errors
 /// [`Error::CannotCreate`] if the file is no picture.
 pub(crate) fn check_replaced(path: &Path) -> Result<()> {
+    check_kind(path, "picture", |start| PICTURES.iter().any(|picture| start.starts_with(picture)))
+}
+
+/// Refuses to replace a file that is no volume. An empty file may be replaced.
+///
+/// # Errors
+/// [`Error::CannotCreate`] if the file is no volume.
+pub(crate) fn check_volume_replaced(path: &Path) -> Result<()> {
+    check_kind(path, "volume", |start| start.starts_with(b"PK"))
+}
+
+/// Refuses to replace a file whose first 4096 bytes are not those of a `kind`. An empty file may be replaced.
+///
+/// # Errors
+/// [`Error::CannotCreate`] if the file is of another kind.
+pub(crate) fn check_kind(path: &Path, kind: &str, is: impl Fn(&[u8]) -> bool) -> Result<()> {
     // Whatever is no file is refused where the output is opened.
     if !path.is_file() {
         return Ok(());
     }
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
-    if read.is_ok() && (start.is_empty() || PICTURES.iter().any(|picture| start.starts_with(picture))) {
+    let read = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut start));
+    if read.is_ok() && (start.is_empty() || is(&start)) {
         return Ok(());
     }
     Err(Error::CannotCreate {
         path: path.to_owned(),
-        why: "the file of this name is no picture".into(),
+        why: format!("the file of this name is no {kind}"),
         fix: "choose another name, or remove the file; taki replaces it with --overwrite".into(),
     })
 }

@@ -176,16 +176,23 @@ fn what_no_engine_could_run_is_refused() {
 }
 
 #[test]
-fn a_job_file_goes_to_stdout_or_replaces_a_file() {
+fn a_job_file_goes_to_stdout_or_replaces_a_job_file() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("fall.sbatch");
     let batch = ["--", "front", "--frames", "0-1", "-o", "a b.####.png"];
     let slurm = || taki(["farm", "slurm", "--shards", "2"]);
     let text = run(slurm().args(batch)).done().to_owned();
     assert!(text.starts_with("#!/bin/bash\n") && text.contains("'a b.####.png'"), "{text}");
-    fs::write(&file, "old").unwrap();
-    assert_eq!(run(slurm().arg("-o").arg(&file).args(batch)).done(), "");
+    let write = |more: &[&str]| run(slurm().arg("-o").arg(&file).args(more).args(batch));
+    for other in ["old", "#!/bin/bash\nrm -r build\n"] {
+        fs::write(&file, other).unwrap();
+        write(&[]).refused(73, &["fall.sbatch", "no job file", "--overwrite"]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), other);
+    }
+    assert_eq!(write(&["--overwrite"]).done(), "");
     assert_eq!(fs::read_to_string(&file).unwrap(), text);
+    assert_eq!(write(&["--name", "again"]).done(), "");
+    assert!(fs::read_to_string(&file).unwrap().contains("again"));
     run(slurm().arg("-o").arg(folder.path().join("none/x")).args(batch)).refused(73, &["none/x"]);
 }
 

@@ -29,7 +29,7 @@ fn an_output_through_a_link_replaces_the_file_behind_it() {
     let at = |name: &str| dir.path().join(name);
     fs::create_dir_all(at("links")).unwrap();
     fs::create_dir_all(at("disk/deep")).unwrap();
-    fs::write(at("disk/old.sh"), "old").unwrap();
+    fs::write(at("disk/old.sh"), "#SBATCH").unwrap();
     // A relative link starts in its own folder, not in the current one.
     symlink("../disk/old.sh", at("links/relative.sh")).unwrap();
     symlink(at("disk/deep/absent.sh"), at("links/dangling.sh")).unwrap();
@@ -42,7 +42,7 @@ fn an_output_through_a_link_replaces_the_file_behind_it() {
         ("links/chain.sh", "disk/deep/absent.sh"),
     ];
     for (link, file) in cases {
-        fs::write(at("disk/old.sh"), "old").unwrap();
+        fs::write(at("disk/old.sh"), "#SBATCH").unwrap();
         let _ = fs::remove_file(at("disk/deep/absent.sh"));
         job(dir.path(), link).done();
         assert!(!at(file).is_symlink(), "{link}");
@@ -118,7 +118,7 @@ fn a_replaced_file_hands_on_its_mode() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("j.sh");
     for wanted in [0o600, 0o640, 0o755, 0o444] {
-        fs::write(&path, "old").unwrap();
+        fs::write(&path, "#SBATCH").unwrap();
         fs::set_permissions(&path, PermissionsExt::from_mode(wanted)).unwrap();
         job(dir.path(), "j.sh").done();
         is_job(&path);
@@ -220,4 +220,37 @@ fn a_still_replaces_pictures_but_no_other_file_unless_told_to() {
     render(&[]).done();
     is_picture(&path);
     has_only(dir.path(), &["part.png", "x.png", "y.exr"]);
+}
+
+#[test]
+fn a_picture_of_a_difference_a_volume_and_a_screenshot_replace_their_own_kind_alone() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(dir.path()));
+    run(render("front", dir.path().join("a.png")).arg("-o").arg(dir.path().join("b.png"))).done();
+    let difference = ["compare", "a.png", "b.png", "--difference", "d.png"];
+    let volume = ["volume", "build", "front", "-o", "v.npz"];
+    let mut commands: Vec<(&str, &[&str], &str)> =
+        vec![("d.png", &difference, "no picture"), ("v.npz", &volume, "no volume")];
+    let screenshot = ["view", "front", "--exit-after", "1", "--screenshot", "s.png"];
+    if cfg!(feature = "viewer") {
+        commands.push(("s.png", &screenshot, "no picture"));
+    }
+    for (file, command, why) in commands {
+        let path = dir.path().join(file);
+        fs::write(&path, "notes").unwrap();
+        at(command).refused(73, &[file, why, "--overwrite"]);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "notes");
+        if file == "s.png" {
+            // Whether a window opens is another matter.
+            continue;
+        }
+        at(&[command, &["--overwrite"]].concat()).done();
+        assert!(fs::metadata(&path).unwrap().len() > 50);
+        at(command).done();
+    }
+    // A folder that is missing is known before the window opens.
+    if cfg!(feature = "viewer") {
+        at(&["view", "front", "--exit-after", "1", "--screenshot", "none/s.png"])
+            .refused(73, &["none/s.png"]);
+    }
 }
