@@ -6,11 +6,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::choice::layer;
+use super::choice::{codec, layer, movie_bits};
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, EngineOptions, SceneOptions, crop, measured_words, seconds, size, window};
+use super::{CacheOptions, DepthOptions, EngineOptions, SceneOptions};
+use super::{crop, measured_words, seconds, size, window};
 use crate::engine::Engine;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
+use crate::output::movie::Codec;
 use crate::picture::Layer;
 use crate::scene::Animation;
 use crate::util::error::{Error, Result};
@@ -37,10 +39,10 @@ pub struct BatchArgs {
     scene: SceneOptions,
     #[command(flatten)]
     cache: CacheOptions,
-    /// Files to write. Pictures are .png or .exr; in their names, #### stands for the frame's number and
-    /// {NAME} for a sweep's value, such as `-o out/fall.####.png`. '%04d', '$F4' and '@@@@' stand for the
-    /// number too. Movies are .gif, .apng (or .png without a number), .mp4 or .webm. Can be given more than
-    /// once. Default: PNG files with the scene's name in the current folder.
+    /// Files to write. Pictures are .png, .jpg, .tif, .webp or .exr; in their names, #### stands for the
+    /// frame's number and {NAME} for a sweep's value, such as `-o out/fall.####.png`. '%04d', '$F4' and
+    /// '@@@@' stand for the number too. Movies are .gif, .apng (or .png without a number), .mp4, .mov or
+    /// .webm. Can be given more than once. Default: PNG files with the scene's name in the current folder.
     #[arg(short, long = "output", value_name = "PATTERN")]
     outputs: Vec<PathBuf>,
     /// Frames to render, such as 0-239, or 0-239:10 for every tenth, or 1,5,9, or -10-10 to begin before
@@ -58,7 +60,8 @@ pub struct BatchArgs {
     /// key is enough if no other parameter has it.
     #[arg(long = "sweep", value_name = "KEY=VALUES")]
     sweeps: Vec<String>,
-    /// File of a sweep's labelled contact sheet (.png). Default: SCENE.sheet.png beside the pictures.
+    /// File of a sweep's labelled contact sheet (.png, .jpg, .tif or .webp). Default: SCENE.sheet.png beside
+    /// the pictures.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
     /// File of a table that lists every picture with its parameters, files and figures (.csv or .json). Can
@@ -96,6 +99,14 @@ pub struct BatchArgs {
     /// Renders only this part of every picture: column and row of its top left pixel, width and height.
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
+    #[command(flatten)]
+    depth: DepthOptions,
+    /// Codec of .mp4 and .mov files. Default: h264 for .mp4, prores for .mov. A .webm is always vp9.
+    #[arg(long, value_parser = codec())]
+    codec: Option<Codec>,
+    /// Bits per sample of videos: 8, or 10 for skies without bands. Default: 8; ProRes always has 10.
+    #[arg(long, value_name = "N", value_parser = movie_bits())]
+    movie_bits: Option<u8>,
     #[command(flatten)]
     engine: EngineOptions,
     /// Layers of EXR files, separated by commas. Default: all. Example: --layers rgb,depth
@@ -211,6 +222,9 @@ impl BatchArgs {
             retries: self.retries,
             crop,
             layers: self.layers.clone().unwrap_or(Layer::ALL.to_vec()),
+            depth: self.depth.depth(),
+            codec: self.codec,
+            movie_bits: self.movie_bits,
             stale: Duration::from_secs_f64(self.stale),
         })
     }

@@ -4,6 +4,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::engine::EngineChoice;
+use crate::output::movie::Codec;
 use crate::picture::Layer;
 #[cfg(feature = "viewer")]
 use crate::viewer::WindowChoice;
@@ -26,6 +27,32 @@ pub fn engine() -> impl TypedValueParser<Value = EngineChoice> {
         ("auto", "A GPU adapter if there is one, otherwise the CPU", EngineChoice::Auto),
         ("gpu", "A GPU adapter; without one, taki exits with code 69", EngineChoice::Gpu),
         ("cpu", "All cores of the CPU", EngineChoice::Cpu),
+    ])
+}
+
+/// Parser of `--bits`.
+pub fn bits() -> impl TypedValueParser<Value = u8> {
+    choice(&[
+        ("8", "256 steps, dithered; what displays show", 8),
+        ("16", "65536 steps, for programs that change the picture", 16),
+    ])
+}
+
+/// Parser of `--movie-bits`.
+pub fn movie_bits() -> impl TypedValueParser<Value = u8> {
+    choice(&[
+        ("8", "Plays everywhere", 8),
+        ("10", "Four times as many steps; older players may not show it", 10),
+    ])
+}
+
+/// Parser of `--codec`.
+pub fn codec() -> impl TypedValueParser<Value = Codec> {
+    choice(&[
+        ("h264", "H.264, 4:2:0: plays everywhere", Codec::H264),
+        ("h265", "H.265, 4:2:0: smaller", Codec::H265),
+        ("prores", "ProRes 422 HQ, 10 bits, .mov alone: for editing", Codec::Prores),
+        ("vp9", "VP9, 4:2:0, .webm alone", Codec::Vp9),
     ])
 }
 

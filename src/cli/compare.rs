@@ -7,25 +7,27 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::terminal::say;
-use super::{crop, window};
-use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
+use super::{crop, developed, window};
 use crate::job::check_replaced;
-use crate::output::frame::{Difference, Output, Tolerance, encode_png, read_exr, read_png};
-use crate::picture::Frame;
+use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
+use crate::output::frame::{
+    Difference, Encoding, Format, Head, Output, ReadPicture, Tolerance, encode, read_exr, read_picture,
+};
+use crate::picture::resolve::srgb;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
 #[derive(Args)]
 pub struct CompareArgs {
-    /// Two pictures of the same size and format. PNG files are compared by encoded values (0 to 1), EXR files
-    /// by linear radiance. With --eye, any number of pictures, in order of time.
+    /// Two pictures of the same size. PNG, JPEG, TIFF and WebP files are compared by encoded values (0 to 1),
+    /// EXR files by linear radiance. With --eye, any number of pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at
     /// most the relative plus the absolute tolerance.
     #[arg(long, value_name = "X", default_value_t = 1e-3)]
     relative: f32,
-    /// Absolute tolerance, in the picture's values. Default: 1e-4 for .exr, 2/255 for .png.
+    /// Absolute tolerance, in the picture's values. Default: 1e-4 for .exr, 2/255 for the others.
     #[arg(long, value_name = "X")]
     absolute: Option<f32>,
     /// Share of the pixels that may lie outside the tolerances. If more do, taki exits with code 1.
@@ -34,8 +36,9 @@ pub struct CompareArgs {
     /// Largest root mean square error. If it is exceeded, taki exits with code 1.
     #[arg(long, value_name = "X")]
     rmse: Option<f64>,
-    /// Writes a PNG of the absolute difference, scaled so that the largest difference is white.
-    #[arg(long, value_name = "FILE.png")]
+    /// Writes a picture (.png, .jpg, .tif or .webp) of the absolute difference, scaled so that the largest
+    /// difference is white.
+    #[arg(long, value_name = "FILE")]
     difference: Option<PathBuf>,
     /// Replaces an existing file of --difference even if it is no picture.
     #[arg(long, requires = "difference")]
@@ -67,8 +70,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         let what = format!("{} pictures given; compare two, or use --eye for any number", args.files.len());
         return Err(Error::Usage(what));
     };
-    if let Some(path) = args.difference.as_ref().filter(|_| !args.overwrite) {
-        check_replaced(path)?;
+    if let Some(path) = &args.difference {
+        developed("--difference", path)?;
+        if !args.overwrite {
+            check_replaced(path)?;
+        }
     }
     let (width, height, a) = read(path_a)?;
     let (other_width, other_height, b) = read(path_b)?;
@@ -82,8 +88,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let absolute = args.absolute.unwrap_or(if is_exr(path_a) { 1e-4 } else { 2.0 / 255.0 });
     let d = Difference::new(width, &a, &b, Tolerance { relative: args.relative, absolute });
     if let Some(path) = &args.difference {
-        let bytes = encode_png(&difference_picture(width, height, &a, &b, d.max), &[])
-            .map_err(|e| Error::write(path, e))?;
+        let format = developed("--difference", path)?;
+        let head = Head { format, encoding: Encoding::DISPLAY, size: [width, height], texts: Vec::new() };
+        let bytes = encode(&head, difference_picture(&a, &b, d.max)).map_err(|e| Error::write(path, e))?;
         Output::create(path)?.finish_with(&bytes)?;
     }
     let share = d.share_outside();
@@ -190,7 +197,7 @@ fn part(args: &CompareArgs, size: [u32; 2]) -> Result<Window> {
 }
 
 fn is_exr(path: &Path) -> bool {
-    extension(path).as_deref() == Some("exr")
+    Format::of(path) == Some(Format::Exr)
 }
 
 fn one_kind(files: &[PathBuf]) -> Result<()> {
@@ -202,14 +209,13 @@ fn one_kind(files: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-fn extension(path: &Path) -> Option<String> {
-    path.extension().map(|e| e.to_string_lossy().to_lowercase())
-}
-
+/// Reads a picture: encoded values, or the linear radiance of an EXR.
 fn read(path: &Path) -> Result<Picture> {
     std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !is_exr(path) {
-        return read_png(path);
+        let ReadPicture { width, height, encoding, pixels } = read_picture(path)?;
+        let encoded = |p: [f32; 3]| if encoding.linear { p.map(srgb) } else { p };
+        return Ok((width, height, pixels.into_iter().map(encoded).collect()));
     }
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
@@ -225,12 +231,8 @@ fn read(path: &Path) -> Result<Picture> {
 }
 
 /// Draws the absolute difference of `a` and `b`, scaled so that `max` is 255.
-fn difference_picture(width: u32, height: u32, a: &[[f32; 3]], b: &[[f32; 3]], max: f64) -> Frame {
+fn difference_picture(a: &[[f32; 3]], b: &[[f32; 3]], max: f64) -> Vec<u8> {
     let scale = if max > 0.0 { 255.0 / max } else { 0.0 };
-    let mut frame = Frame::new(width, height, false);
-    for (out, (p, q)) in frame.picture.iter_mut().zip(a.iter().zip(b)) {
-        let channel = |c: usize| ((p[c] - q[c]).abs() as f64 * scale) as u8;
-        *out = [channel(0), channel(1), channel(2), 255];
-    }
-    frame
+    let apart = |(x, y): (&f32, &f32)| ((x - y).abs() as f64 * scale) as u8;
+    a.as_flattened().iter().zip(b.as_flattened()).map(apart).collect()
 }

@@ -1,6 +1,6 @@
 //! `taki farm`: writes job files.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::job::batch::Pattern;
 use crate::job::check_kind;
-use crate::output::frame::Output;
+use crate::output::frame::{Format, Output};
 use crate::scene::STDIN;
 use crate::util::error::{Error, Result};
 
@@ -164,10 +164,9 @@ fn check_batch(job: &Job) -> Result<()> {
         return Err(Error::Usage(what.into()));
     }
     let whole = |path: &&PathBuf| {
-        let picture = |e: &OsStr| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr");
         let sweeps = path.file_name().unwrap_or_default().to_string_lossy().contains('{');
         let frames = || Pattern::new(path, &[]).is_ok_and(|pattern| pattern.has_frame());
-        !path.extension().is_some_and(picture) || !sweeps && !frames()
+        Format::of(path).is_none() || !sweeps && !frames()
     };
     let given = |id| batch.get_many::<PathBuf>(id).into_iter().flatten();
     let (mut outputs, mut wholes) = (given("outputs"), given("sheet").chain(given("manifests")));

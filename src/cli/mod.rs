@@ -25,6 +25,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::engine::EngineChoice;
 use crate::engine::gpu::DeviceOptions;
+use crate::job::Depth;
+use crate::output::frame::Format;
 use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -145,6 +147,25 @@ impl CacheOptions {
     }
 }
 
+/// Options of commands that write developed pictures.
+#[derive(Args, Clone)]
+struct DepthOptions {
+    /// Bits per channel of .png and .tif files: 8 or 16. Default: 8 for .png, 16 for .tif. The other formats
+    /// of developed pictures always have 8.
+    #[arg(long, value_name = "N", value_parser = choice::bits())]
+    bits: Option<u8>,
+    /// Writes .png and .tif files with 16 bits of linear light, for programs that grade or composite. Needs
+    /// --set image.tone=none; light above 1 is cut off, so prefer .exr where you can.
+    #[arg(long)]
+    linear: bool,
+}
+
+impl DepthOptions {
+    fn depth(&self) -> Depth {
+        Depth { bits: self.bits, linear: self.linear }
+    }
+}
+
 /// Options that choose the engine and its device.
 #[derive(Args, Clone)]
 struct EngineOptions {
@@ -164,6 +185,14 @@ impl EngineOptions {
     fn device(&self) -> DeviceOptions {
         DeviceOptions { adapter: self.adapter.clone(), watchdog: Duration::from_secs_f64(self.watchdog) }
     }
+}
+
+/// Returns the format of a developed picture, which `option` names.
+fn developed(option: &str, path: &Path) -> Result<Format> {
+    Format::of(path).filter(|format| format.is_developed()).ok_or_else(|| {
+        let what = format!("{option} {}: use .png, .jpg, .tif or .webp", path.display());
+        Error::Usage(what)
+    })
 }
 
 /// Formats the exposure that was measured automatically.

@@ -9,10 +9,11 @@ use serde_json::json;
 
 use super::choice::layer;
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, EngineOptions, SceneOptions, crop, default_output, measured_words, size, window};
+use super::{CacheOptions, DepthOptions, EngineOptions, SceneOptions};
+use super::{crop, default_output, measured_words, size, window};
 use crate::engine::exposure::exposed;
 use crate::engine::{Engine, RenderOptions};
-use crate::job::{STDOUT, Still, check_bloom, strips};
+use crate::job::{STDOUT, Still, beside_encoders, check_bloom, strips};
 use crate::output::frame::Figures;
 use crate::picture::Layer;
 use crate::scene::Scene;
@@ -24,10 +25,13 @@ use crate::util::window::Window;
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// File to write: .png (sRGB, 8 bits) or .exr (linear, float32, with layers). Give -o twice to write
-    /// both; - is stdout, as PNG. Default: the scene's name with .png, in the current folder.
+    /// File to write: .png, .jpg, .tif or .webp (the picture as shown, sRGB) or .exr (linear, float32, with
+    /// layers). Give -o several times to write several; - is stdout, as PNG. Default: the scene's name with
+    /// .png, in the current folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
+    #[command(flatten)]
+    depth: DepthOptions,
     /// Replaces an existing file even if it is no picture.
     #[arg(long)]
     overwrite: bool,
@@ -79,7 +83,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         given => given.to_vec(),
     };
     check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
-    let still = Still::create(&outputs)?;
+    let still = Still::create(&outputs)?.with_depth(args.depth.depth());
+    still.check(&scene.image.look, window)?;
     if !args.overwrite {
         still.check_replaced()?;
     }
@@ -116,8 +121,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let (mut engine, line) = opened?;
     terminal.note(&format!("taki: {line}"));
     let options = RenderOptions { surface, ..Default::default() };
-    let strips = strips(&scene, window, surface, limits.memory)?;
-    if still.has_png() {
+    let memory = beside_encoders(limits.memory, &still.formats(), window)?;
+    let strips = strips(&scene, window, surface, memory)?;
+    if still.has_developed() {
         check_bloom(&scene, window, strips.len())?;
     }
     let mut writer = still.begin(&scene, &volume, window, &layers)?;

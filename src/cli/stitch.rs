@@ -11,8 +11,8 @@ use crate::util::error::Result;
 
 #[derive(Args)]
 pub struct StitchArgs {
-    /// Files that `taki render --crop` wrote, all PNG or all EXR. They must show one scene at one size and
-    /// cover the whole picture; overlaps are allowed.
+    /// Files that `taki render --crop` wrote, all .png, all .tif, all .webp or all .exr. They must show one
+    /// scene at one size and cover the whole picture; overlaps are allowed.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
     /// File of the whole picture, with the same extension as the parts.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, EngineOptions, SceneOptions, choice, seconds};
+use super::{CacheOptions, EngineOptions, SceneOptions, choice, developed, seconds};
 use crate::job::check_replaced;
 use crate::output::frame::Output;
 use crate::util::error::Result;
@@ -28,7 +28,7 @@ pub struct ViewArgs {
     /// Closes the window after this number of seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     exit_after: Option<f64>,
-    /// Saves a picture of the window to this PNG before --exit-after closes it.
+    /// Saves a picture of the window (.png, .jpg, .tif or .webp) before --exit-after closes it.
     #[arg(long, value_name = "FILE", requires = "exit_after")]
     screenshot: Option<PathBuf>,
     /// Replaces an existing file of --screenshot even if it is no picture.
@@ -48,6 +48,7 @@ pub struct ViewArgs {
 
 pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
     if let Some(path) = &args.screenshot {
+        developed("--screenshot", path)?;
         if !args.overwrite {
             check_replaced(path)?;
         }

@@ -5,13 +5,14 @@ use std::io::{BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::{Depth, check_side};
 use crate::engine::RenderOptions;
 use crate::light::environment::Source;
 use crate::output::frame::{
-    CROP_TEXT, ExrWriter, FIGURES_TEXT, Figures, Output, PngWriter, SCENE_TEXT, channel_names, crop_text,
-    lines_of, rgb_rows,
+    CROP_TEXT, Encoding, ExrWriter, FIGURES_TEXT, Figures, Format, Head, LINEAR_TEXT, Output, RowWriter,
+    SCENE_TEXT, channel_names, crop_text, lines_of, samples_of,
 };
-use crate::picture::{Frame, Layer, Seconds};
+use crate::picture::{Frame, Layer, Look, Seconds};
 use crate::scene::{REFERENCES, Scene};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -28,7 +29,10 @@ const LINES: usize = 8;
 pub const STDOUT: &str = "-";
 
 /// The open outputs of one still.
-pub struct Still(Vec<(Kind, Target)>);
+pub struct Still {
+    outputs: Vec<(Format, Target)>,
+    depth: Depth,
+}
 
 /// The place that a picture goes to.
 pub(crate) enum Target {
@@ -75,26 +79,19 @@ impl Target {
     }
 }
 
-/// The format of an output.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Png,
-    Exr,
-}
-
 impl Still {
     /// Opens every output, so that a missing folder is noticed before any work. Removes temporary files that
     /// dead processes left in the folders. The path [`STDOUT`] is stdout, which gets a PNG.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a path ends with neither .png nor .exr, [`Error::CannotCreate`] if a file cannot
-    /// be created.
+    /// [`Error::Usage`] if a path has the extension of no format, [`Error::CannotCreate`] if a file cannot be
+    /// created.
     pub fn create(paths: &[PathBuf]) -> Result<Still> {
         let target = |path: &PathBuf| match path.to_str() {
-            Some(STDOUT) => Ok((Kind::Png, Target::stdout()?)),
+            Some(STDOUT) => Ok((Format::Png, Target::stdout()?)),
             _ => open(path, Output::create),
         };
-        paths.iter().map(target).collect::<Result<Vec<_>>>().map(Still)
+        Ok(Still { outputs: paths.iter().map(target).collect::<Result<_>>()?, depth: Depth::default() })
     }
 
     /// Does as [`Still::create`], but leaves other files of the folders alone.
@@ -102,7 +99,27 @@ impl Still {
     /// # Errors
     /// As [`Still::create`].
     pub fn open(paths: &[PathBuf]) -> Result<Still> {
-        paths.iter().map(|path| open(path, Output::open)).collect::<Result<Vec<_>>>().map(Still)
+        let outputs = paths.iter().map(|path| open(path, Output::open)).collect::<Result<_>>()?;
+        Ok(Still { outputs, depth: Depth::default() })
+    }
+
+    /// Chooses the depth of developed pictures.
+    pub fn with_depth(self, depth: Depth) -> Still {
+        Still { depth, ..self }
+    }
+
+    /// Checks that the formats can hold the part `window` of a picture with this look, in the chosen depth.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a depth that does not suit, [`Error::CannotCreate`] for a part that is too large.
+    pub fn check(&self, look: &Look, window: Window) -> Result<()> {
+        self.depth.check(&self.formats(), look)?;
+        self.outputs.iter().try_for_each(|(format, target)| check_side(target.path(), *format, window))
+    }
+
+    /// Formats of the outputs.
+    pub fn formats(&self) -> Vec<Format> {
+        self.outputs.iter().map(|(format, _)| *format).collect()
     }
 
     /// Refuses to replace files that are no pictures.
@@ -110,7 +127,7 @@ impl Still {
     /// # Errors
     /// [`Error::CannotCreate`] if there is such a file.
     pub fn check_replaced(&self) -> Result<()> {
-        self.0.iter().try_for_each(|(_, target)| match target {
+        self.outputs.iter().try_for_each(|(_, target)| match target {
             Target::File(output) => check_replaced(output.path()),
             Target::Stdout(_) => Ok(()),
         })
@@ -118,12 +135,12 @@ impl Still {
 
     /// Whether an output is an EXR, which holds layers.
     pub fn has_exr(&self) -> bool {
-        self.0.iter().any(|(kind, _)| *kind == Kind::Exr)
+        self.formats().contains(&Format::Exr)
     }
 
-    /// Whether an output is a PNG, which holds the picture as displayed.
-    pub fn has_png(&self) -> bool {
-        self.0.iter().any(|(kind, _)| *kind == Kind::Png)
+    /// Whether an output holds the developed picture, with bloom.
+    pub fn has_developed(&self) -> bool {
+        self.formats().into_iter().any(Format::is_developed)
     }
 
     /// Writes the heads of the files for the part `window` of a scene's image. EXR files get `layers`.
@@ -144,9 +161,14 @@ impl Still {
             scene: scene.values().is_some().then(|| metadata(scene, volume)),
             channels: channel_names(layers),
         };
-        let sinks = self.0.into_iter().map(|(kind, output)| Sink::begin(kind, output, &about));
+        let Depth { bits, linear } = self.depth;
+        let encoded = |(format, output): (Format, Target)| (format, output, format.encoding(bits, linear));
+        let sinks = self.outputs.into_iter().map(encoded);
+        let sinks = sinks.map(|(format, output, encoding)| Sink::begin(format, output, encoding, &about));
         Ok(StillWriter {
             sinks: sinks.collect::<Result<_>>()?,
+            whole: window == Window::whole(about.whole),
+            look: scene.image.look,
             window,
             layers: layers.to_vec(),
             rows: 0,
@@ -171,15 +193,12 @@ impl Still {
     }
 }
 
-/// First bytes of the pictures that taki writes: PNG, EXR and GIF.
-const PICTURES: [&[u8]; 3] = [b"\x89PNG", b"\x76\x2f\x31\x01", b"GIF8"];
-
 /// Refuses to replace a file that is no picture. An empty file may be replaced.
 ///
 /// # Errors
 /// [`Error::CannotCreate`] if the file is no picture.
 pub(crate) fn check_replaced(path: &Path) -> Result<()> {
-    check_kind(path, "picture", |start| PICTURES.iter().any(|picture| start.starts_with(picture)))
+    check_kind(path, "picture", |start| Format::of_start(start).is_some() || start.starts_with(b"GIF8"))
 }
 
 /// Refuses to replace a file that is no volume. An empty file may be replaced.
@@ -232,17 +251,8 @@ pub(crate) fn scene_text(scene: &Scene) -> String {
     map.unwrap_or_default() + &values.to_toml()
 }
 
-fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Kind, Target)> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let kind = match extension.as_deref() {
-        Some("png") => Kind::Png,
-        Some("exr") => Kind::Exr,
-        _ => {
-            let what = format!("-o {}: unknown kind of picture; use .png or .exr", path.display());
-            return Err(Error::Usage(what));
-        }
-    };
-    Ok((kind, Target::File(open(path)?)))
+fn open(path: &Path, open: impl Fn(&Path) -> Result<Output>) -> Result<(Format, Target)> {
+    Ok((Format::wanted("-o", path)?, Target::File(open(path)?)))
 }
 
 /// Description of a file besides its pixels.
@@ -258,11 +268,14 @@ pub(crate) struct About {
 }
 
 impl About {
-    fn texts(&self, kind: Kind) -> Vec<(String, String)> {
+    fn texts(&self, format: Format, encoding: Encoding) -> Vec<(String, String)> {
         let mut texts = vec![("Software".to_owned(), SOFTWARE.to_owned())];
         texts.extend(self.scene.iter().map(|scene| (SCENE_TEXT.to_owned(), scene.clone())));
-        if kind == Kind::Png && self.window != Window::whole(self.whole) {
+        if format.is_developed() && self.window != Window::whole(self.whole) {
             texts.push((CROP_TEXT.to_owned(), crop_text(self.window, self.whole)));
+        }
+        if format.is_developed() && encoding.linear {
+            texts.push((LINEAR_TEXT.to_owned(), "Rec. 709".to_owned()));
         }
         texts
     }
@@ -270,27 +283,29 @@ impl About {
 
 /// A file that is being written.
 pub(crate) enum Sink {
-    Png(Target, PngWriter),
+    Rows(Target, Encoding, RowWriter),
     Exr(Target, Box<ExrWriter<BufWriter<File>>>),
 }
 
 impl Sink {
-    /// Opens an output in the format that its extension names, and writes the file's head.
-    pub fn create(path: &Path, about: &About) -> Result<Sink> {
-        let (kind, output) = open(path, Output::create)?;
-        Sink::begin(kind, output, about)
+    /// Opens an output in the format that its extension names, and writes the file's head. A developed
+    /// picture has this `encoding`.
+    pub fn create(path: &Path, encoding: Encoding, about: &About) -> Result<Sink> {
+        let (format, output) = open(path, Output::create)?;
+        Sink::begin(format, output, encoding, about)
     }
 
-    fn begin(kind: Kind, mut output: Target, about: &About) -> Result<Sink> {
+    fn begin(format: Format, mut output: Target, encoding: Encoding, about: &About) -> Result<Sink> {
         let file = output.handle()?;
-        let texts = about.texts(kind);
-        match kind {
-            Kind::Png => {
+        let texts = about.texts(format, encoding);
+        match format {
+            Format::Png | Format::Jpeg | Format::Tiff | Format::Webp => {
                 let size = [about.window.width, about.window.height];
-                let writer = PngWriter::new(file, size, texts).map_err(|e| Error::write(output.path(), e))?;
-                Ok(Sink::Png(output, writer))
+                let head = Head { format, encoding, size, texts };
+                let writer = RowWriter::new(file, head).map_err(|e| Error::write(output.path(), e))?;
+                Ok(Sink::Rows(output, encoding, writer))
             }
-            Kind::Exr => {
+            Format::Exr => {
                 let file = BufWriter::with_capacity(1 << 20, file);
                 let writer = ExrWriter::new(file, about.whole, about.window, &about.channels, &texts)
                     .map_err(|e| Error::write(output.path(), e))?;
@@ -299,19 +314,19 @@ impl Sink {
         }
     }
 
-    /// Writes the next rows in the file's own layout. A PNG takes R, G, B bytes of any number of rows; an
-    /// EXR takes one line of float32 in native byte order, channel by channel.
+    /// Writes the next rows in the file's own layout. A developed picture takes samples of any number of
+    /// rows; an EXR takes one line of float32 in native byte order, channel by channel.
     pub fn push(&mut self, rows: Vec<u8>) -> Result<()> {
         match self {
-            Sink::Png(output, writer) => writer.push(rows).map_err(|e| Error::write(output.path(), e)),
+            Sink::Rows(output, _, writer) => writer.push(rows).map_err(|e| Error::write(output.path(), e)),
             Sink::Exr(output, writer) => writer.push(rows).map_err(|e| Error::write(output.path(), e)),
         }
     }
 
-    /// Completes the file and gives it its name. A PNG also gets `figures`, if given.
+    /// Completes the file and gives it its name. A developed picture also gets `figures`, if given.
     pub fn finish(self, figures: Option<&Figures>) -> Result<()> {
         let output = match self {
-            Sink::Png(output, writer) => {
+            Sink::Rows(output, _, writer) => {
                 // Figures are whole numbers, so this serialisation cannot fail.
                 let text = figures.and_then(|figures| serde_json::to_string(figures).ok());
                 let texts = text.map(|text| (FIGURES_TEXT.to_owned(), text));
@@ -331,6 +346,9 @@ impl Sink {
 pub struct StillWriter {
     sinks: Vec<Sink>,
     window: Window,
+    /// Whether the window is the whole image.
+    whole: bool,
+    look: Look,
     layers: Vec<Layer>,
     /// Number of rows written.
     rows: u32,
@@ -351,7 +369,10 @@ impl StillWriter {
         assert!(strip.height <= self.window.height - self.rows, "no more rows than the window has");
         for sink in &mut self.sinks {
             match sink {
-                Sink::Png(..) => sink.push(rgb_rows(strip))?,
+                Sink::Rows(_, encoding, _) => {
+                    let samples = samples_of(strip, *encoding, &self.look, self.whole);
+                    sink.push(samples)?;
+                }
                 Sink::Exr(..) => {
                     // All lines at once would take as much memory as the frame itself.
                     for first in (0..strip.height).step_by(LINES) {

@@ -3,22 +3,23 @@
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
-use super::{About, Sink, check_replaced};
-use crate::output::frame::{ExrLines, Figures, Kind, PngRows, SCENE_TEXT};
+use super::{About, Sink, check_replaced, check_side};
+use crate::output::frame::{Encoding, ExrLines, Figures, Format, PictureRows};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 
-/// Bytes of rows handed to the PNG encoder at a time.
+/// Bytes of rows handed to an encoder at a time.
 const PIECE_BYTES: usize = 1 << 20;
 
 /// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
 /// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
 /// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
-/// crop, plus the rows that wait for the PNG encoder (about 1 MiB). A file that is no picture is replaced
-/// only with `overwrite`.
+/// crop, plus the rows that wait for the encoder (about 1 MiB); WebP files are held whole. A file that is no
+/// picture is replaced only with `overwrite`.
 ///
-/// Returns the figures of a PNG: the sum of its crops' figures, without crops that lie wholly inside another.
+/// Returns the figures of a developed picture: the sum of its crops' figures, without crops that lie wholly
+/// inside another.
 /// If the remaining crops overlap, or one carries no figures, the sum is unknown: the file gets none and the
 /// result is `None`. An EXR never carries figures.
 ///
@@ -37,9 +38,14 @@ pub fn stitch(
     let Some(first) = parts.first() else {
         return Err(Error::Usage("nothing to stitch; give the files that taki render --crop wrote".into()));
     };
-    let (kind, whole) = (first.kind, first.whole);
+    let (format, encoding, whole) = (first.format, first.encoding, first.whole);
+    if !format.is_lossless() {
+        let what = format!("{} is a {}, whose pixels are not exact", first.path.display(), format.name());
+        return Err(Error::input(what, "render the crops as .png, .tif, .webp or .exr files"));
+    }
     check_parts(first, &parts)?;
-    check_extension(output, kind)?;
+    check_extension(output, format)?;
+    check_side(output, format, Window::whole(whole))?;
     if !overwrite {
         check_replaced(output)?;
     }
@@ -49,9 +55,9 @@ pub fn stitch(
         scene: first.scene.clone(),
         channels: first.channels.clone(),
     };
-    let mut sink = RowSink { sink: Sink::create(output, &about)?, kind, piece: Vec::new() };
-    let mut sum = FigureSum::new(kind, whole, &parts);
-    let mut canvas = Canvas::new(kind, whole[0], about.channels.len());
+    let mut sink = RowSink { sink: Sink::create(output, encoding, &about)?, format, piece: Vec::new() };
+    let mut sum = FigureSum::new(format, whole, &parts);
+    let mut canvas = Canvas::new(format, encoding, whole[0], about.channels.len());
     let mut readers = Readers::new(&parts);
     for y in 0..whole[1] {
         monitor.progress("rows", u64::from(y), u64::from(whole[1]))?;
@@ -61,7 +67,7 @@ pub fn stitch(
         sink.push(&canvas.row)?;
         readers.close_after(y, &mut sum)?;
     }
-    if kind == Kind::Png && sum.total.is_none() {
+    if format.is_developed() && sum.total.is_none() {
         monitor.warn("some crops overlap or carry no figures: the whole picture gets no figures");
     }
     sink.finish(sum.total.as_ref())?;
@@ -82,15 +88,11 @@ fn check_parts(first: &Part, parts: &[Part]) -> Result<()> {
 }
 
 /// Refuses an output whose extension is not that of the parts.
-fn check_extension(output: &Path, kind: Kind) -> Result<()> {
-    let extension = match kind {
-        Kind::Png => "png",
-        Kind::Exr => "exr",
-    };
-    let given = output.extension().map(|e| e.to_string_lossy().to_lowercase());
-    if given.as_deref() == Some(extension) {
+fn check_extension(output: &Path, format: Format) -> Result<()> {
+    if Format::of(output) == Some(format) {
         return Ok(());
     }
+    let extension = format.extension();
     let what = format!(
         "-o {}: the crops are .{extension} files, so the output must end with .{extension} too",
         output.display()
@@ -100,7 +102,7 @@ fn check_extension(output: &Path, kind: Kind) -> Result<()> {
 
 /// The reader of a part's pixels.
 enum Rows {
-    Png(Box<PngRows>),
+    Picture(Box<PictureRows>),
     Exr(Box<ExrLines>),
 }
 
@@ -111,30 +113,28 @@ struct Part {
     /// Width and height of the whole picture, pixels.
     whole: [u32; 2],
     scene: Option<String>,
-    /// Channels of an EXR; empty for a PNG.
+    /// Channels of an EXR; empty for a developed picture.
     channels: Vec<String>,
-    kind: Kind,
+    format: Format,
+    /// Encoding of a developed picture's samples.
+    encoding: Encoding,
 }
 
 impl Part {
     fn open(path: &Path) -> Result<(Part, Rows)> {
-        let kind = Kind::of(path)?;
-        let path_buf = path.to_owned();
-        Ok(match kind {
-            Kind::Png => {
-                let rows = PngRows::open(path)?;
-                let (window, whole, scene) = (rows.window, rows.whole, rows.text(SCENE_TEXT));
-                let part = Part { path: path_buf, window, whole, scene, channels: Vec::new(), kind };
-                (part, Rows::Png(Box::new(rows)))
-            }
-            Kind::Exr => {
-                let lines = ExrLines::open(path)?;
-                let (window, whole, scene) = (lines.window, lines.whole, lines.scene());
-                let part =
-                    Part { path: path_buf, window, whole, scene, channels: lines.channels.clone(), kind };
-                (part, Rows::Exr(Box::new(lines)))
-            }
-        })
+        let format = Format::of_file(path)?;
+        let path = path.to_owned();
+        if format == Format::Exr {
+            let lines = ExrLines::open(&path)?;
+            let (window, whole, scene) = (lines.window, lines.whole, lines.scene());
+            let (channels, encoding) = (lines.channels.clone(), Encoding::DISPLAY);
+            let part = Part { path, window, whole, scene, channels, format, encoding };
+            return Ok((part, Rows::Exr(Box::new(lines))));
+        }
+        let rows = PictureRows::open(&path)?;
+        let (window, whole, scene, encoding) = (rows.window, rows.whole, rows.scene(), rows.encoding);
+        let part = Part { path, window, whole, scene, channels: Vec::new(), format, encoding };
+        Ok((part, Rows::Picture(Box::new(rows))))
     }
 
     /// Refuses a part that cannot belong to the same picture as `self`.
@@ -142,8 +142,11 @@ impl Part {
         let names = format!("{} and {}", self.path.display(), other.path.display());
         let refuse = |why: String| Err(Error::input(format!("{names} {why}"), "stitch crops of one picture"));
         let [[w, h], [other_w, other_h]] = [self.whole, other.whole];
-        if self.kind != other.kind {
-            return refuse("are a PNG and an EXR file".into());
+        if self.format != other.format {
+            return refuse(format!("are a {} and a {} file", self.format.name(), other.format.name()));
+        }
+        if self.encoding != other.encoding {
+            return refuse(format!("have other samples ({} and {})", self.encoding, other.encoding));
         }
         if self.whole != other.whole {
             return refuse(format!(
@@ -218,8 +221,8 @@ impl<'a> Readers<'a> {
         for Reader { index, rows, row } in &mut self.open {
             let part = &self.parts[*index];
             match rows {
-                Rows::Png(rows) => {
-                    row.resize(3 * part.window.width as usize, 0);
+                Rows::Picture(rows) => {
+                    row.resize(rows.row_bytes(), 0);
                     rows.read_row(row)?;
                 }
                 Rows::Exr(lines) => lines.read_line(row)?,
@@ -246,7 +249,7 @@ impl<'a> Readers<'a> {
         self.open = open;
         for Reader { index, rows, .. } in ended {
             let figures = match rows {
-                Rows::Png(rows) => rows.finish()?,
+                Rows::Picture(rows) => rows.finish()?,
                 Rows::Exr(lines) => lines.finish().map(|()| None)?,
             };
             sum.add(index, figures.as_ref());
@@ -264,10 +267,10 @@ struct FigureSum {
 }
 
 impl FigureSum {
-    fn new(kind: Kind, whole: [u32; 2], parts: &[Part]) -> FigureSum {
+    fn new(format: Format, whole: [u32; 2], parts: &[Part]) -> FigureSum {
         let windows: Vec<Window> = parts.iter().map(|part| part.window).collect();
         let counts = disjoint_cover(whole, &windows);
-        let total = (kind == Kind::Png && counts.is_some()).then(Figures::default);
+        let total = (format.is_developed() && counts.is_some()).then(Figures::default);
         FigureSum { counts: counts.unwrap_or_default(), total }
     }
 
@@ -281,17 +284,18 @@ impl FigureSum {
     }
 }
 
-/// The output file. Rows of a PNG reach it in pieces of about [`PIECE_BYTES`], lines of an EXR one by one.
+/// The output file. Rows of a developed picture reach it in pieces of about [`PIECE_BYTES`], lines of an EXR
+/// one by one.
 struct RowSink {
     sink: Sink,
-    kind: Kind,
-    /// Rows of a PNG that are not yet with the encoder.
+    format: Format,
+    /// Rows of a developed picture that are not yet with the encoder.
     piece: Vec<u8>,
 }
 
 impl RowSink {
     fn push(&mut self, row: &[u8]) -> Result<()> {
-        if self.kind == Kind::Exr {
+        if self.format == Format::Exr {
             return self.sink.push(row.to_owned());
         }
         self.piece.extend_from_slice(row);
@@ -313,9 +317,9 @@ impl RowSink {
 struct Canvas {
     /// Pixels of a row.
     width: usize,
-    /// Bytes that a pixel has in one plane: 3 in a PNG, 4 in an EXR.
+    /// Bytes that a pixel has in one plane: all of it in a developed picture, 4 in an EXR.
     item: usize,
-    /// Planes of a row: 1 in a PNG, one per channel in an EXR.
+    /// Planes of a row: 1 in a developed picture, one per channel in an EXR.
     planes: usize,
     row: Vec<u8>,
     /// By column, the index of the part that the pixel came from, plus 1; 0 where no part has drawn.
@@ -323,11 +327,8 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn new(kind: Kind, width: u32, channels: usize) -> Canvas {
-        let (item, planes) = match kind {
-            Kind::Png => (3, 1),
-            Kind::Exr => (4, channels),
-        };
+    fn new(format: Format, encoding: Encoding, width: u32, channels: usize) -> Canvas {
+        let (item, planes) = if format == Format::Exr { (4, channels) } else { (encoding.pixel_bytes(), 1) };
         let width = width as usize;
         Canvas { width, item, planes, row: vec![0; width * item * planes], owner: vec![0; width] }
     }

@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, channel};
 use eframe::egui;
 
 use super::parameters::name;
+use crate::job::Depth;
+use crate::output::frame::Format;
 
 /// Purpose of the path that a dialog asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,10 +148,10 @@ pub struct ExportDialog {
     pub samples: u32,
     /// Path of the files without extension.
     pub path: String,
-    /// Whether to write a PNG file.
-    pub png: bool,
-    /// Whether to write an EXR file.
-    pub exr: bool,
+    /// Formats, and whether to write a file of each.
+    pub formats: [(Format, bool); 5],
+    /// Whether files of formats that have 16 bits get them.
+    pub deep: bool,
     /// Whether a change of width or height keeps the picture's aspect.
     pub keep_aspect: bool,
 }
@@ -161,8 +163,8 @@ impl Default for ExportDialog {
             size: [1280, 720],
             samples: 16,
             path: String::new(),
-            png: true,
-            exr: false,
+            formats: Format::ALL.map(|format| (format, format == Format::Png)),
+            deep: false,
             keep_aspect: true,
         }
     }
@@ -172,12 +174,20 @@ impl ExportDialog {
     /// The files to write.
     pub fn paths(&self) -> Vec<PathBuf> {
         let path = self.path.trim();
-        let stem = path.strip_suffix(".png").or(path.strip_suffix(".exr")).unwrap_or(path);
-        [(self.png, "png"), (self.exr, "exr")]
+        let named = Format::of(Path::new(path)).and_then(|_| path.rsplit_once('.'));
+        let stem = named.map_or(path, |(stem, _)| stem);
+        self.formats
             .into_iter()
-            .filter(|(chosen, _)| *chosen && !stem.is_empty())
-            .map(|(_, extension)| PathBuf::from(format!("{stem}.{extension}")))
+            .filter(|(_, chosen)| *chosen && !stem.is_empty())
+            .map(|(format, _)| PathBuf::from(format!("{stem}.{}", format.extension())))
             .collect()
+    }
+
+    /// The depth of developed pictures.
+    pub fn depth(&self) -> Depth {
+        let has = |bits| self.formats.iter().any(|(format, on)| *on && format.depths().contains(&bits));
+        let bits = if self.deep { 16 } else { 8 };
+        Depth { bits: Some(bits).filter(|bits| has(*bits)), linear: false }
     }
 
     /// Shows the dialog for a picture of this aspect. `exporting` is the finished share of a running export.
@@ -195,10 +205,15 @@ impl ExportDialog {
                 ui.end_row();
                 ui.label("Kind");
                 ui.horizontal(|ui| {
-                    ui.checkbox(&mut self.png, "PNG").on_hover_text("sRGB, 8 bits per channel, as shown");
-                    ui.checkbox(&mut self.exr, "EXR")
-                        .on_hover_text("Linear float32, with depth, uv, quad, normal and more as layers");
+                    for (format, chosen) in &mut self.formats {
+                        ui.checkbox(chosen, format.name()).on_hover_text(about(*format));
+                    }
                 });
+                ui.end_row();
+                ui.label("Depth");
+                ui.checkbox(&mut self.deep, "16 bits").on_hover_text(
+                    "PNG and TIFF files get 16 bits per channel, for programs that change the picture",
+                );
                 ui.end_row();
                 ui.label("Size");
                 ui.horizontal(|ui| self.size_fields(ui, aspect));
@@ -237,7 +252,7 @@ impl ExportDialog {
     fn start_button(&self, ui: &mut egui::Ui) -> ExportAnswer {
         let files = self.paths();
         let text = match files.as_slice() {
-            [] => "Enter a file name and choose PNG or EXR.".to_owned(),
+            [] => "Enter a file name and choose a kind.".to_owned(),
             files => {
                 let names: Vec<String> = files.iter().map(|p| p.display().to_string()).collect();
                 format!("Writes {}", names.join(" and "))
@@ -246,6 +261,17 @@ impl ExportDialog {
         ui.weak(text);
         let start = ui.add_enabled(!files.is_empty(), egui::Button::new("Export")).clicked();
         if start { ExportAnswer::Start } else { ExportAnswer::Nothing }
+    }
+}
+
+/// Says what a format is for.
+fn about(format: Format) -> &'static str {
+    match format {
+        Format::Png => "sRGB, as shown, exact; 8 or 16 bits per channel",
+        Format::Jpeg => "sRGB, as shown, small; 8 bits per channel",
+        Format::Tiff => "sRGB, as shown, exact; 8 or 16 bits per channel, for print and retouching",
+        Format::Webp => "sRGB, as shown, exact and smaller than PNG; 8 bits per channel",
+        Format::Exr => "Linear float32, with depth, uv, quad, normal and more as layers",
     }
 }
 

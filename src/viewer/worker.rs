@@ -18,6 +18,7 @@ use eframe::egui;
 use super::layer_image::Legend;
 use crate::engine::EngineChoice;
 use crate::engine::gpu::DeviceOptions;
+use crate::job::Depth;
 use crate::picture::{Frame, Layer};
 use crate::place::Mesh;
 use crate::scene::{Cost, Scene};
@@ -46,8 +47,10 @@ pub struct Request {
 pub struct Export {
     /// The scene, with the picture's size and samples.
     pub scene: Scene,
-    /// Files to write, `.png` or `.exr`.
+    /// Files to write; their extensions choose the formats.
     pub paths: Vec<PathBuf>,
+    /// Depth of developed pictures.
+    pub depth: Depth,
 }
 
 /// A picture for the window.

@@ -7,13 +7,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::report::{Event, Watcher, word, words};
+use super::shown::Shown;
 use super::{Batch, Pattern, Sweep, existing};
+use crate::job::check_side;
 use crate::job::still::{SOFTWARE, scene_text};
 use crate::output::contact_sheet::{Axis, Sheet, draw};
-use crate::output::frame::{Output, figures_of, read_exr, read_png, real_file, rgb_rows};
-use crate::output::movie::{Movie, MovieKind, MovieOptions, mark_of};
-use crate::picture::resolve::develop;
-use crate::picture::{Frame, Image, Layer};
+use crate::output::frame::{Encoding, Format, Head, Output, encode, figures_of, real_file};
+use crate::output::movie::{Movie, MovieKind, MovieOptions, Video, mark_of};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
@@ -25,6 +25,8 @@ pub struct MovieFile {
     pub pattern: Pattern,
     /// Format.
     pub kind: MovieKind,
+    /// Codec and depth, if it is a video.
+    pub video: Option<Video>,
 }
 
 /// A manifest's entry about one picture.
@@ -62,6 +64,7 @@ impl Batch {
             frames: self.frames.len() as u64,
             repeat: true,
             mark: 0,
+            video: None,
         }
     }
 
@@ -77,10 +80,19 @@ impl Batch {
         }
         let point = number / self.frames.len();
         let options = self.movie_options(scene);
-        let movies = self.movies.iter().map(|m| (self.movie_path(m, point), m.kind));
+        let movies = self.movies.iter().map(|m| (self.movie_path(m, point), m));
         let missing = movies.filter(|(path, _)| !self.fresh.contains(path));
-        let mark = self.marks.get(point).copied().unwrap_or(0);
-        missing.map(|(path, kind)| (path, kind, MovieOptions { mark, ..options })).collect()
+        missing.map(|(path, m)| (path, m.kind, self.options_of(m, point, options))).collect()
+    }
+
+    /// Options of a movie at a point of the grid, from those of any movie there.
+    fn options_of(&self, movie: &MovieFile, point: usize, options: MovieOptions) -> MovieOptions {
+        let mut mark = self.marks.get(point).copied().unwrap_or(0);
+        if let Some(Video { codec, bits }) = movie.video.filter(|v| Some(*v) != movie.kind.video(None, None))
+        {
+            mark ^= u64::from(crc32fast::hash(format!("{} {bits}", codec.word()).as_bytes()));
+        }
+        MovieOptions { mark, video: movie.video, ..options }
     }
 
     /// Checks that movies can be made, and that they replace only files that may be replaced. Existing
@@ -102,14 +114,15 @@ impl Batch {
         for movie in &self.movies {
             for point in 0..self.points() {
                 let path = self.movie_path(movie, point);
+                let options = self.options_of(movie, point, options);
                 if real_file(&path)?.symlink_metadata().is_ok() && !self.request.overwrite {
                     let why = match mark_of(&path) {
-                        Some(mark) if mark == self.marks[point] => {
+                        Some(mark) if mark == options.mark => {
                             self.fresh.insert(path);
                             continue;
                         }
                         Some(_) => {
-                            "the movie exists with other frames, or of another scene, size or frame rate"
+                            "the movie exists with other frames, or of another scene, size, rate or codec"
                         }
                         None => "it exists and is not a movie that taki wrote",
                     };
@@ -154,14 +167,17 @@ impl Batch {
                 for point in 0..self.points() {
                     let path = self.movie_path(movie, point);
                     if !self.fresh.contains(&path) {
-                        self.make_movie(movie.kind, &path, point, watcher)?;
+                        self.make_movie(movie, &path, point, watcher)?;
                         watcher.event(&Event::Assembled { file: word(&path) });
                     }
                 }
             }
         }
         if let Some(path) = &self.sheet {
-            let bytes = png_of(&self.draw_sheet(watcher)?).map_err(|e| Error::write(path, e))?;
+            let sheet = self.draw_sheet(watcher)?;
+            let format = Format::wanted("--sheet", path)?;
+            check_side(path, format, Window::whole([sheet.width(), sheet.height()]))?;
+            let bytes = encoded(sheet, format).map_err(|e| Error::write(path, e))?;
             Output::create(path)?.finish_with(&bytes)?;
             watcher.event(&Event::Assembled { file: word(path) });
         }
@@ -181,29 +197,17 @@ impl Batch {
         Ok(())
     }
 
-    fn make_movie(&self, kind: MovieKind, path: &Path, point: usize, watcher: &dyn Watcher) -> Result<()> {
+    fn make_movie(&self, file: &MovieFile, path: &Path, point: usize, watcher: &dyn Watcher) -> Result<()> {
         let first = point * self.frames.len();
         let scene = self.scene(first)?;
-        let options = MovieOptions { mark: self.marks[point], ..self.movie_options(&scene) };
-        let mut movie = Movie::create(path, kind, &options)?;
+        let options = self.options_of(file, point, self.movie_options(&scene));
+        let mut movie = Movie::create(path, file.kind, &options)?;
+        let bits = movie.encoding().bits;
         for (i, number) in (first..first + self.frames.len()).enumerate() {
             watcher.progress("movie", i as u64, self.frames.len() as u64)?;
-            movie.push(self.picture(number)?.as_raw())?;
+            movie.push(&self.shown(number, bits)?.samples)?;
         }
         movie.finish_watched(watcher)
-    }
-
-    /// Reads a picture as displayed, from its PNG if there is one, else from its EXR.
-    fn picture(&self, number: usize) -> Result<RgbImage> {
-        let files = self.files(number);
-        let png = self.pictures.iter().position(|p| !p.is_exr());
-        match png {
-            Some(i) => picture_of_png(&files[i]),
-            None => {
-                let scene = self.scene(number)?;
-                picture_of_exr(&files[0], &scene.image, self.window(&scene))
-            }
-        }
     }
 
     fn draw_sheet(&self, watcher: &dyn Watcher) -> Result<RgbImage> {
@@ -232,7 +236,9 @@ impl Batch {
                 (row * self.sweeps[0].values.len() + column) as u64,
                 self.points() as u64,
             )?;
-            self.picture((column * rows + row) * self.frames.len()).map(Some)
+            let number = (column * rows + row) * self.frames.len();
+            let Shown { size: [width, height], samples } = self.shown(number, 8)?;
+            Ok(RgbImage::from_raw(width, height, samples))
         })
     }
 
@@ -242,9 +248,9 @@ impl Batch {
         let values = scene.written();
         let parameters = self.sweeps.iter().map(|s| (s.key.clone(), values.get(&s.key).to_json())).collect();
         let files = self.files(number);
-        // A PNG carries all figures in its text; an EXR's layers yield only some.
-        let png = self.pictures.iter().position(|p| !p.is_exr()).unwrap_or(0);
-        let figures = figures_of(&files[png])?;
+        // A developed picture carries all figures in its text; an EXR's layers yield only some.
+        let developed = self.pictures.iter().position(|p| !p.is_exr()).unwrap_or(0);
+        let figures = figures_of(&files[developed])?;
         Ok(Row {
             number,
             frame: self.frame(number),
@@ -262,7 +268,7 @@ impl Batch {
         let mut out = csv::Writer::from_writer(Vec::new());
         let mut head = vec!["number".to_owned(), "frame".into()];
         head.extend(self.sweeps.iter().map(|s| s.key.clone()));
-        head.extend(self.pictures.iter().map(|p| if p.is_exr() { "exr".into() } else { "png".into() }));
+        head.extend(self.formats().into_iter().map(|format| format.extension().to_owned()));
         let figures = [
             "mean_r",
             "mean_g",
@@ -291,17 +297,12 @@ impl Batch {
     }
 }
 
-/// Encodes the sheet as a PNG with the program's name, by which [`check_replaced`] recognises it.
-fn png_of(sheet: &RgbImage) -> std::result::Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, sheet.width(), sheet.height());
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    encoder.add_text_chunk("Software".into(), SOFTWARE.into())?;
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(sheet.as_raw())?;
-    writer.finish()?;
-    Ok(bytes)
+/// Encodes the sheet with the program's name, by which [`check_replaced`] recognises it.
+fn encoded(sheet: RgbImage, format: Format) -> std::io::Result<Vec<u8>> {
+    let (width, height) = sheet.dimensions();
+    let texts = vec![("Software".to_owned(), SOFTWARE.to_owned())];
+    let head = Head { format, encoding: Encoding::DISPLAY, size: [width, height], texts };
+    encode(&head, sheet.into_raw())
 }
 
 /// Refuses to replace a file that is not a sheet or manifest written by this program.
@@ -314,7 +315,7 @@ pub(super) fn check_replaced(path: &Path) -> Result<()> {
     let ours = match extension.as_deref() {
         Some("csv") => start.starts_with(b"number,frame,"),
         Some("json") => start.starts_with(b"[\n  {\n    \"number\": "),
-        _ => existing::is_ours(&start),
+        _ => existing::is_ours(path),
     };
     if ours || start.is_empty() && path.is_file() {
         return Ok(());
@@ -329,31 +330,4 @@ pub(super) fn check_replaced(path: &Path) -> Result<()> {
 /// Whether a manifest is CSV; otherwise it is JSON.
 pub(super) fn is_csv(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
-}
-
-fn picture_of_png(path: &Path) -> Result<RgbImage> {
-    let (width, height, pixels) = read_png(path)?;
-    let bytes = pixels.iter().flatten().map(|x| (x * 255.0).round() as u8).collect();
-    RgbImage::from_raw(width, height, bytes)
-        .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
-}
-
-/// Develops the EXR's colour, the part `window` of an image, into the 8-bit picture that a PNG would hold.
-fn picture_of_exr(path: &Path, image: &Image, window: Window) -> Result<RgbImage> {
-    let (width, height, channels) = read_exr(path)?;
-    let channel = |name: &str| {
-        let values = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
-        values.ok_or_else(|| {
-            Error::input(
-                format!("{} has no colour", path.display()),
-                format!("add {} to --layers, or write PNG files too", Layer::Rgb.name()),
-            )
-        })
-    };
-    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-    let mut frame = Frame::new(width, height, false);
-    frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
-    develop(&mut frame, &image.look, window, [image.width, image.height]);
-    RgbImage::from_raw(width, height, rgb_rows(&frame))
-        .ok_or_else(|| Error::read(path, "its size does not match its pixels"))
 }

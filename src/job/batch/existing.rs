@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Batch, stamp};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
 use crate::job::{Claims, VolumeMemo};
-use crate::output::frame::{Kind, Verified, real_file, verify};
+use crate::output::frame::{Format, Verified, real_file, verify};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -35,12 +35,18 @@ pub(super) fn start_of(path: &Path) -> Option<Vec<u8>> {
     Some(start)
 }
 
-/// Whether a file with this start is a PNG or EXR of this program, whose name then stands near the start.
-pub(super) fn is_ours(start: &[u8]) -> bool {
-    let picture = start.starts_with(b"\x89PNG") || start.starts_with(b"\x76\x2f\x31\x01");
+/// Whether a file is a picture of this program, whose name then stands in it: near the start, but in a WebP
+/// after the pixels.
+pub(super) fn is_ours(path: &Path) -> bool {
+    let start = start_of(path).unwrap_or_default();
+    let bytes = match Format::of_start(&start) {
+        None => return false,
+        Some(Format::Webp) => std::fs::read(path).unwrap_or(start),
+        Some(_) => start,
+    };
     // Other versions of the program count too.
     let name = &SOFTWARE.as_bytes()[..SOFTWARE.find(' ').map_or(SOFTWARE.len(), |space| space + 1)];
-    picture && start.windows(name.len()).any(|w| w == name)
+    bytes.windows(name.len()).any(|w| w == name)
 }
 
 /// The error for a name that another picture has.
@@ -150,7 +156,7 @@ impl Batch {
                 // A file of another program must stay. A damaged one of ours, or an empty one, may be the
                 // rest of an interrupted run.
                 let start = start_of(file).unwrap_or_default();
-                let ours = file.is_file() && (start.is_empty() || is_ours(&start));
+                let ours = file.is_file() && (start.is_empty() || is_ours(file));
                 return Ok(if ours {
                     FileState::Broken(what)
                 } else {
@@ -194,7 +200,17 @@ impl Batch {
         if verified.window != self.window(scene) {
             return Ok(Some("it shows another part of the picture".into()));
         }
-        if Kind::of(file)? == Kind::Exr {
+        let wanted = Format::of(file);
+        if wanted != Some(verified.format) {
+            return Ok(Some(format!("it is a {}", verified.format.name())));
+        }
+        if let Some((format, encoding)) = wanted.zip(verified.encoding) {
+            let wanted = self.encoding(format);
+            if encoding != wanted {
+                return Ok(Some(format!("it has {encoding}, but this picture has {wanted}")));
+            }
+        }
+        if verified.format == Format::Exr {
             let mut wanted: Vec<&str> =
                 self.request.layers.iter().flat_map(|l| l.channels()).copied().collect();
             let mut have: Vec<&str> = verified.channels.iter().map(String::as_str).collect();

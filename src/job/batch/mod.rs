@@ -16,6 +16,7 @@ mod needs;
 mod pattern;
 mod report;
 mod run;
+mod shown;
 mod sweep;
 mod writer;
 
@@ -32,10 +33,10 @@ use rayon::prelude::*;
 
 use assemble::MovieFile;
 
-use super::Still;
+use super::{Depth, Still, check_side};
 use crate::engine::exposure::exposed;
-use crate::output::frame::{Output, folder_of, real_file, remove_stale};
-use crate::output::movie::MovieKind;
+use crate::output::frame::{Format, Output, folder_of, real_file, remove_stale};
+use crate::output::movie::{Codec, MovieKind, Video};
 use crate::picture::Layer;
 use crate::scene::{Animation, Place, Scene};
 use crate::util::error::{Error, Result};
@@ -73,6 +74,12 @@ pub struct Request {
     pub crop: Option<Window>,
     /// Layers of EXR files.
     pub layers: Vec<Layer>,
+    /// Depth of developed pictures.
+    pub depth: Depth,
+    /// Codec of videos whose format has it.
+    pub codec: Option<Codec>,
+    /// Bits per sample of videos whose codec has that depth.
+    pub movie_bits: Option<u8>,
     /// Claims that their owner has not touched for this time are taken over.
     pub stale: Duration,
 }
@@ -163,7 +170,8 @@ impl Batch {
             match movie_kind(&pattern, frames.len()) {
                 Some(kind) => {
                     check_pattern(&pattern, &sweeps, 1)?;
-                    movies.push(MovieFile { pattern, kind });
+                    let video = kind.video(request.codec, request.movie_bits);
+                    movies.push(MovieFile { pattern, kind, video });
                 }
                 None => {
                     check_pattern(&pattern, &sweeps, frames.len())?;
@@ -171,6 +179,7 @@ impl Batch {
                 }
             }
         }
+        check_videos(&request, &movies)?;
         let (sheet, manifests) = sheet_and_manifests(&request, &base, &sweeps, &pictures)?;
         let mut batch = Batch {
             base,
@@ -190,6 +199,7 @@ impl Batch {
         batch.check_names()?;
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
+        batch.check_depth(monitor)?;
         batch.check_bloom()?;
         batch.look(monitor)?;
         batch.check_movies()?;
@@ -321,6 +331,30 @@ impl Batch {
         Ok(())
     }
 
+    /// Formats of the pictures.
+    pub(super) fn formats(&self) -> Vec<Format> {
+        self.pictures.iter().filter_map(Pattern::format).collect()
+    }
+
+    /// Checks that the formats can hold the pictures in the depth that is asked for. Warns of videos that get
+    /// fewer bits than they could hold.
+    fn check_depth(&self, monitor: &dyn Monitor) -> Result<()> {
+        let scene = self.scene(self.own().next().unwrap_or(0))?;
+        let (window, formats) = (self.window(&scene), self.formats());
+        self.request.depth.check(&formats, &scene.image.look)?;
+        for pattern in &self.pictures {
+            pattern.format().map_or(Ok(()), |format| check_side(pattern.given(), format, window))?;
+        }
+        let deep = self.movies.iter().find(|movie| movie.video.is_some_and(|video| video.bits > 8));
+        if let Some(movie) = deep.filter(|_| !formats.is_empty() && !self.has_deep_source()) {
+            monitor.warn(&format!(
+                "{} is made of pictures with 8 bits per channel; add --bits 16, or write .exr files",
+                movie.pattern.given().display()
+            ));
+        }
+        Ok(())
+    }
+
     /// Checks that every folder exists and can be written. Removes temporary files that dead processes left
     /// there.
     fn check_folders(&self) -> Result<()> {
@@ -344,6 +378,25 @@ impl Batch {
         folders.iter().for_each(|folder| remove_stale(folder, |_| true));
         Ok(())
     }
+}
+
+/// Refuses a codec and a depth that no movie has.
+fn check_videos(request: &Request, movies: &[MovieFile]) -> Result<()> {
+    let refuse = |option: &str, with: &str| Err(Error::Usage(format!("{option} is for {with}")));
+    let videos: Vec<Video> = movies.iter().filter_map(|movie| movie.video).collect();
+    if let Some(codec) = request.codec.filter(|codec| videos.iter().all(|video| video.codec != *codec)) {
+        let kinds = MovieKind::ALL.into_iter().filter(|kind| kind.codecs().contains(&codec));
+        let kinds: Vec<String> = kinds.map(|kind| format!(".{}", kind.extension())).collect();
+        let with = format!("{} files; add -o FILE{}", kinds.join(" and "), kinds[0]);
+        return refuse(&format!("--codec {}", codec.word()), &with);
+    }
+    if let Some(bits) = request.movie_bits.filter(|bits| videos.iter().all(|video| video.bits != *bits)) {
+        let codecs = Codec::ALL.into_iter().filter(|codec| codec.depths().contains(&bits));
+        let codecs: Vec<&str> = codecs.map(Codec::word).collect();
+        let with = format!("videos in {}; add -o FILE.mp4 or choose --codec", codecs.join(", "));
+        return refuse(&format!("--movie-bits {bits}"), &with);
+    }
+    Ok(())
 }
 
 /// Format of the movie that a pattern asks for; `None` for pictures. A .png without #### is an animated PNG
@@ -389,9 +442,10 @@ fn sheet_and_manifests(
         }
     }
     if let Some(path) = &sheet
-        && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+        && !Format::of(path).is_some_and(Format::is_developed)
     {
-        return Err(Error::Usage(format!("--sheet {}: use .png", path.display())));
+        let what = format!("--sheet {}: use .png, .jpg, .tif or .webp", path.display());
+        return Err(Error::Usage(what));
     }
     // Opening and dropping each output finds a missing folder before the work starts.
     if request.shard.is_none() {

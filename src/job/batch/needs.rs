@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::Batch;
 use super::report::word;
 use crate::engine::overlap;
-use crate::job::{check_bloom, memory_of, spare_for_rasters};
+use crate::job::{beside_encoders, check_bloom, held_bytes, memory_of, spare_for_rasters};
+use crate::output::frame::Format;
 use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::canvas_bytes;
 use crate::util::error::{Result, human_bytes};
@@ -49,7 +50,8 @@ impl Batch {
         let scene = self.scene(own.first().copied().unwrap_or(0))?;
         let window = self.window(&scene);
         let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
-        let memory = self.base.limits().memory;
+        let formats = self.formats();
+        let memory = beside_encoders(self.base.limits().memory, &formats, window)?;
         let (needed, strips) = memory_of(&scene, window, surface, memory)?;
         let passes =
             scene.image.samples + u32::from(surface && !sample_numbers(&scene.image).contains(&CENTRE));
@@ -59,10 +61,13 @@ impl Batch {
         } else {
             spare_for_rasters(memory, needed).min(rasters)
         };
-        let memory_bytes = needed + kept_rasters;
+        let memory_bytes = needed + kept_rasters + held_bytes(&formats, window);
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
-        let bytes = |exr: bool| if exr { 4 * channels as u64 } else { 3 };
-        let pixel: u64 = self.pictures.iter().map(|p| bytes(p.is_exr())).sum();
+        let bytes = |format: Format| match format {
+            Format::Exr => 4 * channels as u64,
+            developed => self.encoding(developed).pixel_bytes() as u64,
+        };
+        let pixel: u64 = formats.into_iter().map(bytes).sum();
         // While a GIF is made, its frames wait uncompressed in a file beside it. Other movies are smaller
         // than their frames.
         let movies = (self.movies.len() * (self.count() / self.frames.len()) - self.fresh.len()) as u64;
@@ -87,7 +92,8 @@ impl Batch {
         let Some(number) = self.own().next().filter(|_| seen) else { return Ok(()) };
         let scene = self.scene(number)?;
         let window = self.window(&scene);
-        let (_, strips) = memory_of(&scene, window, self.has_exr(), self.base.limits().memory)?;
+        let memory = beside_encoders(self.base.limits().memory, &self.formats(), window)?;
+        let (_, strips) = memory_of(&scene, window, self.has_exr(), memory)?;
         check_bloom(&scene, window, strips.len())
     }
 

@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use crate::output::frame::Format;
 use crate::util::error::{Error, Result};
 
 /// Most digits that a placeholder may ask for. File systems allow names of 255 bytes.
@@ -103,9 +104,14 @@ impl Pattern {
         &self.given
     }
 
+    /// The format of its files by their extension; `None` if they are no pictures.
+    pub fn format(&self) -> Option<Format> {
+        Format::of(&self.given)
+    }
+
     /// Whether its files are EXR files, which hold layers.
     pub fn is_exr(&self) -> bool {
-        self.given.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+        self.format() == Some(Format::Exr)
     }
 
     /// Whether the name contains the frame's number.

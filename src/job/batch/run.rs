@@ -6,7 +6,7 @@ use super::Batch;
 use super::report::{Event, Name, Summary, Watcher};
 use super::writer::{Outcomes, Start, Writer};
 use crate::engine::{Engine, RenderOptions};
-use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, memory_of, spare_for_rasters};
+use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, beside_encoders, memory_of, spare_for_rasters};
 use crate::output::frame::remove_left_by;
 use crate::place::{Ground, Mesh};
 use crate::scene::Scene;
@@ -177,7 +177,7 @@ impl Work<'_> {
         let files = self.batch.files(number);
         let scene = self.batch.scene(number)?;
         let memory = self.batch.base.limits().memory;
-        let still = Still::open(&files)?;
+        let still = Still::open(&files)?.with_depth(self.batch.request.depth);
         let layers = &self.batch.request.layers;
         let surface = still.has_exr() && layers.iter().any(|l| l.of_surface());
         let window = self.batch.window(&scene);
@@ -186,6 +186,7 @@ impl Work<'_> {
             scene.warnings(&volume).iter().for_each(|w| self.watcher.warn(w));
         }
         let mesh = self.mesh(&scene);
+        let memory = beside_encoders(memory, &still.formats(), window)?;
         let (needed, parts) = memory_of(&scene, window, surface, memory)?;
         let mut start = Some(Start {
             number,

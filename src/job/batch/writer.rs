@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::report::{Event, Name, Watcher, word, words};
 use crate::job::still::StillWriter;
 use crate::job::{Claim, Still};
-use crate::output::frame::rgb_rows;
+use crate::output::frame::samples_of;
 use crate::output::movie::{Movie, MovieKind, MovieOptions};
 use crate::picture::{Frame, Layer, Seconds};
 use crate::scene::Scene;
@@ -118,8 +118,8 @@ struct Open {
     writer: Option<StillWriter>,
     error: Option<Error>,
     seconds: Seconds,
-    /// R, G, B bytes of the rows so far, for movies.
-    rgb: Vec<u8>,
+    /// Samples of the rows so far, for movies: 8 bits, and 16 bits.
+    rgb: [Vec<u8>; 2],
 }
 
 fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn Watcher) {
@@ -130,7 +130,7 @@ fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn 
             Message::Start(start) => open = Some(begin(*start, &mut movies)),
             Message::Strip(strip) => {
                 if let Some(open) = &mut open {
-                    push(open, &strip, !movies.is_empty());
+                    push(open, &strip, &movies);
                 }
             }
             Message::Settle => {}
@@ -165,13 +165,17 @@ fn begin(mut start: Start, movies: &mut Vec<(PathBuf, Movie)>) -> Open {
         }
         Err(e) => Some(e),
     };
-    Open { start, writer, error, seconds: Seconds::default(), rgb: Vec::new() }
+    Open { start, writer, error, seconds: Seconds::default(), rgb: Default::default() }
 }
 
-fn push(open: &mut Open, strip: &Frame, movies: bool) {
+fn push(open: &mut Open, strip: &Frame, movies: &[(PathBuf, Movie)]) {
     let clock = Instant::now();
-    if movies {
-        open.rgb.extend(rgb_rows(strip));
+    let image = &open.start.scene.image;
+    let whole = open.start.window == Window::whole([image.width, image.height]);
+    for (rgb, bits) in open.rgb.iter_mut().zip([8, 16]) {
+        if let Some((_, movie)) = movies.iter().find(|(_, movie)| movie.encoding().bits == bits) {
+            rgb.extend(samples_of(strip, movie.encoding(), &image.look, whole));
+        }
     }
     if let Some(writer) = &mut open.writer
         && let Err(e) = writer.push(strip)
@@ -194,7 +198,10 @@ fn end(
     let finished = match error {
         Some(e) => Err(e),
         None => writer.map_or(Ok(()), |writer| writer.finish().map(drop)).and_then(|()| {
-            movies.iter_mut().try_for_each(|(_, movie)| movie.push(&rgb))?;
+            movies.iter_mut().try_for_each(|(_, movie)| {
+                let deep = movie.encoding().bits > 8;
+                movie.push(&rgb[usize::from(deep)])
+            })?;
             let ending = if start.last { movies.drain(..) } else { movies.drain(..0) };
             for (path, movie) in ending {
                 movie.finish_watched(watcher)?;

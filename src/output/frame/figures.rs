@@ -5,9 +5,8 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::Kind;
 use super::exr_file::ExrLines;
-use super::png_file::PngRows;
+use super::{Format, PictureRows};
 use crate::picture::Frame;
 use crate::util::error::Result;
 
@@ -138,22 +137,20 @@ fn fixed(value: f32) -> i128 {
     (f64::from(value.clamp(-BRIGHTEST, BRIGHTEST)) * UNIT).round() as i64 as i128
 }
 
-/// Returns the figures of a PNG from its text, or of an EXR from its layers. Reads and checks the whole file
-/// in constant memory.
+/// Returns the figures of a developed picture from its text, or of an EXR from its layers. Reads and checks
+/// the whole file.
 ///
 /// # Errors
 /// The errors of [`super::verify`].
 pub fn figures_of(path: &Path) -> Result<KnownFigures> {
-    match Kind::of(path)? {
-        Kind::Png => {
-            let mut rows = PngRows::open(path)?;
-            let pixels = rows.window.pixels();
-            rows.skip_rows()?;
-            let unknown = KnownFigures { pixels, ..Default::default() };
-            Ok(rows.finish()?.map_or(unknown, KnownFigures::from))
-        }
-        Kind::Exr => figures_of_exr(ExrLines::open(path)?),
+    if Format::of_file(path)? == Format::Exr {
+        return figures_of_exr(ExrLines::open(path)?);
     }
+    let mut rows = PictureRows::open(path)?;
+    let pixels = rows.window.pixels();
+    rows.skip_rows()?;
+    let unknown = KnownFigures { pixels, ..Default::default() };
+    Ok(rows.finish()?.map_or(unknown, KnownFigures::from))
 }
 
 fn figures_of_exr(mut lines: ExrLines) -> Result<KnownFigures> {

@@ -1,194 +1,88 @@
-//! PNG files: sRGB, 8 bits, with the resolved scene as text before the pixels and the figures after them.
+//! PNG files: 8 or 16 bits, sRGB or linear, with the resolved scene as text before the pixels and the figures
+//! after them.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
-use std::thread::JoinHandle;
 
-use super::{CROP_TEXT, FIGURES_TEXT, Figures, MAX_SIDE};
+use super::texts::{Texts, bad};
+use super::writer::{Head, Rows, encode};
+use super::{Encoding, Format, MAX_SIDE, rgb_rows};
 use crate::picture::Frame;
 use crate::util::error::{Error, Result};
-use crate::util::window::Window;
 
-/// Memory limit of [`read_png`], in pixels of 8 bytes.
-const MAX_PIXELS: u64 = 1 << 28;
 /// Compressed bytes in an IDAT chunk.
 const CHUNK_BYTES: usize = 1 << 18;
 /// Memory for the texts and one row of a file that is read, bytes.
 const READ_BYTES: usize = 64 << 20;
 
-fn encoder<W: Write>(
-    out: W,
-    [width, height]: [u32; 2],
-    texts: &[(String, String)],
-) -> std::result::Result<png::Writer<W>, png::EncodingError> {
+/// Code points of the chunk cICP: primaries of Rec. 709, linear, RGB, full range.
+const LINEAR_CODE_POINTS: [u8; 4] = [1, 8, 0, 1];
+
+pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result<()> {
+    let [width, height] = head.size;
     let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    for (key, text) in texts {
+    encoder.set_depth(if head.encoding.bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
+    if head.encoding.linear {
+        encoder.set_source_gamma(png::ScaledFloat::new(1.0));
+        encoder.set_source_chromaticities(png::SourceChromaticities::new(
+            (0.3127, 0.329),
+            (0.64, 0.33),
+            (0.3, 0.6),
+            (0.15, 0.06),
+        ));
+    } else {
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    }
+    for (key, text) in &head.texts {
         encoder.add_itxt_chunk(key.clone(), text.clone())?;
     }
-    encoder.write_header()
-}
-
-/// Encodes a small picture in memory.
-///
-/// # Errors
-/// Errors of the encoder, such as a text that PNG does not allow.
-pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> std::result::Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let texts: Vec<_> = texts.iter().map(|(key, text)| (key.to_string(), text.to_string())).collect();
-    let mut writer = encoder(&mut bytes, [frame.width, frame.height], &texts)?;
-    writer.write_image_data(&rgb_rows(frame))?;
-    writer.finish()?;
-    Ok(bytes)
-}
-
-/// Returns the picture as R, G, B bytes.
-pub fn rgb_rows(frame: &Frame) -> Vec<u8> {
-    frame.picture.iter().flat_map(|p| [p[0], p[1], p[2]]).collect()
-}
-
-/// A writer that keeps its first error, because the encoder drops those of its destructors.
-struct Checked<W> {
-    inner: W,
-    error: Option<io::Error>,
-}
-
-impl<W: Write> Write for Checked<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if let Some(e) = &self.error {
-            return Err(io::Error::new(e.kind(), e.to_string()));
-        }
-        match self.inner.write(bytes) {
-            Err(e) if e.kind() != io::ErrorKind::Interrupted => {
-                self.error = Some(io::Error::new(e.kind(), e.to_string()));
-                Err(e)
-            }
-            other => other,
-        }
+    let mut writer = encoder.write_header()?;
+    if head.encoding.linear {
+        // The encoder does not write this chunk by itself. It stands before the pixels.
+        writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &LINEAR_CODE_POINTS)?;
     }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
-    }
-}
-
-/// Writer of a picture, row by row. A thread of its own encodes them while the next rows are computed. The
-/// bytes do not depend on how the rows are divided.
-pub struct PngWriter {
-    rows: Option<SyncSender<Message>>,
-    thread: Option<JoinHandle<io::Result<()>>>,
-}
-
-enum Message {
-    Rows(Vec<u8>),
-    /// The end of the picture, with the texts that follow the pixels.
-    Finish(Vec<(String, String)>),
-}
-
-impl PngWriter {
-    /// Begins a picture of `size` pixels. `texts` stand before the pixels.
-    ///
-    /// # Errors
-    /// An error where the thread cannot be started.
-    pub fn new(file: File, size: [u32; 2], texts: Vec<(String, String)>) -> io::Result<PngWriter> {
-        // A queue of length 0: one piece is encoded while the next waits. A longer one would only take
-        // memory.
-        let (rows, queue) = sync_channel(0);
-        let work = move || {
-            let inner = BufWriter::with_capacity(1 << 16, file);
-            let mut out = Checked { inner, error: None };
-            let written = write(&mut out, size, &texts, &queue);
-            match out.error.take() {
-                Some(e) => Err(e),
-                None => written.and_then(|()| out.inner.flush()),
-            }
-        };
-        let thread = std::thread::Builder::new().name("png".into()).spawn(work)?;
-        Ok(PngWriter { rows: Some(rows), thread: Some(thread) })
-    }
-
-    /// Writes the next rows: R, G, B bytes of any whole number of rows.
-    ///
-    /// # Errors
-    /// Errors of the encoder and the file, also from rows written earlier.
-    pub fn push(&mut self, rows: Vec<u8>) -> io::Result<()> {
-        self.send(Message::Rows(rows))
-    }
-
-    /// Writes `texts` and ends the file. All rows must have been written.
-    ///
-    /// # Errors
-    /// Errors of the encoder and the file.
-    pub fn finish(mut self, texts: Vec<(String, String)>) -> io::Result<()> {
-        self.send(Message::Finish(texts))?;
-        self.join()
-    }
-
-    fn send(&mut self, message: Message) -> io::Result<()> {
-        match &self.rows {
-            Some(rows) if rows.send(message).is_ok() => Ok(()),
-            // The thread ended early and returns the reason.
-            _ => self.join().and(Err(io::Error::other("the picture has ended"))),
-        }
-    }
-
-    fn join(&mut self) -> io::Result<()> {
-        self.rows = None;
-        match self.thread.take().map(JoinHandle::join) {
-            Some(Ok(done)) => done,
-            Some(Err(_)) => Err(io::Error::other("the encoder failed")),
-            None => Ok(()),
-        }
-    }
-}
-
-fn write(
-    out: &mut Checked<BufWriter<File>>,
-    size: [u32; 2],
-    texts: &[(String, String)],
-    queue: &std::sync::mpsc::Receiver<Message>,
-) -> io::Result<()> {
-    let mut writer = encoder(out, size, texts)?;
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    let texts = loop {
-        match queue.recv() {
-            Ok(Message::Rows(rows)) => stream.write_all(&rows)?,
-            Ok(Message::Finish(texts)) => break texts,
-            // The picture was abandoned, and its file is removed.
-            Err(_) => return Ok(()),
-        }
-    };
+    while let Some(rows) = rows.next()? {
+        stream.write_all(&rows)?;
+    }
     stream.finish()?;
-    for (key, text) in texts {
+    for (key, text) in std::mem::take(&mut rows.texts) {
         writer.write_text_chunk(&png::text_metadata::ITXtChunk::new(key, text))?;
     }
     Ok(writer.finish()?)
 }
 
-/// Reads a PNG. Returns width, height and pixels: RGB from 0 to 1, as encoded, not linear.
+/// Encodes a small picture in memory, with 8 bits.
 ///
 /// # Errors
-/// [`Error::Io`] where the file cannot be opened, [`Error::Input`] where it is no PNG or too large.
-pub fn read_png(path: &Path) -> Result<(u32, u32, Vec<[f32; 3]>)> {
-    let file = File::open(path).map_err(|e| Error::read(path, e))?;
-    let mut reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(MAX_PIXELS * 8);
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(|e| bad(path, e))?;
-    let rgb = decoded.to_rgb32f();
-    let pixels = rgb.pixels().map(|p| p.0).collect();
-    Ok((rgb.width(), rgb.height(), pixels))
+/// Errors of the encoder, such as a text that PNG does not allow.
+pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> io::Result<Vec<u8>> {
+    let head = Head {
+        format: Format::Png,
+        encoding: Encoding::DISPLAY,
+        size: [frame.width, frame.height],
+        texts: texts.iter().map(|(key, text)| (key.to_string(), text.to_string())).collect(),
+    };
+    encode(&head, rgb_rows(frame))
 }
 
-fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
-    Error::input(format!("{}: {why}", path.display()), "give a PNG image")
+/// Whether a PNG says that its samples are linear.
+pub(super) fn is_linear(path: &Path) -> Result<bool> {
+    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| decoding(path, e))?;
+    Ok(says_linear(reader.info()))
+}
+
+/// Whether the colour chunks of a PNG say that its samples are linear.
+fn says_linear(info: &png::Info) -> bool {
+    match info.coding_independent_code_points {
+        Some(points) => points.transfer_function == LINEAR_CODE_POINTS[1],
+        None => info.srgb.is_none() && info.gama_chunk.is_some_and(|gamma| gamma.into_value() == 1.0),
+    }
 }
 
 /// Converts a decoding error. Damage is a fault of the file, other input errors come from the disk.
@@ -232,19 +126,16 @@ impl Seek for Counted {
     }
 }
 
-/// Reader of this program's pictures, row by row. It checks every checksum.
-pub struct PngRows {
+/// Reader of a picture of this program, row by row. It checks every checksum.
+pub(super) struct PngRows {
     path: PathBuf,
     reader: png::Reader<Counted>,
     /// Bytes read so far.
     read: Arc<AtomicU64>,
     /// Size of the file.
     bytes: u64,
-    rows_left: u32,
-    /// Width and height of the whole image, pixels.
-    pub whole: [u32; 2],
-    /// Part of the image in the file.
-    pub window: Window,
+    pub encoding: Encoding,
+    pub size: [u32; 2],
 }
 
 impl PngRows {
@@ -265,102 +156,55 @@ impl PngRows {
         decoder.set_limits(png::Limits { bytes: READ_BYTES });
         let info = decoder.read_header_info().map_err(|e| decoding(path, e))?;
         let [width, height] = [info.width, info.height];
+        let bits = info.bit_depth as u8;
         if info.color_type != png::ColorType::Rgb
-            || info.bit_depth != png::BitDepth::Eight
+            || !Format::Png.depths().contains(&bits)
             || info.interlaced
             || width.max(height) > MAX_SIDE
         {
-            return Err(bad(path, "not a picture of taki (8 bits RGB, not interlaced)"));
+            return Err(bad(path, "not a picture of taki (8 or 16 bits RGB, not interlaced)"));
         }
         // Deflate expands a byte to at most 1032.
-        if (u64::from(width) * 3 + 1) * u64::from(height) > bytes.saturating_mul(1032) {
+        let row_bytes = u64::from(width) * Encoding { bits, linear: false }.pixel_bytes() as u64 + 1;
+        if row_bytes * u64::from(height) > bytes.saturating_mul(1032) {
             return Err(bad(path, format!("{bytes} bytes cannot hold {width}×{height} pixels")));
         }
         let reader = decoder.read_info().map_err(|e| decoding(path, e))?;
         if reader.info().animation_control.is_some() {
             return Err(bad(path, "not a picture of taki (animated)"));
         }
-        let size = [width, height];
-        let mut rows = PngRows {
-            path: path.to_owned(),
-            reader,
-            read,
-            bytes,
-            rows_left: height,
-            whole: size,
-            window: Window::whole(size),
-        };
-        if let Some(crop) = rows.text(CROP_TEXT) {
-            let parsed = parse_crop(&crop).filter(|(window, _)| [window.width, window.height] == size);
-            (rows.window, rows.whole) = parsed.ok_or_else(|| {
-                bad(path, format!("the text taki.crop = {crop:?} does not fit the picture"))
-            })?;
-        }
-        Ok(rows)
+        let encoding = Encoding { bits, linear: says_linear(reader.info()) };
+        Ok(PngRows { path: path.to_owned(), reader, read, bytes, encoding, size: [width, height] })
     }
 
-    /// Returns a text, if it has been read so far.
-    pub fn text(&self, key: &str) -> Option<String> {
+    /// Returns the texts that have been read so far.
+    pub fn texts(&self) -> Texts {
         let chunks = &self.reader.info().utf8_text;
-        chunks.iter().find(|chunk| chunk.keyword == key).and_then(|chunk| chunk.get_text().ok())
+        let texts = chunks.iter().filter_map(|c| Some((c.keyword.clone(), c.get_text().ok()?)));
+        Texts(texts.collect())
     }
 
-    /// Reads the next row into `row`: R, G, B bytes of the window's width.
+    /// Reads the next row of samples into `row`.
     ///
     /// # Errors
     /// [`Error::Input`] where the file is damaged or has no more rows, [`Error::Io`] where it cannot be read.
     pub fn read_row(&mut self, row: &mut [u8]) -> Result<()> {
         match self.reader.read_row(row) {
-            Ok(Some(_)) => {
-                self.rows_left = self.rows_left.saturating_sub(1);
-                Ok(())
-            }
+            Ok(Some(_)) => Ok(()),
             Ok(None) => Err(bad(&self.path, "the pixels end too early")),
             Err(e) => Err(decoding(&self.path, e)),
         }
     }
 
-    /// Reads the remaining rows.
+    /// Reads the rest of the file, to its last byte. Returns all texts.
     ///
     /// # Errors
-    /// The errors of [`PngRows::read_row`].
-    pub fn skip_rows(&mut self) -> Result<()> {
-        let mut row = vec![0; 3 * self.window.width as usize];
-        (0..self.rows_left).try_for_each(|_| self.read_row(&mut row))
-    }
-
-    /// Reads the rest of the file, to its last byte. Returns the figures, if the file has them.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where the file is damaged or its figures do not fit it, [`Error::Io`] where it cannot
-    /// be read.
-    pub fn finish(mut self) -> Result<Option<Figures>> {
+    /// [`Error::Input`] where the file is damaged, [`Error::Io`] where it cannot be read.
+    pub fn finish(mut self) -> Result<Texts> {
         self.reader.finish().map_err(|e| decoding(&self.path, e))?;
         if self.read.load(Ordering::Relaxed) != self.bytes {
             return Err(bad(&self.path, "there are bytes after its end"));
         }
-        let Some(text) = self.text(FIGURES_TEXT) else { return Ok(None) };
-        let figures: Figures = serde_json::from_str(&text)
-            .map_err(|e| bad(&self.path, format!("the text taki.figures: {e}")))?;
-        if figures.pixels != self.window.pixels() {
-            return Err(bad(&self.path, "the text taki.figures belongs to another picture"));
-        }
-        Ok(Some(figures))
+        Ok(self.texts())
     }
-}
-
-/// Formats a part of an image: `X,Y,W,H of WxH`.
-pub fn crop_text(window: Window, [width, height]: [u32; 2]) -> String {
-    format!("{window} of {width}x{height}")
-}
-
-fn parse_crop(text: &str) -> Option<(Window, [u32; 2])> {
-    let (window, whole) = text.split_once(" of ")?;
-    let (width, height) = whole.split_once('x')?;
-    let whole: [u32; 2] = [width.parse().ok()?, height.parse().ok()?];
-    let numbers: Vec<u32> = window.split(',').map(|n| n.parse().ok()).collect::<Option<_>>()?;
-    let numbers: [u32; 4] = numbers.try_into().ok()?;
-    let [x, y, width, height] = numbers;
-    let valid = whole[0].max(whole[1]) <= MAX_SIDE && Window::fits(whole, numbers);
-    valid.then_some((Window { x, y, width, height }, whole))
 }

@@ -1,4 +1,4 @@
-//! MP4 and WebM by the program ffmpeg: it reads frames from its stdin and writes the file to its stdout.
+//! MP4, MOV and WebM by the program ffmpeg: it reads frames from its stdin and writes the file to its stdout.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use super::{MovieKind, MovieOptions};
+use super::{Codec, MovieKind, MovieOptions, Video};
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -23,6 +23,8 @@ pub(super) struct VideoWriter {
     encoder: Encoder,
     output: Output,
     size: [u32; 2],
+    /// Bytes of a pixel.
+    pixel_bytes: usize,
     frames: u64,
     /// Buffer of a frame with even sides, used where the movie's sides are odd.
     padded: Vec<u8>,
@@ -35,15 +37,20 @@ impl VideoWriter {
         options: &MovieOptions,
         program: &Path,
     ) -> Result<Self> {
-        has_encoder(kind, program)?;
+        let Some(video) = options.video else {
+            return Err(Error::write(output.path(), format!("{} is no video", kind.name())));
+        };
+        has_encoder(video.codec, program)?;
         let file = output.file().try_clone().map_err(|e| Error::write(output.path(), e))?;
         let even = options.size.map(|side| side.next_multiple_of(2));
         let mut command = quiet(program);
-        command.args(arguments(kind, even, options)).stdin(Stdio::piped()).stdout(file);
+        command.args(arguments(kind, video, even, options)).stdin(Stdio::piped()).stdout(file);
         let encoder = Encoder::start(command, program, output.path())?;
-        let bytes = if even == options.size { 0 } else { even[0] as usize * even[1] as usize * 3 };
+        let pixel_bytes = options.encoding().pixel_bytes();
+        let bytes = if even == options.size { 0 } else { even[0] as usize * even[1] as usize * pixel_bytes };
         let padded = Vec::with_capacity(bytes);
-        Ok(VideoWriter { encoder, output, size: options.size, frames: options.frames, padded })
+        let (size, frames) = (options.size, options.frames);
+        Ok(VideoWriter { encoder, output, size, pixel_bytes, frames, padded })
     }
 
     pub(super) fn push(&mut self, rgb: &[u8]) -> Result<()> {
@@ -52,12 +59,12 @@ impl VideoWriter {
             return self.encoder.write(rgb);
         }
         self.padded.clear();
-        let row_bytes = width * 3;
+        let row_bytes = width * self.pixel_bytes;
         for y in 0..height.next_multiple_of(2) {
             let row = &rgb[y.min(height - 1) * row_bytes..][..row_bytes];
             self.padded.extend_from_slice(row);
             if width % 2 == 1 {
-                self.padded.extend_from_slice(&row[row_bytes - 3..]);
+                self.padded.extend_from_slice(&row[row_bytes - self.pixel_bytes..]);
             }
         }
         self.encoder.write(&self.padded)
@@ -81,15 +88,23 @@ fn quiet(program: &Path) -> Command {
 }
 
 /// Returns the encoder's name in ffmpeg.
-fn codec(kind: MovieKind) -> &'static str {
-    if kind == MovieKind::Webm { "libvpx-vp9" } else { "libx264" }
+fn encoder_name(codec: Codec) -> &'static str {
+    match codec {
+        Codec::H264 => "libx264",
+        Codec::H265 => "libx265",
+        Codec::Prores => "prores_ks",
+        Codec::Vp9 => "libvpx-vp9",
+    }
 }
 
+/// Options of x265 that make it silent but for errors, and leave out the text about itself.
+const QUIET_X265: &str = "log-level=error:info=0";
+
 /// Checks that ffmpeg exists and can encode this format.
-fn has_encoder(kind: MovieKind, program: &Path) -> Result<()> {
+fn has_encoder(codec: Codec, program: &Path) -> Result<()> {
     let run = quiet(program).arg("-encoders").stdin(Stdio::null()).output();
     let list = run.map_err(|e| absent(program, &e))?;
-    let codec = codec(kind);
+    let codec = encoder_name(codec);
     let encoders = String::from_utf8_lossy(&list.stdout);
     // A line of the list has flags, name and description.
     if encoders.lines().any(|line| line.split_whitespace().nth(1) == Some(codec)) {
@@ -114,40 +129,49 @@ fn rate(fps: f64) -> String {
 }
 
 /// Returns the arguments after those of [`quiet`]: frames on stdin, the file on stdout.
-fn arguments(kind: MovieKind, [width, height]: [u32; 2], options: &MovieOptions) -> Vec<String> {
-    let (codec, size, fps) = (codec(kind), format!("{width}x{height}"), rate(options.fps));
+fn arguments(
+    kind: MovieKind,
+    Video { codec, bits }: Video,
+    [width, height]: [u32; 2],
+    options: &MovieOptions,
+) -> Vec<String> {
+    let (size, fps) = (format!("{width}x{height}"), rate(options.fps));
     let comment = format!("comment={}", options.mark_text());
+    let given = if options.encoding().bits == 8 { "rgb24" } else { "rgb48be" };
+    let stored = match (codec, bits) {
+        (Codec::Prores, _) => "yuv422p10le",
+        (_, 8) => "yuv420p",
+        _ => "yuv420p10le",
+    };
     let mut all: Vec<&str> = Vec::new();
-    all.extend([
-        "-f",
-        "rawvideo",
-        "-pixel_format",
-        "rgb24",
-        "-video_size",
-        &size,
-        "-framerate",
-        &fps,
-        "-i",
-        "pipe:0",
-    ]);
+    all.extend(["-f", "rawvideo", "-pixel_format", given, "-video_size", &size, "-framerate", &fps]);
+    all.extend(["-i", "pipe:0"]);
     // By default ffmpeg converts with the matrix of BT.601 and does not tag it; players assume BT.709.
-    let convert = "scale=in_range=full:out_range=limited:out_color_matrix=bt709:\
-                   flags=bicubic+accurate_rnd+full_chroma_int,format=yuv420p";
-    all.extend(["-vf", convert, "-color_range", "tv", "-colorspace", "bt709", "-color_primaries", "bt709"]);
-    all.extend(["-color_trc", "bt709", "-c:v", codec]);
+    let convert = format!(
+        "scale=in_range=full:out_range=limited:out_color_matrix=bt709:\
+         flags=bicubic+accurate_rnd+full_chroma_int,format={stored},\
+         setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709"
+    );
+    all.extend(["-vf", &convert, "-color_range", "tv", "-colorspace", "bt709", "-color_primaries", "bt709"]);
+    all.extend(["-color_trc", "bt709", "-c:v", encoder_name(codec)]);
     // With a fixed number of threads the file is the same on every machine with the same ffmpeg.
     all.extend(["-threads", "4", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]);
     all.extend(["-metadata", &comment]);
-    all.extend(match kind {
-        // Water has fine grain, which ffmpeg's default of 23 blurs.
-        MovieKind::Webm => &["-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "3"][..],
-        _ => &["-crf", "16", "-preset", "medium", "-profile:v", "high"],
+    // Water has fine grain, which ffmpeg's default qualities blur.
+    all.extend(match codec {
+        Codec::Vp9 => &["-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "3"][..],
+        Codec::H264 if bits == 8 => &["-crf", "16", "-preset", "medium", "-profile:v", "high"],
+        Codec::H264 => &["-crf", "16", "-preset", "medium", "-profile:v", "high10"],
+        // The tag is the one that QuickTime plays.
+        Codec::H265 => &["-crf", "18", "-preset", "medium", "-tag:v", "hvc1", "-x265-params", QUIET_X265],
+        // Profile 3 is 422 HQ.
+        Codec::Prores => &["-profile:v", "3", "-vendor", "apl0"],
     });
-    if kind == MovieKind::Webm {
-        all.extend(["-f", "webm", "-y", OUT]);
-    } else {
-        all.extend(["-movflags", MOVFLAGS, "-f", "mp4", "-y", OUT]);
-    }
+    all.extend(match kind {
+        MovieKind::Webm => &["-f", "webm", "-y", OUT][..],
+        MovieKind::Mov => &["-movflags", MOVFLAGS, "-f", "mov", "-y", OUT],
+        _ => &["-movflags", MOVFLAGS, "-f", "mp4", "-y", OUT],
+    });
     all.into_iter().map(String::from).collect()
 }
 

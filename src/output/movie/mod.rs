@@ -10,7 +10,7 @@ mod palette;
 
 use std::path::Path;
 
-use super::frame::Output;
+use super::frame::{Encoding, Output};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::{Monitor, Unwatched};
 
@@ -21,24 +21,80 @@ pub enum MovieKind {
     Gif,
     /// Animated PNG: lossless.
     Apng,
-    /// H.264 in MP4, 4:2:0, BT.709. Needs ffmpeg.
+    /// MP4: H.264 or H.265. Needs ffmpeg.
     Mp4,
-    /// VP9 in WebM, 4:2:0, BT.709. Needs ffmpeg.
+    /// QuickTime: ProRes, H.264 or H.265. Needs ffmpeg.
+    Mov,
+    /// WebM: VP9. Needs ffmpeg.
     Webm,
 }
 
+/// Codec of a video.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Codec {
+    /// H.264, 4:2:0: plays everywhere.
+    H264,
+    /// H.265, 4:2:0: half as large.
+    H265,
+    /// ProRes 422 HQ: for editing.
+    Prores,
+    /// VP9, 4:2:0: for the web.
+    Vp9,
+}
+
+/// Codec and depth of a video.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Video {
+    /// Codec.
+    pub codec: Codec,
+    /// Bits per sample, 8 or 10.
+    pub bits: u8,
+}
+
+impl Codec {
+    /// All codecs.
+    pub const ALL: [Codec; 4] = [Codec::H264, Codec::H265, Codec::Prores, Codec::Vp9];
+
+    /// Returns the word on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Codec::H264 => "h264",
+            Codec::H265 => "h265",
+            Codec::Prores => "prores",
+            Codec::Vp9 => "vp9",
+        }
+    }
+
+    /// Returns the depths, bits per sample. The first is the default.
+    pub fn depths(self) -> &'static [u8] {
+        match self {
+            Codec::H264 | Codec::H265 | Codec::Vp9 => &[8, 10],
+            Codec::Prores => &[10],
+        }
+    }
+}
+
 impl MovieKind {
-    /// Returns the format of a file extension: `.gif`, `.apng`, `.mp4` or `.webm`, in upper or lower case.
-    /// The caller decides for `.png`, which may be animated or not.
+    /// All formats.
+    pub const ALL: [MovieKind; 5] =
+        [MovieKind::Gif, MovieKind::Apng, MovieKind::Mp4, MovieKind::Mov, MovieKind::Webm];
+
+    /// Returns the format of a file extension: `.gif`, `.apng`, `.mp4`, `.mov` or `.webm`, in upper or lower
+    /// case. The caller decides for `.png`, which may be animated or not.
     pub fn of(path: &Path) -> Option<MovieKind> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        Some(match extension.as_str() {
-            "gif" => MovieKind::Gif,
-            "apng" => MovieKind::Apng,
-            "mp4" => MovieKind::Mp4,
-            "webm" => MovieKind::Webm,
-            _ => return None,
-        })
+        MovieKind::ALL.into_iter().find(|kind| kind.extension() == extension)
+    }
+
+    /// Returns the file extension.
+    pub fn extension(self) -> &'static str {
+        match self {
+            MovieKind::Gif => "gif",
+            MovieKind::Apng => "apng",
+            MovieKind::Mp4 => "mp4",
+            MovieKind::Mov => "mov",
+            MovieKind::Webm => "webm",
+        }
     }
 
     /// Returns the name for messages.
@@ -47,8 +103,28 @@ impl MovieKind {
             MovieKind::Gif => "GIF",
             MovieKind::Apng => "animated PNG",
             MovieKind::Mp4 => "MP4",
+            MovieKind::Mov => "MOV",
             MovieKind::Webm => "WebM",
         }
+    }
+
+    /// Returns the codecs of a video that this program writes. The first is the default.
+    pub fn codecs(self) -> &'static [Codec] {
+        match self {
+            MovieKind::Gif | MovieKind::Apng => &[],
+            MovieKind::Mp4 => &[Codec::H264, Codec::H265],
+            MovieKind::Mov => &[Codec::Prores, Codec::H264, Codec::H265],
+            MovieKind::Webm => &[Codec::Vp9],
+        }
+    }
+
+    /// Returns the video that a file of this format holds: with the wanted codec and depth where the format
+    /// has them, otherwise with its defaults. `None` for a format that is no video.
+    pub fn video(self, codec: Option<Codec>, bits: Option<u8>) -> Option<Video> {
+        let codecs = self.codecs();
+        let codec = codec.filter(|codec| codecs.contains(codec)).or(codecs.first().copied())?;
+        let bits = bits.filter(|bits| codec.depths().contains(bits)).unwrap_or(codec.depths()[0]);
+        Some(Video { codec, bits })
     }
 
     /// Returns the largest side, pixels. GIF stores 16 bits; the encoders of both videos stop at 2¹⁴.
@@ -56,7 +132,7 @@ impl MovieKind {
         match self {
             MovieKind::Gif => 65_535,
             MovieKind::Apng => i32::MAX as u32,
-            MovieKind::Mp4 | MovieKind::Webm => 16_384,
+            MovieKind::Mp4 | MovieKind::Mov | MovieKind::Webm => 16_384,
         }
     }
 
@@ -85,6 +161,8 @@ pub struct MovieOptions {
     pub repeat: bool,
     /// Number that identifies the movie. It is stored in the file, and [`mark_of`] reads it.
     pub mark: u64,
+    /// Codec and depth of a video. `None`: the defaults of its format.
+    pub video: Option<Video>,
 }
 
 /// Text that precedes the mark in a file.
@@ -109,9 +187,15 @@ impl MovieOptions {
         format!("{MARK}{:016x}", self.mark)
     }
 
+    /// Returns the encoding of the samples that frames are given in. A video of more than 8 bits gets 16.
+    pub fn encoding(&self) -> Encoding {
+        let bits = if self.video.is_some_and(|video| video.bits > 8) { 16 } else { 8 };
+        Encoding { bits, linear: false }
+    }
+
     /// Returns the size of a frame, bytes.
     fn frame_bytes(&self) -> usize {
-        self.size[0] as usize * self.size[1] as usize * 3
+        self.size[0] as usize * self.size[1] as usize * self.encoding().pixel_bytes()
     }
 }
 
@@ -145,20 +229,27 @@ impl Movie {
     /// # Errors
     /// The errors of [`Movie::create`].
     pub fn create_with(path: &Path, kind: MovieKind, options: &MovieOptions, ffmpeg: &Path) -> Result<Movie> {
+        let video = options.video.or(kind.video(None, None));
+        let options = &MovieOptions { video, ..*options };
         check(path, kind, options)?;
         let output = Output::create(path)?;
         let writer = match kind {
             MovieKind::Gif => Writer::Gif(Box::new(gif_file::GifWriter::create(output, options)?)),
             MovieKind::Apng => Writer::Apng(Box::new(apng_file::ApngWriter::create(output, options)?)),
-            MovieKind::Mp4 | MovieKind::Webm => {
+            MovieKind::Mp4 | MovieKind::Mov | MovieKind::Webm => {
                 Writer::Video(Box::new(ffmpeg::VideoWriter::create(output, kind, options, ffmpeg)?))
             }
         };
         Ok(Movie { writer, path: path.to_owned(), options: *options, pushed: 0 })
     }
 
-    /// Adds a frame: sRGB bytes R, G, B, row by row from the top left. After an error the movie can only be
-    /// dropped.
+    /// Returns the encoding of the samples that frames are given in.
+    pub fn encoding(&self) -> Encoding {
+        self.options.encoding()
+    }
+
+    /// Adds a frame: sRGB samples R, G, B, row by row from the top left, in the depth of [`Movie::encoding`];
+    /// those of 16 bits with the higher byte first. After an error the movie can only be dropped.
     ///
     /// # Errors
     /// [`Error::Io`] (exit 74) where the disk is full, ffmpeg failed, or the frame does not fit the options.
@@ -208,7 +299,13 @@ impl Movie {
 /// Refuses a movie that the format cannot store.
 fn check(path: &Path, kind: MovieKind, options: &MovieOptions) -> Result<()> {
     let fail = |why: String, fix: String| Err(Error::CannotCreate { path: path.to_owned(), why, fix });
-    let MovieOptions { size: [width, height], fps, frames, .. } = *options;
+    let MovieOptions { size: [width, height], fps, frames, video, .. } = *options;
+    if let Some(Video { codec, bits }) = video
+        && !(kind.codecs().contains(&codec) && codec.depths().contains(&bits))
+    {
+        let why = format!("{} cannot hold {} with {bits} bits", kind.name(), codec.word());
+        return fail(why, "choose another codec, depth or extension".into());
+    }
     let (name, side, [slow, fast]) = (kind.name(), kind.longest_side(), kind.rates());
     if width == 0 || height == 0 || frames == 0 {
         return fail(

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use eframe::egui;
 
 use super::{Leaving, Screenshot, Viewer};
+use crate::output::frame::{Encoding, Format, Head, Output, encode};
 use crate::util::error::{Error, Result};
 use crate::viewer::Handover;
 
@@ -88,11 +89,12 @@ impl Viewer {
     }
 }
 
-/// Writes the window's picture as PNG.
+/// Writes the window's picture in the format that the extension names.
 fn write_image(image: &egui::ColorImage, path: &Path) -> Result<()> {
-    let [width, height] = image.size.map(|n| n as u32);
-    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_array()).collect();
-    let picture = image::RgbaImage::from_raw(width, height, bytes)
-        .ok_or_else(|| Error::write(path, "the window has no picture"))?;
-    picture.save_with_format(path, image::ImageFormat::Png).map_err(|e| Error::write(path, e))
+    let format = Format::wanted("--screenshot", path)?;
+    let size = image.size.map(|n| n as u32);
+    let samples = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+    let head = Head { format, encoding: Encoding::DISPLAY, size, texts: Vec::new() };
+    let bytes = encode(&head, samples).map_err(|e| Error::write(path, e))?;
+    Output::create(path)?.finish_with(&bytes)
 }

@@ -131,7 +131,8 @@ impl Viewer {
         match self.document.variant(&edits.map(|(key, value)| (key, Raw::Int(value)))) {
             Ok(scene) => {
                 self.exporting = true;
-                self.worker.export(Export { scene, paths: self.export.paths() });
+                let (paths, depth) = (self.export.paths(), self.export.depth());
+                self.worker.export(Export { scene, paths, depth });
             }
             Err(e) => self.say(MessageKind::Error, e.to_string()),
         }

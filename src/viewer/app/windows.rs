@@ -172,7 +172,7 @@ const HELP: &[(&str, &str)] = &[
     ("T", "light or dark theme"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
     ("Ctrl+O, Ctrl+S", "open, save (Ctrl+Shift+S: save as)"),
-    ("Ctrl+E", "export PNG and EXR"),
+    ("Ctrl+E", "export pictures"),
     ("Ctrl+Shift+C", "copy as command line"),
     ("Ctrl +, Ctrl −, Ctrl 0", "size of the interface"),
     ("?", "show this list"),

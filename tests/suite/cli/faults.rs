@@ -166,8 +166,8 @@ fn outputs_that_cannot_be_made_are_known_before_work() {
         (at("taken.png"), 73, "a folder has this name"),
         (at("file/x.png"), 73, "file/x.png"),
         ("/proc/x.png".into(), 73, "/proc/x.png"),
-        (at("x.jpg"), 2, "use .png or .exr"),
-        (at("x"), 2, "use .png or .exr"),
+        (at("x.bmp"), 2, "use .png, .jpg, .tif, .webp or .exr"),
+        (at("x"), 2, "use .png, .jpg, .tif, .webp or .exr"),
         ("..".into(), 2, ".."),
     ];
     for (path, code, words) in cases {
@@ -183,7 +183,7 @@ fn outputs_that_cannot_be_made_are_known_before_work() {
 #[test]
 fn a_full_disk_leaves_the_old_file_and_no_other() {
     // A limit on the size of files acts as a full disk does: it fails in the middle of a write.
-    for name in ["x.png", "x.exr", "x.npz"] {
+    for name in ["x.png", "x.jpg", "x.tif", "x.webp", "x.exr", "x.npz"] {
         let dir = tempdir().unwrap();
         let path = dir.path().join(name);
         fs::write(&path, "old").unwrap();

@@ -1,6 +1,7 @@
 //! Batches: a picture depends only on its scene and its number, and none is lost, however the work ends.
 
 mod crash;
+mod formats;
 mod moving;
 mod numbers;
 mod sweep;
@@ -178,7 +179,7 @@ fn faults_are_known_before_any_picture() {
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),
         (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would share one name", "fall.####.png"]),
-        (&["--frames", "0-3", "-o", "f.####.jpg"], 2, &["unknown kind"]),
+        (&["--frames", "0-3", "-o", "f.####.bmp"], 2, &["unknown kind"]),
         (&["--frames", "3-0", "-o", "f.####.png"], 2, &["ends before it begins"]),
         (&["--frames", "x", "-o", "f.####.png"], 2, &["0-239"]),
         (&["--frames", "0-999999999", "-o", "f.####.png"], 2, &["more than 1000000 frames"]),

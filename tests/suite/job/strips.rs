@@ -8,7 +8,7 @@ use crate::engine::gpu::{renderer, scene};
 use rand::{RngExt, SeedableRng};
 use taki::engine::{Engine, RenderOptions};
 use taki::job::{Still, stitch, strips};
-use taki::output::frame::{Figures, figures_of, read_exr, verify};
+use taki::output::frame::{Figures, figures_of, read_exr, read_picture, verify};
 use taki::picture::camera::clip_to_window;
 use taki::picture::{Frame, Grid, Layer, Surface};
 use taki::place::Mesh;
@@ -200,7 +200,7 @@ fn a_file_does_not_depend_on_how_its_rows_came() {
     let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));
     let crop = Window { x: 11, y: 4, width: 70, height: 50 };
     for window in [subject.whole(), crop] {
-        for extension in ["png", "exr"] {
+        for extension in ["png", "jpg", "tif", "webp", "exr"] {
             let file = |name: &str| dir.path().join(format!("{name}.{extension}"));
             let figures = subject.write(&file("a"), window, &[61]);
             for (name, rows) in [("b", &[1][..]), ("c", &[7, 1, 30, 2]), ("d", &[16])] {
@@ -215,7 +215,7 @@ fn a_file_does_not_depend_on_how_its_rows_came() {
             assert_eq!((verified.size, verified.window), ([97, 61], window));
             let scene = verified.scene.expect("a scene");
             assert!(scene.contains("[camera]") && scene.contains("width = 97"), "{scene}");
-            assert_eq!(verified.figures, (extension == "png").then_some(figures.clone()));
+            assert_eq!(verified.figures, (extension != "exr").then_some(figures.clone()));
             check_contents(&file("a"), &frame, window);
             let known = figures_of(&file("a")).expect("figures");
             assert_eq!(known.mean_radiance(), Some(figures.mean_radiance()));
@@ -228,10 +228,18 @@ fn a_file_does_not_depend_on_how_its_rows_came() {
 
 /// Checks that other programs can read what was rendered.
 fn check_contents(path: &Path, frame: &Frame, window: Window) {
-    if path.extension().is_some_and(|e| e == "png") {
-        let image = image::open(path).expect("a PNG").into_rgb8();
-        let want: Vec<[u8; 3]> = frame.picture.iter().map(|p| [p[0], p[1], p[2]]).collect();
-        assert!(image.pixels().map(|p| p.0).eq(want));
+    if path.extension().is_some_and(|e| e != "exr") {
+        let image = read_picture(path).expect("a picture");
+        let want = frame.picture.iter().map(|p| [p[0], p[1], p[2]].map(|x| f32::from(x) / 255.0));
+        let least = match path.extension().and_then(|e| e.to_str()) {
+            // 16 bits are not dithered.
+            Some("tif") => 1.01 / 255.0,
+            Some("jpg") => 0.1,
+            _ => 0.0,
+        };
+        let near = |p: [f32; 3], q: [f32; 3]| p.iter().zip(q).all(|(p, q)| (p - q).abs() <= least);
+        assert!(image.pixels.len() == frame.picture.len());
+        assert!(image.pixels.into_iter().zip(want).all(|(p, q)| near(p, q)), "{}", path.display());
         return;
     }
     let (width, height, channels) = read_exr(path).expect("an EXR");
@@ -294,15 +302,15 @@ fn crops_stitch_to_the_file_of_the_whole() {
     let tiles = [(40, 20, 57, 41), (0, 0, 40, 61), (40, 0, 57, 20)];
     let inside = [(0, 0, 97, 30), (0, 30, 97, 31), (5, 5, 10, 10), (0, 30, 97, 31)];
     let lapped = [(0, 0, 60, 61), (50, 0, 47, 61)];
-    for extension in ["png", "exr"] {
+    for extension in ["png", "tif", "webp", "exr"] {
         for (windows, figures) in [(&tiles[..], true), (&inside, true), (&lapped, false)] {
             let (dir, parts, whole) = pieces(extension, windows);
             let joined = dir.path().join(format!("joined.{extension}"));
             let known = stitch(&parts, &joined, false, &Unwatched).expect("stitched");
             let same = std::fs::read(&joined).expect("joined") == std::fs::read(&whole).expect("whole");
-            // Where crops overlap, the sums of a PNG cannot be derived from its parts.
+            // Where crops overlap, the sums of a developed picture cannot be derived from its parts.
             assert_eq!(same, figures || extension == "exr", "{extension} {windows:?}");
-            assert_eq!(known.is_some(), figures && extension == "png");
+            assert_eq!(known.is_some(), figures && extension != "exr");
             let (a, b) = (verify(&joined).expect("whole"), verify(&whole).expect("whole"));
             assert_eq!((a.size, a.window, a.scene), (b.size, b.window, b.scene));
         }
@@ -355,7 +363,7 @@ fn parts_that_make_no_whole_are_refused() {
 fn a_file_that_is_cut_anywhere_is_refused() {
     let (subject, dir) =
         (Subject::new("front", &["image.width=9", "image.height=7"]), tempdir().expect("a folder"));
-    for extension in ["png", "exr"] {
+    for extension in ["png", "jpg", "tif", "webp", "exr"] {
         let path = dir.path().join(format!("x.{extension}"));
         subject.write(&path, subject.whole(), &[7]);
         verify(&path).expect("whole");
@@ -372,13 +380,14 @@ fn a_file_that_is_cut_anywhere_is_refused() {
 }
 
 #[test]
-fn a_changed_byte_of_a_png_is_seen_and_one_of_an_exr_does_no_harm() {
+fn a_changed_byte_is_seen_or_changes_nothing_or_belongs_to_an_exr_and_does_no_harm() {
     let (subject, dir) =
         (Subject::new("front", &["image.width=9", "image.height=7"]), tempdir().expect("a folder"));
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(3);
-    for extension in ["png", "exr"] {
+    for extension in ["png", "jpg", "tif", "webp", "exr"] {
         let path = dir.path().join(format!("x.{extension}"));
         subject.write(&path, subject.whole(), &[7]);
+        let (whole, picture) = (verify(&path).expect("whole"), read_picture(&path).ok());
         let bytes = std::fs::read(&path).expect("read");
         let flipped = dir.path().join("flipped");
         let mut unseen = 0;
@@ -395,11 +404,16 @@ fn a_changed_byte_of_a_png_is_seen_and_one_of_an_exr_does_no_harm() {
             match verify(&flipped) {
                 Err(Error::Input { .. }) => {}
                 Err(e) => panic!("{extension} byte {round}: {e}"),
-                Ok(_) => unseen += 1,
+                Ok(verified) => {
+                    unseen += 1;
+                    let same = verified == whole && read_picture(&flipped).ok() == picture;
+                    assert!(same || extension == "exr", "{extension} byte {round}");
+                }
             }
             let _ = figures_of(&flipped);
         }
-        assert!(extension == "exr" || unseen == 0, "{unseen} of {} unseen", bytes.len());
+        let may_be_unseen = !["png", "jpg"].contains(&extension);
+        assert!(may_be_unseen || unseen == 0, "{unseen} of {} unseen", bytes.len());
     }
 }
 

@@ -3,5 +3,6 @@
 pub mod contact_sheet;
 pub mod difference;
 pub mod exr;
+pub mod formats;
 pub mod movie;
 pub mod streaks;

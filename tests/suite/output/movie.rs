@@ -6,7 +6,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use taki::output::movie::{Movie, MovieKind, MovieOptions};
+use taki::output::movie::{Codec, Movie, MovieKind, MovieOptions, Video, mark_of};
 use taki::util::error::{Error, Result};
 use taki::util::monitor::Monitor;
 use tempfile::{TempDir, tempdir};
@@ -18,6 +18,20 @@ const KINDS: [(MovieKind, &str); 4] = [
     (MovieKind::Webm, "m.webm"),
 ];
 
+/// Videos in all codecs and depths: file, codec, depth, and what ffprobe calls codec, profile, tag and
+/// samples.
+const VIDEOS: [(&str, Codec, u8, &str); 9] = [
+    ("m.mp4", Codec::H264, 8, "h264 High avc1 yuv420p"),
+    ("m.mp4", Codec::H264, 10, "h264 High 10 avc1 yuv420p10le"),
+    ("m.mp4", Codec::H265, 8, "hevc Main hvc1 yuv420p"),
+    ("m.mp4", Codec::H265, 10, "hevc Main 10 hvc1 yuv420p10le"),
+    ("m.mov", Codec::Prores, 10, "prores HQ apch yuv422p10le"),
+    ("m.mov", Codec::H264, 8, "h264 High avc1 yuv420p"),
+    ("m.mov", Codec::H265, 10, "hevc Main 10 hvc1 yuv420p10le"),
+    ("m.webm", Codec::Vp9, 8, "vp9 Profile 0 [0][0][0][0] yuv420p"),
+    ("m.webm", Codec::Vp9, 10, "vp9 Profile 2 [0][0][0][0] yuv420p10le"),
+];
+
 /// Largest mean absolute error of a channel of a video, in 255ths, from 4:2:0 and the encoder's quantiser.
 /// With the matrix of BT.601, or with full range taken for limited range, these frames would be off by 5 to
 /// 15.
@@ -27,7 +41,7 @@ const VIDEO_ERROR: f64 = 2.5;
 const GIF_ERROR: f64 = 4.0;
 
 fn options(size: [u32; 2], fps: f64, frames: u64) -> MovieOptions {
-    MovieOptions { size, fps, frames, repeat: true, mark: 7 }
+    MovieOptions { size, fps, frames, repeat: true, mark: 7, video: None }
 }
 
 /// Frame `i`: smooth and coloured, with a bright bar that moves down and a part that never changes.
@@ -154,7 +168,7 @@ fn a_video_has_the_exact_rate_of_film() {
 fn a_gif_of_few_colours_is_exact() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("m.gif");
-    let options = MovieOptions { size: [16, 16], fps: 10.0, frames: 3, repeat: false, mark: 7 };
+    let options = MovieOptions { size: [16, 16], fps: 10.0, frames: 3, repeat: false, mark: 7, video: None };
     let mut movie = Movie::create(&path, MovieKind::Gif, &options).unwrap();
     let shades = |i: u8| (0..=255).flat_map(|k: u8| [k / 4, k / 4 + i, 7]).collect::<Vec<u8>>();
     let frames = [shades(0), shades(1), shades(1)];
@@ -170,7 +184,7 @@ fn an_animated_png_keeps_every_bit() {
     let dir = tempdir().unwrap();
     let path = dir.path().join("m.apng");
     for (repeat, frames) in [(true, 5), (false, 2), (true, 1)] {
-        let options = MovieOptions { size: [19, 7], fps: 23.976, frames, repeat, mark: 7 };
+        let options = MovieOptions { size: [19, 7], fps: 23.976, frames, repeat, mark: 7, video: None };
         write(&path, MovieKind::Apng, &options).unwrap();
         let decoder = png::Decoder::new(BufReader::new(File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();
@@ -237,17 +251,117 @@ fn videos_decode_to_their_frames_by_their_own_tags() {
     }
 }
 
+/// Eight saturated colours in fields of 32×32, with the samples of a movie's depth.
+fn fields(options: &MovieOptions) -> (Vec<u16>, Vec<u8>) {
+    let colours: [[u16; 3]; 8] = [
+        [65_535, 0, 0],
+        [0, 65_535, 0],
+        [0, 0, 65_535],
+        [65_535, 65_535, 0],
+        [0, 60_000, 60_000],
+        [50_000, 0, 50_000],
+        [65_535, 65_535, 65_535],
+        [20_000, 40_000, 10_000],
+    ];
+    let samples: Vec<u16> = (0..32).flat_map(|_| colours.iter().flat_map(|c| c.repeat(32))).collect();
+    let deep = options.encoding().bits == 16;
+    let bytes =
+        samples.iter().flat_map(|x| if deep { x.to_be_bytes().to_vec() } else { vec![(x >> 8) as u8] });
+    let bytes = bytes.collect();
+    (samples, bytes)
+}
+
+#[test]
+fn every_codec_and_depth_says_what_it_holds_and_holds_it() {
+    let dir = tempdir().unwrap();
+    for (name, codec, bits, words) in VIDEOS {
+        let path = dir.path().join(name);
+        let kind = MovieKind::of(&path).unwrap();
+        let video = Some(Video { codec, bits });
+        assert!(kind.video(Some(codec), Some(bits)) == video);
+        let options = MovieOptions { video, ..options([256, 32], 24.0, 3) };
+        let (samples, bytes) = fields(&options);
+        let mut movie = Movie::create(&path, kind, &options).unwrap();
+        (0..3).for_each(|_| movie.push(&bytes).unwrap());
+        movie.finish().unwrap();
+        assert_eq!(mark_of(&path), Some(7), "{name} {codec:?}");
+        let fields = "stream=codec_name,profile,codec_tag_string,pix_fmt,color_range,color_space,\
+                      color_transfer,color_primaries";
+        let told = probe(&path, fields);
+        let value =
+            |key: &str| told.lines().find_map(|line| line.strip_prefix(&format!("{key}="))).unwrap_or("");
+        let got = ["codec_name", "profile", "codec_tag_string", "pix_fmt"].map(value).join(" ");
+        assert_eq!(got, words);
+        let colours = ["color_range", "color_space", "color_transfer", "color_primaries"].map(value);
+        assert_eq!(colours, ["tv", "bt709", "bt709", "bt709"], "{name} {codec:?} {bits}");
+        // Decoded by the stated matrix, whatever the player would guess.
+        let mut ffmpeg = Command::new("ffmpeg");
+        ffmpeg.args(["-loglevel", "error", "-nostdin", "-i"]).arg(&path);
+        let convert =
+            "scale=in_color_matrix=bt709:in_range=limited:out_range=full:flags=accurate_rnd+full_chroma_int";
+        ffmpeg.args(["-vf", convert, "-f", "rawvideo", "-pix_fmt", "rgb48be", "pipe:1"]);
+        let out = ffmpeg.output().expect("tests/run installs ffmpeg");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert_eq!(out.stdout.len(), 3 * samples.len() * 2);
+        let played: Vec<u16> = out.stdout.as_chunks::<2>().0.iter().map(|b| u16::from_be_bytes(*b)).collect();
+        for field in 0..8 {
+            // The middle of the field, away from the edges of chroma.
+            let at = 3 * (16 * 256 + 32 * field + 16);
+            for c in 0..3 {
+                let error = f64::from(played[at + c].abs_diff(samples[at + c])) / 257.0;
+                // BT.601 would be off by 20 to 50.
+                assert!(error <= 4.0, "{name} {codec:?} {bits}: field {field} channel {c} is off by {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_movie_of_ten_bits_has_more_steps_than_eight_can_hold() {
+    let dir = tempdir().unwrap();
+    for (name, codec, bits, _) in VIDEOS {
+        let path = dir.path().join(name);
+        let options = MovieOptions { video: Some(Video { codec, bits }), ..options([1024, 32], 24.0, 2) };
+        let deep = options.encoding().bits == 16;
+        assert_eq!(deep, bits == 10);
+        let row = (0..1024u32).map(|x| (x * 64) as u16);
+        let row: Vec<u8> = match deep {
+            true => row.flat_map(|x| x.to_be_bytes().repeat(3)).collect(),
+            false => row.flat_map(|x| [(x >> 8) as u8; 3]).collect(),
+        };
+        let mut movie = Movie::create(&path, MovieKind::of(&path).unwrap(), &options).unwrap();
+        (0..2).for_each(|_| movie.push(&row.repeat(32)).unwrap());
+        movie.finish().unwrap();
+        let mut ffmpeg = Command::new("ffmpeg");
+        ffmpeg.args(["-loglevel", "error", "-nostdin", "-i"]).arg(&path);
+        let out = ffmpeg.args(["-vf", "extractplanes=y", "-f", "rawvideo", "pipe:1"]).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let size = if bits == 8 { 1 } else { 2 };
+        let luma: std::collections::BTreeSet<&[u8]> = out.stdout[..1024 * size].chunks(size).collect();
+        // 8 bits of limited range have 220 steps.
+        assert_eq!(luma.len() > 400, deep, "{name} {codec:?} {bits}: {} steps", luma.len());
+    }
+}
+
 #[test]
 fn an_mp4_starts_with_its_index_and_holds_no_time() {
     let dir = tempdir().unwrap();
     let (a, b) = (dir.path().join("a.mp4"), dir.path().join("b.mp4"));
     let options = options([64, 64], 30.0, 4);
-    write(&a, MovieKind::Mp4, &options).unwrap();
-    write(&b, MovieKind::Mp4, &options).unwrap();
-    let bytes = fs::read(&a).unwrap();
-    let find = |word: &[u8]| bytes.windows(word.len()).position(|w| w == word).unwrap();
-    assert!(find(b"moov") < find(b"mdat"));
-    assert_eq!(bytes, fs::read(&b).unwrap(), "equal frames are equal files");
+    for (_, codec, bits, _) in VIDEOS.into_iter().filter(|(name, ..)| *name != "m.webm") {
+        let kind = if codec == Codec::Prores { MovieKind::Mov } else { MovieKind::Mp4 };
+        let options = MovieOptions { video: Some(Video { codec, bits }), ..options };
+        for path in [&a, &b] {
+            let mut movie = Movie::create(path, kind, &options).unwrap();
+            let deep = options.encoding().pixel_bytes() / 3;
+            (0..4).for_each(|i| movie.push(&frame(options.size, i).repeat(deep)).unwrap());
+            movie.finish().unwrap();
+        }
+        let bytes = fs::read(&a).unwrap();
+        let find = |word: &[u8]| bytes.windows(word.len()).position(|w| w == word).unwrap();
+        assert!(find(b"moov") < find(b"mdat"), "{codec:?}");
+        assert!(bytes == fs::read(&b).unwrap(), "equal frames are equal files: {codec:?} {bits}");
+    }
 }
 
 #[test]

@@ -139,7 +139,11 @@ fn a_lost_device_during_an_export_is_replaced_too() {
     let file = window.path("x.png");
     let scene = (**window.viewer().document().scene()).clone();
     window.viewer().worker().lose_device();
-    window.viewer().worker().export(taki::viewer::worker::Export { scene, paths: vec![file.clone()] });
+    window.viewer().worker().export(taki::viewer::worker::Export {
+        scene,
+        paths: vec![file.clone()],
+        depth: Default::default(),
+    });
     window.until("the export", |viewer| viewer.worker().state().exports_done == 1);
     let (width, height, _) = taki::output::frame::read_png(&file).expect("a picture");
     assert_eq!((width, height), (160, 90));

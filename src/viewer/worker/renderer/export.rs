@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::Renderer;
 use crate::engine::RenderOptions;
-use crate::job::{Still, check_bloom, strips};
+use crate::job::{Still, beside_encoders, check_bloom, strips};
 use crate::picture::Layer;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -35,7 +35,7 @@ impl Renderer {
     }
 
     fn export_files(&mut self, export: &Export) -> Result<()> {
-        let still = Still::create(&export.paths)?;
+        let still = Still::create(&export.paths)?.with_depth(export.depth);
         still.check_replaced()?;
         let request = Request {
             // No request is newer, so the volume of the export is never abandoned.
@@ -53,8 +53,10 @@ impl Renderer {
         let scene = &self.exposed(&export.scene, &volume, &mesh, u64::MAX)?;
         let image = &scene.image;
         let window = Window::whole([image.width, image.height]);
-        let strips = strips(scene, window, options.surface, self.memory)?;
-        if still.has_png() {
+        still.check(&image.look, window)?;
+        let memory = beside_encoders(self.memory, &still.formats(), window)?;
+        let strips = strips(scene, window, options.surface, memory)?;
+        if still.has_developed() {
             check_bloom(scene, window, strips.len())?;
         }
         let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;

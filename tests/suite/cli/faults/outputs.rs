@@ -248,6 +248,11 @@ fn a_picture_of_a_difference_a_volume_and_a_screenshot_replace_their_own_kind_al
         assert!(fs::metadata(&path).unwrap().len() > 50);
         at(command).done();
     }
+    for [command, path] in [["--difference", "d.exr"], ["--difference", "d"]] {
+        at(&["compare", "a.png", "b.png", command, path]).refused(2, &[path, "use .png, .jpg"]);
+    }
+    at(&["compare", "a.png", "b.png", "--difference", "d.webp"]).done();
+    assert!(fs::read(dir.path().join("d.webp")).unwrap().starts_with(b"RIFF"));
     // A folder that is missing is known before the window opens.
     if cfg!(feature = "viewer") {
         at(&["view", "front", "--exit-after", "1", "--screenshot", "none/s.png"])

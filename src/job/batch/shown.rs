@@ -1,0 +1,97 @@
+//! Finished pictures as they are shown, for movies and sheets, from whichever file holds them best.
+
+use std::path::Path;
+
+use super::Batch;
+use crate::output::frame::{Encoding, Format, read_exr, read_picture, rgb_rows, samples_of};
+use crate::picture::resolve::{Resolver, develop, srgb};
+use crate::picture::{Frame, Image, Layer};
+use crate::util::error::{Error, Result};
+use crate::util::window::Window;
+
+/// A picture as shown.
+pub(super) struct Shown {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// sRGB samples, as of [`samples_of`].
+    pub samples: Vec<u8>,
+}
+
+impl Batch {
+    /// Encoding of the pictures of a format.
+    pub(super) fn encoding(&self, format: Format) -> Encoding {
+        format.encoding(self.request.depth.bits, self.request.depth.linear)
+    }
+
+    /// Ranks a format as the source of a picture with `bits` per channel; the best is 0.
+    fn rank(&self, format: Format, bits: u8) -> u8 {
+        let Encoding { bits: own, linear } = self.encoding(format);
+        match format {
+            // It has no colour without this layer.
+            Format::Exr if !self.request.layers.contains(&Layer::Rgb) => 9,
+            Format::Exr if bits == 8 => 2,
+            Format::Exr => 1,
+            Format::Jpeg => 4,
+            _ if own == bits && !linear => 0,
+            _ if own == 16 => 2,
+            _ => 3,
+        }
+    }
+
+    /// Whether the pictures hold more than 8 bits of what is shown.
+    pub(super) fn has_deep_source(&self) -> bool {
+        self.formats().into_iter().any(|format| self.rank(format, 16) <= 2)
+    }
+
+    /// Reads a picture as shown, with `bits` per channel.
+    pub(super) fn shown(&self, number: usize, bits: u8) -> Result<Shown> {
+        let formats = self.formats();
+        let best = (0..formats.len()).min_by_key(|&i| self.rank(formats[i], bits)).unwrap_or(0);
+        let path = &self.files(number)[best];
+        let scene = self.scene(number)?;
+        let (image, window) = (&scene.image, self.window(&scene));
+        if formats[best] == Format::Exr {
+            return of_exr(path, image, window, bits);
+        }
+        let picture = read_picture(path)?;
+        let Encoding { bits: own, linear } = picture.encoding;
+        let size = [picture.width, picture.height];
+        let shown = picture.pixels.into_iter().map(|p| if linear { p.map(srgb) } else { p });
+        let samples = match bits {
+            8 if own == 8 => shown.flatten().map(|x| (x * 255.0).round() as u8).collect(),
+            8 => {
+                let resolver = Resolver::new(&image.look);
+                let width = picture.width.max(1);
+                let at = |i: u32| [window.x + i % width, window.y + i / width];
+                shown.zip(0..).flat_map(|(x, i)| resolver.bytes(x, at(i))).collect()
+            }
+            _ => shown.flatten().flat_map(|x| ((x * 65_535.0).round() as u16).to_be_bytes()).collect(),
+        };
+        Ok(Shown { size, samples })
+    }
+}
+
+/// Develops an EXR's colour, the part `window` of an image, as a picture file would hold it.
+fn of_exr(path: &Path, image: &Image, window: Window, bits: u8) -> Result<Shown> {
+    let (width, height, channels) = read_exr(path)?;
+    let channel = |name: &str| {
+        let values = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+        values.ok_or_else(|| {
+            Error::input(
+                format!("{} has no colour", path.display()),
+                format!("add {} to --layers, or write PNG files too", Layer::Rgb.name()),
+            )
+        })
+    };
+    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+    let mut frame = Frame::new(width, height, false);
+    frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
+    let whole = [image.width, image.height];
+    let samples = if bits == 8 {
+        develop(&mut frame, &image.look, window, whole);
+        rgb_rows(&frame)
+    } else {
+        samples_of(&frame, Encoding { bits, linear: false }, &image.look, window == Window::whole(whole))
+    };
+    Ok(Shown { size: [width, height], samples })
+}
