@@ -1,9 +1,11 @@
 //! Foundations that every other module builds on: errors, progress, random numbers, the disk cache, unit
-//! vectors, and parts of an image.
+//! vectors, parts of an image, colour spaces, and EXR files of any program.
 
 pub mod cache;
+pub mod colour;
 pub mod error;
 pub mod monitor;
+pub mod open_exr;
 pub mod random;
 pub mod unit;
 pub mod window;

@@ -1,16 +1,13 @@
 //! Environment maps in files: Radiance `.hdr` (RGBE, XYZE) and OpenEXR `.exr`.
 //!
-//! [`radiance`] and [`open_exr`] decode. [`channels`] finds the picture among the channels of an EXR, and
-//! [`colour`] leads from the file's colour space to linear Rec. 709, which a file without a word about its
-//! colours is taken for.
+//! [`radiance`] and [`open_exr`] decode. [`crate::util::colour`] leads from the file's colour space to linear
+//! Rec. 709, which a file without a word about its colours is taken for.
 //!
 //! Values of an `.hdr` file are divided by its EXPOSURE and COLORCORR. An alpha channel is ignored, because
 //! the colours of an EXR are multiplied by it already. Values below zero, which resampling leaves beside
 //! bright texels, are replaced by 0 and counted. An infinite value of an EXR becomes the largest that a half
 //! can hold. A file with a value that is not a number or larger than [`MAX_RADIANCE`] is refused.
 
-mod channels;
-mod colour;
 mod open_exr;
 mod radiance;
 
@@ -82,11 +79,6 @@ fn start_of(path: &Path, file: &mut BufReader<File>) -> Result<Vec<u8>> {
     let mut start = Vec::new();
     file.take(HEADER_BYTES).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
     Ok(start)
-}
-
-/// Says how many texels lie outside Rec. 709.
-fn outside(texels: u64) -> Option<String> {
-    (texels > 0).then(|| format!("{texels} texels lie outside Rec. 709: they were moved to its border"))
 }
 
 /// Turns an error of reading into one of the program. A file that ends too early or contains impossible

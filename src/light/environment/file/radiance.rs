@@ -10,9 +10,9 @@ use std::path::Path;
 use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
 
-use super::colour::{Curve, Primaries, Space};
-use super::{FileMap, bad, check_size, checked, outside, start_of};
+use super::{FileMap, bad, check_size, checked, start_of};
 use crate::light::environment::map::Map;
+use crate::util::colour::{Curve, Primaries, Space, outside};
 use crate::util::error::{Error, Result};
 
 /// Luminance of a unit of radiance, lm/W: XYZE holds cd/m².

@@ -8,12 +8,15 @@ use glam::{DMat3, DVec3};
 /// Chromaticities x, y of red, green, blue and white.
 pub type Primaries = [f64; 8];
 
+/// Primaries and white of Rec. 709.
 pub const REC709: Primaries = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329];
-const REC2020: Primaries = [0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329];
+/// Primaries and white of Rec. 2020.
+pub const REC2020: Primaries = [0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329];
 const P3_D65: Primaries = [0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329];
 const ADOBE_RGB: Primaries = [0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.329];
 const AP0: Primaries = [0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767];
-const AP1: Primaries = [0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767];
+/// Primaries and white of ACEScg.
+pub const AP1: Primaries = [0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767];
 /// The axes of CIE XYZ. Its values are those of the eye, whatever the white: they are not adapted.
 const XYZ: Primaries = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0 / 3.0, 1.0 / 3.0];
 /// Primaries that differ by less are the same: files hold them with three or four digits.
@@ -51,7 +54,9 @@ impl Curve {
 
 /// Curve and primaries that a name says. A name may say nothing of one of them.
 pub struct Named {
+    /// Curve of the values.
     pub curve: Curve,
+    /// Primaries and white.
     pub primaries: Option<Primaries>,
 }
 
@@ -96,6 +101,7 @@ pub fn named(name: &str) -> Option<Named> {
     some(curve, Some(primaries))
 }
 
+/// Whether two sets of primaries are the same, within the digits that files have.
 pub fn same(a: &Primaries, b: &Primaries) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME)
 }
@@ -118,6 +124,19 @@ fn xyz_from_rgb(p: &Primaries) -> Option<DMat3> {
 /// Adapts the white `from` to the white `to`.
 fn adapted(from: DVec3, to: DVec3) -> DMat3 {
     BRADFORD.inverse() * DMat3::from_diagonal((BRADFORD * to) / (BRADFORD * from)) * BRADFORD
+}
+
+/// Returns the matrix from linear Rec. 709 to other primaries, whose white is adapted by Bradford's
+/// transform. `None` if the primaries span no space.
+pub fn from_rec709(primaries: &Primaries) -> Option<DMat3> {
+    let xyz_from_other = xyz_from_rgb(primaries)?;
+    let white_of_other = adapted(white(&REC709), white(primaries));
+    Some(xyz_from_other.inverse() * white_of_other * xyz_from_rgb(&REC709)?)
+}
+
+/// Says how many texels lie outside Rec. 709.
+pub fn outside(texels: u64) -> Option<String> {
+    (texels > 0).then(|| format!("{texels} texels lie outside Rec. 709: they were moved to its border"))
 }
 
 /// Colour space of a file.
