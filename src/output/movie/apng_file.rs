@@ -49,7 +49,7 @@ impl ApngWriter {
 /// Returns 1 / `fps` as a fraction of two 16-bit numbers: the last convergent of its continued fraction that
 /// fits. Whole rates, 23.976 and 30000/1001 are exact. The relative error of a rate with many digits is less
 /// than 1/65535, which is ten milliseconds in eleven minutes.
-fn delay(fps: f64) -> [u16; 2] {
+pub(super) fn delay(fps: f64) -> [u16; 2] {
     let ([mut n, mut d], [mut n_before, mut d_before]) = ([1u64, 0u64], [0u64, 1u64]);
     let mut x = 1.0 / fps;
     loop {

@@ -120,12 +120,18 @@ fn absent(program: &Path, e: &std::io::Error) -> Error {
     }
 }
 
-/// Formats frames per second. Those of film and television that are 1000/1001 of a whole number, such as 24,
-/// are written as this fraction, which ffmpeg would not find in the float32 of the scene.
+/// Formats frames per second. Those of film and television are written as a fraction, which ffmpeg would not
+/// find in the float32 of the scene.
 fn rate(fps: f64) -> String {
+    film_rate(fps).map_or_else(|| fps.to_string(), |whole| format!("{whole}000/1001"))
+}
+
+/// Returns the whole number of which a rate of film and television is 1000/1001, such as 24; `None` for other
+/// rates.
+pub(super) fn film_rate(fps: f64) -> Option<u32> {
     let whole = (fps * 1.001).round();
     let is_fraction = fps.fract() != 0.0 && (whole * 1000.0 / 1001.0) as f32 == fps as f32;
-    if is_fraction { format!("{whole}000/1001") } else { fps.to_string() }
+    is_fraction.then_some(whole as u32)
 }
 
 /// Returns the arguments after those of [`quiet`]: frames on stdin, the file on stdout.

@@ -146,6 +146,18 @@ impl MovieKind {
     }
 }
 
+/// Returns frames per second as a fraction: 1000/1001 of a whole number where the rate is one of film and
+/// television.
+pub fn fraction(fps: f64) -> [u32; 2] {
+    match ffmpeg::film_rate(fps) {
+        Some(whole) => [whole * 1000, 1001],
+        None => {
+            let [seconds, parts] = apng_file::delay(fps).map(u32::from);
+            [parts, seconds]
+        }
+    }
+}
+
 /// Properties of a movie that are known before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovieOptions {
