@@ -5,6 +5,7 @@ mod budget;
 pub mod camera;
 pub mod develop;
 mod frame;
+mod gamut;
 mod grid;
 mod image;
 pub mod resolve;
@@ -15,5 +16,6 @@ pub use budget::{PICTURE_BYTES, canvas, canvas_bytes, check_image, target_bytes}
 pub use camera::Camera;
 pub use develop::{Develop, TONE_AGX, TONE_FILMIC};
 pub use frame::{Frame, Layer, Seconds, Surface};
+pub use gamut::Gamut;
 pub use grid::Grid;
 pub use image::{AutoExposure, Dither, Filter, Image, Look, Tone};

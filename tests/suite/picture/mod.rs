@@ -4,6 +4,7 @@
 pub mod alpha;
 pub mod bloom;
 pub mod filter;
+pub mod gamut;
 pub mod resolve;
 pub mod samples;
 pub mod white_balance;
