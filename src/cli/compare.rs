@@ -20,7 +20,7 @@ use crate::util::window::Window;
 #[derive(Args)]
 pub struct CompareArgs {
     /// Two pictures of the same size. PNG, JPEG, TIFF and WebP files are compared by encoded values (0 to 1),
-    /// EXR files by linear radiance. With --eye, any number of pictures, in order of time.
+    /// EXR files by linear radiance; those with alpha over black and over white. With --eye, any number of pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at
@@ -59,8 +59,15 @@ pub struct CompareArgs {
     json: bool,
 }
 
-/// Width, height, and R, G, B of each pixel.
-type Picture = (u32, u32, Vec<[f32; 3]>);
+/// A picture to compare.
+struct Picture {
+    /// Width and height, pixels.
+    size: [u32; 2],
+    /// R, G, B of each pixel, over black where they are transparent.
+    pixels: Vec<[f32; 3]>,
+    /// The same over white, if the picture has alpha.
+    over_white: Option<Vec<[f32; 3]>>,
+}
 
 pub fn run(args: &CompareArgs) -> Result<()> {
     if args.eye {
@@ -76,9 +83,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             check_replaced(path)?;
         }
     }
-    let (width, height, a) = read(path_a)?;
-    let (other_width, other_height, b) = read(path_b)?;
-    if (width, height) != (other_width, other_height) {
+    let (mut a, mut b) = (read(path_a)?, read(path_b)?);
+    let ([width, height], [other_width, other_height]) = (a.size, b.size);
+    if a.size != b.size {
         return Err(Error::Comparison(format!(
             "the pictures differ in size: {width}×{height} and {other_width}×{other_height}; render both at \
              the same size"
@@ -86,11 +93,22 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     one_kind(&args.files)?;
     let absolute = args.absolute.unwrap_or(if is_exr(path_a) { 1e-4 } else { 2.0 / 255.0 });
-    let d = Difference::new(width, &a, &b, Tolerance { relative: args.relative, absolute });
+    let tolerance = Tolerance { relative: args.relative, absolute };
+    let mut d = Difference::new(width, &a.pixels, &b.pixels, tolerance);
+    if a.over_white.is_some() || b.over_white.is_some() {
+        // Over black and over white, no difference of colour or alpha stays unseen.
+        let whites = [&a, &b].map(|p| p.over_white.clone().unwrap_or_else(|| p.pixels.clone()));
+        let white = Difference::new(width, &whites[0], &whites[1], tolerance);
+        if (white.outside, white.rmse) > (d.outside, d.rmse) {
+            d = white;
+            [a.pixels, b.pixels] = whites;
+        }
+    }
     if let Some(path) = &args.difference {
         let format = developed("--difference", path)?;
         let head = Head { format, encoding: Encoding::DISPLAY, size: [width, height], texts: Vec::new() };
-        let bytes = encode(&head, difference_picture(&a, &b, d.max)).map_err(|e| Error::write(path, e))?;
+        let bytes = encode(&head, difference_picture(&a.pixels, &b.pixels, d.max))
+            .map_err(|e| Error::write(path, e))?;
         Output::create(path)?.finish_with(&bytes)?;
     }
     let share = d.share_outside();
@@ -123,8 +141,8 @@ fn eye(args: &CompareArgs) -> Result<()> {
     let mut flicker = Flicker::default();
     let mut pictures = Vec::new();
     for path in &args.files {
-        let (width, height, pixels) = read(path)?;
-        let size = [width, height];
+        let Picture { size, pixels, .. } = read(path)?;
+        let [width, height] = size;
         let (first_size, part) = match first {
             Some(first) => first,
             None => *first.insert((size, part(args, size)?)),
@@ -213,9 +231,12 @@ fn one_kind(files: &[PathBuf]) -> Result<()> {
 fn read(path: &Path) -> Result<Picture> {
     std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !is_exr(path) {
-        let ReadPicture { width, height, encoding, pixels } = read_picture(path)?;
+        let picture = read_picture(path)?;
+        let ReadPicture { width, height, encoding, .. } = picture;
         let encoded = |p: [f32; 3]| if encoding.linear { p.map(srgb) } else { p };
-        return Ok((width, height, pixels.into_iter().map(encoded).collect()));
+        let over = |grey: f32| picture.over(grey).into_iter().map(encoded).collect();
+        let over_white = encoding.alpha.then(|| over(1.0));
+        return Ok(Picture { size: [width, height], pixels: over(0.0), over_white });
     }
     let (width, height, channels) = read_exr(path)?;
     let channel = |name: &str| {
@@ -227,7 +248,13 @@ fn read(path: &Path) -> Result<Picture> {
         })
     };
     let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-    Ok((width, height, r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect()))
+    let pixels: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+    // The colours of an EXR are multiplied by alpha.
+    let over_white = channel("A").ok().map(|alpha| {
+        let white = |(p, a): (&[f32; 3], &f32)| p.map(|x| x + 1.0 - a);
+        pixels.iter().zip(alpha).map(white).collect()
+    });
+    Ok(Picture { size: [width, height], pixels, over_white })
 }
 
 /// Draws the absolute difference of `a` and `b`, scaled so that `max` is 255.

@@ -84,7 +84,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     };
     check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
     let still = Still::create(&outputs)?.with_depth(args.depth.depth());
-    still.check(&scene.image.look, window)?;
+    still.check(&scene.image, window)?;
     if !args.overwrite {
         still.check_replaced()?;
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::output::frame::Format;
-use crate::picture::{Look, Tone};
+use crate::picture::{Image, Look, Tone};
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
@@ -48,6 +48,25 @@ impl Depth {
             return Err(Error::Usage(what));
         }
         Ok(())
+    }
+}
+
+/// Refuses files without an alpha channel for an image that has one.
+///
+/// # Errors
+/// [`Error::Usage`] for such a file.
+pub(crate) fn check_alpha<'a>(
+    image: &Image,
+    files: impl IntoIterator<Item = (&'a Path, Format)>,
+) -> Result<()> {
+    let mut files = files.into_iter();
+    match files.find(|(_, format)| image.alpha && !format.has_alpha()) {
+        Some((path, format)) => Err(Error::Usage(format!(
+            "-o {}: {} has no alpha channel, and image.alpha is true; write .png, .tif, .webp or .exr",
+            path.display(),
+            format.name()
+        ))),
+        None => Ok(()),
     }
 }
 

@@ -5,14 +5,14 @@ use std::io::{BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::{Depth, check_side};
+use super::{Depth, check_alpha, check_side};
 use crate::engine::RenderOptions;
 use crate::light::environment::Source;
 use crate::output::frame::{
     CROP_TEXT, Encoding, ExrWriter, FIGURES_TEXT, Figures, Format, Head, LINEAR_TEXT, Output, RowWriter,
     SCENE_TEXT, channel_names, crop_text, lines_of, samples_of,
 };
-use crate::picture::{Frame, Layer, Look, Seconds};
+use crate::picture::{Frame, Image, Layer, Look, Seconds};
 use crate::scene::{REFERENCES, Scene};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -108,12 +108,13 @@ impl Still {
         Still { depth, ..self }
     }
 
-    /// Checks that the formats can hold the part `window` of a picture with this look, in the chosen depth.
+    /// Checks that the formats can hold the part `window` of an image in the chosen depth, with its alpha.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a depth that does not suit, [`Error::CannotCreate`] for a part that is too large.
-    pub fn check(&self, look: &Look, window: Window) -> Result<()> {
-        self.depth.check(&self.formats(), look)?;
+    /// [`Error::Usage`] for a depth that does not suit, or a format without alpha, [`Error::CannotCreate`] for a part that is too large.
+    pub fn check(&self, image: &Image, window: Window) -> Result<()> {
+        self.depth.check(&self.formats(), &image.look)?;
+        check_alpha(image, self.outputs.iter().map(|(format, target)| (target.path(), *format)))?;
         self.outputs.iter().try_for_each(|(format, target)| check_side(target.path(), *format, window))
     }
 
@@ -162,7 +163,9 @@ impl Still {
             channels: channel_names(layers),
         };
         let Depth { bits, linear } = self.depth;
-        let encoded = |(format, output): (Format, Target)| (format, output, format.encoding(bits, linear));
+        let alpha = scene.image.alpha;
+        let encoded =
+            |(format, output): (Format, Target)| (format, output, format.encoding(bits, linear, alpha));
         let sinks = self.outputs.into_iter().map(encoded);
         let sinks = sinks.map(|(format, output, encoding)| Sink::begin(format, output, encoding, &about));
         Ok(StillWriter {

@@ -205,7 +205,7 @@ impl Batch {
             return Ok(Some(format!("it is a {}", verified.format.name())));
         }
         if let Some((format, encoding)) = wanted.zip(verified.encoding) {
-            let wanted = self.encoding(format);
+            let wanted = self.encoding(format, scene.image.alpha);
             if encoding != wanted {
                 return Ok(Some(format!("it has {encoding}, but this picture has {wanted}")));
             }

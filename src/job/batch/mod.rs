@@ -33,7 +33,7 @@ use rayon::prelude::*;
 
 use assemble::MovieFile;
 
-use super::{Depth, Still, check_side};
+use super::{Depth, Still, check_alpha, check_side};
 use crate::engine::exposure::exposed;
 use crate::output::frame::{Format, Output, folder_of, real_file, remove_stale};
 use crate::output::movie::{Codec, MovieKind, Video};
@@ -342,6 +342,15 @@ impl Batch {
         let scene = self.scene(self.own().next().unwrap_or(0))?;
         let (window, formats) = (self.window(&scene), self.formats());
         self.request.depth.check(&formats, &scene.image.look)?;
+        let files = self.pictures.iter().filter_map(|pattern| Some((pattern.given(), pattern.format()?)));
+        check_alpha(&scene.image, files)?;
+        if let Some(movie) = self.movies.first().filter(|_| scene.image.alpha) {
+            return Err(Error::Usage(format!(
+                "-o {}: movies of taki have no alpha channel, and image.alpha is true; write .png, .tif, .webp \
+                 or .exr frames",
+                movie.pattern.given().display()
+            )));
+        }
         for pattern in &self.pictures {
             pattern.format().map_or(Ok(()), |format| check_side(pattern.given(), format, window))?;
         }

@@ -65,7 +65,7 @@ impl Batch {
         let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
         let bytes = |format: Format| match format {
             Format::Exr => 4 * channels as u64,
-            developed => self.encoding(developed).pixel_bytes() as u64,
+            developed => self.encoding(developed, scene.image.alpha).pixel_bytes() as u64,
         };
         let pixel: u64 = formats.into_iter().map(bytes).sum();
         // While a GIF is made, its frames wait uncompressed in a file beside it. Other movies are smaller

@@ -18,14 +18,14 @@ pub(super) struct Shown {
 }
 
 impl Batch {
-    /// Encoding of the pictures of a format.
-    pub(super) fn encoding(&self, format: Format) -> Encoding {
-        format.encoding(self.request.depth.bits, self.request.depth.linear)
+    /// Encoding of the pictures of a format, with `alpha` if they have it.
+    pub(super) fn encoding(&self, format: Format, alpha: bool) -> Encoding {
+        format.encoding(self.request.depth.bits, self.request.depth.linear, alpha)
     }
 
     /// Ranks a format as the source of a picture with `bits` per channel; the best is 0.
     fn rank(&self, format: Format, bits: u8) -> u8 {
-        let Encoding { bits: own, linear } = self.encoding(format);
+        let Encoding { bits: own, linear, .. } = self.encoding(format, false);
         match format {
             // It has no colour without this layer.
             Format::Exr if !self.request.layers.contains(&Layer::Rgb) => 9,
@@ -54,14 +54,15 @@ impl Batch {
             return of_exr(path, image, window, bits);
         }
         let picture = read_picture(path)?;
-        let Encoding { bits: own, linear } = picture.encoding;
+        let Encoding { bits: own, linear, .. } = picture.encoding;
         let size = [picture.width, picture.height];
-        let shown = picture.pixels.into_iter().map(|p| if linear { p.map(srgb) } else { p });
+        let width = picture.width.max(1);
+        // A picture with alpha is shown over black.
+        let shown = picture.over(0.0).into_iter().map(|p| if linear { p.map(srgb) } else { p });
         let samples = match bits {
             8 if own == 8 => shown.flatten().map(|x| (x * 255.0).round() as u8).collect(),
             8 => {
                 let resolver = Resolver::new(&image.look);
-                let width = picture.width.max(1);
                 let at = |i: u32| [window.x + i % width, window.y + i / width];
                 shown.zip(0..).flat_map(|(x, i)| resolver.bytes(x, at(i))).collect()
             }
@@ -91,7 +92,12 @@ fn of_exr(path: &Path, image: &Image, window: Window, bits: u8) -> Result<Shown>
         develop(&mut frame, &image.look, window, whole);
         rgb_rows(&frame)
     } else {
-        samples_of(&frame, Encoding { bits, linear: false }, &image.look, window == Window::whole(whole))
+        samples_of(
+            &frame,
+            Encoding { bits, ..Encoding::DISPLAY },
+            &image.look,
+            window == Window::whole(whole),
+        )
     };
     Ok(Shown { size: [width, height], samples })
 }

@@ -138,12 +138,12 @@ impl Format {
     }
 
     /// Returns the encoding of a developed picture: with `bits` per channel if the format has that depth. A
-    /// linear one has 16.
-    pub fn encoding(self, bits: Option<u8>, linear: bool) -> Encoding {
+    /// linear one has 16. It has `alpha` if the format can hold it.
+    pub fn encoding(self, bits: Option<u8>, linear: bool, alpha: bool) -> Encoding {
         let depths = self.depths();
         let wanted = if linear { Some(16) } else { bits };
         let bits = wanted.filter(|bits| depths.contains(bits)).or(depths.first().copied()).unwrap_or(8);
-        Encoding { bits, linear: linear && bits == 16 }
+        Encoding { bits, linear: linear && bits == 16, alpha: alpha && self.has_alpha() }
     }
 
     /// Returns the largest side, pixels: that of the format, or of its encoder.
@@ -160,7 +160,7 @@ impl Format {
     pub fn held_bytes(self) -> u64 {
         match self {
             Format::Jpeg => 3 + 3,
-            Format::Webp => 3 + 4 + 4,
+            Format::Webp => 4 + 4 + 4,
             _ => 0,
         }
     }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::texts::{Texts, bad};
 use super::writer::{Head, Rows, encode};
-use super::{Encoding, Format, MAX_SIDE, rgb_rows};
+use super::{Encoding, Format, MAX_SIDE};
 use crate::picture::Frame;
 use crate::util::error::{Error, Result};
 
@@ -24,7 +24,7 @@ const LINEAR_CODE_POINTS: [u8; 4] = [1, 8, 0, 1];
 pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result<()> {
     let [width, height] = head.size;
     let mut encoder = png::Encoder::new(out, width, height);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(if head.encoding.alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_depth(if head.encoding.bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     if head.encoding.linear {
         encoder.set_source_gamma(png::ScaledFloat::new(1.0));
@@ -61,13 +61,15 @@ pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result
 /// # Errors
 /// Errors of the encoder, such as a text that PNG does not allow.
 pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> io::Result<Vec<u8>> {
+    let encoding = Encoding { alpha: frame.alpha.is_some(), ..Encoding::DISPLAY };
     let head = Head {
         format: Format::Png,
-        encoding: Encoding::DISPLAY,
+        encoding,
         size: [frame.width, frame.height],
         texts: texts.iter().map(|(key, text)| (key.to_string(), text.to_string())).collect(),
     };
-    encode(&head, rgb_rows(frame))
+    let channels = encoding.channels();
+    encode(&head, frame.picture.iter().flat_map(|p| p[..channels].iter().copied()).collect())
 }
 
 /// Whether a PNG says that its samples are linear.
@@ -157,15 +159,16 @@ impl PngRows {
         let info = decoder.read_header_info().map_err(|e| decoding(path, e))?;
         let [width, height] = [info.width, info.height];
         let bits = info.bit_depth as u8;
-        if info.color_type != png::ColorType::Rgb
+        let alpha = info.color_type == png::ColorType::Rgba;
+        if !(alpha || info.color_type == png::ColorType::Rgb)
             || !Format::Png.depths().contains(&bits)
             || info.interlaced
             || width.max(height) > MAX_SIDE
         {
-            return Err(bad(path, "not a picture of taki (8 or 16 bits RGB, not interlaced)"));
+            return Err(bad(path, "not a picture of taki (8 or 16 bits RGB or RGBA, not interlaced)"));
         }
         // Deflate expands a byte to at most 1032.
-        let row_bytes = u64::from(width) * Encoding { bits, linear: false }.pixel_bytes() as u64 + 1;
+        let row_bytes = u64::from(width) * Encoding { bits, linear: false, alpha }.pixel_bytes() as u64 + 1;
         if row_bytes * u64::from(height) > bytes.saturating_mul(1032) {
             return Err(bad(path, format!("{bytes} bytes cannot hold {width}×{height} pixels")));
         }
@@ -173,7 +176,7 @@ impl PngRows {
         if reader.info().animation_control.is_some() {
             return Err(bad(path, "not a picture of taki (animated)"));
         }
-        let encoding = Encoding { bits, linear: says_linear(reader.info()) };
+        let encoding = Encoding { bits, linear: says_linear(reader.info()), alpha };
         Ok(PngRows { path: path.to_owned(), reader, read, bytes, encoding, size: [width, height] })
     }
 

@@ -21,6 +21,21 @@ pub struct ReadPicture {
     pub encoding: Encoding,
     /// R, G, B from 0 to 1, as they stand in the file, row by row.
     pub pixels: Vec<[f32; 3]>,
+    /// Alpha from 0 to 1, if the file has it; `pixels` are not multiplied by it.
+    pub alpha: Option<Vec<f32>>,
+}
+
+impl ReadPicture {
+    /// Returns the pixels over a grey backdrop, 0 to 1, as viewers mix them: in the file's values.
+    pub fn over(&self, grey: f32) -> Vec<[f32; 3]> {
+        match &self.alpha {
+            None => self.pixels.clone(),
+            Some(alpha) => {
+                let pixels = self.pixels.iter().zip(alpha);
+                pixels.map(|(p, a)| p.map(|x| x * a + grey * (1.0 - a))).collect()
+            }
+        }
+    }
 }
 
 /// Reads a PNG, JPEG, TIFF or WebP.
@@ -48,10 +63,15 @@ pub fn read_picture(path: &Path) -> Result<ReadPicture> {
         8
     };
     let linear = kind == image::ImageFormat::Png && png_file::is_linear(path)?;
+    let alpha = decoded
+        .color()
+        .has_alpha()
+        .then(|| decoded.to_rgba32f().pixels().map(|p| p.0[3]).collect::<Vec<f32>>());
     let rgb = decoded.into_rgb32f();
     let (width, height) = rgb.dimensions();
     let pixels = rgb.pixels().map(|p| p.0).collect();
-    Ok(ReadPicture { width, height, encoding: Encoding { bits, linear }, pixels })
+    let encoding = Encoding { bits, linear, alpha: alpha.is_some() };
+    Ok(ReadPicture { width, height, encoding, pixels, alpha })
 }
 
 /// Reads a picture as [`read_picture`] does. Returns width, height and pixels: RGB from 0 to 1, as they stand

@@ -54,8 +54,8 @@ impl PictureRows {
                 (Source::Tiff(Box::new(rows)), texts, encoding, size)
             }
             Format::Webp => {
-                let (texts, size, samples) = webp_file::read(path)?;
-                (Source::Samples(texts.clone(), samples, 0), texts, Encoding::DISPLAY, size)
+                let (texts, size, samples, encoding) = webp_file::read(path)?;
+                (Source::Samples(texts.clone(), samples, 0), texts, encoding, size)
             }
             Format::Jpeg => {
                 let (texts, size) = jpeg_file::verify(path)?;

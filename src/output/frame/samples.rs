@@ -12,15 +12,17 @@ pub struct Encoding {
     pub bits: u8,
     /// Whether samples are proportional to light. They are encoded by the curve of sRGB otherwise.
     pub linear: bool,
+    /// Whether alpha follows R, G, B, which are not multiplied by it. It is never encoded by a curve.
+    pub alpha: bool,
 }
 
 impl Encoding {
     /// 8 bits, as displays show them.
-    pub const DISPLAY: Encoding = Encoding { bits: 8, linear: false };
+    pub const DISPLAY: Encoding = Encoding { bits: 8, linear: false, alpha: false };
 
-    /// Number of channels: R, G, B.
+    /// Number of channels: R, G, B, and alpha if there is one.
     pub fn channels(self) -> usize {
-        3
+        3 + usize::from(self.alpha)
     }
 
     /// Bytes of a pixel.
@@ -31,7 +33,8 @@ impl Encoding {
 
 impl std::fmt::Display for Encoding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} bits{}", self.bits, if self.linear { ", linear" } else { "" })
+        let linear = if self.linear { ", linear" } else { "" };
+        write!(f, "{} bits{linear}{}", self.bits, if self.alpha { ", alpha" } else { "" })
     }
 }
 
@@ -40,24 +43,24 @@ impl std::fmt::Display for Encoding {
 /// image; linear ones without tone curve.
 pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, whole: bool) -> Vec<u8> {
     if encoding.bits == 8 {
-        return rgb_rows(frame);
+        return frame.picture.iter().flat_map(|p| p[..encoding.channels()].iter().copied()).collect();
     }
     let (resolver, lit) = (Resolver::new(look), lit(frame, look, whole));
     let mut samples = vec![0; frame.radiance.len() * encoding.pixel_bytes()];
     samples.par_chunks_mut(encoding.pixel_bytes()).enumerate().for_each(|(i, pixel)| {
         let light = lit(i);
-        let values = match encoding.linear {
+        let [r, g, b] = match encoding.linear {
             true => resolver.exposed(light).map(|x| x.min(1.0)),
             false => resolver.encoded(light),
         };
-        for (sample, value) in pixel.chunks_exact_mut(2).zip(values) {
+        for (sample, value) in pixel.chunks_exact_mut(2).zip([r, g, b, light[3]]) {
             sample.copy_from_slice(&((value * 65_535.0 + 0.5) as u16).to_be_bytes());
         }
     });
     samples
 }
 
-/// Returns the picture as R, G, B bytes.
+/// Returns the picture as R, G, B bytes, without alpha.
 pub fn rgb_rows(frame: &Frame) -> Vec<u8> {
     frame.picture.iter().flat_map(|p| [p[0], p[1], p[2]]).collect()
 }

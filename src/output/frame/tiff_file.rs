@@ -29,6 +29,8 @@ const STRIP_BYTES: usize = 1 << 20;
 /// Bytes of samples from which a file gets offsets of 64 bits. It leaves room for what compression adds and
 /// for the texts.
 const LARGE_BYTES: u64 = 0xF000_0000;
+/// Value of the tag of extra samples: colours are not multiplied by alpha.
+const UNASSOCIATED_ALPHA: u16 = 2;
 /// Memory limit for the texts and one strip of a file that is read, bytes.
 const READ_BYTES: usize = 256 << 20;
 /// Memory limit for the samples of a picture that is read as a whole, bytes.
@@ -148,6 +150,9 @@ where
     directory.write_tag(Tag::BitsPerSample, &vec![u16::from(head.encoding.bits); channels][..])?;
     directory.write_tag(Tag::SampleFormat, &vec![SampleFormat::Uint.to_u16(); channels][..])?;
     directory.write_tag(Tag::SamplesPerPixel, channels as u16)?;
+    if head.encoding.alpha {
+        directory.write_tag(Tag::ExtraSamples, UNASSOCIATED_ALPHA)?;
+    }
     directory.write_tag(Tag::PhotometricInterpretation, PhotometricInterpretation::RGB.to_u16())?;
     directory.write_tag(Tag::PlanarConfiguration, PlanarConfiguration::Chunky.to_u16())?;
     directory.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
@@ -232,13 +237,14 @@ impl TiffRows {
     pub fn open(path: &Path) -> Result<TiffRows> {
         let mut decoder = open(path, READ_BYTES)?;
         let (width, height) = decoder.dimensions().map_err(|e| decoding(path, e))?;
-        let bits = match decoder.colortype().map_err(|e| decoding(path, e))? {
-            tiff::ColorType::RGB(bits @ (8 | 16)) if width.max(height) <= MAX_SIDE => bits,
-            _ => return Err(bad(path, "not a picture of taki (8 or 16 bits RGB)")),
+        let (bits, alpha) = match decoder.colortype().map_err(|e| decoding(path, e))? {
+            tiff::ColorType::RGB(bits @ (8 | 16)) if width.max(height) <= MAX_SIDE => (bits, false),
+            tiff::ColorType::RGBA(bits @ (8 | 16)) if width.max(height) <= MAX_SIDE => (bits, true),
+            _ => return Err(bad(path, "not a picture of taki (8 or 16 bits RGB or RGBA)")),
         };
         let texts = texts_of(&mut decoder);
         let texts = texts.ok_or_else(|| bad(path, "not a picture of taki (it has no description)"))?;
-        let encoding = Encoding { bits, linear: texts.get(LINEAR_TEXT).is_some() };
+        let encoding = Encoding { bits, linear: texts.get(LINEAR_TEXT).is_some(), alpha };
         Ok(TiffRows {
             path: path.to_owned(),
             decoder,
@@ -331,7 +337,9 @@ pub(super) fn read(path: &Path) -> Result<ReadPicture> {
     };
     let pixel = |pixel: &[f32]| if channels == 1 { [pixel[0]; 3] } else { [pixel[0], pixel[1], pixel[2]] };
     let pixels = samples.chunks_exact(channels).map(pixel).collect();
-    Ok(ReadPicture { width, height, encoding: Encoding { bits, linear }, pixels })
+    let alpha = (channels == 4).then(|| samples.chunks_exact(4).map(|pixel| pixel[3]).collect());
+    let encoding = Encoding { bits, linear, alpha: alpha.is_some() };
+    Ok(ReadPicture { width, height, encoding, pixels, alpha })
 }
 
 /// Opens a file whose texts, and whose strips or whole picture, take at most `bytes` of memory.

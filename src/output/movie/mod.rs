@@ -202,7 +202,7 @@ impl MovieOptions {
     /// Returns the encoding of the samples that frames are given in. A video of more than 8 bits gets 16.
     pub fn encoding(&self) -> Encoding {
         let bits = if self.video.is_some_and(|video| video.bits > 8) { 16 } else { 8 };
-        Encoding { bits, linear: false }
+        Encoding { bits, ..Encoding::DISPLAY }
     }
 
     /// Returns the size of a frame, bytes.

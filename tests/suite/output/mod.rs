@@ -1,5 +1,6 @@
 //! Output files: pictures, movies, contact sheets.
 
+pub mod alpha_files;
 pub mod contact_sheet;
 pub mod difference;
 pub mod exr;

@@ -53,7 +53,7 @@ impl Renderer {
         let scene = &self.exposed(&export.scene, &volume, &mesh, u64::MAX)?;
         let image = &scene.image;
         let window = Window::whole([image.width, image.height]);
-        still.check(&image.look, window)?;
+        still.check(image, window)?;
         let memory = beside_encoders(self.memory, &still.formats(), window)?;
         let strips = strips(scene, window, options.surface, memory)?;
         if still.has_developed() {
