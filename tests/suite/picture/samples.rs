@@ -113,7 +113,7 @@ fn pictures_of_any_number_of_samples_register() {
         let scene = figure(1, samples);
         cpu::render(&scene, &volume, &mesh, false, &Unwatched).expect("a frame")
     };
-    let truth = render(256);
+    let truth = render(64);
     for samples in [1, 2, 3, 4, 8] {
         let shift = shift(&render(samples), &truth);
         assert!(shift[0].hypot(shift[1]) < 0.02, "{samples} samples lie off by {shift:?} pixels");
