@@ -79,7 +79,7 @@ pub fn layer() -> impl TypedValueParser<Value = Layer> {
 
 fn layer_help(layer: Layer) -> &'static str {
     match layer {
-        Layer::Rgb => "Linear radiance (channels R, G, B)",
+        Layer::Rgb | Layer::Rgba => "Linear radiance (channels R, G, B; with --alpha also A)",
         Layer::Depth => "Distance to the first surface in metres; 0 if there is none",
         Layer::Uv => "Texture coordinates (u, v) on the quad",
         Layer::Quad => "Number of the quad plus 1; 0 if there is none",

@@ -155,12 +155,13 @@ impl Still {
         window: Window,
         layers: &[Layer],
     ) -> Result<StillWriter> {
+        let layers: Vec<Layer> = layers.iter().map(|l| l.of_picture(scene.image.alpha)).collect();
         let about = About {
             whole: [scene.image.width, scene.image.height],
             window,
             // An edited scene has no values, so the picture tells no scene.
             scene: scene.values().is_some().then(|| metadata(scene, volume)),
-            channels: channel_names(layers),
+            channels: channel_names(&layers),
         };
         let Depth { bits, linear } = self.depth;
         let alpha = scene.image.alpha;
@@ -173,7 +174,7 @@ impl Still {
             whole: window == Window::whole(about.whole),
             look: scene.image.look,
             window,
-            layers: layers.to_vec(),
+            layers,
             rows: 0,
             figures: Figures::default(),
         })

@@ -155,6 +155,9 @@ impl Frame {
 pub enum Layer {
     /// Linear radiance: channels R, G, B.
     Rgb,
+    /// The same multiplied by alpha, and alpha: channels R, G, B, A. It takes the place of `Rgb` in a picture
+    /// with an alpha channel; see [`Layer::of_picture`].
+    Rgba,
     /// Distance to the first surface in metres; 0 in the background.
     Depth,
     /// Texture coordinates on the nearest quad.
@@ -170,7 +173,7 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// All layers; the default for an EXR file.
+    /// All layers that can be asked for; the default for an EXR file.
     pub const ALL: [Layer; 7] =
         [Layer::Rgb, Layer::Depth, Layer::Uv, Layer::Quad, Layer::Transmittance, Layer::Cells, Layer::Normal];
 
@@ -179,10 +182,15 @@ impl Layer {
         matches!(self, Layer::Depth | Layer::Uv | Layer::Quad | Layer::Normal)
     }
 
+    /// Returns the layer as a picture with or without an `alpha` channel has it.
+    pub fn of_picture(self, alpha: bool) -> Layer {
+        if self == Layer::Rgb && alpha { Layer::Rgba } else { self }
+    }
+
     /// Name of the layer on the command line.
     pub fn name(self) -> &'static str {
         match self {
-            Layer::Rgb => "rgb",
+            Layer::Rgb | Layer::Rgba => "rgb",
             Layer::Depth => "depth",
             Layer::Uv => "uv",
             Layer::Quad => "quad",
@@ -196,6 +204,7 @@ impl Layer {
     pub fn channels(self) -> &'static [&'static str] {
         match self {
             Layer::Rgb => &["R", "G", "B"],
+            Layer::Rgba => &["R", "G", "B", "A"],
             Layer::Depth => &["depth.Z"],
             Layer::Uv => &["uv.U", "uv.V"],
             Layer::Quad => &["quad.ID"],
@@ -211,7 +220,8 @@ impl Layer {
             frame.surface.as_ref().map_or(0.0, |s| get(s, channel, i))
         };
         match self {
-            Layer::Rgb => frame.radiance[i][channel],
+            Layer::Rgba if channel == 3 => frame.alpha.as_ref().map_or(1.0, |alpha| alpha[i]),
+            Layer::Rgb | Layer::Rgba => frame.radiance[i][channel],
             Layer::Depth => surface(|s, _, i| s.depth[i]),
             Layer::Uv => surface(|s, c, i| s.uv[i][c]),
             Layer::Quad => surface(|s, _, i| s.quad[i] as f32),

@@ -56,7 +56,7 @@ pub enum Legend {
 pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
     let samples = samples.max(1) as f32;
     let radiance = |i: usize| frame.radiance.get(i).copied().unwrap_or([0.0; 4]);
-    if layer == Layer::Rgb {
+    if matches!(layer, Layer::Rgb | Layer::Rgba) {
         let pixels = draw(frame, |i| {
             let is_finite = radiance(i).iter().all(|x| x.is_finite());
             Some(if is_finite { frame.picture[i] } else { NON_FINITE })
@@ -102,7 +102,7 @@ pub fn layer_image(frame: &Frame, layer: Layer, samples: u32) -> LayerImage {
             LayerImage { pixels, legend: Legend::Normal }
         }
         (Layer::Quad, Some(surface)) => quad_image(frame, surface),
-        (Layer::Rgb, Some(_)) => none(),
+        (Layer::Rgb | Layer::Rgba, Some(_)) => none(),
     }
 }
 

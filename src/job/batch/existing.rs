@@ -211,8 +211,8 @@ impl Batch {
             }
         }
         if verified.format == Format::Exr {
-            let mut wanted: Vec<&str> =
-                self.request.layers.iter().flat_map(|l| l.channels()).copied().collect();
+            let layers = self.request.layers.iter().map(|l| l.of_picture(scene.image.alpha));
+            let mut wanted: Vec<&str> = layers.flat_map(|l| l.channels()).copied().collect();
             let mut have: Vec<&str> = verified.channels.iter().map(String::as_str).collect();
             wanted.sort_unstable();
             have.sort_unstable();

@@ -62,7 +62,8 @@ impl Batch {
             spare_for_rasters(memory, needed).min(rasters)
         };
         let memory_bytes = needed + kept_rasters + held_bytes(&formats, window);
-        let channels: usize = self.request.layers.iter().map(|l| l.channels().len()).sum();
+        let layers = self.request.layers.iter().map(|l| l.of_picture(scene.image.alpha));
+        let channels: usize = layers.map(|l| l.channels().len()).sum();
         let bytes = |format: Format| match format {
             Format::Exr => 4 * channels as u64,
             developed => self.encoding(developed, scene.image.alpha).pixel_bytes() as u64,

@@ -31,9 +31,10 @@ impl Frame {
         let fault = |e: &dyn std::fmt::Display| Error::write(&target, e.to_string());
         let file = BufWriter::new(output.file().try_clone().map_err(|e| fault(&e))?);
         let size = [self.width, self.height];
-        let mut writer = ExrWriter::new(file, size, Window::whole(size), &channel_names(layers), &[])
+        let layers: Vec<Layer> = layers.iter().map(|l| l.of_picture(self.alpha.is_some())).collect();
+        let mut writer = ExrWriter::new(file, size, Window::whole(size), &channel_names(&layers), &[])
             .map_err(|e| fault(&e))?;
-        for line in lines_of(self, layers, 0..self.height) {
+        for line in lines_of(self, &layers, 0..self.height) {
             writer.push(line).map_err(|e| fault(&e))?;
         }
         writer.finish().map_err(|e| fault(&e))?;

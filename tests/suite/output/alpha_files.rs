@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use taki::output::frame::{ReadPicture, read_picture, verify};
+use taki::output::frame::{ReadPicture, read_exr, read_picture, verify};
 use tempfile::tempdir;
 
 use crate::cli::faults::{Run, run, taki};
@@ -65,6 +65,29 @@ fn a_linear_picture_over_a_backdrop_is_the_picture_with_it() {
         let near = (0..3).all(|c| (got[c] - want[c]).abs() <= 2.0 / 65_535.0);
         assert!(near, "{got:?} for {want:?}");
     }
+}
+
+#[test]
+fn an_exr_holds_colour_multiplied_by_alpha() {
+    let dir = tempdir().unwrap();
+    render(dir.path(), &["-o", "with.exr"]).done();
+    render(dir.path(), &["-o", "apart.exr", "--alpha"]).done();
+    let read = |name: &str| {
+        let (_, _, channels) = read_exr(&dir.path().join(name)).expect(name);
+        move |wanted: &str| channels.iter().find(|(name, _)| name == wanted).map(|(_, values)| values.clone())
+    };
+    let (with, apart) = (read("with.exr"), read("apart.exr"));
+    assert!(with("A").is_none());
+    let alpha = apart("A").expect("alpha");
+    for name in ["R", "G", "B"] {
+        let (want, got) = (with(name).unwrap(), apart(name).unwrap());
+        for ((got, alpha), want) in got.iter().zip(&alpha).zip(&want) {
+            assert!((got + (1.0 - alpha) * 0.25 - want).abs() < 2e-6, "{name}: {got}, {alpha} for {want}");
+        }
+    }
+    let compare = |a: &str, b: &str| run(taki(["compare", a, b]).current_dir(dir.path()));
+    compare("apart.exr", "apart.exr").done();
+    compare("with.exr", "apart.exr").refused(1, &["tolerance"]);
 }
 
 #[test]
