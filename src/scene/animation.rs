@@ -1,7 +1,8 @@
 //! A scene in time, as one scene for each frame.
 //!
 //! The scene of a frame depends only on the animation and the number of the frame. In a loop of N frames,
-//! frame f is frame f mod N, so frame N equals frame 0 to the last bit. Frames before 0 are as good as others.
+//! frame f is frame f mod N, so frame N equals frame 0 to the last bit. Frames before 0 are as good
+//! as others.
 
 use std::path::{Path, PathBuf};
 

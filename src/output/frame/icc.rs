@@ -6,6 +6,10 @@ use moxcms::{ColorProfile, LocalizableString, ProfileText, ToneReprCurve};
 
 /// Place of the profile's date in its header. The date would make the bytes of pictures differ.
 const DATE: std::ops::Range<usize> = 24..36;
+/// Place of the illuminant in the header.
+const ILLUMINANT: std::ops::Range<usize> = 68..80;
+/// D50 as the specification writes it, to the last bit, which strict readers compare.
+const D50: [u8; 12] = [0, 0, 0xf6, 0xd6, 0, 1, 0, 0, 0, 0, 0xd3, 0x2d];
 /// The first of January 2026, as six numbers of 16 bits.
 const FIXED_DATE: [u8; 12] = [0x07, 0xea, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0];
 
@@ -20,10 +24,16 @@ pub(super) fn profile(linear: bool) -> io::Result<Vec<u8>> {
     if linear {
         let curve = || Some(ToneReprCurve::Lut(Vec::new()));
         (profile.red_trc, profile.green_trc, profile.blue_trc) = (curve(), curve(), curve());
-        let name = LocalizableString::new("en".into(), "US".into(), "Linear Rec. 709".into());
-        profile.description = Some(ProfileText::Localizable(vec![name]));
     }
+    // The encoder does not align what follows a text, so texts have an even number of letters.
+    let text = |text: &str| {
+        let text = LocalizableString::new("en".into(), "US".into(), text.into());
+        Some(ProfileText::Localizable(vec![text]))
+    };
+    profile.description = text(if linear { "sRGB, linear" } else { "sRGB" });
+    profile.copyright = text("No copyright");
     let mut bytes = profile.encode().map_err(|e| io::Error::other(e.to_string()))?;
     bytes[DATE].copy_from_slice(&FIXED_DATE);
+    bytes[ILLUMINANT].copy_from_slice(&D50);
     Ok(bytes)
 }

@@ -9,8 +9,8 @@ use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
 impl Frame {
-    /// Writes the picture as an 8-bit sRGB PNG. The file appears whole or not at all, and replaces any file of
-    /// this name, whatever it holds.
+    /// Writes the picture as an 8-bit sRGB PNG. The file appears whole or not at all, and replaces any file
+    /// of this name, whatever it holds.
     ///
     /// # Errors
     /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.
@@ -20,8 +20,8 @@ impl Frame {
         output.finish_with(&bytes)
     }
 
-    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all, and replaces any file of
-    /// this name, whatever it holds. A layer of the raster pass that the frame was rendered without is 0.
+    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all, and replaces any file
+    /// of this name, whatever it holds. A layer of the raster pass that the frame was rendered without is 0.
     ///
     /// # Errors
     /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.

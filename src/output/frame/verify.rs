@@ -28,12 +28,11 @@ pub struct Verified {
 
 /// Decodes a whole file that this program wrote, in constant memory.
 ///
-/// A PNG has checksums over everything, so a missing, changed or added byte is always detected. A JPEG has one
-/// over all that follows its texts; in them a change is detected where it makes another scene. TIFF and WebP
-/// have one over the samples; a change elsewhere that leaves them as they are is not detected. An EXR has
-/// none. Missing and added bytes are detected, and changes to the structure of the header, to the table of
-/// lines, and to the position, length or run lengths of a line. A change to the value of a sample or inside a
-/// text is not detected.
+/// A PNG has checksums over everything, so a missing, changed or added byte is always detected, and so it is
+/// in a JPEG. TIFF and WebP have a checksum over samples and texts; a change that leaves both as they are is
+/// not detected. An EXR has none. Missing and added bytes are detected, and changes to the structure of the
+/// header, to the table of lines, and to the position, length or run lengths of a line. A change to the value
+/// of a sample or inside a text is not detected.
 ///
 /// # Errors
 /// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it cannot be

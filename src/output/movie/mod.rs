@@ -325,6 +325,11 @@ fn check(path: &Path, kind: MovieKind, options: &MovieOptions) -> Result<()> {
             "give at least 1 of each".into(),
         );
     }
+    let least = if video.is_some_and(|video| video.codec == Codec::H265) { 16 } else { 1 };
+    if width.min(height) < least {
+        let why = format!("{width}x{height} is less than the {least} pixels a side that H.265 needs");
+        return fail(why, "make the frames larger, or choose another codec".into());
+    }
     if width.max(height) > side {
         let why = format!("{width}x{height} is more than the {side} pixels a side of {name}");
         return fail(why, "make the frames smaller".into());

@@ -128,7 +128,7 @@ fn chunks(png: &[u8]) -> Vec<(String, Vec<u8>)> {
     }
 }
 
-/// The profile of a JPEG, TIFF or WebP.
+/// The profile of a JPEG, TIFF or WebP, of which strict readers such as libpng have nothing to complain.
 fn profile(path: &Path) -> moxcms::ColorProfile {
     let icc = match Format::of(path).expect("a format") {
         Format::Tiff => {
@@ -141,6 +141,12 @@ fn profile(path: &Path) -> moxcms::ColorProfile {
             decoder.icc_profile().unwrap().expect("a profile")
         }
     };
+    let number = |at: usize| u32::from_be_bytes(icc[at..at + 4].try_into().unwrap());
+    assert_eq!(number(0) as usize, icc.len());
+    assert_eq!([68, 72, 76].map(number), [0xf6d6, 0x10000, 0xd32d], "D50");
+    for tag in 0..number(128) as usize {
+        assert_eq!(number(132 + 12 * tag + 4) % 4, 0, "tag {tag} of {} is aligned", path.display());
+    }
     moxcms::ColorProfile::new_from_slice(&icc).expect("a profile")
 }
 

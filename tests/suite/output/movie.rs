@@ -380,7 +380,15 @@ fn what_a_format_cannot_hold_is_known_before_work() {
         (MovieKind::Gif, at("absent/m.gif"), options([8, 8], 24.0, 1), "make the folder"),
         (MovieKind::Mp4, at("absent/m.mp4"), options([8, 8], 24.0, 1), "make the folder"),
     ];
-    for (kind, path, options, words) in cases {
+    let video =
+        |codec, bits| MovieOptions { video: Some(Video { codec, bits }), ..options([32, 15], 24.0, 1) };
+    let videos = [
+        (MovieKind::Mp4, at("m.mp4"), video(Codec::H265, 8), "32x15 is less than the 16 pixels a side"),
+        (MovieKind::Mp4, at("m.mp4"), video(Codec::Prores, 10), "MP4 cannot hold prores with 10 bits"),
+        (MovieKind::Mov, at("m.mov"), video(Codec::Prores, 8), "MOV cannot hold prores with 8 bits"),
+        (MovieKind::Gif, at("m.gif"), video(Codec::H264, 8), "GIF cannot hold h264"),
+    ];
+    for (kind, path, options, words) in cases.into_iter().chain(videos) {
         let e = Movie::create(&path, kind, &options).err().expect(words);
         assert_eq!(e.exit_code(), 73, "{e}");
         assert!(e.to_string().contains(words), "{e}");

@@ -5,7 +5,7 @@ use std::fs;
 use taki::output::frame::{Format, read_picture};
 
 use super::{EVENTS, batch, counts, files, folder};
-use crate::cli::faults::run;
+use crate::cli::faults::{run, taki};
 
 const KINDS: [&str; 5] = ["png", "jpg", "tif", "webp", "exr"];
 
@@ -139,5 +139,29 @@ fn movies_and_sheets_are_made_of_any_format() {
         let other = format!("b{pattern}");
         let again = ["--sweep", "h=0.5,1", "-o", &other, "--sheet", &sheet, "--manifest", "m.csv"];
         run(&mut batch(sheets.path(), again)).done();
+    }
+}
+
+#[test]
+fn a_video_of_ten_bits_is_made_of_deep_pictures_or_warned_of() {
+    let dir = folder();
+    let movie = |more: &[&str]| {
+        let small = ["batch", "front", "--engine", "cpu", "--size", "16x16", "--samples=1"];
+        let mut command = taki(small);
+        let made = run(command.args(["--frames", "0-1", "-o", "m.mov"]).args(more).current_dir(dir.path()));
+        let warned =
+            made.stderr().contains("m.mov is made of pictures with 8 bits per channel; add --bits 16");
+        (made.exit_code(), warned)
+    };
+    assert_eq!(movie(&[]), (Some(0), false), "straight from the renderer");
+    let straight = fs::read(dir.path().join("m.mov")).unwrap();
+    assert_eq!(movie(&[]), (Some(0), false), "the same movie is kept");
+    assert_eq!(movie(&["--codec", "h265"]).0, Some(73), "another codec is another movie");
+    assert_eq!(movie(&["--codec", "h265", "--overwrite"]), (Some(0), false));
+    assert_eq!(movie(&["-o", "a.####.png", "--overwrite"]), (Some(0), true));
+    assert_ne!(fs::read(dir.path().join("m.mov")).unwrap(), straight, "the steps of 8 bits");
+    for deep in [&["-o", "b.####.png", "--bits", "16"][..], &["-o", "b.####.tif"], &["-o", "b.####.exr"]] {
+        assert_eq!(movie(&[deep, &["--overwrite"]].concat()), (Some(0), false), "{deep:?}");
+        assert!(fs::read(dir.path().join("m.mov")).unwrap() == straight, "{deep:?}");
     }
 }
