@@ -10,7 +10,7 @@ use taki::{Engine, EngineChoice, Limits, RenderOptions, Unwatched};
 fn main() -> taki::Result<()> {
     let mut arguments = std::env::args().skip(1);
     let preset = arguments.next().unwrap_or("fig5".into());
-    let frames: u32 = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(8);
+    let frames: i32 = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(8);
 
     let sets =
         [format!("animate.frames={frames}"), format!("animate.turn={frames}"), "animate.speed=0".into()];

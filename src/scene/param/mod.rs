@@ -226,8 +226,8 @@ impl Param {
             Text(_) => "text".into(),
             Corners => format!("four points of three numbers, ±{}", number(POINT_MAX)),
             Frames => format!(
-                "at most {MAX_KEYFRAMES} whole numbers, -{MAX_FRAME} to {MAX_FRAME}, each larger than the one \
-                 before"
+                "at most {MAX_KEYFRAMES} whole numbers, -{MAX_FRAME} to {MAX_FRAME}, each larger than the \
+                 one before"
             ),
             Series => format!("at most {MAX_KEYFRAMES} values of one kind: numbers, triples or corners"),
         }
