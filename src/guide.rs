@@ -13,6 +13,7 @@ pages! {
     scenes_and_files "scenes-and-files.md"
     viewer "viewer.md"
     batch "batch.md"
+    compositing "compositing.md"
     farms "farms.md"
     speed "speed.md"
     architecture "architecture.md"
