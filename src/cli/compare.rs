@@ -20,7 +20,8 @@ use crate::util::window::Window;
 #[derive(Args)]
 pub struct CompareArgs {
     /// Two pictures of the same size. PNG, JPEG, TIFF and WebP files are compared by encoded values (0 to 1),
-    /// EXR files by linear radiance; those with alpha over black and over white. With --eye, any number of pictures, in order of time.
+    /// EXR files by linear radiance; those with alpha over black and over white. With --eye, any number of
+    /// pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at

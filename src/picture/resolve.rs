@@ -74,12 +74,12 @@ impl Resolver {
     }
 
     /// Develops one pixel: division by alpha, white balance, exposure, tone curve, sRGB encoding and rounding
-    /// to 8 bits. `lit` is R, G, B multiplied by alpha, and alpha, as of [`lit`]; the result is not multiplied.
+    /// to 8 bits. `light` is R, G, B multiplied by alpha, and alpha, see [`lit`]; the result is not multiplied.
     /// `at` is the pixel's column and row in the whole image, on which the dither depends.
-    pub fn pixel(&self, lit: [f32; 4], at: [u32; 2]) -> [u8; 4] {
-        let [r, g, b] = self.bytes(self.encoded(lit), at);
+    pub fn pixel(&self, light: [f32; 4], at: [u32; 2]) -> [u8; 4] {
+        let [r, g, b] = self.bytes(self.encoded(light), at);
         // Alpha is not dithered, so that what is solid or empty stays so.
-        [r, g, b, byte(lit[3], 0.5)]
+        [r, g, b, byte(light[3], 0.5)]
     }
 
     /// Rounds encoded values to 8 bits, dithered as in [`Resolver::pixel`].
@@ -89,8 +89,8 @@ impl Resolver {
     }
 
     /// Develops one pixel as [`Resolver::pixel`] does, without rounding: values for a display, 0 to 1.
-    pub fn encoded(&self, lit: [f32; 4]) -> [f32; 3] {
-        let x = self.exposed(lit);
+    pub fn encoded(&self, light: [f32; 4]) -> [f32; 3] {
+        let x = self.exposed(light);
         let encoded = match self.0.tone {
             TONE_AGX => agx(x),
             TONE_FILMIC => x.map(|x| srgb(filmic(x).clamp(0.0, 1.0))),

@@ -1,6 +1,6 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
-use super::param::{PARAMS, Param, last_part};
+use super::param::{Kind, PARAMS, Param, last_part};
 use super::value::{Place, Values};
 use crate::util::error::Error;
 
@@ -12,7 +12,7 @@ const ALIKE: f64 = 0.7;
 
 /// Returns the full key that `name` stands for: `name` itself, or the one key of the scene that ends with it.
 /// Parameters that a scene has once take precedence over those of lights, rocks and materials, and all of
-/// them over those of the animation.
+/// them over those of the animation. Switches come last: `alpha` is the paper's α, not that of the image.
 ///
 /// # Errors
 /// The candidates, where `name` can mean several.
@@ -20,7 +20,12 @@ pub fn full_key(name: &str, values: &Values) -> std::result::Result<String, Stri
     if name.is_empty() || name.contains('.') {
         return Ok(name.into());
     }
-    let keys: Vec<String> = values.known_keys().into_iter().filter(|key| last_part(key) == name).collect();
+    let mut keys: Vec<String> =
+        values.known_keys().into_iter().filter(|key| last_part(key) == name).collect();
+    let is_switch = |key: &String| Param::find(key).is_some_and(|p| matches!(p.kind, Kind::Switch(_)));
+    if !keys.iter().all(is_switch) {
+        keys.retain(|key| !is_switch(key));
+    }
     let (animated, still): (Vec<&str>, Vec<&str>) =
         keys.iter().map(String::as_str).partition(|key| key.starts_with("animate."));
     let all = if still.is_empty() { animated } else { still };

@@ -218,8 +218,8 @@ impl<'a> WindowFrame<'a> {
         }
     }
 
-    /// Radiance of the background along a ray, with distance and normal 0; in a picture with alpha only that of
-    /// the haze in front of it. Twin: `background_targets`.
+    /// Radiance of the background along a ray, with distance and normal 0; in a picture with alpha only that
+    /// of the haze in front of it. Twin: `background_targets`.
     fn shade_background(&self, d: Vec3) -> ([f32; 4], Vec4) {
         let radiance = match &self.scene.environment {
             _ if self.scene.image.alpha => Vec3::ZERO,

@@ -20,8 +20,8 @@ use crate::util::window::Window;
 /// for read-back, which is over by now.
 const BAND_BYTES: u64 = 32 << 20;
 
-/// Renders some pixels of a frame anew, given by their indices: radiance, alpha, counts and picture. They get the
-/// bits of [`super::render_with`]'s frame. The layers of the raster pass stay.
+/// Renders some pixels of a frame anew, given by their indices: radiance, alpha, counts and picture. They get
+/// the bits of [`super::render_with`]'s frame. The layers of the raster pass stay.
 ///
 /// # Errors
 /// Errors of `monitor`, which may stop the work.

@@ -25,7 +25,7 @@ fn load(preset: &str, text: &str, sets: &[&str], folder: &Path) -> Scene {
 
 /// Lamps around the middle of the preset's first quad.
 fn lamps(preset: &str, folder: &Path) -> String {
-    let quad = load(preset, "", &[], folder).quads[0].clone();
+    let quad = load(preset, "", &[], folder).quads[0];
     let middle = quad.map.point_world(0.5, 0.5);
     let lamp = |i: usize| {
         let (turn, height) = (i as f32 * 2.4, i as f32 / LAMPS as f32 - 0.5);
@@ -37,7 +37,7 @@ fn lamps(preset: &str, folder: &Path) -> String {
 
 /// Moves the eye so that it looks at the middle of the first quad at one degree to its face.
 fn graze(scene: &mut Scene) {
-    let map = scene.quads[0].map.clone();
+    let map = scene.quads[0].map;
     let (sin, cos) = 1f32.to_radians().sin_cos();
     let middle = map.point_world(0.5, 0.5);
     let camera = &mut scene.edit().camera;
