@@ -74,8 +74,8 @@ impl Resolver {
     }
 
     /// Develops one pixel: division by alpha, white balance, exposure, tone curve, sRGB encoding and rounding
-    /// to 8 bits. `light` is R, G, B multiplied by alpha, and alpha, see [`lit`]; the result is not multiplied.
-    /// `at` is the pixel's column and row in the whole image, on which the dither depends.
+    /// to 8 bits. `light` is R, G, B multiplied by alpha, and alpha, see [`lit`]; the result is not
+    /// multiplied. `at` is the pixel's column and row in the whole image, on which the dither depends.
     pub fn pixel(&self, light: [f32; 4], at: [u32; 2]) -> [u8; 4] {
         let [r, g, b] = self.bytes(self.encoded(light), at);
         // Alpha is not dithered, so that what is solid or empty stays so.

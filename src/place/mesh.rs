@@ -23,8 +23,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Makes a mesh of consecutive grids. `grids` are the squares on a side of each, powers of two, and whether
-    /// it is a holdout.
+    /// Makes a mesh of consecutive grids. `grids` are the squares on a side of each, powers of two, and
+    /// whether it is a holdout.
     pub fn new(vertices: Vec<Vertex>, grids: impl IntoIterator<Item = (u32, bool)>) -> Mesh {
         let tiles = tiles::cut(&vertices, grids.into_iter());
         Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }

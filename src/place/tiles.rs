@@ -45,8 +45,8 @@ pub struct Tile {
     lost: [Vec2; STEPS],
 }
 
-/// Cuts consecutive grids into tiles. `grids` are the squares on a side of each, powers of two, and whether it
-/// is a holdout.
+/// Cuts consecutive grids into tiles. `grids` are the squares on a side of each, powers of two, and whether
+/// it is a holdout.
 pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec<Tile> {
     let mut tiles = Vec::new();
     let mut first = 0;

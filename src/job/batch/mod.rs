@@ -346,8 +346,8 @@ impl Batch {
         check_alpha(&scene.image, files)?;
         if let Some(movie) = self.movies.first().filter(|_| scene.image.alpha) {
             return Err(Error::Usage(format!(
-                "-o {}: movies of taki have no alpha channel, and image.alpha is true; write .png, .tif, .webp \
-                 or .exr frames",
+                "-o {}: movies of taki have no alpha channel, and image.alpha is true; write .png, .tif, \
+                 .webp or .exr frames",
                 movie.pattern.given().display()
             )));
         }
