@@ -111,8 +111,8 @@ impl Still {
     /// Checks that the formats can hold the part `window` of an image in the chosen depth, with its alpha.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a depth that does not suit, or a format without alpha, [`Error::CannotCreate`] for
-    /// a part that is too large.
+    /// [`Error::Usage`] for a depth that does not suit, or a format without alpha, [`Error::CannotCreate`]
+    /// for a part that is too large.
     pub fn check(&self, image: &Image, window: Window) -> Result<()> {
         self.depth.check(&self.formats(), &image.look)?;
         check_alpha(image, self.outputs.iter().map(|(format, target)| (target.path(), *format)))?;
