@@ -2,7 +2,7 @@
 //! level.
 //!
 //! The display window is the picture, of which any area can be read. Pixels outside the data window are
-//! black, and data outside the area is cropped. [`channels`] finds the picture among the channels, and
+//! black, and data outside the area is cropped. `channels` finds the picture among the channels, and
 //! [`super::colour`] leads from the file's colour space to linear Rec. 709.
 
 mod channels;
