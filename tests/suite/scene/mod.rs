@@ -121,6 +121,15 @@ fn every_parameter_can_be_set_and_is_printed() {
     }
 }
 
+/// The word of `show` of a table that is a holdout or is not, or of one that the scene left out.
+fn shown(holdout: Option<bool>) -> &'static str {
+    match holdout {
+        None => "hidden",
+        Some(true) => "holdout",
+        Some(false) => "visible",
+    }
+}
+
 #[test]
 fn every_word_of_a_choice_gives_the_variant_of_its_name() {
     let dir = tempdir().unwrap();
@@ -144,6 +153,8 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "light.scattering" => scene.scattering.word(),
                 "light.visibility" => scene.visibility.word(),
                 "lights.*.kind" => scene.lights[0].kind().word(),
+                "pools.*.show" => shown(scene.pools.first().map(|pool| pool.holdout)),
+                "rocks.*.show" => shown(scene.rocks.first().map(|rock| rock.holdout)),
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),
                 "trace.filter" => scene.trace.filter.word(),
                 "trace.lookup" => scene.trace.lookup.word(),
