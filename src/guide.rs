@@ -11,6 +11,7 @@ pages! {
     method "method.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"
+    aces "aces.md"
     viewer "viewer.md"
     batch "batch.md"
     compositing "compositing.md"

@@ -6,14 +6,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::choice::{codec, layer, movie_bits};
+use super::choice::{codec, movie_bits};
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, DepthOptions, EngineOptions, SceneOptions};
+use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, measured_words, seconds, size, window};
 use crate::engine::Engine;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::output::movie::Codec;
-use crate::picture::Layer;
 use crate::scene::Animation;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -109,9 +108,8 @@ pub struct BatchArgs {
     movie_bits: Option<u8>,
     #[command(flatten)]
     engine: EngineOptions,
-    /// Layers of EXR files, separated by commas. Default: all. Example: --layers rgb,depth
-    #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
-    layers: Option<Vec<Layer>>,
+    #[command(flatten)]
+    layers: LayerOptions,
     /// Prints events on stdout while the batch runs, for other programs to read.
     #[arg(long, value_enum, value_name = "FORMAT")]
     events: Option<EventFormat>,
@@ -221,7 +219,7 @@ impl BatchArgs {
             keep_going: self.keep_going,
             retries: self.retries,
             crop,
-            layers: self.layers.clone().unwrap_or(Layer::ALL.to_vec()),
+            exr: self.layers.exr(),
             depth: self.depth.depth(),
             codec: self.codec,
             movie_bits: self.movie_bits,

@@ -4,6 +4,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::engine::EngineChoice;
+use crate::output::frame::Compression;
 use crate::output::movie::Codec;
 use crate::picture::Layer;
 #[cfg(feature = "viewer")]
@@ -70,6 +71,25 @@ pub fn window() -> impl TypedValueParser<Value = WindowChoice> {
     ])
 }
 
+/// Parser of `--compression`.
+pub fn compression() -> impl TypedValueParser<Value = Compression> {
+    let words =
+        Compression::ALL.map(|method| PossibleValue::new(method.word()).help(compression_help(method)));
+    PossibleValuesParser::new(words).try_map(|word| {
+        Compression::ALL.into_iter().find(|method| method.word() == word).ok_or("unknown compression")
+    })
+}
+
+fn compression_help(method: Compression) -> &'static str {
+    match method {
+        Compression::Zip => "Deflate, 16 lines at a time: the usual one",
+        Compression::Zips => "Deflate, line by line: less memory, and fast access to parts",
+        Compression::Piz => "Wavelets, 32 lines at a time: small where colours are grainy",
+        Compression::Rle => "Run lengths: the fastest",
+        Compression::None => "None: the largest files",
+    }
+}
+
 /// Parser of one word of `--layers`.
 pub fn layer() -> impl TypedValueParser<Value = Layer> {
     let words = Layer::ALL.map(|layer| PossibleValue::new(layer.name()).help(layer_help(layer)));
@@ -80,7 +100,7 @@ pub fn layer() -> impl TypedValueParser<Value = Layer> {
 fn layer_help(layer: Layer) -> &'static str {
     match layer {
         Layer::Rgb | Layer::Rgba => "Linear radiance (channels R, G, B; with --alpha also A)",
-        Layer::Depth => "Distance to the first surface in metres; 0 if there is none",
+        Layer::Depth => "Metres to the first surface, along the view (depth.Z) and the ray (distance.D)",
         Layer::Uv => "Texture coordinates (u, v) on the quad",
         Layer::Quad => "Number of the quad plus 1; 0 if there is none",
         Layer::Transmittance => "Transmittance of the volume, 0 to 1",

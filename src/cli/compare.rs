@@ -6,22 +6,25 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
-use super::terminal::say;
+use super::parse::memory;
+use super::terminal::{Terminal, say};
 use super::{crop, developed, window};
 use crate::job::check_replaced;
 use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
 use crate::output::frame::{
-    Difference, Encoding, Format, Head, Output, ReadPicture, Tolerance, encode, read_exr, read_picture,
+    Difference, Encoding, ExrColours, ExrPicture, Format, Head, Output, ReadPicture, Tolerance, encode,
+    read_picture,
 };
 use crate::picture::resolve::srgb;
 use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 
 #[derive(Args)]
 pub struct CompareArgs {
     /// Two pictures of the same size. PNG, JPEG, TIFF and WebP files are compared by encoded values (0 to 1),
-    /// EXR files by linear radiance; those with alpha over black and over white. With --eye, any number of
-    /// pictures, in order of time.
+    /// EXR files of any program by linear radiance in Rec. 709; those with alpha over black and over white.
+    /// With --eye, any number of pictures, in order of time.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at
@@ -55,6 +58,9 @@ pub struct CompareArgs {
     /// Also prints the streaks of N horizontal bands, from the top of the region to its bottom.
     #[arg(long, value_name = "N", default_value_t = 1, requires = "eye")]
     bands: u32,
+    /// Largest memory for one EXR file, such as 6GiB or 512MiB. A number alone counts MiB.
+    #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
+    memory: u64,
     /// Prints the figures as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -70,9 +76,11 @@ struct Picture {
     over_white: Option<Vec<[f32; 3]>>,
 }
 
-pub fn run(args: &CompareArgs) -> Result<()> {
+pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<()> {
+    let read_in = |area: Option<Window>| move |path: &Path| read(path, area, args.memory, terminal);
     if args.eye {
-        return eye(args);
+        one_kind(&args.files)?;
+        return eye(args, &read_in(area(&args.files)?));
     }
     let [path_a, path_b] = &args.files[..] else {
         let what = format!("{} pictures given; compare two, or use --eye for any number", args.files.len());
@@ -84,6 +92,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             check_replaced(path)?;
         }
     }
+    one_kind(&args.files)?;
+    let read = read_in(area(&args.files)?);
     let (mut a, mut b) = (read(path_a)?, read(path_b)?);
     let ([width, height], [other_width, other_height]) = (a.size, b.size);
     if a.size != b.size {
@@ -92,7 +102,6 @@ pub fn run(args: &CompareArgs) -> Result<()> {
              the same size"
         )));
     }
-    one_kind(&args.files)?;
     let absolute = args.absolute.unwrap_or(if is_exr(path_a) { 1e-4 } else { 2.0 / 255.0 });
     let tolerance = Tolerance { relative: args.relative, absolute };
     let mut d = Difference::new(width, &a.pixels, &b.pixels, tolerance);
@@ -136,26 +145,19 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 }
 
 /// Prints how the pictures look to the eye: streaks and flicker.
-fn eye(args: &CompareArgs) -> Result<()> {
-    one_kind(&args.files)?;
+fn eye(args: &CompareArgs, read: &dyn Fn(&Path) -> Result<Picture>) -> Result<()> {
     let mut first: Option<([u32; 2], Window)> = None;
     let mut flicker = Flicker::default();
     let mut pictures = Vec::new();
     for path in &args.files {
         let Picture { size, pixels, .. } = read(path)?;
-        let [width, height] = size;
+        let width = size[0];
         let (first_size, part) = match first {
             Some(first) => first,
             None => *first.insert((size, part(args, size)?)),
         };
         if first_size != size {
-            return Err(Error::Comparison(format!(
-                "{} has {width}×{height} pixels, but {} has {}×{}; render them at the same size",
-                path.display(),
-                args.files[0].display(),
-                first_size[0],
-                first_size[1]
-            )));
+            return Err(sizes_differ(path, size, &args.files[0], first_size));
         }
         let linear = |p: &[f32; 3]| luminance(if is_exr(path) { *p } else { p.map(decoded) });
         let luminances: Vec<f32> = pixels.iter().map(linear).collect();
@@ -228,32 +230,61 @@ fn one_kind(files: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
+/// Returns the part of the picture in which one of the EXR files has data; `None` without such files. The
+/// rest is black in all of them.
+fn area(files: &[PathBuf]) -> Result<Option<Window>> {
+    let mut all: Option<([u32; 2], Window)> = None;
+    for path in files.iter().filter(|path| is_exr(path)) {
+        let own = open(path)?;
+        all = Some(match all {
+            None => (own.size, own.data),
+            Some((size, _)) if size != own.size => return Err(sizes_differ(path, own.size, &files[0], size)),
+            Some((size, data)) => (size, data.around(&own.data)),
+        });
+    }
+    Ok(all.map(|(_, area)| area))
+}
+
+fn sizes_differ(path: &Path, size: [u32; 2], first: &Path, other: [u32; 2]) -> Error {
+    let [[width, height], [other_width, other_height]] = [size, other];
+    Error::Comparison(format!(
+        "{} has {width}×{height} pixels, but {} has {other_width}×{other_height}; render them at the same \
+         size",
+        path.display(),
+        first.display()
+    ))
+}
+
+fn open(path: &Path) -> Result<ExrColours> {
+    check_file(path)?;
+    ExrColours::open(path)
+}
+
+/// Refuses what is no regular file: a pipe without a writer would block for ever.
+fn check_file(path: &Path) -> Result<()> {
+    if std::fs::metadata(path).map_err(|e| Error::open(path, e))?.is_file() {
+        return Ok(());
+    }
+    Err(Error::input(format!("{} is not a regular file", path.display()), "give a PNG or EXR"))
+}
+
 /// Reads a picture: encoded values, or the linear radiance of an EXR.
-fn read(path: &Path) -> Result<Picture> {
-    std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
-    if !is_exr(path) {
+fn read(path: &Path, area: Option<Window>, memory: u64, terminal: &Terminal) -> Result<Picture> {
+    let Some(area) = area.filter(|_| is_exr(path)) else {
+        check_file(path)?;
         let picture = read_picture(path)?;
         let ReadPicture { width, height, encoding, .. } = picture;
         let encoded = |p: [f32; 3]| if encoding.linear { p.map(srgb) } else { p };
         let over = |grey: f32| picture.over(grey).into_iter().map(encoded).collect();
         let over_white = encoding.alpha.then(|| over(1.0));
         return Ok(Picture { size: [width, height], pixels: over(0.0), over_white });
-    }
-    let (width, height, channels) = read_exr(path)?;
-    let channel = |name: &str| {
-        channels.iter().find(|(n, _)| n == name).map(|(_, values)| values).ok_or_else(|| {
-            Error::input(
-                format!("{} has no channel {name}", path.display()),
-                "compare files with the layer rgb",
-            )
-        })
     };
-    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-    let pixels: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+    let ExrPicture { width, height, pixels, alpha, notes } = open(path)?.read(area, memory)?;
+    notes.iter().for_each(|note| terminal.warn(&format!("{}: {note}", path.display())));
     // The colours of an EXR are multiplied by alpha.
-    let over_white = channel("A").ok().map(|alpha| {
+    let over_white = alpha.map(|alpha| {
         let white = |(p, a): (&[f32; 3], &f32)| p.map(|x| x + 1.0 - a);
-        pixels.iter().zip(alpha).map(white).collect()
+        pixels.iter().zip(&alpha).map(white).collect()
     });
     Ok(Picture { size: [width, height], pixels, over_white })
 }

@@ -26,7 +26,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::engine::EngineChoice;
 use crate::engine::gpu::DeviceOptions;
 use crate::job::Depth;
-use crate::output::frame::Format;
+use crate::output::frame::{Compression, Exr, Format};
+use crate::picture::Layer;
 use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -166,6 +167,55 @@ impl DepthOptions {
     }
 }
 
+/// Options of commands that write EXR files.
+#[derive(Args, Clone)]
+struct ExrOptions {
+    /// Stores colours, transmittance and normals of EXR files as half floats: half of the size, three digits.
+    /// Depths, numbers and texture coordinates stay floats.
+    #[arg(long)]
+    half: bool,
+    /// Compression of EXR files. All methods are lossless. Default: zip; zips where 16 lines of the picture
+    /// take more than 8 MiB.
+    #[arg(long, value_parser = choice::compression(), value_name = "METHOD")]
+    compression: Option<Compression>,
+}
+
+/// Options that choose the layers of EXR files.
+#[derive(Args, Clone)]
+struct LayerOptions {
+    /// Layers of EXR files, separated by commas. Default: all. Example: --layers rgb,depth
+    #[arg(long, value_parser = choice::layer(), value_delimiter = ',', value_name = "A,B,…")]
+    layers: Option<Vec<Layer>>,
+    /// Writes each layer into an EXR file of its own: -o fall.exr gives fall.rgb.exr, fall.depth.exr and so
+    /// on.
+    #[arg(long)]
+    split_layers: bool,
+    #[command(flatten)]
+    pixels: ExrOptions,
+}
+
+impl LayerOptions {
+    fn exr(&self) -> Exr {
+        let ExrOptions { half, compression } = self.pixels;
+        let layers = self.layers.clone().unwrap_or(Layer::ALL.to_vec());
+        Exr { half, compression, split: self.split_layers, ..Exr::of(&layers) }
+    }
+
+    /// Refuses the options where no EXR is written.
+    fn check(&self, has_exr: bool) -> Result<()> {
+        let given = [
+            ("--layers", self.layers.is_some()),
+            ("--half", self.pixels.half),
+            ("--compression", self.pixels.compression.is_some()),
+            ("--split-layers", self.split_layers),
+        ];
+        match given.into_iter().find(|(_, given)| *given && !has_exr) {
+            Some((option, _)) => Err(Error::Usage(format!("{option} needs an EXR file; add -o FILE.exr"))),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Options that choose the engine and its device.
 #[derive(Args, Clone)]
 struct EngineOptions {
@@ -282,7 +332,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Farm(args) => farm::run(&args),
         Command::Bench(args) => bench::run(&args, terminal),
         Command::Stitch(args) => stitch::run(&args, terminal),
-        Command::Compare(args) => compare::run(&args),
+        Command::Compare(args) => compare::run(&args, terminal),
         Command::Devices => devices::run(),
         Command::Presets => presets().try_for_each(|(name, what)| say(&format!("{name:<12} {what}"))),
         Command::Completions { shell } => {

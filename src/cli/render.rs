@@ -7,14 +7,14 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::json;
 
-use super::choice::layer;
 use super::terminal::{Terminal, say};
-use super::{CacheOptions, DepthOptions, EngineOptions, SceneOptions};
+use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, default_output, measured_words, size, window};
 use crate::engine::exposure::exposed;
 use crate::engine::{Engine, RenderOptions};
 use crate::job::{STDOUT, Still, beside_encoders, check_bloom, strips};
-use crate::output::frame::Figures;
+use crate::output::frame::{Exr, Figures, Format};
+use crate::output::movie::fraction;
 use crate::picture::Layer;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
@@ -25,9 +25,9 @@ use crate::util::window::Window;
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneOptions,
-    /// File to write: .png, .jpg, .tif or .webp (the picture as shown, sRGB) or .exr (linear, float32, with
-    /// layers). Give -o several times to write several; - is stdout, as PNG. Default: the scene's name with
-    /// .png, in the current folder.
+    /// File to write: .png, .jpg, .tif or .webp (the picture as shown, sRGB) or .exr (linear, half or float,
+    /// with layers). Give -o several times to write several; - is stdout, as PNG. Default: the scene's name
+    /// with .png, in the current folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -57,9 +57,8 @@ pub struct RenderArgs {
     engine: EngineOptions,
     #[command(flatten)]
     cache: CacheOptions,
-    /// Layers of the EXR file, separated by commas. Default: all. Example: --layers rgb,depth
-    #[arg(long, value_parser = layer(), value_delimiter = ',', value_name = "A,B,…")]
-    layers: Option<Vec<Layer>>,
+    #[command(flatten)]
+    layers: LayerOptions,
     /// Prints a report with sizes, figures and times as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -83,17 +82,23 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         given => given.to_vec(),
     };
     check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
+    let exr = Exr { rate: Some(fraction(animation.fps)), ..args.layers.exr() };
+    exr.check(scene.image.width, scene.image.alpha)?;
+    let files = |path: PathBuf| -> Vec<PathBuf> {
+        match Format::of(&path) {
+            Some(Format::Exr) => exr.files(&path).into_iter().map(|(file, _)| file).collect(),
+            _ => vec![path],
+        }
+    };
+    let outputs: Vec<PathBuf> = outputs.into_iter().flat_map(files).collect();
     let still = Still::create(&outputs)?.with_depth(args.depth.depth());
     still.check(&scene.image, window)?;
     if !args.overwrite {
         still.check_replaced()?;
     }
     let has_exr = still.has_exr();
-    if args.layers.is_some() && !has_exr {
-        return Err(Error::Usage("--layers needs an EXR file; add -o FILE.exr".into()));
-    }
-    let layers = args.layers.clone().unwrap_or(Layer::ALL.to_vec());
-    let surface = has_exr && layers.iter().any(|l| l.of_surface());
+    args.layers.check(has_exr)?;
+    let surface = has_exr && exr.layers.iter().any(|l| l.of_surface());
 
     // Opening the device is slow, so the CPU builds the volume and the mesh at the same time.
     let cache = limits.cache.as_ref();
@@ -126,7 +131,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     if still.has_developed() {
         check_bloom(&scene, window, strips.len())?;
     }
-    let mut writer = still.begin(&scene, &volume, window, &layers)?;
+    let mut writer = still.begin(&scene, &volume, window, &exr)?;
     let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
         engine.render_volume(&scene, &volume, &mesh, options, monitor)
     })?;
@@ -143,7 +148,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     terminal.close();
     let total = start.elapsed().as_secs_f64();
     if args.json {
-        let layers = if has_exr { layers.as_slice() } else { &[] };
+        let layers = if has_exr { exr.layers.as_slice() } else { &[] };
         let mut report = report(&scene, &engine, window, &figures, layers, &outputs);
         report["auto_exposure"] = json!(measured);
         report["seconds"] = json!(seconds);

@@ -9,10 +9,10 @@ use super::{Depth, check_alpha, check_side};
 use crate::engine::RenderOptions;
 use crate::light::environment::Source;
 use crate::output::frame::{
-    CROP_TEXT, Encoding, ExrWriter, FIGURES_TEXT, Figures, Format, Head, LINEAR_TEXT, Output, RowWriter,
-    SCENE_TEXT, channel_names, crop_text, lines_of, samples_of,
+    CROP_TEXT, Channel, Compression, Encoding, Exr, ExrCamera, ExrHead, ExrWriter, FIGURES_TEXT, Figures,
+    Format, Head, LINEAR_TEXT, Output, RowWriter, SCENE_TEXT, crop_text, lines_of, samples_of,
 };
-use crate::picture::{Frame, Image, Layer, Look, Seconds};
+use crate::picture::{Frame, Gamut, Image, Layer, Look, Seconds};
 use crate::scene::{REFERENCES, Scene};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -145,54 +145,59 @@ impl Still {
         self.formats().into_iter().any(Format::is_developed)
     }
 
-    /// Writes the heads of the files for the part `window` of a scene's image. EXR files get `layers`.
+    /// Writes the heads of the files for the part `window` of a scene's image. EXR files get what `exr` says;
+    /// where it splits the layers, the outputs are all files of one picture after another, as
+    /// [`Exr::files`] lists them.
     ///
     /// # Errors
-    /// [`Error::Io`] if writing fails.
+    /// [`Error::Io`] if writing fails, [`Error::Usage`] if [`Exr::check`] refuses the picture.
     pub fn begin(
         self,
         scene: &Scene,
         volume: &VolumeTexture,
         window: Window,
-        layers: &[Layer],
+        exr: &Exr,
     ) -> Result<StillWriter> {
-        let layers: Vec<Layer> = layers.iter().map(|l| l.of_picture(scene.image.alpha)).collect();
-        let about = About {
-            whole: [scene.image.width, scene.image.height],
-            window,
-            // An edited scene has no values, so the picture tells no scene.
-            scene: scene.values().is_some().then(|| metadata(scene, volume)),
-            channels: channel_names(&layers),
-        };
-        let Depth { bits, linear } = self.depth;
+        let whole = [scene.image.width, scene.image.height];
         let alpha = scene.image.alpha;
-        let encoded =
-            |(format, output): (Format, Target)| (format, output, format.encoding(bits, linear, alpha));
-        let sinks = self.outputs.into_iter().map(encoded);
-        let sinks = sinks.map(|(format, output, encoding)| Sink::begin(format, output, encoding, &about));
+        // An edited scene has no values, so the picture tells no scene.
+        let text = scene.values().is_some().then(|| metadata(scene, volume));
+        let Depth { bits, linear } = self.depth;
+        let files = exr.files(Path::new(""));
+        let mut layers = files.iter().map(|(_, layers)| layers).cycle();
+        let sinks = self.outputs.into_iter().map(|(format, output)| {
+            let layers: Vec<Layer> = match format {
+                Format::Exr => layers.next().into_iter().flatten().map(|l| l.of_picture(alpha)).collect(),
+                _ => Vec::new(),
+            };
+            let channels = exr.channels(&layers, alpha);
+            let head = ExrHead {
+                compression: Compression::for_width(exr.compression, &channels, whole[0])?,
+                gamut: scene.image.gamut,
+                rate: exr.rate,
+                camera: Some(ExrCamera::new(&scene.camera, whole)),
+            };
+            let about = About { whole, window, scene: text.clone(), channels, head };
+            Ok((Sink::begin(format, output, format.encoding(bits, linear, alpha), &about)?, layers))
+        });
         Ok(StillWriter {
             sinks: sinks.collect::<Result<_>>()?,
-            whole: window == Window::whole(about.whole),
+            whole: window == Window::whole(whole),
             look: scene.image.look,
             window,
-            layers,
+            half: exr.half,
+            gamut: scene.image.gamut,
             rows: 0,
             figures: Figures::default(),
         })
     }
 
-    /// Writes the frame of a scene's whole image and returns its figures. EXR files get `layers`.
+    /// Writes the frame of a scene's whole image and returns its figures. EXR files get what `exr` says.
     ///
     /// # Errors
-    /// [`Error::Io`] if writing fails.
-    pub fn save(
-        self,
-        frame: &Frame,
-        layers: &[Layer],
-        scene: &Scene,
-        volume: &VolumeTexture,
-    ) -> Result<Figures> {
-        let mut writer = self.begin(scene, volume, Window::whole([frame.width, frame.height]), layers)?;
+    /// [`Error::Io`] if writing fails, [`Error::Usage`] if [`Exr::check`] refuses the picture.
+    pub fn save(self, frame: &Frame, exr: &Exr, scene: &Scene, volume: &VolumeTexture) -> Result<Figures> {
+        let mut writer = self.begin(scene, volume, Window::whole([frame.width, frame.height]), exr)?;
         writer.push(frame)?;
         writer.finish()
     }
@@ -268,8 +273,10 @@ pub(crate) struct About {
     pub window: Window,
     /// The scene's text, if known.
     pub scene: Option<String>,
-    /// Names of an EXR's channels.
-    pub channels: Vec<String>,
+    /// Channels of an EXR.
+    pub channels: Vec<Channel>,
+    /// Head of an EXR.
+    pub head: ExrHead,
 }
 
 impl About {
@@ -312,7 +319,8 @@ impl Sink {
             }
             Format::Exr => {
                 let file = BufWriter::with_capacity(1 << 20, file);
-                let writer = ExrWriter::new(file, about.whole, about.window, &about.channels, &texts)
+                let About { whole, window, channels, head, .. } = about;
+                let writer = ExrWriter::new(file, *whole, *window, channels, head, &texts)
                     .map_err(|e| Error::write(output.path(), e))?;
                 Ok(Sink::Exr(output, Box::new(writer)))
             }
@@ -320,7 +328,7 @@ impl Sink {
     }
 
     /// Writes the next rows in the file's own layout. A developed picture takes samples of any number of
-    /// rows; an EXR takes one line of float32 in native byte order, channel by channel.
+    /// rows; an EXR takes one line in native byte order, channel by channel.
     pub fn push(&mut self, rows: Vec<u8>) -> Result<()> {
         match self {
             Sink::Rows(output, _, writer) => writer.push(rows).map_err(|e| Error::write(output.path(), e)),
@@ -349,12 +357,14 @@ impl Sink {
 
 /// The files of a still while rows are written. Dropping it before [`StillWriter::finish`] leaves no file.
 pub struct StillWriter {
-    sinks: Vec<Sink>,
+    /// Files, and the layers of an EXR.
+    sinks: Vec<(Sink, Vec<Layer>)>,
     window: Window,
     /// Whether the window is the whole image.
     whole: bool,
     look: Look,
-    layers: Vec<Layer>,
+    half: bool,
+    gamut: Gamut,
     /// Number of rows written.
     rows: u32,
     figures: Figures,
@@ -372,7 +382,7 @@ impl StillWriter {
     pub fn push(&mut self, strip: &Frame) -> Result<()> {
         assert_eq!(strip.width, self.window.width, "whole rows");
         assert!(strip.height <= self.window.height - self.rows, "no more rows than the window has");
-        for sink in &mut self.sinks {
+        for (sink, layers) in &mut self.sinks {
             match sink {
                 Sink::Rows(_, encoding, _) => {
                     let samples = samples_of(strip, *encoding, &self.look, self.whole);
@@ -382,7 +392,7 @@ impl StillWriter {
                     // All lines at once would take as much memory as the frame itself.
                     for first in (0..strip.height).step_by(LINES) {
                         let rows = first..strip.height.min(first + LINES as u32);
-                        lines_of(strip, &self.layers, rows)
+                        lines_of(strip, layers, self.half, self.gamut, rows)
                             .into_iter()
                             .try_for_each(|line| sink.push(line))?;
                     }
@@ -437,7 +447,7 @@ impl StillWriter {
     pub fn finish(self) -> Result<Figures> {
         assert_eq!(self.rows, self.window.height, "all rows");
         let StillWriter { sinks, figures, .. } = self;
-        sinks.into_iter().try_for_each(|sink| sink.finish(Some(&figures)))?;
+        sinks.into_iter().try_for_each(|(sink, _)| sink.finish(Some(&figures)))?;
         Ok(figures)
     }
 }

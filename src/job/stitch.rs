@@ -1,22 +1,51 @@
 //! Joins crops of a picture to the file of the whole picture.
 
+mod canvas;
+
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
 use super::{About, Sink, check_replaced, check_side};
-use crate::output::frame::{Encoding, ExrLines, Figures, Format, PictureRows};
+use crate::output::frame::{
+    Channel, Compression, Encoding, ExrHead, ExrLines, Figures, Format, PictureRows, fits_half, listed,
+};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
+use canvas::{Canvas, recoded};
 
 /// Bytes of rows handed to an encoder at a time.
 const PIECE_BYTES: usize = 1 << 20;
+
+/// How [`stitch_with`] writes the whole picture.
+#[derive(Clone, Debug, Default)]
+pub struct StitchOptions {
+    /// Whether a file that is no picture is replaced.
+    pub overwrite: bool,
+    /// Whether colours, transmittance and normals of an EXR become half floats.
+    pub half: bool,
+    /// Compression of an EXR; `None` keeps that of the crops.
+    pub compression: Option<Compression>,
+}
+
+/// Does as [`stitch_with`], with the number types and the compression of the crops.
+///
+/// # Errors
+/// Those of [`stitch_with`].
+pub fn stitch(
+    parts: &[PathBuf],
+    output: &Path,
+    overwrite: bool,
+    monitor: &dyn Monitor,
+) -> Result<Option<Figures>> {
+    stitch_with(parts, output, &StitchOptions { overwrite, ..Default::default() }, monitor)
+}
 
 /// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
 /// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
 /// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
 /// crop, plus the rows that wait for the encoder (about 1 MiB); WebP files are held whole. A file that is no
-/// picture is replaced only with `overwrite`.
+/// picture is replaced only where the options say so.
 ///
 /// Returns the figures of a developed picture: the sum of its crops' figures, without crops that lie wholly
 /// inside another.
@@ -25,12 +54,13 @@ const PIECE_BYTES: usize = 1 << 20;
 ///
 /// # Errors
 /// [`Error::Input`] if the crops belong to different pictures, leave a gap, or differ where they overlap.
-/// [`Error::Usage`] if `parts` is empty or the extension of `output` does not match the crops.
+/// [`Error::Usage`] if `parts` is empty, the extension of `output` does not match the crops, or the options
+/// ask for what only an EXR has.
 /// Otherwise an error of reading, of creating or writing `output`, or of the monitor.
-pub fn stitch(
+pub fn stitch_with(
     parts: &[PathBuf],
     output: &Path,
-    overwrite: bool,
+    options: &StitchOptions,
     monitor: &dyn Monitor,
 ) -> Result<Option<Figures>> {
     let parts =
@@ -46,18 +76,26 @@ pub fn stitch(
     check_parts(first, &parts)?;
     check_extension(output, format)?;
     check_side(output, format, Window::whole(whole))?;
-    if !overwrite {
+    if format != Format::Exr && (options.half || options.compression.is_some()) {
+        let what = format!("--half and --compression are for EXR files, but the crops are {}", format.name());
+        return Err(Error::Usage(what));
+    }
+    if !options.overwrite {
         check_replaced(output)?;
     }
-    let about = About {
-        whole,
-        window: Window::whole(whole),
-        scene: first.scene.clone(),
-        channels: first.channels.clone(),
-    };
-    let mut sink = RowSink { sink: Sink::create(output, encoding, &about)?, format, piece: Vec::new() };
+    let stored = first.channels.clone();
+    let mut channels = stored.clone();
+    channels.iter_mut().for_each(|c| c.half |= options.half && fits_half(&c.name));
+    let mut head = first.head.clone();
+    if let Some(asked) = options.compression {
+        head.compression = Compression::for_width(Some(asked), &channels, whole[0])?;
+    }
+    let about = About { whole, window: Window::whole(whole), scene: first.scene.clone(), channels, head };
+    let sink = Sink::create(output, encoding, &about)?;
+    let mut canvas = Canvas::new(format, encoding, whole[0], &stored);
+    let recode = (stored != about.channels).then(|| (stored, about.channels.clone()));
+    let mut sink = RowSink { sink, format, piece: Vec::new(), recode };
     let mut sum = FigureSum::new(format, whole, &parts);
-    let mut canvas = Canvas::new(format, encoding, whole[0], about.channels.len());
     let mut readers = Readers::new(&parts);
     for y in 0..whole[1] {
         monitor.progress("rows", u64::from(y), u64::from(whole[1]))?;
@@ -114,7 +152,9 @@ struct Part {
     whole: [u32; 2],
     scene: Option<String>,
     /// Channels of an EXR; empty for a developed picture.
-    channels: Vec<String>,
+    channels: Vec<Channel>,
+    /// Head of an EXR.
+    head: ExrHead,
     format: Format,
     /// Encoding of a developed picture's samples.
     encoding: Encoding,
@@ -128,12 +168,14 @@ impl Part {
             let lines = ExrLines::open(&path)?;
             let (window, whole, scene) = (lines.window, lines.whole, lines.scene());
             let (channels, encoding) = (lines.channels.clone(), Encoding::DISPLAY);
-            let part = Part { path, window, whole, scene, channels, format, encoding };
+            let head = lines.head.clone();
+            let part = Part { path, window, whole, scene, channels, head, format, encoding };
             return Ok((part, Rows::Exr(Box::new(lines))));
         }
         let rows = PictureRows::open(&path)?;
         let (window, whole, scene, encoding) = (rows.window, rows.whole, rows.scene(), rows.encoding);
-        let part = Part { path, window, whole, scene, channels: Vec::new(), format, encoding };
+        let (channels, head) = (Vec::new(), ExrHead::default());
+        let part = Part { path, window, whole, scene, channels, head, format, encoding };
         Ok((part, Rows::Picture(Box::new(rows))))
     }
 
@@ -156,9 +198,12 @@ impl Part {
         if self.channels != other.channels {
             return refuse(format!(
                 "have different layers ({} and {})",
-                self.channels.join(" "),
-                other.channels.join(" ")
+                listed(&self.channels),
+                listed(&other.channels)
             ));
+        }
+        if self.head.gamut != other.head.gamut {
+            return refuse("have colours in different primaries".into());
         }
         if self.scene != other.scene {
             return refuse(format!(
@@ -291,12 +336,18 @@ struct RowSink {
     format: Format,
     /// Rows of a developed picture that are not yet with the encoder.
     piece: Vec<u8>,
+    /// Channels of the lines and of the file, if they differ.
+    recode: Option<(Vec<Channel>, Vec<Channel>)>,
 }
 
 impl RowSink {
     fn push(&mut self, row: &[u8]) -> Result<()> {
         if self.format == Format::Exr {
-            return self.sink.push(row.to_owned());
+            let line = match &self.recode {
+                Some((from, to)) => recoded(row, from, to),
+                None => row.to_owned(),
+            };
+            return self.sink.push(line);
         }
         self.piece.extend_from_slice(row);
         if self.piece.len() >= PIECE_BYTES {
@@ -310,60 +361,6 @@ impl RowSink {
             self.sink.push(self.piece)?;
         }
         self.sink.finish(figures)
-    }
-}
-
-/// The row of the whole picture that is being assembled.
-struct Canvas {
-    /// Pixels of a row.
-    width: usize,
-    /// Bytes that a pixel has in one plane: all of it in a developed picture, 4 in an EXR.
-    item: usize,
-    /// Planes of a row: 1 in a developed picture, one per channel in an EXR.
-    planes: usize,
-    row: Vec<u8>,
-    /// By column, the index of the part that the pixel came from, plus 1; 0 where no part has drawn.
-    owner: Vec<u32>,
-}
-
-impl Canvas {
-    fn new(format: Format, encoding: Encoding, width: u32, channels: usize) -> Canvas {
-        let (item, planes) = if format == Format::Exr { (4, channels) } else { (encoding.pixel_bytes(), 1) };
-        let width = width as usize;
-        Canvas { width, item, planes, row: vec![0; width * item * planes], owner: vec![0; width] }
-    }
-
-    fn clear(&mut self) {
-        self.owner.fill(0);
-    }
-
-    /// Draws a row of the part `index`.
-    ///
-    /// # Errors
-    /// If a pixel differs from what another part drew there: its column, and the index of that part.
-    fn draw(&mut self, index: usize, window: Window, row: &[u8]) -> std::result::Result<(), (usize, usize)> {
-        let (item, count, first) = (self.item, window.width as usize, window.x as usize);
-        let mut done = 0;
-        while done < count {
-            let owner = self.owner[first + done];
-            // A run of pixels with the same owner is copied or compared at once.
-            let run = self.owner[first + done..first + count].iter().take_while(|&&o| o == owner).count();
-            for plane in 0..self.planes {
-                let target = item * (plane * self.width + first + done)..;
-                let target = &mut self.row[target][..item * run];
-                let source = &row[item * (plane * count + done)..][..item * run];
-                if owner == 0 {
-                    target.copy_from_slice(source);
-                } else if let Some(byte) = (0..item * run).find(|&i| target[i] != source[i]) {
-                    return Err((first + done + byte / item, owner as usize - 1));
-                }
-            }
-            if owner == 0 {
-                self.owner[first + done..][..run].fill(index as u32 + 1);
-            }
-            done += run;
-        }
-        Ok(())
     }
 }
 

@@ -20,7 +20,7 @@ const STRIP_PIXELS: u64 = 1 << 23;
 /// raster window evenly.
 ///
 /// Bytes counted:
-/// - per pixel of a strip 34; with `surface_layers` 28 more; with bloom 12 more, and one strip if it fits;
+/// - per pixel of a strip 34; with `surface_layers` 32 more; with bloom 12 more, and one strip if it fits;
 ///   with an alpha channel 6 more, and with both 28 more;
 /// - per pixel of the raster window, at most 2²¹ pixels, 88; where n > 1 quads overlap, the larger of 88 +
 ///   4·n and 32 + 16·n; with an alpha channel 4 more;

@@ -7,8 +7,8 @@ use crate::util::error::{Error, Result};
 /// the strip that is being encoded and 3 for the strip that waits.
 pub(crate) const PIXEL_BYTES: u64 = 28 + 6;
 
-/// Additional host memory per pixel for the raster pass's layers, bytes: depth 4, uv 8, quad 4, normal 12.
-pub(crate) const SURFACE_BYTES: u64 = 28;
+/// Additional host memory per pixel for the raster pass's layers, bytes: depth 8, uv 8, quad 4, normal 12.
+pub(crate) const SURFACE_BYTES: u64 = 32;
 
 /// Additional host memory per pixel for an alpha channel, bytes: alpha 4, and 2 in the encoded strips.
 const ALPHA_BYTES: u64 = 6;

@@ -51,6 +51,36 @@ impl Camera {
         Mat4::from_cols(x, y, z, w).transpose()
     }
 
+    /// Matrix from the world to the camera's left-handed coordinates: x to the right, y up, z forward.
+    pub fn camera_from_world(&self) -> DMat4 {
+        let eye = self.eye.as_dvec3();
+        let row = |axis: Vec3| axis.as_dvec3().extend(-axis.as_dvec3().dot(eye));
+        DMat4::from_cols(row(self.right), row(self.up), row(self.forward), DVec4::W).transpose()
+    }
+
+    /// Matrix from the world to the picture: after division by w, x is 0 at its left edge and 1 at its right
+    /// one, y is 0 at its top and 1 at its bottom, and z is 0 at the near plane and 1 at infinity.
+    pub fn ndc_from_world(&self, width: u32, height: u32) -> DMat4 {
+        let y = f64::from(self.tan_half_fov);
+        let x = y * f64::from(width) / f64::from(height);
+        let ndc_from_camera = DMat4::from_cols(
+            DVec4::new(0.5 / x, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, -0.5 / y, 0.0, 0.0),
+            DVec4::new(0.5, 0.5, 1.0, 1.0),
+            DVec4::new(0.0, 0.0, -f64::from(self.near), 0.0),
+        );
+        ndc_from_camera * self.camera_from_world()
+    }
+
+    /// Cosine of the angle between the view and the ray through a pixel of the whole image; see
+    /// [`Camera::view_ray`]. It is the share of the ray's length that lies along the view.
+    pub fn cosine(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> f32 {
+        let (right, up) = self.image_plane(width, height);
+        let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;
+        let y = 1.0 - 2.0 * (pixel[1] as f32 + offset[1]) / height as f32;
+        1.0 / (1.0 + x * x * right.length_squared() + y * y * up.length_squared()).sqrt()
+    }
+
     /// Unit direction through a pixel of the whole image, at `offset` pixels from the pixel's top left
     /// corner. Twin: `view_ray` in `shaders/layout.wgsl`.
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {

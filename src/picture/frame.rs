@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
+use super::camera::{CENTRE, sample_offset};
+use super::{Camera, Image};
 use crate::mapping::Quad;
+use crate::util::window::Window;
 
 /// Seconds per stage. On the GPU engine gbuffer, integrate and resolve are device time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -49,6 +52,9 @@ impl std::ops::AddAssign for Seconds {
 pub struct Surface {
     /// Distance from the eye to the nearest water or opaque surface, metres; 0 in the background.
     pub depth: Vec<f32>,
+    /// The part of that distance that lies along the view, metres: the surface lies on a plane so far before
+    /// the eye. See [`Surface::set_planar`].
+    pub z: Vec<f32>,
     /// Texture coordinates (u, v) on the quad, 0 to 1.
     pub uv: Vec<[f32; 2]>,
     /// Number of the nearest quad plus 1; 0 without a quad.
@@ -84,6 +90,7 @@ impl Surface {
     pub fn new(pixels: usize) -> Self {
         Surface {
             depth: vec![0.0; pixels],
+            z: vec![0.0; pixels],
             uv: vec![[0.0; 2]; pixels],
             quad: vec![0; pixels],
             normal: vec![[0.0; 3]; pixels],
@@ -115,6 +122,17 @@ impl Surface {
         self.depth[i] = hit[2];
         self.uv[i] = [hit[0], hit[1]];
         self.normal[i] = (map.n_world * side).to_array();
+    }
+
+    /// Fills `z` from `depth`, for the part `window` of an image.
+    pub fn set_planar(&mut self, camera: &Camera, image: &Image, window: Window) {
+        let offset = sample_offset(image, CENTRE);
+        let rows = self.z.chunks_mut(window.width as usize).zip(self.depth.chunks(window.width as usize));
+        for ((z, depth), y) in rows.zip(window.y..) {
+            for ((z, depth), x) in z.iter_mut().zip(depth).zip(window.x..) {
+                *z = depth * camera.cosine(image.width, image.height, [x, y], offset);
+            }
+        }
     }
 }
 
@@ -158,7 +176,7 @@ pub enum Layer {
     /// The same multiplied by alpha, and alpha: channels R, G, B, A. It takes the place of `Rgb` in a picture
     /// with an alpha channel; see [`Layer::of_picture`].
     Rgba,
-    /// Distance to the first surface in metres; 0 in the background.
+    /// Two depths of the first surface in metres, along the view and along the ray; 0 in the background.
     Depth,
     /// Texture coordinates on the nearest quad.
     Uv,
@@ -205,7 +223,7 @@ impl Layer {
         match self {
             Layer::Rgb => &["R", "G", "B"],
             Layer::Rgba => &["R", "G", "B", "A"],
-            Layer::Depth => &["depth.Z"],
+            Layer::Depth => &["depth.Z", "distance.D"],
             Layer::Uv => &["uv.U", "uv.V"],
             Layer::Quad => &["quad.ID"],
             Layer::Transmittance => &["transmittance.T"],
@@ -222,7 +240,7 @@ impl Layer {
         match self {
             Layer::Rgba if channel == 3 => frame.alpha.as_ref().map_or(1.0, |alpha| alpha[i]),
             Layer::Rgb | Layer::Rgba => frame.radiance[i][channel],
-            Layer::Depth => surface(|s, _, i| s.depth[i]),
+            Layer::Depth => surface(|s, c, i| [s.z[i], s.depth[i]][c]),
             Layer::Uv => surface(|s, c, i| s.uv[i][c]),
             Layer::Quad => surface(|s, _, i| s.quad[i] as f32),
             Layer::Transmittance => frame.radiance[i][3],

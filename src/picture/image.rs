@@ -1,5 +1,6 @@
 //! Settings of the picture: size, samples and look.
 
+use super::Gamut;
 use crate::util::words::words;
 
 /// Settings of the picture.
@@ -17,6 +18,8 @@ pub struct Image {
     pub alpha: bool,
     /// Maximum error of simplified rock, in distances between samples. A larger error takes fewer triangles.
     pub rock_error: f32,
+    /// Primaries of files of linear light.
+    pub gamut: Gamut,
     /// Development of the picture from the radiance.
     pub look: Look,
 }

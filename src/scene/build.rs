@@ -10,7 +10,7 @@ use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
 use crate::light::strand::StrandParams;
 use crate::light::{Background, Cone, Light, LightKind, Reflection, ReflectionKind, Scattering, Visibility};
-use crate::picture::{AutoExposure, Camera, Dither, Filter, Image, Look, Tone};
+use crate::picture::{AutoExposure, Camera, Dither, Filter, Gamut, Image, Look, Tone};
 use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
@@ -124,6 +124,7 @@ pub(super) fn image(v: &Values) -> Image {
         filter: v.choice("image.filter", Filter::from_word),
         alpha: v.is_on("image.alpha"),
         rock_error: v.float("image.rock_error"),
+        gamut: v.choice("image.primaries", Gamut::from_word),
         look: look(v),
     }
 }

@@ -50,6 +50,13 @@ impl Window {
         (width > 0 && height > 0).then_some(Window { x, y, width, height })
     }
 
+    /// Smallest window around this one and `other`.
+    pub fn around(&self, other: &Window) -> Window {
+        let (x, y) = (self.x.min(other.x), self.y.min(other.y));
+        let (right, bottom) = (self.right().max(other.right()), self.bottom().max(other.bottom()));
+        Window { x, y, width: right - x, height: bottom - y }
+    }
+
     /// Whether all of `other` lies inside this window.
     pub fn holds(&self, other: &Window) -> bool {
         self.meet(other) == Some(*other)

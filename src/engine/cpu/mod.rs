@@ -132,6 +132,9 @@ pub fn render_with(
             seconds.integrate += clock.elapsed().as_secs_f64();
         }
     }
+    if let Some(surface) = &mut frame.surface {
+        surface.set_planar(&scene.camera, image, window);
+    }
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;
     frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));

@@ -144,6 +144,9 @@ impl GpuRenderer {
         for window in options.grid.windows(whole, part) {
             run.window(window, &mut frame)?;
         }
+        if let Some(surface) = &mut frame.surface {
+            surface.set_planar(&scene.camera, &scene.image, part);
+        }
         let (learned, cut) = run.finish(&mut frame);
         self.learned = learned;
         Ok((frame, cut))

@@ -12,7 +12,7 @@ use super::{Batch, Pattern, Sweep, existing};
 use crate::job::check_side;
 use crate::job::still::{SOFTWARE, scene_text};
 use crate::output::contact_sheet::{Axis, Sheet, draw};
-use crate::output::frame::{Encoding, Format, Head, Output, encode, figures_of, real_file};
+use crate::output::frame::{Encoding, Format, Head, KnownFigures, Output, encode, figures_of, real_file};
 use crate::output::movie::{Movie, MovieKind, MovieOptions, Video, mark_of};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
@@ -249,8 +249,14 @@ impl Batch {
         let parameters = self.sweeps.iter().map(|s| (s.key.clone(), values.get(&s.key).to_json())).collect();
         let files = self.files(number);
         // A developed picture carries all figures in its text; an EXR's layers yield only some.
-        let developed = self.pictures.iter().position(|p| !p.is_exr()).unwrap_or(0);
-        let figures = figures_of(&files[developed])?;
+        let figures = match self.pictures.iter().position(|p| !p.is_exr()) {
+            Some(developed) => figures_of(&files[developed])?,
+            None => {
+                let own = self.request.exr.files(Path::new("")).len();
+                let all = files[..own].iter().map(|file| figures_of(file)).collect::<Result<Vec<_>>>()?;
+                all.into_iter().reduce(KnownFigures::join).unwrap_or_default()
+            }
+        };
         Ok(Row {
             number,
             frame: self.frame(number),
@@ -268,7 +274,10 @@ impl Batch {
         let mut out = csv::Writer::from_writer(Vec::new());
         let mut head = vec!["number".to_owned(), "frame".into()];
         head.extend(self.sweeps.iter().map(|s| s.key.clone()));
-        head.extend(self.formats().into_iter().map(|format| format.extension().to_owned()));
+        head.extend(self.formats().into_iter().zip(&self.layers).map(|(format, own)| match own.as_slice() {
+            [layer] if self.request.exr.split => format!("exr.{}", layer.name()),
+            _ => format.extension().to_owned(),
+        }));
         let figures = [
             "mean_r",
             "mean_g",

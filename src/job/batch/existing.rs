@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use super::{Batch, stamp};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
 use crate::job::{Claims, VolumeMemo};
-use crate::output::frame::{Format, Verified, real_file, verify};
+use crate::output::frame::{Compression, Format, Verified, listed, real_file, verify};
+use crate::picture::Layer;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -132,10 +133,11 @@ impl Batch {
     /// State of each file of a picture.
     fn states(&self, number: usize) -> Result<Vec<FileState>> {
         let scene = self.scene(number)?;
-        self.files(number).iter().map(|file| self.state_of(file, &scene)).collect()
+        let files = self.files(number);
+        files.iter().zip(&self.layers).map(|(file, layers)| self.state_of(file, layers, &scene)).collect()
     }
 
-    fn state_of(&self, file: &Path, scene: &Scene) -> Result<FileState> {
+    fn state_of(&self, file: &Path, layers: &[Layer], scene: &Scene) -> Result<FileState> {
         // A link to a file that does not exist yet is as good as nothing.
         let real = real_file(file)?;
         if real.symlink_metadata().is_err() {
@@ -165,14 +167,19 @@ impl Batch {
             }
             Err(e) => return Err(e),
         };
-        Ok(match self.difference(file, &verified, scene)? {
+        Ok(match self.difference((file, layers), &verified, scene)? {
             None => FileState::Whole,
             Some(what) => FileState::Other(what),
         })
     }
 
     /// Describes how the picture in a file differs from the one of `scene`; `None` if it does not.
-    fn difference(&self, file: &Path, verified: &Verified, scene: &Scene) -> Result<Option<String>> {
+    fn difference(
+        &self,
+        (file, layers): (&Path, &[Layer]),
+        verified: &Verified,
+        scene: &Scene,
+    ) -> Result<Option<String>> {
         let Some(text) = &verified.scene else {
             return Ok(Some("it does not name its scene".into()));
         };
@@ -211,13 +218,20 @@ impl Batch {
             }
         }
         if verified.format == Format::Exr {
-            let layers = self.request.layers.iter().map(|l| l.of_picture(scene.image.alpha));
-            let mut wanted: Vec<&str> = layers.flat_map(|l| l.channels()).copied().collect();
-            let mut have: Vec<&str> = verified.channels.iter().map(String::as_str).collect();
-            wanted.sort_unstable();
-            have.sort_unstable();
-            if wanted != have {
-                return Ok(Some(format!("it has the channels {}", have.join(", "))));
+            let exr = &self.request.exr;
+            let wanted = exr.channels(layers, scene.image.alpha);
+            if wanted != verified.channels {
+                return Ok(Some(format!("it has the channels {}", listed(&verified.channels))));
+            }
+            if let Some(head) = &verified.head {
+                let compression = Compression::for_width(exr.compression, &wanted, scene.image.width)?;
+                if head.compression != compression {
+                    return Ok(Some(format!("its compression is {}", head.compression.word())));
+                }
+                if head.rate != exr.rate {
+                    let [n, d] = head.rate.unwrap_or([0, 1]);
+                    return Ok(Some(format!("it is for {n}/{d} frames per second")));
+                }
             }
         }
         Ok(None)

@@ -35,8 +35,8 @@ use assemble::MovieFile;
 
 use super::{Depth, Still, check_alpha, check_side};
 use crate::engine::exposure::exposed;
-use crate::output::frame::{Format, Output, folder_of, real_file, remove_stale};
-use crate::output::movie::{Codec, MovieKind, Video};
+use crate::output::frame::{Exr, Format, Output, folder_of, real_file, remove_stale};
+use crate::output::movie::{Codec, MovieKind, Video, fraction};
 use crate::picture::Layer;
 use crate::scene::{Animation, Place, Scene};
 use crate::util::error::{Error, Result};
@@ -72,8 +72,8 @@ pub struct Request {
     pub retries: u32,
     /// The part of every picture to render; `None`: all of it.
     pub crop: Option<Window>,
-    /// Layers of EXR files.
-    pub layers: Vec<Layer>,
+    /// What goes into EXR files, and how. The rate is that of the animation.
+    pub exr: Exr,
     /// Depth of developed pictures.
     pub depth: Depth,
     /// Codec of videos whose format has it.
@@ -93,6 +93,8 @@ pub struct Batch {
     sweeps: Vec<Sweep>,
     frames: Vec<i32>,
     pictures: Vec<Pattern>,
+    /// Layers of each pattern that is an EXR; none of the others.
+    layers: Vec<Vec<Layer>>,
     movies: Vec<MovieFile>,
     sheet: Option<PathBuf>,
     manifests: Vec<PathBuf>,
@@ -123,7 +125,7 @@ impl Batch {
     /// [`Error::Usage`] for a request that contradicts itself, [`Error::Input`] for an invalid scene,
     /// [`Error::CannotCreate`] for outputs that cannot be written or are other pictures, [`Error::Memory`]
     /// for pictures that do not fit, or an error of the monitor.
-    pub fn plan(base: Animation, request: Request, monitor: &dyn Monitor) -> Result<Batch> {
+    pub fn plan(base: Animation, mut request: Request, monitor: &dyn Monitor) -> Result<Batch> {
         // The volume is made once more for the first picture and warns then.
         let (base, measured) = exposed(base, &Unwarned(monitor))?;
         // A scene that is not valid is reported before the sweeps are read.
@@ -161,7 +163,9 @@ impl Batch {
             )));
         };
         let names: Vec<Vec<String>> = sweeps.iter().map(Sweep::names).collect();
-        let (mut pictures, mut movies) = (Vec::new(), Vec::new());
+        request.exr.rate = Some(fraction(base.fps));
+        request.exr.check(base.values().count("image.width"), base.values().is_on("image.alpha"))?;
+        let (mut pictures, mut layers, mut movies) = (Vec::new(), Vec::new(), Vec::new());
         for (i, path) in request.outputs.iter().enumerate() {
             let pattern = Pattern::new(path, &names)?;
             if request.outputs[..i].contains(path) {
@@ -173,9 +177,18 @@ impl Batch {
                     let video = kind.video(request.codec, request.movie_bits);
                     movies.push(MovieFile { pattern, kind, video });
                 }
+                None if pattern.is_exr() => {
+                    for (path, own) in request.exr.files(path) {
+                        let pattern = Pattern::new(&path, &names)?;
+                        check_pattern(&pattern, &sweeps, frames.len())?;
+                        pictures.push(pattern);
+                        layers.push(own);
+                    }
+                }
                 None => {
                     check_pattern(&pattern, &sweeps, frames.len())?;
                     pictures.push(pattern);
+                    layers.push(Vec::new());
                 }
             }
         }
@@ -188,6 +201,7 @@ impl Batch {
             sweeps,
             frames,
             pictures,
+            layers,
             movies,
             sheet,
             manifests,
@@ -370,7 +384,8 @@ impl Batch {
         // A shard may have no pictures; the batch's first picture then stands in.
         let mut files = self.files(self.own().next().unwrap_or(0));
         drop(Still::open(&files)?);
-        let colour = self.request.layers.contains(&Layer::Rgb) || self.pictures.iter().any(|p| !p.is_exr());
+        let colour =
+            self.request.exr.layers.contains(&Layer::Rgb) || self.pictures.iter().any(|p| !p.is_exr());
         let shown = self.sheet.is_some() || !self.movies.is_empty() && !self.pictures.is_empty();
         if !colour && shown && self.request.shard.is_none() {
             return Err(Error::Usage(
@@ -379,8 +394,15 @@ impl Batch {
         }
         files.extend(self.movies.iter().map(|movie| self.movie_path(movie, 0)));
         files.extend(self.sheet.iter().chain(&self.manifests).cloned());
-        if self.request.layers != Layer::ALL && !self.has_exr() {
-            return Err(Error::Usage("--layers is for EXR files; add -o FILE.####.exr".into()));
+        let Exr { layers, half, compression, split, .. } = &self.request.exr;
+        let given = [
+            ("--layers", *layers != Layer::ALL),
+            ("--half", *half),
+            ("--compression", compression.is_some()),
+            ("--split-layers", *split),
+        ];
+        if let Some((option, _)) = given.into_iter().find(|(_, given)| *given && !self.has_exr()) {
+            return Err(Error::Usage(format!("{option} is for EXR files; add -o FILE.####.exr")));
         }
         let files = files.iter().map(|file| real_file(file)).collect::<Result<Vec<PathBuf>>>()?;
         let folders: BTreeSet<&Path> = files.iter().map(|file| folder_of(file)).collect();

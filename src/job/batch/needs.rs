@@ -6,9 +6,9 @@ use super::Batch;
 use super::report::word;
 use crate::engine::overlap;
 use crate::job::{beside_encoders, check_bloom, held_bytes, memory_of, spare_for_rasters};
-use crate::output::frame::Format;
+use crate::output::frame::{Channel, Format};
 use crate::picture::camera::{CENTRE, sample_numbers};
-use crate::picture::canvas_bytes;
+use crate::picture::{Layer, canvas_bytes};
 use crate::util::error::{Result, human_bytes};
 
 /// The work and needs of a run, as `--dry-run` prints them.
@@ -49,7 +49,7 @@ impl Batch {
         };
         let scene = self.scene(own.first().copied().unwrap_or(0))?;
         let window = self.window(&scene);
-        let surface = self.has_exr() && self.request.layers.iter().any(|l| l.of_surface());
+        let surface = self.has_exr() && self.request.exr.layers.iter().any(|l| l.of_surface());
         let formats = self.formats();
         let memory = beside_encoders(self.base.limits().memory, &formats, window)?;
         let (needed, strips) = memory_of(&scene, window, surface, memory)?;
@@ -62,13 +62,15 @@ impl Batch {
             spare_for_rasters(memory, needed).min(rasters)
         };
         let memory_bytes = needed + kept_rasters + held_bytes(&formats, window);
-        let layers = self.request.layers.iter().map(|l| l.of_picture(scene.image.alpha));
-        let channels: usize = layers.map(|l| l.channels().len()).sum();
-        let bytes = |format: Format| match format {
-            Format::Exr => 4 * channels as u64,
-            developed => self.encoding(developed, scene.image.alpha).pixel_bytes() as u64,
+        let alpha = scene.image.alpha;
+        let exr = |layers: &[Layer]| {
+            self.request.exr.channels(layers, alpha).iter().map(Channel::bytes).sum::<usize>()
         };
-        let pixel: u64 = formats.into_iter().map(bytes).sum();
+        let bytes = formats.into_iter().zip(&self.layers).map(|(format, layers)| match format {
+            Format::Exr => exr(layers),
+            developed => self.encoding(developed, alpha).pixel_bytes(),
+        });
+        let pixel = bytes.sum::<usize>() as u64;
         // While a GIF is made, its frames wait uncompressed in a file beside it. Other movies are smaller
         // than their frames.
         let movies = (self.movies.len() * (self.count() / self.frames.len()) - self.fresh.len()) as u64;

@@ -178,8 +178,8 @@ impl Work<'_> {
         let scene = self.batch.scene(number)?;
         let memory = self.batch.base.limits().memory;
         let still = Still::open(&files)?.with_depth(self.batch.request.depth);
-        let layers = &self.batch.request.layers;
-        let surface = still.has_exr() && layers.iter().any(|l| l.of_surface());
+        let exr = &self.batch.request.exr;
+        let surface = still.has_exr() && exr.layers.iter().any(|l| l.of_surface());
         let window = self.batch.window(&scene);
         let (volume, _) = self.volumes.volume(&scene, memory, self.watcher)?;
         if !std::mem::replace(&mut self.warned, true) {
@@ -197,7 +197,7 @@ impl Work<'_> {
             scene: scene.clone(),
             volume: volume.clone(),
             window,
-            layers: layers.clone(),
+            exr: exr.clone(),
             movies: self.batch.movies_starting(number, &scene),
             last: (number + 1).is_multiple_of(self.batch.frames.len()),
             began,

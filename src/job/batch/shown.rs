@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::Batch;
-use crate::output::frame::{Encoding, Format, read_exr, read_picture, rgb_rows, samples_of};
+use crate::output::frame::{Encoding, ExrColours, Format, read_picture, rgb_rows, samples_of};
 use crate::picture::resolve::{Resolver, develop, srgb};
 use crate::picture::{Frame, Image, Layer};
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 use crate::util::window::Window;
 
 /// A picture as shown.
@@ -23,12 +23,13 @@ impl Batch {
         format.encoding(self.request.depth.bits, self.request.depth.linear, alpha)
     }
 
-    /// Ranks a format as the source of a picture with `bits` per channel; the best is 0.
-    fn rank(&self, format: Format, bits: u8) -> u8 {
+    /// Ranks a file of this format and these layers as the source of a picture with `bits` per channel; the
+    /// best is 0.
+    fn rank(&self, (format, layers): (Format, &[Layer]), bits: u8) -> u8 {
         let Encoding { bits: own, linear, .. } = self.encoding(format, false);
         match format {
             // It has no colour without this layer.
-            Format::Exr if !self.request.layers.contains(&Layer::Rgb) => 9,
+            Format::Exr if !layers.contains(&Layer::Rgb) => 9,
             Format::Exr if bits == 8 => 2,
             Format::Exr => 1,
             Format::Jpeg => 4,
@@ -40,18 +41,24 @@ impl Batch {
 
     /// Whether the pictures hold more than 8 bits of what is shown.
     pub(super) fn has_deep_source(&self) -> bool {
-        self.formats().into_iter().any(|format| self.rank(format, 16) <= 2)
+        self.ranks(16).into_iter().any(|rank| rank <= 2)
+    }
+
+    /// Ranks all files of a picture.
+    fn ranks(&self, bits: u8) -> Vec<u8> {
+        let files = self.formats().into_iter().zip(&self.layers);
+        files.map(|(format, layers)| self.rank((format, layers), bits)).collect()
     }
 
     /// Reads a picture as shown, with `bits` per channel.
     pub(super) fn shown(&self, number: usize, bits: u8) -> Result<Shown> {
-        let formats = self.formats();
-        let best = (0..formats.len()).min_by_key(|&i| self.rank(formats[i], bits)).unwrap_or(0);
+        let (formats, ranks) = (self.formats(), self.ranks(bits));
+        let best = (0..formats.len()).min_by_key(|&i| ranks[i]).unwrap_or(0);
         let path = &self.files(number)[best];
         let scene = self.scene(number)?;
         let (image, window) = (&scene.image, self.window(&scene));
         if formats[best] == Format::Exr {
-            return of_exr(path, image, window, bits);
+            return of_exr(path, image, window, bits, self.base.limits().memory);
         }
         let picture = read_picture(path)?;
         let Encoding { bits: own, linear, .. } = picture.encoding;
@@ -73,20 +80,11 @@ impl Batch {
 }
 
 /// Develops an EXR's colour, the part `window` of an image, as a picture file would hold it.
-fn of_exr(path: &Path, image: &Image, window: Window, bits: u8) -> Result<Shown> {
-    let (width, height, channels) = read_exr(path)?;
-    let channel = |name: &str| {
-        let values = channels.iter().find(|(n, _)| n == name).map(|(_, values)| values);
-        values.ok_or_else(|| {
-            Error::input(
-                format!("{} has no colour", path.display()),
-                format!("add {} to --layers, or write PNG files too", Layer::Rgb.name()),
-            )
-        })
-    };
-    let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+fn of_exr(path: &Path, image: &Image, window: Window, bits: u8, memory: u64) -> Result<Shown> {
+    let read = ExrColours::open(path)?.read(window, memory)?;
+    let (width, height) = (read.width, read.height);
     let mut frame = Frame::new(width, height, false);
-    frame.radiance = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b, 1.0]).collect();
+    frame.radiance = read.pixels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     let whole = [image.width, image.height];
     let samples = if bits == 8 {
         develop(&mut frame, &image.look, window, whole);

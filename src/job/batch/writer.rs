@@ -8,9 +8,9 @@ use std::time::Instant;
 use super::report::{Event, Name, Watcher, word, words};
 use crate::job::still::StillWriter;
 use crate::job::{Claim, Still};
-use crate::output::frame::samples_of;
+use crate::output::frame::{Exr, samples_of};
 use crate::output::movie::{Movie, MovieKind, MovieOptions};
-use crate::picture::{Frame, Layer, Seconds};
+use crate::picture::{Frame, Seconds};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
@@ -27,7 +27,7 @@ pub struct Start {
     pub scene: Scene,
     pub volume: Arc<VolumeTexture>,
     pub window: Window,
-    pub layers: Vec<Layer>,
+    pub exr: Exr,
     /// Movies whose first frame this is.
     pub movies: Vec<(PathBuf, MovieKind, MovieOptions)>,
     /// Whether this is the last frame of the open movies.
@@ -152,7 +152,7 @@ fn begin(mut start: Start, movies: &mut Vec<(PathBuf, Movie)>) -> Open {
         .map(|(path, kind, options)| Ok((path.clone(), Movie::create(&path, kind, &options)?)));
     let opened = opened.collect::<Result<Vec<_>>>();
     let writer =
-        start.still.take().map(|still| still.begin(&start.scene, &start.volume, start.window, &start.layers));
+        start.still.take().map(|still| still.begin(&start.scene, &start.volume, start.window, &start.exr));
     let (writer, error) = match writer {
         Some(Ok(writer)) => (Some(writer), None),
         Some(Err(e)) => (None, Some(e)),

@@ -1,41 +1,103 @@
-//! EXR files: linear float32 in one part, with dotted channel names and the resolved scene in attributes.
+//! EXR files: linear light in one part, with dotted channel names and the resolved scene in attributes.
 //!
-//! Scan lines are in increasing order, one per block, and compressed by run lengths. That is lossless and
-//! fast, and the bytes do not depend on how the rows are divided.
+//! Scan lines are in increasing order, and their bytes do not depend on how the rows are divided.
 
-use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
+use exr::block::chunk::CompressedBlock;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData, magic_number};
-use exr::prelude::{
-    AttributeValue, ChannelDescription, Compression, IntegerBounds, LayerAttributes, LineOrder, ReadChannels,
-    ReadLayers, SampleType, Text, Vec2,
-};
+use exr::prelude::{LineOrder, Text, Vec2, f16};
 use rayon::prelude::*;
 
-use super::{MAX_SIDE, SCENE_TEXT};
-use crate::picture::{Frame, Layer};
-use crate::util::error::{Error, Result};
+use super::exr_head::{Channel, Compression, ExrHead, fits_half};
+use crate::picture::{Frame, Gamut, Layer};
+use crate::util::error::Result;
 use crate::util::window::Window;
 
 /// Bytes that are compressed at a time, on all cores.
 const BATCH_BYTES: usize = 8 << 20;
-/// Largest line of a file that is read, bytes. A line of the widest picture with all layers has 48 MB.
-const LINE_BYTES: u64 = 64 << 20;
 /// Longest text in an attribute that is written, bytes. FFmpeg before 6 loses its place in the header after a
 /// longer attribute, takes what follows for the table of lines, and shows black rows without an error.
 const TEXT_BYTES: usize = 255;
-/// Largest header of a file that is read, bytes.
-const HEADER_BYTES: u64 = 64 << 20;
+/// Meaning of the layer depth, for those who read the header. The two depths have different prefixes, because
+/// Blender takes a layer of two channels for a vector and one of a single channel for a number.
+const DEPTHS: &str = "metres to the first surface, 0: none; depth.Z along the camera's axis (planar), \
+                      distance.D along the ray";
+/// Largest finite half float.
+const HALF_MAX: f32 = 65504.0;
 
-/// Returns the names of the layers' channels, in the order of the file.
-pub fn channel_names(layers: &[Layer]) -> Vec<String> {
-    sorted(layers).into_iter().map(|(name, ..)| name.to_owned()).collect()
+/// What goes into EXR files, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exr {
+    /// Layers.
+    pub layers: Vec<Layer>,
+    /// Whether colours, transmittance and normals are half floats.
+    pub half: bool,
+    /// Compression that is asked for; see [`Compression::for_width`].
+    pub compression: Option<Compression>,
+    /// Whether each layer gets a file of its own.
+    pub split: bool,
+    /// Frames per second as a fraction, if the picture is one of a sequence.
+    pub rate: Option<[u32; 2]>,
+}
+
+impl Exr {
+    /// Layers in one file, as floats.
+    pub fn of(layers: &[Layer]) -> Exr {
+        Exr { layers: layers.to_vec(), half: false, compression: None, split: false, rate: None }
+    }
+
+    /// Returns the files of a picture that is written to `path`, each with its layers.
+    pub fn files(&self, path: &Path) -> Vec<(PathBuf, Vec<Layer>)> {
+        if !self.split {
+            return vec![(path.to_owned(), self.layers.clone())];
+        }
+        self.layers.iter().map(|layer| (path_of_layer(path, *layer), vec![*layer])).collect()
+    }
+
+    /// Returns the channels of a file with these layers, of a picture with or without `alpha`.
+    pub fn channels(&self, layers: &[Layer], alpha: bool) -> Vec<Channel> {
+        let layers: Vec<Layer> = layers.iter().map(|layer| layer.of_picture(alpha)).collect();
+        channels_of(&layers, self.half)
+    }
+
+    /// Refuses what cannot be written of pictures of this width, with or without `alpha`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) if the compression needs too much memory.
+    pub fn check(&self, width: u32, alpha: bool) -> Result<()> {
+        let files = self.files(Path::new(""));
+        files.iter().try_for_each(|(_, layers)| {
+            Compression::for_width(self.compression, &self.channels(layers, alpha), width).map(drop)
+        })
+    }
+}
+
+/// Returns the path of a layer's own file: its name stands before the number of the frame, if there is one,
+/// and before the extension, as in `fall.depth.0001.exr`.
+fn path_of_layer(path: &Path, layer: Layer) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut parts: Vec<&str> = name.split('.').collect();
+    let is_frame = |part: &str| {
+        let numbered = part.chars().all(|c| c.is_ascii_digit() || "#@%$Fd".contains(c));
+        numbered && part.contains(|c: char| c.is_ascii_digit() || "#@%$".contains(c))
+    };
+    let at = match parts.len() {
+        n @ 3.. if is_frame(parts[n - 2]) => n - 2,
+        n => n.saturating_sub(1),
+    };
+    parts.insert(at, layer.name());
+    path.with_file_name(parts.join("."))
+}
+
+/// Returns the layers' channels, in the order of the file.
+pub fn channels_of(layers: &[Layer], half: bool) -> Vec<Channel> {
+    let channel = |name: &str| Channel { name: name.to_owned(), half: half && fits_half(name) };
+    sorted(layers).into_iter().map(|(name, ..)| channel(name)).collect()
 }
 
 /// Returns the channels in the order of the file: name, layer, index in the layer.
@@ -48,22 +110,44 @@ fn sorted(layers: &[Layer]) -> Vec<(&'static str, Layer, usize)> {
     channels
 }
 
-/// Returns rows of a frame as lines of the file: channel by channel, native float32.
-pub fn lines_of(frame: &Frame, layers: &[Layer], rows: Range<u32>) -> Vec<Vec<u8>> {
-    rows.into_par_iter().map(|row| line_of(frame, layers, row)).collect()
+/// Returns rows of a frame as lines of the file, channel by channel in native byte order: R, G and B in the
+/// primaries of `gamut`, and half floats where [`channels_of`] says so.
+pub fn lines_of(frame: &Frame, layers: &[Layer], half: bool, gamut: Gamut, rows: Range<u32>) -> Vec<Vec<u8>> {
+    rows.into_par_iter().map(|row| line_of(frame, layers, half, gamut, row)).collect()
 }
 
-fn line_of(frame: &Frame, layers: &[Layer], row: u32) -> Vec<u8> {
+fn line_of(frame: &Frame, layers: &[Layer], half: bool, gamut: Gamut, row: u32) -> Vec<u8> {
     let width = frame.width as usize;
     let first = row as usize * width;
     let channels = sorted(layers);
+    let from_rec709 = gamut.from_rec709();
     let mut line = Vec::with_capacity(4 * width * channels.len());
-    for (_, layer, c) in channels {
-        for i in first..first + width {
-            line.extend_from_slice(&layer.value(frame, c, i).to_ne_bytes());
+    for (name, layer, c) in channels {
+        let weights =
+            from_rec709.filter(|_| matches!(layer, Layer::Rgb | Layer::Rgba) && c < 3).map(|m| m.row(c));
+        let value = |i: usize| match weights {
+            Some(weights) => {
+                let rgb = [0, 1, 2].map(|c| f64::from(layer.value(frame, c, i)));
+                weights.dot(rgb.into()) as f32
+            }
+            None => layer.value(frame, c, i),
+        };
+        let half = half && fits_half(name);
+        for value in (first..first + width).map(value) {
+            if half {
+                line.extend_from_slice(&half_of(value).to_ne_bytes());
+            } else {
+                line.extend_from_slice(&value.to_ne_bytes());
+            }
         }
     }
     line
+}
+
+/// Rounds to a half float. A value beyond the largest one becomes that, because programs add up what they
+/// read, and an infinite value would spread.
+pub fn half_of(value: f32) -> f16 {
+    f16::from_f32(if value.is_finite() { value.clamp(-HALF_MAX, HALF_MAX) } else { value })
 }
 
 /// Writer of a picture, line by line.
@@ -88,19 +172,18 @@ impl<W: Write + Seek> ExrWriter<W> {
         mut out: W,
         whole: [u32; 2],
         window: Window,
-        channels: &[String],
+        channels: &[Channel],
+        head: &ExrHead,
         texts: &[(String, String)],
     ) -> std::result::Result<Self, exr::error::Error> {
-        let attributes = LayerAttributes {
-            layer_position: Vec2(window.x as i32, window.y as i32),
-            ..LayerAttributes::default()
-        };
-        let channels = channels.iter().map(|name| ChannelDescription::named(name.as_str(), SampleType::F32));
+        let (image, mut attributes) = head.attributes(whole);
+        attributes.layer_position = Vec2(window.x as i32, window.y as i32);
         let size = Vec2(window.width as usize, window.height as usize);
-        let header = Header::new(Text::from(""), size, channels.collect())
-            .with_encoding(Compression::RLE, BlockDescription::ScanLines, LineOrder::Increasing)
-            .with_attributes(attributes)
-            .with_display_window(IntegerBounds::from_dimensions((whole[0] as usize, whole[1] as usize)));
+        let mut header =
+            Header::new(Text::from(""), size, channels.iter().map(Channel::description).collect())
+                .with_encoding(head.compression.method(), BlockDescription::ScanLines, LineOrder::Increasing)
+                .with_attributes(attributes);
+        header.shared_attributes = image;
         let headers = [header];
         let requirements = MetaData::validate(&headers, true)?;
         magic_number::write(&mut out)?;
@@ -110,6 +193,13 @@ impl<W: Write + Seek> ExrWriter<W> {
         // The header ends with an empty name. The texts are written here, because the library keeps further
         // attributes in a hash map and their order would be random.
         let end = bytes.pop();
+        push_text(&mut bytes, "colorInteropID", head.gamut.interop_id());
+        for (name, value) in head.camera.iter().flat_map(|camera| camera.lens(whole)) {
+            push(&mut bytes, name, "float", &value.to_le_bytes());
+        }
+        if channels.iter().any(|c| c.name.starts_with("depth.")) {
+            push_text(&mut bytes, "taki.depth", DEPTHS);
+        }
         for (key, text) in texts {
             if key == "Software" {
                 push_text(&mut bytes, "software", text);
@@ -123,32 +213,35 @@ impl<W: Write + Seek> ExrWriter<W> {
         out.write_all(&bytes)?;
         let table = out.stream_position()?;
         // Space for the offsets of the blocks, which are known once the blocks are written.
-        let bytes = 8 * u64::from(window.height);
+        let bytes = 8 * headers[0].chunk_count as u64;
         std::io::copy(&mut std::io::repeat(0).take(bytes), &mut out)?;
         Ok(ExrWriter { out, headers, table, position: table + bytes, offsets: Vec::new(), lines: Vec::new() })
     }
 
-    /// Writes the next line: channel by channel, native float32.
+    /// Writes the next line: channel by channel, in native byte order.
     ///
     /// # Errors
     /// Errors of compression and of the output.
     pub fn push(&mut self, line: Vec<u8>) -> std::result::Result<(), exr::error::Error> {
-        let most = (BATCH_BYTES / line.len().max(1)).max(1);
+        let block = self.headers[0].compression.scan_lines_per_block();
+        let most = (BATCH_BYTES / line.len().max(1) / block).max(1) * block;
         self.lines.push(line);
         if self.lines.len() >= most { self.write_lines() } else { Ok(()) }
     }
 
     fn write_lines(&mut self) -> std::result::Result<(), exr::error::Error> {
-        let (headers, first) = (&self.headers, self.offsets.len());
-        let width = headers[0].layer_size.width();
-        let chunks = std::mem::take(&mut self.lines).into_par_iter().enumerate().map(|(i, data)| {
+        let headers = &self.headers;
+        let (width, block) = (headers[0].layer_size.width(), headers[0].compression.scan_lines_per_block());
+        let first = self.offsets.len() * block;
+        let lines = std::mem::take(&mut self.lines);
+        let chunks = lines.par_chunks(block).enumerate().map(|(i, lines)| {
             let index = BlockIndex {
                 layer: 0,
-                pixel_position: Vec2(0, first + i),
-                pixel_size: Vec2(width, 1),
+                pixel_position: Vec2(0, first + i * block),
+                pixel_size: Vec2(width, lines.len()),
                 level: Vec2(0, 0),
             };
-            UncompressedBlock { index, data }.compress_to_chunk(headers)
+            UncompressedBlock { index, data: lines.concat() }.compress_to_chunk(headers)
         });
         for chunk in chunks.collect::<std::result::Result<Vec<_>, _>>()? {
             self.offsets.push(self.position);
@@ -177,14 +270,19 @@ impl<W: Write + Seek> ExrWriter<W> {
     }
 }
 
-/// Adds an attribute to the bytes of a header.
+/// Adds a text to the bytes of a header.
 fn push_text(header: &mut Vec<u8>, name: &str, text: &str) {
-    for word in [name, "string"] {
+    push(header, name, "string", text.as_bytes());
+}
+
+/// Adds an attribute to the bytes of a header.
+fn push(header: &mut Vec<u8>, name: &str, kind: &str, value: &[u8]) {
+    for word in [name, kind] {
         header.extend_from_slice(word.as_bytes());
         header.push(0);
     }
-    header.extend_from_slice(&(text.len() as u32).to_le_bytes());
-    header.extend_from_slice(text.as_bytes());
+    header.extend_from_slice(&(value.len() as u32).to_le_bytes());
+    header.extend_from_slice(value);
 }
 
 /// Cuts a text into attributes of at most [`TEXT_BYTES`]: NAME if one is enough, otherwise NAME.0001 and so
@@ -205,209 +303,4 @@ fn pieces<'a>(name: &str, text: &'a str) -> Vec<(String, &'a str)> {
         rest = after;
     }
     out
-}
-
-/// Names and values of an EXR file's channels; values row by row.
-pub type Channels = Vec<(String, Vec<f32>)>;
-
-/// Reads every channel of the first part of an EXR file. Returns width, height and channels.
-///
-/// # Errors
-/// [`Error::Io`] where the file cannot be read, [`Error::Input`] where it is no EXR.
-pub fn read_exr(path: &Path) -> Result<(u32, u32, Channels)> {
-    let file = File::open(path).map_err(|e| Error::read(path, e))?;
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(BufReader::new(file))
-        .map_err(|e| bad(path, e))?;
-    let size = image.layer_data.size;
-    let channels = image.layer_data.channel_data.list;
-    let channels =
-        channels.into_iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect()));
-    Ok((size.width() as u32, size.height() as u32, channels.collect()))
-}
-
-fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
-    Error::input(format!("{}: {why}", path.display()), "give an EXR image")
-}
-
-/// Converts a read error. A file that ends too early is damaged; other errors come from the disk.
-fn unreadable(path: &Path, e: std::io::Error) -> Error {
-    match e.kind() {
-        std::io::ErrorKind::UnexpectedEof => bad(path, "it ends too early"),
-        _ => Error::read(path, e),
-    }
-}
-
-/// Reader of this program's pictures, line by line.
-pub struct ExrLines {
-    path: PathBuf,
-    file: BufReader<File>,
-    /// Size of the file.
-    bytes: u64,
-    meta: MetaData,
-    /// Offset of each line in the file, bytes.
-    offsets: Vec<u64>,
-    position: u64,
-    next: usize,
-    /// Width and height of the whole image, pixels.
-    pub whole: [u32; 2],
-    /// Part of the image in the file.
-    pub window: Window,
-    /// Names of the channels, in their order within a line.
-    pub channels: Vec<String>,
-}
-
-impl ExrLines {
-    /// Opens a file and reads everything before the pixels.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it
-    /// cannot be read.
-    pub fn open(path: &Path) -> Result<ExrLines> {
-        let file = File::open(path).map_err(|e| Error::read(path, e))?;
-        let bytes = file.metadata().map_err(|e| Error::read(path, e))?.len();
-        let mut file = BufReader::new(file);
-        let foreign = || bad(path, "not a picture of taki (one part of float32 scan lines, run lengths)");
-        // Only version 2 is parsed, with no flag except that of long names.
-        let mut start = [0; 8];
-        file.read_exact(&mut start).map_err(|e| unreadable(path, e))?;
-        if start[..5] != [0x76, 0x2f, 0x31, 0x01, 2] || start[5] & !4 != 0 || start[6..] != [0, 0] {
-            return Err(foreign());
-        }
-        file.seek(SeekFrom::Start(0)).map_err(|e| Error::read(path, e))?;
-        let meta =
-            MetaData::read_from_buffered((&mut file).take(HEADER_BYTES), true).map_err(|e| bad(path, e))?;
-        let [header] = &meta.headers[..] else { return Err(foreign()) };
-        let (data, display) = (header.data_window(), header.shared_attributes.display_window);
-        let side = |n: usize| u32::try_from(n).ok().filter(|n| (1..=MAX_SIDE).contains(n));
-        let at = |n: i32| u32::try_from(n).ok();
-        let window = (|| {
-            Some([at(data.position.x())?, at(data.position.y())?, side(data.size.x())?, side(data.size.y())?])
-        })();
-        let whole = (|| Some([side(display.size.x())?, side(display.size.y())?]))();
-        let (Some(window), Some(whole)) = (window, whole) else { return Err(foreign()) };
-        let plain = |c: &ChannelDescription| c.sample_type == SampleType::F32 && c.sampling == Vec2(1, 1);
-        if header.compression != Compression::RLE
-            || header.blocks != BlockDescription::ScanLines
-            || header.line_order != LineOrder::Increasing
-            || header.deep
-            || display.position != Vec2(0, 0)
-            || !Window::fits(whole, window)
-            || header.chunk_count != window[3] as usize
-            || header.channels.list.is_empty()
-            || !header.channels.list.iter().all(plain)
-        {
-            return Err(foreign());
-        }
-        MetaData::validate(&meta.headers, true).map_err(|e| bad(path, e))?;
-        // Run lengths expand a byte to at most 64.
-        let pixels = u64::from(window[2]) * u64::from(window[3]);
-        let values = pixels.saturating_mul(4 * header.channels.list.len() as u64);
-        if values / u64::from(window[3]) > LINE_BYTES {
-            return Err(foreign());
-        }
-        if values / 64 > bytes || 8 * u64::from(window[3]) > bytes {
-            return Err(bad(path, format!("{bytes} bytes cannot hold {}×{} pixels", window[2], window[3])));
-        }
-        let offsets = (0..window[3]).map(|_| {
-            let mut offset = [0; 8];
-            file.read_exact(&mut offset).map(|()| u64::from_le_bytes(offset))
-        });
-        let offsets = offsets.collect::<std::io::Result<Vec<u64>>>().map_err(|e| unreadable(path, e))?;
-        let position = file.stream_position().map_err(|e| Error::read(path, e))?;
-        let [x, y, width, height] = window;
-        let channels = header.channels.list.iter().map(|c| c.name.to_string()).collect();
-        let window = Window { x, y, width, height };
-        Ok(ExrLines {
-            path: path.to_owned(),
-            file,
-            bytes,
-            meta,
-            offsets,
-            position,
-            next: 0,
-            whole,
-            window,
-            channels,
-        })
-    }
-
-    /// Returns the text of the scene, from one attribute or from its pieces.
-    pub fn scene(&self) -> Option<String> {
-        let attributes = &self.meta.headers[0].own_attributes.other;
-        let bytes = |name: &str| match attributes.get(&Text::from(name)) {
-            Some(AttributeValue::Text(text)) => Some(text.as_slice().to_vec()),
-            _ => None,
-        };
-        let text = bytes(SCENE_TEXT).or_else(|| {
-            let pieces = (1..).map_while(|number| bytes(&format!("{SCENE_TEXT}.{number:04}")));
-            Some(pieces.flatten().collect()).filter(|whole: &Vec<u8>| !whole.is_empty())
-        })?;
-        // The library takes every byte for a character.
-        Some(String::from_utf8_lossy(&text).into_owned())
-    }
-
-    /// Reads the next line into `line`: channel by channel, native float32.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where the line is damaged, [`Error::Io`] where it cannot be read.
-    pub fn read_line(&mut self, line: &mut Vec<u8>) -> Result<()> {
-        let fail = |why: &str| bad(&self.path, format!("line {}: {why}", self.next));
-        let header = &self.meta.headers[0];
-        let expected = 4 * header.channels.list.len() * self.window.width as usize;
-        if self.offsets.get(self.next) != Some(&self.position) {
-            return Err(fail("the table of lines is wrong"));
-        }
-        let mut head = [0; 8];
-        self.file.read_exact(&mut head).map_err(|e| unreadable(&self.path, e))?;
-        let [y, size] = [0, 4].map(|i| i32::from_le_bytes([head[i], head[i + 1], head[i + 2], head[i + 3]]));
-        let size = u32::try_from(size).unwrap_or(0) as usize;
-        self.position += 8 + size as u64;
-        if i64::from(y) != i64::from(self.window.y) + self.next as i64 {
-            return Err(fail("its row number is wrong"));
-        }
-        if size == 0 || size > expected || self.position > self.bytes {
-            return Err(fail("it has a wrong length"));
-        }
-        let mut packed = vec![0; size];
-        self.file.read_exact(&mut packed).map_err(|e| unreadable(&self.path, e))?;
-        if size < expected && unpacked_length(&packed) != Some(expected) {
-            return Err(fail("its run lengths are wrong"));
-        }
-        let block = CompressedScanLineBlock { y_coordinate: y, compressed_pixels_le: packed };
-        let chunk = Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) };
-        let block =
-            UncompressedBlock::decompress_chunk(chunk, &self.meta, true).map_err(|e| fail(&e.to_string()))?;
-        *line = block.data;
-        self.next += 1;
-        Ok(())
-    }
-
-    /// Checks that nothing follows the last line.
-    ///
-    /// # Errors
-    /// [`Error::Input`] where something does, or not all lines have been read.
-    pub fn finish(self) -> Result<()> {
-        let whole = self.next == self.offsets.len() && self.position == self.bytes;
-        if whole { Ok(()) } else { Err(bad(&self.path, "there are bytes after its end")) }
-    }
-}
-
-/// Returns the number of bytes that run lengths expand to, without expanding them; `None` where they are
-/// malformed.
-fn unpacked_length(packed: &[u8]) -> Option<usize> {
-    let (mut i, mut length) = (0, 0);
-    while i < packed.len() {
-        let count = i32::from(packed[i] as i8);
-        let (taken, made) =
-            if count < 0 { (-count as usize, -count as usize) } else { (1, count as usize + 1) };
-        i += 1 + taken;
-        length += made;
-    }
-    (i == packed.len()).then_some(length)
 }

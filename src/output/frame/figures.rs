@@ -5,8 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::exr_file::ExrLines;
-use super::{Format, PictureRows};
+use super::{ExrLines, Format, PictureRows};
 use crate::picture::Frame;
 use crate::util::error::Result;
 
@@ -116,6 +115,19 @@ impl From<Figures> for KnownFigures {
 }
 
 impl KnownFigures {
+    /// Adds the figures that another file of the same picture has.
+    pub fn join(self, other: KnownFigures) -> KnownFigures {
+        KnownFigures {
+            pixels: self.pixels,
+            covered_pixels: self.covered_pixels.or(other.covered_pixels),
+            cells_walked: self.cells_walked.or(other.cells_walked),
+            light_cells_walked: self.light_cells_walked.or(other.light_cells_walked),
+            non_finite_pixels: self.non_finite_pixels.or(other.non_finite_pixels),
+            radiance_sum: self.radiance_sum.or(other.radiance_sum),
+            transmittance_sum: self.transmittance_sum.or(other.transmittance_sum),
+        }
+    }
+
     /// Returns the mean linear R, G, B of the pixels.
     pub fn mean_radiance(&self) -> Option<[f64; 3]> {
         self.radiance_sum.map(|sums| sums.map(|sum| mean(sum, self.pixels)))
@@ -155,24 +167,20 @@ pub fn figures_of(path: &Path) -> Result<KnownFigures> {
 
 fn figures_of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
     let width = lines.window.width as usize;
-    let channel = |name: &str| lines.channels.iter().position(|c| c == name);
-    let rgb = channel("R").zip(channel("G")).zip(channel("B")).map(|((r, g), b)| [r, g, b]);
-    let (transmittance, cells) = (channel("transmittance.T"), channel("cells.N"));
+    let rgb = lines.colours();
+    let (transmittance, cells) = (lines.channel("transmittance.T"), lines.channel("cells.N"));
     let (mut radiance_sum, mut transmittance_sum) = ([0i128; 3], 0i128);
     let (mut covered, mut walked, mut non_finite) = (0u64, 0u64, 0u64);
     let mut line = Vec::new();
     for _ in 0..lines.window.height {
         lines.read_line(&mut line)?;
-        let value = |channel: usize, x: usize| -> f32 {
-            let at = 4 * (channel * width + x);
-            bytemuck::pod_read_unaligned(&line[at..at + 4])
-        };
+        let value = |channel: usize, x: usize| lines.value(&line, channel, x);
         for x in 0..width {
             let mut finite = true;
-            if let Some(channels) = rgb {
-                for (sum, channel) in radiance_sum.iter_mut().zip(channels) {
-                    finite &= value(channel, x).is_finite();
-                    *sum += fixed(value(channel, x));
+            if let Some(colours) = &rgb {
+                for (sum, value) in radiance_sum.iter_mut().zip(lines.rec709(&line, colours, x)) {
+                    finite &= value.is_finite();
+                    *sum += fixed(value);
                 }
             }
             if let Some(t) = transmittance {
@@ -193,7 +201,7 @@ fn figures_of_exr(mut lines: ExrLines) -> Result<KnownFigures> {
         covered_pixels: cells.map(|_| covered),
         cells_walked: cells.map(|_| walked),
         light_cells_walked: None,
-        non_finite_pixels: rgb.and(transmittance).map(|_| non_finite),
+        non_finite_pixels: rgb.as_ref().and(transmittance).map(|_| non_finite),
         radiance_sum: rgb.map(|_| radiance_sum),
         transmittance_sum: transmittance.map(|_| transmittance_sum),
     })

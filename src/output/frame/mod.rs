@@ -2,6 +2,9 @@
 
 mod difference;
 mod exr_file;
+mod exr_head;
+mod exr_lines;
+mod exr_read;
 mod figures;
 mod format;
 mod icc;
@@ -21,7 +24,10 @@ mod webp_file;
 mod writer;
 
 pub use difference::{Difference, Tolerance};
-pub use exr_file::{ExrLines, ExrWriter, channel_names, lines_of, read_exr};
+pub use exr_file::{Exr, ExrWriter, channels_of, half_of, lines_of};
+pub use exr_head::{Channel, Compression, ExrCamera, ExrHead, fits_half, listed};
+pub use exr_lines::ExrLines;
+pub use exr_read::{Channels, ExrColours, ExrPicture, read_exr, read_exr_picture};
 pub use figures::{Figures, KnownFigures, figures_of};
 pub use format::Format;
 pub use output::{Output, folder_of, real_file, remove_left_by, remove_stale};

@@ -3,8 +3,8 @@
 use std::io::BufWriter;
 use std::path::Path;
 
-use super::{ExrWriter, Output, channel_names, encode_png, lines_of};
-use crate::picture::{Frame, Layer};
+use super::{Compression, ExrHead, ExrWriter, Output, channels_of, encode_png, lines_of};
+use crate::picture::{Frame, Gamut, Layer};
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 
@@ -20,8 +20,9 @@ impl Frame {
         output.finish_with(&bytes)
     }
 
-    /// Writes `layers` as a linear float32 EXR. The file appears whole or not at all, and replaces any file
-    /// of this name, whatever it holds. A layer of the raster pass that the frame was rendered without is 0.
+    /// Writes `layers` as an EXR of linear float32 in Rec. 709. The file appears whole or not at all, and
+    /// replaces any file of this name, whatever it holds. A layer of the raster pass that the frame was
+    /// rendered without is 0.
     ///
     /// # Errors
     /// [`Error::CannotCreate`] or [`Error::Io`] where the file cannot be created or written.
@@ -32,9 +33,12 @@ impl Frame {
         let file = BufWriter::new(output.file().try_clone().map_err(|e| fault(&e))?);
         let size = [self.width, self.height];
         let layers: Vec<Layer> = layers.iter().map(|l| l.of_picture(self.alpha.is_some())).collect();
-        let mut writer = ExrWriter::new(file, size, Window::whole(size), &channel_names(&layers), &[])
-            .map_err(|e| fault(&e))?;
-        for line in lines_of(self, &layers, 0..self.height) {
+        let channels = channels_of(&layers, false);
+        let compression = Compression::for_width(None, &channels, self.width)?;
+        let head = ExrHead { compression, ..Default::default() };
+        let mut writer =
+            ExrWriter::new(file, size, Window::whole(size), &channels, &head, &[]).map_err(|e| fault(&e))?;
+        for line in lines_of(self, &layers, false, Gamut::Rec709, 0..self.height) {
             writer.push(line).map_err(|e| fault(&e))?;
         }
         writer.finish().map_err(|e| fault(&e))?;

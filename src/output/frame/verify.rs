@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use super::exr_file::ExrLines;
-use super::{Encoding, Figures, Format, PictureRows};
+use super::{Channel, Encoding, ExrHead, ExrLines, Figures, Format, PictureRows};
 use crate::util::error::Result;
 use crate::util::window::Window;
 
@@ -21,7 +20,9 @@ pub struct Verified {
     /// Scene of the picture, as a scene file.
     pub scene: Option<String>,
     /// Channels of an EXR, in the file's order; empty for a developed picture.
-    pub channels: Vec<String>,
+    pub channels: Vec<Channel>,
+    /// Head of an EXR.
+    pub head: Option<ExrHead>,
     /// Figures of a developed picture, if it has any.
     pub figures: Option<Figures>,
 }
@@ -30,9 +31,10 @@ pub struct Verified {
 ///
 /// A PNG has checksums over everything, so a missing, changed or added byte is always detected, and so it is
 /// in a JPEG. TIFF and WebP have a checksum over samples and texts; a change that leaves both as they are is
-/// not detected. An EXR has none. Missing and added bytes are detected, and changes to the structure of the
-/// header, to the table of lines, and to the position, length or run lengths of a line. A change to the value
-/// of a sample or inside a text is not detected.
+/// not detected. An EXR has one only over samples that are compressed by ZIP or ZIPS. Missing and added bytes
+/// are detected, and changes to the structure of the header, to the table of lines, and to the position,
+/// length or run lengths of a line. A change inside a text is not detected, nor one to a sample with another
+/// compression.
 ///
 /// # Errors
 /// [`Error::Input`] where the file is damaged or not of this program's kind, [`Error::Io`] where it cannot be
@@ -48,7 +50,8 @@ pub fn verify(path: &Path) -> Result<Verified> {
         let encoding = Some(rows.encoding);
         rows.skip_rows()?;
         let figures = rows.finish()?;
-        return Ok(Verified { format, encoding, size, window, scene, channels: Vec::new(), figures });
+        let (channels, head) = (Vec::new(), None);
+        return Ok(Verified { format, encoding, size, window, scene, channels, head, figures });
     }
     let mut lines = ExrLines::open(path)?;
     let (size, window, scene) = (lines.whole, lines.window, lines.scene());
@@ -56,7 +59,7 @@ pub fn verify(path: &Path) -> Result<Verified> {
     for _ in 0..window.height {
         lines.read_line(&mut line)?;
     }
-    let channels = std::mem::take(&mut lines.channels);
+    let (channels, head) = (lines.channels.clone(), Some(lines.head.clone()));
     lines.finish()?;
-    Ok(Verified { format, encoding: None, size, window, scene, channels, figures: None })
+    Ok(Verified { format, encoding: None, size, window, scene, channels, head, figures: None })
 }

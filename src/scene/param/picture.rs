@@ -3,7 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
-use crate::picture::{AutoExposure, Dither, Filter, Tone};
+use crate::picture::{AutoExposure, Dither, Filter, Gamut, Tone};
 use crate::scene::keyframes::Interpolation;
 
 pub(super) const IMAGE: Group = Group {
@@ -48,6 +48,13 @@ pub(super) const IMAGE: Group = Group {
                  light, but are not seen.",
             )
             .when("Set it to put the water over a photograph or another rendering; `--alpha` does the same."),
+        p("image.primaries", "", "", Choice(Gamut::WORDS), Uniform)
+            .doc(
+                "Primaries of files of linear light, such as EXR: `rec709` are those of sRGB, `acescg` is \
+                 AP1 with the white of ACES, `rec2020` is wide gamut television. PNG files and movies for a \
+                 display stay sRGB.",
+            )
+            .when("Set it to the working space of your compositor; docs/aces.md shows the way into ACES."),
         p("image.exposure", "", "stops", Float(-32.0, 32.0, 0.0), Uniform)
             .slider(-8.0, 8.0)
             .doc("Exposure: the radiance is multiplied by 2^exposure.")

@@ -45,6 +45,8 @@ pub struct Picture {
     pub kind: Kind,
     /// Indices of three channels.
     pub channels: [usize; 3],
+    /// Index of the alpha channel, if there is one.
+    pub alpha: Option<usize>,
     rank: Rank,
 }
 
@@ -82,8 +84,8 @@ fn listed(headers: &[Header]) -> String {
 
 /// The pictures of one part, in the order of their first channels.
 fn pictures(part: usize, header: &Header) -> Vec<Picture> {
-    // By prefix: the indices of R, G, B, Y, RY, BY and X.
-    let mut groups: Vec<(String, [Option<usize>; 7])> = Vec::new();
+    // By prefix: the indices of R, G, B, Y, RY, BY, X and A.
+    let mut groups: Vec<(String, [Option<usize>; 8])> = Vec::new();
     let mut places: HashMap<String, usize> = HashMap::new();
     for (i, channel) in header.channels.list.iter().enumerate().filter(|_| !header.deep) {
         let name = channel.name.to_string();
@@ -96,21 +98,22 @@ fn pictures(part: usize, header: &Header) -> Vec<Picture> {
             "ry" => 4,
             "by" => 5,
             "x" => 6,
+            "a" | "alpha" => 7,
             _ => continue,
         };
         let place = *places.entry(prefix.to_owned()).or_insert_with(|| {
-            groups.push((prefix.to_owned(), [None; 7]));
+            groups.push((prefix.to_owned(), [None; 8]));
             groups.len() - 1
         });
         groups[place].1[slot].get_or_insert(i);
     }
     let part_name = header.own_attributes.layer_name.as_ref().map(|n| n.to_string()).unwrap_or_default();
-    let picture = |(prefix, slots): (String, [Option<usize>; 7])| {
+    let picture = |(prefix, slots): (String, [Option<usize>; 8])| {
         let (kind, channels) = match slots {
             [Some(r), Some(g), Some(b), ..] => (Kind::Rgb, [r, g, b]),
-            [.., Some(y), Some(ry), Some(by), _] => (Kind::Chroma, [ry, y, by]),
+            [_, _, _, Some(y), Some(ry), Some(by), ..] => (Kind::Chroma, [ry, y, by]),
             // Beside an X, Y is a direction.
-            [_, _, _, Some(y), _, _, None] => (Kind::Grey, [y; 3]),
+            [_, _, _, Some(y), _, _, None, _] => (Kind::Grey, [y; 3]),
             _ => return None,
         };
         let name = if prefix.is_empty() { &part_name } else { &prefix };
@@ -121,7 +124,7 @@ fn pictures(part: usize, header: &Header) -> Vec<Picture> {
             (true, false) => Rank::InPart,
             (false, _) => Rank::Pass,
         };
-        Some(Picture { part, kind, channels, rank })
+        Some(Picture { part, kind, channels, alpha: slots[7], rank })
     };
     groups.into_iter().filter_map(picture).collect()
 }

@@ -168,6 +168,8 @@ pub struct Colours {
 pub struct Pixels {
     /// R, G, B, or the like, and 0, row by row from the top.
     pub values: Vec<[f32; 4]>,
+    /// Alpha, by which R, G and B are multiplied, if the file has it.
+    pub alpha: Option<Vec<f32>>,
     /// Notes on the file for the user, a sentence each.
     pub notes: Vec<String>,
     kind: Kind,
@@ -205,13 +207,17 @@ impl Colours {
             .ok_or_else(|| Fault::bad("its chromaticities span no colours"))?;
         let Colours { picture, exr } = self;
         let mut values = vec![[0.0; 4]; area.size.area()];
+        let mut alpha = picture.alpha.map(|_| vec![0.0; area.size.area()]);
         exr.lines(picture.part, area, |channel, y, first, line| {
+            if let Some(alpha) = alpha.as_mut().filter(|_| picture.alpha == Some(channel)) {
+                alpha[y * area.size.0 + first..][..line.len()].copy_from_slice(line);
+            }
             let row = &mut values[y * area.size.0 + first..][..line.len()];
             for component in (0..3).filter(|c| picture.channels[*c] == channel) {
                 row.iter_mut().zip(line).for_each(|(pixel, value)| pixel[component] = *value);
             }
         })?;
-        Ok(Pixels { values, notes, kind: picture.kind, space })
+        Ok(Pixels { values, alpha, notes, kind: picture.kind, space })
     }
 }
 

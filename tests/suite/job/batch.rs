@@ -226,8 +226,8 @@ fn a_dry_run_tells_what_would_be_made_and_makes_nothing() {
     let json: serde_json::Value =
         serde_json::from_str(run(batch(dir.path(), arguments).arg("--json")).done()).unwrap();
     assert_eq!((json["pictures"].as_u64(), json["to_render"].as_u64()), (Some(10), Some(10)));
-    // A picture has twelve channels and a PNG of 16×12 pixels.
-    assert_eq!(json["disk_bytes"].as_u64(), Some(10 * 16 * 12 * (12 * 4 + 3)));
+    // A picture has thirteen channels and a PNG of 16×12 pixels.
+    assert_eq!(json["disk_bytes"].as_u64(), Some(10 * 16 * 12 * (13 * 4 + 3)));
 }
 
 #[test]

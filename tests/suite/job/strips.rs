@@ -7,8 +7,8 @@ use crate::cli::faults::{run, taki};
 use crate::engine::gpu::{renderer, scene};
 use rand::{RngExt, SeedableRng};
 use taki::engine::{Engine, RenderOptions};
-use taki::job::{Still, stitch, strips};
-use taki::output::frame::{Figures, figures_of, read_exr, read_picture, verify};
+use taki::job::{Still, StitchOptions, stitch, stitch_with, strips};
+use taki::output::frame::{Compression, Exr, Figures, figures_of, read_exr, read_picture, verify};
 use taki::picture::camera::clip_to_window;
 use taki::picture::{Frame, Grid, Layer, Surface};
 use taki::place::Mesh;
@@ -50,8 +50,12 @@ impl Subject {
 
     /// Writes `window` to `path` in strips of the given heights. The last height repeats.
     fn write(&self, path: &Path, window: Window, rows: &[u32]) -> Figures {
+        self.write_as(path, window, rows, &Exr::of(&Layer::ALL))
+    }
+
+    fn write_as(&self, path: &Path, window: Window, rows: &[u32], exr: &Exr) -> Figures {
         let still = Still::create(&[path.to_owned()]).expect("an output");
-        let mut writer = still.begin(&self.scene, &self.volume, window, &Layer::ALL).expect("begun");
+        let mut writer = still.begin(&self.scene, &self.volume, window, exr).expect("begun");
         let (mut y, mut rows) =
             (window.y, rows.iter().copied().chain(std::iter::repeat(rows[rows.len() - 1])));
         while y < window.bottom() {
@@ -75,6 +79,7 @@ fn part_of(frame: &Frame, window: Window) -> Frame {
     }
     let surface = frame.surface.as_ref().map(|s| Surface {
         depth: pick(&places, &s.depth),
+        z: pick(&places, &s.z),
         uv: pick(&places, &s.uv),
         quad: pick(&places, &s.quad),
         normal: pick(&places, &s.normal),
@@ -242,15 +247,24 @@ fn check_contents(path: &Path, frame: &Frame, window: Window) {
         assert!(image.pixels.into_iter().zip(want).all(|(p, q)| near(p, q)), "{}", path.display());
         return;
     }
-    let (width, height, channels) = read_exr(path).expect("an EXR");
-    assert_eq!((width, height, channels.len()), (window.width, window.height, 12));
+    let (width, height, channels) = read_exr(path, 1 << 30).expect("an EXR");
+    // The picture is the display window, in which a crop has its place.
+    assert_eq!((width, height, channels.len()), (97, 61, 13));
+    let rows = window.y..window.bottom();
+    let places: Vec<usize> = rows
+        .flat_map(|y| (window.x..window.right()).map(move |x| Window::whole([97, 61]).index([x, y])))
+        .collect();
     for (name, values) in channels {
         let (layer, c) = Layer::ALL
             .iter()
             .find_map(|l| l.channels().iter().position(|n| *n == name).map(|c| (*l, c)))
             .expect("a known channel");
-        let want = (0..values.len()).map(|i| layer.value(frame, c, i).to_bits());
-        assert!(values.iter().map(|v| v.to_bits()).eq(want), "{name}");
+        let want = (0..places.len()).map(|i| layer.value(frame, c, i).to_bits());
+        assert!(places.iter().map(|&i| values[i].to_bits()).eq(want), "{name}");
+        let inside =
+            |i: &usize| window.meet(&Window { x: *i as u32 % 97, y: *i as u32 / 97, width: 1, height: 1 });
+        let mut outside = (0..values.len()).filter(|i| inside(i).is_none());
+        assert!(outside.all(|i| values[i] == 0.0), "{name}");
     }
     let meta = exr::prelude::MetaData::read_from_file(path, true).expect("a header");
     let header = &meta.headers[0];
@@ -314,6 +328,122 @@ fn crops_stitch_to_the_file_of_the_whole() {
             let (a, b) = (verify(&joined).expect("whole"), verify(&whole).expect("whole"));
             assert_eq!((a.size, a.window, a.scene), (b.size, b.window, b.scene));
         }
+    }
+}
+
+#[test]
+fn crops_keep_their_numbers_and_compression_or_get_what_is_asked_for() {
+    let (subject, dir) = (Subject::small(), tempdir().expect("a folder"));
+    let file = |name: &str| dir.path().join(name);
+    let as_of = |half, compression| Exr { half, compression, ..Exr::of(&Layer::ALL) };
+    // Blocks of 16 and 32 lines begin elsewhere in the parts than in the whole.
+    let windows = [(40, 0, 57, 20), (40, 20, 57, 41), (0, 0, 40, 61)];
+    let parts = |half, compression| -> Vec<PathBuf> {
+        let part = |(x, y, width, height)| {
+            let path = file(&format!("{x}-{y}.exr"));
+            subject.write_as(&path, Window { x, y, width, height }, &[13], &as_of(half, compression));
+            path
+        };
+        windows.into_iter().map(part).collect()
+    };
+    let whole = |half, compression| {
+        let path = file("whole.exr");
+        subject.write_as(&path, subject.whole(), &[7, 61], &as_of(half, compression));
+        verify(&path).expect("whole");
+        std::fs::read(path).expect("read")
+    };
+    let joined = |parts: &[PathBuf], half, compression| {
+        let options = StitchOptions { half, compression, ..Default::default() };
+        stitch_with(parts, &file("joined.exr"), &options, &Unwatched).expect("stitched");
+        std::fs::read(file("joined.exr")).expect("read")
+    };
+    for half in [false, true] {
+        for compression in Compression::ALL.map(Some) {
+            let parts = parts(half, compression);
+            assert!(joined(&parts, false, None) == whole(half, compression), "{half} {compression:?}");
+        }
+    }
+    let floats = parts(false, None);
+    assert!(joined(&floats, true, Some(Compression::Piz)) == whole(true, Some(Compression::Piz)));
+    // Halves of one crop and floats of another are no picture.
+    let half = file("half.exr");
+    subject.write_as(&half, Window { x: 40, y: 0, width: 57, height: 20 }, &[20], &as_of(true, None));
+    let mixed = [half, floats[1].clone(), floats[2].clone()];
+    let e = stitch(&mixed, &file("joined.exr"), false, &Unwatched).expect_err("refused").to_string();
+    assert!(e.contains("different layers") && e.contains("B (half)"), "{e}");
+}
+
+#[test]
+fn a_changed_byte_does_no_harm_in_any_compression() {
+    let (subject, dir) =
+        (Subject::new("front", &["image.width=9", "image.height=7"]), tempdir().expect("a folder"));
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+    let (path, wrong) = (dir.path().join("x.exr"), dir.path().join("wrong.exr"));
+    for (half, compression) in [false, true].into_iter().zip(Compression::ALL.into_iter().cycle()).chain([
+        (false, Compression::Piz),
+        (true, Compression::Rle),
+        (false, Compression::None),
+    ]) {
+        let exr = Exr { half, compression: Some(compression), ..Exr::of(&Layer::ALL) };
+        subject.write_as(&path, subject.whole(), &[7], &exr);
+        verify(&path).expect("whole");
+        let bytes = std::fs::read(&path).expect("read");
+        // The pixels stand at the end. ZIP has a checksum of them.
+        for at in bytes.len() - 40..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[at] ^= 0x10;
+            std::fs::write(&wrong, changed).expect("written");
+            let zip = matches!(compression, Compression::Zip | Compression::Zips);
+            // Some bits mean nothing, as those of codes that do not occur.
+            let same = || read_exr(&wrong, 1 << 24).ok() == read_exr(&path, 1 << 24).ok();
+            assert!(!zip || verify(&wrong).is_err() || same(), "{compression:?} byte {at}");
+        }
+        for length in (0..bytes.len()).step_by(31) {
+            std::fs::write(&wrong, &bytes[..length]).expect("written");
+            assert!(matches!(verify(&wrong), Err(Error::Input { .. })), "{compression:?} {length}");
+        }
+        for round in (0..bytes.len()).step_by(7) {
+            let mut changed = bytes.clone();
+            for _ in 0..=round % 3 {
+                let at = random.random_range(0..bytes.len());
+                changed[at] = random.random();
+            }
+            std::fs::write(&wrong, changed).expect("written");
+            match verify(&wrong) {
+                Ok(_) | Err(Error::Input { .. }) => {}
+                Err(e) => panic!("{compression:?} {round}: {e}"),
+            }
+            let _ = read_exr(&wrong, 1 << 24);
+        }
+    }
+}
+
+#[test]
+fn planar_depth_is_the_ray_s_share_along_the_view_on_both_engines() {
+    let mut engines = vec![Engine::cpu()];
+    engines.extend(renderer("planar depth").map(Engine::gpu));
+    for engine in &mut engines {
+        let subject = Subject::small();
+        let frame = subject.render(engine, None, Grid::default());
+        let (surface, camera) = (frame.surface.as_ref().expect("layers"), &subject.scene.camera);
+        let (mut wet, mut dry, mut slanted) = (0, 0, 0);
+        for i in 0..surface.z.len() {
+            let (z, depth) = (surface.z[i], surface.depth[i]);
+            assert!(z <= depth && (z > 0.0) == (depth > 0.0), "{i}: {z} {depth}");
+            slanted += usize::from(z < 0.99 * depth);
+            match surface.quad[i] {
+                0 => dry += usize::from(depth > 0.0),
+                quad => {
+                    wet += 1;
+                    let [u, v] = surface.uv[i];
+                    let point = subject.scene.quads[quad as usize - 1].map.point_world(u, v);
+                    let right = (point - camera.eye).dot(camera.forward);
+                    // A rasteriser's (u, v) leave the point some thousandths of a pixel off the ray.
+                    assert!((z / right - 1.0).abs() < 1e-4, "{i}: {z} {right}");
+                }
+            }
+        }
+        assert!(wet > 100 && dry > 100 && slanted > 100, "{wet} {dry} {slanted}");
     }
 }
 

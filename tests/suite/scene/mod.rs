@@ -147,6 +147,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "image.auto_exposure" => scene.image.look.auto_exposure.word(),
                 "image.dither" => scene.image.look.dither.word(),
                 "image.filter" => scene.image.filter.word(),
+                "image.primaries" => scene.image.gamut.word(),
                 "image.tone" => scene.image.look.tone.word(),
                 "light.frame" => scene.angles.word(),
                 "light.reflection" => scene.reflection.kind().word(),

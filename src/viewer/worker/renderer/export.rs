@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::Renderer;
 use crate::engine::RenderOptions;
 use crate::job::{Still, beside_encoders, check_bloom, strips};
+use crate::output::frame::Exr;
 use crate::picture::Layer;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -59,7 +60,7 @@ impl Renderer {
         if still.has_developed() {
             check_bloom(scene, window, strips.len())?;
         }
-        let mut writer = still.begin(scene, &volume, window, &Layer::ALL)?;
+        let mut writer = still.begin(scene, &volume, window, &Exr::of(&Layer::ALL))?;
         writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
             self.run_engine(scene, &volume, &mesh, options, watch)
         })?;
