@@ -15,7 +15,6 @@ use crate::output::frame::{
     Difference, Encoding, ExrColours, ExrPicture, Format, Head, Output, ReadPicture, Tolerance, encode,
     read_picture,
 };
-use crate::picture::resolve::srgb;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
@@ -274,8 +273,7 @@ fn read(path: &Path, area: Option<Window>, memory: u64, terminal: &Terminal) -> 
         check_file(path)?;
         let picture = read_picture(path)?;
         let ReadPicture { width, height, encoding, .. } = picture;
-        let encoded = |p: [f32; 3]| if encoding.linear { p.map(srgb) } else { p };
-        let over = |grey: f32| picture.over(grey).into_iter().map(encoded).collect();
+        let over = |grey: f32| picture.over(grey).into_iter().map(encoding.shown()).collect();
         let over_white = encoding.alpha.then(|| over(1.0));
         return Ok(Picture { size: [width, height], pixels: over(0.0), over_white });
     };

@@ -178,7 +178,8 @@ impl Still {
                 camera: Some(ExrCamera::new(&scene.camera, whole)),
             };
             let about = About { whole, window, scene: text.clone(), channels, head };
-            Ok((Sink::begin(format, output, format.encoding(bits, linear, alpha), &about)?, layers))
+            let encoding = format.encoding(bits, linear, alpha).in_gamut(scene.image.gamut);
+            Ok((Sink::begin(format, output, encoding, &about)?, layers))
         });
         Ok(StillWriter {
             sinks: sinks.collect::<Result<_>>()?,
@@ -287,7 +288,7 @@ impl About {
             texts.push((CROP_TEXT.to_owned(), crop_text(self.window, self.whole)));
         }
         if format.is_developed() && encoding.linear {
-            texts.push((LINEAR_TEXT.to_owned(), "Rec. 709".to_owned()));
+            texts.push((LINEAR_TEXT.to_owned(), encoding.gamut.name().to_owned()));
         }
         texts
     }

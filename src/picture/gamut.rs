@@ -41,6 +41,15 @@ impl Gamut {
         }
     }
 
+    /// Returns its name for people and for texts of files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Gamut::Rec709 => "Rec. 709",
+            Gamut::Acescg => "ACEScg",
+            Gamut::Rec2020 => "Rec. 2020",
+        }
+    }
+
     /// Returns the matrix from linear Rec. 709. White is adapted by Bradford's transform, so that grey stays
     /// grey. `None` for Rec. 709 itself, whose values do not change.
     pub fn from_rec709(self) -> Option<DMat3> {

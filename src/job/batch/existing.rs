@@ -212,7 +212,7 @@ impl Batch {
             return Ok(Some(format!("it is a {}", verified.format.name())));
         }
         if let Some((format, encoding)) = wanted.zip(verified.encoding) {
-            let wanted = self.encoding(format, scene.image.alpha);
+            let wanted = self.encoding(format, scene.image.alpha).in_gamut(scene.image.gamut);
             if encoding != wanted {
                 return Ok(Some(format!("it has {encoding}, but this picture has {wanted}")));
             }

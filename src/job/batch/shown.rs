@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Batch;
 use crate::output::frame::{Encoding, ExrColours, Format, read_picture, rgb_rows, samples_of};
-use crate::picture::resolve::{Resolver, develop, srgb};
+use crate::picture::resolve::{Resolver, develop};
 use crate::picture::{Frame, Image, Layer};
 use crate::util::error::Result;
 use crate::util::window::Window;
@@ -61,11 +61,11 @@ impl Batch {
             return of_exr(path, image, window, bits, self.base.limits().memory);
         }
         let picture = read_picture(path)?;
-        let Encoding { bits: own, linear, .. } = picture.encoding;
+        let own = picture.encoding.bits;
         let size = [picture.width, picture.height];
         let width = picture.width.max(1);
         // A picture with alpha is shown over black.
-        let shown = picture.over(0.0).into_iter().map(|p| if linear { p.map(srgb) } else { p });
+        let shown = picture.over(0.0).into_iter().map(picture.encoding.shown());
         let samples = match bits {
             8 if own == 8 => shown.flatten().map(|x| (x * 255.0).round() as u8).collect(),
             8 => {

@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::Encoding;
+use crate::picture::Gamut;
 use crate::util::error::{Error, Result};
 
 /// Format of a picture file.
@@ -137,13 +138,19 @@ impl Format {
         }
     }
 
-    /// Returns the encoding of a developed picture: with `bits` per channel if the format has that depth. A
-    /// linear one has 16. It has `alpha` if the format can hold it.
+    /// Returns the encoding of a developed picture, with `bits` per channel and `alpha` if the format has
+    /// them. A linear one has 16 bits and, unless [`Encoding::in_gamut`] says otherwise, the primaries of
+    /// Rec. 709.
     pub fn encoding(self, bits: Option<u8>, linear: bool, alpha: bool) -> Encoding {
         let depths = self.depths();
         let wanted = if linear { Some(16) } else { bits };
         let bits = wanted.filter(|bits| depths.contains(bits)).or(depths.first().copied()).unwrap_or(8);
-        Encoding { bits, linear: linear && bits == 16, alpha: alpha && self.has_alpha() }
+        Encoding {
+            bits,
+            linear: linear && bits == 16,
+            alpha: alpha && self.has_alpha(),
+            gamut: Gamut::Rec709,
+        }
     }
 
     /// Returns the largest side, pixels: that of the format, or of its encoder.

@@ -9,6 +9,7 @@ use crc32fast::Hasher;
 use image::ImageEncoder;
 use image::codecs::jpeg::JpegEncoder;
 
+use super::Encoding;
 use super::icc::profile;
 use super::texts::{Texts, bad};
 use super::writer::{Head, Rows};
@@ -28,7 +29,7 @@ pub(super) fn write(mut out: impl Write, head: &Head, rows: &mut Rows) -> io::Re
     let samples = rows.all(head)?;
     let mut bytes = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut bytes, QUALITY);
-    encoder.set_icc_profile(profile(false)?).map_err(io::Error::other)?;
+    encoder.set_icc_profile(profile(Encoding::DISPLAY)?).map_err(io::Error::other)?;
     let [width, height] = head.size;
     encoder.write_image(&samples, width, height, image::ExtendedColorType::Rgb8).map_err(io::Error::other)?;
     drop(samples);

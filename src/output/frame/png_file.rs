@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::texts::{Texts, bad};
 use super::writer::{Head, Rows, encode};
 use super::{Encoding, Format, MAX_SIDE};
-use crate::picture::Frame;
+use crate::picture::{Frame, Gamut};
 use crate::util::error::{Error, Result};
 
 /// Compressed bytes in an IDAT chunk.
@@ -18,8 +18,19 @@ const CHUNK_BYTES: usize = 1 << 18;
 /// Memory for the texts and one row of a file that is read, bytes.
 const READ_BYTES: usize = 64 << 20;
 
-/// Code points of the chunk cICP: primaries of Rec. 709, linear, RGB, full range.
-const LINEAR_CODE_POINTS: [u8; 4] = [1, 8, 0, 1];
+/// Code point of linear light in the chunk cICP.
+const LINEAR: u8 = 8;
+
+/// Returns the code points of the chunk cICP for linear light: primaries, curve, RGB, full range. ACEScg has
+/// none.
+fn code_points(gamut: Gamut) -> Option<[u8; 4]> {
+    let primaries = match gamut {
+        Gamut::Rec709 => 1,
+        Gamut::Rec2020 => 9,
+        Gamut::Acescg => return None,
+    };
+    Some([primaries, LINEAR, 0, 1])
+}
 
 pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result<()> {
     let [width, height] = head.size;
@@ -28,12 +39,9 @@ pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result
     encoder.set_depth(if head.encoding.bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     if head.encoding.linear {
         encoder.set_source_gamma(png::ScaledFloat::new(1.0));
-        encoder.set_source_chromaticities(png::SourceChromaticities::new(
-            (0.3127, 0.329),
-            (0.64, 0.33),
-            (0.3, 0.6),
-            (0.15, 0.06),
-        ));
+        let [rx, ry, gx, gy, bx, by, wx, wy] = head.encoding.gamut.chromaticities().map(|x| x as f32);
+        let chromaticities = png::SourceChromaticities::new((wx, wy), (rx, ry), (gx, gy), (bx, by));
+        encoder.set_source_chromaticities(chromaticities);
     } else {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
@@ -41,9 +49,10 @@ pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result
         encoder.add_itxt_chunk(key.clone(), text.clone())?;
     }
     let mut writer = encoder.write_header()?;
-    if head.encoding.linear {
+    let points = code_points(head.encoding.gamut).filter(|_| head.encoding.linear);
+    if let Some(points) = points {
         // The encoder does not write this chunk by itself. It stands before the pixels.
-        writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &LINEAR_CODE_POINTS)?;
+        writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &points)?;
     }
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
     while let Some(rows) = rows.next()? {
@@ -72,19 +81,27 @@ pub fn encode_png(frame: &Frame, texts: &[(&str, &str)]) -> io::Result<Vec<u8>> 
     encode(&head, frame.picture.iter().flat_map(|p| p[..channels].iter().copied()).collect())
 }
 
-/// Whether a PNG says that its samples are linear.
-pub(super) fn is_linear(path: &Path) -> Result<bool> {
+/// Returns the primaries of a PNG whose samples are linear; `None` if they are not.
+pub(super) fn linear_gamut(path: &Path) -> Result<Option<Gamut>> {
     let file = File::open(path).map_err(|e| Error::read(path, e))?;
     let reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| decoding(path, e))?;
-    Ok(says_linear(reader.info()))
+    Ok(said_gamut(reader.info()))
 }
 
-/// Whether the colour chunks of a PNG say that its samples are linear.
-fn says_linear(info: &png::Info) -> bool {
-    match info.coding_independent_code_points {
-        Some(points) => points.transfer_function == LINEAR_CODE_POINTS[1],
-        None => info.srgb.is_none() && info.gama_chunk.is_some_and(|gamma| gamma.into_value() == 1.0),
+/// Returns what the colour chunks of a PNG say of linear samples; `None` if they are not linear.
+fn said_gamut(info: &png::Info) -> Option<Gamut> {
+    if let Some(points) = info.coding_independent_code_points {
+        let known = |gamut: &Gamut| code_points(*gamut).is_some_and(|own| own[0] == points.color_primaries);
+        let gamut = Gamut::ALL.into_iter().find(known).unwrap_or_default();
+        return (points.transfer_function == LINEAR).then_some(gamut);
     }
+    let linear = info.srgb.is_none() && info.gama_chunk.is_some_and(|gamma| gamma.into_value() == 1.0);
+    let gamut = info.chrm_chunk.and_then(|chunk| {
+        let all = [chunk.red, chunk.green, chunk.blue, chunk.white].map(|(x, y)| [x, y]);
+        let all: Vec<f64> = all.iter().flatten().map(|x| f64::from(x.into_value())).collect();
+        Gamut::of(&all.try_into().ok()?)
+    });
+    linear.then_some(gamut.unwrap_or_default())
 }
 
 /// Converts a decoding error. Damage is a fault of the file, other input errors come from the disk.
@@ -168,7 +185,8 @@ impl PngRows {
             return Err(bad(path, "not a picture of taki (8 or 16 bits RGB or RGBA, not interlaced)"));
         }
         // Deflate expands a byte to at most 1032.
-        let row_bytes = u64::from(width) * Encoding { bits, linear: false, alpha }.pixel_bytes() as u64 + 1;
+        let row_bytes =
+            u64::from(width) * Encoding { bits, alpha, ..Encoding::DISPLAY }.pixel_bytes() as u64 + 1;
         if row_bytes * u64::from(height) > bytes.saturating_mul(1032) {
             return Err(bad(path, format!("{bytes} bytes cannot hold {width}×{height} pixels")));
         }
@@ -176,7 +194,8 @@ impl PngRows {
         if reader.info().animation_control.is_some() {
             return Err(bad(path, "not a picture of taki (animated)"));
         }
-        let encoding = Encoding { bits, linear: says_linear(reader.info()), alpha };
+        let gamut = said_gamut(reader.info());
+        let encoding = Encoding { bits, linear: gamut.is_some(), alpha, gamut: gamut.unwrap_or_default() };
         Ok(PngRows { path: path.to_owned(), reader, read, bytes, encoding, size: [width, height] })
     }
 

@@ -62,7 +62,7 @@ pub fn read_picture(path: &Path) -> Result<ReadPicture> {
     } else {
         8
     };
-    let linear = kind == image::ImageFormat::Png && png_file::is_linear(path)?;
+    let gamut = if kind == image::ImageFormat::Png { png_file::linear_gamut(path)? } else { None };
     let alpha = decoded
         .color()
         .has_alpha()
@@ -70,7 +70,8 @@ pub fn read_picture(path: &Path) -> Result<ReadPicture> {
     let rgb = decoded.into_rgb32f();
     let (width, height) = rgb.dimensions();
     let pixels = rgb.pixels().map(|p| p.0).collect();
-    let encoding = Encoding { bits, linear, alpha: alpha.is_some() };
+    let (linear, gamut) = (gamut.is_some(), gamut.unwrap_or_default());
+    let encoding = Encoding { bits, linear, alpha: alpha.is_some(), gamut };
     Ok(ReadPicture { width, height, encoding, pixels, alpha })
 }
 

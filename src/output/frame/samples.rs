@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::picture::resolve::{Resolver, lit};
-use crate::picture::{Frame, Look};
+use glam::{DMat3, DVec3};
+
+use crate::picture::resolve::{Resolver, lit, srgb};
+use crate::picture::{Frame, Gamut, Look};
 
 /// Encoding of a developed picture's samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,11 +16,26 @@ pub struct Encoding {
     pub linear: bool,
     /// Whether alpha follows R, G, B, which are not multiplied by it. It is never encoded by a curve.
     pub alpha: bool,
+    /// Primaries of linear samples; those of Rec. 709 otherwise.
+    pub gamut: Gamut,
 }
 
 impl Encoding {
     /// 8 bits, as displays show them.
-    pub const DISPLAY: Encoding = Encoding { bits: 8, linear: false, alpha: false };
+    pub const DISPLAY: Encoding = Encoding { bits: 8, linear: false, alpha: false, gamut: Gamut::Rec709 };
+
+    /// Returns the encoding with linear samples in these primaries.
+    pub fn in_gamut(self, gamut: Gamut) -> Encoding {
+        if self.linear { Encoding { gamut, ..self } } else { self }
+    }
+
+    /// Returns R, G and B from 0 to 1 as a display shows them: Rec. 709 with the curve of sRGB.
+    pub fn shown(self) -> impl Fn([f32; 3]) -> [f32; 3] {
+        let rec709 = self.gamut.from_rec709().map(|m| m.inverse());
+        move |p| {
+            if self.linear { multiplied(rec709, p).map(|x| srgb(x.clamp(0.0, 1.0))) } else { p }
+        }
+    }
 
     /// Number of channels: R, G, B, and alpha if there is one.
     pub fn channels(self) -> usize {
@@ -33,24 +50,29 @@ impl Encoding {
 
 impl std::fmt::Display for Encoding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let linear = if self.linear { ", linear" } else { "" };
+        let linear = match (self.linear, self.gamut) {
+            (false, _) => String::new(),
+            (true, Gamut::Rec709) => ", linear".into(),
+            (true, gamut) => format!(", linear {}", gamut.name()),
+        };
         write!(f, "{} bits{linear}{}", self.bits, if self.alpha { ", alpha" } else { "" })
     }
 }
 
 /// Returns the samples of a frame, row by row; those of 16 bits with the higher byte first. 8 bits are those
 /// of the frame's picture. 16 bits are developed from its radiance by `look`, with bloom if it is the `whole`
-/// image; linear ones without tone curve.
+/// image; linear ones without tone curve, in the primaries of the encoding.
 pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, whole: bool) -> Vec<u8> {
     if encoding.bits == 8 {
         return frame.picture.iter().flat_map(|p| p[..encoding.channels()].iter().copied()).collect();
     }
     let (resolver, lit) = (Resolver::new(look), lit(frame, look, whole));
+    let from_rec709 = encoding.gamut.from_rec709();
     let mut samples = vec![0; frame.radiance.len() * encoding.pixel_bytes()];
     samples.par_chunks_mut(encoding.pixel_bytes()).enumerate().for_each(|(i, pixel)| {
         let light = lit(i);
         let [r, g, b] = match encoding.linear {
-            true => resolver.exposed(light).map(|x| x.min(1.0)),
+            true => multiplied(from_rec709, resolver.exposed(light)).map(|x| x.clamp(0.0, 1.0)),
             false => resolver.encoded(light),
         };
         for (sample, value) in pixel.chunks_exact_mut(2).zip([r, g, b, light[3]]) {
@@ -58,6 +80,11 @@ pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, whole: bool) -
         }
     });
     samples
+}
+
+/// Multiplies a colour by a matrix, if there is one.
+fn multiplied(matrix: Option<DMat3>, rgb: [f32; 3]) -> [f32; 3] {
+    matrix.map_or(rgb, |m| (m * DVec3::from(rgb.map(f64::from))).as_vec3().to_array())
 }
 
 /// Returns the picture as R, G, B bytes, without alpha.

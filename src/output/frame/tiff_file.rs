@@ -22,6 +22,7 @@ use super::icc::profile;
 use super::texts::{Texts, bad};
 use super::writer::{Head, Rows};
 use super::{Encoding, LINEAR_TEXT, MAX_SIDE, ReadPicture};
+use crate::picture::Gamut;
 use crate::util::error::{Error, Result};
 
 /// Bytes of samples in a strip, if a row is not longer.
@@ -112,7 +113,7 @@ where
     let mut encoder = TiffEncoder::<_, K>::new_generic(out)?;
     let mut directory = encoder.image_directory()?;
     directory.write_tag(Tag::Software, software(&head.texts))?;
-    directory.write_tag(Tag::IccProfile, Tagged(&profile(head.encoding.linear)?))?;
+    directory.write_tag(Tag::IccProfile, Tagged(&profile(head.encoding)?))?;
     let strip_rows = (STRIP_BYTES / head.row_bytes().max(1)).clamp(1, height as usize);
     let strip_bytes = strip_rows * head.row_bytes();
     let (mut waiting, mut crc) = (Vec::new(), Hasher::new());
@@ -244,7 +245,8 @@ impl TiffRows {
         };
         let texts = texts_of(&mut decoder);
         let texts = texts.ok_or_else(|| bad(path, "not a picture of taki (it has no description)"))?;
-        let encoding = Encoding { bits, linear: texts.get(LINEAR_TEXT).is_some(), alpha };
+        let gamut = gamut_of(&texts);
+        let encoding = Encoding { bits, linear: gamut.is_some(), alpha, gamut: gamut.unwrap_or_default() };
         Ok(TiffRows {
             path: path.to_owned(),
             decoder,
@@ -329,7 +331,7 @@ pub(super) fn read(path: &Path) -> Result<ReadPicture> {
         tiff::ColorType::RGBA(_) => 4,
         other => return Err(bad(path, format!("its colours are {other:?}, not RGB"))),
     };
-    let linear = texts_of(&mut decoder).is_some_and(|texts| texts.get(LINEAR_TEXT).is_some());
+    let gamut = texts_of(&mut decoder).and_then(|texts| gamut_of(&texts));
     let (bits, samples): (u8, Vec<f32>) = match decoder.read_image().map_err(|e| decoding(path, e))? {
         DecodingResult::U8(samples) => (8, samples.into_iter().map(|x| f32::from(x) / 255.0).collect()),
         DecodingResult::U16(samples) => (16, samples.into_iter().map(|x| f32::from(x) / 65_535.0).collect()),
@@ -338,8 +340,15 @@ pub(super) fn read(path: &Path) -> Result<ReadPicture> {
     let pixel = |pixel: &[f32]| if channels == 1 { [pixel[0]; 3] } else { [pixel[0], pixel[1], pixel[2]] };
     let pixels = samples.chunks_exact(channels).map(pixel).collect();
     let alpha = (channels == 4).then(|| samples.chunks_exact(4).map(|pixel| pixel[3]).collect());
-    let encoding = Encoding { bits, linear, alpha: alpha.is_some() };
+    let (linear, gamut) = (gamut.is_some(), gamut.unwrap_or_default());
+    let encoding = Encoding { bits, linear, alpha: alpha.is_some(), gamut };
     Ok(ReadPicture { width, height, encoding, pixels, alpha })
+}
+
+/// Returns the primaries of linear samples; `None` if they are not linear.
+fn gamut_of(texts: &Texts) -> Option<Gamut> {
+    let name = texts.get(LINEAR_TEXT)?;
+    Some(Gamut::ALL.into_iter().find(|gamut| gamut.name() == name).unwrap_or_default())
 }
 
 /// Opens a file whose texts, and whose strips or whole picture, take at most `bytes` of memory.

@@ -23,7 +23,7 @@ pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result
     crc.update(&samples);
     Texts::seal(&mut texts, crc);
     let mut encoder = WebPEncoder::new_lossless(out);
-    encoder.set_icc_profile(profile(false)?).map_err(io::Error::other)?;
+    encoder.set_icc_profile(profile(Encoding::DISPLAY)?).map_err(io::Error::other)?;
     encoder.set_exif_metadata(tiff_file::exif(&texts)?).map_err(io::Error::other)?;
     let [width, height] = head.size;
     let color =

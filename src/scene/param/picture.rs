@@ -50,9 +50,9 @@ pub(super) const IMAGE: Group = Group {
             .when("Set it to put the water over a photograph or another rendering; `--alpha` does the same."),
         p("image.primaries", "", "", Choice(Gamut::WORDS), Uniform)
             .doc(
-                "Primaries of files of linear light, such as EXR: `rec709` are those of sRGB, `acescg` is \
-                 AP1 with the white of ACES, `rec2020` is wide gamut television. PNG files and movies for a \
-                 display stay sRGB.",
+                "Primaries of linear light, in EXR files and with `--linear`: `rec709` are those of sRGB, \
+                 `acescg` is AP1 with the white of ACES, `rec2020` is wide gamut television. Pictures and \
+                 movies for a display stay sRGB.",
             )
             .when("Set it to the working space of your compositor; docs/aces.md shows the way into ACES."),
         p("image.exposure", "", "stops", Float(-32.0, 32.0, 0.0), Uniform)

@@ -49,6 +49,25 @@ fn render_writes_what_its_options_say() {
 }
 
 #[test]
+fn alpha_is_kept_in_halves_and_in_other_primaries() {
+    let dir = tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    let render = |name: &str, more: &[&str]| {
+        let all = ["--alpha", "--layers=rgb"];
+        run(taki(["render"]).args(TINY).arg("-o").arg(at(name)).args(all).args(more)).done();
+        verified(&at(name))
+    };
+    render("a.exr", &[]);
+    let other = render("b.exr", &["--half", "--set", "image.primaries=rec2020"]);
+    assert_eq!(taki::output::frame::listed(&other.channels), "A (half), B (half), G (half), R (half)");
+    // Alpha is compared over black and over white.
+    run(taki(["compare", "--relative=2e-3", "--share=0"]).arg(at("a.exr")).arg(at("b.exr"))).done();
+    // A tolerance of a twentieth of a half's step tells the two apart.
+    run(taki(["compare", "--relative=2e-5", "--absolute=0", "--share=0"]).arg(at("a.exr")).arg(at("b.exr")))
+        .refused(1, &["outside the tolerance"]);
+}
+
+#[test]
 fn a_layer_of_its_own_is_that_of_the_whole_file() {
     let dir = tempdir().expect("a folder");
     let at = |name: &str| dir.path().join(name);

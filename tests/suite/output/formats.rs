@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use taki::output::frame::{Encoding, Format, ReadPicture, read_exr, read_picture, verify};
+use taki::picture::Gamut;
 use taki::picture::resolve::srgb;
 use tempfile::tempdir;
 
@@ -88,7 +89,7 @@ fn linear_samples_are_the_radiance() {
     let wanted: Vec<f32> = radiance.map(|x| (2.0 * x).clamp(0.0, 1.0)).collect();
     for name in ["a.png", "a.tif"] {
         let picture = read_picture(&dir.path().join(name)).expect(name);
-        assert_eq!(picture.encoding, Encoding { bits: 16, linear: true, alpha: false }, "{name}");
+        assert_eq!(picture.encoding, Encoding { bits: 16, linear: true, ..Encoding::DISPLAY }, "{name}");
         for (got, wanted) in picture.pixels.iter().flatten().zip(&wanted) {
             assert!((got - wanted).abs() <= 0.51 / 65_535.0, "{name}: {got} for {wanted}");
         }
@@ -110,6 +111,54 @@ fn linear_samples_are_the_radiance() {
     ];
     for (arguments, words) in refusals {
         render(dir.path(), arguments).refused(2, words);
+    }
+}
+
+#[test]
+fn linear_samples_are_in_the_primaries_asked_for_and_say_so() {
+    let dir = tempdir().unwrap();
+    let at = |gamut: Gamut, extension: &str| dir.path().join(format!("{}.{extension}", gamut.word()));
+    for gamut in Gamut::ALL {
+        let primaries = format!("image.primaries={}", gamut.word());
+        let files = ["png", "tif", "exr"].map(|e| at(gamut, e).display().to_string());
+        let outputs = files.iter().flat_map(|file| ["-o", file]);
+        let sets = ["--set", "image.tone=none", "--set", &primaries, "--linear", "--layers", "rgb"];
+        render(dir.path(), &sets.into_iter().chain(outputs).collect::<Vec<_>>()).done();
+        let (_, _, channels) = read_exr(&at(gamut, "exr"), 1 << 30).expect("an EXR");
+        let light = |c: &str, i: usize| channels.iter().find(|(name, _)| name == c).expect("RGB").1[i];
+        for extension in ["png", "tif"] {
+            let picture = read_picture(&at(gamut, extension)).expect("a picture");
+            assert_eq!(picture.encoding, Encoding { bits: 16, linear: true, alpha: false, gamut });
+            let verified = verify(&at(gamut, extension)).expect("whole");
+            assert_eq!(verified.encoding, Some(picture.encoding));
+            for (i, pixel) in picture.pixels.iter().enumerate() {
+                for (got, c) in pixel.iter().zip(["R", "G", "B"]) {
+                    let wanted = light(c, i).clamp(0.0, 1.0);
+                    assert!((got - wanted).abs() <= 0.51 / 65_535.0, "{gamut:?}: {got} for {wanted}");
+                }
+            }
+            // They show the same picture, except where light is cut off.
+            let first = read_picture(&at(Gamut::Rec709, extension)).expect("a picture");
+            let (shown, first_shown) = (picture.encoding.shown(), first.encoding.shown());
+            for (a, b) in picture.pixels.iter().zip(&first.pixels) {
+                if a.iter().chain(b).any(|x| *x > 0.99) {
+                    continue;
+                }
+                let far = shown(*a).iter().zip(first_shown(*b)).any(|(a, b)| (a - b).abs() > 2e-3);
+                assert!(!far, "{gamut:?} {extension}: {a:?} {b:?}");
+            }
+        }
+        let png = fs::read(at(gamut, "png")).unwrap();
+        let code = chunks(&png).into_iter().find(|(name, _)| name == "cICP").map(|(_, points)| points[0]);
+        let known = [(Gamut::Rec709, Some(1)), (Gamut::Acescg, None), (Gamut::Rec2020, Some(9))];
+        assert!(known.contains(&(gamut, code)), "{gamut:?}: {code:?}");
+        // The profile has the primaries too: its columns add up to its white.
+        let profile = profile(&at(gamut, "tif"));
+        let sum = profile.red_colorant.x + profile.green_colorant.x + profile.blue_colorant.x;
+        assert!((sum - 0.9642).abs() < 2e-3, "{gamut:?}: {sum}");
+        let red = [(Gamut::Rec709, 0.436), (Gamut::Acescg, 0.690), (Gamut::Rec2020, 0.673)];
+        let (_, red) = red.into_iter().find(|(known, _)| *known == gamut).expect("known");
+        assert!((profile.red_colorant.x - red).abs() < 3e-3, "{gamut:?}: {}", profile.red_colorant.x);
     }
 }
 
