@@ -28,7 +28,7 @@ use crate::engine::gpu::DeviceOptions;
 use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
-use crate::scene::{Animation, DEFAULT_PRESET, Limits, Scene, presets};
+use crate::scene::{Animation, DEFAULT_PRESET, Limits, REMOVE, Scene, presets};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
@@ -98,6 +98,10 @@ struct SceneOptions {
     /// parameters; `taki scene` prints their values.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
+    /// Removes a part of the scene, such as `--remove rocks.wall` or `--remove pools`, before the settings of
+    /// --set apply. Can be given more than once. Short for --set remove=NAME.
+    #[arg(long = "remove", value_name = "NAME")]
+    removes: Vec<String>,
     /// Seed of the volume's random numbers. Short for --set volume.seed=N.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -126,7 +130,8 @@ impl SceneOptions {
     }
 
     fn all_sets(&self, more: &[String]) -> Vec<String> {
-        let mut sets = self.sets.clone();
+        let mut sets: Vec<String> = self.removes.iter().map(|name| format!("{REMOVE}={name}")).collect();
+        sets.extend_from_slice(&self.sets);
         sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
         sets.extend_from_slice(more);
         sets

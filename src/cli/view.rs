@@ -55,11 +55,9 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         // Opening and dropping the output finds a missing folder before the window opens.
         drop(Output::open(path)?);
     }
-    let mut sets = args.scene.sets.clone();
-    sets.extend(args.scene.seed.map(|n| format!("volume.seed={n}")));
     let report = viewer::run(Options {
         scene: args.scene.scene.clone(),
-        sets,
+        sets: args.scene.all_sets(&[]),
         limits: args.cache.add_to(args.scene.limits()),
         window: args.window,
         engine: args.engine.engine,

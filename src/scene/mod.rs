@@ -12,6 +12,7 @@ mod presets;
 mod print;
 mod quads;
 mod read;
+mod remove;
 mod slips;
 mod typed;
 mod value;
@@ -23,10 +24,11 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use build::resolve;
-pub use names::{check_names, full_key, unknown_key};
+pub use names::{NAMED, check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, STDIN, Source, set_by_hand};
+pub use remove::REMOVE;
 pub use typed::parse_value;
 pub use value::{Key, Place, Raw, Value, Values};
 

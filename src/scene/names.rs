@@ -1,11 +1,12 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
 use super::param::{Kind, PARAMS, Param, last_part};
+use super::remove::REMOVE;
 use super::value::{Place, Values};
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
-pub(super) const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
+pub const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;
@@ -53,9 +54,16 @@ pub fn unknown_key(key: &str, values: &Values, place: &Place) -> Error {
     unknown(key, nearest(key, values.known_keys()), place)
 }
 
+/// Keys of a scene file that stand before its tables.
+pub(super) const AT_THE_TOP: [&str; 3] = ["version", "base", REMOVE];
+
 /// The error for an unknown key in a scene file, which may name lights and other things as it likes. It
 /// suggests the nearest key that the scene has so far, or one that has the misspelt key's own name.
 pub fn unknown_key_in_file(key: &str, values: &Values, place: &Place) -> Error {
+    if let Some(top) = AT_THE_TOP.iter().find(|top| last_part(key) == **top) {
+        let what = format!("{}: unknown key {key}", place.0);
+        return Error::input(what, format!("write the line {top} = … above the first table"));
+    }
     let parts: Vec<&str> = key.split('.').collect();
     let named = PARAMS.iter().filter_map(|param| {
         let pattern: Vec<&str> = param.key.split('.').collect();

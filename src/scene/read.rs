@@ -11,8 +11,9 @@ use toml::de::{DeTable, DeValue};
 use super::names::NAMED;
 use super::names::{check_names, full_key, unknown_key};
 use super::param::{Kind, PARAMS, Param};
+use super::remove::{self, REMOVE};
 use super::slips::{not_allowed, slip_at};
-use super::typed::parse_for;
+use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
 use crate::util::error::{Error, Result};
@@ -171,9 +172,12 @@ impl Source {
                 base.values_at_depth(depth + 1)?
             }
         };
+        if let Some(list) = root.get(REMOVE) {
+            file.remove(list, &mut values)?;
+        }
         for (key, value) in root.iter() {
             match key.get_ref().as_ref() {
-                "version" | "base" => {}
+                "version" | "base" | REMOVE => {}
                 name => file.section(name, value, &mut values)?,
             }
         }
@@ -226,6 +230,28 @@ impl File<'_> {
                 format!("write `version = {VERSION}`"),
             )),
         }
+    }
+
+    /// Removes the parts of the base that the file does without.
+    fn remove(&self, list: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
+        let place = self.place(list.span().start);
+        if self.base.is_empty() {
+            return Err(Error::input(
+                format!("{}: {REMOVE} without a base, from which it would remove", place.0),
+                format!("add a line such as base = \"waterfall\", or leave {REMOVE} out"),
+            ));
+        }
+        let texts = remove::texts(&raw(list.get_ref())).ok_or_else(|| {
+            Error::input(
+                format!("{}: {REMOVE} is a list of names", place.0),
+                format!("write {REMOVE} = [\"rocks.wall\", \"pools\"]"),
+            )
+        })?;
+        let items = match list.get_ref() {
+            DeValue::Array(items) => items.iter().map(|item| self.place(item.span().start)).collect(),
+            _ => vec![place],
+        };
+        texts.iter().zip(items).try_for_each(|(text, place)| values.remove_all(text, &place))
     }
 
     fn section(&self, name: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
@@ -289,11 +315,7 @@ impl File<'_> {
         if NAMED.contains(&path) && values.has_under(path) {
             return Err(Error::input(
                 format!("{}: the empty {path} removes nothing of the base", place.0),
-                format!(
-                    "leave it out, or replace the line `base` by what `taki scene {}` prints, and delete \
-                     {path} there",
-                    self.base
-                ),
+                format!("to remove all {path}, write {REMOVE} = [\"{path}\"] above the first table"),
             ));
         }
         match Param::find(&key).map(|param| param.kind) {
@@ -358,7 +380,8 @@ pub fn apply_sets(
 }
 
 /// Applies one `--set key=value`. The last part of the key is enough where it means one parameter. The value
-/// is TOML, in which a point or colour needs no brackets; text that is not TOML is taken as a word.
+/// is TOML, in which a point or colour needs no brackets; text that is not TOML is taken as a word. The key
+/// `remove` takes names of parts, which are removed.
 ///
 /// # Errors
 /// [`Error::Usage`] where there is no `=` or the last part of a key means several parameters,
@@ -372,6 +395,13 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
     let (key, text) = (key.trim(), text.trim());
+    if key == REMOVE {
+        let place = Place(format!("--{REMOVE}"));
+        let texts = remove::texts(&parse_value(text)).ok_or_else(|| {
+            Error::Usage(format!("--set {setting}: give names, such as {REMOVE}=rocks.wall,pools"))
+        })?;
+        return texts.iter().try_for_each(|text| values.remove_all(text, &place));
+    }
     let key = full_key(key, values).map_err(|why| Error::Usage(format!("--set {setting}: {why}")))?;
     let place = Place("--set".into());
     let Some(param) = Param::find(&key) else {

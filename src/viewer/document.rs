@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::scene::{
-    Key, Kind, Limits, Param, Place, REFERENCES, Raw, STDIN, Scene, Source, Value, Values, resolve,
+    Key, Kind, Limits, NAMED, Param, Place, REFERENCES, Raw, STDIN, Scene, Source, Value, Values, resolve,
     set_by_hand,
 };
 use crate::util::error::{Error, Result};
@@ -323,20 +323,19 @@ impl Document {
         Ok(())
     }
 
-    /// Returns the command that renders this picture: the file or preset, and one `--set` per change.
+    /// Returns the command that renders this picture: the file or preset, one `--remove` per part that is
+    /// gone, and one `--set` per change.
     ///
     /// # Errors
-    /// If lights were added, removed or renamed, because no `--set` does that.
+    /// If lights or other parts were added or renamed, because no option does that.
     pub fn command_line(&self) -> Result<String> {
-        if self.values.names("lights") != self.saved.names("lights") {
-            return Err(Error::input(
-                "a command line cannot add, remove or rename lights",
-                "save the scene, then copy the command line",
-            ));
-        }
+        let removed = self.removed()?;
         let scene = self.path.as_ref().map_or(self.name.clone(), |p| p.display().to_string());
         let mut words = vec!["taki".to_owned(), "render".into(), scene];
-        for key in changed_keys(&self.saved, &self.values) {
+        words.extend(removed.iter().flat_map(|name| ["--remove".to_owned(), name.clone()]));
+        let mut left = self.saved.clone();
+        removed.iter().for_each(|name| left.clear_under(name));
+        for key in changed_keys(&left, &self.values) {
             words.push("--set".into());
             words.push(format!("{key}={}", self.values.get(&key).to_toml()));
         }
@@ -346,6 +345,41 @@ impl Document {
             Err(_) => String::new(),
         };
         Ok(words.iter().map(quoted).collect::<Vec<_>>().join(" "))
+    }
+}
+
+impl Document {
+    /// Returns the parts that were removed since the scene was opened or saved.
+    fn removed(&self) -> Result<Vec<String>> {
+        let mut removed = Vec::new();
+        for section in NAMED {
+            let (before, now) = (self.saved.names(section), self.values.names(section));
+            if now.iter().any(|name| !before.contains(name)) {
+                return Err(Error::input(
+                    format!("a command line cannot add or rename {section}"),
+                    "save the scene, then copy the command line",
+                ));
+            }
+            if now.is_empty() && !before.is_empty() {
+                removed.push(section.into());
+                continue;
+            }
+            let gone = before.iter().filter(|name| !now.contains(name));
+            removed.extend(gone.map(|name| format!("{section}.{name}")));
+        }
+        for list in ["quads", "animate.tracks"] {
+            match (self.saved.names(list).len(), self.values.names(list).len()) {
+                (before, now) if before == now => {}
+                (_, 0) => removed.push(list.into()),
+                _ => {
+                    return Err(Error::input(
+                        format!("a command line cannot change the number of {list}"),
+                        "save the scene, then copy the command line",
+                    ));
+                }
+            }
+        }
+        Ok(removed)
     }
 }
 

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use super::*;
 use taki::output::frame::read_png;
-use taki::viewer::document::changed_keys;
+use taki::viewer::document::{Document, changed_keys};
 use taki::viewer::settings::{Settings, Theme};
 
 /// A window wide enough for its dialogs.
@@ -224,6 +224,32 @@ fn the_command_line_gives_the_same_scene() {
     window.harness.run_steps(2);
     window.chord(Modifiers::COMMAND | Modifiers::SHIFT, Key::C);
     assert!(window.reads("clipboard"));
+}
+
+#[test]
+fn what_a_scene_removes_stays_away_in_the_viewer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scene, saved) = (folder.path().join("bare.toml"), folder.path().join("saved.toml"));
+    std::fs::write(&scene, "version = 1\nbase = \"waterfall\"\nremove = [\"rocks\", \"pools\"]\n")
+        .expect("written");
+    let limits = Limits::default();
+    let mut bare = Document::open(&scene, &[], &limits).expect("a scene");
+    assert!(bare.scene().rocks.is_empty() && bare.scene().pools.is_empty() && !bare.is_changed());
+    bare.save(&saved).expect("saved");
+    let again = Document::open(&saved, &[], &limits).expect("a scene");
+    assert_eq!(again.scene().to_toml(), bare.scene().to_toml());
+    // Removed on the command line, they are a change, and the copied command line removes them again.
+    let sets: Vec<String> = ["remove=pools", "remove=rocks", "h=1.5"].map(String::from).to_vec();
+    let mut removed = Document::open(Path::new("waterfall"), &sets, &limits).expect("a scene");
+    assert!(removed.is_changed());
+    let line = removed.command_line().expect("a line");
+    assert_eq!(line, "taki render waterfall --remove pools --remove rocks --set 'curves.h=1.5'");
+    let line = line.replace('\'', "");
+    let printed = taki(&[&["scene"], &line.split(' ').skip(2).collect::<Vec<_>>()[..]].concat());
+    assert_eq!(String::from_utf8(printed).expect("UTF-8"), removed.scene().to_toml() + "\n");
+    removed.reset_section("rocks");
+    removed.reset_section("pools");
+    assert_eq!(removed.command_line().expect("a line"), "taki render waterfall --set 'curves.h=1.5'");
 }
 
 #[test]

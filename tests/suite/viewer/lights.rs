@@ -337,6 +337,9 @@ fn a_command_line_is_not_given_for_what_it_cannot_say() {
     assert!(window.reads("save the scene, then copy the command line"));
     window.press("Remove sun-2");
     assert!(window.viewer().document().command_line().is_ok());
+    window.press("Remove sun");
+    let line = window.viewer().document().command_line().expect("a line");
+    assert!(line.ends_with(" --remove lights"), "{line}");
 }
 
 #[test]

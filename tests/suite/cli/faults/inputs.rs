@@ -2,10 +2,11 @@
 
 use std::fs;
 use std::os::unix::fs::symlink;
+use std::process::Command;
 
 use tempfile::tempdir;
 
-use super::{TINY, has_only, names, render, run, scene_with_volume, small_volume, taki};
+use super::{TINY, has_only, render, run, scene_with_volume, small_volume, taki};
 
 #[test]
 fn an_input_that_does_not_exist_is_bad_input_and_not_tried_again() {
@@ -91,26 +92,102 @@ fn an_empty_table_over_parts_of_the_base_is_refused_with_the_way_out() {
     let scene = dir.path().join("s.toml");
     for part in ["rocks", "lights", "sheets", "pools"] {
         fs::write(&scene, format!("version = 1\nbase = \"waterfall\"\n{part} = {{}}\n")).unwrap();
-        let words = ["s.toml:3", part, "removes nothing", "taki scene waterfall"];
-        run(taki(["scene"]).arg(&scene)).refused(65, &words);
+        let way_out = format!("remove = [\"{part}\"]");
+        run(taki(["scene"]).arg(&scene)).refused(65, &["s.toml:3", part, "removes nothing", &way_out]);
+        // The way out works.
+        fs::write(&scene, format!("version = 1\nbase = \"waterfall\"\n{way_out}\n")).unwrap();
+        let without = run(taki(["scene"]).arg(&scene)).done().to_owned();
+        assert!(without.contains("[trace]") && !without.contains(&format!("[{part}.")), "{without}");
     }
     // Without parts in the base it is harmless.
     fs::write(&scene, "version = 1\nbase = \"front\"\n[rocks]\n[splashes]\n").unwrap();
     run(taki(["scene"]).arg(&scene)).done();
-    // The way out works.
-    let printed = run(&mut taki(["scene", "waterfall"])).done().to_owned();
-    let mut kept = true;
-    let bare: Vec<&str> = printed
-        .lines()
-        .filter(|line| {
+}
+
+#[test]
+fn parts_of_the_base_are_removed_by_their_names() {
+    let dir = tempdir().unwrap();
+    let scene = dir.path().join("s.toml");
+    let printed = |command: &mut Command| run(command).done().to_owned();
+    let write = |text: &str| fs::write(&scene, format!("version = 1\nbase = \"waterfall\"\n{text}")).unwrap();
+    let of = |text: &str| {
+        write(text);
+        printed(taki(["scene"]).arg(&scene))
+    };
+    let whole = of("");
+    let without = |sections: &[&str]| {
+        let mut kept = true;
+        let lines = whole.lines().filter(|line| {
             if line.starts_with('[') {
-                kept = !line.starts_with("[rocks");
+                kept = !sections.iter().any(|section| line.starts_with(&format!("[{section}")));
             }
             kept
-        })
-        .collect();
-    fs::write(&scene, bare.join("\n")).unwrap();
-    let without = run(taki(["scene"]).arg(&scene)).done().to_owned();
-    assert!(printed.contains("[rocks") && !without.contains("[rocks"), "{without}");
-    assert_eq!(names(dir.path()).len(), 1);
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let rocks: Vec<&str> = whole.lines().filter(|line| line.starts_with("[rocks.")).collect();
+    let first = rocks[0].trim_matches(['[', ']']);
+    assert!(rocks.len() > 1);
+    for (names, sections) in
+        [(format!("[{first:?}, \"pools\"]"), vec![first, "pools"]), ("\"rocks\"".into(), vec!["rocks"])]
+    {
+        let bare = of(&format!("remove = {names}\n"));
+        assert_eq!(bare.trim_end(), without(&sections).trim_end());
+        // On the command line it means the same, and what is printed is read again as it is.
+        let mut option = taki(["scene", "waterfall"]);
+        sections.iter().for_each(|name| _ = option.args(["--remove", name]));
+        assert_eq!(printed(&mut option), bare);
+        assert_eq!(printed(&mut taki(["scene", "waterfall", "--remove", &sections.join(",")])), bare);
+        let setting = format!("remove={names}");
+        assert_eq!(printed(&mut taki(["scene", "waterfall", "--set", &setting])), bare);
+        fs::write(&scene, &bare).unwrap();
+        assert_eq!(printed(taki(["scene"]).arg(&scene)), bare);
+    }
+    // The file's own parts are added after the removal, and settings are applied after it.
+    let own = format!("remove = [\"rocks\"]\n[rocks.mine]\ncorners = {CORNERS}\n");
+    let mine = of(&own);
+    assert_eq!(mine.lines().filter(|line| line.starts_with("[rocks.")).collect::<Vec<_>>(), ["[rocks.mine]"]);
+    let bulge = printed(taki(["scene", "--remove", "pools", "--set", "rocks.mine.bulge=0.125"]).arg(&scene));
+    assert!(bulge.contains("bulge = 0.125") && !bulge.contains("[pools."), "{bulge}");
+    // A value that is removed is the default, and so is a whole section of values.
+    assert!(whole.contains("\nny = 384\n") && of("remove = [\"volume.ny\"]\n").contains("\nny = 40\n"));
+    assert!(of("remove = [\"haze\"]\n").contains("[haze]\ndensity = 0.0\n"));
+    let tiny = dir.path().join("x.png");
+    write("remove = [\"rocks\", \"pools\"]\n");
+    run(&mut render(scene.to_str().unwrap(), tiny)).done();
+}
+
+const CORNERS: &str = "[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]";
+
+#[test]
+fn what_cannot_be_removed_is_told_with_the_nearest_that_can() {
+    let dir = tempdir().unwrap();
+    let scene = dir.path().join("s.toml");
+    for (text, words) in [
+        (
+            "remove = [\"rocks.wal\"]",
+            &["s.toml:3", "no \"rocks.wal\" to remove", "did you mean rocks.wall?"][..],
+        ),
+        ("remove = [\"pools\",\n\"Rocks\"]", &["s.toml:4", "did you mean rocks?"]),
+        ("remove = [\"wall\"]", &["did you mean rocks.wall?"]),
+        ("remove = [\"zzz\"]", &["there are ", "rocks, sheets"]),
+        ("remove = [\"\"]", &["no \"\" to remove"]),
+        ("remove = [\"splashes\"]", &["no \"splashes\" to remove"]),
+        ("remove = [\"sky.elevation\"]", &["it has its default; leave it out"]),
+        ("remove = [\"pools\", \"pools\"]", &["no \"pools\" to remove"]),
+        ("remove = 3", &["s.toml:3", "a list of names", "remove = [\"rocks.wall\", \"pools\"]"]),
+        ("remove = [[\"rocks\"]]", &["a list of names"]),
+        ("[curves]\nremove = [\"rocks\"]", &["s.toml:4", "above the first table"]),
+    ] {
+        fs::write(&scene, format!("version = 1\nbase = \"waterfall\"\n{text}\n")).unwrap();
+        run(taki(["scene"]).arg(&scene)).refused(65, words);
+    }
+    fs::write(&scene, "version = 1\nremove = [\"rocks\"]\n").unwrap();
+    run(taki(["scene"]).arg(&scene)).refused(65, &["s.toml:2", "without a base"]);
+    let option = |name: &str| run(&mut taki(["scene", "fig5", "--remove", name]));
+    option("rocks.wal").refused(65, &["--remove: the scene has no \"rocks.wal\""]);
+    option("quads.1").refused(65, &["numbered", "remove quads, and write those that stay"]);
+    run(&mut taki(["scene", "fig5", "--set", "remove=3"])).refused(2, &["give names, such as remove=rocks"]);
+    let sweep = ["batch", "fig5", "--sweep", "remove=quads,curves", "-o", "{remove}.png", "--dry-run"];
+    run(&mut taki(sweep)).refused(65, &["--sweep", "unknown key", "give --remove NAME"]);
 }
