@@ -240,6 +240,7 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 }
 
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
+    args.scene.begin(terminal);
     let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
     let request = args.request(&animation)?;
     let batch = Batch::plan(animation, request, terminal)?;

@@ -129,6 +129,7 @@ const LARGE: u32 = 512;
 const SIZES: [[u32; 2]; 2] = [[266, 426], [1280, 720]];
 
 pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
+    terminal.watch();
     let sizes = args.size.map_or(SIZES.to_vec(), |s| vec![s]);
     let mut rows = Rows::default();
     let (engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;

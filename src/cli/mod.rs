@@ -28,7 +28,7 @@ use crate::engine::gpu::DeviceOptions;
 use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
-use crate::scene::{Animation, DEFAULT_PRESET, Limits, REMOVE, Scene, presets};
+use crate::scene::{Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, presets, read_stdin};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
@@ -115,6 +115,15 @@ struct SceneOptions {
 }
 
 impl SceneOptions {
+    /// Begins work that a signal asks to stop. A scene on stdin is read before: it may take any time to
+    /// come, and until then a signal has nothing to clean up.
+    fn begin(&self, terminal: &Terminal) {
+        if self.scene == Path::new(STDIN) {
+            read_stdin();
+        }
+        terminal.watch();
+    }
+
     fn limits(&self) -> Limits {
         Limits { allow_paths: self.allow_paths.clone(), memory: self.memory, ..Limits::default() }
     }

@@ -65,6 +65,7 @@ pub struct RenderArgs {
 }
 
 pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
+    args.scene.begin(terminal);
     let start = Instant::now();
     let limits = args.cache.add_to(args.scene.limits());
     let mut more = Vec::new();

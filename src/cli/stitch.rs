@@ -28,6 +28,7 @@ pub struct StitchArgs {
 }
 
 pub fn run(args: &StitchArgs, terminal: &Terminal) -> Result<()> {
+    terminal.watch();
     let start = Instant::now();
     let ExrOptions { half, compression } = args.exr;
     let options = StitchOptions { overwrite: args.overwrite, half, compression };

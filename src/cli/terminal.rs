@@ -38,24 +38,31 @@ pub struct Terminal {
     bar: Mutex<Option<(&'static str, ProgressBar)>>,
     /// Exit code of the signal that was received; 0 if there was none.
     signal: Arc<AtomicUsize>,
+    /// Whether the next signal ends the process.
+    at_once: Arc<AtomicBool>,
 }
 
 impl Terminal {
-    /// Handles SIGINT (Ctrl-C) and SIGTERM: the first signal asks the work to stop, the second ends the
-    /// process.
+    /// Handles SIGINT (Ctrl-C) and SIGTERM. They end the process at once until [`Terminal::watch`] is called.
     pub fn new() -> Self {
         let signal = Arc::new(AtomicUsize::new(0));
-        let again = Arc::new(AtomicBool::new(false));
+        let at_once = Arc::new(AtomicBool::new(true));
         use signal_hook::consts::{SIGINT, SIGTERM};
         for (number, code) in [(SIGINT, 130), (SIGTERM, 143)] {
-            // The shutdown must be registered before the flag, so that it acts only if an earlier signal has
-            // set the flag. If registering fails, the system's default action ends the process, which is
-            // acceptable.
-            let _ = signal_hook::flag::register_conditional_shutdown(number, code, again.clone());
-            let _ = signal_hook::flag::register(number, again.clone());
+            // The shutdown must be registered before the flag, so that it acts only if the flag was set
+            // before this signal. If registering fails, the system's default action ends the process, which
+            // is acceptable.
+            let _ = signal_hook::flag::register_conditional_shutdown(number, code, at_once.clone());
+            let _ = signal_hook::flag::register(number, at_once.clone());
             let _ = signal_hook::flag::register_usize(number, signal.clone(), code as usize);
         }
-        Terminal { bar: Mutex::new(None), signal }
+        Terminal { bar: Mutex::new(None), signal, at_once }
+    }
+
+    /// From now on the first signal asks the work to stop, and the second ends the process. Work that calls
+    /// this asks [`Terminal::check`] often.
+    pub fn watch(&self) {
+        self.at_once.store(false, Ordering::Relaxed);
     }
 
     /// Exit code of the signal that was received; 0 if there was none.

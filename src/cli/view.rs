@@ -55,6 +55,7 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         // Opening and dropping the output finds a missing folder before the window opens.
         drop(Output::open(path)?);
     }
+    args.scene.begin(terminal);
     let report = viewer::run(Options {
         scene: args.scene.scene.clone(),
         sets: args.scene.all_sets(&[]),

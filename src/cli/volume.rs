@@ -49,6 +49,7 @@ enum VolumeCommand {
 pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
     match &args.command {
         VolumeCommand::Build { scene: options, output, overwrite } => {
+            options.begin(terminal);
             let scene = options.load(&[])?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
@@ -73,6 +74,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
         VolumeCommand::Info { file, json, memory } => {
+            terminal.watch();
             let options = ReadOptions { budget: memory.saturating_mul(1 << 20), ..Default::default() };
             let notes = Notes { terminal, texts: Mutex::default() };
             let statistics = read_npz(file, &options, &notes)?.statistics();

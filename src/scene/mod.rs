@@ -27,7 +27,7 @@ pub use build::resolve;
 pub use names::{NAMED, check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{REFERENCES, STDIN, Source, set_by_hand};
+pub use read::{REFERENCES, STDIN, Source, read_stdin, set_by_hand};
 pub use remove::REMOVE;
 pub use typed::parse_value;
 pub use value::{Key, Place, Raw, Value, Values};

@@ -3,7 +3,7 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -102,16 +102,10 @@ impl Source {
         })
     }
 
-    /// Reads the scene from stdin. Its references resolve in the current folder.
+    /// Returns the scene on stdin. Its references resolve in the current folder.
     fn stdin() -> Result<Source> {
-        // Some commands read their scene twice, but stdin can be read only once.
-        static BYTES: LazyLock<std::result::Result<Vec<u8>, String>> = LazyLock::new(|| {
-            let mut bytes = Vec::new();
-            let read = std::io::stdin().lock().take(MAX_BYTES + 1).read_to_end(&mut bytes);
-            read.map(|_| bytes).map_err(|e| e.to_string())
-        });
         let name = "stdin";
-        let bytes = BYTES.as_ref().map_err(|e| Error::read(Path::new(name), e))?;
+        let bytes = read_stdin().as_ref().map_err(|e| Error::read(Path::new(name), e))?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(Error::input(
                 format!("{name} has more than {MAX_BYTES} bytes"),
@@ -183,6 +177,17 @@ impl Source {
         }
         Ok(values)
     }
+}
+
+/// Reads stdin to its end, or to the size of the largest scene. Some commands read their scene twice, but
+/// stdin can be read only once, so its bytes are kept.
+pub fn read_stdin() -> &'static std::result::Result<Vec<u8>, String> {
+    static BYTES: OnceLock<std::result::Result<Vec<u8>, String>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let mut bytes = Vec::new();
+        let read = std::io::stdin().lock().take(MAX_BYTES + 1).read_to_end(&mut bytes);
+        read.map(|_| bytes).map_err(|e| e.to_string())
+    })
 }
 
 /// Decodes the text of a scene.

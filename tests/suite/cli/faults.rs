@@ -277,6 +277,39 @@ fn a_killed_run_leaves_no_picture_and_the_next_one_cleans_up() {
 }
 
 #[test]
+fn signals_end_the_wait_for_a_scene_on_stdin() {
+    let dir = tempdir().unwrap();
+    for arguments in [&["render", "-"][..], &["batch", "-"], &["scene", "-"], &["volume", "build", "-"]] {
+        for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+            let mut command = taki(arguments);
+            command.current_dir(&dir).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+            let mut child = command.spawn().unwrap();
+            // It has begun to wait when it sleeps.
+            let stat = format!("/proc/{}/stat", child.id());
+            let handler = format!("/proc/{}/status", child.id());
+            let waits = || {
+                let caught = fs::read_to_string(&handler).unwrap_or_default();
+                let caught = caught.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+                let caught = u64::from_str_radix(caught.unwrap_or("0").trim(), 16).unwrap();
+                let state = fs::read_to_string(&stat).unwrap_or_default();
+                caught & 1 << 14 != 0
+                    && state.rsplit_once(')').is_some_and(|(_, s)| s.trim().starts_with('S'))
+            };
+            let begun = Instant::now();
+            while !waits() {
+                assert!(begun.elapsed() < LONGEST, "it never waits");
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            std::thread::sleep(Duration::from_millis(50));
+            let pid = child.id().to_string();
+            assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+            assert_eq!(wait(&mut child), Some(code), "{arguments:?} {signal}");
+        }
+    }
+    has_only(dir.path(), &[]);
+}
+
+#[test]
 fn signals_end_the_work_with_their_code_and_no_file() {
     for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
         let dir = tempdir().unwrap();

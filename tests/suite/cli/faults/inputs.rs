@@ -62,6 +62,25 @@ fn an_input_that_is_there_and_cannot_be_read_is_an_io_error() {
 }
 
 #[test]
+fn a_pipe_in_place_of_a_file_is_refused_and_not_waited_for() {
+    let dir = tempdir().unwrap();
+    assert!(Command::new("mkfifo").arg(dir.path().join("f")).status().unwrap().success());
+    run(&mut render("front", dir.path().join("p.png"))).done();
+    for arguments in [
+        &["compare", "f", "p.png"][..],
+        &["compare", "p.png", "f"],
+        &["compare", "--eye", "f"],
+        &["stitch", "f", "-o", "x.png"],
+        &["volume", "info", "f"],
+        &["scene", "f"],
+        &["scene", "front", "--set=volume.file=f"],
+        &["scene", "front", "--set=environment.kind=file", "--set=environment.file=f"],
+    ] {
+        run(taki(arguments).current_dir(&dir)).refused(65, &["f", "not a regular file"]);
+    }
+}
+
+#[test]
 fn an_alpha_beside_a_volume_file_that_brings_its_own_is_warned_of() {
     let dir = tempdir().unwrap();
     small_volume(&dir.path().join("v.npz"));
