@@ -15,7 +15,7 @@ use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 use crate::util::words::words;
-use crate::volume::{Storage, StorageChoice, Structure, WaterSpec, storage_of};
+use crate::volume::{Storage, StorageChoice, Structure, WaterSpec, check_npz, storage_of};
 
 /// Source of a scene's environment, if it has one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +78,11 @@ fn structure(v: &Values) -> Structure {
 pub(super) fn volume_file(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<PathBuf>> {
     match v.text("volume.file") {
         file if file.is_empty() => Ok(None),
-        file => confine("volume.file", Path::new(&file), folder, &limits.allow_paths).map(Some),
+        file => {
+            let file = confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?;
+            check_npz(&file)?;
+            Ok(Some(file))
+        }
     }
 }
 

@@ -150,6 +150,23 @@ impl Default for ReadOptions {
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if it is missing or not a valid volume file,
 /// and [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+    let file = open(path)?;
+    let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string(), FORMAT))?;
+    let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
+    let volume = reader.volume()?;
+    reader.notes.iter().for_each(|note| monitor.warn(&format!("{}: {note}", path.display())));
+    Ok(volume)
+}
+
+/// Checks that a volume file is there and may be read, but not what is in it.
+///
+/// # Errors
+/// As [`read_npz`].
+pub fn check_npz(path: &Path) -> Result<()> {
+    open(path).map(drop)
+}
+
+fn open(path: &Path) -> Result<File> {
     let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
     if !meta.is_file() {
         return Err(Error::input(
@@ -157,12 +174,7 @@ pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Re
             "give an .npz file made by `taki volume build` or NumPy's savez",
         ));
     }
-    let file = File::open(path).map_err(|e| Error::open(path, e))?;
-    let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string(), FORMAT))?;
-    let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
-    let volume = reader.volume()?;
-    reader.notes.iter().for_each(|note| monitor.warn(&format!("{}: {note}", path.display())));
-    Ok(volume)
+    File::open(path).map_err(|e| Error::open(path, e))
 }
 
 /// Whether the volume file has reflection coefficients of its own. A file that cannot be read counts as one

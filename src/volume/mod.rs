@@ -20,7 +20,7 @@ pub use bricks::{BRICK, Bricks, grid as brick_grid};
 pub use bundle::curve_points;
 pub use cell::{Cell, V_SCALE};
 pub use cells::Cells;
-pub use file::{ReadOptions, has_reflection, read_npz, write_npz};
+pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
 pub use pyramid::{
     Leaps, LevelAtlas, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels, level_count,

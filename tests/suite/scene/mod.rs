@@ -89,7 +89,8 @@ fn another(param: &Param) -> String {
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),
-        Kind::Text(_) => "some file.npz".into(),
+        // A volume file is to be there.
+        Kind::Text(_) => format!("{:?}", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")),
         Kind::Corners if param.key.starts_with("pools") => {
             "[[0, 1, 0], [2, 1, 0], [2, 1, -2], [0, 1, -2]]".into()
         }

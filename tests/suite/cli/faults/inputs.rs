@@ -16,13 +16,17 @@ fn an_input_that_does_not_exist_is_bad_input_and_not_tried_again() {
     let map = "--set=environment.file=";
     for folder in ["", "absent/", "file/"] {
         let at = |before: &str, name: &str| format!("{before}{folder}{name}");
-        let commands: [(String, &[&str]); 10] = [
+        let commands: [(String, &[&str]); 14] = [
             (at("", "no.toml"), &["render"]),
             (at("", "no.toml"), &["batch", "--frames=0"]),
             (at("", "no.toml"), &["scene"]),
             (at(volume, "no.npz"), &["render", "front"]),
             (at(volume, "no.npz"), &["batch", "front", "--frames=0"]),
             (at(volume, "no.npz"), &["volume", "build", "front"]),
+            (at(volume, "no.npz"), &["scene", "front"]),
+            (at(volume, "no.npz"), &["scene", "front", "--json"]),
+            (at(volume, "no.npz"), &["batch", "front", "--frames=0", "--dry-run"]),
+            (at("--volume=", "no.npz"), &["bench", "--engine=cpu", "--size=16x16", "--runs=1"]),
             (at("", "no.npz"), &["volume", "info"]),
             (at(map, "no.hdr"), &["render", "front", "--set=environment.kind=file"]),
             (at("", "no.png"), &["compare", "no.png"]),
@@ -37,6 +41,10 @@ fn an_input_that_does_not_exist_is_bad_input_and_not_tried_again() {
             run.refused(65, &[missing.rsplit('/').next().unwrap().rsplit('=').next().unwrap()]);
         }
     }
+    if cfg!(feature = "viewer") {
+        run(taki(["view", "front", "--exit-after=1", "--set=volume.file=no.npz"]).current_dir(&dir))
+            .refused(65, &["no.npz"]);
+    }
     let (folder, scene) = scene_with_volume("nowhere.npz");
     run(taki(["render"]).args(TINY).arg(scene.join("s.toml")).current_dir(&folder))
         .refused(65, &["nowhere.npz"]);
@@ -49,8 +57,9 @@ fn an_input_that_is_there_and_cannot_be_read_is_an_io_error() {
     for name in ["v.npz", "s.toml", "p.png", "m.hdr"] {
         symlink(name, dir.path().join(name)).unwrap();
     }
-    let commands: [(&str, &[&str]); 5] = [
+    let commands: [(&str, &[&str]); 6] = [
         ("v.npz", &["render", "front", "--set=volume.file=v.npz", "-o=x.png"]),
+        ("v.npz", &["scene", "front", "--set=volume.file=v.npz"]),
         ("v.npz", &["volume", "info", "v.npz"]),
         ("s.toml", &["render", "s.toml", "-o=x.png"]),
         ("m.hdr", &["render", "front", "--set=environment.kind=file", "--set=environment.file=m.hdr"]),

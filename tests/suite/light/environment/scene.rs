@@ -389,11 +389,11 @@ fn maps_stay_in_the_scenes_folder_unless_allowed() {
     // A map given on the command line may lie anywhere. Files that the scene itself names are still confined.
     let by_hand = |path: &Path| vec![format!("environment.file={}", path.display())];
     assert!(load(&folder, &by_hand(&dir.path().join("map.hdr")), &Limits::default()).is_ok());
-    let volume = ["volume.file=nowhere.npz".to_owned()];
+    let volume = [format!("volume.file={}", dir.path().join("map.hdr").display())];
     let error = load(&folder, &volume, &Limits::default()).expect_err("outside").to_string();
     assert!(error.contains("environment.file"), "{error}");
     // The scene's map is found from any folder, even if another file is given on the command line.
-    let (_dir, folder) = scene_folder("map.hdr");
+    let (_map, folder) = scene_folder("map.hdr");
     assert!(load(&folder, &volume, &Limits::default()).is_ok());
 }
 
