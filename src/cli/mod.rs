@@ -89,8 +89,8 @@ enum Command {
 /// Options of every command that reads a scene.
 #[derive(Args, Clone)]
 struct SceneOptions {
-    /// Name of a preset (see `taki presets`), path of a scene file, such as fall.toml, or - to read the scene
-    /// from stdin.
+    /// Name of a preset (see `taki presets`), path of a scene file, such as fall.toml, or of a picture that
+    /// taki wrote, or - to read the scene from stdin.
     #[arg(default_value = DEFAULT_PRESET)]
     scene: PathBuf,
     /// Sets a parameter of the scene, such as `--set curves.h=1.4`. The last part of a key is enough where it

@@ -79,7 +79,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {
-        [] => vec![default_output(&scene, "png")],
+        [] => vec![beside_its_scene(default_output(&scene, "png"), &args.scene.scene)?],
         given => given.to_vec(),
     };
     check_stdout(&outputs, args.json, std::io::stdout().is_terminal())?;
@@ -161,6 +161,18 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         terminal.note(&format!("taki: wrote {} in {total:.2} s", names.join(", ")));
     }
     Ok(())
+}
+
+/// Returns the default output, unless it is the picture that the scene was read from.
+fn beside_its_scene(output: PathBuf, scene: &Path) -> Result<PathBuf> {
+    let real = |path: &Path| path.canonicalize().ok();
+    if real(&output).is_some_and(|output| real(scene) == Some(output)) {
+        let name = output.display();
+        let what =
+            format!("{name} holds the scene, and the new picture would replace it; give a name with -o");
+        return Err(Error::Usage(what));
+    }
+    Ok(output)
 }
 
 fn is_stdout(path: &Path) -> bool {

@@ -13,7 +13,7 @@ use crate::output::frame::{
     Format, Head, LINEAR_TEXT, Output, RowWriter, SCENE_TEXT, crop_text, lines_of, samples_of,
 };
 use crate::picture::{Frame, Gamut, Image, Layer, Look, Seconds};
-use crate::scene::{REFERENCES, Scene};
+use crate::scene::{MAP_COMMENT, REFERENCES, Scene, VOLUME_COMMENT};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
@@ -248,7 +248,7 @@ fn metadata(scene: &Scene, volume: &VolumeTexture) -> String {
 
 /// The first line of that text, with the volume's checksum. Equal volumes have equal lines.
 pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
-    format!("# volume texture: crc32 {:08x}", volume.checksum())
+    format!("{VOLUME_COMMENT}{:08x}", volume.checksum())
 }
 
 /// The scene that made a picture, as a scene file. A volume or environment that was read from a file is
@@ -256,7 +256,7 @@ pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
 /// published.
 pub(crate) fn scene_text(scene: &Scene) -> String {
     let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
-    let map = map.map(|e| format!("# environment map: crc32 {:08x}\n", e.map.checksum()));
+    let map = map.map(|e| format!("{MAP_COMMENT}{:08x}\n", e.map.checksum()));
     let mut values = scene.written().clone();
     REFERENCES.iter().for_each(|key| values.clear_under(key));
     map.unwrap_or_default() + &values.to_toml()

@@ -13,7 +13,7 @@ use super::names::check_names;
 use super::param::{Kind, Param};
 use super::read::{Source, apply_sets};
 use super::value::{Place, Raw, Value, Values};
-use super::{Limits, Scene, expose};
+use super::{Limits, Record, Scene, expose};
 use crate::util::error::{Error, Result};
 
 /// A scene and its motion.
@@ -40,6 +40,8 @@ pub struct Animation {
     path: Option<CameraPath>,
     /// Measured stops, which replace the automatic exposure.
     measured: Option<f32>,
+    /// What the picture tells that the scene was read from.
+    record: Option<Record>,
 }
 
 impl Animation {
@@ -51,8 +53,10 @@ impl Animation {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
+        let record = Record::of(&source.text, &values);
         let folder = apply_sets(&mut values, sets, &source, limits)?;
-        Animation::new(&source.name, values, folder, limits)
+        record.map_or(Ok(()), |record| record.check_map(&values))?;
+        Ok(Animation { record, ..Animation::new(&source.name, values, folder, limits)? })
     }
 
     /// Makes the animation of values that the table accepted. The scenes of its frames are not checked yet.
@@ -130,6 +134,7 @@ impl Animation {
             tracks,
             path,
             measured: None,
+            record: None,
         })
     }
 
@@ -156,7 +161,7 @@ impl Animation {
         let mut values = self.values.clone();
         changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
         let animation = Animation::new(&self.name, values, self.folder.clone(), &self.limits)?;
-        Ok(Animation { measured: self.measured, ..animation })
+        Ok(Animation { measured: self.measured, record: self.record, ..animation })
     }
 
     /// Replaces the automatic exposure by `stops` added to the exposure of every frame.
@@ -205,6 +210,7 @@ impl Animation {
             expose(&mut values, stops);
         }
         Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
+            .map(|scene| scene.recorded(self.record))
             .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })
     }
 }

@@ -12,6 +12,7 @@ mod presets;
 mod print;
 mod quads;
 mod read;
+mod record;
 mod remove;
 mod slips;
 mod typed;
@@ -28,6 +29,7 @@ pub use names::{NAMED, check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, STDIN, Source, read_stdin, set_by_hand};
+pub use record::{MAP_COMMENT, Record, VOLUME_COMMENT};
 pub use remove::REMOVE;
 pub use typed::parse_value;
 pub use value::{Key, Place, Raw, Value, Values};
@@ -62,6 +64,8 @@ pub struct Scene {
     /// None after the parts were edited.
     values: Option<Values>,
     parts: Parts,
+    /// What the picture tells that the scene was read from.
+    record: Option<Record>,
 }
 
 impl Deref for Scene {
@@ -177,8 +181,10 @@ impl Scene {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
+        let record = Record::of(&source.text, &values);
         let folder = read::apply_sets(&mut values, sets, &source, limits)?;
-        Scene::from_values(&source.name, values, folder.as_deref(), limits)
+        record.map_or(Ok(()), |record| record.check_map(&values))?;
+        Ok(Scene::from_values(&source.name, values, folder.as_deref(), limits)?.recorded(record))
     }
 
     /// Makes a scene of values that the table accepted, and checks them against one another.
@@ -233,7 +239,7 @@ impl Scene {
             let beside = parts.least_bytes_beside_volume();
             parts.storage = build::water_storage(&parts.water, asked_storage, limits.memory, beside)?;
         }
-        Ok(Scene { values: Some(values), parts })
+        Ok(Scene { values: Some(values), parts, record: None })
     }
 
     /// Returns the values that the scene was made from; `None` after [`Scene::edit`].
@@ -273,14 +279,16 @@ impl Scene {
     /// `Error::Memory` where it does not fit, `Error::Input` or `Error::Io` where the file is unusable, and
     /// those of `monitor`.
     pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
-        match (&self.volume_file, self.storage) {
+        let volume = match (&self.volume_file, self.storage) {
             (Some(path), _) => {
                 let k = [self.water.k_d, self.water.k_s];
-                read_npz(path, &ReadOptions { storage: self.asked_storage, budget: memory, k }, monitor)
+                read_npz(path, &ReadOptions { storage: self.asked_storage, budget: memory, k }, monitor)?
             }
-            (None, Storage::Dense) => build_water(&self.water, monitor),
-            (None, Storage::Sparse) => build_sparse_water(&self.water, memory, monitor),
-        }
+            (None, Storage::Dense) => build_water(&self.water, monitor)?,
+            (None, Storage::Sparse) => build_sparse_water(&self.water, memory, monitor)?,
+        };
+        self.check_built(&volume)?;
+        Ok(volume)
     }
 
     /// Returns [`Scene::volume`], from the cache where it is stored there.
@@ -296,7 +304,9 @@ impl Scene {
         match cache {
             // A sparse volume's cache file would be large enough to evict every other.
             Some(cache) if self.volume_file.is_none() && self.storage == Storage::Dense => {
-                kept_water(&self.water, cache, monitor)
+                let volume = kept_water(&self.water, cache, monitor)?;
+                self.check_built(&volume)?;
+                Ok(volume)
             }
             _ => self.volume(memory, monitor),
         }
@@ -415,6 +425,7 @@ impl Scene {
                 volume.alpha
             ));
         }
+        warnings.extend(self.other_files(volume));
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
         let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
         if self.quads.is_empty() && self.rocks.is_empty() && self.pools.is_empty() {

@@ -36,6 +36,6 @@ impl Scene {
             values.set(key, &Raw::Text(path.to_string_lossy().into_owned()), &Place(key.into()))?;
         }
         sets.iter().try_for_each(|setting| apply_set(&mut values, setting))?;
-        Scene::from_values(&self.name, values, None, &Limits::default())
+        Ok(Scene::from_values(&self.name, values, None, &Limits::default())?.recorded(self.record))
     }
 }

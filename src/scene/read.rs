@@ -16,6 +16,7 @@ use super::slips::{not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets};
+use crate::output::frame::{folder_of, scene_in};
 use crate::util::error::{Error, Result};
 
 /// Largest scene file, bytes. A larger one holds millions of numbers and is a mistake.
@@ -44,7 +45,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// Finds a preset of this name, otherwise a scene file at this path. `-` stands for stdin.
+    /// Finds a preset of this name, otherwise a scene file at this path, or the scene of the picture there.
+    /// `-` stands for stdin.
     ///
     /// # Errors
     /// [`Error::Input`] where there is neither, or the file is no regular file, too large or not UTF-8;
@@ -86,6 +88,9 @@ impl Source {
                 "give a scene file or a preset",
             ));
         }
+        if let Some(text) = scene_in(scene) {
+            return Source::picture(scene, text);
+        }
         if meta.len() > MAX_BYTES {
             return Err(Error::input(
                 format!("{} has {} bytes", scene.display(), meta.len()),
@@ -94,12 +99,27 @@ impl Source {
         }
         let bytes = std::fs::read(scene).map_err(|e| Error::read(scene, e))?;
         let text = utf8(bytes, &scene.display().to_string())?;
-        Ok(Source {
-            name: scene.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            origin: scene.display().to_string(),
-            folder: scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned(),
+        Ok(Source::file(scene, text))
+    }
+
+    fn file(path: &Path, text: String) -> Source {
+        Source {
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            origin: path.display().to_string(),
+            folder: folder_of(path).to_owned(),
             text,
-        })
+        }
+    }
+
+    /// Returns the scene of a picture, whose `text` was read.
+    fn picture(path: &Path, text: Result<Option<String>>) -> Result<Source> {
+        let fix = "a picture in place of a scene is a PNG or EXR that taki wrote";
+        match text {
+            Ok(Some(text)) => Ok(Source::file(path, text)),
+            Ok(None) => Err(Error::input(format!("{} holds no scene", path.display()), fix)),
+            Err(Error::Input { what, .. }) => Err(Error::input(what, fix)),
+            Err(e) => Err(e),
+        }
     }
 
     /// Returns the scene on stdin. Its references resolve in the current folder.

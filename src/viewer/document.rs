@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::output::frame::scene_in;
 use crate::scene::{
-    Key, Kind, Limits, NAMED, Param, Place, REFERENCES, Raw, STDIN, Scene, Source, Value, Values, resolve,
-    set_by_hand,
+    Key, Kind, Limits, NAMED, Param, Place, REFERENCES, Raw, Record, STDIN, Scene, Source, Value, Values,
+    resolve, set_by_hand,
 };
 use crate::util::error::{Error, Result};
 
@@ -18,12 +19,16 @@ const MAX_UNDO: usize = 500;
 pub struct Document {
     /// Name of the preset, or stem of the file name.
     pub name: String,
-    /// The file it was read from or last saved to. `None` for a preset and for stdin.
+    /// The file it was read from or last saved to. `None` for a preset, a picture and stdin.
     pub path: Option<PathBuf>,
     /// The folder that references are relative to and must lie in. `None` once the user has named a file by
     /// hand: references are then trusted.
     folder: Option<PathBuf>,
     limits: Limits,
+    /// What the picture tells that the scene was read from.
+    record: Option<Record>,
+    /// The name of the scene for a command line. `None` if it came from stdin.
+    source: Option<PathBuf>,
     values: Values,
     /// The values when the scene was last opened or saved.
     saved: Values,
@@ -49,13 +54,16 @@ impl Document {
         let plain = Scene::load(source, &[], limits)?;
         let scene = if sets.is_empty() { plain.clone() } else { Scene::load(source, sets, limits)? };
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
-        let is_file = !is_preset && source != Path::new(STDIN);
+        let is_stdin = source == Path::new(STDIN);
+        let is_file = !is_preset && !is_stdin && scene_in(source).is_none();
         let by_hand = REFERENCES.iter().any(|key| set_by_hand(sets, key));
         Ok(Document {
             name: origin.name,
             path: is_file.then(|| source.to_owned()),
             folder: (!by_hand).then_some(origin.folder),
             limits: limits.clone(),
+            record: scene.record(),
+            source: (!is_stdin).then(|| source.to_owned()),
             values: scene.written().clone(),
             saved: plain.written().clone(),
             undo: Vec::new(),
@@ -184,7 +192,12 @@ impl Document {
         for (key, raw) in edits {
             values.set(key, raw, &Place("viewer".into()))?;
         }
-        Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
+        self.scene_of(values)
+    }
+
+    fn scene_of(&self, values: Values) -> Result<Scene> {
+        let scene = Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)?;
+        Ok(scene.recorded(self.record))
     }
 
     /// Resets the values of `keys` to those of when the scene was opened or saved.
@@ -247,7 +260,7 @@ impl Document {
 
     /// Rebuilds the scene from the values, or records why they are not valid.
     fn check(&mut self) {
-        match Scene::from_values(&self.name, self.values.clone(), self.folder.as_deref(), &self.limits) {
+        match self.scene_of(self.values.clone()) {
             Ok(scene) => {
                 self.scene = Arc::new(scene);
                 self.fault = None;
@@ -315,7 +328,7 @@ impl Document {
         }
         crate::output::frame::Output::create(path)?.finish_with(values.to_toml().as_bytes())?;
         self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        self.path = Some(path.to_owned());
+        (self.path, self.source) = (Some(path.to_owned()), Some(path.to_owned()));
         self.folder = Some(folder);
         self.values = values;
         self.saved = self.values.clone();
@@ -327,10 +340,17 @@ impl Document {
     /// gone, and one `--set` per change.
     ///
     /// # Errors
-    /// If lights or other parts were added or renamed, because no option does that.
+    /// If lights or other parts were added or renamed, because no option does that, or the scene came from
+    /// stdin.
     pub fn command_line(&self) -> Result<String> {
         let removed = self.removed()?;
-        let scene = self.path.as_ref().map_or(self.name.clone(), |p| p.display().to_string());
+        let Some(source) = &self.source else {
+            return Err(Error::input(
+                "a command line cannot name a scene that came from stdin",
+                "save the scene, then copy the command line",
+            ));
+        };
+        let scene = source.display().to_string();
         let mut words = vec!["taki".to_owned(), "render".into(), scene];
         words.extend(removed.iter().flat_map(|name| ["--remove".to_owned(), name.clone()]));
         let mut left = self.saved.clone();

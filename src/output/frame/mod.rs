@@ -37,7 +37,7 @@ pub use read::{ReadPicture, read_picture, read_png};
 pub use rows::PictureRows;
 pub use samples::{Encoding, rgb_rows, samples_of};
 pub use texts::crop_text;
-pub use verify::{Verified, verify};
+pub use verify::{Verified, scene_in, verify};
 pub use writer::{Head, RowWriter, encode};
 
 /// Key of the text that contains the scene, as a scene file.

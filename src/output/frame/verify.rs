@@ -63,3 +63,12 @@ pub fn verify(path: &Path) -> Result<Verified> {
     lines.finish()?;
     Ok(Verified { format, encoding: None, size, window, scene, channels, head, figures: None })
 }
+
+/// Returns the scene in a picture of this program, `None` in it for a picture without one. `None` where the
+/// file is no picture.
+pub fn scene_in(path: &Path) -> Option<Result<Option<String>>> {
+    Some(match Format::of_file(path).ok()? {
+        Format::Exr => ExrLines::open(path).map(|lines| lines.scene()),
+        _ => PictureRows::open(path).map(|rows| rows.scene()),
+    })
+}

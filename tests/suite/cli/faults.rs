@@ -110,7 +110,7 @@ pub fn taki<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command 
 }
 
 /// Command for a tiny render on the CPU.
-fn render(scene: impl AsRef<OsStr>, output: impl AsRef<OsStr>) -> Command {
+pub fn render(scene: impl AsRef<OsStr>, output: impl AsRef<OsStr>) -> Command {
     let mut command = taki(["render"]);
     command.arg(scene).args(TINY).arg("-o").arg(output);
     command
@@ -150,7 +150,7 @@ fn scene_with_volume(volume: &str) -> (TempDir, PathBuf) {
     (dir, folder)
 }
 
-fn small_volume(path: &Path) {
+pub fn small_volume(path: &Path) {
     let small = ["nx", "ny", "nz"].map(|axis| format!("--set=volume.{axis}=4"));
     run(taki(["volume", "build", "front"]).args(small).arg("-o").arg(path)).done();
 }

@@ -1,4 +1,5 @@
 //! Output of the command line, and what happens when something fails.
 
+mod again;
 pub mod faults;
 mod slips;

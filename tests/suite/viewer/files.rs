@@ -253,6 +253,24 @@ fn what_a_scene_removes_stays_away_in_the_viewer() {
 }
 
 #[test]
+fn a_picture_opens_as_its_scene_and_is_not_saved_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scene, picture) = (folder.path().join("s.toml"), folder.path().join("fig5.png"));
+    std::fs::write(&scene, SCENE).expect("written");
+    let at = |path: &Path| text(path);
+    taki(&["render", &at(&scene), "--engine=cpu", "--size=16x16", "--seed=9", "-o", &at(&picture)]);
+    let mut window = wide().open();
+    open(&mut window, &picture);
+    window.settle();
+    let document = window.viewer().document();
+    assert_eq!((document.name.as_str(), document.path.as_ref()), ("fig5", None));
+    assert_eq!(document.values().int("volume.seed"), 9);
+    assert_command_line_gives_the_scene(&window);
+    window.set("volume.seed", Raw::Int(10));
+    assert_command_line_gives_the_scene(&window);
+}
+
+#[test]
 fn odd_names_and_paths_survive_the_command_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let odd = folder.path().join("it's a \"place\" for $HOME & ünïcode 滝");
