@@ -10,7 +10,6 @@ use super::choice::{codec, movie_bits};
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, measured_words, seconds, size, window};
-use crate::engine::Engine;
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::output::movie::Codec;
 use crate::scene::Animation;
@@ -251,7 +250,7 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     if let Some(stops) = batch.measured() {
         terminal.note(&measured_words(stops));
     }
-    let (mut engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
+    let (mut engine, line) = args.engine.open()?;
     terminal.note(&format!("taki: {line}"));
     let screen = Screen::new(terminal, args.events.is_some());
     let result = batch.run(&mut engine, &screen);

@@ -132,7 +132,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     terminal.watch();
     let sizes = args.size.map_or(SIZES.to_vec(), |s| vec![s]);
     let mut rows = Rows::default();
-    let (engine, line) = Engine::open(args.engine.engine, &args.engine.device())?;
+    let (engine, line) = args.engine.open()?;
     terminal.note(&format!("taki: {line}"));
     let mut gpu = match engine {
         Engine::Gpu { renderer, .. } => Some(GpuBench::new(*renderer)),

@@ -1,11 +1,12 @@
 //! `taki devices`: lists the GPU adapters.
 
+use super::quiet::without_noise;
 use super::terminal::say;
 use crate::engine::gpu::adapters;
 use crate::util::error::Result;
 
 pub fn run() -> Result<()> {
-    let adapters = adapters();
+    let adapters = without_noise(adapters);
     if adapters.is_empty() {
         say(
             "no GPU adapter: taki renders on the CPU. A Vulkan driver (Debian: mesa-vulkan-drivers) enables \

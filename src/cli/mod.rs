@@ -8,6 +8,7 @@ mod devices;
 mod farm;
 mod new;
 mod parse;
+mod quiet;
 mod render;
 mod scene;
 mod stitch;
@@ -23,7 +24,7 @@ use std::time::Duration;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
-use crate::engine::EngineChoice;
+use crate::engine::{Engine, EngineChoice};
 use crate::engine::gpu::DeviceOptions;
 use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
@@ -33,6 +34,7 @@ use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
 use parse::{crop, memory, seconds, size};
+use quiet::without_noise;
 use terminal::{Terminal, say};
 
 const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
@@ -246,6 +248,11 @@ struct EngineOptions {
 }
 
 impl EngineOptions {
+    /// Opens the engine. Returns it with a line that tells what it runs on.
+    fn open(&self) -> Result<(Engine, String)> {
+        without_noise(|| Engine::open(self.engine, &self.device()))
+    }
+
     fn device(&self) -> DeviceOptions {
         DeviceOptions { adapter: self.adapter.clone(), watchdog: Duration::from_secs_f64(self.watchdog) }
     }

@@ -111,7 +111,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
             Ok((volume, seconds, scene.cached_mesh(cache)))
         });
         let clock = Instant::now();
-        let mut opened = Engine::open(args.engine.engine, &args.engine.device());
+        let mut opened = args.engine.open();
         if let Ok((engine, _)) = &mut opened {
             engine.prepare(&scene);
         }

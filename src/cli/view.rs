@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::quiet::without_noise;
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, EngineOptions, SceneOptions, choice, developed, seconds};
 use crate::job::check_replaced;
@@ -56,7 +57,7 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         drop(Output::open(path)?);
     }
     args.scene.begin(terminal);
-    let report = viewer::run(Options {
+    let options = Options {
         scene: args.scene.scene.clone(),
         sets: args.scene.all_sets(&[]),
         limits: args.cache.add_to(args.scene.limits()),
@@ -69,7 +70,8 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         screenshot: args.screenshot.clone(),
         measure: args.measure,
         lose_window_after: args.lose_window_after.map(Duration::from_secs_f64),
-    })?;
+    };
+    let report = without_noise(|| viewer::run(options))?;
     if args.json || args.measure {
         say(&serde_json::json!(report).to_string())?;
     }

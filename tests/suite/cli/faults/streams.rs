@@ -57,6 +57,31 @@ fn work_whose_report_cannot_be_written_is_done_all_the_same() {
 }
 
 #[test]
+fn lines_of_system_libraries_that_tell_nothing_are_not_shown() {
+    let dir = tempdir().unwrap();
+    for arguments in [
+        &["devices"][..],
+        &["render", "front", "--size=16x16", "--samples=1", "-o=p.png"],
+        &["batch", "front", "--size=16x16", "--samples=1", "--frames=0"],
+        &["render", "front", "--adapter", "no such adapter", "-o=p.png"],
+        // Without a display it ends with an error of its own.
+        &["view", "front", "--exit-after=1"],
+    ] {
+        if arguments[0] == "view" && !cfg!(feature = "viewer") {
+            continue;
+        }
+        let mut command = taki(arguments);
+        for name in ["XDG_RUNTIME_DIR", "DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
+            command.env_remove(name);
+        }
+        let run = run(command.current_dir(&dir));
+        let foreign: Vec<&str> = run.stderr().lines().filter(|line| !line.starts_with("taki: ")).collect();
+        assert_eq!(foreign, [""; 0], "{arguments:?}");
+        assert_eq!(run.lines("taki: error").len(), usize::from(run.exit_code() != Some(0)), "{run:?}");
+    }
+}
+
+#[test]
 fn a_reader_that_has_gone_is_no_error() {
     let dir = tempdir().unwrap();
     for arguments in [
