@@ -1,7 +1,7 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
 use super::param::{Kind, PARAMS, Param, last_part};
-use super::remove::REMOVE;
+use super::remove::{NUMBERED, REMOVE};
 use super::value::{Place, Values};
 use crate::util::error::Error;
 
@@ -51,7 +51,14 @@ fn listed(keys: &[&str]) -> String {
 /// The error for a key that `--set` or `--sweep` cannot give in this scene. It suggests the nearest key that
 /// the scene has.
 pub fn unknown_key(key: &str, values: &Values, place: &Place) -> Error {
-    unknown(key, nearest(key, values.known_keys()), place)
+    let advice = match key {
+        "" => "write the key before the =",
+        "base" => "name the preset in place of the scene, such as taki render fig5",
+        "version" => "a scene file alone has a version",
+        REMOVE => "give --remove NAME",
+        _ => return unknown(key, nearest(key, values.known_keys()), place),
+    };
+    Error::input(format!("{}: unknown key {key:?}", place.0), advice)
 }
 
 /// Keys of a scene file that stand before its tables.
@@ -76,22 +83,48 @@ pub fn unknown_key_in_file(key: &str, values: &Values, place: &Place) -> Error {
 }
 
 fn unknown(key: &str, near: Option<String>, place: &Place) -> Error {
-    let fix = match near {
-        Some(near) => format!("did you mean {near}?"),
-        None => "docs/parameters.md lists every key".into(),
+    let fix = match (misplaced(key), near) {
+        (Some(advice), _) => advice,
+        (None, Some(near)) => format!("did you mean {near}?"),
+        (None, None) => "docs/parameters.md lists every key".into(),
     };
     Error::input(format!("{}: unknown key {key}", place.0), fix)
 }
 
+/// Returns advice on a key that is unknown because a table or a name was written in another way.
+fn misplaced(key: &str) -> Option<String> {
+    let parts: Vec<&str> = key.split('.').collect();
+    if NAMED.contains(&key) {
+        return Some(format!("each of them has a table of its own: [{key}.NAME]"));
+    }
+    if NUMBERED.contains(&key) {
+        return Some(format!("each of them has a table of its own: [[{key}]]"));
+    }
+    let named = NAMED.contains(&parts[0]);
+    if named && parts[1..].contains(&"") {
+        return Some(format!("give it a name: [{}.NAME]", parts[0]));
+    }
+    let last = format!("{}.*.{}", parts[0], parts[parts.len() - 1]);
+    if named && parts.len() > 3 && PARAMS.iter().any(|param| param.key == last) {
+        let name = parts[1..parts.len() - 1].join(".");
+        return Some(format!("the name {name:?} has a dot; choose one without"));
+    }
+    let within = |param: &&Param| param.key.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'));
+    let keys: Vec<&str> = PARAMS.iter().filter(within).map(|param| param.key).collect();
+    (!keys.is_empty()).then(|| format!("it is a table, with the keys {}", listed(&keys)))
+}
+
 /// Returns the candidate nearest to a misspelt key.
 fn nearest(key: &str, candidates: impl IntoIterator<Item = String>) -> Option<String> {
+    let key = key.to_lowercase();
     candidates
         .into_iter()
         .filter(|candidate| Param::find(candidate).is_some())
         .map(|candidate| {
             // The commonest slip is in a bare last part, such as `sgima` for `trace.sigma`.
-            let score = strsim::jaro_winkler(key, &candidate);
-            (score.max(strsim::jaro_winkler(key, last_part(&candidate))), candidate)
+            let low = candidate.to_lowercase();
+            let score = strsim::jaro_winkler(&key, &low);
+            (score.max(strsim::jaro_winkler(&key, last_part(&low))), candidate)
         })
         .filter(|(score, _)| *score > ALIKE)
         .max_by(|a, b| a.0.total_cmp(&b.0))

@@ -58,6 +58,18 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     PRESETS.iter().map(|p| p.0)
 }
 
+/// Returns the preset whose name is nearest to a misspelt one.
+pub fn nearest(name: &str) -> Option<&'static str> {
+    let name = name.to_lowercase();
+    let alike = |preset: &&str| strsim::jaro_winkler(preset, &name);
+    names().max_by(|a, b| alike(a).total_cmp(&alike(b))).filter(|near| alike(near) > 0.7)
+}
+
+/// Returns a sentence that lists the presets.
+pub fn listed() -> String {
+    format!("presets: {}", names().collect::<Vec<_>>().join(", "))
+}
+
 /// Returns the presets' names and descriptions.
 pub fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
     PRESETS.iter().map(|p| (p.0, p.1))

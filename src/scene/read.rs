@@ -68,17 +68,9 @@ impl Source {
         let meta = std::fs::metadata(scene).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
                 let given = scene.display().to_string();
-                let near = presets::names().max_by(|a, b| {
-                    strsim::jaro_winkler(a, &given).total_cmp(&strsim::jaro_winkler(b, &given))
-                });
-                let near = near.filter(|n| strsim::jaro_winkler(n, &given) > 0.7);
-                Error::input(
-                    format!("no preset and no file is named {given}"),
-                    match near {
-                        Some(n) => format!("did you mean {n}?"),
-                        None => format!("presets: {}", presets::names().collect::<Vec<_>>().join(", ")),
-                    },
-                )
+                let near = presets::nearest(&given).map(|n| format!("did you mean {n}?"));
+                let what = format!("no preset and no file is named {given}");
+                Error::input(what, near.unwrap_or_else(presets::listed))
             }
             _ => Error::read(scene, e),
         })?;
@@ -168,9 +160,16 @@ impl Source {
                 let at = file.place(base.span().start);
                 let text = base.get_ref().as_str().and_then(|name| Some((name, presets::text(name)?)));
                 let Some((name, text)) = text else {
+                    let given = base.get_ref().as_str().unwrap_or_default();
                     return Err(Error::input(
                         format!("{}: base is no preset", at.0),
-                        format!("presets: {}", presets::names().collect::<Vec<_>>().join(", ")),
+                        match presets::nearest(given) {
+                            _ if given.contains(['.', '/']) => {
+                                format!("a base is no file; {}", presets::listed())
+                            }
+                            Some(near) => format!("did you mean {near}?"),
+                            None => presets::listed(),
+                        },
                     ));
                 };
                 if depth > 8 {

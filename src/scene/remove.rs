@@ -9,7 +9,7 @@ use crate::util::error::{Error, Result};
 pub const REMOVE: &str = "remove";
 
 /// Lists whose items have numbers instead of names.
-const NUMBERED: [&str; 2] = ["quads", "animate.tracks"];
+pub(super) const NUMBERED: [&str; 2] = ["quads", "animate.tracks"];
 
 /// Returns the texts that the value of [`REMOVE`] holds: one, or a list.
 pub(super) fn texts(raw: &Raw) -> Option<Vec<String>> {

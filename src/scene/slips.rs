@@ -31,6 +31,9 @@ pub fn cut(text: &str) -> String {
 /// Returns advice on a value that the parameter does not allow.
 pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
     match (param.kind, raw) {
+        (Kind::Int(..), Raw::Float(x)) if x.fract() == 0.0 && x.abs() < 1e15 => {
+            Some(format!("write a whole number: {x:.0}"))
+        }
         (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),
         (Kind::Switch(_), Raw::Int(number @ 0..=1)) => Some(format!("write {}", *number == 1)),
         (_, Raw::Text(text)) => advice_on_text(param, text.trim()),
@@ -54,6 +57,7 @@ pub fn slip_at(text: &str, at: usize) -> Option<(String, String, String)> {
     let value = value.trim();
     // A # begins a comment, unless it begins a colour without quotes.
     let value = match value.split_once('#') {
+        Some(("", rest)) if rest.starts_with(char::is_whitespace) => "",
         Some(("", _)) => value.split_whitespace().next()?,
         Some((before, _)) => before.trim_end(),
         None => value,
@@ -97,6 +101,9 @@ fn advice_on_unquoted(param: &Param, text: &str) -> Option<String> {
 }
 
 fn advice_on_text(param: &Param, text: &str) -> Option<String> {
+    if text.is_empty() {
+        return (!matches!(param.kind, Kind::Text(_))).then(|| "write a value behind the =".into());
+    }
     match param.kind {
         Kind::Float(..) | Kind::Int(..) => advice_on_number(param, text),
         Kind::Choice(words) => {

@@ -112,6 +112,7 @@ fn hexadecimal_colours_are_decoded_from_srgb() {
 #[test]
 fn a_slip_in_a_value_is_named_with_the_right_way_to_write_it() {
     for (set, advice) in [
+        ("h=", "write a value behind the =;"),
         ("h=0,5", "use a decimal point: 0.5; allowed: 0 to 8"),
         ("fov=90deg", "no unit: 90 (in degrees)"),
         ("fov=90 °", "no unit: 90 (in degrees)"),
@@ -135,7 +136,7 @@ fn a_slip_in_a_value_is_named_with_the_right_way_to_write_it() {
         has(&scene("fig5", &[set]), understood);
     }
     // What is no known slip gets no advice.
-    for set in ["h=x", "h=1/2", "h=", "h=inf", "camera.eye=1 2", "light.visibility=xyz"] {
+    for set in ["h=x", "h=1/2", "h=inf", "camera.eye=1 2", "light.visibility=xyz"] {
         let refused = scene("fig5", &[set]);
         refused.refused(65, &["; allowed: "]);
         assert_eq!(refused.stderr().matches("; ").count(), 1, "{refused:?}");
@@ -181,5 +182,45 @@ fn a_slip_in_a_scene_file_is_named_with_its_line() {
         ("h = 1.0\nh = 1.0", "TOML"),
     ] {
         fault(&format!("version = 1\n[curves]\n{text}\n")).refused(65, &["s.toml:", words]);
+    }
+}
+
+#[test]
+fn what_stands_in_the_wrong_place_is_told_where_it_belongs() {
+    let scene = |text: &str| fault(&format!("version = 1\nbase = \"front\"\n{text}\n"));
+    for (text, words) in [
+        ("[curves]\nbase = \"fig5\"", &["s.toml:4", "curves.base", "base = … above the first table"][..]),
+        ("[curves]\nversion = 1", &["version = … above the first table"]),
+        ("lights = 5", &["unknown key lights;", "[lights.NAME]"]),
+        ("[[rocks]]\ncorners = 1", &["unknown key rocks;", "[rocks.NAME]"]),
+        ("[animate]\ntracks = 3", &["unknown key animate.tracks;", "[[animate.tracks]]"]),
+        ("animate = 3", &["it is a table, with the keys animate.frames, animate.fps"]),
+        ("[animate]\npath = 3", &["it is a table, with the keys animate.path.frames"]),
+        ("[lights.\"a.b\"]\nkind = \"point\"", &["the name \"a.b\" has a dot"]),
+        ("[lights.\"\"]\nkind = \"point\"", &["give it a name: [lights.NAME]"]),
+        ("[CURVES]\nH = 1", &["did you mean curves.h?"]),
+        ("[curves]\nh =", &["s.toml:4: curves.h", "write a value behind the =; allowed: 0 to 8"]),
+        ("[curves]\nh = # none", &["write a value behind the ="]),
+        ("[volume]\nnx = 1e3", &["write a whole number: 1000;"]),
+    ] {
+        scene(text).refused(65, words);
+    }
+    for (base, words) in [
+        ("\"fronnt\"", "did you mean front?"),
+        ("\"Fig5\"", "did you mean fig5?"),
+        ("\"front.toml\"", "a base is no file; presets: waterfall"),
+        ("5", "presets: waterfall"),
+    ] {
+        fault(&format!("version = 1\nbase = {base}\n")).refused(65, &["s.toml:2: base is no preset", words]);
+    }
+    for (setting, words) in [
+        ("=1", "write the key before the ="),
+        ("base=fig5", "name the preset in place of the scene"),
+        ("version=2", "a scene file alone has a version"),
+        ("curves=1", "it is a table, with the keys curves.across"),
+        ("CURVES.H=1", "did you mean curves.h?"),
+        ("curves.h=", "write a value behind the ="),
+    ] {
+        self::scene("front", &[setting]).refused(65, &["--set", words]);
     }
 }
