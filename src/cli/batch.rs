@@ -241,6 +241,7 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     args.scene.begin(terminal);
     let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
+    args.scene.warn_of_settings(animation.values(), &args.sweeps, terminal);
     let request = args.request(&animation)?;
     let batch = Batch::plan(animation, request, terminal)?;
     terminal.close();

@@ -29,9 +29,12 @@ use crate::engine::gpu::DeviceOptions;
 use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
-use crate::scene::{Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, presets, read_stdin};
+use crate::scene::{
+    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin, settings_without_effect,
+};
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use parse::{crop, memory, seconds, size};
 use quiet::without_noise;
@@ -138,6 +141,14 @@ impl SceneOptions {
     /// Loads the scene's animation. `more` is as in [`SceneOptions::load`].
     fn animation(&self, more: &[String], limits: &Limits) -> Result<Animation> {
         Animation::load(&self.scene, &self.all_sets(more), limits)
+    }
+
+    /// Warns of settings and sweeps that have no effect.
+    fn warn_of_settings(&self, values: &Values, sweeps: &[String], terminal: &Terminal) {
+        let without = settings_without_effect(values, &self.sets, sweeps);
+        // A map without effect is warned of by the scene itself, wherever it comes from.
+        let said_later = |text: &&String| text.starts_with("environment.file ");
+        without.iter().filter(|text| !said_later(text)).for_each(|text| terminal.warn(text));
     }
 
     fn all_sets(&self, more: &[String]) -> Vec<String> {
@@ -348,7 +359,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(&args, terminal),
         Command::New(args) => new::run(&args, terminal),
-        Command::Scene(args) => scene::run(&args),
+        Command::Scene(args) => scene::run(&args, terminal),
         Command::Volume(args) => volume::run(&args, terminal),
         Command::Farm(args) => farm::run(&args),
         Command::Bench(args) => bench::run(&args, terminal),

@@ -75,7 +75,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
     more.extend(args.alpha.then(|| "image.alpha=true".to_owned()));
     // The volume is made once more for the picture and warns then.
-    let (animation, measured) = exposed(args.scene.animation(&more, &limits)?, &Unwarned(terminal))?;
+    let animation = args.scene.animation(&more, &limits)?;
+    args.scene.warn_of_settings(animation.values(), &[], terminal);
+    let (animation, measured) = exposed(animation, &Unwarned(terminal))?;
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
     let outputs = match args.outputs.as_slice() {

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::SceneOptions;
-use super::terminal::say;
+use super::terminal::{Terminal, say};
 use crate::util::error::Result;
 
 #[derive(Args)]
@@ -20,9 +20,10 @@ pub struct SceneArgs {
     json: bool,
 }
 
-pub fn run(args: &SceneArgs) -> Result<()> {
+pub fn run(args: &SceneArgs, terminal: &Terminal) -> Result<()> {
     // Without --frame, the scene is printed together with its animation, so check both.
     let animation = args.scene.animation(&[], &args.scene.limits())?;
+    args.scene.warn_of_settings(animation.values(), &[], terminal);
     let scene = match args.frame {
         Some(frame) => animation.at(frame)?,
         None => args.scene.load(&[])?,

@@ -3,6 +3,7 @@
 mod animation;
 mod budget;
 mod build;
+mod effect;
 mod ground;
 mod keyframes;
 mod names;
@@ -25,6 +26,7 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use build::resolve;
+pub use effect::{settings_without_effect, without_effect};
 pub use names::{NAMED, check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
@@ -426,6 +428,9 @@ impl Scene {
             ));
         }
         warnings.extend(self.other_files(volume));
+        let has_map = |v: &&Values| !v.text("environment.file").is_empty();
+        let map = self.values.as_ref().filter(has_map);
+        warnings.extend(map.and_then(|values| without_effect(values, "environment.file")));
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
         let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
         if self.quads.is_empty() && self.rocks.is_empty() && self.pools.is_empty() {

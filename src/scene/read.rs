@@ -412,13 +412,9 @@ pub fn apply_sets(
 /// [`Error::Input`] where the table has no such key or does not allow the value, or the scene has no such
 /// name.
 pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
-    // A name in the key may contain an = itself. The key ends at the first = that makes it a known one.
-    let splits = || setting.match_indices('=').map(|(at, _)| (&setting[..at], &setting[at + 1..]));
-    let known = splits().find(|(key, _)| Param::find(key.trim()).is_some());
-    let Some((key, text)) = known.or(splits().next()) else {
+    let Some((key, text)) = split(setting) else {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
-    let (key, text) = (key.trim(), text.trim());
     if key == REMOVE {
         let place = Place(format!("--{REMOVE}"));
         let texts = remove::texts(&parse_value(text)).ok_or_else(|| {
@@ -433,4 +429,12 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     };
     check_names(values, &key).map_err(|(what, fix)| Error::input(format!("--set {key}: {what}"), fix))?;
     values.set(&key, &parse_for(param, text), &place)
+}
+
+/// Splits a setting into its key and its value; `None` without a `=`.
+pub(super) fn split(setting: &str) -> Option<(&str, &str)> {
+    // A name in the key may contain an = itself. The key ends at the first = that makes it a known one.
+    let splits = || setting.match_indices('=').map(|(at, _)| (&setting[..at], &setting[at + 1..]));
+    let known = splits().find(|(key, _)| Param::find(key.trim()).is_some());
+    known.or(splits().next()).map(|(key, text)| (key.trim(), text.trim()))
 }

@@ -169,7 +169,7 @@ const fn joined() -> [Param; count()] {
 }
 
 /// Whether a concrete key fits a pattern in which `*` stands for any part that is not empty.
-fn matches(pattern: &str, key: &str) -> bool {
+pub(super) fn matches(pattern: &str, key: &str) -> bool {
     let mut parts = key.split('.');
     pattern
         .split('.')

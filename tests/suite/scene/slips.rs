@@ -3,6 +3,7 @@
 use std::fs;
 
 use crate::cli::faults::{Run, run, taki};
+use taki::scene::{Kind, Limits, Param, Scene, Value, without_effect};
 use tempfile::tempdir;
 
 /// `taki scene` of a scene with settings.
@@ -223,4 +224,97 @@ fn what_stands_in_the_wrong_place_is_told_where_it_belongs() {
     ] {
         self::scene("front", &[setting]).refused(65, &["--set", words]);
     }
+}
+
+#[test]
+fn settings_without_effect_are_told() {
+    let said = |arguments: &[&str]| {
+        let run = run(&mut taki(arguments));
+        run.done();
+        run.lines("taki: warning:").into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    for (setting, words) in [
+        ("sky.elevation=5", "while environment.kind is \"none\": it needs sky"),
+        ("turn=3", "environment.turn has no effect while environment.kind is \"none\""),
+        ("strand.g=0.5", "light.reflection"),
+        ("tau=3", "trace.tau has no effect while trace.attenuation is \"path-length\": it needs per-cell"),
+        ("lights.key.position=[0,0,1]", "lights.key.kind is \"directional\": it needs point or spot"),
+        ("haze.color=1,0,0", "haze.density is 0.0: it needs a number above 0"),
+        ("curves.loose=0.5", "curves.bundles is 0"),
+        ("bloom_radius=0.1", "image.bloom"),
+    ] {
+        let warnings = said(&["scene", "front", "--set", setting]);
+        assert!(warnings.len() == 1 && warnings[0].contains(words), "{setting}: {warnings:?}");
+    }
+    let none: &[&str] = &[];
+    assert_eq!(said(&["scene", "front", "--set=sky.elevation=5", "--set=environment.kind=sky"]), none);
+    assert_eq!(said(&["scene", "front", "--set=h=1", "--set=sigma=3"]), none);
+    // What is printed has every parameter, and is no reason for a warning.
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    fs::write(&file, run(&mut taki(["scene", "front"])).done()).unwrap();
+    let scene = file.to_str().unwrap();
+    assert_eq!(said(&["scene", scene]), none);
+    // The pictures of such a sweep would be equal, unless the switch is swept too.
+    let sweep = |more: &[&str]| {
+        let out = dir.path().join("{elevation}{kind}.png");
+        let start = ["batch", "front", "--size=8x8", "--dry-run", "--sweep=sky.elevation=5,10", "-o"];
+        said(&[&start[..], &[out.to_str().unwrap()], more].concat())
+    };
+    let out = dir.path().join("{elevation}.png");
+    let plain = ["batch", "front", "--dry-run", "--sweep=sky.elevation=5,10", "-o", out.to_str().unwrap()];
+    assert_eq!(said(&plain).len(), 1);
+    assert_eq!(sweep(&["--sweep=environment.kind=sky,none"]), none);
+}
+
+#[test]
+fn a_setting_that_is_told_to_have_no_effect_has_none() {
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    let kinds = ["directional", "point", "spot"];
+    let lights = kinds.map(|kind| format!("[lights.{kind}]\nkind = \"{kind}\"\nposition = [0, 1, 3]\n"));
+    fs::write(&file, format!("version = 1\nbase = \"front\"\n{}", lights.concat())).unwrap();
+    let switches: [&[&str]; 3] = [
+        &[],
+        &["environment.kind=sky", "light.reflection=strand", "attenuation=per-cell", "haze.density=0.1"],
+        &["light.visibility=cached", "image.bloom=0.1", "curves.bundles=3"],
+    ];
+    let (mut silent, mut heard) = (0, 0);
+    for switches in switches {
+        let load = |more: &str| {
+            let sets: Vec<String> = switches.iter().chain([&more]).map(ToString::to_string).collect();
+            Scene::load(&file, &sets, &Limits::default()).expect("a scene")
+        };
+        let base = load("curves.h=1");
+        for key in base.keys() {
+            let numbers = ["volume.flow", "image.width", "image.height"];
+            let (Value::Float(_) | Value::Int(_) | Value::Triple(_)) = base.values().unwrap().get(&key) else {
+                continue;
+            };
+            if numbers.contains(&key.as_str()) || key.starts_with("animate") {
+                continue;
+            }
+            let Some(other) = another(&key) else { continue };
+            let changed = load(&format!("{key}={other}"));
+            let same = format!("{:?}", *changed) == format!("{:?}", *base);
+            match without_effect(base.values().unwrap(), &key) {
+                Some(why) => {
+                    assert!(same, "{why}, but it changes the scene under {switches:?}");
+                    silent += 1;
+                }
+                None => heard += usize::from(!same),
+            }
+        }
+    }
+    assert!(silent > 20 && heard > 100, "{silent} {heard}");
+}
+
+/// A value of a number, point or colour that is allowed and rare.
+fn another(key: &str) -> Option<String> {
+    Some(match Param::find(key)?.kind {
+        Kind::Float(min, max, d) => (0.6180339 * min + 0.3819661 * max.min(d.abs() * 4.0 + 1.0)).to_string(),
+        Kind::Int(min, max, d) => (d + 1).clamp(min, max).to_string(),
+        Kind::Color(_) | Kind::Point(_) => "[0.125, 0.375, 0.625]".into(),
+        _ => return None,
+    })
 }

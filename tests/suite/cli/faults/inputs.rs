@@ -105,6 +105,25 @@ fn an_alpha_beside_a_volume_file_that_brings_its_own_is_warned_of() {
 }
 
 #[test]
+fn an_environment_map_that_is_not_used_is_warned_of() {
+    let dir = tempdir().unwrap();
+    let scene = dir.path().join("s.toml");
+    fs::write(&scene, "version = 1\nbase = \"front\"\n[environment]\nfile = \"m.hdr\"\n").unwrap();
+    let words = "environment.file has no effect while environment.kind is \"none\": it needs file";
+    let set = ["front".into(), "--set=environment.file=m.hdr".into()];
+    for arguments in [vec![scene.display().to_string()], set.to_vec()] {
+        let mut command = render(&arguments[0], dir.path().join("x.png"));
+        let run = run(command.args(&arguments[1..]).current_dir(&dir));
+        run.done();
+        assert_eq!(
+            run.lines("taki: warning:").iter().filter(|line| line.contains(words)).count(),
+            1,
+            "{run:?}"
+        );
+    }
+}
+
+#[test]
 fn a_volume_is_built_only_under_its_own_ending() {
     let dir = tempdir().unwrap();
     for (name, way) in [("v.txt", "use -o v.npz"), ("v", "use -o v.npz"), ("v.npz.gz", "use -o v.npz.npz")] {

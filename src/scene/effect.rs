@@ -1,0 +1,150 @@
+//! Settings that have no effect, because another parameter switches off what they belong to.
+
+use super::Values;
+use super::build::EnvironmentKind;
+use super::names::full_key;
+use super::param::matches;
+use super::read::split;
+use crate::light::{LightKind, ReflectionKind, Visibility};
+use crate::trace::AttenuationKind;
+
+/// Parameters that only have an effect where another one, the switch, has a certain value.
+struct Rule {
+    /// Patterns of their keys.
+    keys: &'static [&'static str],
+    /// Key of the switch. A `*` is the same name as in the keys.
+    switch: &'static str,
+    /// Values of the switch under which they have an effect, in words.
+    needs: &'static str,
+    /// Whether they have an effect, by the values and the key of the switch.
+    works: fn(&Values, &str) -> bool,
+}
+
+fn is(values: &Values, switch: &str, word: &str) -> bool {
+    values.text(switch) == word
+}
+
+const RULES: &[Rule] = &[
+    Rule {
+        keys: &["environment.file"],
+        switch: "environment.kind",
+        needs: "file",
+        works: |v, switch| is(v, switch, EnvironmentKind::File.word()),
+    },
+    Rule {
+        keys: &["environment.intensity", "environment.lights", "environment.turn"],
+        switch: "environment.kind",
+        needs: "sky or file",
+        works: |v, switch| !is(v, switch, EnvironmentKind::None.word()),
+    },
+    Rule {
+        keys: &["sky.*"],
+        switch: "environment.kind",
+        needs: "sky",
+        works: |v, switch| is(v, switch, EnvironmentKind::Sky.word()),
+    },
+    Rule {
+        keys: &["strand.*"],
+        switch: "light.reflection",
+        needs: "strand",
+        works: |v, switch| is(v, switch, ReflectionKind::Strand.word()),
+    },
+    Rule {
+        keys: &["trace.sigma"],
+        switch: "trace.attenuation",
+        needs: "path-length",
+        works: |v, switch| is(v, switch, AttenuationKind::PathLength.word()),
+    },
+    Rule {
+        keys: &["trace.tau"],
+        switch: "trace.attenuation",
+        needs: "per-cell",
+        works: |v, switch| is(v, switch, AttenuationKind::PerCell.word()),
+    },
+    Rule {
+        keys: &["light.cache"],
+        switch: "light.visibility",
+        needs: "cached",
+        works: |v, switch| is(v, switch, Visibility::Cached.word()),
+    },
+    Rule {
+        keys: &["lights.*.position"],
+        switch: "lights.*.kind",
+        needs: "point or spot",
+        works: |v, switch| !is(v, switch, LightKind::Directional.word()),
+    },
+    Rule {
+        keys: &["lights.*.direction"],
+        switch: "lights.*.kind",
+        needs: "directional or spot",
+        works: |v, switch| !is(v, switch, LightKind::Point.word()),
+    },
+    Rule {
+        keys: &["lights.*.angle", "lights.*.softness"],
+        switch: "lights.*.kind",
+        needs: "spot",
+        works: |v, switch| is(v, switch, LightKind::Spot.word()),
+    },
+    Rule {
+        keys: &["haze.color", "haze.far", "haze.level", "haze.scale_height"],
+        switch: "haze.density",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["image.bloom_radius"],
+        switch: "image.bloom",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["curves.breathe", "curves.loose", "curves.radius", "curves.wander"],
+        switch: "curves.bundles",
+        needs: "a number above 0",
+        works: |v, switch| v.int(switch) > 0,
+    },
+    Rule {
+        keys: &["curves.*", "volume.nx", "volume.ny", "volume.nz", "volume.seed"],
+        switch: "volume.file",
+        needs: "no file, because a file brings its own cells",
+        works: |v, switch| v.text(switch).is_empty(),
+    },
+    Rule {
+        keys: &["animate.frames"],
+        switch: "animate.loop",
+        needs: "0, because a loop is as long as it says",
+        works: |v, switch| v.int(switch) == 0,
+    },
+];
+
+/// Returns the rule by which a key has no effect, with its switch, whose key is full.
+fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
+    RULES.iter().filter(|rule| rule.keys.iter().any(|pattern| matches(pattern, key))).find_map(|rule| {
+        let name = key.split('.').nth(1).unwrap_or_default();
+        let switch = rule.switch.replace('*', name);
+        (!(rule.works)(values, &switch)).then_some((rule, switch))
+    })
+}
+
+/// Returns why the value of a key has no effect; `None` where it has one.
+pub fn without_effect(values: &Values, key: &str) -> Option<String> {
+    let (rule, switch) = rule(values, key)?;
+    let now = values.get(&switch).to_toml();
+    Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
+}
+
+/// Returns a sentence for each `--set` without effect, and for each sweep, whose pictures would be equal.
+/// `values` are those with all settings.
+pub fn settings_without_effect(values: &Values, sets: &[String], sweeps: &[String]) -> Vec<String> {
+    let key = |setting: &String| full_key(split(setting)?.0, values).ok();
+    let swept: Vec<String> = sweeps.iter().filter_map(key).collect();
+    let set = sets.iter().filter_map(key);
+    let mut said: Vec<String> = set
+        .chain(swept.clone())
+        // A switch that is swept is on in other pictures.
+        .filter(|key| rule(values, key).is_some_and(|(_, switch)| !swept.contains(&switch)))
+        .filter_map(|key| without_effect(values, &key))
+        .collect();
+    said.dedup();
+    said
+}
