@@ -9,7 +9,7 @@ use clap::Args;
 use super::choice::{codec, movie_bits};
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
-use super::{crop, measured_words, seconds, size, window};
+use super::{crop, measured_words, seconds, size, whole, window};
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::output::movie::Codec;
 use crate::scene::Animation;
@@ -51,7 +51,7 @@ pub struct BatchArgs {
     #[arg(long, value_name = "N")]
     fps: Option<String>,
     /// Makes the animation a seamless loop of N frames. Short for --set animate.loop=N.
-    #[arg(long = "loop", value_name = "N")]
+    #[arg(long = "loop", value_name = "N", value_parser = whole::<u32>)]
     period: Option<u32>,
     /// Renders one picture for each of several values of a parameter: KEY=FIRST:LAST:STEP or
     /// KEY=VALUE,VALUE,…, such as `--sweep alpha=0.25:1:0.25`. Several sweeps make a grid. The last part of a
@@ -78,7 +78,7 @@ pub struct BatchArgs {
     #[arg(long)]
     keep_going: bool,
     /// Number of times a picture is tried again after the GPU device was lost.
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole::<u32>)]
     retries: u32,
     /// Takes over pictures of another process that has shown no sign of life for this number of seconds.
     /// Pictures of a process that has ended on this machine are taken over at once.
@@ -88,7 +88,7 @@ pub struct BatchArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Number of samples per pixel. More samples give smoother edges and take longer.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>)]
     samples: Option<u32>,
     /// Makes the backgrounds transparent: the same as --set image.alpha=true. They can then be put over
     /// a photograph.
@@ -240,6 +240,7 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     args.scene.begin(terminal);
+    args.engine.check()?;
     let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
     args.scene.warn_of_settings(animation.values(), &args.sweeps, terminal);
     let request = args.request(&animation)?;

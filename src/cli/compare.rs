@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
-use super::parse::memory;
+use super::parse::{memory, share, tolerance, whole};
 use super::terminal::{Terminal, say};
 use super::{crop, developed, window};
 use crate::job::check_replaced;
@@ -28,16 +28,16 @@ pub struct CompareArgs {
     files: Vec<PathBuf>,
     /// Relative tolerance, as a share of the larger value. Two values count as equal if they differ by at
     /// most the relative plus the absolute tolerance.
-    #[arg(long, value_name = "X", default_value_t = 1e-3)]
+    #[arg(long, value_name = "X", default_value_t = 1e-3, value_parser = tolerance::<f32>)]
     relative: f32,
     /// Absolute tolerance, in the picture's values. Default: 1e-4 for .exr, 2/255 for the others.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = tolerance::<f32>)]
     absolute: Option<f32>,
     /// Share of the pixels that may lie outside the tolerances. If more do, taki exits with code 1.
-    #[arg(long, value_name = "X", default_value_t = 1e-3)]
+    #[arg(long, value_name = "X", default_value_t = 1e-3, value_parser = share)]
     share: f64,
     /// Largest root mean square error. If it is exceeded, taki exits with code 1.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = tolerance::<f64>)]
     rmse: Option<f64>,
     /// Writes a picture (.png, .jpg, .tif or .webp) of the absolute difference, scaled so that the largest
     /// difference is white.
@@ -55,7 +55,7 @@ pub struct CompareArgs {
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop, requires = "eye")]
     region: Option<[u32; 4]>,
     /// Also prints the streaks of N horizontal bands, from the top of the region to its bottom.
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "eye")]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "eye", value_parser = whole::<u32>)]
     bands: u32,
     /// Largest memory for one EXR file, such as 6GiB or 512MiB. A number alone counts MiB.
     #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
@@ -135,7 +135,7 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<()> {
         )));
     }
     match args.rmse {
-        Some(most) if d.rmse > most || most.is_nan() => Err(Error::Comparison(format!(
+        Some(most) if d.rmse > most => Err(Error::Comparison(format!(
             "the root mean square error is {:.6}; --rmse allows {most}",
             d.rmse
         ))),

@@ -4,9 +4,9 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, CommandFactory, Subcommand};
+use clap::{Args, Subcommand};
 
-use super::Cli;
+use super::grammar;
 use super::parse::shard_memory;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
 use crate::job::batch::Pattern;
@@ -88,10 +88,10 @@ struct JobArgs {
     #[arg(long, value_name = "N", default_value_t = 8)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     shards: u32,
-    /// Job file to write; an existing job file is replaced. Default: stdout.
+    /// Job file to write; a job file of this name is replaced. Default: stdout.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Replaces an existing file even if it is no job file of this kind.
+    /// Replaces an existing file even if it is no job file that taki wrote.
     #[arg(long, requires = "output")]
     overwrite: bool,
     /// Name of the job.
@@ -150,7 +150,7 @@ fn name(text: &str) -> std::result::Result<String, String> {
 fn check_batch(job: &Job) -> Result<()> {
     let shard = format!("0/{}", job.shards);
     let start = ["taki", "batch", "--shard", &shard].map(OsString::from);
-    let matches = Cli::command().try_get_matches_from(start.iter().chain(&job.batch)).map_err(|e| {
+    let matches = grammar().try_get_matches_from(start.iter().chain(&job.batch)).map_err(|e| {
         let text = e.render().to_string();
         let line = match e.use_stderr() {
             true => text.lines().next().unwrap_or("").trim_start_matches("error: "),
@@ -180,25 +180,26 @@ fn check_batch(job: &Job) -> Result<()> {
     }
 }
 
+/// Words at the start of every job file that taki writes.
+const MARK: &[u8] = b"written by taki farm";
+
 pub fn run(args: &FarmArgs) -> Result<()> {
-    // The last is a word that all job files of the kind begin with.
-    let (job, text, mark) = match &args.engine {
+    let (job, text) = match &args.engine {
         Engine::Slurm { job, partition } => {
-            let options = slurm::Options { partition: partition.clone() };
-            (job, slurm::script(&job.job()?, &options)?, "#SBATCH")
+            (job, slurm::script(&job.job()?, &slurm::Options { partition: partition.clone() })?)
         }
-        Engine::Openjd { job } => (job, openjd::template(&job.job()?)?, "specificationVersion"),
+        Engine::Openjd { job } => (job, openjd::template(&job.job()?)?),
         Engine::Kubernetes { job, image, claim, mount } => {
             let options =
                 kubernetes::Options { image: image.clone(), claim: claim.clone(), mount: mount.clone() };
-            (job, kubernetes::manifest(&job.job()?, &options)?, "apiVersion")
+            (job, kubernetes::manifest(&job.job()?, &options)?)
         }
     };
     match &job.output {
         Some(path) => {
             if !job.overwrite {
-                let marked = |start: &[u8]| start.windows(mark.len()).any(|w| w == mark.as_bytes());
-                check_kind(path, "job file of this kind", marked)?;
+                let marked = |start: &[u8]| start.windows(MARK.len()).any(|w| w == MARK);
+                check_kind(path, "job file of taki", marked)?;
             }
             Output::create(path)?.finish_with(text.as_bytes())
         }

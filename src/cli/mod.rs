@@ -22,21 +22,22 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::error::{ContextKind, ContextValue};
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::engine::{Engine, EngineChoice};
 use crate::engine::gpu::DeviceOptions;
+use crate::engine::{Engine, EngineChoice};
 use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
 use crate::scene::{
-    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin, settings_without_effect,
+    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin,
+    settings_without_effect,
 };
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
-use parse::{crop, memory, seconds, size};
+use parse::{crop, memory, seconds, size, wait, whole};
 use quiet::without_noise;
 use terminal::{Terminal, say};
 
@@ -108,7 +109,7 @@ struct SceneOptions {
     #[arg(long = "remove", value_name = "NAME")]
     removes: Vec<String>,
     /// Seed of the volume's random numbers. Short for --set volume.seed=N.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>)]
     seed: Option<u64>,
     /// Allows the scene to read files in this folder too. Can be given more than once.
     #[arg(long = "allow-path", value_name = "DIR")]
@@ -224,7 +225,13 @@ struct LayerOptions {
 impl LayerOptions {
     fn exr(&self) -> Exr {
         let ExrOptions { half, compression } = self.pixels;
-        let layers = self.layers.clone().unwrap_or(Layer::ALL.to_vec());
+        let mut layers = Vec::new();
+        for layer in self.layers.as_deref().unwrap_or(&Layer::ALL) {
+            // A layer given twice is written once.
+            if !layers.contains(layer) {
+                layers.push(*layer);
+            }
+        }
         Exr { half, compression, split: self.split_layers, ..Exr::of(&layers) }
     }
 
@@ -254,14 +261,24 @@ struct EngineOptions {
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Longest wait for one piece of GPU work, in seconds. After that, taki exits with code 124.
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = wait)]
     watchdog: f64,
 }
 
 impl EngineOptions {
     /// Opens the engine. Returns it with a line that tells what it runs on.
     fn open(&self) -> Result<(Engine, String)> {
+        self.check()?;
         without_noise(|| Engine::open(self.engine, &self.device()))
+    }
+
+    /// Checks that the options fit one another.
+    fn check(&self) -> Result<()> {
+        if self.engine == EngineChoice::Cpu && self.adapter.is_some() {
+            let what = "--adapter chooses a GPU, which --engine cpu does not use; leave out one of them";
+            return Err(Error::Usage(what.into()));
+        }
+        Ok(())
     }
 
     fn device(&self) -> DeviceOptions {
@@ -303,9 +320,32 @@ fn default_output(scene: &Scene, extension: &str) -> PathBuf {
     PathBuf::from(format!("{}.{extension}", scene.name))
 }
 
+/// Returns the command line's grammar. A number below 0 is a value, which its parser refuses in plain words;
+/// otherwise clap takes it for an option and gives advice that leads to the next refusal.
+fn grammar() -> clap::Command {
+    // Several numbers, or a number with a unit, are none to clap.
+    const SEVERAL: [&str; 4] = ["crop", "memory", "region", "size"];
+    fn with_negatives(command: clap::Command) -> clap::Command {
+        let option = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
+            true if SEVERAL.contains(&arg.get_id().as_str()) => arg.allow_hyphen_values(true),
+            true => arg.allow_negative_numbers(true),
+            false => arg,
+        };
+        command.mut_args(option).mut_subcommands(with_negatives)
+    }
+    with_negatives(Cli::command())
+}
+
+/// Parses the command line.
+fn parsed() -> std::result::Result<Cli, clap::Error> {
+    let mut grammar = grammar();
+    let matches = grammar.try_get_matches_from_mut(std::env::args_os())?;
+    Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut grammar))
+}
+
 /// Runs the program and returns its exit code. docs/scenes-and-files.md lists the exit codes.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match parsed() {
         Ok(cli) => cli,
         Err(e) => {
             if let Some(scene) = scene_as_command(&e) {
@@ -369,7 +409,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::Presets => presets().try_for_each(|(name, what)| say(&format!("{name:<12} {what}"))),
         Command::Completions { shell } => {
             let mut bytes = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "taki", &mut bytes);
+            clap_complete::generate(shell, &mut grammar(), "taki", &mut bytes);
             say(String::from_utf8_lossy(&bytes).trim_end())
         }
     }

@@ -26,11 +26,13 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<()> {
         return say(SCENE.trim_end());
     }
     let name = path.display();
-    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+    // A folder is refused where the file is opened.
+    let is_folder = path.is_dir() || name.to_string().ends_with(std::path::is_separator);
+    if !is_folder && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let what = format!("{name}: the name of a scene file ends with .toml; write taki new {name}.toml");
         return Err(Error::Usage(what));
     }
-    if path.symlink_metadata().is_ok() && !args.overwrite {
+    if path.symlink_metadata().is_ok() && !is_folder && !args.overwrite {
         return Err(Error::CannotCreate {
             path: path.clone(),
             why: "the file exists".into(),

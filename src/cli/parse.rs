@@ -59,3 +59,26 @@ pub fn shard_memory(text: &str) -> Parsed<u32> {
     let given = u32::try_from(mib).ok().filter(|mib| (1..=1_000_000_000).contains(mib));
     given.ok_or_else(|| "give from 1 to 1000000000 MiB".into())
 }
+
+/// Parses a whole number.
+pub fn whole<T: std::str::FromStr>(text: &str) -> Parsed<T> {
+    text.trim().parse().map_err(|_| "give a whole number, 0 or more, in digits".into())
+}
+
+/// Parses the longest wait for a piece of work, more than no time.
+pub fn wait(text: &str) -> Parsed<f64> {
+    let given = seconds(text).ok().filter(|&s| s > 0.0);
+    given.ok_or_else(|| "give a number of seconds above 0, up to 86400".into())
+}
+
+/// Parses a tolerance or error.
+pub fn tolerance<T: std::str::FromStr + PartialOrd + Default>(text: &str) -> Parsed<T> {
+    let given = text.parse::<T>().ok().filter(|x| *x >= T::default());
+    given.ok_or_else(|| "give a number, 0 or more".into())
+}
+
+/// Parses a share.
+pub fn share(text: &str) -> Parsed<f64> {
+    let given = tolerance(text).ok().filter(|&x: &f64| x <= 1.0);
+    given.ok_or_else(|| "give a share from 0 to 1, such as 0.001".into())
+}

@@ -9,11 +9,11 @@ use serde_json::json;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
-use super::{crop, default_output, measured_words, size, window};
+use super::{crop, default_output, measured_words, size, whole, window};
 use crate::engine::exposure::exposed;
 use crate::engine::{Engine, RenderOptions};
 use crate::job::{STDOUT, Still, beside_encoders, check_bloom, strips};
-use crate::output::frame::{Exr, Figures, Format};
+use crate::output::frame::{Exr, Figures, Format, folder_of, real_file};
 use crate::output::movie::fraction;
 use crate::picture::Layer;
 use crate::scene::Scene;
@@ -43,7 +43,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
     /// Number of samples per pixel. More samples give smoother edges and take longer.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>)]
     samples: Option<u32>,
     /// Makes the background transparent: the same as --set image.alpha=true. The picture can then be put over
     /// a photograph.
@@ -66,6 +66,7 @@ pub struct RenderArgs {
 
 pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     args.scene.begin(terminal);
+    args.engine.check()?;
     let start = Instant::now();
     let limits = args.cache.add_to(args.scene.limits());
     let mut more = Vec::new();
@@ -94,6 +95,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         }
     };
     let outputs: Vec<PathBuf> = outputs.into_iter().flat_map(files).collect();
+    check_twice(&outputs)?;
     let still = Still::create(&outputs)?.with_depth(args.depth.depth());
     still.check(&scene.image, window)?;
     if !args.overwrite {
@@ -175,6 +177,24 @@ fn beside_its_scene(output: PathBuf, scene: &Path) -> Result<PathBuf> {
         return Err(Error::Usage(what));
     }
     Ok(output)
+}
+
+/// Checks that no two outputs are one file.
+fn check_twice(outputs: &[PathBuf]) -> Result<()> {
+    let file = |path: &PathBuf| {
+        let real = real_file(path).ok()?;
+        Some((folder_of(&real).canonicalize().ok()?, real.file_name()?.to_owned()))
+    };
+    let files: Vec<_> = outputs.iter().map(file).collect();
+    for (i, path) in outputs.iter().enumerate().filter(|(_, path)| !is_stdout(path)) {
+        if let Some(first) = files[..i].iter().position(|other| other.is_some() && *other == files[i]) {
+            let (first, path) = (outputs[first].display(), path.display());
+            return Err(Error::Usage(format!(
+                "-o {first} and -o {path} are one file; leave out one of them"
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn is_stdout(path: &Path) -> bool {

@@ -57,6 +57,7 @@ pub fn run(args: &ViewArgs, terminal: &Terminal) -> Result<()> {
         drop(Output::open(path)?);
     }
     args.scene.begin(terminal);
+    args.engine.check()?;
     let options = Options {
         scene: args.scene.scene.clone(),
         sets: args.scene.all_sets(&[]),

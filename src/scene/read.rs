@@ -393,6 +393,12 @@ pub fn apply_sets(
     source: &Source,
     limits: &Limits,
 ) -> Result<Option<PathBuf>> {
+    if let Some(missing) = limits.allow_paths.iter().find(|path| !path.is_dir()) {
+        return Err(Error::input(
+            format!("--allow-path {}: there is no folder of this name", missing.display()),
+            "check the path, which starts in the current folder",
+        ));
+    }
     sets.iter().try_for_each(|setting| apply_set(values, setting))?;
     if !REFERENCES.iter().any(|key| set_by_hand(sets, key)) {
         return Ok(Some(source.folder.clone()));

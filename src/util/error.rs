@@ -145,7 +145,7 @@ impl Error {
             what: "cannot write",
             path: path.to_owned(),
             why: why.to_string(),
-            fix: "free some space or choose another place with -o",
+            fix: "free some space or choose another place",
         }
     }
 

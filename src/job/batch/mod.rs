@@ -305,6 +305,9 @@ impl Batch {
         let mut names: HashMap<PathBuf, String> = HashMap::new();
         let mut add = |file: PathBuf, what: String| match names.insert(plain(&file), what.clone()) {
             None => Ok(()),
+            Some(other) if other == what => {
+                Err(Error::Usage(format!("{} is given twice as {what}", file.display())))
+            }
             Some(other) => Err(Error::Usage(format!(
                 "{} would be both {other} and {what}; give them different names, such as {{h}}-{{alpha}} to \
                  separate two values",

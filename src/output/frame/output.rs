@@ -52,20 +52,24 @@ impl Output {
             |why: String, fix: &str| Error::CannotCreate { path: path.to_owned(), why, fix: fix.into() };
         let real = real_file(path)?;
         let Some(name) = real.file_name() else {
-            return Err(fail("it has no file name".into(), "give a file, such as -o fall.png"));
+            return Err(fail("it has no file name".into(), "give the name of a file"));
         };
+        if path.as_os_str().as_encoded_bytes().last().is_some_and(|&end| std::path::is_separator(end.into()))
+        {
+            return Err(fail("it is the name of a folder".into(), "give the name of a file in it"));
+        }
         let kept = match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
-                return Err(fail("a folder has this name".into(), "choose another name with -o"));
+                return Err(fail("a folder has this name".into(), "choose another name"));
             }
             // A device or a pipe cannot be replaced by a file.
             Ok(meta) if !meta.is_file() => {
-                return Err(fail("it is not a regular file".into(), "choose another name with -o"));
+                return Err(fail("it is not a regular file".into(), "choose another name"));
             }
             Ok(meta) => Some(meta.permissions()),
             // The temporary name is short, so only the final one tells.
             Err(e) if e.kind() == std::io::ErrorKind::InvalidFilename => {
-                return Err(fail(e.to_string(), "choose a shorter name with -o"));
+                return Err(fail(e.to_string(), "choose a shorter name"));
             }
             // Nothing is there yet. A folder that is missing is noticed below.
             Err(_) => None,
@@ -83,8 +87,8 @@ impl Output {
                 return Error::write(path, e);
             }
             let fix = match e.kind() {
-                NotFound => "make the folder first, or choose another with -o",
-                _ => "choose a place you may write to with -o",
+                NotFound => "make the folder first, or choose another",
+                _ => "choose a place you may write to",
             };
             fail(e.to_string(), fix)
         })?;
@@ -177,7 +181,7 @@ pub fn real_file(path: &Path) -> Result<PathBuf> {
     Err(Error::CannotCreate {
         path: path.to_owned(),
         why: "its symbolic links form a loop".into(),
-        fix: "remove the link, or choose another name with -o".into(),
+        fix: "remove the link, or choose another name".into(),
     })
 }
 

@@ -196,3 +196,112 @@ fn a_rate_may_be_a_fraction() {
     // Only a rate is a fraction.
     planned(&["--set", "h=1/2"]).refused(65, &["curves.h", "allowed: 0 to 8"]);
 }
+
+#[test]
+fn numbers_that_options_do_not_take_are_refused_in_plain_words() {
+    for (arguments, words) in [
+        (&["render", "front", "--samples", "-1"][..], "give a whole number, 0 or more"),
+        (&["render", "front", "--samples", "1.5"], "give a whole number"),
+        (&["render", "front", "--seed", "-1"], "give a whole number"),
+        (&["render", "front", "--seed", "1e3"], "give a whole number"),
+        (&["render", "front", "--watchdog", "-1"], "give a number of seconds above 0"),
+        (&["render", "front", "--watchdog", "0"], "give a number of seconds above 0"),
+        (&["render", "front", "--watchdog", "nan"], "give a number of seconds above 0"),
+        (&["render", "front", "--memory", "-1GiB"], "give an amount such as 4GiB"),
+        (&["render", "front", "--size", "-1x5"], "give WIDTHxHEIGHT"),
+        (&["render", "front", "--crop", "-1,0,5,5"], "give column, row, width and height"),
+        (&["batch", "front", "--loop", "-5"], "give a whole number"),
+        (&["batch", "front", "--retries", "-1"], "give a whole number"),
+        (&["batch", "front", "--stale", "-1"], "give a number of seconds from 1"),
+        (&["farm", "slurm", "--shards", "-1", "--", "front"], "-1 is not in 1..=10000"),
+        (&["bench", "--runs", "-1"], "-1 is not in 1..=1000"),
+        (&["compare", "a.png", "b.png", "--share", "-1"], "give a share from 0 to 1"),
+        (&["compare", "a.png", "b.png", "--share", "2"], "give a share from 0 to 1"),
+        (&["compare", "a.png", "b.png", "--share", "nan"], "give a share from 0 to 1"),
+        (&["compare", "a.png", "b.png", "--relative", "nan"], "give a number, 0 or more"),
+        (&["compare", "a.png", "b.png", "--absolute", "-1"], "give a number, 0 or more"),
+        (&["compare", "a.png", "b.png", "--rmse", "nan"], "give a number, 0 or more"),
+        (&["compare", "--eye", "a.png", "--bands", "-1"], "give a whole number"),
+    ] {
+        let refused = run(&mut taki(arguments));
+        assert_eq!(refused.exit_code(), Some(2), "{arguments:?}: {refused:?}");
+        assert!(refused.stderr().contains(words), "{arguments:?}: {refused:?}");
+    }
+    // What begins with a hyphen and is no number is still no value.
+    let refused = run(&mut taki(["render", "front", "--samples", "--json"]));
+    assert!(refused.stderr().contains("a value is required"), "{refused:?}");
+    // A parameter below 0 is a value.
+    run(&mut taki(["scene", "front", "--set", "exposure=-1.5"])).done();
+}
+
+#[test]
+fn options_that_would_be_ignored_are_refused() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    for command in ["render", "batch", "bench", "view"] {
+        if command == "view" && !cfg!(feature = "viewer") {
+            continue;
+        }
+        let refused = at(&[command, "--engine=cpu", "--adapter=nvidia"]);
+        refused.refused(2, &["--adapter chooses a GPU, which --engine cpu does not use"]);
+    }
+    at(&["scene", "front", "--allow-path=absent"]).refused(65, &["--allow-path absent: there is no folder"]);
+    at(&["scene", "front", "--allow-path=."]).done();
+    let tiny = |more: &[&str]| at(&[&["render", "front"], &TINY[..], more].concat());
+    tiny(&["-o", "p.png", "-o", "./p.png"]).refused(2, &["-o p.png and -o ./p.png are one file"]);
+    std::os::unix::fs::symlink("p.png", dir.path().join("link.png")).unwrap();
+    tiny(&["-o", "p.png", "-o", "link.png"]).refused(2, &["are one file"]);
+    tiny(&["-o", "p.png", "-o", "p.exr"]).done();
+    // A layer that is named twice is written once.
+    tiny(&["-o", "q.exr", "--layers=depth,rgb,depth", "--json"]).done();
+    let layers = taki::output::frame::read_exr(&dir.path().join("q.exr")).unwrap().2;
+    let mut names: Vec<String> = layers.into_iter().map(|(name, _)| name).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["B", "G", "R", "depth.Z"]);
+    let twice = ["batch", "front", "--manifest=m.csv", "--manifest=m.csv", "--dry-run"];
+    at(&twice).refused(2, &["m.csv is given twice"]);
+}
+
+#[test]
+fn a_folder_in_place_of_an_output_is_refused_before_the_work() {
+    let dir = tempdir().unwrap();
+    fs::create_dir(dir.path().join("d.toml")).unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    let tiny = |more: &[&str]| at(&[&["render", "front"], &TINY[..], more].concat());
+    tiny(&["-o", "x.png/"])
+        .refused(73, &["x.png/: it is the name of a folder", "give the name of a file in it"]);
+    at(&["volume", "build", "front", "-o", "x.npz/"]).refused(73, &["it is the name of a folder"]);
+    at(&["new", "x.toml/"]).refused(73, &["it is the name of a folder"]);
+    // No advice leads to the next refusal.
+    for (arguments, words) in
+        [(&["new", "d.toml"][..], "a folder has this name"), (&["new", "."], "no file name")]
+    {
+        let refused = at(arguments);
+        refused.refused(73, &[words]);
+        for wrong in ["-o", "--overwrite", "..toml"] {
+            assert!(!refused.stderr().contains(wrong), "{refused:?}");
+        }
+    }
+}
+
+#[test]
+fn a_job_file_replaces_nothing_else_unasked() {
+    let dir = tempdir().unwrap();
+    let scene = dir.path().join("s.toml");
+    let farm = |more: &[&str]| {
+        let mut command = taki(["farm", "slurm", "-o", "s.toml"]);
+        run(command.args(more).args(["--", "front", "-o", "x.####.png"]).current_dir(&dir))
+    };
+    fs::write(&scene, "version = 1\n").unwrap();
+    farm(&[]).refused(73, &["s.toml", "no job file", "--overwrite"]);
+    assert_eq!(fs::read_to_string(&scene).unwrap(), "version = 1\n");
+    farm(&["--overwrite"]).done();
+    farm(&[]).done();
+    for kind in [&["openjd"][..], &["kubernetes", "--image=i", "--claim=c"]] {
+        for _ in 0..2 {
+            let mut command =
+                taki([&["farm"], kind, &["-o", "j.yaml", "--", "front", "-o", "x.####.png"]].concat());
+            run(command.current_dir(&dir)).done();
+        }
+    }
+}

@@ -66,10 +66,10 @@ fn the_watchdog_ends_the_run_and_removes_its_temporary_file() {
         return;
     }
     let dir = tempdir().unwrap();
-    let mut command = taki(["render", "front", "--engine=gpu", "--watchdog=0", "-o"]);
+    let mut command = taki(["render", "front", "--engine=gpu", "--watchdog=1e-9", "-o"]);
     run(command.arg(dir.path().join("x.png"))).refused(124, &["did not answer", "--watchdog"]);
     has_only(dir.path(), &[]);
-    for wrong in ["-1", "NaN", "inf", "1e9", "soon"] {
+    for wrong in ["-1", "0", "NaN", "inf", "1e9", "soon"] {
         let run = run(render("front", "x.png").arg(format!("--watchdog={wrong}")));
         assert_eq!(run.code, Some(2), "{wrong}: {}", run.err);
     }

@@ -11,7 +11,7 @@ use super::{Run, TINY, has_only, is_picture, names, render, run, taki};
 
 /// Writes a job file: the quickest output that passes through the one place that makes outputs.
 fn job(folder: &Path, output: &str) -> Run {
-    let farm = ["farm", "slurm", "-o", output, "--", "front", "-o", "x.####.png"];
+    let farm = ["farm", "slurm", "--overwrite", "-o", output, "--", "front", "-o", "x.####.png"];
     run(taki(farm).current_dir(folder))
 }
 
@@ -78,7 +78,7 @@ fn every_writer_follows_links_and_keeps_the_mode() {
     let picture = [&["render", "front"], &TINY[..]].concat();
     command(&[&picture[..], &["-o", "p.png", "-o", "p.exr"]].concat());
     command(&["volume", "build", "front", "-o", "v.npz"]);
-    command(&["farm", "slurm", "-o", "j.sh", "--", "front", "-o", "x.####.png"]);
+    command(&["farm", "slurm", "--overwrite", "-o", "j.sh", "--", "front", "-o", "x.####.png"]);
     command(&["compare", "p.png", "p.png", "--difference", "d.png"]);
     command(&["stitch", "p.png", "-o", "whole.png"]);
     let batch = [&["batch", "front"], &TINY[..]].concat();
