@@ -73,8 +73,8 @@ pub(super) const TRACE: Group = Group {
         p("trace.max_cells", "", "cells", Int(1, 65536, 512), Uniform)
             .slider(1.0, 2048.0)
             .doc(
-                "Largest number of cells that a view ray may meet; the same limit holds for each light \
-                 ray.",
+                "Largest number of cells that a view ray may meet in one sheet; each sheet behind it counts \
+                 anew. The same limit holds for each light ray.",
             )
             .when(
                 "Raise it for large volumes and grazing views, where rays would end inside the water; \

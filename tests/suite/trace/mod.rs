@@ -2,3 +2,4 @@
 
 pub mod closed_forms;
 pub mod flow;
+pub mod limits;

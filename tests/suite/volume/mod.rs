@@ -1,5 +1,6 @@
 //! §2 The volume texture: what its builder promises. Packing and files have modules of their own.
 
+pub mod axes;
 pub mod bricks;
 pub mod cell;
 pub mod file;
