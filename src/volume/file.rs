@@ -151,7 +151,8 @@ impl Default for ReadOptions {
 /// and [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let file = open(path)?;
-    let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| invalid(path, e.to_string(), FORMAT))?;
+    let zip = ZipArchive::new(BufReader::new(file))
+        .map_err(|e| invalid(path, format!("it is no .npz ({e})"), FORMAT))?;
     let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
     let volume = reader.volume()?;
     reader.notes.iter().for_each(|note| monitor.warn(&format!("{}: {note}", path.display())));
