@@ -20,7 +20,7 @@ pub struct StitchArgs {
     /// File of the whole picture, with the same extension as the parts.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Replaces an existing file even if it is no picture.
+    /// Replaces an existing file even if it is one of the parts, or no picture.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]

@@ -44,8 +44,8 @@ pub fn stitch(
 /// Joins crops of one picture and writes the whole picture to `output`. The crops must cover the picture,
 /// and their pixels must be equal where they overlap. The file equals that of an uncropped render byte for
 /// byte, unless its figures are unknown (see below). Memory holds one row of the picture and of each open
-/// crop, plus the rows that wait for the encoder (about 1 MiB); WebP files are held whole. A file that is no
-/// picture is replaced only where the options say so.
+/// crop, plus the rows that wait for the encoder (about 1 MiB); WebP files are held whole. A crop, or a
+/// file that is no picture, is replaced only where the options say so.
 ///
 /// Returns the figures of a developed picture: the sum of its crops' figures, without crops that lie wholly
 /// inside another.
@@ -54,8 +54,8 @@ pub fn stitch(
 ///
 /// # Errors
 /// [`Error::Input`] if the crops belong to different pictures, leave a gap, or differ where they overlap.
-/// [`Error::Usage`] if `parts` is empty, the extension of `output` does not match the crops, or the options
-/// ask for what only an EXR has.
+/// [`Error::Usage`] if `parts` is empty, `output` is one of them unasked, the extension of `output` does not
+/// match the crops, or the options ask for what only an EXR has.
 /// Otherwise an error of reading, of creating or writing `output`, or of the monitor.
 pub fn stitch_with(
     parts: &[PathBuf],
@@ -63,6 +63,10 @@ pub fn stitch_with(
     options: &StitchOptions,
     monitor: &dyn Monitor,
 ) -> Result<Option<Figures>> {
+    if !options.overwrite && parts.iter().any(|part| is_same_file(part, output)) {
+        let what = "is one of the parts; choose another name, or replace the part with --overwrite";
+        return Err(Error::Usage(format!("-o {} {what}", output.display())));
+    }
     let parts =
         parts.iter().map(|path| Part::open(path).map(|(part, _)| part)).collect::<Result<Vec<_>>>()?;
     let Some(first) = parts.first() else {
@@ -110,6 +114,10 @@ pub fn stitch_with(
     }
     sink.finish(sum.total.as_ref())?;
     Ok(sum.total)
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
 /// Refuses parts of different pictures, and parts that do not cover the whole picture.

@@ -285,6 +285,22 @@ fn a_folder_in_place_of_an_output_is_refused_before_the_work() {
 }
 
 #[test]
+fn a_part_is_not_replaced_by_the_whole_unasked() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    for (name, crop) in [("a.png", "0,0,16,8"), ("b.png", "0,8,16,8")] {
+        at(&[&["render", "front"], &TINY[..], &["--crop", crop, "-o", name]].concat()).done();
+    }
+    let part = fs::read(dir.path().join("a.png")).unwrap();
+    for output in ["a.png", "./b.png"] {
+        at(&["stitch", "a.png", "b.png", "-o", output]).refused(2, &[output, "is one of the parts"]);
+    }
+    assert!(fs::read(dir.path().join("a.png")).unwrap() == part);
+    at(&["stitch", "a.png", "b.png", "-o", "a.png", "--overwrite"]).done();
+    assert!(fs::read(dir.path().join("a.png")).unwrap() != part);
+}
+
+#[test]
 fn a_job_file_replaces_nothing_else_unasked() {
     let dir = tempdir().unwrap();
     let scene = dir.path().join("s.toml");
