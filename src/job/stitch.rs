@@ -20,7 +20,7 @@ const PIECE_BYTES: usize = 1 << 20;
 /// How [`stitch_with`] writes the whole picture.
 #[derive(Clone, Debug, Default)]
 pub struct StitchOptions {
-    /// Whether a file that is no picture is replaced.
+    /// Whether a crop, or a file that is no picture, is replaced.
     pub overwrite: bool,
     /// Whether colours, transmittance and normals of an EXR become half floats.
     pub half: bool,

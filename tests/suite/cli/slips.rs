@@ -254,10 +254,10 @@ fn options_that_would_be_ignored_are_refused() {
     tiny(&["-o", "p.png", "-o", "p.exr"]).done();
     // A layer that is named twice is written once.
     tiny(&["-o", "q.exr", "--layers=depth,rgb,depth", "--json"]).done();
-    let layers = taki::output::frame::read_exr(&dir.path().join("q.exr")).unwrap().2;
+    let layers = taki::output::frame::read_exr(&dir.path().join("q.exr"), 1 << 30).unwrap().2;
     let mut names: Vec<String> = layers.into_iter().map(|(name, _)| name).collect();
     names.sort_unstable();
-    assert_eq!(names, ["B", "G", "R", "depth.Z"]);
+    assert_eq!(names, ["B", "G", "R", "depth.Z", "distance.D"]);
     let twice = ["batch", "front", "--manifest=m.csv", "--manifest=m.csv", "--dry-run"];
     at(&twice).refused(2, &["m.csv is given twice"]);
 }

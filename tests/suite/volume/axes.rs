@@ -1,5 +1,5 @@
-//! Axes of the arrays in volume files: x across the fall, y down it, z into the water. They hold for the place
-//! of a cell and for the direction of its flow.
+//! Axes of the arrays in volume files: x across the fall, y down it, z into the water. They hold for the
+//! place of a cell and for the direction of its flow.
 
 use std::fs::File;
 
