@@ -25,6 +25,8 @@ override CACHED: bool = false;
 override CODES: bool = false;
 // Light volumes stand at the corners of patches.
 override CORNERED: bool = false;
+// Whether rays walk to a light in some patches, because it is too close for light volumes.
+override MARCHED: bool = false;
 // The strand model of flowing water replaces fibres.
 override STRAND: bool = false;
 // Light is scattered more than once.

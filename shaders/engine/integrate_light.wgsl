@@ -38,6 +38,8 @@ struct PatchCorners {
     at: vec2<f32>,
     // Whether the patch has four light volumes; otherwise it has only the first.
     cornered: bool,
+    // Whether rays walk to the light instead, because it is too close.
+    marched: bool,
 }
 
 // The point where a ray meets a quad: everything the terms of its lights depend on.
@@ -128,7 +130,9 @@ fn patch_corners(entry: u32, uv: vec2<f32>) -> PatchCorners {
             let first = patches.x + patch_at.y * row + patch_at.x;
             out.cornered = true;
             out.at = at - vec2<f32>(patch_at);
-            out.p00 = light_places[first].xyz;
+            let first_corner = light_places[first];
+            out.marched = first_corner.w != 0;
+            out.p00 = first_corner.xyz;
             out.p10 = light_places[first + 1].xyz;
             out.p01 = light_places[first + row].xyz;
             out.p11 = light_places[first + row + 1].xyz;
@@ -197,13 +201,16 @@ fn visibility_of(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
             return vec2<f32>(exp2(-depth), depth);
         }
     }
-    if MARCH {
-        if seen.occupied {
-            let l_cell = light.l_cell;
-            let walked = optical_depth(view.level, view.matter, seen.cell, l_cell, view.max_cells, NEVER);
-            (*ray).light_cells += walked.cells;
-            (*ray).cut |= !walked.done;
-            depth = walked.depth * view.extinction;
+    if MARCH | MARCHED {
+        if MARCH || light.corners.marched {
+            if seen.occupied {
+                let l_cell = light.l_cell;
+                let walked = optical_depth(view.level, view.matter, seen.cell, l_cell, view.max_cells, NEVER);
+                (*ray).light_cells += walked.cells;
+                (*ray).cut |= !walked.done;
+                depth = walked.depth * view.extinction;
+            }
+            return vec2<f32>(exp2(-depth), depth);
         }
     }
     if CACHED {

@@ -7,7 +7,8 @@
 //!
 //! Where the direction in cells changes over a quad, the quad is cut into patches. If it changes little (the
 //! quad is not a parallelogram), each patch has one light volume. If it changes more (a point light), each
-//! patch has one at every corner, and rays interpolate between them.
+//! patch has one at every corner, and rays interpolate between them. Where the light is so close that even a
+//! patch is too large for that, every cell of a ray walks to the light.
 //!
 //! A value is normally a code of the transmittance T to the light, √T in 255ths. A code takes one byte, so
 //! many patches fit into a processor's caches, and the view ray computes no exponential. With multiple
@@ -18,7 +19,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{Light, Scattering};
 use crate::mapping::{CellFrame, Quad};
@@ -57,6 +58,14 @@ const MAX_PATCHES: u32 = 16;
 /// Maximum number of patches with four light volumes along one side of a quad.
 const MAX_CORNERED_SIDE: u32 = 16;
 
+/// Maximum turn between the corners of a patch with four light volumes, in degrees; with larger patches,
+/// twice their planned turn. Where the light's direction turns more, rays walk to the light.
+///
+/// A point light that is closer than a patch is wide turns its direction by more than 90° over the patches
+/// below it. With this limit, a light 8 cm before `front` gives 2 % RMSE instead of 27 %; with 24° it is 4 %,
+/// and with 12° 1 %.
+const MARCH_ANGLE: f64 = 16.0;
+
 /// Relative difference of directions below which they share a light volume. At this value rays diverge by a
 /// thousandth of a cell over a slab of 1000 cells.
 const DIRECTION_TOLERANCE: f32 = 1e-6;
@@ -66,8 +75,11 @@ const DIRECTION_TOLERANCE: f32 = 1e-6;
 pub struct LightVolumes {
     /// The distinct light volumes.
     pub volumes: Vec<LightVolume>,
-    /// Indices into `volumes`, one for each patch or for each patch corner, row by row along u.
+    /// Indices into `volumes`, one for each patch or for each patch corner, row by row along u. 0 at
+    /// corners between marched patches.
     pub numbers: Vec<u32>,
+    /// Whether rays walk to the light in the patch that starts at the corner, for each of `numbers`.
+    pub marched: Vec<bool>,
     /// Patches of each quad and light; quad q and light i have the entry q·lights + i.
     pub patches: Vec<Patches>,
     /// Number of lights.
@@ -205,6 +217,11 @@ impl LightVolumes {
         self.patches.iter().any(|patches| patches.cornered)
     }
 
+    /// Whether rays walk to a light in any patch.
+    pub fn marches(&self) -> bool {
+        self.marched.contains(&true)
+    }
+
     /// Plan for patches of the given maximum turns, in radians. Directions that differ by less than
     /// `tolerance` times their length share a light volume.
     fn at_angles(lit: &LitQuads, angles: [f64; 2], tolerance: f32) -> Self {
@@ -228,7 +245,8 @@ impl LightVolumes {
                 volumes.len() as u32 - 1
             })
         };
-        let (mut numbers, mut patches) = (Vec::new(), Vec::new());
+        let (mut numbers, mut marched, mut patches) = (Vec::new(), Vec::new(), Vec::new());
+        let widest = MARCH_ANGLE.to_radians().max(2.0 * angles[1]);
         for quad in quads {
             let cell_depth = if medium.per_cell { 1.0 } else { quad.material.thickness_m / size[2] as f32 };
             let bits = match form {
@@ -244,6 +262,7 @@ impl LightVolumes {
                     // regular.
                     patches.push(Patches { first: numbers.len() as u32, count: [1, 1], cornered: false });
                     numbers.push(0);
+                    marched.push(false);
                     continue;
                 }
                 let at = |u: f32, v: f32| direction(quad, light, side_seen, size, Vec2::new(u, v));
@@ -251,17 +270,24 @@ impl LightVolumes {
                 patches.push(Patches { first: numbers.len() as u32, count, cornered });
                 let [nu, nv] = count.map(|n| n + u32::from(cornered));
                 let offset = if cornered { 0.0 } else { 0.5 };
-                for (j, i) in (0..nv).flat_map(|j| (0..nu).map(move |i| (j, i))) {
-                    let coordinate = |i: u32, n: u32| (i as f32 + offset) / n as f32;
-                    let direction = at(coordinate(i, count[0]), coordinate(j, count[1]));
-                    numbers.push(number_of(direction, bits, tolerance));
-                }
+                let coordinate = |i: u32, n: u32| (i as f32 + offset) / n as f32;
+                let places = (0..nv).flat_map(|j| (0..nu).map(move |i| [i, j]));
+                let directions: Vec<Vec3> =
+                    places.map(|[i, j]| at(coordinate(i, count[0]), coordinate(j, count[1]))).collect();
+                let (walked, needed) = match cornered {
+                    true => walked_and_needed(&directions, [nu, nv], widest),
+                    false => (vec![false; directions.len()], vec![true; directions.len()]),
+                };
+                let number =
+                    |(&d, needed): (&Vec3, bool)| if needed { number_of(d, bits, tolerance) } else { 0 };
+                numbers.extend(directions.iter().zip(needed).map(number));
+                marched.extend(walked);
             }
         }
         if volumes.is_empty() && !numbers.is_empty() {
             volumes.push(LightVolume { direction: Vec3::Z, bits: 1.0 });
         }
-        LightVolumes { volumes, numbers, patches, lights: lights.len(), medium, form }
+        LightVolumes { volumes, numbers, marched, patches, lights: lights.len(), medium, form }
     }
 }
 
@@ -278,6 +304,28 @@ fn direction(quad: &Quad, light: &Light, side: f32, size: [u32; 3], uv: Vec2) ->
     let (l, _) = light.at(map.point_world(uv.x, uv.y));
     let plane = Vec3::new(l.dot(map.e1_world), l.dot(map.e2_world), l.dot(map.n_world) * side);
     frame.cell_from_plane(plane) * frame.depth
+}
+
+/// Whether rays walk to a light in each patch, by its first corner, and whether each corner needs a light
+/// volume. `directions` are those at the `nu` times `nv` corners; patches that turn by more than `widest`
+/// radians are walked.
+fn walked_and_needed(directions: &[Vec3], [nu, nv]: [u32; 2], widest: f64) -> (Vec<bool>, Vec<bool>) {
+    let (mut walked, mut needed) = (vec![false; directions.len()], vec![false; directions.len()]);
+    for (j, i) in (0..nv - 1).flat_map(|j| (0..nu - 1).map(move |i| (j, i))) {
+        let first = (j * nu + i) as usize;
+        let corners = [first, first + 1, first + nu as usize, first + nu as usize + 1];
+        walked[first] = turn_between(corners.map(|n| directions[n].as_dvec3())) > widest;
+        if !walked[first] {
+            corners.iter().for_each(|&n| needed[n] = true);
+        }
+    }
+    (walked, needed)
+}
+
+/// Largest angle between two of four directions, radians.
+fn turn_between(directions: [DVec3; 4]) -> f64 {
+    let angle = |a: usize, b: usize| directions[a].angle_between(directions[b]);
+    (0..4).flat_map(|a| (0..a).map(move |b| angle(a, b))).fold(0.0, f64::max)
 }
 
 /// Number of patches along u and v, and whether they are cornered. The direction turns by at most `whole`

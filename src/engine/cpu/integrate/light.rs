@@ -40,6 +40,8 @@ struct PatchCorners {
     numbers: [u32; 4],
     /// Position in the patch, 0 to 1.
     at: Vec2,
+    /// Whether rays walk to the light instead, because it is too close.
+    marched: bool,
 }
 
 impl Integrator<'_> {
@@ -89,10 +91,7 @@ impl Integrator<'_> {
             _ if matter.mist > 0.0 => {
                 matter.depth(cell.z, light.l_cell, level.size.z, self.per_cell) * extinction
             }
-            Visibility::March => {
-                optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked) * extinction
-            }
-            Visibility::Cached => {
+            Visibility::Cached if !light.corners.marched => {
                 let value = self.patch_value(level, cell, &light.corners);
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
                     let transmittance = value * value * TRANSMITTANCE_OF_CODE;
@@ -105,6 +104,7 @@ impl Integrator<'_> {
                 // leaves.
                 value * (extinction * matter.left * if self.per_cell { 1.0 } else { ray.frame.depth })
             }
+            _ => optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked) * extinction,
         };
         ((-depth).exp2(), depth)
     }
@@ -141,9 +141,11 @@ fn patch_corners(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) ->
     let patch = at.as_uvec2().min(UVec2::new(nu - 1, nv - 1));
     let number = |x: u32, y: u32, row: u32| volumes.numbers[(patches.first + y * row + x) as usize];
     if !patches.cornered {
-        return PatchCorners { numbers: [number(patch.x, patch.y, nu); 4], at: Vec2::ZERO };
+        let numbers = [number(patch.x, patch.y, nu); 4];
+        return PatchCorners { numbers, at: Vec2::ZERO, marched: false };
     }
     let [x, y] = patch.to_array();
     let numbers = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| number(x, y, nu + 1));
-    PatchCorners { numbers, at: at - patch.as_vec2() }
+    let marched = volumes.marched[(patches.first + y * (nu + 1) + x) as usize];
+    PatchCorners { numbers, at: at - patch.as_vec2(), marched }
 }

@@ -74,9 +74,9 @@ pub fn light_places(gpu: &Gpu, plan: &LightVolumes, atlas: &LightVolumeAtlas) ->
         let [nu, nv] = p.count.map(|n| n as i32);
         [(before + p.first) as i32, nu, nv, i32::from(p.cornered)]
     });
-    let numbers = plan.numbers.iter().map(|&number| {
+    let numbers = plan.numbers.iter().zip(&plan.marched).map(|(&number, &marched)| {
         let [x, y, z] = atlas.origin(number);
-        [x, y, z, 0]
+        [x, y, z, i32::from(marched)]
     });
     let all: Vec<[i32; 4]> = patches.chain(numbers).collect();
     gpu.buffer_with("light places", bytemuck::cast_slice(&all), wgpu::BufferUsages::STORAGE)
