@@ -311,7 +311,7 @@ fn parity_fails_when_sigma_or_a_quad_changes() {
     // Where more is tolerated, only larger changes are seen.
     let changes = match Parity::of_adapter().is_coarse() {
         false => ["trace.sigma=10.2", "materials.water.thickness=1.02", "light.p=21", "volume.seed=2"],
-        true => ["trace.sigma=13", "materials.water.thickness=1.3", "light.p=40", "volume.seed=2"],
+        true => ["trace.sigma=13", "materials.water.thickness=1.3", "light.p=4", "volume.seed=2"],
     };
     for change in changes {
         let other = frame(&mut renderer, change);
