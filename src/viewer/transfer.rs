@@ -27,6 +27,8 @@ pub struct PathDialog {
     text: String,
     /// Why the last path could not be used.
     pub fault: Option<String>,
+    /// Existing file that the user may replace: the dialog or the system's has asked.
+    replaced: Option<PathBuf>,
     /// Answer of the system's file dialog, while that is open.
     picked: Option<Receiver<Option<PathBuf>>>,
     /// Whether the text field is to get the keyboard in the next frame.
@@ -54,6 +56,17 @@ impl PathDialog {
         self.open.is_some()
     }
 
+    /// Whether the user agreed to replace the existing file `path`. Otherwise asks, unless the dialog is
+    /// closed.
+    pub fn may_replace(&mut self, path: &Path) -> bool {
+        if self.replaced.as_deref() == Some(path) {
+            return true;
+        }
+        self.fault = Some(format!("{} exists already", path.display()));
+        self.replaced = Some(path.to_owned());
+        false
+    }
+
     /// Shows the dialog. Returns the path that the user gave. `also` adds contents, such as recent files, and
     /// returns the path chosen there.
     pub fn show(
@@ -71,6 +84,7 @@ impl PathDialog {
             && let Ok(path) = picked.try_recv()
         {
             self.picked = None;
+            self.replaced.clone_from(&path);
             given = path;
         }
         let shown = egui::Modal::new(egui::Id::unique("path dialog")).show(ctx, |ui| {
@@ -93,6 +107,8 @@ impl PathDialog {
             ui.add_space(4.0);
             ui.horizontal(|ui| {
                 let ready = !self.text.trim().is_empty();
+                let replaces = self.replaced.as_deref() == Some(Path::new(self.text.trim()));
+                let verb = if replaces { "Replace" } else { verb };
                 if (ui.add_enabled(ready, egui::Button::new(verb)).clicked() || entered) && ready {
                     given = Some(PathBuf::from(self.text.trim()));
                 }
@@ -154,6 +170,8 @@ pub struct ExportDialog {
     pub deep: bool,
     /// Whether a change of width or height keeps the picture's aspect.
     pub keep_aspect: bool,
+    /// Files to write, while the dialog asks whether to replace those of them that exist.
+    asked: Vec<PathBuf>,
 }
 
 impl Default for ExportDialog {
@@ -166,6 +184,7 @@ impl Default for ExportDialog {
             formats: Format::ALL.map(|format| (format, format == Format::Png)),
             deep: false,
             keep_aspect: true,
+            asked: Vec::new(),
         }
     }
 }
@@ -248,20 +267,46 @@ impl ExportDialog {
         }
     }
 
-    /// The names of the files to write, and the button that starts the export.
-    fn start_button(&self, ui: &mut egui::Ui) -> ExportAnswer {
+    /// The names of the files to write, and the button that starts the export. Asks before files are
+    /// replaced.
+    fn start_button(&mut self, ui: &mut egui::Ui) -> ExportAnswer {
         let files = self.paths();
-        let text = match files.as_slice() {
-            [] => "Enter a file name and choose a kind.".to_owned(),
-            files => {
-                let names: Vec<String> = files.iter().map(|p| p.display().to_string()).collect();
-                format!("Writes {}", names.join(" and "))
-            }
+        let existing: Vec<PathBuf> = files.iter().filter(|path| path.exists()).cloned().collect();
+        if files == self.asked && !existing.is_empty() {
+            return self.replace_buttons(ui, &existing);
+        }
+        match files.is_empty() {
+            true => ui.weak("Enter a file name and choose a kind."),
+            false => ui.weak(format!("Writes {}", listed(&files))),
         };
-        ui.weak(text);
         let start = ui.add_enabled(!files.is_empty(), egui::Button::new("Export")).clicked();
-        if start { ExportAnswer::Start } else { ExportAnswer::Nothing }
+        match (start, existing.is_empty()) {
+            (true, true) => return ExportAnswer::Start { overwrite: false },
+            (true, false) => self.asked = files,
+            (false, _) => self.asked.clear(),
+        }
+        ExportAnswer::Nothing
     }
+
+    /// The question whether to replace `existing` files.
+    fn replace_buttons(&mut self, ui: &mut egui::Ui, existing: &[PathBuf]) -> ExportAnswer {
+        let exist = if existing.len() == 1 { "exists" } else { "exist" };
+        ui.colored_label(ui.visuals().warn_fg_color, format!("{} {exist} already.", listed(existing)));
+        let answers = ui.horizontal(|ui| [ui.button("Replace").clicked(), ui.button("Go back").clicked()]);
+        match answers.inner {
+            [false, false] => ExportAnswer::Nothing,
+            [replace, _] => {
+                self.asked.clear();
+                if replace { ExportAnswer::Start { overwrite: true } } else { ExportAnswer::Nothing }
+            }
+        }
+    }
+}
+
+/// The names of files, in words.
+fn listed(files: &[PathBuf]) -> String {
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    names.join(" and ")
 }
 
 /// Says what a format is for.
@@ -290,7 +335,10 @@ pub enum ExportAnswer {
     /// No action.
     Nothing,
     /// Starts the export.
-    Start,
+    Start {
+        /// Whether the user agreed to replace existing files.
+        overwrite: bool,
+    },
     /// Cancels the running export.
     Cancel,
 }

@@ -49,6 +49,8 @@ pub struct Export {
     pub scene: Scene,
     /// Files to write; their extensions choose the formats.
     pub paths: Vec<PathBuf>,
+    /// Whether existing files are replaced even if they are no pictures.
+    pub overwrite: bool,
     /// Depth of developed pictures.
     pub depth: Depth,
 }

@@ -56,6 +56,14 @@ impl Viewer {
         self.paths.ask(Purpose::Save, &guess);
     }
 
+    /// Saves the scene to a path that the user gave, after asking whether to replace another file.
+    pub(super) fn save_as(&mut self, path: &Path) {
+        let is_own = self.document.path.as_deref() == Some(path);
+        if is_own || !path.exists() || self.paths.may_replace(path) {
+            self.save_to(path);
+        }
+    }
+
     pub(super) fn save_to(&mut self, path: &Path) {
         match self.document.save(path) {
             Ok(()) => {
@@ -122,7 +130,7 @@ impl Viewer {
         self.export.open = true;
     }
 
-    pub(super) fn start_export(&mut self) {
+    pub(super) fn start_export(&mut self, overwrite: bool) {
         let edits = [
             ("image.width", i64::from(self.export.size[0])),
             ("image.height", i64::from(self.export.size[1])),
@@ -132,7 +140,7 @@ impl Viewer {
             Ok(scene) => {
                 self.exporting = true;
                 let (paths, depth) = (self.export.paths(), self.export.depth());
-                self.worker.export(Export { scene, paths, depth });
+                self.worker.export(Export { scene, paths, overwrite, depth });
             }
             Err(e) => self.say(MessageKind::Error, e.to_string()),
         }

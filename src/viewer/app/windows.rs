@@ -91,7 +91,7 @@ impl Viewer {
             let image = &self.document.scene().image;
             let aspect = f64::from(image.width) / f64::from(image.height);
             match self.export.show(ctx, aspect, exporting) {
-                ExportAnswer::Start => self.start_export(),
+                ExportAnswer::Start { overwrite } => self.start_export(overwrite),
                 ExportAnswer::Cancel => self.worker.cancel_exports(),
                 ExportAnswer::Nothing => {}
             }
@@ -108,7 +108,7 @@ impl Viewer {
         });
         match opening {
             Some((Purpose::Open, path)) => self.open(&path),
-            Some((Purpose::Save, path)) => self.save_to(&path),
+            Some((Purpose::Save, path)) => self.save_as(&path),
             None => {}
         }
         // A cancelled save also cancels the action that was to follow it.

@@ -393,6 +393,41 @@ fn an_export_into_no_folder_is_told() {
 }
 
 #[test]
+fn what_exists_is_replaced_only_after_a_question() {
+    let mut window = wide().open();
+    let (picture, other) = (window.path("out.png"), window.path("notes.toml"));
+    std::fs::write(&picture, "no picture").expect("written");
+    std::fs::write(&other, "notes").expect("written");
+    let old = |path: &Path| std::fs::read(path).expect("a file").len() < 20;
+    let stem = window.path("out");
+    ask_export(&mut window, &stem, [32, 18], 1);
+    window.press("Export");
+    assert!(window.reads("out.png exists already.") && !window.reads("Writes "));
+    window.press("Go back");
+    assert!(window.reads("Writes ") && old(&picture) && window.viewer().worker().state().exports_done == 0);
+    // The answer holds for the files that were asked about.
+    window.press("Export");
+    window.widget(Role::CheckBox, "EXR").click_accesskit();
+    window.harness.run_steps(3);
+    assert!(window.reads("Writes "));
+    window.widget(Role::CheckBox, "EXR").click_accesskit();
+    window.harness.run_steps(3);
+    window.press("Export");
+    window.press("Replace");
+    exported(&mut window, 1);
+    assert!(read_png(&picture).is_ok_and(|(width, height, _)| (width, height) == (32, 18)));
+    window.harness.state_mut().document_mut().set("curves.h", &Raw::Float(0.2), None).expect("valid");
+    save_as(&mut window, &other);
+    assert!(window.reads("notes.toml exists already") && old(&other));
+    window.press("Replace");
+    assert!(!old(&other) && window.reads("saved "));
+    // A scene's own file is saved without a question.
+    window.set("curves.h", Raw::Float(0.4));
+    save_as(&mut window, &other);
+    assert!(!is_changed(&window));
+}
+
+#[test]
 fn the_size_of_an_export_keeps_the_aspect() {
     let mut window = wide().open();
     window.chord(Modifiers::COMMAND, Key::E);

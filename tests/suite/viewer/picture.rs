@@ -142,6 +142,7 @@ fn a_lost_device_during_an_export_is_replaced_too() {
     window.viewer().worker().export(taki::viewer::worker::Export {
         scene,
         paths: vec![file.clone()],
+        overwrite: false,
         depth: Default::default(),
     });
     window.until("the export", |viewer| viewer.worker().state().exports_done == 1);

@@ -37,7 +37,9 @@ impl Renderer {
 
     fn export_files(&mut self, export: &Export) -> Result<()> {
         let still = Still::create(&export.paths)?.with_depth(export.depth);
-        still.check_replaced()?;
+        if !export.overwrite {
+            still.check_replaced()?;
+        }
         let request = Request {
             // No request is newer, so the volume of the export is never abandoned.
             serial: u64::MAX,
