@@ -63,6 +63,13 @@ struct FrameUniforms {
     footprint: f32,
     // 1: the background is transparent. 0: it is seen.
     alpha: u32,
+    // Constants that turn a depth of the z-buffer into a point: DepthToPoint of src/picture/camera.rs.
+    anchor: vec3<f32>,
+    depth_shift: f32,
+    depth_rise: f32,
+    depth_slope: f32,
+    depth_scale: f32,
+    pad_d: f32,
 }
 
 struct Light {
@@ -91,10 +98,14 @@ struct Quad {
     repeat_u: f32,
     n: vec3<f32>,
     repeat_v: f32,
-    // Position of the eye relative to corner A, along e1, e2 and n, metres.
-    eye_plane: vec3<f32>,
+    // The plane as the eye sees it, and the eye's height over it: PlaneView of src/mapping/view.rs.
+    across: vec3<f32>,
+    height: f32,
+    along: vec3<f32>,
     // Index of the first value of the material's multiple-scattering profile.
     profile: u32,
+    normal: vec3<f32>,
+    pad_d: f32,
     // E = B − A, F = D − A and G = A − B + C − D in the plane, metres.
     e: vec2<f32>,
     f: vec2<f32>,
@@ -176,10 +187,35 @@ fn fresnel(cos_angle: f32) -> f32 {
     return 0.02 + 0.98 * (m2 * m2 * m);
 }
 
-// Unit direction through a pixel of the whole image. Twin: Camera::view_ray in src/picture/camera.rs.
-fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
+// The point (X, Y) of the image under a pixel of the whole image. Twin: Camera::image_point in
+// src/picture/camera.rs.
+fn image_point(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec2<f32> {
     let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
     let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;
-    let d = frame.forward + frame.right * x + frame.up * y;
+    return vec2<f32>(x, y);
+}
+
+// Vector from the eye to a point of the image plane at distance 1. Twin: Camera::ray_to.
+fn ray_to(frame: FrameUniforms, at: vec2<f32>) -> vec3<f32> {
+    return frame.forward + frame.right * at.x + frame.up * at.y;
+}
+
+// Length of `ray_to`.
+fn ray_length(frame: FrameUniforms, at: vec2<f32>) -> f32 {
+    let d = ray_to(frame, at);
+    return sqrt(dot3(d, d));
+}
+
+// Unit direction through a pixel of the whole image. Twin: Camera::view_ray.
+fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
+    let d = ray_to(frame, image_point(frame, pixel_x, pixel_y));
     return d / sqrt(dot3(d, d));
+}
+
+// Point at depth `z` of the z-buffer under a point of the image. Twin: DepthToPoint::point.
+fn point_at(frame: FrameUniforms, at: vec2<f32>, z: f32) -> vec3<f32> {
+    let inverse = 1.0 / (z - frame.depth_shift);
+    let along = (frame.depth_rise + frame.depth_slope * z) * inverse;
+    return frame.anchor + frame.forward * along
+        + (frame.right * at.x + frame.up * at.y) * (frame.depth_scale * inverse);
 }

@@ -60,11 +60,38 @@ fn face_point(quad: Quad, uv: vec2<f32>, size: vec3<i32>, flow_cells: f32) -> ve
     return vec3<f32>(xy - cells * floor(xy / cells), 0.0);
 }
 
-// Point where the ray `d` from the eye meets a quad: u, v, and the distance in metres.
-fn quad_hit(quad: Quad, d: vec3<f32>) -> vec3<f32> {
-    let d_n = dot3(d, quad.n);
-    let t = clamp(-quad.eye_plane.z / select(d_n, 1e-20, abs(d_n) < 1e-20), 0.0, 1e9);
-    let hh = quad.eye_plane.xy + vec2<f32>(dot3(d, quad.e1), dot3(d, quad.e2)) * t;
+// Value of a row of a PlaneView at a point of the image.
+fn linear_in(row: vec3<f32>, at: vec2<f32>) -> f32 {
+    return row.x + row.y * at.x + row.z * at.y;
+}
+
+// Point of a plane under a point of the image, and the length of the ray in front of it as a multiple of
+// `ray_to`. Twin: PlaneView::hit in src/mapping/view.rs, which holds the reasoning.
+fn plane_hit(
+    across: vec3<f32>,
+    along: vec3<f32>,
+    normal: vec3<f32>,
+    height: f32,
+    at: vec2<f32>,
+) -> vec3<f32> {
+    let v_n = linear_in(normal, at);
+    let inverse = 1.0 / select(v_n, 1e-20, abs(v_n) < 1e-20);
+    let hh = vec2<f32>(linear_in(across, at), linear_in(along, at)) * inverse;
+    return vec3<f32>(clamp(hh, vec2<f32>(-1e9), vec2<f32>(1e9)), clamp(-height * inverse, 0.0, 1e9));
+}
+
+// Point of a quad in the world at the texture coordinates `uv`. Twin: QuadMap::point_world.
+fn point_world(quad: Quad, uv: vec2<f32>) -> vec3<f32> {
+    let p = quad.e * uv.x + quad.f * uv.y + quad.g * (uv.x * uv.y);
+    return quad.corners[0].xyz + quad.e1 * p.x + quad.e2 * p.y;
+}
+
+// Point where the ray through the point `at` of the image meets a quad: u, v, and the distance in metres.
+// `length` is the ray's ray_length.
+fn quad_hit(quad: Quad, at: vec2<f32>, length: f32) -> vec3<f32> {
+    let hit = plane_hit(quad.across, quad.along, quad.normal, quad.height, at);
+    let hh = hit.xy;
+    let t = hit.z * length;
 
     let k2 = cross2(quad.g, quad.f);
     let k1 = cross2(quad.e, quad.f) + cross2(hh, quad.g);

@@ -27,6 +27,7 @@ fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         return;
     }
     let pixel = vec2<u32>(groups.area.x, groups.area.y) + id;
+    let at = image_point(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     var sum = 0u;
     var n = 0u;
@@ -37,7 +38,7 @@ fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         }
         var hit = textureLoad(surface, pixel, 0).xyz;
         if layer != 0u {
-            hit = quad_hit(quads[quad_number - 1u], d_world);
+            hit = quad_hit(quads[quad_number - 1u], at, ray_length(frame, at));
         }
         sheet(quads[quad_number - 1u], hit, d_world, &sum, &n);
     }

@@ -1,11 +1,11 @@
 // §3 The raster pass: z-buffer, opaque radiance, texture coordinates and quad ids. Twin:
 // src/engine/cpu/gbuffer.rs.
 //
-// The pipelines share one z-buffer (reversed: 1 at the near plane, 0 at infinity). `rock_surface` writes the
-// tile of the mesh that a sample shows and the position in it. `opaque` shades the visible rock once per
-// sample. `volume` intersects the pixel's own ray with the quad and maps the point by the exact inverse
-// bilinear map (src/mapping/mod.rs, QuadMap::uv), so the result does not depend on how a quad is cut into
-// triangles. `peel` finds the sheets behind the nearest, one layer per pass.
+// The pipelines share one z-buffer (reversed: 1 at the near plane, 0 at the far plane or at infinity).
+// `rock_surface` writes the tile of the mesh that a sample shows and the position in it. `opaque` shades the
+// visible rock once per sample. `volume` intersects the pixel's own ray with the quad and maps the point by
+// the exact inverse bilinear map (src/mapping/mod.rs, QuadMap::uv), so the result does not depend on how a
+// quad is cut into triangles. `peel` finds the sheets behind the nearest, one layer per pass.
 
 #import engine::opaque
 #import engine::pool
@@ -124,11 +124,10 @@ fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
     let low = min(f.x, f.y);
     let high = max(f.x, f.y);
-    let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
-    let near = frame.clip_from_world[3].z;
+    let at = image_point(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     var out: OpaquePoint;
     out.pixel = pixel;
-    out.position_world = frame.eye_world + d * (near / (drawn.w * dot3(d, frame.forward)));
+    out.position_world = point_at(frame, at, drawn.w);
     out.holdout = tile.holdout != 0u;
     out = add_coat(out, first, 1.0 - high);
     out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
@@ -159,9 +158,9 @@ fn volume_vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) qu
 
 @fragment
 fn volume_fragment(in: VolumeVarying) -> VolumeTargets {
-    let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
+    let at = image_point(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
     var out: VolumeTargets;
-    out.surface = vec4<f32>(quad_hit(quads[in.quad], d), 0.0);
+    out.surface = vec4<f32>(quad_hit(quads[in.quad], at, ray_length(frame, at)), 0.0);
     out.quad_id = in.quad + 1u;
     return out;
 }

@@ -213,7 +213,7 @@ fn trace(
         view.strand = reflection.strand;
         view.similarity = reflection.similarity;
     }
-    view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, frame.eye_world + d_world * hit.z,
+    view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, point_world(quad, hit.xy),
         view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z);
     view.lights = arrayLength(&lights);
 

@@ -6,6 +6,7 @@
 #import layout
 #import light::environment
 #import light::haze
+#import mapping
 
 const WAVES: u32 = 32u;
 const AROUND_COLUMNS: u32 = 64u;
@@ -14,7 +15,7 @@ const AROUND_ROWS: u32 = 12u;
 struct Wave {
     // x and z of a straight wave's unit direction, or of a ring's centre in metres.
     toward: vec2<f32>,
-    // Waves per metre, and phase in turns at the origin or the ring's centre.
+    // Waves per metre, and phase in turns at the scene's origin or the ring's centre.
     k: f32,
     phase: f32,
     // Steepest slope.
@@ -24,6 +25,14 @@ struct Wave {
     // Decay of a ring with the distance from its centre, 1/m.
     decay: f32,
     pad: f32,
+}
+
+// Place of the scene's origin in a lattice that is fixed to the world.
+struct Foam {
+    // Whole cells along x and z.
+    cells: vec2<i32>,
+    // The rest, 0 to 1.
+    rest: vec2<f32>,
 }
 
 struct Surface {
@@ -36,7 +45,17 @@ struct Surface {
     absorption: vec3<f32>,
     pad_b: f32,
     middle: vec3<f32>,
+    // Metres along a view ray beyond which points of the pool's plane are not used.
+    far: f32,
+    // The plane as the eye sees it, with the axes x and z, and the eye's height over it: PlaneView of
+    // src/mapping/view.rs.
+    across: vec3<f32>,
+    height: f32,
+    along: vec3<f32>,
     pad_c: f32,
+    normal: vec3<f32>,
+    pad_d: f32,
+    foam: array<Foam, 4>,
     waves: array<Wave, 32>,
     // Map of the surroundings: radiance × cover, and the cover.
     around: array<vec4<f32>, 768>,
@@ -66,25 +85,33 @@ fn lattice(x: u32, y: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
 
-// Value noise between the values of the lattice.
-fn value_noise(p: vec2<f32>) -> f32 {
+// Value noise between the values of the lattice. `cells` counts from the scene's origin.
+fn value_noise(cells: vec2<f32>, origin: Foam) -> f32 {
+    let p = cells + origin.rest;
     let cell = floor(p);
     let f = p - cell;
     let s = f * f * (vec2<f32>(3.0) - f * 2.0);
-    let x = bitcast<u32>(i32(cell.x));
-    let y = bitcast<u32>(i32(cell.y));
+    let x = bitcast<u32>(i32(cell.x) + origin.cells.x);
+    let y = bitcast<u32>(i32(cell.y) + origin.cells.y);
     let near = lattice(x, y) + (lattice(x + 1u, y) - lattice(x, y)) * s.x;
     let far = lattice(x, y + 1u) + (lattice(x + 1u, y + 1u) - lattice(x, y + 1u)) * s.x;
     return near + (far - near) * s.y;
 }
 
+// Noise of the foam at a point, measured from the scene's origin. Twin: FOAM of src/engine/pool_surface.
+fn foam_noise(p: vec2<f32>) -> f32 {
+    return 0.45 * value_noise(p * 2.3, pool.foam[0]) + 0.27 * value_noise(p * 5.1, pool.foam[1])
+        + 0.17 * value_noise(p * 11.0, pool.foam[2]) + 0.11 * value_noise(p * 23.0, pool.foam[3]);
+}
+
 // Moves a point to where the view ray meets the pool's plane.
 fn on_pool(in: OpaquePoint) -> OpaquePoint {
-    let d = view_ray(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
-    let t = (pool.middle.y - frame.eye_world.y) / select(d.y, 1e-20, d.y == 0.0);
+    let at = image_point(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
+    let hit = plane_hit(pool.across, pool.along, pool.normal, pool.height, at);
+    let metres = hit.z * ray_length(frame, at);
     var out = in;
-    if t > 0.0 && t < 1e6 {
-        out.position_world = frame.eye_world + d * t;
+    if metres > 0.0 && metres < pool.far {
+        out.position_world = pool.middle + vec3<f32>(hit.x, 0.0, hit.y);
     }
     return out;
 }
@@ -205,8 +232,7 @@ fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>)
     let clear = mirror * back + sum.gloss + body * sum.irradiance * (1.0 - back);
 
     let p = in.position_world.xz + vec2<f32>(n.x, n.z) * 0.3;
-    let noise = 0.45 * value_noise(p * 2.3) + 0.27 * value_noise(p * 5.1) + 0.17 * value_noise(p * 11.0)
-        + 0.11 * value_noise(p * 23.0);
+    let noise = foam_noise(p);
     let cover = clamp((1.6 * in.albedo.y + noise - 1.05) * 2.2, 0.0, 1.0);
     let foam = sum.irradiance * ((0.25 + 0.5 * noise) * cover);
     return opaque_targets(clear * (1.0 - cover) + foam, n, to_eye, pool.holdout != 0.0);

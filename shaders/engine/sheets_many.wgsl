@@ -11,7 +11,8 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
     var result = vec4<f32>(0.0, 0.0, 0.0, 1.0);
     var quad_number = nearest;
     var hit = textureLoad(surface, pixel, 0).xyz;
-    let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let at = image_point(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let length = ray_length(frame, at);
     var ended = false;
     for (var layer = 1u; quad_number != 0u; layer++) {
         var next = 0u;
@@ -20,7 +21,7 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
         }
         let quad = quads[quad_number - 1u];
         if layer > 1u {
-            hit = quad_hit(quad, d_world);
+            hit = quad_hit(quad, at, length);
         }
         result = trace(quad, quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
         ended = result.w < frame.early_end || (*count).x == CUT;

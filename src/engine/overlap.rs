@@ -99,8 +99,7 @@ fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
     let camera = &scene.camera;
     let [width, height] = [scene.image.width, scene.image.height];
     let size = DVec2::new(width.into(), height.into());
-    let (right, up) = camera.image_plane(width, height);
-    let [eye, right, up, forward] = [camera.eye, right, up, camera.forward].map(|v| v.as_dvec3());
+    let ([forward, right, up], eye) = (camera.rays(width, height), camera.eye_local());
     let near = f64::from(camera.near);
     scene.quads.iter().map(move |quad| {
         // x and y are in units of the image plane; z is the distance along the view axis.

@@ -5,7 +5,7 @@
 //! Games", 2006): τ(t) = β(eye)·t·(1 − e^(−x))/x with x = d_y·t/H. A surface of radiance L appears as
 //! L·e^(−τ) + colour·(1 − e^(−τ)).
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Maximum extinction at the eye, 1/m. An eye so far below y₀ that β exceeds it sees only haze anyway.
 const DENSEST: f64 = 1e6;
@@ -44,9 +44,9 @@ pub struct EyeHaze {
 
 impl Haze {
     /// Haze as seen from `eye`, a position in metres.
-    pub fn seen_from(&self, eye: Vec3) -> EyeHaze {
+    pub fn seen_from(&self, eye: DVec3) -> EyeHaze {
         let falloff = if self.height > 0.0 { 1.0 / f64::from(self.height) } else { 0.0 };
-        let above = (f64::from(eye.y) - f64::from(self.level)) * falloff;
+        let above = (eye.y - f64::from(self.level)) * falloff;
         let density = (f64::from(self.density) * (-above).exp()).min(DENSEST);
         EyeHaze {
             // A subnormal density counts as no haze.

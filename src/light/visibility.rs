@@ -160,7 +160,7 @@ pub struct LitQuads<'a> {
     /// Number of the scene's own lights.
     pub own_lights: usize,
     /// Position of the eye, metres.
-    pub eye: Vec3,
+    pub eye: DVec3,
     /// Settings of the trace.
     pub trace: &'a Trace,
     /// Single or multiple scattering.
@@ -292,8 +292,8 @@ impl LightVolumes {
 }
 
 /// Whether the eye is behind the plane of a quad. All its rays then meet the quad from behind.
-fn quad_seen_from_behind(quad: &Quad, eye: Vec3) -> bool {
-    (eye.as_dvec3() - quad.map.a_world.as_dvec3()).dot(quad.map.n_world.as_dvec3()) < 0.0
+fn quad_seen_from_behind(quad: &Quad, eye: DVec3) -> bool {
+    (eye - quad.map.a_world.as_dvec3()).dot(quad.map.n_world.as_dvec3()) < 0.0
 }
 
 /// Direction from a point of a quad towards a light, in cells per cell depth. `side` is −1 for a quad seen

@@ -6,18 +6,22 @@
 //! [`QuadMap::uv`] inverts the map: from a point of the plane to (u, v). `quad.rs` adds a material to a quad;
 //! `sheet.rs` and `splash.rs` cut falling water into quads.
 //!
-//! Twins in `shaders/mapping.wgsl`: `CellFrame`, and `quad_hit`, which finds the point of the plane that a
-//! pixel's ray meets and inverts the map there. On the CPU `map_quad` in `src/engine/cpu/gbuffer.rs` does so.
+//! [`PlaneView`] finds the point of the plane under a pixel.
+//!
+//! Twins in `shaders/mapping.wgsl`: `CellFrame`, `plane_hit`, and `quad_hit`, which inverts the map at the
+//! point under a pixel. On the CPU `map_quad` in `src/engine/cpu/gbuffer.rs` does so.
 
 mod quad;
 mod sheet;
 mod splash;
+mod view;
 
 use glam::{Vec2, Vec3};
 
 pub use quad::Quad;
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use splash::Splash;
+pub use view::PlaneView;
 
 /// Cross product of two vectors in a plane: its component along the normal.
 pub fn cross(a: Vec2, b: Vec2) -> f32 {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use glam::{DMat4, DVec4, Mat4, Vec3, Vec4};
+use glam::{DMat4, DVec3, DVec4, Mat4, Vec2, Vec3, Vec4};
 
 use super::{Filter, Image};
 use crate::util::window::Window;
@@ -11,50 +11,155 @@ use crate::util::window::Window;
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Position of the eye, metres.
-    pub eye: Vec3,
+    /// The place in the world from which all other positions of the scene are measured, metres.
+    pub origin: DVec3,
+    /// Position of the eye in the world, metres.
+    pub eye: DVec3,
     /// Unit vector to the right of the image.
-    pub right: Vec3,
+    pub right: DVec3,
     /// Unit vector to the top of the image.
-    pub up: Vec3,
+    pub up: DVec3,
     /// Unit vector into the image.
-    pub forward: Vec3,
+    pub forward: DVec3,
     /// Tangent of half the vertical field of view.
     pub tan_half_fov: f32,
     /// Distance of the near plane along `forward`, metres.
     pub near: f32,
 }
 
+/// Range of depths that the z-buffer tells apart, metres along the view axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthRange {
+    near: f64,
+    /// Infinite for a scene around the eye.
+    far: f64,
+}
+
+/// Share of a distance below which a scene's depth makes the z-buffer end behind the scene. The steps of an
+/// endless one are 2^-24 of the distance, so a scene would get fewer than 2^16 of them.
+const SHALLOW: f64 = 1.0 / 256.0;
+
+impl DepthRange {
+    /// Reversed depth z/w of the near plane and of the far plane as A/w + B: returns A and B.
+    fn scale(&self) -> [f64; 2] {
+        match self.far {
+            f64::INFINITY => [self.near, 0.0],
+            far => [self.near * far / (far - self.near), -self.near / (far - self.near)],
+        }
+    }
+}
+
+/// Constants that turn a depth of the z-buffer into a point.
+///
+/// The point lies at the depth w = A/(z − B) along the view axis. For a distant scene, float32 would lose the
+/// digits of w that count, so the point is measured from an anchor in the far plane:
+/// w − far = −far·z/(z − B).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthToPoint {
+    /// Point of the view axis from which points are measured: the eye, or the middle of the far plane.
+    pub anchor: Vec3,
+    /// B.
+    pub shift: f32,
+    /// The distance from the anchor along the view axis is (rise + slope·z)/(z − B).
+    pub rise: f32,
+    /// See `rise`.
+    pub slope: f32,
+    /// A.
+    pub scale: f32,
+}
+
+impl DepthToPoint {
+    /// Returns the point at depth `z` under the point `at` of the image. `rays` are the camera's vectors
+    /// forward, right and up. Twin: `point_at` of `shaders/layout.wgsl`.
+    pub fn point(&self, [forward, right, up]: [Vec3; 3], at: Vec2, z: f32) -> Vec3 {
+        let inverse = 1.0 / (z - self.shift);
+        let along = (self.rise + self.slope * z) * inverse;
+        self.anchor + forward * along + (right * at.x + up * at.y) * (self.scale * inverse)
+    }
+}
+
 impl Camera {
-    /// Vectors (right, up) from the centre of the image plane at distance 1 to its edges.
-    pub fn image_plane(&self, width: u32, height: u32) -> (Vec3, Vec3) {
-        let aspect = width as f32 / height as f32;
-        (self.right * (self.tan_half_fov * aspect), self.up * self.tan_half_fov)
+    /// Position of the eye relative to the scene's origin, metres. It is exact only in float64: a distant eye
+    /// and a narrow view leave few digits for the scene.
+    pub fn eye_local(&self) -> DVec3 {
+        self.eye - self.origin
     }
 
-    /// Matrix to clip space with reversed infinite depth: z/w is 1 at the near plane and 0 at infinity.
+    /// Vectors forward, right and up from the eye to the middle of the image plane at distance 1, and from
+    /// there to its edges.
+    pub fn rays(&self, width: u32, height: u32) -> [DVec3; 3] {
+        let aspect = f64::from(width) / f64::from(height);
+        let tan = f64::from(self.tan_half_fov);
+        [self.forward, self.right * (tan * aspect), self.up * tan]
+    }
+
+    /// Vectors (right, up) from the centre of the image plane at distance 1 to its edges.
+    pub fn image_plane(&self, width: u32, height: u32) -> (Vec3, Vec3) {
+        let [_, right, up] = self.rays(width, height).map(|v| v.as_vec3());
+        (right, up)
+    }
+
+    /// Returns the depths of a scene whose parts have these bounding boxes, relative to the origin.
+    pub fn depth_range(&self, boxes: impl Iterator<Item = [Vec3; 2]>) -> DepthRange {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for corners in boxes {
+            for i in 0..8 {
+                let corner = Vec3::from_array([0, 1, 2].map(|c| corners[i >> c & 1][c]));
+                let depth = (corner.as_dvec3() - self.eye_local()).dot(self.forward);
+                (low, high) = (low.min(depth), high.max(depth));
+            }
+        }
+        // A margin keeps the outermost points inside.
+        let margin = 0.01 * (high - low) + 1e-6 * high.abs();
+        let (near, far) = (low - margin, high + margin);
+        if near > f64::from(self.near) && high - low < SHALLOW * high {
+            DepthRange { near, far }
+        } else {
+            DepthRange { near: self.near.into(), far: f64::INFINITY }
+        }
+    }
+
+    /// Returns what turns depths of the z-buffer into points.
+    pub fn depth_to_point(&self, depth: &DepthRange) -> DepthToPoint {
+        let [scale, shift] = depth.scale().map(|x| x as f32);
+        let eye = self.eye_local();
+        match depth.far {
+            f64::INFINITY => DepthToPoint { anchor: eye.as_vec3(), shift, rise: scale, slope: 0.0, scale },
+            far => DepthToPoint {
+                anchor: (eye + self.forward * far).as_vec3(),
+                shift,
+                rise: 0.0,
+                slope: -far as f32,
+                scale,
+            },
+        }
+    }
+
+    /// Matrix to clip space from positions relative to the origin, with reversed depth: z/w is 1 at the near
+    /// plane and 0 at the far plane, or at infinity.
     ///
     /// The image is shifted so that the sample at `offset` inside each pixel lies on the pixel's centre,
     /// where rasterisers sample.
-    pub fn clip_from_world(&self, width: u32, height: u32, offset: [f32; 2]) -> Mat4 {
-        let (right, up) = self.image_plane(width, height);
+    pub fn clip_from_world(&self, width: u32, height: u32, offset: [f32; 2], depth: &DepthRange) -> Mat4 {
+        let [forward, right, up] = self.rays(width, height);
+        let eye = self.eye_local();
         // Rows give view coordinates in units of the image plane. The eye's part is computed in float64.
-        let row = |axis: Vec3, scale: f32| {
-            let axis64 = axis.as_dvec3() / scale as f64;
-            let translation = -axis64.dot(self.eye.as_dvec3());
-            axis64.as_vec3().extend(translation as f32)
+        let row = |axis: DVec3| axis.extend(-axis.dot(eye));
+        let w64 = row(forward);
+        let w = w64.as_vec4();
+        let x = row(right / right.length_squared()).as_vec4() - w * ((2.0 * offset[0] - 1.0) / width as f32);
+        let y = row(up / up.length_squared()).as_vec4() + w * ((2.0 * offset[1] - 1.0) / height as f32);
+        let z = match depth.far {
+            f64::INFINITY => Vec4::new(0.0, 0.0, 0.0, depth.near as f32),
+            // far − w is a small difference of large numbers.
+            far => ((DVec4::W * far - w64) * (depth.near / (far - depth.near))).as_vec4(),
         };
-        let w = row(self.forward, 1.0);
-        let x = row(right, right.length_squared()) - w * ((2.0 * offset[0] - 1.0) / width as f32);
-        let y = row(up, up.length_squared()) + w * ((2.0 * offset[1] - 1.0) / height as f32);
-        let z = Vec4::new(0.0, 0.0, 0.0, self.near);
         Mat4::from_cols(x, y, z, w).transpose()
     }
 
     /// Matrix from the world to the camera's left-handed coordinates: x to the right, y up, z forward.
     pub fn camera_from_world(&self) -> DMat4 {
-        let eye = self.eye.as_dvec3();
-        let row = |axis: Vec3| axis.as_dvec3().extend(-axis.as_dvec3().dot(eye));
+        let row = |axis: DVec3| axis.extend(-axis.dot(self.eye));
         DMat4::from_cols(row(self.right), row(self.up), row(self.forward), DVec4::W).transpose()
     }
 
@@ -76,18 +181,29 @@ impl Camera {
     /// [`Camera::view_ray`]. It is the share of the ray's length that lies along the view.
     pub fn cosine(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> f32 {
         let (right, up) = self.image_plane(width, height);
-        let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;
-        let y = 1.0 - 2.0 * (pixel[1] as f32 + offset[1]) / height as f32;
+        let Vec2 { x, y } = Self::image_point(width, height, pixel, offset);
         1.0 / (1.0 + x * x * right.length_squared() + y * y * up.length_squared()).sqrt()
+    }
+
+    /// The point (X, Y) of the image at `offset` pixels from the top left corner of a pixel: −1 to 1 from
+    /// left to right and from bottom to top. Twin: `image_point` in `shaders/layout.wgsl`.
+    pub fn image_point(width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec2 {
+        Vec2::new(
+            2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0,
+            1.0 - 2.0 * (pixel[1] as f32 + offset[1]) / height as f32,
+        )
+    }
+
+    /// Vector from the eye to the point `at` of the image plane at distance 1.
+    pub fn ray_to(&self, width: u32, height: u32, at: Vec2) -> Vec3 {
+        let [forward, right, up] = self.rays(width, height).map(|v| v.as_vec3());
+        forward + right * at.x + up * at.y
     }
 
     /// Unit direction through a pixel of the whole image, at `offset` pixels from the pixel's top left
     /// corner. Twin: `view_ray` in `shaders/layout.wgsl`.
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
-        let (right, up) = self.image_plane(width, height);
-        let x = 2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0;
-        let y = 1.0 - 2.0 * (pixel[1] as f32 + offset[1]) / height as f32;
-        let d = self.forward + right * x + up * y;
+        let d = self.ray_to(width, height, Self::image_point(width, height, pixel, offset));
         d / d.dot(d).sqrt()
     }
 }

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::pool::Pool;
@@ -57,6 +57,8 @@ pub struct Ground {
     pub water: Vec<[Vec3; 4]>,
     /// Unit vector to the light that makes rock cast shadows on rock; `None` where no rock is shaded.
     pub sun: Option<Vec3>,
+    /// The place in the world from which positions are measured, metres. Beds of rock are fixed to the world.
+    pub origin: DVec3,
 }
 
 impl Ground {
@@ -80,7 +82,8 @@ impl Ground {
     }
 
     fn vertices(&self) -> Vec<Vertex> {
-        let of_rocks: Vec<Vec<Vertex>> = self.rocks.par_iter().map(Rock::vertices).collect();
+        let of_rocks: Vec<Vec<Vertex>> =
+            self.rocks.par_iter().map(|rock| rock.vertices(self.origin)).collect();
         let vertices = &mut of_rocks.concat();
         let rocks: Vec<(&Rock, Range<usize>)> = self.rocks.iter().zip(self.ranges()).collect();
         let mut pools = Vec::new();

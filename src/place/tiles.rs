@@ -239,13 +239,13 @@ impl Tile {
         let corners = (0..8).map(|i| {
             let corner =
                 Vec3::from_array([0, 1, 2].map(|c| if i >> c & 1 == 0 { self.low[c] } else { self.high[c] }));
-            corner.as_dvec3() - camera.eye.as_dvec3()
+            corner.as_dvec3() - camera.eye_local()
         });
         let (mut depth, mut distance, mut sin2) = (f64::INFINITY, 0f64, 0f64);
         let (mut front, mut back) = (false, false);
         for to_corner in corners {
             let (r, along) = (to_corner.length(), to_corner.dot(self.out.as_dvec3()));
-            depth = depth.min(to_corner.dot(camera.forward.as_dvec3()));
+            depth = depth.min(to_corner.dot(camera.forward));
             distance = distance.max(r);
             // Directions within one angle of the normal form a cone. It is convex, so it contains the box if
             // it contains the corners.

@@ -199,7 +199,7 @@ impl Animation {
         }
         if self.turn != 0 && i64::from(number) % self.turn != 0 {
             let [eye, target, up] =
-                ["eye", "target", "up"].map(|what| values.triple(&format!("camera.{what}")).as_dvec3());
+                ["eye", "target", "up"].map(|what| values.point(&format!("camera.{what}")));
             let share = (i64::from(number) % self.turn) as f64 / self.turn as f64;
             let axis = up.try_normalize().unwrap_or(DVec3::Y);
             let turned =

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{Limits, MAX_LIGHTS, Place, Raw, Values};
 use crate::curve::{CurveShape, levels_for};
@@ -198,9 +198,10 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
     Environment::new(source, settings, &limits.environments, limits.memory).map(Some)
 }
 
-/// Returns the scene's own lights and the `sun` of its environment. `others` is the number of directional
-/// lights that stand for the rest of the environment; they count towards [`MAX_LIGHTS`].
-pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
+/// Returns the scene's own lights, relative to `origin`, and the `sun` of its environment. `others` is the
+/// number of directional lights that stand for the rest of the environment; they count towards
+/// [`MAX_LIGHTS`].
+pub(super) fn lights(v: &Values, origin: DVec3, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     for name in v.names("lights") {
         let key = |what: &str| format!("lights.{name}.{what}");
@@ -211,7 +212,7 @@ pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Ve
                 "lower its color or intensity",
             ));
         }
-        let position = || v.triple(&key("position"));
+        let position = || v.local_point(&key("position"), origin);
         let to_light = || {
             let direction = v.triple(&key("direction"));
             unit(direction).ok_or_else(|| {
@@ -243,14 +244,16 @@ pub(super) fn lights(v: &Values, sun: Option<Light>, others: usize) -> Result<Ve
     Ok(lights)
 }
 
-pub(super) fn camera(v: &Values) -> Result<Camera> {
-    let (eye, target, up) = (v.triple("camera.eye"), v.triple("camera.target"), v.triple("camera.up"));
+pub(super) fn camera(v: &Values, origin: DVec3) -> Result<Camera> {
+    let [eye, target, up] = ["camera.eye", "camera.target", "camera.up"].map(|key| v.point(key));
+    let unit = |v: DVec3| (v.length() > 1e-12).then(|| v.normalize());
     let forward = unit(target - eye)
         .ok_or_else(|| Error::input("camera.eye and camera.target are the same point", "move one of them"))?;
-    let right = unit(forward.cross(unit(up).unwrap_or(Vec3::ZERO))).ok_or_else(|| {
+    let right = unit(forward.cross(unit(up).unwrap_or(DVec3::ZERO))).ok_or_else(|| {
         Error::input("camera.up is zero or along the view", "turn it away from the view direction")
     })?;
     Ok(Camera {
+        origin,
         eye,
         right,
         up: right.cross(forward),
@@ -260,12 +263,12 @@ pub(super) fn camera(v: &Values) -> Result<Camera> {
     })
 }
 
-pub(super) fn haze(v: &Values) -> Haze {
+pub(super) fn haze(v: &Values, origin: DVec3) -> Haze {
     Haze {
         density: v.float("haze.density"),
         color: v.triple("haze.color"),
         height: v.float("haze.scale_height"),
-        level: v.float("haze.level"),
+        level: (v.coordinate("haze.level") - origin.y) as f32,
         far: v.float("haze.far"),
     }
 }

@@ -1,12 +1,15 @@
 //! Builders of a scene's rocks and pools. They take values that the table accepted and check them against one
 //! another.
 
+use glam::DVec3;
+
 use super::Values;
 use crate::mapping::QuadMap;
 use crate::place::{MAX_POOLS, Pool, Rock, Show, Vertex};
 use crate::util::error::{Error, Result};
 
-pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
+/// Returns the rocks, relative to `origin`.
+pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>> {
     let mut rocks = Vec::new();
     for name in v.names("rocks") {
         let key = |what: &str| format!("rocks.{name}.{what}");
@@ -22,7 +25,7 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
         }
         rocks.push(Rock {
             holdout: show == Show::Holdout,
-            corners: v.corners(&key("corners")),
+            corners: v.local_corners(&key("corners"), origin),
             levels: v.count(&key("levels")),
             h: v.float(&key("h")),
             amplitude: v.float(&key("amplitude")),
@@ -58,7 +61,8 @@ pub(super) fn rocks(v: &Values, memory: u64) -> Result<Vec<Rock>> {
     Ok(rocks)
 }
 
-pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
+/// Returns the pools, relative to `origin`.
+pub(super) fn pools(v: &Values, origin: DVec3) -> Result<Vec<Pool>> {
     let mut pools = Vec::new();
     for name in v.names("pools") {
         let key = |what: &str| format!("pools.{name}.{what}");
@@ -68,7 +72,7 @@ pub(super) fn pools(v: &Values) -> Result<Vec<Pool>> {
                 format!("give {} four points at one height", key("corners")),
             ));
         }
-        let corners = v.corners(&key("corners"));
+        let corners = v.local_corners(&key("corners"), origin);
         let fault = |fault: &str| {
             Error::input(
                 format!("pool {name} ({}) {fault}", key("corners")),

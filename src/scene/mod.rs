@@ -8,6 +8,7 @@ mod ground;
 mod keyframes;
 mod names;
 mod open;
+mod origin;
 mod param;
 mod presets;
 mod print;
@@ -42,6 +43,7 @@ use crate::light::scatter::media::Media;
 use crate::light::visibility::{LightVolumes, LitQuads};
 use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility};
 use crate::mapping::Quad;
+use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
 use crate::place::{Ground, Mesh, Pool, Rock};
 use crate::trace::{Trace, pyramid_spec};
@@ -207,7 +209,8 @@ impl Scene {
         }
         let image = build::image(v);
         check_image(&image, limits.memory)?;
-        let camera = build::camera(v)?;
+        let origin = origin::origin(v);
+        let camera = build::camera(v, origin)?;
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
@@ -218,13 +221,13 @@ impl Scene {
             storage: Storage::Dense,
             asked_storage,
             flow: v.float("volume.flow"),
-            quads: quads::quads(v)?,
-            lights: build::lights(v, sun, environment_lights.len())?,
+            quads: quads::quads(v, origin)?,
+            lights: build::lights(v, origin, sun, environment_lights.len())?,
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
-            rocks: ground::rocks(v, limits.memory)?,
-            pools: ground::pools(v)?,
+            rocks: ground::rocks(v, origin, limits.memory)?,
+            pools: ground::pools(v, origin)?,
             trace: build::trace(v),
             angles: v.choice("light.frame", AngleFrame::from_word),
             visibility: v.choice("light.visibility", Visibility::from_word),
@@ -234,7 +237,7 @@ impl Scene {
             p: v.float("light.p"),
             camera,
             background: build::background(v),
-            haze: build::haze(v),
+            haze: build::haze(v, origin),
             image,
         };
         if parts.volume_file.is_none() {
@@ -349,7 +352,7 @@ impl Scene {
             quads: &self.quads,
             lights: &self.volume_lights(),
             own_lights: self.lights.len(),
-            eye: self.camera.eye,
+            eye: self.camera.eye_local(),
             trace: &self.trace,
             scattering: self.scattering,
             size,
@@ -374,12 +377,22 @@ impl Scene {
             pools: self.pools.clone(),
             water: if wet { self.falls() } else { Vec::new() },
             sun,
+            origin: self.camera.origin,
         }
     }
 
     /// Returns the corners of the quads that are not mist, metres.
     pub fn falls(&self) -> Vec<[Vec3; 4]> {
         self.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| quad.corners).collect()
+    }
+
+    /// Returns the depths of the scene, whose opaque mesh is `mesh`.
+    pub fn depth_range(&self, mesh: &Mesh) -> DepthRange {
+        let quads = self.quads.iter().map(|quad| {
+            let [a, b, c, d] = quad.corners;
+            [a.min(b).min(c).min(d), a.max(b).max(c).max(d)]
+        });
+        self.camera.depth_range(quads.chain(mesh.tiles.iter().map(|tile| [tile.low, tile.high])))
     }
 
     /// Builds all opaque geometry as one mesh.

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use glam::{DVec3, Vec3};
 use serde_json::{Map, Value as Json, json};
 
 use super::param::{PARAMS, Param};
@@ -115,24 +116,31 @@ impl Scene {
     }
 
     fn derived_json(&self) -> Json {
+        let origin = self.camera.origin;
         json!({
             "curves": {
                 "levels": self.water.shape.levels,
                 "sigma_g_cells": self.water.shape.sigma_g_cells,
             },
-            "quads": self.quads.iter().map(quad_json).collect::<Vec<_>>(),
+            "quads": self.quads.iter().map(|quad| quad_json(quad, origin)).collect::<Vec<_>>(),
             "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
             "camera": camera_json(&self.camera, &self.image),
-            "lights": lights_json(&self.lights),
+            "lights": lights_json(&self.lights, origin),
             "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
-            "mesh": mesh_json(&self.mesh()),
+            "mesh": mesh_json(&self.mesh(), origin),
         })
     }
 }
 
-fn quad_json(quad: &Quad) -> Json {
+/// Returns a position in the world, metres, with the digits of a float32 and no more.
+fn in_world(position: Vec3, origin: DVec3) -> [f64; 3] {
+    let decimal = |x: f32| x.to_string().parse().unwrap_or(f64::NAN);
+    [0, 1, 2].map(|c| origin[c] + decimal(position[c]))
+}
+
+fn quad_json(quad: &Quad, origin: DVec3) -> Json {
     json!({
-        "corners": quad.corners.map(|c| c.to_array()),
+        "corners": quad.corners.map(|c| in_world(c, origin)),
         "thickness": quad.material.thickness_m,
         // Copies of the volume before the quad's corner A, and on the quad.
         "offset": quad.offset.to_array(),
@@ -154,21 +162,21 @@ fn camera_json(camera: &Camera, image: &Image) -> Json {
     })
 }
 
-fn lights_json(lights: &[Light]) -> Vec<Json> {
-    lights.iter().map(light_json).collect()
+fn lights_json(lights: &[Light], origin: DVec3) -> Vec<Json> {
+    lights.iter().map(|light| light_json(light, origin)).collect()
 }
 
-fn light_json(light: &Light) -> Json {
+fn light_json(light: &Light, origin: DVec3) -> Json {
     let kind = light.kind().word();
     match light {
         Light::Directional { to_light, intensity } => {
             json!({"kind": kind, "to_light": to_light.to_array(), "intensity": intensity.to_array()})
         }
         Light::Point { position, intensity } => {
-            json!({"kind": kind, "position": position.to_array(), "intensity": intensity.to_array()})
+            json!({"kind": kind, "position": in_world(*position, origin), "intensity": intensity.to_array()})
         }
         Light::Spot { position, intensity, cone } => json!({
-            "kind": kind, "position": position.to_array(), "intensity": intensity.to_array(),
+            "kind": kind, "position": in_world(*position, origin), "intensity": intensity.to_array(),
             "axis": cone.axis.to_array(), "cos_edge": cone.cos_edge, "inverse_soft": cone.inverse_soft,
         }),
     }
@@ -186,7 +194,7 @@ fn environment_json(environment: &Environment, lights: &[Light]) -> Json {
         "intensity": environment.intensity,
         "irradiance": environment.irradiance.0.map(|c| c.to_array()),
         "irradiance_error": environment.irradiance_error(),
-        "lights": lights_json(lights),
+        "lights": lights_json(lights, DVec3::ZERO),
         "lights_error": environment.error(),
         "sun": environment.sun.map(|sun| json!({
             "to_sun": sun.to_sun.to_array(),
@@ -196,10 +204,10 @@ fn environment_json(environment: &Environment, lights: &[Light]) -> Json {
     })
 }
 
-fn mesh_json(mesh: &Mesh) -> Json {
+fn mesh_json(mesh: &Mesh, origin: DVec3) -> Json {
     let column = |get: fn(&Vertex) -> [f32; 3]| mesh.vertices.iter().map(get).collect::<Vec<_>>();
     json!({
-        "positions": column(|v| v.position),
+        "positions": mesh.vertices.iter().map(|v| in_world(v.position.into(), origin)).collect::<Vec<_>>(),
         "normals": column(|v| v.normal),
         "albedos": column(|v| v.albedo),
         // Occlusion, shadow and film of water of each vertex.

@@ -9,7 +9,8 @@ use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 
-pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
+/// Returns the quads, relative to `origin`.
+pub(super) fn quads(v: &Values, origin: DVec3) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
     let materials = v.names("materials");
     for i in v.names("quads") {
@@ -21,7 +22,7 @@ pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
             ));
         }
         let (material, mist) = material(v, &materials, &format!("quad {i}"), &format!("quads.{i}.material"))?;
-        let quad = Quad::new(v.corners(&key), material).map_err(|fault| {
+        let quad = Quad::new(v.local_corners(&key, origin), material).map_err(|fault| {
             Error::input(
                 format!("quad {i} ({key}) {}", fault.words()),
                 "a quad needs four corners A, B, C, D in one plane, convex, in order around it",
@@ -30,10 +31,10 @@ pub(super) fn quads(v: &Values) -> Result<Vec<Quad>> {
         quads.push(Quad { mist, ..quad });
     }
     for name in v.names("sheets") {
-        sheet_quads(v, &materials, &name, &mut quads)?;
+        sheet_quads(v, origin, &materials, &name, &mut quads)?;
     }
     for name in v.names("splashes") {
-        splash_quads(v, &materials, &name, &mut quads)?;
+        splash_quads(v, origin, &materials, &name, &mut quads)?;
     }
     Ok(quads)
 }
@@ -58,8 +59,14 @@ fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(
 }
 
 /// Adds the quads of a sheet.
-fn sheet_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Quad>) -> Result<()> {
-    let sheet = sheet(v, materials, name)?;
+fn sheet_quads(
+    v: &Values,
+    origin: DVec3,
+    materials: &[String],
+    name: &str,
+    quads: &mut Vec<Quad>,
+) -> Result<()> {
+    let sheet = sheet(v, origin, materials, name)?;
     let count = sheet.segments as usize * (sheet.borders().len() - 1);
     if quads.len() + count > MAX_QUADS {
         return Err(Error::input(
@@ -81,7 +88,13 @@ fn sheet_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qua
 }
 
 /// Adds the quads of a splash.
-fn splash_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Quad>) -> Result<()> {
+fn splash_quads(
+    v: &Values,
+    origin: DVec3,
+    materials: &[String],
+    name: &str,
+    quads: &mut Vec<Quad>,
+) -> Result<()> {
     let key = |what: &str| format!("splashes.{name}.{what}");
     let float = |what: &str| v.float(&key(what));
     let toward = v.triple(&key("toward"));
@@ -92,9 +105,9 @@ fn splash_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qu
         ));
     };
     let (material, mist) = material(v, materials, &format!("splash {name}"), &key("material"))?;
-    let from = v.triple(&key("from"));
+    let local = |what: &str| v.local_point(&key(what), origin);
     let splash = Splash {
-        line: [from, if v.is_set(&key("to")) { v.triple(&key("to")) } else { from }],
+        line: [local("from"), local(if v.is_set(&key("to")) { "to" } else { "from" })],
         drop_m: float("drop"),
         restitution: float("restitution"),
         elevation: float("elevation"),
@@ -121,7 +134,7 @@ fn splash_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qu
             Error::input(
                 format!("splash {name}: quad {segment} of an arc {}", fault.words()),
                 format!(
-                    "bring {} nearer to the origin, or raise its drop, restitution or width",
+                    "bring {} nearer to the other water, or raise its drop, restitution or width",
                     key("from")
                 ),
             )
@@ -131,7 +144,7 @@ fn splash_quads(v: &Values, materials: &[String], name: &str, quads: &mut Vec<Qu
     Ok(())
 }
 
-fn sheet(v: &Values, materials: &[String], name: &str) -> Result<Sheet> {
+fn sheet(v: &Values, origin: DVec3, materials: &[String], name: &str) -> Result<Sheet> {
     let key = |what: &str| format!("sheets.{name}.{what}");
     let bad = |what: String, fix: String| Err(Error::input(format!("sheet {name}: {what}"), fix));
     let points = v.series(&key("points"));
@@ -142,7 +155,8 @@ fn sheet(v: &Values, materials: &[String], name: &str) -> Result<Sheet> {
             format!("give {} at least two points of three numbers, ±{POINT_MAX:e}", key("points")),
         );
     }
-    let points: Vec<Vec3> = points.iter().map(|p| DVec3::new(p[0], p[1], p[2]).as_vec3()).collect();
+    let local = |p: &Vec<f64>| (DVec3::from_slice(p) - origin).as_vec3();
+    let points: Vec<Vec3> = points.iter().map(local).collect();
     let size = points.iter().map(|p| p.distance(points[0])).fold(0.0, f32::max);
     if let Some(i) = points.windows(2).position(|p| p[0].distance(p[1]) <= 1e-5 * size) {
         return bad(

@@ -182,6 +182,14 @@ impl Values {
         self.0.contains_key(&Key::new(key))
     }
 
+    /// Returns the number of a place along an axis of the world, metres.
+    pub fn coordinate(&self, key: &str) -> f64 {
+        match self.get(key) {
+            Value::Float(x) => x,
+            other => panic!("{key} is no number: {other:?}"),
+        }
+    }
+
     /// Returns a float32 parameter.
     pub fn float(&self, key: &str) -> f32 {
         match self.get(key) {
@@ -237,6 +245,19 @@ impl Values {
         }
     }
 
+    /// Returns a point, in float64: far from the world's origin, float32 would lose its digits.
+    pub fn point(&self, key: &str) -> glam::DVec3 {
+        match self.get(key) {
+            Value::Triple(t) => glam::DVec3::from_array(t),
+            other => panic!("{key} is no point: {other:?}"),
+        }
+    }
+
+    /// Returns a point relative to `origin`.
+    pub fn local_point(&self, key: &str, origin: glam::DVec3) -> glam::Vec3 {
+        (self.point(key) - origin).as_vec3()
+    }
+
     /// Returns frame numbers.
     pub fn frames(&self, key: &str) -> Vec<i64> {
         match self.get(key) {
@@ -253,10 +274,15 @@ impl Values {
         }
     }
 
+    /// Returns four corners relative to `origin`.
+    pub fn local_corners(&self, key: &str, origin: glam::DVec3) -> [glam::Vec3; 4] {
+        self.corners(key).map(|corner| (corner - origin).as_vec3())
+    }
+
     /// Returns four corners.
-    pub fn corners(&self, key: &str) -> [glam::Vec3; 4] {
+    pub fn corners(&self, key: &str) -> [glam::DVec3; 4] {
         match self.get(key) {
-            Value::Corners(c) => c.map(|p| glam::Vec3::from_array(p.map(|x| x as f32))),
+            Value::Corners(c) => c.map(glam::DVec3::from_array),
             other => panic!("{key} is no quad: {other:?}"),
         }
     }
@@ -265,6 +291,11 @@ impl Values {
 /// Rounds to the renderer's float32, as its shortest decimal.
 fn round_f32(x: f64) -> f64 {
     (x as f32).to_string().parse().unwrap_or(f64::NAN)
+}
+
+/// Rounds a coordinate to 13 digits, a micrometre at [`POINT_MAX`], so that computed ones stay short.
+fn round_point(x: f64) -> f64 {
+    format!("{x:.12e}").parse().unwrap_or(f64::NAN)
 }
 
 /// Checks a raw value against a parameter's kind. The error is the value as text.
@@ -278,6 +309,10 @@ pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
                 number => float(number, min, max),
             };
             Ok(Value::Float(rate.ok_or_else(words)?))
+        }
+        // A height of the world, which float32 would move as it would a point.
+        Kind::Float(min, max, _) if param.key == "haze.level" => {
+            Ok(Value::Float(number(raw, min, max, round_point).ok_or_else(words)?))
         }
         Kind::Float(min, max, _) => Ok(Value::Float(float(raw, min, max).ok_or_else(words)?)),
         Kind::Int(min, max, _) => match raw {
@@ -299,15 +334,17 @@ pub fn check(param: &Param, raw: &Raw) -> std::result::Result<Value, String> {
         Kind::Color(_) => {
             let color = match raw {
                 Raw::Text(t) => hex_color(t).map(|c| c.map(round_f32)),
-                list => triple(list, 0.0, COLOR_MAX),
+                list => triple(list, 0.0, COLOR_MAX, round_f32),
             };
             Ok(Value::Triple(color.ok_or_else(words)?))
         }
-        Kind::Point(_) => Ok(Value::Triple(triple(raw, -POINT_MAX, POINT_MAX).ok_or_else(words)?)),
+        Kind::Point(_) => {
+            Ok(Value::Triple(triple(raw, -POINT_MAX, POINT_MAX, round_point).ok_or_else(words)?))
+        }
         Kind::Corners => {
             let Raw::List(list) = raw else { return Err(words()) };
             let points: Option<Vec<[f64; 3]>> =
-                list.iter().map(|p| triple(p, -POINT_MAX, POINT_MAX)).collect();
+                list.iter().map(|p| triple(p, -POINT_MAX, POINT_MAX, round_point)).collect();
             let corners = points.and_then(|p| <[[f64; 3]; 4]>::try_from(p).ok());
             Ok(Value::Corners(corners.ok_or_else(words)?))
         }
@@ -351,8 +388,13 @@ fn series(raw: &Raw) -> Option<Vec<Vec<f64>>> {
     (values.len() <= MAX_KEYFRAMES && alike).then_some(values)
 }
 
-/// Returns a number inside the range whose float32 is neither denormal nor infinite.
+/// Returns a float32 inside the range that is neither denormal nor infinite.
 fn float(raw: &Raw, min: f64, max: f64) -> Option<f64> {
+    number(raw, min, max, round_f32)
+}
+
+/// Returns a number inside the range whose float32 is neither denormal nor infinite, rounded by `round`.
+fn number(raw: &Raw, min: f64, max: f64, round: fn(f64) -> f64) -> Option<f64> {
     let x = match *raw {
         Raw::Float(x) => x,
         Raw::Int(x) => x as f64,
@@ -361,12 +403,12 @@ fn float(raw: &Raw, min: f64, max: f64) -> Option<f64> {
     let single = x as f32;
     let usable = single.is_normal() || x == 0.0;
     // −0 becomes 0: it would flip the signs of derived values.
-    ((min..=max).contains(&x) && usable).then(|| if x == 0.0 { 0.0 } else { round_f32(x) })
+    ((min..=max).contains(&x) && usable).then(|| if x == 0.0 { 0.0 } else { round(x) })
 }
 
-fn triple(raw: &Raw, min: f64, max: f64) -> Option<[f64; 3]> {
+fn triple(raw: &Raw, min: f64, max: f64, round: fn(f64) -> f64) -> Option<[f64; 3]> {
     let Raw::List(list) = raw else { return None };
-    let numbers: Option<Vec<f64>> = list.iter().map(|x| float(x, min, max)).collect();
+    let numbers: Option<Vec<f64>> = list.iter().map(|x| number(x, min, max, round)).collect();
     numbers.and_then(|n| n.try_into().ok())
 }
 

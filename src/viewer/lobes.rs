@@ -208,7 +208,7 @@ pub fn flow(scene: &Scene) -> DVec3 {
 
 /// Direction from the middle of the first quad to a light, not normalised.
 fn to_light(scene: &Scene, values: &Values, name: &str) -> DVec3 {
-    let triple = |what: &str| values.triple(&format!("lights.{name}.{what}")).as_dvec3();
+    let triple = |what: &str| values.point(&format!("lights.{name}.{what}"));
     if values.text(&format!("lights.{name}.kind")) == "directional" {
         return triple("direction");
     }
@@ -216,5 +216,5 @@ fn to_light(scene: &Scene, values: &Values, name: &str) -> DVec3 {
         .quads
         .first()
         .map_or(DVec3::ZERO, |quad| quad.corners.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / 4.0);
-    triple("position") - middle
+    triple("position") - (scene.camera.origin + middle)
 }

@@ -23,7 +23,7 @@ pub struct Pose {
 impl Pose {
     /// Pose of the camera in a scene's values.
     pub fn of(values: &Values) -> Pose {
-        let point = |key| values.triple(key).as_dvec3();
+        let point = |key| values.point(key);
         Pose {
             eye: point("camera.eye"),
             target: point("camera.target"),
@@ -92,7 +92,7 @@ impl Pose {
     pub fn frame_all(mut self, scene: &Scene, aspect: f64) -> Pose {
         let corners =
             scene.quads.iter().flat_map(|q| q.corners).chain(scene.rocks.iter().flat_map(|r| r.corners));
-        let corners: Vec<DVec3> = corners.map(|c| c.as_dvec3()).collect();
+        let corners: Vec<DVec3> = corners.map(|c| scene.camera.origin + c.as_dvec3()).collect();
         let (Some(low), Some(high)) =
             (corners.iter().copied().reduce(DVec3::min), corners.iter().copied().reduce(DVec3::max))
         else {

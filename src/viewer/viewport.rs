@@ -166,7 +166,7 @@ fn drag(
         Tool::Light => {
             actions.lights.extend(lights::turned(values, lights.selected()).map(|light| {
                 let key = format!("lights.{light}.direction");
-                let direction = values.triple(&key).as_dvec3();
+                let direction = values.point(&key);
                 let turned = navigate::turn_light(direction, &pose, dx * turn, -dy * turn);
                 (key, navigate::raw(turned))
             }));

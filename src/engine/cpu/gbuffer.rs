@@ -11,9 +11,9 @@ use super::pool::shade_pool;
 use crate::engine::pool_surface::Surface;
 use crate::engine::{overlap, pool_surface};
 use crate::light::haze::EyeHaze;
-use crate::mapping::Quad;
-use crate::picture::Image;
-use crate::picture::camera::sample_offset;
+use crate::mapping::{PlaneView, Quad};
+use crate::picture::camera::{DepthRange, DepthToPoint, sample_offset};
+use crate::picture::{Camera, Image};
 use crate::place::{Mesh, tiles};
 use crate::scene::{Parts, Scene};
 use crate::util::window::Window;
@@ -90,11 +90,11 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
             let band =
                 Window { y: window.y + (i * rows) as u32, height: (opaque.len() / width) as u32, ..window };
             let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
-            rock.draw(i, frame.near(), band, &mut covered, 1);
+            rock.draw(i, band, &mut covered, 1);
             frame.shade_rock(&rock, &covered, band, opaque, normal);
             let mut covered: Vec<Covered> =
                 covered.iter().flat_map(|&(depth, _)| std::iter::repeat_n((depth, 0), layers)).collect();
-            water.draw(i, frame.near(), band, &mut covered, layers);
+            water.draw(i, band, &mut covered, layers);
             frame.map_water(&water, &covered, band, layers, surface, quad_id);
         });
     out
@@ -110,12 +110,17 @@ struct WindowFrame<'a> {
     shadow_light: Option<usize>,
     pools: Vec<Surface>,
     haze: EyeHaze,
-    /// The eye relative to each quad's corner A; see [`eye_in_plane`].
-    eye_plane: Vec<Vec3>,
+    /// The planes of the quads.
+    planes: Vec<PlaneView>,
+    depth: DepthRange,
+    to_point: DepthToPoint,
 }
 
 impl<'a> WindowFrame<'a> {
     fn new(scene: &'a Scene, mesh: &'a Mesh, window: Window, sample: u32) -> Self {
+        let Parts { camera, image, .. } = &**scene;
+        let (eye, rays) = (camera.eye_local(), camera.rays(image.width, image.height));
+        let depth = scene.depth_range(mesh);
         WindowFrame {
             scene,
             mesh,
@@ -123,20 +128,23 @@ impl<'a> WindowFrame<'a> {
             offset: sample_offset(&scene.image, sample),
             shadow_light: scene.shadow_light(),
             pools: pool_surface::surfaces(scene, mesh),
-            haze: scene.haze.seen_from(scene.camera.eye),
-            eye_plane: scene.quads.iter().map(|q| eye_in_plane(q, scene.camera.eye)).collect(),
+            haze: scene.haze.seen_from(eye),
+            planes: scene.quads.iter().map(|quad| PlaneView::of_quad(&quad.map, eye, rays)).collect(),
+            depth,
+            to_point: camera.depth_to_point(&depth),
         }
-    }
-
-    /// Distance of the near plane, metres.
-    fn near(&self) -> f64 {
-        self.scene.camera.near as f64
     }
 
     /// The pixel of the image at index `k` of a band.
     fn pixel(&self, band: Window, k: usize) -> [u32; 2] {
         let width = band.width as usize;
         [band.x + (k % width) as u32, band.y + (k / width) as u32]
+    }
+
+    /// The point of the image under the sample of index `k` of a band.
+    fn image_point(&self, band: Window, k: usize) -> Vec2 {
+        let image = &self.scene.image;
+        Camera::image_point(image.width, image.height, self.pixel(band, k), self.offset)
     }
 
     /// Unit direction of the sample's view ray through index `k` of a band.
@@ -149,7 +157,7 @@ impl<'a> WindowFrame<'a> {
     fn project(&self) -> impl Fn([Vec3; 3], u32, [u16; 3], &mut Vec<ScreenTriangle>) {
         let Parts { camera, image, .. } = &**self.scene;
         let window = self.window;
-        let clip_from_world = camera.clip_from_world(image.width, image.height, self.offset);
+        let clip_from_world = camera.clip_from_world(image.width, image.height, self.offset, &self.depth);
         let size = [image.width as usize, image.height as usize];
         let near = camera.near;
         move |points, id, corners, out| {
@@ -213,7 +221,8 @@ impl<'a> WindowFrame<'a> {
             } else {
                 let triangle = &rock.triangles[id as usize - 1];
                 let centre = self.pixel(band, k).map(|p| p as f64 + 0.5);
-                (opaque[k], normal[k]) = self.shade_point(triangle, centre, self.ray(band, k), depth);
+                let at = self.image_point(band, k);
+                (opaque[k], normal[k]) = self.shade_point(triangle, centre, at, depth);
             }
         }
     }
@@ -232,27 +241,28 @@ impl<'a> WindowFrame<'a> {
     }
 
     /// Radiance, metres from the eye, and normal of the opaque point under a pixel whose centre is `centre`.
-    /// `d` is its view ray, `depth` the reversed depth of `triangle` there. Of a holdout in a picture with
-    /// alpha, only the haze in front of it has a radiance.
+    /// `at` is its point of the image, `depth` the reversed depth of `triangle` there. Of a holdout in a
+    /// picture with alpha, only the haze in front of it has a radiance.
     fn shade_point(
         &self,
         triangle: &ScreenTriangle,
         centre: [f64; 2],
-        d: Vec3,
+        at: Vec2,
         depth: f32,
     ) -> ([f32; 4], Vec4) {
         let (scene, mesh) = (self.scene, self.mesh);
+        let Parts { camera, image, .. } = &**scene;
         let weights = triangle.weights_at(centre).to_array();
         let in_tile = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
-        let metres = scene.camera.near / (depth * d.dot(scene.camera.forward));
-        let position = scene.camera.eye + d * metres;
+        let rays = camera.rays(image.width, image.height).map(|v| v.as_vec3());
+        let position = self.to_point.point(rays, at, depth);
         let point = Opaque::at(mesh, &mesh.tiles[triangle.id as usize], in_tile, position);
         let (radiance, n) = match point.pool {
             0 => shade_opaque(scene, self.shadow_light, &point),
-            pool => shade_pool(scene, self.shadow_light, &self.pools[pool as usize - 1], &point, d),
+            pool => shade_pool(scene, self.shadow_light, &self.pools[pool as usize - 1], &point, at),
         };
         let distance = radiance[3];
-        let d_y = (point.position.y - scene.camera.eye.y) / distance.max(1e-20);
+        let d_y = (point.position.y - camera.eye_local().y as f32) / distance.max(1e-20);
         let hole = point.holdout && scene.image.alpha;
         let seen = if hole { Vec3::ZERO } else { Vec3::from_slice(&radiance) };
         let passes = if hole { self.haze.passes(d_y, distance) } else { 0.0 };
@@ -270,34 +280,24 @@ impl<'a> WindowFrame<'a> {
         surface: &mut [[f32; 3]],
         quad_id: &mut [u32],
     ) {
+        let Parts { camera, image, .. } = &**self.scene;
         for (k, &(_, id)) in covered.iter().enumerate() {
             if id != 0 {
                 let quad = water.triangles[id as usize - 1].id;
                 quad_id[k] = quad + 1;
-                let eye_plane = self.eye_plane[quad as usize];
-                surface[k] =
-                    map_quad(&self.scene.quads[quad as usize], eye_plane, self.ray(band, k / layers));
+                let at = self.image_point(band, k / layers);
+                let length = camera.ray_to(image.width, image.height, at).length();
+                let plane = &self.planes[quad as usize];
+                surface[k] = map_quad(&self.scene.quads[quad as usize], plane, at, length);
             }
         }
     }
 }
 
-/// Returns the eye relative to corner A along e1, e2 and n, metres. The difference is taken in float64.
-pub fn eye_in_plane(quad: &Quad, eye: Vec3) -> Vec3 {
-    let away = eye.as_dvec3() - quad.map.a_world.as_dvec3();
-    Vec3::from_array(
-        [quad.map.e1_world, quad.map.e2_world, quad.map.n_world].map(|axis| away.dot(axis.as_dvec3()) as f32),
-    )
-}
-
-/// Returns where the ray from the eye along the unit direction `d` meets a quad: u, v and metres from the
-/// eye. Twin: `quad_hit` of `shaders/mapping.wgsl`.
-pub fn map_quad(quad: &Quad, eye_plane: Vec3, d: Vec3) -> [f32; 3] {
-    let map = &quad.map;
-    let d_n = d.dot(map.n_world);
-    let d_n = if d_n.abs() < 1e-20 { 1e-20 } else { d_n };
-    let t = (-eye_plane.z / d_n).clamp(0.0, 1e9);
-    let hh = eye_plane.truncate() + Vec2::new(d.dot(map.e1_world), d.dot(map.e2_world)) * t;
-    let uv = map.uv(hh);
-    [uv.x, uv.y, t]
+/// Returns where the ray through the point `at` of the image meets a quad, whose plane is `plane`: u, v and
+/// metres from the eye. `length` is that of [`Camera::ray_to`]. Twin: `quad_hit` of `shaders/mapping.wgsl`.
+pub fn map_quad(quad: &Quad, plane: &PlaneView, at: Vec2, length: f32) -> [f32; 3] {
+    let (hh, t) = plane.hit(at);
+    let uv = quad.map.uv(hh);
+    [uv.x, uv.y, t * length]
 }

@@ -170,7 +170,7 @@ impl<'a> Integrator<'a> {
             },
             media: scene.media(volume),
             profile_of_quad: thicknesses(&scene.quads).1,
-            haze: scene.haze.seen_from(scene.camera.eye),
+            haze: scene.haze.seen_from(scene.camera.eye_local()),
             levels,
         }
     }
@@ -312,7 +312,8 @@ impl<'a> Integrator<'a> {
             d_world,
             d_cell,
             origin: self.face_point(quad, uv),
-            point: scene.camera.eye + d_world * hit[2],
+            // A distant eye leaves float32 no digits along the ray.
+            point: map.point_world(uv.x, uv.y),
             metric,
             e_v,
             matter: [SheetDensity::new(quad, uv), SheetDensity::of_coarse(quad, uv)],
@@ -334,7 +335,7 @@ impl<'a> Integrator<'a> {
         if self.scene.trace.filter == Prefilter::None {
             return (0, 0.0);
         }
-        let forward = self.scene.camera.forward;
+        let forward = self.scene.camera.forward.as_vec3();
         let level = level_at(self.footprint, forward, ray.d_world, t, &ray.frame, ray.d_cell);
         let level = level.clamp(0.0, (self.levels.len() - 1) as f32);
         (level as u32, level - level.floor())

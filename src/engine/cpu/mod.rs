@@ -95,7 +95,7 @@ pub fn render_with(
                     let behind = (gbuffer.opaque[i][3], gbuffer.normal[i].truncate());
                     surface.set(
                         first + i,
-                        (&scene.quads, scene.camera.eye),
+                        (&scene.quads, scene.camera.eye_local().as_vec3()),
                         gbuffer.quad_id[nearest],
                         [u, v, t, 0.0],
                         behind,

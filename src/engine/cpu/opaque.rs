@@ -46,7 +46,7 @@ impl Opaque {
 /// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance with the
 /// metres from the eye, and the unit normal. `shadow_light` is [`Scene::shadow_light`].
 pub fn shade_opaque(scene: &Scene, shadow_light: Option<usize>, point: &Opaque) -> ([f32; 4], Vec3) {
-    let to_eye = scene.camera.eye - point.position;
+    let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let mut n = point.normal / point.normal.dot(point.normal).max(1e-30).sqrt();
     if n.dot(to_eye) < 0.0 {

@@ -3,7 +3,8 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use super::opaque::{Opaque, fresnel};
-use crate::engine::pool_surface::{AROUND, Surface, turn};
+use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface, turn};
+use crate::mapping::PlaneView;
 use crate::scene::Scene;
 
 /// Returns sin(2πt) with an error below 3e-5. It replaces WGSL's `sin`, whose error the standard leaves open.
@@ -28,30 +29,40 @@ fn lattice(x: u32, y: u32) -> f32 {
     (h >> 8) as f32 / 16_777_216.0
 }
 
-/// Value noise: interpolates smoothly between the values of the lattice.
-fn value_noise(p: Vec2) -> f32 {
+/// Value noise: interpolates smoothly between the values of the lattice. The lattice is fixed to the world;
+/// `p` is measured from the scene's origin, in cells.
+fn value_noise(p: Vec2, origin: &Foam) -> f32 {
+    let p = p + Vec2::from(origin.rest);
     let cell = p.floor();
     let f = p - cell;
     let s = f * f * (Vec2::splat(3.0) - f * 2.0);
-    let (x, y) = (cell.x as i32 as u32, cell.y as i32 as u32);
+    let [x, y] = [0, 1].map(|c| (cell[c] as i32 + origin.cells[c]) as u32);
     let (right, above) = (x.wrapping_add(1), y.wrapping_add(1));
     let near = lattice(x, y) + (lattice(right, y) - lattice(x, y)) * s.x;
     let far = lattice(x, above) + (lattice(right, above) - lattice(x, above)) * s.x;
     near + (far - near) * s.y
 }
 
-/// Returns the point where the view ray `d` meets the pool's plane. The position interpolated from the
-/// triangle's corners differs from it by more than the size of waves. Far or parallel rays keep `position`.
-fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, d: Vec3) -> Vec3 {
-    let eye = scene.camera.eye;
-    let t = (surface.middle[1] - eye.y) / if d.y == 0.0 { 1e-20 } else { d.y };
-    if t > 0.0 && t < 1e6 { eye + d * t } else { position }
+/// Returns the point where the view ray through the point `at` of the image meets the pool's plane. The
+/// position interpolated from the triangle's corners differs from it by more than the size of waves. Far or
+/// parallel rays keep `position`.
+fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, at: Vec2) -> Vec3 {
+    let plane = PlaneView {
+        across: surface.across.into(),
+        along: surface.along.into(),
+        normal: surface.normal.into(),
+        height: surface.height,
+    };
+    let (hh, t) = plane.hit(at);
+    let metres = t * scene.camera.ray_to(scene.image.width, scene.image.height, at).length();
+    let met = Vec3::from(surface.middle) + Vec3::new(hh.x, 0.0, hh.y);
+    if metres > 0.0 && metres < surface.far { met } else { position }
 }
 
 /// Returns the unit normal of the waves. A wave fades out as the pixel's footprint reaches half its length,
 /// because the pixel then sees the wave's mean.
 pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
-    let to_eye = scene.camera.eye - point.position;
+    let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let e = to_eye / distance.max(1e-6);
     let pixel = 2.0 * scene.camera.tan_half_fov / scene.image.height as f32;
@@ -113,20 +124,20 @@ fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
     low * (1.0 - g) + high * g
 }
 
-/// Shades a pool's surface under the view ray `d`. Returns the linear radiance with the metres from the eye,
-/// and the unit normal. The radiance adds the mirrored surroundings, the glint of the lights (Blinn 1977 with
-/// the exponent 256) and the light from below through the depth of water; foam covers all of them.
-/// `shadow_light` is [`Scene::shadow_light`].
+/// Shades a pool's surface under the point `at` of the image. Returns the linear radiance with the metres
+/// from the eye, and the unit normal. The radiance adds the mirrored surroundings, the glint of the lights
+/// (Blinn 1977 with the exponent 256) and the light from below through the depth of water; foam covers all of
+/// them. `shadow_light` is [`Scene::shadow_light`].
 pub fn shade_pool(
     scene: &Scene,
     shadow_light: Option<usize>,
     surface: &Surface,
     point: &Opaque,
-    d: Vec3,
+    at: Vec2,
 ) -> ([f32; 4], Vec3) {
-    let point = &Opaque { position: on_pool(scene, surface, point.position, d), ..*point };
+    let point = &Opaque { position: on_pool(scene, surface, point.position, at), ..*point };
     let n = pool_normal(scene, surface, point);
-    let to_eye = scene.camera.eye - point.position;
+    let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let e = to_eye / distance.max(1e-6);
     let r = pool_mirrored(e, n);
@@ -161,10 +172,8 @@ pub fn shade_pool(
     let clear = mirror * back + glint + body * irradiance * (1.0 - back);
 
     let p = Vec2::new(point.position.x, point.position.z) + Vec2::new(n.x, n.z) * 0.3;
-    let noise = 0.45 * value_noise(p * 2.3)
-        + 0.27 * value_noise(p * 5.1)
-        + 0.17 * value_noise(p * 11.0)
-        + 0.11 * value_noise(p * 23.0);
+    let noise = |i: usize| value_noise(p * FOAM[i], &surface.foam[i]);
+    let noise = 0.45 * noise(0) + 0.27 * noise(1) + 0.17 * noise(2) + 0.11 * noise(3);
     let cover = ((1.6 * point.albedo.y + noise - 1.05) * 2.2).clamp(0.0, 1.0);
     let radiance = clear * (1.0 - cover) + irradiance * ((0.25 + 0.5 * noise) * cover);
     (radiance.extend(distance).to_array(), n)

@@ -2,10 +2,11 @@
 //! pixel looks as it does. An [`Observer`] records the frame's own trace, so the numbers are those of the
 //! frame.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::gbuffer;
 use super::integrate::{Integrator, Observer};
+use crate::picture::Camera;
 use crate::picture::camera::{CENTRE, sample_offset};
 use crate::place::Mesh;
 use crate::scene::Scene;
@@ -25,7 +26,7 @@ pub struct RayReport {
     /// Linear radiance of the opaque scene or background behind the water, seen through the scene's haze.
     pub behind: Vec3,
     /// Point where the ray meets the opaque scene, metres; `None` if it leaves to the background.
-    pub opaque: Option<Vec3>,
+    pub opaque: Option<DVec3>,
     /// Cells in the order in which the ray meets them; empty without water. Their radiance is without haze.
     pub steps: Vec<RayStep>,
     /// Linear radiance of the pixel: the steps' sum and the transmitted share of `behind`, seen through the
@@ -42,7 +43,7 @@ pub struct RayReport {
 
 impl RayReport {
     /// Returns the first point of water or rock that the ray meets, metres.
-    pub fn surface_point(&self) -> Option<Vec3> {
+    pub fn surface_point(&self) -> Option<DVec3> {
         self.face().map(|face| face.point).or(self.opaque)
     }
 
@@ -69,7 +70,7 @@ pub struct RayFace {
     /// Metres from the eye.
     pub depth_m: f32,
     /// The point in the world, metres.
-    pub point: Vec3,
+    pub point: DVec3,
 }
 
 /// One cell of a ray.
@@ -108,14 +109,15 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
     let window = Window { x: pixel[0], y: pixel[1], width: 1, height: 1 };
     let gbuffer = gbuffer::run_window(scene, mesh, window, CENTRE);
     let offset = sample_offset(image, CENTRE);
-    let d_world = scene.camera.view_ray(image.width, image.height, pixel, offset);
-    let at = |metres: f32| scene.camera.eye + d_world * metres;
+    let at = Camera::image_point(image.width, image.height, pixel, offset).as_dvec2();
+    let [forward, right, up] = scene.camera.rays(image.width, image.height);
+    let d_world = (forward + right * at.x + up * at.y).normalize();
     let opaque_m = gbuffer.opaque[0][3];
     let face = |(quad, [u, v, depth_m]): (usize, [f32; 3])| RayFace {
         quad,
         uv: [u, v],
         depth_m,
-        point: at(depth_m),
+        point: scene.camera.origin + scene.quads[quad].map.point_world(u, v).as_dvec3(),
     };
     let faces = gbuffer.faces(0).map(face).collect();
     let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
@@ -128,7 +130,7 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
         pixel,
         faces,
         behind: Vec3::from_slice(&gbuffer.opaque[0]),
-        opaque: (opaque_m > 0.0).then(|| at(opaque_m)),
+        opaque: (opaque_m > 0.0).then(|| scene.camera.eye + d_world * f64::from(opaque_m)),
         steps: recorder.steps,
         radiance: result.radiance,
         transmittance: result.transmittance,

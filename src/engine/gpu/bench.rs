@@ -96,7 +96,7 @@ impl GpuBench {
                 }
             };
             layers = prepared.layers;
-            let frame = FrameUniforms::new(scene, volume, window, &(0..1), 0, layers);
+            let frame = FrameUniforms::new(scene, volume, window, &(0..1), 0, layers, &prepared.depth);
             let lights = scene.volume_lights().len();
             let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, lights), None);
             let mut visibility = VisibilityPass::new(gpu);

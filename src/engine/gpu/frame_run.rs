@@ -113,7 +113,8 @@ impl<'a> FrameRun<'a> {
                 visibility.none()
             }
             Some(plan) => {
-                let mut frame = FrameUniforms::new(scene, volume, part, &samples, samples.start, 1);
+                let mut frame =
+                    FrameUniforms::new(scene, volume, part, &samples, samples.start, 1, &prepared.depth);
                 frame.max_cells = plan.medium.max_cells;
                 let (up, lookup) = (&prepared.up, scene.trace.lookup);
                 let inputs = VisibilityInputs { gpu, timer, up, frame: &frame, plan, lookup };
@@ -155,7 +156,8 @@ impl<'a> FrameRun<'a> {
         // The sums run over the samples of the picture. A sample that gives only layers stands alone.
         let own = sample..sample + 1;
         let samples = if self.samples.contains(&sample) { &self.samples } else { &own };
-        FrameUniforms::new(self.scene, self.volume, window, samples, sample, self.prepared.layers)
+        let PreparedScene { layers, depth, .. } = &self.prepared;
+        FrameUniforms::new(self.scene, self.volume, window, samples, sample, *layers, depth)
     }
 
     /// Renders one window of the grid, as far as it lies in the rendered part, into `frame`.

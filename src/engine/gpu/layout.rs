@@ -4,11 +4,12 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, scatter};
-use crate::picture::camera::{clip_to_window, footprint, sample_offset};
+use crate::mapping::PlaneView;
+use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
@@ -57,6 +58,12 @@ pub struct FrameUniforms {
     pub levels: u32,
     pub footprint: f32,
     pub alpha: u32,
+    pub anchor: [f32; 3],
+    pub depth_shift: f32,
+    pub depth_rise: f32,
+    pub depth_slope: f32,
+    pub depth_scale: f32,
+    pub pad_d: f32,
 }
 
 /// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
@@ -126,8 +133,12 @@ pub struct Quad {
     pub repeat_u: f32,
     pub n: [f32; 3],
     pub repeat_v: f32,
-    pub eye_plane: [f32; 3],
+    pub across: [f32; 3],
+    pub height: f32,
+    pub along: [f32; 3],
     pub profile: u32,
+    pub normal: [f32; 3],
+    pub pad_d: f32,
     pub e: [f32; 2],
     pub f: [f32; 2],
     pub g: [f32; 2],
@@ -276,7 +287,8 @@ impl Tile {
 
 impl FrameUniforms {
     /// Packs the uniforms of sample `sample` of a window. The sums run over `samples`; the targets have
-    /// `layers` layers.
+    /// `layers` layers, and `depth` is that of the scene.
+    #[allow(clippy::too_many_arguments)]
     pub fn new(
         scene: &Scene,
         volume: &VolumeTexture,
@@ -284,22 +296,24 @@ impl FrameUniforms {
         samples: &Range<u32>,
         sample: u32,
         layers: u32,
+        depth: &DepthRange,
     ) -> Self {
         let camera = &scene.camera;
         let image = &scene.image;
-        let haze = scene.haze.seen_from(camera.eye);
+        let haze = scene.haze.seen_from(camera.eye_local());
         let [jitter_x, jitter_y] = sample_offset(image, sample);
         let (right, up) = camera.image_plane(image.width, image.height);
-        let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y]);
+        let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y], depth);
+        let to_point = camera.depth_to_point(depth);
         FrameUniforms {
             clip_from_world: clip_to_window(clip, [image.width, image.height], window).to_cols_array_2d(),
-            eye_world: camera.eye.to_array(),
+            eye_world: camera.eye_local().as_vec3().to_array(),
             jitter_x,
             right: right.to_array(),
             jitter_y,
             up: up.to_array(),
             sample_index: sample - samples.start,
-            forward: camera.forward.to_array(),
+            forward: camera.forward.as_vec3().to_array(),
             samples: samples.len() as u32,
             zenith: scene.background.zenith.to_array(),
             light_count: scene.lights.len() as u32,
@@ -327,6 +341,12 @@ impl FrameUniforms {
             levels: level_atlas(&scene.trace, volume.size).count,
             footprint: footprint(camera, image),
             alpha: u32::from(image.alpha),
+            anchor: to_point.anchor.to_array(),
+            depth_shift: to_point.shift,
+            depth_rise: to_point.rise,
+            depth_slope: to_point.slope,
+            depth_scale: to_point.scale,
+            pad_d: 0.0,
         }
     }
 }
@@ -362,13 +382,12 @@ impl Light {
 }
 
 impl Quad {
-    /// Packs a quad for an eye. The eye's position relative to the quad is computed in float64, because a
-    /// distant eye would lose the digits that texture coordinates need. `profile` is the index at which the
-    /// profile of its material begins.
-    pub fn new(quad: &crate::mapping::Quad, eye: Vec3, profile: u32) -> Self {
+    /// Packs a quad as the eye of a scene sees it. `profile` is the index at which the profile of its
+    /// material begins.
+    pub fn new(quad: &crate::mapping::Quad, scene: &Scene, profile: u32) -> Self {
         let map = &quad.map;
-        let away: DVec3 = eye.as_dvec3() - map.a_world.as_dvec3();
-        let along = |axis: Vec3| away.dot(axis.as_dvec3()) as f32;
+        let rays = scene.camera.rays(scene.image.width, scene.image.height);
+        let plane = PlaneView::of_quad(map, scene.camera.eye_local(), rays);
         Quad {
             corners: quad.corners.map(|c| c.extend(1.0).to_array()),
             e1: map.e1_world.to_array(),
@@ -377,8 +396,12 @@ impl Quad {
             repeat_u: quad.material.repeat_u,
             n: map.n_world.to_array(),
             repeat_v: quad.material.repeat_v,
-            eye_plane: [along(map.e1_world), along(map.e2_world), along(map.n_world)],
+            across: plane.across.to_array(),
+            height: plane.height,
+            along: plane.along.to_array(),
             profile,
+            normal: plane.normal.to_array(),
+            pad_d: 0.0,
             e: map.e.to_array(),
             f: map.f.to_array(),
             g: map.g.to_array(),

@@ -7,6 +7,7 @@ use super::upload::{Resident, Uploaded};
 use crate::engine::overlap;
 use crate::light::Visibility;
 use crate::light::visibility::LightVolumes;
+use crate::picture::camera::DepthRange;
 use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::util::error::Result;
@@ -24,6 +25,8 @@ pub struct PreparedScene {
     pub reflection: BoundReflection,
     /// The variant of the integrate pass that renders the scene.
     pub variant: Variant,
+    /// Depths of the scene.
+    pub depth: DepthRange,
 }
 
 impl PreparedScene {
@@ -45,6 +48,7 @@ impl PreparedScene {
         let reflection = reflections.bind(gpu, scene, volume);
         let storage = [up.levels.leaps, up.levels[0].is_sparse()];
         let variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
-        Ok(PreparedScene { up, layers, light_volumes, reflection, variant })
+        let depth = scene.depth_range(mesh);
+        Ok(PreparedScene { up, layers, light_volumes, reflection, variant, depth })
     }
 }

@@ -123,7 +123,7 @@ pub fn read_surface(
             let (row, column) = (y as usize + i / band.width as usize, i % band.width as usize);
             surface.set(
                 first + row * width + column,
-                (&scene.quads, scene.camera.eye),
+                (&scene.quads, scene.camera.eye_local().as_vec3()),
                 quad,
                 floats(&hit, i),
                 behind,

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, DVec4, Mat4};
+use glam::{DVec3, Mat4};
 
 use super::layout::MeshTile;
 use crate::place::tiles::{self, Tile};
@@ -77,18 +77,17 @@ pub fn in_view(parts: &[Part], clip_from_world: Mat4, eye: DVec3) -> Vec<&Part> 
 impl Part {
     /// Whether the bounding box reaches into the view, or is outside by no more than a device may round.
     fn may_be_visible(&self, clip_from_world: Mat4) -> bool {
-        let [x, y, _, w] = [0, 1, 2, 3].map(|i| clip_from_world.row(i).as_dvec4());
-        let near = f64::from(clip_from_world.w_axis.z);
+        let [x, y, z, w] = [0, 1, 2, 3].map(|i| clip_from_world.row(i).as_dvec4());
         let far_corner = self.low.abs().max(self.high.abs()).extend(1.0);
         // The rounding error of a sum of four products is below this share of the sum of their magnitudes.
         const ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
         // A point is in view if it lies on the positive side of all planes.
-        let planes = [w + x, w - x, w + y, w - y, w - DVec4::W * near];
+        let planes = [w + x, w - x, w + y, w - y, w - z];
         planes.iter().all(|plane| {
             // The corner that lies farthest on the plane's positive side.
             let normal = plane.truncate();
             let corner = DVec3::select(normal.cmpge(DVec3::ZERO), self.high, self.low);
-            let margin = ROUNDING * (x.abs() + y.abs() + w.abs()).dot(far_corner);
+            let margin = ROUNDING * (x.abs() + y.abs() + z.abs() + w.abs()).dot(far_corner);
             plane.dot(corner.extend(1.0)) >= -margin
         })
     }

@@ -123,8 +123,7 @@ impl Uploaded {
         let (_, thickness_of_quad) = thicknesses(&scene.quads);
         let length = profile_length(volume.size[2]);
         let numbered = scene.quads.iter().zip(thickness_of_quad);
-        let quads: Vec<Quad> =
-            numbered.map(|(quad, which)| Quad::new(quad, scene.camera.eye, which * length)).collect();
+        let quads: Vec<Quad> = numbered.map(|(quad, which)| Quad::new(quad, scene, which * length)).collect();
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));

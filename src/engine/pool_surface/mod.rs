@@ -11,12 +11,12 @@ mod around;
 
 use std::f32::consts::TAU;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rand::RngExt;
 
-use crate::mapping::GRAVITY;
+use crate::mapping::{GRAVITY, PlaneView};
 use crate::place::{Mesh, Pool};
-use crate::scene::Scene;
+use crate::scene::{Parts, Scene};
 use crate::util::random::{Family, Stream};
 
 /// Number of straight waves.
@@ -38,7 +38,7 @@ pub struct Wave {
     pub toward: [f32; 2],
     /// Waves per metre.
     pub k: f32,
-    /// Phase in turns, at the origin or at the ring's centre.
+    /// Phase in turns, at the scene's origin or at the ring's centre.
     pub phase: f32,
     /// Steepest slope, 2π·k·A.
     pub slope: f32,
@@ -48,6 +48,27 @@ pub struct Wave {
     pub decay: f32,
     /// Padding.
     pub pad: f32,
+}
+
+/// Cells per metre of the lattices of the foam's noise. Twin: `foam_noise` of `shaders/engine/pool.wgsl`.
+pub const FOAM: [f32; 4] = [2.3, 5.1, 11.0, 23.0];
+
+/// Place of the scene's origin in a lattice that is fixed to the world.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Foam {
+    /// Whole cells along x and z.
+    pub cells: [i32; 2],
+    /// The rest, 0 to 1.
+    pub rest: [f32; 2],
+}
+
+impl Foam {
+    /// Returns the place of `origin` in a lattice of `scale` cells per metre.
+    fn new(origin: DVec3, scale: f32) -> Foam {
+        let at = [origin.x, origin.z].map(|x| x * f64::from(scale));
+        Foam { cells: at.map(|x| x.floor() as i32), rest: at.map(|x| (x - x.floor()) as f32) }
+    }
 }
 
 /// A pool's surface as both engines read it.
@@ -68,8 +89,22 @@ pub struct Surface {
     pub pad_b: f32,
     /// Centre of the pool, metres.
     pub middle: [f32; 3],
+    /// Metres along a view ray beyond which points of the pool's plane are not used.
+    pub far: f32,
+    /// The plane as the eye sees it, with the axes x and z: see [`PlaneView`].
+    pub across: [f32; 3],
+    /// Height of the eye over the plane, metres.
+    pub height: f32,
+    /// See `across`.
+    pub along: [f32; 3],
     /// Padding.
     pub pad_c: f32,
+    /// See `across`.
+    pub normal: [f32; 3],
+    /// Padding.
+    pub pad_d: f32,
+    /// The foam's lattices.
+    pub foam: [Foam; FOAM.len()],
     /// The straight waves, then the rings; unused rings have slope 0.
     pub waves: [Wave; WAVES],
     /// Map of the surroundings, row by row upwards: linear radiance × cover, and the cover (0 to 1).
@@ -113,15 +148,24 @@ impl Surface {
             holdout: f32::from(u8::from(pool.holdout)),
             absorption: pool.absorption.to_array(),
             middle: middle.to_array(),
-            waves: waves(pool, &scene.falls(), flow),
+            waves: waves(pool, &scene.falls(), flow, scene.camera.origin),
+            foam: FOAM.map(|scale| Foam::new(scene.camera.origin, scale)),
             ..Surface::default()
         };
+        let Parts { camera, image, .. } = &**scene;
+        let eye = camera.eye_local() - middle.as_dvec3();
+        let plane = PlaneView::new([Vec3::X, Vec3::Z, Vec3::Y], eye, camera.rays(image.width, image.height));
+        surface.across = plane.across.to_array();
+        surface.along = plane.along.to_array();
+        surface.normal = plane.normal.to_array();
+        surface.height = plane.height;
+        surface.far = 1e6f32.max(2.0 * eye.length() as f32);
         (surface.radius, surface.around) = around::around(scene, mesh, middle);
         surface
     }
 }
 
-fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32) -> [Wave; WAVES] {
+fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32, origin: DVec3) -> [Wave; WAVES] {
     let mut waves = [Wave::default(); WAVES];
     let family = Family::new(pool.seed, Stream::Wave);
     // All waves are equally steep: A = λ·a, where Σ A²/2 is the variance of the height.
@@ -132,10 +176,14 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32) -> [Wave; WAVES] {
         let mut random = family.member(i as u64);
         let (sin, cos) = random.random_range(0.0..TAU).sin_cos();
         let phase: f32 = random.random_range(0.0..1.0);
+        // Waves are fixed to the world: the phase is that at the scene's origin.
+        let k = 1.0 / length(i);
+        let turns_before = f64::from(k) * (f64::from(cos) * origin.x + f64::from(sin) * origin.z);
+        let before = turns_before.rem_euclid(1.0) as f32;
         *wave = Wave {
             toward: [cos, sin],
-            k: 1.0 / length(i),
-            phase: (phase - flow * turns(length(i), pool.period)).rem_euclid(1.0),
+            k,
+            phase: (phase - flow * turns(length(i), pool.period) + before).rem_euclid(1.0),
             slope: TAU * a,
             ..Wave::default()
         };

@@ -6,7 +6,7 @@ pub mod shade;
 mod strata;
 pub mod wet;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Vertex;
@@ -70,8 +70,8 @@ impl Rock {
         side * side
     }
 
-    /// Builds the vertices, dry and without shade from other rock.
-    pub(super) fn vertices(&self) -> Vec<Vertex> {
+    /// Builds the vertices, dry and without shade from other rock. Positions are measured from `origin`.
+    pub(super) fn vertices(&self, origin: DVec3) -> Vec<Vertex> {
         let n = 1usize << self.levels;
         let side = n + 1;
         let field = |channel| displace(self.levels, self.h, self.seed, channel);
@@ -105,7 +105,7 @@ impl Rock {
         }
         let mut tone = vec![0.0; side * side];
         if self.strata > 0.0 {
-            let strata = Strata::new(self, out);
+            let strata = Strata::new(self, out, origin);
             let (bend, weather) = (field(5), field(6));
             let size = self.strata * self.strata_height;
             height.par_iter_mut().zip(&mut tone).enumerate().for_each(|(i, (height, tone))| {

@@ -1,7 +1,7 @@
 //! Beds of rock. They have uneven heights, are broken by joints into blocks that step back or stand out, have
 //! ledges between them, and contain thinner beds.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rand::RngExt;
 
 use super::Rock;
@@ -26,6 +26,21 @@ pub struct Strata {
     /// Mean height of a bed, metres.
     height: f32,
     family: Family,
+    /// Beds and blocks between the world's origin and that of the scene, across and along, for each octave.
+    before: [[Lattice; 2]; 2],
+}
+
+/// A number that is too large for float32: whole cells, and the rest, 0 to 1.
+#[derive(Clone, Copy)]
+struct Lattice {
+    cells: i64,
+    rest: f32,
+}
+
+impl Lattice {
+    fn new(x: f64) -> Lattice {
+        Lattice { cells: x.floor() as i64, rest: (x - x.floor()) as f32 }
+    }
 }
 
 /// Properties of a bed at a point.
@@ -37,14 +52,22 @@ pub struct Bed {
 }
 
 impl Strata {
-    /// Makes the beds of a rock whose patch faces `out`.
-    pub fn new(rock: &Rock, out: Vec3) -> Strata {
+    /// Makes the beds of a rock whose patch faces `out`. Beds are fixed to the world; `origin` is the place
+    /// from which points are measured.
+    pub fn new(rock: &Rock, out: Vec3, origin: DVec3) -> Strata {
         let level = Vec3::Y.cross(out).normalize_or(Vec3::X);
         let (sin, cos) = rock.strata_tilt.to_radians().sin_cos();
+        let (up, along) = (Vec3::Y * cos + level * sin, level * cos - Vec3::Y * sin);
+        let beds = |axis: Vec3| origin.dot(axis.as_dvec3()) / f64::from(rock.strata_height);
+        let octave = |thin: f64| {
+            let (s, t) = (beds(up) * thin, beds(along) * thin / f64::from(LENGTH));
+            [Lattice::new(s), Lattice::new(t)]
+        };
         Strata {
-            up: Vec3::Y * cos + level * sin,
-            along: level * cos - Vec3::Y * sin,
+            up,
+            along,
             height: rock.strata_height,
+            before: [octave(1.0), octave(f64::from(THIN.0))],
             family: Family::new(rock.seed, Stream::Stratum),
         }
     }
@@ -64,19 +87,21 @@ impl Strata {
     }
 
     /// Returns the bed at a point of one octave. Beds have height 1; the point lies at `s` across and `t`
-    /// along them.
+    /// along them, measured from the scene's origin.
     fn octave(&self, s: f32, t: f32, octave: i64) -> Bed {
+        let [across, along] = self.before[octave as usize];
+        let s = s + across.rest;
         const BOUND: i64 = 1 << 40;
         const FACE: i64 = BOUND + 1;
         const TONE: i64 = BOUND + 2;
         const SHIFT: i64 = BOUND + 3;
-        let random = |i, j| self.random(octave, i, j);
+        let random = |i: i64, j| self.random(octave, across.cells + i, j);
         let (i, low, high) = cell(s, |i| random(i, BOUND));
         let f = (s - low) / (high - low);
         // Each bed has its own joints: none runs through several beds.
-        let t = t / LENGTH + 8.0 * random(i, SHIFT);
-        let (j, left, right) = cell(t, |j| random(i, BOUND + 8 + 2 * j));
-        let block = |j: i64| 0.5 * random(i, BOUND + 9 + 2 * j);
+        let t = t / LENGTH + along.rest + 8.0 * random(i, SHIFT);
+        let (j, left, right) = cell(t, |j| random(i, BOUND + 8 + 2 * (along.cells + j)));
+        let block = |j: i64| 0.5 * random(i, BOUND + 9 + 2 * (along.cells + j));
         let own = block(j);
         // Half of each joint's width lies in either block.
         let width = 0.5 * JOINT;

@@ -195,7 +195,7 @@ pub(super) const CAMERA: Group = Group {
         p("camera.up", "", "", Point([0.0, 1.0, 0.0]), Uniform)
             .doc("Direction that is up in the image.")
             .when("Tilt it for a slanted picture, or when the view is straight up or down."),
-        p("camera.fov", "", "°", Float(0.01, 170.0, 40.0), Uniform)
+        p("camera.fov", "", "°", Float(1e-5, 170.0, 40.0), Uniform)
             .slider(5.0, 120.0)
             .doc("Vertical field of view.")
             .when("Lower it to magnify what is far away; raise it to show more from nearby."),

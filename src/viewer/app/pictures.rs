@@ -101,7 +101,7 @@ impl Viewer {
             Some((Aim::Inspect, ray)) => self.ray = Some(ray),
             Some((Aim::Focus, ray)) => {
                 if let Some(point) = ray.surface_point() {
-                    let pose = Pose::of(self.document.values()).focus(point.as_dvec3());
+                    let pose = Pose::of(self.document.values()).focus(point);
                     self.move_camera(pose, None);
                 }
             }

@@ -96,7 +96,7 @@ impl Canvas<'_> {
     /// The handle of the light itself, which is dragged parallel to the image, or with Shift in depth.
     fn light(&mut self, lights: &mut Lights, light: &str, selected: bool) {
         let key = format!("lights.{light}.position");
-        let position = self.values.triple(&key).as_dvec3();
+        let position = self.values.point(&key);
         let (visible, at) = self.handle_position(position);
         let response = self.handle(at, &format!("Handle of {light}"));
         if response.clicked() || response.drag_started() {
@@ -128,8 +128,8 @@ impl Canvas<'_> {
     /// The handle of the point at which a spot light is aimed, and the light's cone.
     fn aim(&mut self, lights: &mut Lights, light: &str) {
         let key = |what: &str| format!("lights.{light}.{what}");
-        let position = self.values.triple(&key("position")).as_dvec3();
-        let to_light = self.values.triple(&key("direction")).as_dvec3().normalize_or(DVec3::Y);
+        let position = self.values.point(&key("position"));
+        let to_light = self.values.point(&key("direction")).normalize_or(DVec3::Y);
         let far = position.distance(self.pose.target).max(1e-3);
         let distance = *lights.aim_distance.get_or_insert(far);
         let aim = position - to_light * distance;
@@ -187,7 +187,7 @@ impl Canvas<'_> {
         let response = self.ui.interact(square, id, Sense::click_and_drag());
         label(&response, &format!("Dial of {light}"));
         self.done.hovered |= response.hovered();
-        let mut to_light = self.values.triple(&key).as_dvec3().normalize_or(DVec3::Y);
+        let mut to_light = self.values.point(&key).normalize_or(DVec3::Y);
         if (response.dragged_by(egui::PointerButton::Primary) || response.clicked())
             && let Some(pointer) = response.interact_pointer_pos()
         {
@@ -223,7 +223,7 @@ impl Canvas<'_> {
         for other in self.values.names("lights") {
             let key = |what: &str| format!("lights.{other}.{what}");
             if other != light && self.values.text(&key("kind")) == "directional" {
-                let d = self.values.triple(&key("direction")).as_dvec3().normalize_or(DVec3::Y);
+                let d = self.values.point(&key("direction")).normalize_or(DVec3::Y);
                 painter.circle_filled(on_dial(self.view.dial_place(d)), 2.5, Color32::from_gray(160));
             }
         }

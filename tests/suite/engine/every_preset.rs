@@ -41,10 +41,10 @@ fn graze(scene: &mut Scene) {
     let (sin, cos) = 1f32.to_radians().sin_cos();
     let middle = map.point_world(0.5, 0.5);
     let camera = &mut scene.edit().camera;
-    camera.forward = -(map.e1_world * cos + map.n_world * sin);
-    camera.right = map.e2_world;
+    camera.forward = -(map.e1_world * cos + map.n_world * sin).as_dvec3();
+    camera.right = map.e2_world.as_dvec3();
     camera.up = camera.right.cross(camera.forward);
-    camera.eye = middle - camera.forward * 0.7;
+    camera.eye = camera.origin + middle.as_dvec3() - camera.forward * 0.7;
 }
 
 /// Asserts that the frame is whole, and that its water has the brightness and the transmittance of `other`.

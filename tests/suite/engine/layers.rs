@@ -9,14 +9,14 @@ use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use taki::engine::cpu;
-use taki::engine::cpu::gbuffer::{self, eye_in_plane, map_quad};
+use taki::engine::cpu::gbuffer::{self, map_quad};
 use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::engine::cpu::ray::inspect;
 use taki::engine::overlap;
 use taki::light::Light;
-use taki::mapping::{Material, Quad};
-use taki::picture::Frame;
+use taki::mapping::{Material, PlaneView, Quad};
 use taki::picture::camera::sample_offset;
+use taki::picture::{Camera, Frame, Image};
 use taki::place::{Mesh, Vertex};
 use taki::scene::Scene;
 use taki::trace::Attenuation;
@@ -132,7 +132,7 @@ fn view_ray(scene: &Scene, i: usize) -> Vec3 {
 /// Distances in metres and numbers of the quads that the ray of pixel i meets, sorted by distance. Returns
 /// `None` if an edge or another face is too close to decide.
 fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
-    let (eye, d) = (scene.camera.eye.as_dvec3(), view_ray(scene, i).as_dvec3());
+    let (eye, d) = (scene.camera.eye_local(), view_ray(scene, i).as_dvec3());
     let mut all = Vec::new();
     for (number, quad) in scene.quads.iter().enumerate() {
         let corners = quad.corners.map(Vec3::as_dvec3);
@@ -156,11 +156,15 @@ fn met(scene: &Scene, i: usize, opaque_m: f32) -> Option<Vec<(f64, usize)>> {
     all.windows(2).all(|pair| pair[1].0 - pair[0].0 > DOUBT_M).then_some(all)
 }
 
-/// Traces one sheet alone, with nothing in front of it.
-fn alone(scene: &Scene, volume: &VolumeTexture, quad: usize, d: Vec3) -> RayResult {
-    let own = &scene.quads[quad];
-    let hit = map_quad(own, eye_in_plane(own, scene.camera.eye), d);
-    Integrator::new(scene, volume).trace(quad, d, hit, Vec3::ZERO, &mut ())
+/// Traces one sheet under pixel i alone, with nothing in front of it.
+fn alone(scene: &Scene, volume: &VolumeTexture, quad: usize, i: usize) -> RayResult {
+    let (own, camera) = (&scene.quads[quad], &scene.camera);
+    let Image { width, height, .. } = scene.image;
+    let pixel = [i as u32 % width, i as u32 / width];
+    let at = Camera::image_point(width, height, pixel, sample_offset(&scene.image, 0));
+    let plane = PlaneView::of_quad(&own.map, camera.eye_local(), camera.rays(width, height));
+    let hit = map_quad(own, &plane, at, camera.ray_to(width, height, at).length());
+    Integrator::new(scene, volume).trace(quad, view_ray(scene, i), hit, Vec3::ZERO, &mut ())
 }
 
 /// Compares every pixel that can be decided with the reference. Returns the number of such pixels by their
@@ -179,7 +183,7 @@ fn assert_composited(
         told[faces.len()] += 1;
         let (mut radiance, mut transmittance) = (DVec3::ZERO, 1.0);
         for &(_, quad) in faces.iter().take(scene.trace.layers as usize) {
-            let sheet = alone(scene, volume, quad, view_ray(scene, i));
+            let sheet = alone(scene, volume, quad, i);
             radiance += sheet.radiance.as_dvec3() * transmittance;
             transmittance *= f64::from(sheet.transmittance);
         }
@@ -282,7 +286,7 @@ fn faces_of_equal_depth_come_in_the_order_of_the_quads() {
     assert_eq!(faces, [0, 1, 2]);
     let volume = uniform();
     let frame = on_cpu(&scene, &volume, &no_rock());
-    let one = alone(&scene, &volume, 0, view_ray(&scene, 24 * 64 + 32)).transmittance;
+    let one = alone(&scene, &volume, 0, 24 * 64 + 32).transmittance;
     let got = f64::from(frame.radiance[24 * 64 + 32][3]);
     assert!(close(got, f64::from(one).powi(3), CLOSED_FORM_RELATIVE, 0.0));
 }

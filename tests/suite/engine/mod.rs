@@ -3,6 +3,7 @@
 pub mod device_limits;
 pub mod every_preset;
 pub mod exposure;
+pub mod far;
 pub mod gpu;
 pub mod layers;
 pub mod long_walks;

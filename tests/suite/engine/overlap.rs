@@ -1,7 +1,7 @@
 //! Squares of the image that water may cover: no covered square is left out, and few others are included.
 
 use super::gpu::{COARSE_PLACE, scene};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use taki::engine::cpu::gbuffer;
 use taki::engine::overlap::covered;
@@ -24,10 +24,10 @@ fn no_square_under_water_is_left_out_wherever_the_eye_is() {
             };
             let (eye, forward) = (place(&mut rng), place(&mut rng).normalize());
             // Some eyes lie among the quads, so that the near plane cuts some quads.
-            scene.edit().camera.eye = base.camera.eye.lerp(eye, rng.random_range(0.0..1.0));
+            scene.edit().camera.eye = base.camera.eye.lerp(eye.as_dvec3(), rng.random_range(0.0..1.0));
             scene.edit().camera.forward =
-                base.camera.forward.lerp(forward, rng.random_range(0.0..1.0)).normalize();
-            scene.edit().camera.right = scene.camera.forward.cross(Vec3::Y).normalize();
+                base.camera.forward.lerp(forward.as_dvec3(), rng.random_range(0.0..1.0)).normalize();
+            scene.edit().camera.right = scene.camera.forward.cross(DVec3::Y).normalize();
             scene.edit().camera.up = scene.camera.right.cross(scene.camera.forward);
             let window = Window { x: 5, y: 3, width: 80, height: 45 };
             let squares = covered(&scene, [window.x, window.y], [10, 6], 8);

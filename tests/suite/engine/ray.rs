@@ -100,7 +100,8 @@ fn a_rays_report_is_the_pixel_of_the_frame_on_every_pixel() {
             };
             wet += 1;
             assert_eq!((face.uv, face.depth_m), (surface.uv[i], surface.depth[i]), "{what}");
-            let own = scene.quads[face.quad].map.point_world(face.uv[0], face.uv[1]);
+            let ray = scene.camera.view_ray(frame.width, frame.height, pixel, [0.5, 0.5]).as_dvec3();
+            let own = scene.camera.eye + ray * f64::from(face.depth_m);
             assert!((own - face.point).length() < 1e-3, "{what}: {own} and {}", face.point);
             for step in &report.steps {
                 let cell = volume.cells[volume.index(step.cell[0], step.cell[1], step.cell[2])];

@@ -12,7 +12,7 @@ use taki::engine::gpu::layout::{
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
-use taki::engine::pool_surface::{AROUND, Surface, WAVES, Wave};
+use taki::engine::pool_surface::{AROUND, Foam, Surface, WAVES, Wave};
 use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
 use wgpu::naga;
 
@@ -158,14 +158,15 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let frame = fields!(FrameUniforms: clip_from_world eye_world jitter_x right jitter_y up sample_index
         forward samples zenith light_count horizon p ambient early_end cells max_cells image_width
         image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
-        window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha);
+        window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha anchor
+        depth_shift depth_rise depth_slope depth_scale pad_d);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
-    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v eye_plane profile e f g offset
-        erosion mist pad_a pad_b pad_c);
+    let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v across height along profile normal
+        pad_d e f g offset erosion mist pad_a pad_b pad_c);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
@@ -184,11 +185,13 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let environment =
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
     assert_eq!(members(&module, "Environment"), environment);
-    let surface = fields!(Surface: color radius bottom holdout absorption pad_b middle pad_c waves around);
+    let surface = fields!(Surface: color radius bottom holdout absorption pad_b middle far across height
+        along pad_c normal pad_d foam waves around);
     assert_eq!(members(&module, "Surface"), surface);
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
     assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout));
+    assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
 
@@ -259,9 +262,10 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 15] = [
+const COMPARED: [&str; 16] = [
     "Develop",
     "Environment",
+    "Foam",
     "FrameUniforms",
     "Groups",
     "Light",

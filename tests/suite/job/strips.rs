@@ -145,7 +145,7 @@ fn a_part_of_an_image_is_that_part_of_the_whole_bit_for_bit_on_both_engines() {
 #[test]
 fn a_window_that_is_the_whole_image_has_the_matrix_of_the_image() {
     let scene = scene("waterfall", &[]);
-    let clip = scene.camera.clip_from_world(1280, 720, [0.25, 0.75]);
+    let clip = scene.camera.clip_from_world(1280, 720, [0.25, 0.75], &scene.depth_range(&Mesh::default()));
     let bits = |m: glam::Mat4| m.to_cols_array().map(|x| (x + 0.0).to_bits());
     assert_eq!(bits(clip_to_window(clip, [1280, 720], Window::whole([1280, 720]))), bits(clip));
     // The corner of any other window is the corner of its clip space.
@@ -437,7 +437,7 @@ fn planar_depth_is_the_ray_s_share_along_the_view_on_both_engines() {
                     wet += 1;
                     let [u, v] = surface.uv[i];
                     let point = subject.scene.quads[quad as usize - 1].map.point_world(u, v);
-                    let right = (point - camera.eye).dot(camera.forward);
+                    let right = (point.as_dvec3() - camera.eye_local()).dot(camera.forward) as f32;
                     // A rasteriser's (u, v) leave the point some thousandths of a pixel off the ray.
                     assert!((z / right - 1.0).abs() < 1e-4, "{i}: {z} {right}");
                 }

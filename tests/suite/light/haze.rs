@@ -2,7 +2,7 @@
 
 use crate::engine::gpu::{COARSE_PLACE, assert_parity, both, renderer, scene};
 use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use taki::engine::cpu;
 use taki::light::haze::Haze;
 use taki::picture::Frame;
@@ -26,7 +26,7 @@ fn depth(haze: &Haze, eye_y: f64, d_y: f64, t: f64) -> f64 {
 
 #[test]
 fn even_haze_dims_by_the_exponential_of_the_metres() {
-    let seen = haze(0.2, 0.0, 0.0).seen_from(Vec3::new(0.0, 50.0, 0.0));
+    let seen = haze(0.2, 0.0, 0.0).seen_from(DVec3::new(0.0, 50.0, 0.0));
     for t in [0.0f32, 0.5, 3.0, 40.0] {
         let want = (-0.2 * f64::from(t)).exp();
         assert!(close(seen.transmittance(0.7, t).into(), want, CLOSED_FORM_RELATIVE, 0.0), "{t} m");
@@ -37,10 +37,10 @@ fn even_haze_dims_by_the_exponential_of_the_metres() {
 fn haze_that_thins_upwards_dims_by_the_integral_along_the_ray() {
     for height in [0.7f32, 3.0, 500.0] {
         let haze = haze(0.05, height, -2.0);
-        let eye = Vec3::new(0.0, 1.5, 0.0);
+        let eye = DVec3::new(0.0, 1.5, 0.0);
         for d_y in [-0.9f32, -0.1, -1e-4, 0.0, 1e-4, 0.3, 1.0] {
             for t in [0.01f32, 1.0, 4.0] {
-                let tau = depth(&haze, eye.y.into(), d_y.into(), t.into());
+                let tau = depth(&haze, eye.y, d_y.into(), t.into());
                 let got = f64::from(haze.seen_from(eye).transmittance(d_y, t));
                 // Next to the range of its series, the quotient loses up to 6e-8/1e-2 of τ.
                 let tolerance = CLOSED_FORM_RELATIVE * (1.0 + tau);
@@ -52,8 +52,8 @@ fn haze_that_thins_upwards_dims_by_the_integral_along_the_ray() {
 
 #[test]
 fn no_height_of_eye_or_ray_makes_haze_that_is_no_number() {
-    for y in [-1e7f32, -5.0, 0.0, 1e7] {
-        let seen = haze(1000.0, 1e-3, 0.0).seen_from(Vec3::new(0.0, y, 0.0));
+    for y in [-1e7f64, -5.0, 0.0, 1e7] {
+        let seen = haze(1000.0, 1e-3, 0.0).seen_from(DVec3::new(0.0, y, 0.0));
         for d_y in [-1.0f32, 0.0, 1.0] {
             let t = seen.transmittance(d_y, 1e7);
             assert!((0.0..=1.0).contains(&t), "{y} {d_y}: {t}");

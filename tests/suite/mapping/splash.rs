@@ -149,6 +149,6 @@ fn faulty_splashes_are_refused_with_their_name() {
     bad("fan = 181.0", &["splashes.a.fan = 181", "0 to 180"]);
     bad("width = 0.0", &["splashes.a.width = 0", "0.001 to"]);
     bad("from = [1e8, 0, 0]", &["splashes.a.from", "±1e7"]);
-    bad("from = [9e6, 9e6, 9e6]", &["splash a: quad", "nearer to the origin"]);
+    bad("to = [9e6, 9e6, 9e6]", &["splash a: quad", "nearer to the other water"]);
     bad("height = 1.0", &["unknown key", "splashes.a.height"]);
 }

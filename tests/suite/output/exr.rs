@@ -8,7 +8,7 @@ use std::process::Command;
 use exr::meta::MetaData;
 use exr::meta::header::Header;
 use exr::prelude::{AttributeValue, SampleType, Text, Vec2};
-use glam::{DVec3, DVec4, Vec3};
+use glam::{DVec3, DVec4};
 use taki::output::frame::{
     Compression, Exr, ExrCamera, ExrHead, ExrLines, ExrWriter, SCENE_TEXT, channels_of, half_of, lines_of,
     read_exr, read_exr_picture,
@@ -148,8 +148,8 @@ fn every_file_names_its_colour_space_rate_and_camera() {
     assert_eq!((colours.red, colours.white), (Vec2(0.64, 0.33), Vec2(0.3127, 0.329)));
     assert_eq!(own.frames_per_second, Some((24000, 1001)));
     // A vector is a row: it is multiplied from the left.
-    let by = |point: Vec3, m: [f32; 16]| {
-        let p = point.as_dvec3().extend(1.0).to_array();
+    let by = |point: DVec3, m: [f32; 16]| {
+        let p = point.extend(1.0).to_array();
         let column = |c: usize| (0..4).map(|r| p[r] * f64::from(m[4 * r + c])).sum::<f64>();
         DVec4::new(column(0), column(1), column(2), column(3))
     };
@@ -161,11 +161,11 @@ fn every_file_names_its_colour_space_rate_and_camera() {
     assert!(near(by(ahead, to_camera).truncate(), DVec3::new(3.0, 4.0, 2.0)), "{}", by(ahead, to_camera));
     for (pixel, offset) in [([0, 0], [0.0, 0.0]), ([95, 53], [1.0, 1.0]), ([30, 7], [0.25, 0.5])] {
         let ray = camera.view_ray(size[0], size[1], pixel, offset);
-        let p = by(camera.eye + 7.0 * ray, to_ndc);
+        let p = by(camera.eye + 7.0 * ray.as_dvec3(), to_ndc);
         let want = [0, 1].map(|i| (f64::from(pixel[i]) + f64::from(offset[i])) / f64::from(size[i]));
         assert!((p.x / p.w - want[0]).abs() < 1e-5 && (p.y / p.w - want[1]).abs() < 1e-5, "{p} {want:?}");
         let cosine = camera.cosine(size[0], size[1], pixel, offset);
-        assert!((cosine - ray.dot(camera.forward)).abs() < 1e-6, "{cosine}");
+        assert!((cosine - ray.dot(camera.forward.as_vec3())).abs() < 1e-6, "{cosine}");
         assert!((p.w / f64::from(7.0 * cosine) - 1.0).abs() < 1e-5);
     }
     let width = 2.0 * camera.tan_half_fov * 96.0 / 54.0;

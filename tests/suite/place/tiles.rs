@@ -112,8 +112,8 @@ fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
     (scene.edit().image.height, scene.edit().image.samples, scene.edit().image.rock_error) = (1000, 1, 1.0);
     // From far off and along the grid, the loss is f·loss/distance pixels.
     let distance = 1e4;
-    scene.edit().camera.eye = glam::Vec3::new(0.5 - distance as f32, 0.5, 0.0);
-    scene.edit().camera.forward = glam::Vec3::X;
+    scene.edit().camera.eye = glam::DVec3::new(0.5 - distance, 0.5, 0.0);
+    scene.edit().camera.forward = glam::DVec3::X;
     let mut step = |lost_pixels: f64, samples: u32, error: f32| {
         // With this focal length, a step of 2 moves points by `lost_pixels`.
         let focal = lost_pixels * distance / loss(2.0);
@@ -133,12 +133,12 @@ fn the_step_is_the_largest_whose_loss_stays_below_the_distance_of_samples() {
     assert_eq!((step(1.98, 1, 2.0), step(2.02, 1, 2.0), step(0.99, 1, 0.0)), (2, 1, 1));
     // Seen from straight above, no point moves.
     (scene.edit().image.samples, scene.edit().image.rock_error) = (1, 1.0);
-    scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, distance as f32);
-    scene.edit().camera.forward = glam::Vec3::NEG_Z;
+    scene.edit().camera.eye = glam::DVec3::new(0.5, 0.5, distance);
+    scene.edit().camera.forward = glam::DVec3::NEG_Z;
     scene.edit().camera.tan_half_fov = (500.0 * loss(2.0) / (4.0 * distance)) as f32;
     assert_eq!(chosen(&scene, &mesh), [16]);
     // A tile that the eye is in or beside is drawn whole.
-    scene.edit().camera.eye = glam::Vec3::new(0.5, 0.5, 0.005);
+    scene.edit().camera.eye = glam::DVec3::new(0.5, 0.5, 0.005);
     assert_eq!(chosen(&scene, &mesh), [1]);
 }
 
@@ -148,8 +148,8 @@ fn one_stone_that_stands_out_alone_is_kept() {
     // not.
     let mesh = grid(16, 1.0, |x, y| if (x, y) == (7, 7) { 0.3 } else { 0.0 });
     let mut scene = cliff(&[]);
-    scene.edit().camera.eye = glam::Vec3::new(-1e4, 0.5, 0.0);
-    scene.edit().camera.forward = glam::Vec3::X;
+    scene.edit().camera.eye = glam::DVec3::new(-1e4, 0.5, 0.0);
+    scene.edit().camera.forward = glam::DVec3::X;
     (scene.edit().image.height, scene.edit().image.rock_error) = (1000, 1.0);
     for (pixels, step) in [(2.0, 16), (4.0, 1)] {
         scene.edit().camera.tan_half_fov = 500.0 * 0.3 / (pixels * 1e4);

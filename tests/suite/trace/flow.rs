@@ -121,7 +121,9 @@ fn water_flows_down_the_quad_by_that_share_of_its_length() {
     };
     let row_of = |v: f32| {
         let Quad { map, .. } = still.quads[0];
-        let clip = still.camera.clip_from_world(32, 120, [0.5, 0.5]) * map.point_world(0.5, v).extend(1.0);
+        let depth = still.depth_range(&still.mesh());
+        let clip =
+            still.camera.clip_from_world(32, 120, [0.5, 0.5], &depth) * map.point_world(0.5, v).extend(1.0);
         (0.5 - clip.y as f64 / clip.w as f64 * 0.5) * 120.0
     };
     assert!(row_of(0.75) > row_of(0.25), "v runs down the picture");

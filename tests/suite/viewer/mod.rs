@@ -204,7 +204,7 @@ impl Window {
     }
 
     pub fn point(&self, key: &str) -> glam::DVec3 {
-        self.viewer().document().values().triple(key).as_dvec3()
+        self.viewer().document().values().point(key)
     }
 
     pub fn set(&mut self, key: &str, raw: Raw) {

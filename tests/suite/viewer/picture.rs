@@ -279,8 +279,7 @@ fn a_double_click_brings_what_is_under_the_pointer_to_the_middle() {
         });
     }
     window.harness.run_steps(2);
-    window
-        .until("the focus", |viewer| viewer.document().values().triple("camera.target").as_dvec3() != before);
+    window.until("the focus", |viewer| viewer.document().values().point("camera.target") != before);
     assert!(window.point("camera.target").y < before.y - 0.3, "the part below is now in the middle");
     window.undo();
     assert_eq!(window.point("camera.target"), before);

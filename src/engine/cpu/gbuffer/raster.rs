@@ -10,6 +10,8 @@ pub struct ScreenTriangle {
     x: [f64; 3],
     y: [f64; 3],
     inverse_w: [f64; 3],
+    /// Reversed depth z/w.
+    depth: [f64; 3],
     /// Weights of the corners before clipping, for each corner.
     weights: [Vec3; 3],
     /// Number of the tile or the quad.
@@ -63,6 +65,7 @@ pub fn to_screen(
         x: part.map(|(c, _)| snap((c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64)),
         y: part.map(|(c, _)| snap((0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64)),
         inverse_w: part.map(|(c, _)| 1.0 / c.w as f64),
+        depth: part.map(|(c, _)| c.z as f64 / c.w as f64),
         weights: part.map(|(_, w)| w),
         id,
         corners,
@@ -71,6 +74,7 @@ pub fn to_screen(
         t.x.swap(1, 2);
         t.y.swap(1, 2);
         t.inverse_w.swap(1, 2);
+        t.depth.swap(1, 2);
         t.weights.swap(1, 2);
     }
     t
@@ -151,7 +155,7 @@ impl Rasteriser {
     /// per pixel, the nearest first; of equal depths the first drawn comes first. Of several triangles with
     /// one `id` only the nearest stays: where snapping folds a quad that is seen edge-on, its two triangles
     /// overlap.
-    pub fn draw(&self, bin: usize, near: f64, band: Window, covered: &mut [Covered], layers: usize) {
+    pub fn draw(&self, bin: usize, band: Window, covered: &mut [Covered], layers: usize) {
         let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
         for &number in &self.bins[bin] {
             let t = &self.triangles[number as usize];
@@ -163,8 +167,7 @@ impl Rasteriser {
                     let p = [x as f64 + 0.5, y as f64 + 0.5];
                     let e = [0, 1, 2].map(|i| t.edge(i, p));
                     if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
-                        let inverse_w = (0..3).map(|i| e[i] * t.inverse_w[i]).sum::<f64>() / area;
-                        let depth = (near * inverse_w) as f32;
+                        let depth = ((0..3).map(|i| e[i] * t.depth[i]).sum::<f64>() / area) as f32;
                         let pixel = ((y - top) * width + x - left) * layers;
                         insert(&mut covered[pixel..pixel + layers], (depth, number + 1), |other| {
                             self.triangles[other as usize - 1].id == t.id

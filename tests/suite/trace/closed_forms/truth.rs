@@ -151,7 +151,7 @@ fn compare(attenuation: Attenuation, visibility: Visibility, frame: AngleFrame, 
             let (uv, distance) = ([span(0.0, 1.0), span(0.0, 1.0)], span(0.5, 4.0));
             let map = scene.quads[0].map;
             let x = map.point_world(uv[0], uv[1]);
-            scene.edit().camera.eye = x - d * distance;
+            scene.edit().camera.eye = (x - d * distance).as_dvec3();
             // The point light lies on either side of the plane, away from it.
             let above = n * span(0.6, 2.0) * if ray % 2 == 0 { 1.0 } else { -1.0 };
             let position = x + above + map.e1_world * span(-1.0, 1.0);
