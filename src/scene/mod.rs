@@ -456,6 +456,7 @@ impl Scene {
         {
             warnings.push("the volume is empty: no cell has density".into());
         }
+        warnings.extend(origin::rounded(self));
         warnings
     }
 }

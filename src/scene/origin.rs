@@ -1,9 +1,9 @@
 //! The origin of a scene: the place in the world from which the engines measure in float32.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::Values;
 use super::param::POINT_MAX;
+use super::{Parts, Values};
 
 /// Distance between origins along each axis, metres. Within half of it a float32 is accurate to 2 µm. The
 /// origin stays where it is while the scene changes a little, and a scene near the world's origin has that.
@@ -49,4 +49,38 @@ fn water(v: &Values) -> Vec<DVec3> {
 fn corners<'a>(v: &'a Values, family: &'a str) -> impl Iterator<Item = DVec3> + 'a {
     let keys = v.names(family).into_iter().map(move |name| format!("{family}.{name}.corners"));
     keys.filter(|key| v.is_set(key)).flat_map(|key| v.corners(&key))
+}
+
+/// Largest error of a point that needs no warning, pixels.
+const UNSEEN_PX: f64 = 0.5;
+
+/// Returns a warning about the part whose points the picture shows rounded most, if that is seen. Such a part
+/// lies far from the origin and near the eye.
+pub(super) fn rounded(scene: &Parts) -> Option<String> {
+    let (camera, eye) = (&scene.camera, scene.camera.eye_local());
+    let pixel = 2.0 * f64::from(camera.tan_half_fov) / f64::from(scene.image.height);
+    let water = scene.quads.iter().map(|quad| ("water".to_owned(), quad.corners));
+    let rocks = scene.rocks.iter().map(|rock| (format!("rocks.{}", rock.name), rock.corners));
+    let pools = scene.pools.iter().map(|pool| (format!("pools.{}", pool.name), pool.corners));
+    let seen = water.chain(rocks).chain(pools).filter_map(|(name, corners)| {
+        let corners = corners.map(Vec3::as_dvec3);
+        if corners.iter().all(|corner| (*corner - eye).dot(camera.forward) < 0.0) {
+            return None;
+        }
+        let [low, high] = [DVec3::min, DVec3::max].map(|f| corners.into_iter().reduce(f).unwrap_or_default());
+        let largest = low.abs().max(high.abs()).max_element() as f32;
+        let step = f64::from(largest.next_up() - largest);
+        // A box may hold the eye although the part is not that near.
+        let least = f64::from(camera.near).max(0.01 * low.distance(high));
+        let pixels = 0.5 * step / (eye.distance(eye.clamp(low, high)).max(least) * pixel);
+        (pixels > UNSEEN_PX).then(|| (pixels, name, 0.5 * (low + high), step))
+    });
+    let (pixels, name, middle, step) = seen.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "{name} lies {:.0} m from the middle of the scene: its points are rounded to {:.2} mm, which moves \
+         them by up to {pixels:.1} pixels; bring the parts of the scene closer together, or render {name} as \
+         a scene of its own",
+        middle.length(),
+        1000.0 * step
+    ))
 }

@@ -223,3 +223,49 @@ fn beds_of_rock_waves_and_foam_are_fixed_to_the_world() {
         assert_alike("beds, waves and foam", a, b, 2e-2, 0.98);
     }
 }
+
+/// Rock that fills the view of an eye 5 m before it, `apart` metres from the water, at `at` in the world.
+fn rock_apart(apart: f64, at: f64) -> Scene {
+    let rock = at + apart;
+    let text = format!(
+        "version = 1\n[volume]\nnx = 8\nny = 8\nnz = 8\n[curves]\nacross = 2\ndeep = 2\n\
+         [[quads]]\ncorners = [[{at:?}, 1, 0], [{:?}, 1, 0], [{:?}, 0, 0], [{at:?}, 0, 0]]\n\
+         [rocks.wall]\ncorners = [[{rock:?}, 0, 0], [{:?}, 0, 0], [{:?}, 3, 0], [{rock:?}, 3, 0]]\n\
+         levels = 2\n\
+         [lights.sun]\nintensity = 3.0\n[camera]\neye = [{:?}, 1, 5]\ntarget = [{:?}, 1, 0]\n\
+         [image]\nwidth = 160\nheight = 120\n",
+        at + 1.0,
+        at + 1.0,
+        rock + 4.0,
+        rock + 4.0,
+        rock + 2.0,
+        rock + 2.0,
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("apart.toml");
+    std::fs::write(&path, text).expect("written");
+    Scene::load(&path, &[], &Limits::default()).expect("a valid scene")
+}
+
+#[test]
+fn parts_that_lie_too_far_apart_for_their_digits_are_told() {
+    let warnings = |scene: &Scene| scene.warnings(&scene.volume(1 << 30, &Unwatched).expect("a volume"));
+    // The scene as a whole may lie anywhere.
+    for at in [0.0, 1e5, -9.9e6] {
+        assert!(warnings(&rock_apart(1e3, at)).is_empty(), "at {at}");
+    }
+    let told = warnings(&rock_apart(1e6, 0.0));
+    assert_eq!(told.len(), 1, "{told:?}");
+    // A float32 near 10⁶ has steps of 2^-4 m.
+    for word in ["rocks.wall", "1000002 m", "62.50 mm", "closer together"] {
+        assert!(told[0].contains(word), "{word}: {}", told[0]);
+    }
+    // An eye that is as far from the rock does not see it rounded.
+    let mut from_the_water = rock_apart(1e6, 0.0);
+    from_the_water.edit().camera.eye = DVec3::new(0.5, 1.0, 5.0);
+    assert!(warnings(&from_the_water).is_empty());
+    // Nor does an eye that looks away.
+    let mut away = rock_apart(1e6, 0.0);
+    away.edit().camera.forward *= -1.0;
+    assert!(warnings(&away).is_empty());
+}
