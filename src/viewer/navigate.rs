@@ -135,7 +135,15 @@ pub fn direction([azimuth, elevation]: [f64; 2]) -> DVec3 {
     DVec3::new(a.sin() * e.cos(), e.sin(), a.cos() * e.cos())
 }
 
-/// A vector as a value of a scene file, rounded to float32.
+/// A vector as a value of a scene file, with the digits of a float32, or to a micrometre where those are too
+/// few.
 pub fn raw(v: DVec3) -> Raw {
-    Raw::List(v.to_array().into_iter().map(|x| Raw::Float(f64::from(x as f32))).collect())
+    Raw::List(v.to_array().into_iter().map(|x| Raw::Float(short(x))).collect())
+}
+
+/// Rounds a coordinate so that its decimals are few and a distant place still moves smoothly.
+fn short(x: f64) -> f64 {
+    const STEPS_PER_M: f64 = 1e6;
+    let single = (x as f32).to_string().parse().unwrap_or(x);
+    if (single - x).abs() * STEPS_PER_M < 1.0 { single } else { (x * STEPS_PER_M).round() / STEPS_PER_M }
 }

@@ -78,6 +78,24 @@ fn a_pan_takes_the_scene_along() {
     }
 }
 
+#[test]
+fn a_pan_far_from_the_origin_moves_as_smoothly() {
+    let pan = |by: DVec3| {
+        let mut setup = Setup::bare();
+        let list = |p: DVec3| format!("[{:?}, {:?}, {:?}]", p.x, p.y, p.z);
+        let points = [DVec3::new(0.3, 0.2, 8.0), DVec3::new(0.1, 0.0, 0.0)].map(|p| list(by + p));
+        setup.sets = vec![format!("camera.eye={}", points[0]), format!("camera.target={}", points[1])];
+        let mut window = setup.open();
+        let centre = window.image_rect().center();
+        window.drag(centre, RIGHT, Modifiers::SHIFT);
+        camera(&window).target - by
+    };
+    // A float32 would round the target to whole metres there.
+    let (home, far) = (pan(DVec3::ZERO), pan(DVec3::new(9.5e6, -2e6, 9.5e6)));
+    assert!(home.distance(DVec3::new(0.1, 0.0, 0.0)) > 0.1, "{home}");
+    assert!(home.distance(far) < 1e-5, "{home} and {far}");
+}
+
 fn scroll(window: &mut Window, lines: f32) {
     window.harness.hover_at(window.image_rect().center());
     window.harness.event(egui::Event::MouseWheel {
