@@ -8,6 +8,7 @@ use crate::light::optical_depth::{light_volume_value, optical_depth};
 use crate::light::scatter::{ORDERS, Row, forward_peak};
 use crate::light::visibility::{Form, LightVolumes, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Visibility};
+use crate::trace::SheetDensity;
 use crate::trace::lookup::Level;
 use crate::walk::NEVER;
 
@@ -91,7 +92,11 @@ impl Integrator<'_> {
             _ if matter.mist > 0.0 => {
                 matter.depth(cell.z, light.l_cell, level.size.z, self.per_cell) * extinction
             }
-            Visibility::Cached if !light.corners.marched => {
+            Visibility::March => self.walked_depth(level, matter, cell, light, walked) * extinction,
+            Visibility::Cached if light.corners.marched => {
+                self.walked_depth(level, matter, cell, light, walked) * extinction
+            }
+            Visibility::Cached => {
                 let value = self.patch_value(level, cell, &light.corners);
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
                     let transmittance = value * value * TRANSMITTANCE_OF_CODE;
@@ -104,9 +109,22 @@ impl Integrator<'_> {
                 // leaves.
                 value * (extinction * matter.left * if self.per_cell { 1.0 } else { ray.frame.depth })
             }
-            _ => optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked) * extinction,
         };
         ((-depth).exp2(), depth)
+    }
+
+    /// Optical depth from a cell to the light, in the units of [`optical_depth`]. Inlined at two places, the
+    /// walk took 2.8 times as long.
+    #[inline(never)]
+    fn walked_depth(
+        &self,
+        level: &Level,
+        matter: &SheetDensity,
+        cell: IVec3,
+        light: &RayLight,
+        walked: &mut u32,
+    ) -> f32 {
+        optical_depth(level, matter, cell, light.l_cell, self.medium, NEVER, walked)
     }
 
     /// Interpolates a cell's value between the light volumes at the corners of the ray's patch.
