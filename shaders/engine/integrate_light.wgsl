@@ -24,8 +24,9 @@ struct RayLight {
     corners: PatchCorners,
     // Cosine between light and eye, in the frame where angles are measured.
     l_dot_e: f32,
-    // Row of the profile and forward peaks of multiple scattering.
+    // Row of the profile, gain and fill, and forward peaks of multiple scattering.
     row: Row,
+    gain: vec4<f32>,
     peak: Peak,
 }
 
@@ -58,6 +59,9 @@ struct SheetHit {
     g: f32,
     // Layers of the volume itself.
     layers: i32,
+    // Index at which the quad's profile begins, and the eye's column in its gains.
+    profile: u32,
+    column: GainColumn,
 }
 
 // Values of a cell that all lights share.
@@ -100,12 +104,11 @@ fn ray_light(i: u32, hit: SheetHit, level: Level, count: u32) -> RayLight {
         out.l_dot_e = -cosine;
         if MULTIPLE {
             out.peak = scatter_peak(hit.g, cosine);
-            var slab = l_n;
-            if PER_CELL {
-                let c = abs(out.l_cell);
-                slab = -out.l_cell.z / (c.x + c.y + c.z);
-            }
-            out.row = scatter_row(slab, u32(hit.layers));
+            out.row = scatter_row(slab_cosine(l_n, out.l_cell), u32(hit.layers));
+            let near = hit.profile + out.row.gain + hit.column.below;
+            let far = near + VIEWS;
+            out.gain = scatter_gain(array(profiles[near], profiles[near + 1u]),
+                array(profiles[far], profiles[far + 1u]), out.row, hit.column);
         }
         if hit.texture_frame {
             out.l_dot_e = dot3(out.l_v, hit.e_v);
@@ -115,6 +118,15 @@ fn ray_light(i: u32, hit: SheetHit, level: Level, count: u32) -> RayLight {
         out.l_cell *= level.scale;
     }
     return out;
+}
+
+// Cosine of a direction with the slab's normal, as Row::new of src/light/scatter/mod.rs takes it.
+fn slab_cosine(cosine: f32, in_cells: vec3<f32>) -> f32 {
+    if PER_CELL {
+        let c = abs(in_cells);
+        return -in_cells.z / (c.x + c.y + c.z);
+    }
+    return cosine;
 }
 
 // The light volumes around the point `uv` of a quad; `entry` is that of quad and light in the table.
@@ -187,7 +199,8 @@ fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
         let row = light.row;
         let diffuse = scatter_diffuse(profiles[row.near + z].rgb, profiles[row.far + z].rgb, row);
         let depth = (*ray).depth;
-        lit += scatter_multiple(view.similarity, light.peak, diffuse, depth, seen.tau_bits, visibility.y);
+        let more = scatter_multiple(view.similarity, light.peak, diffuse, depth, seen.tau_bits, visibility.y);
+        lit += light.gain.xyz * more + view.similarity.albedo * (light.gain.w * seen.weight);
     }
     return lit;
 }

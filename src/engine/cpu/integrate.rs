@@ -10,7 +10,7 @@ use super::gbuffer::Gbuffer;
 use super::visibility::{Filled, LightVolumeCache};
 use crate::light::fibre::Metric;
 use crate::light::haze::EyeHaze;
-use crate::light::scatter::media::{Media, thicknesses};
+use crate::light::scatter::media::{Media, MultipleMedium, kinds};
 use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
 use crate::light::{AngleFrame, Light, Reflection, Visibility};
@@ -43,8 +43,8 @@ pub struct Integrator<'a> {
     medium: Medium,
     strand: Option<StrandShading>,
     media: Option<Media>,
-    /// Index of each quad's profile in `media`.
-    profile_of_quad: Vec<u32>,
+    /// Index of each quad's medium in `media`.
+    medium_of_quad: Vec<u32>,
     haze: EyeHaze,
 }
 
@@ -169,7 +169,7 @@ impl<'a> Integrator<'a> {
                 Reflection::KajiyaKay => None,
             },
             media: scene.media(volume),
-            profile_of_quad: thicknesses(&scene.quads).1,
+            medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
             levels,
         }
@@ -263,6 +263,11 @@ impl<'a> Integrator<'a> {
             radiance += light.intensity * sum;
         }
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
+    }
+
+    /// Multiple scattering in a quad, if the scene asks for it.
+    fn medium_of(&self, quad: usize) -> Option<&MultipleMedium> {
+        self.media.as_ref().map(|media| &media.media[self.medium_of_quad[quad] as usize])
     }
 
     /// Whether the light of a cell has a colour of its own.

@@ -38,7 +38,7 @@ impl Reflections {
             Reflection::KajiyaKay => None,
         };
         let media = scene.media(volume);
-        let uniform = layout::Reflection::new(strand.as_ref(), media.as_ref().map(|m| &m.similarity));
+        let uniform = layout::Reflection::new(strand.as_ref(), media.as_ref().map(|m| &m.water));
         let table = strand.map(|strand| strand.table);
         let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,
@@ -52,7 +52,7 @@ impl Reflections {
             };
             self.strand = Some((table, texture));
         }
-        let profiles = media.map_or(Vec::new(), |media| media.profiles);
+        let profiles: Vec<_> = media.into_iter().flat_map(|m| m.media).map(|medium| medium.profile).collect();
         let alike = |old: &[Arc<Profile>]| {
             old.len() == profiles.len() && old.iter().zip(&profiles).all(|(a, b)| Arc::ptr_eq(a, b))
         };

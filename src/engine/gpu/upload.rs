@@ -12,7 +12,7 @@ use super::rasters::hash_twice;
 use super::tiles::{self, Part};
 use crate::engine::pool_surface;
 use crate::light::environment::Map;
-use crate::light::scatter::media::{profile_length, thicknesses};
+use crate::light::scatter::media::{kinds, profile_length};
 use crate::place::tiles::steps;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
@@ -120,9 +120,9 @@ impl Uploaded {
         mesh: &Mesh,
     ) -> Result<Self> {
         let limits = gpu.device.limits();
-        let (_, thickness_of_quad) = thicknesses(&scene.quads);
+        let (_, medium_of_quad) = kinds(&scene.quads);
         let length = profile_length(volume.size[2]);
-        let numbered = scene.quads.iter().zip(thickness_of_quad);
+        let numbered = scene.quads.iter().zip(medium_of_quad);
         let quads: Vec<Quad> = numbered.map(|(quad, which)| Quad::new(quad, scene, which * length)).collect();
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =

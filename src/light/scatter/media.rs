@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{COSINES, Profile, Scattering, Similarity, layer_depths};
+use super::{COSINES, Layers, Profile, Scattering, Similarity, VIEWS, full_depth, layer_means};
 use crate::light::Reflection;
 use crate::light::strand::table::StrandShading;
 use crate::mapping::Quad;
-use crate::trace::Attenuation;
+use crate::trace::{Attenuation, MIST_OF_CELLS, MIST_RHO};
 use crate::volume::VolumeTexture;
 
 /// Maximum albedo of Kajiya and Kay's fibres. A medium that gains light at every scattering has no finite
@@ -19,10 +19,27 @@ const CACHED_PROFILES: usize = 16;
 
 /// Multiple scattering of a scene.
 pub struct Media {
+    /// Constants of the reduced medium of flowing water.
+    pub water: Similarity,
+    /// One medium for each kind of sheet, in the order in which the quads first have them.
+    pub media: Vec<MultipleMedium>,
+}
+
+/// Multiple scattering of the sheets of one kind.
+pub struct MultipleMedium {
     /// Constants of the reduced medium.
     pub similarity: Similarity,
-    /// One profile for each thickness, in the order in which the quads first have them.
-    pub profiles: Vec<Arc<Profile>>,
+    /// Tables of the slab.
+    pub profile: Arc<Profile>,
+}
+
+/// What sheets with the same multiple scattering share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kind {
+    /// Thickness of the slab in metres.
+    pub thickness_m: f32,
+    /// Ψ of mist, or 0 for flowing water.
+    pub mist: f32,
 }
 
 impl Media {
@@ -34,23 +51,36 @@ impl Media {
         p: f32,
         volume: &VolumeTexture,
     ) -> Media {
-        let scattering = scattering(reflection, p, volume);
-        let (thicknesses, _) = thicknesses(quads);
-        let profiles = thicknesses.iter().map(|thickness_m| {
-            let depths = layer_depths(volume, attenuation, thickness_m / volume.size[2] as f32);
-            profile(depths, scattering)
-        });
-        Media { similarity: scattering.similarity(), profiles: profiles.collect() }
+        let water = scattering(reflection, p, volume);
+        let own = if matches!(attenuation, Attenuation::PerCell { .. }) { 0.5 } else { 0.0 };
+        let medium = |Kind { thickness_m, mist }: &Kind| {
+            let full = full_depth(volume, attenuation, thickness_m / volume.size[2] as f32);
+            let shares = layer_means(volume);
+            let (layers, scattering) = match *mist > 0.0 {
+                true => {
+                    let depths = shares.iter().map(|rho| full * mist_rho(*rho));
+                    // Light rays take mist to be even.
+                    let lit = vec![full * MIST_RHO as f64 / 65535.0; shares.len()];
+                    (Layers { depths: depths.collect(), lit, own: 0.0 }, Scattering::mist(*mist))
+                }
+                false => {
+                    let depths: Vec<f64> = shares.iter().map(|rho| full * rho).collect();
+                    (Layers { lit: depths.clone(), depths, own }, water)
+                }
+            };
+            MultipleMedium { similarity: scattering.similarity(), profile: profile(layers, scattering) }
+        };
+        Media { water: water.similarity(), media: kinds(quads).0.iter().map(medium).collect() }
     }
 }
 
-/// Distinct thicknesses of the quads in metres, and for every quad the index of its thickness.
-pub fn thicknesses(quads: &[Quad]) -> (Vec<f32>, Vec<u32>) {
+/// Distinct kinds of the quads, and for every quad the index of its kind.
+pub fn kinds(quads: &[Quad]) -> (Vec<Kind>, Vec<u32>) {
     let (mut list, mut known) = (Vec::new(), HashMap::new());
     let indices = quads.iter().map(|quad| {
-        let thickness_m = quad.material.thickness_m;
-        *known.entry(thickness_m.to_bits()).or_insert_with(|| {
-            list.push(thickness_m);
+        let kind = Kind { thickness_m: quad.material.thickness_m, mist: quad.mist };
+        *known.entry((kind.thickness_m.to_bits(), kind.mist.to_bits())).or_insert_with(|| {
+            list.push(kind);
             list.len() as u32 - 1
         })
     });
@@ -58,9 +88,15 @@ pub fn thicknesses(quads: &[Quad]) -> (Vec<f32>, Vec<u32>) {
     (list, indices)
 }
 
+/// ρ of mist in a cell of density `rho`: [`SheetDensity`](crate::trace::SheetDensity) without erosion.
+fn mist_rho(rho: f64) -> f64 {
+    let [of_cells, even] = [MIST_OF_CELLS as f64, MIST_RHO as f64 / 65535.0];
+    of_cells * rho + (1.0 - of_cells) * even
+}
+
 /// Number of values in one profile of `layers` layers.
 pub fn profile_length(layers: u32) -> u32 {
-    2 * COSINES * layers
+    2 * COSINES * (layers + VIEWS)
 }
 
 fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scattering {
@@ -77,15 +113,15 @@ fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scatte
     }
 }
 
-fn profile(depths: Vec<f64>, scattering: Scattering) -> Arc<Profile> {
-    type CachedProfile = (Vec<f64>, Scattering, Arc<Profile>);
+fn profile(layers: Layers, scattering: Scattering) -> Arc<Profile> {
+    type CachedProfile = (Layers, Scattering, Arc<Profile>);
     static CACHE: Mutex<Vec<CachedProfile>> = Mutex::new(Vec::new());
     let mut cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner);
-    let cached = match cache.iter().position(|cached| cached.0 == depths && cached.1 == scattering) {
+    let cached = match cache.iter().position(|cached| cached.0 == layers && cached.1 == scattering) {
         Some(i) => cache.remove(i),
         None => {
-            let profile = Arc::new(Profile::new(&depths, &scattering));
-            (depths, scattering, profile)
+            let profile = Arc::new(Profile::new(&layers, &scattering));
+            (layers, scattering, profile)
         }
     };
     let profile = cached.2.clone();

@@ -122,7 +122,7 @@ fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
     let spot =
         ["lights.key.kind=spot", "lights.key.position=[0.4,0.5,1.5]", "lights.key.direction=[0.3,0.4,1.5]"];
     let (strand, multiple) = ("light.reflection=strand", "light.scattering=multiple");
-    let variants: [&[&str]; 17] = [
+    let variants: [&[&str]; 19] = [
         &["light.visibility=march"],
         &["trace.attenuation=per-cell", "trace.tau=0.3"],
         &["trace.attenuation=per-cell", "light.visibility=march", "light.frame=texture"],
@@ -144,6 +144,8 @@ fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
         &[strand, multiple, "light.visibility=cached", "trace.attenuation=per-cell", "trace.tau=0.3"],
         &[strand, multiple, "light.visibility=cached", "lights.key.direction=[0.4,0.2,-0.9]"],
         &[strand, multiple, spot[0], spot[1], spot[2], "light.visibility=march", "camera.eye=[0.5,1,-3]"],
+        &[multiple, "light.visibility=march", "materials.water.mist=0.4"],
+        &[strand, multiple, "light.visibility=cached", "materials.water.mist=0.1", "trace.lookup=trilinear"],
         &["lights.key.intensity=0", "trace.early_end=0.2"],
         &["materials.water.repeat_u=2.5", "materials.water.repeat_v=0.6", "camera.eye=[1.5,-1.0,1.2]"],
         &["volume.flow=0.3", "materials.water.repeat_v=0.6", "light.visibility=march"],

@@ -215,6 +215,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("CUT"), taki::engine::gpu::CUT as f64);
     assert_eq!(constant("CELLS_A_WORD"), taki::light::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::light::scatter::COSINES as f64);
+    assert_eq!(constant("VIEWS"), taki::light::scatter::VIEWS as f64);
     assert_eq!(constant("DARK_BITS"), f64::from(taki::light::visibility::DARK_BITS));
     assert_eq!(constant("TRANSMITTANCE_OF_CODE"), f64::from(taki::light::visibility::TRANSMITTANCE_OF_CODE));
     assert_eq!(constant("MEAN_EROSION"), f64::from(taki::trace::MEAN_EROSION));

@@ -2,6 +2,7 @@
 //! forms.
 
 mod closed_forms;
+mod flux;
 mod parity;
 mod pictures;
 mod renderer;

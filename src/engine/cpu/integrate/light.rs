@@ -1,7 +1,7 @@
 //! §5 Per-ray terms of the lights, and the visibility between a light and a cell. Twin:
 //! `shaders/engine/integrate_light.wgsl`.
 
-use glam::{IVec3, UVec2, Vec2, Vec3};
+use glam::{IVec3, UVec2, Vec2, Vec3, Vec4};
 
 use super::{Integrator, SheetHit};
 use crate::light::optical_depth::{light_volume_value, optical_depth};
@@ -29,6 +29,8 @@ pub struct RayLight {
     pub l_dot_e: f32,
     /// Row of the profile of multiple scattering.
     pub row: Row,
+    /// Gain and fill of multiple scattering.
+    pub gain: Vec4,
     /// Forward peaks of the orders of multiple scattering.
     pub peak: [f32; ORDERS - 1],
 }
@@ -49,6 +51,13 @@ impl Integrator<'_> {
     /// Computes the terms of all lights for a ray in a level of the volume.
     pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> Vec<RayLight> {
         let texture_frame = self.scene.angles == AngleFrame::Texture;
+        let medium = self.medium_of(ray.quad);
+        // Cosines with the slab's normal; with per-cell attenuation in the sense of `Row::new`.
+        let slab = |in_cells: Vec3, cosine: f32| {
+            let c = in_cells.abs();
+            if self.per_cell { -in_cells.z / (c.x + c.y + c.z) } else { cosine }
+        };
+        let e_n = slab(-ray.d_cell, -ray.side * ray.d_world.dot(ray.map.n_world));
         let terms = |(i, light): (usize, &crate::light::Light)| {
             let (to_light, intensity) = light.at(ray.point);
             let l_n = to_light.dot(ray.map.n_world) * ray.side;
@@ -62,16 +71,12 @@ impl Integrator<'_> {
             };
             let cosine = to_light.dot(ray.d_world);
             let l_dot_e = if texture_frame { l_v.dot(ray.e_v) } else { -cosine };
-            let mut slab = l_n;
-            if self.per_cell {
-                let c = l_cell.abs();
-                slab = -l_cell.z / (c.x + c.y + c.z);
-            }
-            let row = Row::new(slab, self.levels[0].size[2]);
-            let peak = forward_peak(self.media.as_ref().map_or(0.0, |m| m.similarity.g), cosine);
+            let row = Row::new(slab(l_cell, l_n), self.levels[0].size[2]);
+            let gain = medium.map_or(Vec4::ZERO, |m| m.profile.gain(&row, e_n));
+            let peak = forward_peak(medium.map_or(0.0, |m| m.similarity.g), cosine);
             let (sum, colour) = (0.0, Vec3::ZERO);
             let l_cell = l_cell * level.scale;
-            RayLight { l_v, l_cell, corners, intensity, sum, colour, l_dot_e, row, peak }
+            RayLight { l_v, l_cell, corners, intensity, sum, colour, l_dot_e, row, gain, peak }
         };
         self.lights.iter().enumerate().map(terms).collect()
     }

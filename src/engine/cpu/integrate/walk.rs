@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::light::RayLight;
 use super::{Integrator, Observer, SheetHit};
 use crate::light::fibre::{Spread, fibre_angles, specular_power};
+use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::{CellSample, Level};
@@ -49,6 +50,7 @@ impl Integrator<'_> {
         let scene = self.scene;
         let mut lights = self.ray_lights(ray, level);
         let matter = ray.matter(level);
+        let medium = self.medium_of(ray.quad);
         let extinction = self.extinction_in(level);
         let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
         let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
@@ -124,10 +126,10 @@ impl Integrator<'_> {
                     }
                     _ => Vec3::splat(weight * visibility * fibre() * (1.0 / 255.0)),
                 };
-                if let Some(media) = &self.media {
-                    let profile = &media.profiles[self.profile_of_quad[ray.quad] as usize];
+                if let Some(MultipleMedium { similarity, profile }) = medium {
                     let diffuse = profile.at(&light.row, self.layer_in(level, crossing.cell.z));
-                    lit += multiple(&media.similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
+                    let more = multiple(similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
+                    lit += light.gain.truncate() * more + similarity.albedo * (light.gain.w * weight);
                 }
                 light.colour += lit;
                 observer.light(visibility, light.intensity * lit);
