@@ -11,6 +11,7 @@ use super::layout::{self, Quad, VertexMaterial};
 use super::rasters::hash_twice;
 use super::tiles::{self, Part};
 use crate::engine::pool_surface;
+use crate::light::Scattering;
 use crate::light::environment::Map;
 use crate::light::scatter::media::{kinds, profile_length};
 use crate::place::tiles::steps;
@@ -120,8 +121,23 @@ impl Uploaded {
         mesh: &Mesh,
     ) -> Result<Self> {
         let limits = gpu.device.limits();
-        let (_, medium_of_quad) = kinds(&scene.quads);
-        let length = profile_length(volume.size[2]);
+        let (media, medium_of_quad) = kinds(&scene.quads);
+        let length = match scene.scattering {
+            Scattering::Multiple => profile_length(volume.size[2]),
+            Scattering::Single => 0,
+        };
+        let profile_bytes = media.len() as u64 * u64::from(length) * 16;
+        if profile_bytes > limits.max_storage_buffer_binding_size {
+            return Err(Error::device(
+                format!(
+                    "multiple scattering in {} thicknesses and mists takes {} MiB, too much for {}",
+                    media.len(),
+                    profile_bytes >> 20,
+                    gpu.name()
+                ),
+                "give materials the same thickness and sheets the same mist, or use --engine cpu",
+            ));
+        }
         let numbered = scene.quads.iter().zip(medium_of_quad);
         let quads: Vec<Quad> = numbered.map(|(quad, which)| Quad::new(quad, scene, which * length)).collect();
         let lights = layout::lights(scene);

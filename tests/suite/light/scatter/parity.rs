@@ -1,10 +1,12 @@
 //! Parity of `shaders/light/scatter.wgsl` with `taki::light::scatter`: equal input gives equal output.
 
+use crate::engine::gpu::SURFACE;
 use glam::Vec3;
 use taki::engine::gpu::shader::resolve;
 use taki::engine::gpu::{DeviceOptions, Gpu};
 use taki::light::scatter::media::profile_length;
 use taki::light::scatter::{Profile, Row, Scattering, forward_peak, multiple};
+use taki::util::monitor::Unwatched;
 use wgpu::BufferUsages;
 
 const STAGE: &str = "#import light::scatter
@@ -125,4 +127,27 @@ fn the_shaders_multiple_scattering_is_the_hosts() {
             assert!((got[c] - want[c]).abs() <= allowed, "case {i}, {c}: {got:?}, not {want:?}");
         }
     }
+}
+
+#[test]
+fn profiles_that_the_device_cannot_bind_are_refused_before_they_are_computed() {
+    let Some(mut renderer) = crate::engine::gpu::renderer("profiles") else { return };
+    let small = ["image.width=8", "image.height=8", "volume.nx=4", "volume.ny=4", "volume.nz=512"];
+    let sets =
+        [&small[..], &["curves.across=4", "light.scattering=multiple", "light.visibility=march"]].concat();
+    let mut scene = crate::engine::gpu::scene("front", &sets);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let limit = renderer.gpu.device.limits().max_storage_buffer_binding_size;
+    // Each quad has a thickness of its own.
+    let count = limit / (16 * u64::from(profile_length(512))) + 1;
+    let quad = scene.quads[0].clone();
+    let thin = |n: u64| {
+        let mut quad = quad.clone();
+        quad.material.thickness_m += n as f32 * 1e-3;
+        quad
+    };
+    scene.edit().quads = (0..count).map(thin).collect();
+    let refused = renderer.render(&scene, &volume, &scene.mesh(), &SURFACE, &Unwatched);
+    let said = refused.expect_err("more than the device binds").to_string();
+    assert!(said.contains("multiple scattering") && said.contains("--engine cpu"), "{said}");
 }
