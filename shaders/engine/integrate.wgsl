@@ -218,8 +218,8 @@ fn trace(
         column = scatter_column(slab_cosine(d.z, -d_cell));
     }
     view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, point_world(quad, hit.xy),
-        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z, view.profile,
-        column);
+        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z,
+        view.profile, column);
     view.lights = arrayLength(&lights);
 
     // The level whose cells match the sample's footprint lies between two levels; both are walked.

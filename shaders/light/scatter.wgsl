@@ -52,7 +52,9 @@ fn scatter_column(e_n: f32) -> GainColumn {
 }
 
 // Gain and fill, from the profile's values in the column and the next, in the row of the light and the next.
-fn scatter_gain(near: array<vec4<f32>, 2>, far: array<vec4<f32>, 2>, row: Row, column: GainColumn) -> vec4<f32> {
+fn scatter_gain(
+    near: array<vec4<f32>, 2>, far: array<vec4<f32>, 2>, row: Row, column: GainColumn,
+) -> vec4<f32> {
     let n = near[0] + (near[1] - near[0]) * column.share;
     let f = far[0] + (far[1] - far[0]) * column.share;
     return n + (f - n) * row.share;
