@@ -140,9 +140,9 @@ fn profiles_that_the_device_cannot_bind_are_refused_before_they_are_computed() {
     let limit = renderer.gpu.device.limits().max_storage_buffer_binding_size;
     // Each quad has a thickness of its own.
     let count = limit / (16 * u64::from(profile_length(512))) + 1;
-    let quad = scene.quads[0].clone();
+    let quad = scene.quads[0];
     let thin = |n: u64| {
-        let mut quad = quad.clone();
+        let mut quad = quad;
         quad.material.thickness_m += n as f32 * 1e-3;
         quad
     };
