@@ -28,7 +28,7 @@
 //!   is negative; without that part the error at g = 0.7 was twice as large.
 //! - **Flux.** The terms so far follow the strands, but their sum is not the flux of a slab. G(μ₀, μ) is the
 //!   factor on it with which a homogeneous slab is exact, and F(μ₀, μ) the light scattered once that the
-//!   centres of thick layers miss ([`gain`]). What G multiplies counts as 0 where it is negative, in dark
+//!   centres of thick layers miss (`gain.rs`). What G multiplies counts as 0 where it is negative, in dark
 //!   cells between bright ones.
 //!
 //! Mist is such a medium of its own, with g = 0 and four times its Ψ as the albedo.
