@@ -83,8 +83,8 @@ impl Engine {
                 Ok(opened) => Ok(opened),
                 // A named adapter that is missing is a user error, not a reason to fall back.
                 Err(e) if device.adapter.is_some() => Err(e),
-                Err(Error::NoAdapter(why)) => Ok(cpu(&format!(
-                    ": {why}; a Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine"
+                Err(Error::NoAdapter { what, .. }) => Ok(cpu(&format!(
+                    ": {what}; a Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine"
                 ))),
                 Err(e) => Err(e),
             },
@@ -158,7 +158,7 @@ impl Engine {
             && is_the_devices(e, self)
             && !matches!(e, Error::Device { .. } | Error::Watchdog { .. })
         {
-            monitor.warn(&format!("{e}: trying once more on a new device with smaller tiles"));
+            monitor.warn(&format!("{}: trying once more on a new device with smaller tiles", e.cause()));
             self.renew()?;
             let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
             result = self.render_once(scene, volume, mesh, &careful, monitor);
@@ -166,7 +166,7 @@ impl Engine {
         match &result {
             Err(e) if matches!(self, Engine::Gpu { falls_back: true, .. }) && is_the_devices(e, self) => {
                 // It stays, so that the strips of one picture come from one engine and are warned of once.
-                monitor.warn(&format!("{e}: the CPU engine takes over"));
+                monitor.warn(&format!("{}: the CPU engine takes over", e.cause()));
                 *self = Engine::cpu();
                 self.render_once(scene, volume, mesh, options, monitor)
             }

@@ -66,6 +66,9 @@ const MAX_CORNERED_SIDE: u32 = 16;
 /// and with 12° 1 %.
 const MARCH_ANGLE: f64 = 16.0;
 
+/// Largest value of `light.cache`, MiB.
+const MOST_CACHE: u128 = 65_536;
+
 /// Relative difference of directions below which they share a light volume. At this value rays diverge by a
 /// thousandth of a cell over a slab of 1000 cells.
 const DIRECTION_TOLERANCE: f32 = 1e-6;
@@ -194,7 +197,7 @@ impl LightVolumes {
             format!("cached visibility of {} lights on {} quads", lit.lights.len(), lit.quads.len()),
             need,
             budget,
-            "raise light.cache (at most half of --memory counts), or use light.visibility=march",
+            advice(need),
         ))
     }
 
@@ -288,6 +291,18 @@ impl LightVolumes {
             volumes.push(LightVolume { direction: Vec3::Z, bits: 1.0 });
         }
         LightVolumes { volumes, numbers, marched, patches, lights: lights.len(), medium, form }
+    }
+}
+
+/// Advice for light volumes of `need` bytes that do not fit.
+fn advice(need: u128) -> String {
+    let mib = need.div_ceil(1 << 20);
+    match mib <= MOST_CACHE {
+        true => format!(
+            "set light.cache={mib}, with --memory={}MiB or more, or use light.visibility=march",
+            2 * mib
+        ),
+        false => "use light.visibility=march, fewer lights or a smaller volume".into(),
     }
 }
 

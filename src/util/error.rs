@@ -39,9 +39,14 @@ pub enum Error {
         /// Advice: how to mend it.
         fix: String,
     },
-    /// The command asks for `--engine gpu` and no adapter can do the work.
-    #[error("{0}; install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu")]
-    NoAdapter(String),
+    /// The command asks for `--engine gpu` or for an adapter, and no such adapter can do the work.
+    #[error("{what}; {fix}")]
+    NoAdapter {
+        /// Description of what is missing.
+        what: String,
+        /// Advice: how to mend it.
+        fix: String,
+    },
     /// The viewer's window cannot be opened.
     #[error(
         "no window could be opened ({0}); the viewer needs a display (DISPLAY or WAYLAND_DISPLAY) with \
@@ -99,6 +104,19 @@ impl Error {
     /// [`Error::Input`]: a fault in what the user gave.
     pub fn input(what: impl Into<String>, fix: impl Into<String>) -> Self {
         Error::Input { what: what.into(), fix: fix.into() }
+    }
+
+    /// What happened, without the advice: for a message about what taki does by itself.
+    pub fn cause(&self) -> String {
+        match self {
+            Error::Device { what, .. } => what.clone(),
+            Error::DeviceLost(why) => format!("the GPU device was lost: {why}"),
+            Error::Watchdog { seconds } => format!("the GPU did not answer for {seconds} s"),
+            Error::Memory { what, need, budget, .. } => {
+                format!("{what} needs {need}, the budget is {budget}")
+            }
+            other => other.to_string(),
+        }
     }
 
     /// [`Error::Device`]: more than the device can do.
@@ -166,7 +184,7 @@ impl Error {
             Error::Usage(_) => 2,
             Error::Memory { .. } => 33,
             Error::Input { .. } | Error::Device { .. } => 65,
-            Error::NoAdapter(_) | Error::NoWindow(_) | Error::NoFfmpeg(_) => 69,
+            Error::NoAdapter { .. } | Error::NoWindow(_) | Error::NoFfmpeg(_) => 69,
             Error::CannotCreate { .. } => 73,
             Error::Io { .. } => 74,
             Error::DeviceLost(_) => 75,

@@ -72,16 +72,20 @@ impl Gpu {
         let adapter = match &options.adapter {
             Some(name) => {
                 let wanted = name.to_lowercase();
-                adapters()
-                    .into_iter()
+                let all = adapters();
+                let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+                all.into_iter()
                     .find(|a| a.get_info().name.to_lowercase().contains(&wanted))
-                    .ok_or_else(|| Error::NoAdapter(format!("no adapter's name contains {name:?}")))?
+                    .ok_or_else(|| unknown_adapter(name, &names))?
             }
             None => pollster::block_on(instance().request_adapter(&wgpu::RequestAdapterOptions {
                 power_preference: wgpu::PowerPreference::HighPerformance,
                 ..Default::default()
             }))
-            .map_err(|_| Error::NoAdapter("no GPU adapter was found".into()))?,
+            .map_err(|_| Error::NoAdapter {
+                what: "no GPU adapter was found".into(),
+                fix: "install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu".into(),
+            })?,
         };
         let info = adapter.get_info();
         let has = adapter.limits();
@@ -106,8 +110,9 @@ impl Gpu {
             required_limits,
             ..Default::default()
         }))
-        .map_err(|e| {
-            Error::NoAdapter(format!("{} cannot be used: {}", info.name, one_line(&e.to_string())))
+        .map_err(|e| Error::NoAdapter {
+            what: format!("{} cannot be used: {}", info.name, one_line(&e.to_string())),
+            fix: "name another one with --adapter, or use --engine cpu without --adapter".into(),
         })?;
 
         let fault: Arc<Mutex<Option<Fault>>> = Arc::default();
@@ -249,6 +254,17 @@ impl Gpu {
         }
         buffer
     }
+}
+
+/// The error for an adapter `name` that is none of `names`.
+fn unknown_adapter(name: &str, names: &[String]) -> Error {
+    let what = format!("no adapter's name contains {name:?}");
+    let fix = match names {
+        [] => "there is none; leave out --adapter, or install a Vulkan driver (Debian: mesa-vulkan-drivers)"
+            .into(),
+        names => format!("there is {}; name one of these, or leave out --adapter", names.join(" and ")),
+    };
+    Error::NoAdapter { what, fix }
 }
 
 fn one_line(text: &str) -> String {

@@ -168,6 +168,8 @@ fn an_automatic_engine_leaves_a_picture_of_long_walks_to_the_cpu_before_the_work
         assert!(frame.radiance == on_cpu.radiance && frame.counts == on_cpu.counts);
         assert_eq!(warnings.len(), 1, "{warnings:?}");
         assert!(warnings[0].ends_with("the CPU engine takes over"), "{warnings:?}");
+        // No advice stands beside what taki does by itself.
+        assert!(!warnings[0].contains("--engine cpu"), "{warnings:?}");
     } else {
         assert!(warnings.is_empty(), "{warnings:?}");
     }

@@ -122,8 +122,11 @@ fn a_frame_whose_light_volumes_do_not_fit_is_refused_once_and_in_one_line() {
     let mut args = vec!["render", "front", "-o", out.to_str().expect("UTF-8")];
     args.extend(sets);
     let run = crate::cli::faults::run(&mut crate::cli::faults::taki(&args));
-    run.refused(33, &["cached visibility of 1 lights on 1 quads needs 2.5 MiB", "light.cache"]);
+    run.refused(33, &["cached visibility of 1 lights on 1 quads needs 2.5 MiB", "light.cache=3"]);
     assert!(!run.stderr().contains("once more"), "{}", run.stderr());
+    // The advice leads to a picture.
+    args.extend(["--set=light.cache=3", "--size=32x32"]);
+    crate::cli::faults::run(&mut crate::cli::faults::taki(&args)).done();
 }
 
 #[test]

@@ -22,7 +22,7 @@ impl Renderer {
                 return true;
             }
             Ok(Err(e @ Error::Device { .. })) if self.choice == EngineChoice::Auto => {
-                self.say(MessageKind::Warning, format!("{e}. The CPU engine takes over"));
+                self.say(MessageKind::Warning, format!("{}. The CPU engine takes over", e.cause()));
                 self.take_cpu();
                 return true;
             }
@@ -49,7 +49,7 @@ impl Renderer {
         self.losses.push_back(now);
         lock(&self.shared.state).devices_lost += 1;
         if self.losses.len() > MAX_REBUILDS || matches!(e, Error::Watchdog { .. }) {
-            self.say(MessageKind::Error, format!("{e}. The CPU engine takes over; save your work"));
+            self.say(MessageKind::Error, format!("{}. The CPU engine takes over; save your work", e.cause()));
             self.take_cpu();
         } else {
             self.say(

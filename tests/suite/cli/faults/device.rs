@@ -55,7 +55,10 @@ fn an_adapter_of_another_name_is_refused() {
     let dir = tempdir().unwrap();
     for engine in ["auto", "gpu"] {
         let mut command = taki(["render", "front", "--adapter=no such thing", "--engine", engine, "-o"]);
-        run(command.arg(dir.path().join("x.png"))).refused(69, &["no such thing"]);
+        let run = run(command.arg(dir.path().join("x.png")));
+        run.refused(69, &["no such thing", "leave out --adapter"]);
+        // The adapters that there are stand in the message.
+        assert!(adapters().iter().all(|a| run.stderr().contains(&a.get_info().name)), "{run:?}");
     }
     has_only(dir.path(), &[]);
 }
