@@ -40,8 +40,9 @@ const FORMAT: &str = "a volume file is an .npz with rho [nz,ny,nx] and v [nz,ny,
 const FIX_V: &str = "divide v by its length where it has one: n = numpy.linalg.norm(v, axis=-1, \
                      keepdims=True); v = v / numpy.where(n > 0, n, 1)";
 const FIX_V_FINITE: &str = "empty such cells: bad = ~numpy.isfinite(v).all(-1); v[bad] = 0; rho[bad] = 0";
-const FIX_K: &str = "k = numpy.clip(numpy.nan_to_num(k), 0, 1) brings it into the range; without k all cells \
-                     take volume.k_d and volume.k_s";
+const WITHOUT_K: &str = "; without k all cells take volume.k_d and volume.k_s";
+const FIX_NO_V: &str = "save the flow as v [nz,ny,nx,3]; where nothing is known about it, let all water fall \
+                        straight down: v = numpy.zeros((*rho.shape, 3)); v[..., 1] = 1";
 const FIX_ALPHA: &str = "save alpha as one number from 0 to 1, or leave alpha out, which means 1";
 
 /// Writes `volume` to `out` as `.npz`. The bytes depend on the volume alone.
@@ -261,13 +262,12 @@ impl Reader<'_> {
         };
         slack += alpha * 1e-6 + rho.number.rounding(alpha, rho.codes);
         let mut cursor = CellCursor::new(size);
-        self.each(&rho, size, |_, [value]: [f32; 1]| {
+        let mut outside = false;
+        let read = self.each(&rho, size, |_, [value]: [f32; 1]| {
             let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&value) {
-                return Err(Fault(
-                    format!("{value} is outside 0..=1"),
-                    format!("rho = numpy.clip(numpy.nan_to_num(rho), 0, {alpha}) brings it into the range"),
-                ));
+                outside = true;
+                return Err(Fault(format!("{value} is outside 0..=1"), String::new()));
             }
             if value > alpha + slack {
                 return Err(Fault(
@@ -286,7 +286,8 @@ impl Reader<'_> {
                 *cell = cell.with_density(if alpha > 0.0 { value / alpha } else { 0.0 }, k[0], k[1]);
             }
             Ok(())
-        })?;
+        });
+        read.map_err(|fault| if outside { self.out_of_range(fault, &rho, alpha, "") } else { fault })?;
         if self.zip.index_for_name("k.npy").is_none() {
             self.notes.push(format!(
                 "k is missing: all cells take k_d = {} and k_s = {} (volume.k_d, volume.k_s)",
@@ -296,16 +297,19 @@ impl Reader<'_> {
         }
         let head = self.head("k")?;
         let mut cursor = CellCursor::new(size);
-        self.each(&head, size, |_, [k_d, k_s]: [f32; 2]| {
+        let mut outside = false;
+        let read = self.each(&head, size, |_, [k_d, k_s]: [f32; 2]| {
             let cell = cursor.next(&mut cells);
             if !(0.0..=1.0).contains(&k_d) || !(0.0..=1.0).contains(&k_s) {
-                return Err(Fault(format!("({k_d}, {k_s}) is outside 0..=1"), FIX_K.into()));
+                outside = true;
+                return Err(Fault(format!("({k_d}, {k_s}) is outside 0..=1"), String::new()));
             }
             if let Some(cell) = cell.filter(|cell| cell.has_direction()) {
                 *cell = cell.with_reflection(k_d, k_s);
             }
             Ok(())
-        })?;
+        });
+        read.map_err(|fault| if outside { self.out_of_range(fault, &head, 1.0, WITHOUT_K) } else { fault })?;
         Ok(VolumeTexture { size, alpha, cells: cells.into() })
     }
 
@@ -397,6 +401,45 @@ impl Reader<'_> {
         Ok((value, head.number.rounding(value, head.codes)))
     }
 
+    /// Gives the error for a number outside 0 to 1 its way out, followed by `more`. The numbers of a larger
+    /// range are to be divided, because clipping them would make nearly all of them 1. `most` is the largest
+    /// number that is allowed.
+    fn out_of_range(&mut self, fault: Error, head: &Head, most: f32, more: &str) -> Error {
+        let Error::Input { what, .. } = fault else { return fault };
+        let name = head.name;
+        let fix = match self.divisor(head) {
+            None => format!("{name} = numpy.clip(numpy.nan_to_num({name}), 0, {most})"),
+            Some(by) => {
+                let factor = if most == 1.0 { String::new() } else { format!("{most} * ") };
+                format!("{name} = {factor}numpy.clip(numpy.nan_to_num({name}) / {by}, 0, 1)")
+            }
+        };
+        Error::input(what, format!("{fix} brings it into the range{more}"))
+    }
+
+    /// Returns the number by which an array is to be divided so that it lies within 0 to 1: the largest code
+    /// of 8 or 16 bits where the array seems to hold such codes, and otherwise its largest number. `None`
+    /// where that is about 1, or the array cannot be read to its end.
+    fn divisor(&mut self, head: &Head) -> Option<String> {
+        let count = head.shape.iter().product();
+        let mut numbers = self.numbers(head, count).ok()?;
+        let (mut most, mut whole) = (0f32, true);
+        for _ in 0..count {
+            let number = numbers.next().ok()?;
+            if number.is_finite() {
+                most = most.max(number);
+                whole &= number.fract() == 0.0;
+            }
+        }
+        match most {
+            _ if most <= 1.01 => None,
+            128.0..=255.0 if whole => Some("255".into()),
+            32768.0..=65535.0 if whole => Some("65535".into()),
+            _ if most < 1e9 => Some(most.to_string()),
+            _ => Some(format!("{most:e}")),
+        }
+    }
+
     /// Error about an array.
     fn fault(&self, head: &Head, what: String, fix: impl Into<String>) -> Error {
         invalid(self.path, format!("{}: {what}", head.name), fix)
@@ -415,7 +458,10 @@ impl Reader<'_> {
                 [] => "there is no such array".into(),
                 names => format!("there is no such array, but {}", names.join(", ")),
             };
-            return Err(fault(what, format!("numpy.savez(file, rho=rho, v=v) names arrays; {FORMAT}")));
+            return Err(match name {
+                "v" => fault(what, FIX_NO_V.into()),
+                _ => fault(what, format!("numpy.savez(file, rho=rho, v=v) names arrays; {FORMAT}")),
+            });
         }
         let entry = self.zip.by_name(&file).map_err(|e| fault(e.to_string(), FORMAT.into()))?;
         let (header, _) = open_array(entry).map_err(|e| fault(e.to_string(), FORMAT.into()))?;

@@ -559,6 +559,49 @@ fn what_has_no_meaning_is_refused() {
 }
 
 #[test]
+fn densities_of_a_larger_range_are_to_be_divided() {
+    let ramp = |most: f64| -> Vec<f64> {
+        (0..CELLS).map(|i| (i as f64 / (CELLS - 1) as f64 * most).floor()).collect()
+    };
+    let of = |values: Vec<f64>, descr| Array::new(&SHAPE, values).of(descr);
+    for (rho, by) in [
+        (of(ramp(255.0), "<i2"), "/ 255,"),
+        (of(ramp(200.0), "<i4"), "/ 255,"),
+        (of(ramp(255.0), "<f4"), "/ 255,"),
+        (of(ramp(65535.0), "<u2"), "/ 65535,"),
+        (of(ramp(1000.0), "<u2"), "/ 1000,"),
+        (of(ramp(12.0).iter().map(|x| x + 0.5).collect(), "<f8"), "/ 12.5,"),
+    ] {
+        let advice = format!("rho = numpy.clip(numpy.nan_to_num(rho) {by} 0, 1)");
+        Foreign { rho: rho.clone(), ..ok() }.refused(&["rho: ", &advice]);
+        Foreign { rho: rho.in_fortran_order(), ..ok() }.refused(&["rho: ", &advice]);
+    }
+    // α stays the largest density.
+    let alpha = Some(Array::new(&[], vec![0.5]));
+    Foreign { rho: of(ramp(255.0), "<i2"), alpha, ..ok() }
+        .refused(&["rho = 0.5 * numpy.clip(numpy.nan_to_num(rho) / 255, 0, 1)"]);
+    let k = Array { values: (0..2 * CELLS).map(|i| (i * 5) as f64).collect(), ..ok().k.unwrap() };
+    Foreign { k: Some(k.of("<i2")), ..ok() }.refused(&["k = numpy.clip(numpy.nan_to_num(k) / 255, 0, 1)"]);
+    // Noise around 0 and 1 is cut, and the density stays as it is.
+    let mut noisy = ok().rho;
+    (noisy.values[3], noisy.values[5]) = (-0.001, 1.001);
+    Foreign { rho: noisy, ..ok() }.refused(&["rho = numpy.clip(numpy.nan_to_num(rho), 0, 1)"]);
+}
+
+#[test]
+fn a_volume_without_a_flow_is_told_how_to_give_one() {
+    let (_dir, path) = ok().written();
+    let mut zip = ZipWriter::new(File::create(&path).unwrap());
+    zip.start_file("rho.npy", SimpleFileOptions::default()).unwrap();
+    zip.write_all(&ok().rho.bytes()).unwrap();
+    zip.finish().unwrap();
+    let fault = read_npz(&path, &ROOMY, &Unwatched).unwrap_err().to_string();
+    for words in ["v: there is no such array, but rho", "v = numpy.zeros((*rho.shape, 3))", "v[..., 1] = 1"] {
+        assert!(fault.contains(words), "no {words:?} in {fault}");
+    }
+}
+
+#[test]
 fn arrays_under_other_names_are_told() {
     let dir = super::folder();
     let path = dir.path().join("unnamed.npz");
