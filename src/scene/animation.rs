@@ -53,7 +53,7 @@ impl Animation {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Animation> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
-        let record = Record::of(&source.text, &values);
+        let record = Record::of(&source.text, &mut values);
         let folder = apply_sets(&mut values, sets, &source, limits)?;
         record.map_or(Ok(()), |record| record.check_map(&values))?;
         Ok(Animation { record, ..Animation::new(&source.name, values, folder, limits)? })

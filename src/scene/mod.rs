@@ -185,7 +185,7 @@ impl Scene {
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
         let source = Source::find(scene)?;
         let mut values = source.values()?;
-        let record = Record::of(&source.text, &values);
+        let record = Record::of(&source.text, &mut values);
         let folder = read::apply_sets(&mut values, sets, &source, limits)?;
         record.map_or(Ok(()), |record| record.check_map(&values))?;
         Ok(Scene::from_values(&source.name, values, folder.as_deref(), limits)?.recorded(record))
@@ -429,15 +429,14 @@ impl Scene {
     /// Returns warnings about what is valid but probably a mistake.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
-        if let Some(values) = self.values.as_ref().filter(|v| v.is_set("volume.alpha"))
+        if let Some(values) = self.values.as_ref().filter(|v| v.is_set_by_user("volume.alpha"))
             && self.volume_file.is_some()
             && values.float("volume.alpha") != volume.alpha
         {
             warnings.push(format!(
-                "volume.alpha = {} has no effect: volume.file brings its own alpha, {}; change trace.sigma \
-                 or trace.tau, or write the file with another alpha",
+                "volume.alpha = {} has no effect: volume.file gives the density as it is; change trace.sigma \
+                 or trace.tau, or multiply rho in the file by a number",
                 values.float("volume.alpha"),
-                volume.alpha
             ));
         }
         warnings.extend(self.other_files(volume));

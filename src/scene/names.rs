@@ -1,8 +1,8 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
-use super::param::{Kind, PARAMS, Param, last_part};
+use super::param::{Kind, PARAMS, Param, last_part, matches};
 use super::remove::{NUMBERED, REMOVE};
-use super::value::{Place, Values};
+use super::value::{Place, Raw, Values, check};
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
@@ -56,7 +56,7 @@ pub fn unknown_key(key: &str, values: &Values, place: &Place) -> Error {
         "base" => "name the preset in place of the scene, such as taki render fig5",
         "version" => "a scene file alone has a version",
         REMOVE => "give --remove NAME",
-        _ => return unknown(key, nearest(key, values.known_keys()), place),
+        _ => return unknown(key, None, values, nearest(key, values.known_keys()), place),
     };
     Error::input(format!("{}: unknown key {key:?}", place.0), advice)
 }
@@ -65,11 +65,15 @@ pub fn unknown_key(key: &str, values: &Values, place: &Place) -> Error {
 pub(super) const AT_THE_TOP: [&str; 3] = ["version", "base", REMOVE];
 
 /// The error for an unknown key in a scene file, which may name lights and other things as it likes. It
-/// suggests the nearest key that the scene has so far, or one that has the misspelt key's own name.
-pub fn unknown_key_in_file(key: &str, values: &Values, place: &Place) -> Error {
+/// suggests the nearest key that the scene has so far, or one that has the misspelt key's own name. `raw` is
+/// the value of the key.
+pub fn unknown_key_in_file(key: &str, raw: &Raw, values: &Values, place: &Place) -> Error {
     if let Some(top) = AT_THE_TOP.iter().find(|top| last_part(key) == **top) {
         let what = format!("{}: unknown key {key}", place.0);
         return Error::input(what, format!("write the line {top} = … above the first table"));
+    }
+    if let Some(advice) = brackets(key, raw) {
+        return Error::input(format!("{}: unknown key {key}", place.0), advice);
     }
     let parts: Vec<&str> = key.split('.').collect();
     let named = PARAMS.iter().filter_map(|param| {
@@ -79,16 +83,118 @@ pub fn unknown_key_in_file(key: &str, values: &Values, place: &Place) -> Error {
         fits.then(|| whole().copied().collect::<Vec<&str>>().join("."))
     });
     let named: Vec<String> = named.collect();
-    unknown(key, nearest(key, values.known_keys().into_iter().chain(named)), place)
+    let near = nearest(key, values.known_keys().into_iter().chain(named));
+    unknown(key, Some(raw), values, near, place)
 }
 
-fn unknown(key: &str, near: Option<String>, place: &Place) -> Error {
-    let fix = match (misplaced(key), near) {
-        (Some(advice), _) => advice,
-        (None, Some(near)) => format!("did you mean {near}?"),
-        (None, None) => "docs/parameters.md lists every key".into(),
-    };
+fn unknown(key: &str, raw: Option<&Raw>, values: &Values, near: Option<String>, place: &Place) -> Error {
+    let fix = misplaced(key)
+        .or_else(|| word_of_choice(key, raw))
+        .or_else(|| elsewhere(key, raw, values))
+        .or_else(|| own_table(key))
+        .or_else(|| near.map(|near| format!("did you mean {near}?")))
+        .unwrap_or_else(|| "docs/parameters.md lists every key".into());
     Error::input(format!("{}: unknown key {key}", place.0), fix)
+}
+
+/// Returns advice on a table of a scene file whose header has the wrong brackets, or no name.
+fn brackets(key: &str, raw: &Raw) -> Option<String> {
+    let parts: Vec<&str> = key.split('.').collect();
+    if let [section, last] = parts[..]
+        && NAMED.contains(&section)
+        && Param::find(&format!("{section}.NAME.{last}")).is_some()
+    {
+        return Some(format!("each of them has a table of its own: [{section}.NAME]"));
+    }
+    let Raw::List(items) = raw else { return None };
+    let tables = !items.is_empty() && items.iter().all(|item| matches!(item, Raw::Other("a table")));
+    let is_table = PARAMS.iter().any(|param| {
+        let pattern: Vec<&str> = param.key.split('.').collect();
+        let fits = pattern.iter().zip(&parts).all(|(want, own)| *want == "*" || want == own);
+        pattern.len() > parts.len() && fits
+    });
+    let single = tables && is_table && !NAMED.contains(&key);
+    single.then(|| format!("write [{key}] in single brackets"))
+}
+
+/// Returns advice on a key that is a word of a choice in the same table, such as `holdout = true`.
+fn word_of_choice(key: &str, raw: Option<&Raw>) -> Option<String> {
+    let (table, word) = key.rsplit_once('.')?;
+    if let Some(Raw::Switch(false)) = raw {
+        return None;
+    }
+    PARAMS.iter().find_map(|param| {
+        let own = last_part(param.key);
+        let Kind::Choice(words) = param.kind else { return None };
+        let here = words.contains(&word) && matches(param.key, &format!("{table}.{own}"));
+        here.then(|| format!("write {own} = {word:?}"))
+    })
+}
+
+/// Returns advice on a key that stands in the wrong table. Keys of a table with a similar name go first, then
+/// those that allow the value, and then those that a scene has once.
+fn elsewhere(key: &str, raw: Option<&Raw>, values: &Values) -> Option<String> {
+    let (key, first) = (key.to_lowercase(), |key: &str| key.split('.').next().unwrap_or("").to_lowercase());
+    // Between keys of one letter, such as `curves.g` and `curves.h`, a slip of the finger is likelier.
+    let short = |key: &str| last_part(key).len() == 1;
+    if short(&key) && key.contains('.') && keys_within(&first(&key)).into_iter().any(short) {
+        return None;
+    }
+    let absent = PARAMS.iter().filter_map(|param| {
+        let (section, rest) = param.key.split_once(".*.")?;
+        let absent = NAMED.contains(&section) && section != "materials" && !values.has_under(section);
+        absent.then(|| format!("{section}.NAME.{rest}"))
+    });
+    let mut keys: Vec<String> = values.known_keys().into_iter().chain(absent).collect();
+    keys.retain(|other| last_part(other) == last_part(&key));
+    let fits = |other: &String| {
+        Param::find(other).is_some_and(|param| raw.is_none_or(|raw| check(param, raw).is_ok()))
+    };
+    let alike = |other: &String| strsim::jaro_winkler(&first(&key), &first(other)) > 0.85;
+    let still = |other: &String| !other.starts_with("animate.");
+    let once = |other: &String| PARAMS.iter().any(|param| param.key == other);
+    let wishes: [&dyn Fn(&String) -> bool; 4] = [&alike, &fits, &still, &once];
+    for wish in wishes {
+        if keys.iter().any(wish) {
+            keys.retain(wish);
+        }
+    }
+    if keys.iter().all(alike) {
+        let score = |other: &String| strsim::jaro_winkler(&key, other);
+        keys = keys.into_iter().max_by(|a, b| score(a).total_cmp(&score(b))).into_iter().collect();
+    }
+    if keys.len() > 1 {
+        let pattern = |param: &Param| param.key.replace("quads.*", "quads.0").replace('*', "NAME");
+        keys = keys.iter().filter_map(|key| Param::find(key)).map(pattern).collect();
+        keys.dedup();
+    }
+    (!keys.is_empty()).then(|| format!("did you mean {}?", keys.join(" or ")))
+}
+
+/// Returns advice on a key that is the name of a table, or the size of the picture.
+fn own_table(key: &str) -> Option<String> {
+    let (_, last) = key.rsplit_once('.')?;
+    if ["size", "resolution"].contains(&last) {
+        return Some("write image.width and image.height".into());
+    }
+    if NAMED.contains(&last) || NUMBERED.contains(&last) {
+        return misplaced(last);
+    }
+    let keys = keys_within(last);
+    (!keys.is_empty()).then(|| format!("[{last}] is a table of its own, with the keys {}", listed(&keys)))
+}
+
+/// Returns the keys of a table.
+fn keys_within(table: &str) -> Vec<&'static str> {
+    let within = |key: &&str| key.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
+    PARAMS.iter().map(|param| param.key).filter(within).collect()
+}
+
+/// Returns the one of `names` that a misspelt one is most like, if it is.
+pub(super) fn likeliest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    let alike = |other: &str| strsim::jaro_winkler(&name, &other.to_lowercase());
+    names.filter(|other| alike(other) > 0.8).max_by(|a, b| alike(a).total_cmp(&alike(b)))
 }
 
 /// Returns advice on a key that is unknown because a table or a name was written in another way.
@@ -109,8 +215,15 @@ fn misplaced(key: &str) -> Option<String> {
         let name = parts[1..parts.len() - 1].join(".");
         return Some(format!("the name {name:?} has a dot; choose one without"));
     }
-    let within = |param: &&Param| param.key.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'));
-    let keys: Vec<&str> = PARAMS.iter().filter(within).map(|param| param.key).collect();
+    let unnumbered = |list: &&&str| {
+        key.strip_prefix(**list)
+            .and_then(|rest| rest.strip_prefix('.'))
+            .is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    if let Some(list) = NUMBERED.iter().find(unnumbered) {
+        return Some(format!("each of them has a table of its own: [[{list}]]"));
+    }
+    let keys = keys_within(key);
     (!keys.is_empty()).then(|| format!("it is a table, with the keys {}", listed(&keys)))
 }
 

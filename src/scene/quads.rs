@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Values;
+use super::names::likeliest;
 use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
 use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash};
@@ -39,15 +40,21 @@ pub(super) fn quads(v: &Values, origin: DVec3) -> Result<Vec<Quad>> {
     Ok(quads)
 }
 
+/// Returns advice on the name of a material; `None` where the scene has it. Every scene has `water`.
+pub(super) fn unknown_material(name: &str, materials: &[String]) -> Option<String> {
+    let others = materials.iter().map(String::as_str).filter(|other| *other != "water");
+    let known: Vec<&str> = std::iter::once("water").chain(others).collect();
+    (!known.contains(&name)).then(|| match likeliest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean {near}? Otherwise add [materials.{name}]"),
+        None => format!("add [materials.{name}], or use one of these: {}", known.join(", ")),
+    })
+}
+
 /// Returns the material that `key` names, and its mist. `what` names the user of the material in messages.
 fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(Material, f32)> {
     let name = v.text(key);
-    if name != "water" && !materials.contains(&name) {
-        let known = materials.join(", ");
-        return Err(Error::input(
-            format!("{what} ({key}) has the unknown material {name:?}"),
-            format!("add [materials.{name}] or use one of: water {known}"),
-        ));
+    if let Some(fix) = unknown_material(&name, materials) {
+        return Err(Error::input(format!("{what} ({key}) has the unknown material {name:?}"), fix));
     }
     let float = |what: &str| v.float(&format!("materials.{name}.{what}"));
     let material = Material {

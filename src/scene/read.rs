@@ -9,13 +9,13 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::names::NAMED;
-use super::names::{check_names, full_key, unknown_key};
+use super::names::{check_names, full_key, likeliest, unknown_key};
 use super::param::{Kind, PARAMS, Param};
 use super::remove::{self, REMOVE};
-use super::slips::{not_allowed, slip_at};
+use super::slips::{foreign_signs_at, not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
-use super::{Limits, build, presets};
+use super::{Limits, build, presets, quads};
 use crate::output::frame::{folder_of, scene_in};
 use crate::util::error::{Error, Result};
 
@@ -133,7 +133,11 @@ impl Source {
     /// # Errors
     /// [`Error::Input`] with the line of the fault.
     pub fn values(&self) -> Result<Values> {
-        self.values_at_depth(0)
+        let mut values = self.values_at_depth(0)?;
+        if self.origin == format!("preset {}", self.name) {
+            values.come_from_base();
+        }
+        Ok(values)
     }
 
     fn values_at_depth(&self, depth: u32) -> Result<Values> {
@@ -141,6 +145,9 @@ impl Source {
         let mut file = File { source: self, newlines, base: "" };
         let root = DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
+            if let Some((start, line, advice)) = foreign_signs_at(&self.text, at) {
+                return Error::input(format!("{}: {line}", file.place(start).0), advice);
+            }
             if let Some((key, value, advice)) = slip_at(&self.text, at)
                 && let Some(param) = Param::find(&key)
             {
@@ -182,7 +189,9 @@ impl Source {
                     text: text.into(),
                 };
                 file.base = name;
-                base.values_at_depth(depth + 1)?
+                let mut values = base.values_at_depth(depth + 1)?;
+                values.come_from_base();
+                values
             }
         };
         if let Some(list) = root.get(REMOVE) {
@@ -194,6 +203,7 @@ impl Source {
                 name => file.section(name, value, &mut values)?,
             }
         }
+        file.check_parts(&root, &values)?;
         Ok(values)
     }
 }
@@ -324,6 +334,53 @@ impl File<'_> {
         }
     }
 
+    /// Checks that the parts of this file have the corners or points that they need, and a material that
+    /// exists. A part without may be one of the base, misspelt.
+    fn check_parts(&self, root: &DeTable, values: &Values) -> Result<()> {
+        let materials = values.names("materials");
+        for (section, need) in [
+            ("quads", "corners"),
+            ("rocks", "corners"),
+            ("pools", "corners"),
+            ("sheets", "points"),
+            ("splashes", ""),
+        ] {
+            let parts: Vec<(String, usize, &Spanned<DeValue>)> = match root.get(section).map(Spanned::get_ref)
+            {
+                Some(DeValue::Table(parts)) => parts
+                    .iter()
+                    .map(|(name, part)| (name.get_ref().to_string(), name.span().start, part))
+                    .collect(),
+                Some(DeValue::Array(parts)) => parts
+                    .iter()
+                    .enumerate()
+                    .map(|(i, part)| (i.to_string(), part.span().start, part))
+                    .collect(),
+                _ => Vec::new(),
+            };
+            for (name, at, part) in parts {
+                let path = format!("{section}.{name}");
+                let has = || match need {
+                    "points" => !values.series(&format!("{path}.points")).is_empty(),
+                    need => values.is_set(&format!("{path}.{need}")),
+                };
+                if !need.is_empty() && !has() {
+                    return Err(without(&path, need, values, &self.place(at)));
+                }
+                let material = part.get_ref().as_table().and_then(|part| part.get("material"));
+                if let Some(material) = material
+                    && let Some(name) = material.get_ref().as_str()
+                    && let Some(fix) = quads::unknown_material(name, &materials)
+                {
+                    let place = self.place(material.span().start).0;
+                    let what = format!("{place}: {path}.material = {name:?}: the scene has no such material");
+                    return Err(Error::input(what, fix));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Reads a table without keys: a light or material with every default, or a mistake.
     fn empty(&self, path: &str, value: &Spanned<DeValue>, values: &mut Values) -> Result<()> {
         let section = path.split('.').next().unwrap_or(path);
@@ -344,10 +401,7 @@ impl File<'_> {
         }
         match Param::find(&key).map(|param| param.kind) {
             Some(_) if values.is_set(&key) => Ok(()),
-            Some(Kind::Corners) => Err(Error::input(
-                format!("{}: {path} has no corners", place.0),
-                format!("give {key} four points A, B, C, D"),
-            )),
+            Some(Kind::Corners) => Err(without(path, "corners", values, &place)),
             Some(_) => {
                 let default = values.get(&key);
                 values.0.insert(Key::new(&key), default);
@@ -357,6 +411,24 @@ impl File<'_> {
             None => values.set(path, &Raw::Other("a table"), &place),
         }
     }
+}
+
+/// The error for a part without the corners or points that it needs. A part of the base may be meant.
+fn without(path: &str, need: &str, values: &Values, place: &Place) -> Error {
+    let (section, name) = path.split_once('.').unwrap_or((path, ""));
+    let others = values.names(section);
+    let near = likeliest(name, others.iter().map(String::as_str).filter(|other| *other != name));
+    let near = near.filter(|_| section != "quads");
+    let points = match section {
+        "sheets" => "points along the flow, two or more",
+        "pools" => "four points at one height",
+        _ => "four points A, B, C, D",
+    };
+    let fix = match near {
+        Some(near) => format!("did you mean [{section}.{near}]? Otherwise give {path}.{need} {points}"),
+        None => format!("give {path}.{need} {points}"),
+    };
+    Error::input(format!("{}: {path} has no {need}", place.0), fix)
 }
 
 /// Converts a TOML value, without its positions.

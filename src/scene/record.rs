@@ -26,14 +26,18 @@ pub struct Record {
 
 impl Record {
     /// Reads the comments at the start of a picture's scene, whose values are `values`. `None` where there
-    /// are none, as in a scene that somebody wrote.
-    pub fn of(text: &str, values: &Values) -> Option<Record> {
+    /// are none, as in a scene that somebody wrote. The values of a picture, which holds all parameters, are
+    /// marked as such.
+    pub fn of(text: &str, values: &mut Values) -> Option<Record> {
         let comments: Vec<&str> = text.lines().take_while(|line| line.starts_with('#')).collect();
         let checksum = |start: &str| {
             comments.iter().find_map(|line| u32::from_str_radix(line.strip_prefix(start)?.trim(), 16).ok())
         };
         let (volume, map) = (checksum(VOLUME_COMMENT), checksum(MAP_COMMENT));
-        (volume.is_some() || map.is_some()).then(|| Record { volume, map, water: build::water(values) })
+        (volume.is_some() || map.is_some()).then(|| {
+            values.come_from_base();
+            Record { volume, map, water: build::water(values) }
+        })
     }
 
     /// Checks that values which name no environment map need none.

@@ -37,8 +37,75 @@ pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
         (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),
         (Kind::Switch(_), Raw::Int(number @ 0..=1)) => Some(format!("write {}", *number == 1)),
         (_, Raw::Text(text)) => advice_on_text(param, text.trim()),
+        (_, Raw::List(items)) => advice_on_list(param.kind, items),
         _ => None,
     }
+}
+
+/// Returns advice on a list whose points or colour do not have three numbers.
+fn advice_on_list(kind: Kind, items: &[Raw]) -> Option<String> {
+    let point = |items: &[Raw]| three("a point", "x, y and z", items);
+    let points =
+        || items.iter().find_map(|item| if let Raw::List(parts) = item { point(parts) } else { None });
+    match kind {
+        Kind::Point(_) => point(items),
+        Kind::Color(_) => three("a colour", "red, green and blue", items),
+        Kind::Series => points(),
+        Kind::Corners => points().or_else(|| {
+            let whole = items.iter().all(|item| matches!(item, Raw::List(_)));
+            (whole && items.len() != 4).then(|| format!("{} points: give four", items.len()))
+        }),
+        _ => None,
+    }
+}
+
+/// Returns advice on a list of numbers that are not three. A decimal comma makes two numbers from one.
+fn three(what: &str, parts: &str, items: &[Raw]) -> Option<String> {
+    let numbers = items.iter().all(|item| matches!(item, Raw::Int(_) | Raw::Float(_)));
+    if !numbers || items.is_empty() || items.len() == 3 {
+        return None;
+    }
+    let list = items.iter().map(Raw::words).collect::<Vec<_>>().join(", ");
+    let has = format!("[{}] has {} numbers, and {what} has 3", cut(&list), items.len());
+    let comma = items.len() <= 6 && items.windows(2).any(|pair| matches!(pair, [_, Raw::Int(0..)]));
+    Some(match items.len() {
+        4.. if comma => format!("{has}; write decimals with a point: 6.3, not 6,3"),
+        _ => format!("{has}: {parts}"),
+    })
+}
+
+/// Returns the place of the line of a scene file that holds byte `at`, or of the line before, its text, and
+/// advice on signs in it that TOML does not know. Within a list the fault shows only in the next line.
+pub fn foreign_signs_at(text: &str, at: usize) -> Option<(usize, String, String)> {
+    let start = |end: usize| text.as_bytes()[..end].iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
+    let own = start(at.min(text.len()));
+    [own, start(own.saturating_sub(1))].into_iter().find_map(|start| {
+        let line = text.get(start..)?.lines().next()?.trim();
+        Some((start, cut(line), foreign_signs(line)?))
+    })
+}
+
+/// Returns advice on signs that word processors and other languages use in place of those of TOML. What
+/// stands in quotes may hold any.
+fn foreign_signs(line: &str) -> Option<String> {
+    let mut quote = None;
+    for (at, c) in line.char_indices() {
+        match (quote, c) {
+            (Some(open), c) if c == open => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '#') => return None,
+            (None, '−' | '–') => return Some(format!("write a plain - in place of {c}")),
+            (None, '“' | '”' | '„' | '‘' | '’' | '«' | '»') => {
+                return Some(format!("write plain quotes, \", in place of {c}"));
+            }
+            (None, '/') if line[at..].starts_with("//") => {
+                return Some("a comment begins with #, not with //".into());
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 /// Returns the key and value on the line of a scene file that holds byte `at`, and advice on that value.
@@ -103,6 +170,9 @@ fn advice_on_unquoted(param: &Param, text: &str) -> Option<String> {
 fn advice_on_text(param: &Param, text: &str) -> Option<String> {
     if text.is_empty() {
         return (!matches!(param.kind, Kind::Text(_))).then(|| "write a value behind the =".into());
+    }
+    if let Some(advice) = foreign_signs(text) {
+        return Some(advice);
     }
     match param.kind {
         Kind::Float(..) | Kind::Int(..) => advice_on_number(param, text),

@@ -1,6 +1,6 @@
 //! Parameter values: they are checked against the table, merged and printed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::names::unknown_key_in_file;
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
@@ -51,8 +51,20 @@ pub enum Raw {
 pub struct Place(pub String);
 
 /// Dotted concrete keys and their values. Keys that are absent have their defaults.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Values(pub BTreeMap<Key, Value>);
+#[derive(Clone, Debug, Default)]
+pub struct Values(
+    /// The values.
+    pub BTreeMap<Key, Value>,
+    /// Keys whose values come from a preset or picture, and were not set by the user.
+    BTreeSet<Key>,
+);
+
+/// The origin of a value does not matter.
+impl PartialEq for Values {
+    fn eq(&self, other: &Values) -> bool {
+        self.0 == other.0
+    }
+}
 
 /// A dotted key. Numeric parts (quads, tracks) sort by value, names by letters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -99,12 +111,25 @@ impl Values {
     /// the value. The message begins with `place`.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
         let Some(param) = Param::find(key) else {
-            return Err(unknown_key_in_file(key, self, place));
+            return Err(unknown_key_in_file(key, raw, self, place));
         };
         let value =
             check(param, raw).map_err(|got| not_allowed(place, key, &got, param, advice(param, raw)))?;
-        self.0.insert(Key::new(key), value);
+        let key = Key::new(key);
+        self.1.remove(&key);
+        self.0.insert(key, value);
         Ok(())
+    }
+
+    /// Marks all values so far as those of a preset or picture.
+    pub(super) fn come_from_base(&mut self) {
+        self.1 = self.0.keys().cloned().collect();
+    }
+
+    /// Whether the user has set this key, in a scene file or with `--set`.
+    pub fn is_set_by_user(&self, key: &str) -> bool {
+        let key = Key::new(key);
+        self.0.contains_key(&key) && !self.1.contains(&key)
     }
 
     /// Removes every key under `prefix`.
@@ -414,7 +439,7 @@ fn triple(raw: &Raw, min: f64, max: f64, round: fn(f64) -> f64) -> Option<[f64; 
 
 impl Raw {
     /// Formats the value for a message, cut to 60 characters.
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let text = match self {
             Raw::Float(x) => format!("{x:?}"),
             Raw::Int(x) => x.to_string(),

@@ -431,7 +431,7 @@ fn what_is_no_pool_is_refused_with_what_to_do() {
     let level = "[[-9,0,9],[9,0,9],[9,0,-9],[-9,0,-9]]";
     let many: String = (0..9).map(|i| format!("[pools.p{i}]\ncorners = {level}\n")).collect();
     let cases = [
-        ("[pools.p]\nfoam = 0.5\n".into(), ["pool p has no corners", "four points at one height"]),
+        ("[pools.p]\nfoam = 0.5\n".into(), ["pools.p has no corners", "four points at one height"]),
         (
             corners("[[-9,0,9],[9,0,9],[9,1,-9],[-9,1,-9]]"),
             ["pool p (pools.p.corners) is not level", "one height"],

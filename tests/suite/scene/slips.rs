@@ -308,6 +308,118 @@ fn a_setting_that_is_told_to_have_no_effect_has_none() {
     assert!(silent.len() > 25, "{silent:?}");
 }
 
+#[test]
+fn a_key_in_the_wrong_table_is_told_its_own() {
+    let front = |text: &str| fault(&format!("version = 1\nbase = \"front\"\n{text}\n"));
+    for (text, words) in [
+        ("[image]\nfov = 40", "did you mean camera.fov?"),
+        ("[camera]\nelevation = 5", "did you mean sky.elevation?"),
+        ("[camera]\nexposure = 1", "did you mean image.exposure?"),
+        ("[render]\nalpha = true", "did you mean image.alpha?"),
+        ("[render]\nalpha = 0.5", "did you mean volume.alpha?"),
+        ("h = 1.2", "did you mean curves.h?"),
+        ("[image]\nsize = [640, 360]", "write image.width and image.height"),
+        ("[image]\nbackground = [1, 0, 0]", "[background] is a table of its own, with the keys background."),
+        ("[camera]\nrocks = 1", "[rocks.NAME]"),
+        ("[sheets]\npoints = [[0, 0, 0], [0, 1, 0]]", "each of them has a table of its own: [sheets.NAME]"),
+        ("[sheets.fall]\nrepeat_v = 2", "did you mean materials.water.repeat_v?"),
+        ("[materials.jet]\n[sheets.fall]\nrepeat_v = 2", "did you mean materials.NAME.repeat_v?"),
+        ("[rocks.wall]\nholdout = true", "write show = \"holdout\""),
+        ("[environment]\nsky = true", "write kind = \"sky\""),
+        ("[animate.tracks]\nkey = \"curves.h\"", "each of them has a table of its own: [[animate.tracks]]"),
+        ("[[sheets.fall]]\nsegments = 3", "write [sheets.fall] in single brackets"),
+        ("[[camera]]\nfov = 40", "write [camera] in single brackets"),
+    ] {
+        front(text).refused(65, &["s.toml:", "unknown key", words]);
+    }
+    for (setting, words) in [
+        ("image.fov=40", "did you mean camera.fov?"),
+        ("camera.elevation=5", "did you mean sky.elevation?"),
+        // A table that is misspelt goes before one with another name.
+        ("light.sun.color=1", "did you mean lights.sun.color?"),
+        ("ligth.ambient=1", "did you mean light.ambient?"),
+    ] {
+        scene("fig5", &[setting]).refused(65, &["--set", "unknown key", words]);
+    }
+}
+
+#[test]
+fn a_misspelt_name_is_told_with_its_line() {
+    for (text, words) in [
+        (
+            "base = \"waterfall\"\n[rocks.wal]\nlevels = 3",
+            &["s.toml:3: rocks.wal has no corners", "did you mean [rocks.wall]?"][..],
+        ),
+        ("base = \"waterfall\"\n[rocks.wal]", &["s.toml:3: rocks.wal has no", "did you mean [rocks.wall]?"]),
+        ("[rocks.a]\nlevels = 3", &["s.toml:2: rocks.a has no corners", "give rocks.a.corners four points"]),
+        ("[pools.a]\nfoam = 0.5", &["s.toml:2: pools.a has no corners", "give pools.a.corners four points"]),
+        (
+            "base = \"waterfall\"\n[sheets.thred]\nsegments = 3",
+            &["s.toml:3: sheets.thred has no points", "did you mean [sheets.thread]?"],
+        ),
+        (
+            "[materials.water]\n[sheets.a]\npoints = [[0, 1, 0], [0, 0, 0]]\nmaterial = \"wter\"",
+            &[
+                "s.toml:5: sheets.a.material = \"wter\": the scene has no such material",
+                "did you mean water?",
+            ],
+        ),
+        (
+            "[[quads]]\ncorners = [[0, 1, 0], [1, 1, 0], [1, 0, 0], [0, 0, 0]]\nmaterial = \"mud\"",
+            &["s.toml:4: quads.0.material = \"mud\"", "add [materials.mud], or use one of these: water"],
+        ),
+    ] {
+        fault(&format!("version = 1\n{text}\n")).refused(65, words);
+    }
+    let names = |run: &Run| run.stderr().matches("water").count();
+    let set = scene("fig5", &["quads.0.material=wxyz"]);
+    set.refused(65, &["add [materials.wxyz], or use one of these: water"]);
+    assert_eq!(names(&set), 1, "{set:?}");
+}
+
+#[test]
+fn a_slip_in_a_list_of_points_is_named() {
+    let sheet = |points: &str| fault(&format!("version = 1\n[sheets.a]\npoints = {points}\n"));
+    let comma = "write decimals with a point: 6.3, not 6,3";
+    for (points, words) in [
+        ("[[0, 6,3, -3,4], [0, 0, 0]]", comma),
+        ("[[0, 1, 0], [0, 2]]", "[0, 2] has 2 numbers, and a point has 3: x, y and z"),
+    ] {
+        sheet(points).refused(65, &["s.toml:3: sheets.a.points", words, "allowed: "]);
+    }
+    for (line, words) in [
+        ("[camera]\neye = [0, 6,3, -3,4]", comma),
+        ("[camera]\neye = [0, 6]", "[0, 6] has 2 numbers, and a point has 3: x, y and z"),
+        ("[lights.a]\ncolor = [1, 0]", "[1, 0] has 2 numbers, and a colour has 3: red, green and blue"),
+        ("[rocks.a]\ncorners = [[0, 0, 0], [1, 0], [1, 1, 0], [0, 1, 0]]", "[1, 0] has 2 numbers"),
+        ("[rocks.a]\ncorners = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]", "3 points: give four"),
+    ] {
+        fault(&format!("version = 1\n{line}\n")).refused(65, &["s.toml:3: ", words, "allowed: "]);
+    }
+    scene("fig5", &["eye=0,6,3,-3,4"]).refused(65, &["camera.eye", comma]);
+}
+
+#[test]
+fn signs_of_other_programs_are_named() {
+    for (line, words) in [
+        ("h = 1 // as before", "a comment begins with #, not with //"),
+        ("// the water", "a comment begins with #, not with //"),
+        ("h = \u{2212}1", "write a plain - in place of \u{2212}"),
+        ("base = \u{201c}front\u{201d}", "write plain quotes, \""),
+        ("h = \u{2018}1\u{2019}", "write plain quotes, \""),
+    ] {
+        fault(&format!("version = 1\n[curves]\n{line}\n")).refused(65, &["s.toml:3: ", words]);
+    }
+    let list = "version = 1\n[sheets.a]\npoints = [\n  [0, 1, 0], // top\n  [0, 0, 0],\n]\n";
+    fault(list).refused(65, &["s.toml:4: ", "a comment begins with #, not with //"]);
+    scene("fig5", &["camera.near=\u{2212}1"]).refused(65, &["write a plain - in place of \u{2212}"]);
+    scene("fig5", &["eye=0,\u{2212}1,5"]).refused(65, &["write a plain - in place of \u{2212}"]);
+    // A string may hold any of them.
+    let odd = fault("version = 1\n[volume]\nfile = \"a//b \u{201c}\u{2212}.npz\" x\n");
+    odd.refused(65, &["s.toml:3: "]);
+    assert!(!odd.stderr().contains("write ") && !odd.stderr().contains("begins with #"), "{odd:?}");
+}
+
 /// A value of a number, point or colour that is allowed and rare.
 fn another(key: &str) -> Option<String> {
     Some(match Param::find(key)?.kind {

@@ -12,7 +12,7 @@ mod open_exr;
 mod radiance;
 
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use super::map::Map;
@@ -48,20 +48,34 @@ pub struct FileMap {
 /// - [`Error::Io`] if the file cannot be read.
 pub fn read(path: &Path, budget: u64) -> Result<FileMap> {
     let meta = std::fs::metadata(path).map_err(|e| match e.kind() {
-        ErrorKind::NotFound | ErrorKind::NotADirectory => bad(path, e),
+        ErrorKind::NotFound | ErrorKind::NotADirectory => bad_with(path, e, "check the path"),
         _ => Error::read(path, e),
     })?;
     if !meta.is_file() {
-        return Err(bad(path, "not a regular file"));
+        return Err(bad_with(path, "not a regular file", "give the path of the map's file"));
     }
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let file = || File::open(path).map(BufReader::new).map_err(|e| Error::read(path, e));
     match extension.as_deref() {
         Some("hdr") => radiance::read(path, file()?, budget),
-        Some("exr") => open_exr::read(path, file()?, budget),
-        _ => Err(bad(path, "its name ends in neither .hdr nor .exr")),
+        Some("exr") => {
+            let mut file = file()?;
+            if file.fill_buf().map_err(|e| Error::read(path, e))?.starts_with(b"#?") {
+                return Err(bad_with(path, "it starts with #?", "it is a Radiance file: name it .hdr"));
+            }
+            open_exr::read(path, file, budget)
+        }
+        _ => Err(bad_with(
+            path,
+            "its name ends in neither .hdr nor .exr",
+            "open the map in a program that knows its format, and save it as .hdr or .exr, which also hold \
+             light brighter than white",
+        )),
     }
 }
+
+/// Advice on a file that ends too early or holds what is impossible.
+const DAMAGED: &str = "the file is cut short or damaged: copy or export it again";
 
 fn bad(path: &Path, why: impl std::fmt::Display) -> Error {
     bad_with(path, why, "give an equirectangular map as Radiance .hdr or as .exr with channels R, G and B")
@@ -85,7 +99,9 @@ fn start_of(path: &Path, file: &mut BufReader<File>) -> Result<Vec<u8>> {
 /// offsets is broken; any other failure is an I/O error.
 fn unreadable(path: &Path, e: std::io::Error) -> Error {
     match e.kind() {
-        ErrorKind::UnexpectedEof | ErrorKind::InvalidInput | ErrorKind::InvalidData => bad(path, e),
+        ErrorKind::UnexpectedEof | ErrorKind::InvalidInput | ErrorKind::InvalidData => {
+            bad_with(path, e, DAMAGED)
+        }
         _ => Error::read(path, e),
     }
 }
@@ -104,7 +120,8 @@ fn check_size(path: &Path, width: u64, height: u64, more_bytes: u128, budget: u6
         ));
     }
     if width.max(height) > MAX_SIDE {
-        return Err(bad(path, format!("{width}×{height} texels: at most {MAX_SIDE} on a side")));
+        let what = format!("{width}×{height} texels: at most {MAX_SIDE} on a side");
+        return Err(bad_with(path, what, "scale it down"));
     }
     Ok(())
 }
@@ -116,9 +133,13 @@ fn checked(path: &Path, mut map: Map, notes: Vec<String>) -> Result<FileMap> {
         for value in &mut texel[..3] {
             if !value.is_finite() || *value > MAX_RADIANCE {
                 let (x, y) = (i % map.width as usize, i / map.width as usize);
-                return Err(bad(
+                return Err(bad_with(
                     path,
                     format!("texel ({x}, {y}) has the radiance {value}: 0 to {MAX_RADIANCE:e} are allowed"),
+                    match value.is_finite() {
+                        true => "divide the map by a number, and raise environment.intensity by it",
+                        false => "replace what is no number, by 0 for example, and save the map again",
+                    },
                 ));
             }
             negative += u64::from(*value < 0.0);

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use exr::prelude::attribute::EnvironmentMap;
 
-use super::{FileMap, bad, bad_with, check_size, checked, unreadable};
+use super::{DAMAGED, FileMap, bad, bad_with, check_size, checked, unreadable};
 use crate::light::environment::map::Map;
 use crate::util::error::{Error, Result};
 use crate::util::open_exr::{Fault, OpenExr};
@@ -18,6 +18,8 @@ pub fn read(path: &Path, file: BufReader<File>, budget: u64) -> Result<FileMap> 
     let fault = |fault: Fault| -> Error {
         match fault {
             Fault::Bad { why, fix: Some(fix) } => bad_with(path, why, fix),
+            // The library says so of contents that contradict themselves.
+            Fault::Bad { why, fix: None } if why.starts_with("invalid: ") => bad_with(path, why, DAMAGED),
             Fault::Bad { why, fix: None } => bad(path, why),
             Fault::Io(e) => unreadable(path, e),
         }

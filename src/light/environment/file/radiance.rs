@@ -10,11 +10,13 @@ use std::path::Path;
 use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
 
-use super::{FileMap, bad, check_size, checked, start_of};
+use super::{DAMAGED, FileMap, bad, bad_with, check_size, checked, start_of};
 use crate::light::environment::map::Map;
 use crate::util::colour::{Curve, Primaries, Space, outside};
 use crate::util::error::{Error, Result};
 
+/// First bytes of an OpenEXR file.
+const OPEN_EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Luminance of a unit of radiance, lm/W: XYZE holds cd/m².
 const LUMENS_PER_WATT: f32 = 179.0;
 
@@ -121,7 +123,11 @@ pub fn read(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
     let io = |e| Error::read(path, e);
     let start = start_of(path, &mut file)?;
     if !start.starts_with(b"#?RADIANCE") && !start.starts_with(b"#?RGBE") {
-        return Err(bad(path, "it does not start with #?RADIANCE or #?RGBE"));
+        let fix = match start.starts_with(&OPEN_EXR) {
+            true => "it is an OpenEXR file: name it .exr",
+            false => "export the map again, as Radiance (.hdr) or OpenEXR (.exr)",
+        };
+        return Err(bad_with(path, "it does not start with #?RADIANCE or #?RGBE", fix));
     }
     let Header { length, mut divisors, xyz, primaries, order } =
         Header::parse(&start).map_err(|why| bad(path, why))?;
@@ -129,7 +135,7 @@ pub fn read(path: &Path, mut file: BufReader<File>, budget: u64) -> Result<FileM
     file.seek(SeekFrom::Start(length)).map_err(io)?;
     let fault = |e: image::ImageError| match e {
         image::ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => Error::read(path, e),
-        other => bad(path, other),
+        other => bad_with(path, other, DAMAGED),
     };
     let head = format!("FORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", order.lines, order.length);
     let decoder = HdrDecoder::new_nonstrict(Cursor::new(head).chain(file)).map_err(fault)?;

@@ -105,6 +105,36 @@ fn an_alpha_beside_a_volume_file_that_brings_its_own_is_warned_of() {
 }
 
 #[test]
+fn the_alpha_of_a_preset_is_no_setting_that_a_volume_file_silences() {
+    let dir = tempdir().unwrap();
+    small_volume(&dir.path().join("v.npz"));
+    let said = |scene: &str, sets: &[&str]| {
+        let run = run(render(scene, dir.path().join("x.png")).args(sets).current_dir(&dir));
+        run.done();
+        let lines = run.lines("taki: warning:");
+        lines.into_iter().filter(|line| line.contains("volume.alpha")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let none: &[&str] = &[];
+    let file = "--set=volume.file=v.npz";
+    // Figure 5 has the alpha 0.3.
+    assert_eq!(said("fig5", &[file]), none);
+    let write = |text: &str| {
+        fs::write(dir.path().join("s.toml"), "version = 1\nbase = \"fig5\"\n[volume]\n".to_owned() + text)
+            .unwrap()
+    };
+    write("file = \"v.npz\"\n");
+    assert_eq!(said("s.toml", &[]), none);
+    // The picture of a scene without a file holds the preset's alpha too.
+    assert_eq!(said("fig5", &[]), none);
+    assert_eq!(said("x.png", &[file]), none);
+    let words = "volume.alpha = 0.3 has no effect: volume.file gives the density as it is";
+    write("file = \"v.npz\"\nalpha = 0.3\n");
+    for said in [said("fig5", &[file, "--set=alpha=0.3"]), said("s.toml", &[])] {
+        assert!(said.len() == 1 && said[0].contains(words), "{said:?}");
+    }
+}
+
+#[test]
 fn an_environment_map_that_is_not_used_is_warned_of() {
     let dir = tempdir().unwrap();
     let scene = dir.path().join("s.toml");

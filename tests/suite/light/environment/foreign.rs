@@ -1,6 +1,7 @@
 //! Maps from other programs: windows, colour spaces, compressions, channel names, suns and orientations.
 
 use std::io::Cursor;
+use std::path::Path;
 
 use exr::prelude::*;
 use taki::light::environment::{FileMap, read_map};
@@ -255,6 +256,31 @@ fn an_infinite_sun_is_clamped_and_what_is_no_number_is_refused() {
     for value in [f32::NAN, f32::NEG_INFINITY] {
         assert!(refusal(with(value)).0.contains("texel (1, 1) has the radiance"));
     }
+}
+
+#[test]
+fn every_fault_of_a_map_has_its_own_way_out() {
+    let whole = exr(plain(), vec![part("rgb", &RGB)]);
+    let odd = |value: f32| exr(plain(), vec![part("rgb", &[("R", 1.0), ("G", 2.0), ("B", value)])]);
+    let hdr = |size: &str| [b"#?RADIANCE\n\n".as_slice(), size.as_bytes(), b"\n\x02\x02"].concat();
+    for (name, bytes, cure) in [
+        ("nan.exr", odd(f32::NAN), "replace what is no number, by 0 for example"),
+        ("bright.exr", odd(2e9), "divide the map by a number, and raise environment.intensity"),
+        ("short.exr", whole[..whole.len() - 9].to_vec(), "copy or export it again"),
+        ("short.hdr", hdr("-Y 4 +X 8"), "copy or export it again"),
+        ("map.png", whole.clone(), "save it as .hdr or .exr"),
+        ("map.hdr", whole.clone(), "an OpenEXR file: name it .exr"),
+        ("map.exr", hdr("-Y 4 +X 8"), "a Radiance file: name it .hdr"),
+        ("wide.hdr", hdr("-Y 1 +X 200000"), "scale it down"),
+    ] {
+        let (what, fix) = refusal(read(name, &bytes));
+        assert!(fix.contains(cure), "{name}: {what}: {fix}");
+        assert!(!fix.contains("give an equirectangular map"), "{name}: {fix}");
+    }
+    let (what, fix) = refusal(read_map(Path::new("/nowhere/map.exr"), BUDGET));
+    assert!(fix.contains("check the path"), "{what}: {fix}");
+    let (what, fix) = refusal(read_map(Path::new("/"), BUDGET));
+    assert!(fix.contains("give the path of the map's file"), "{what}: {fix}");
 }
 
 #[test]
