@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::choice::{codec, movie_bits};
+use super::parse::{LAST_FRAME, fps, period};
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
-use super::{crop, measured_words, seconds, size, whole, window};
+use super::{crop, measured_words, samples, seconds, size, whole, window};
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
 use crate::output::movie::Codec;
 use crate::scene::Animation;
@@ -48,10 +49,10 @@ pub struct BatchArgs {
     #[arg(long, value_name = "LIST", value_parser = frames, allow_hyphen_values = true)]
     frames: Option<FrameList>,
     /// Frames per second, such as 25 or 24000/1001. Short for --set animate.fps=N.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = fps)]
     fps: Option<String>,
     /// Makes the animation a seamless loop of N frames. Short for --set animate.loop=N.
-    #[arg(long = "loop", value_name = "N", value_parser = whole::<u32>)]
+    #[arg(long = "loop", value_name = "N", value_parser = period)]
     period: Option<u32>,
     /// Renders one picture for each of several values of a parameter: KEY=FIRST:LAST:STEP or
     /// KEY=VALUE,VALUE,…, such as `--sweep alpha=0.25:1:0.25`. Several sweeps make a grid. The last part of a
@@ -88,7 +89,7 @@ pub struct BatchArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Number of samples per pixel. More samples give smoother edges and take longer.
-    #[arg(long, value_name = "N", value_parser = whole::<u32>)]
+    #[arg(long, value_name = "N", value_parser = samples)]
     samples: Option<u32>,
     /// Makes the backgrounds transparent: the same as --set image.alpha=true. They can then be put over
     /// a photograph.
@@ -133,9 +134,6 @@ struct FrameList(Vec<i32>);
 
 /// Most frames in a list.
 const MAX_FRAMES: u64 = 1_000_000;
-
-/// Frame with the largest number; the smallest has the opposite sign.
-const LAST_FRAME: i32 = 999_999_999;
 
 /// Parses `0-239`, `7`, `-10-10`, `0-239:10` and lists of these, separated by commas. The result is sorted,
 /// each frame once.
@@ -243,6 +241,9 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     args.engine.check()?;
     let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
     args.scene.warn_of_settings(animation.values(), &args.sweeps, terminal);
+    // Frames from 0 on continue from the picture.
+    let first = args.frames.as_ref().and_then(|frames| frames.0.first().copied()).unwrap_or(0);
+    args.scene.warn_of_moved(first, terminal);
     let request = args.request(&animation)?;
     let batch = Batch::plan(animation, request, terminal)?;
     terminal.close();

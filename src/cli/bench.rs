@@ -10,6 +10,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
+use super::parse::within;
 use super::terminal::{Terminal, say};
 use super::{EngineOptions, size};
 use crate::engine::gpu::GpuBench;
@@ -28,14 +29,14 @@ pub struct BenchArgs {
     /// Measures only the `front` scene with a cube of N cells a side. A cube of more than 256 cells a side
     /// has the strands of one of 256, and is stored sparse if it does not fit the memory.
     #[arg(long, value_name = "N", conflicts_with = "volume")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=8192))]
+    #[arg(value_parser = within::<1, 8192>)]
     cells: Option<u32>,
     /// Measures only this picture size, such as 1280x720.
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
     /// Number of runs of each row. The table shows their median.
     #[arg(long, value_name = "N", default_value_t = 9)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(value_parser = within::<1, 1000>)]
     runs: u32,
     #[command(flatten)]
     engine: EngineOptions,

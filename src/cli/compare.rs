@@ -9,7 +9,7 @@ use serde_json::json;
 use super::parse::{memory, share, tolerance, whole};
 use super::terminal::{Terminal, say};
 use super::{crop, developed, window};
-use crate::job::check_replaced;
+use crate::job::{check_replaced, is_same_file};
 use crate::output::frame::streaks::{Flicker, Streaks, bands, decoded, luminance, streaks};
 use crate::output::frame::{
     Difference, Encoding, ExrColours, ExrPicture, Format, Head, Output, ReadPicture, Tolerance, encode,
@@ -43,7 +43,7 @@ pub struct CompareArgs {
     /// difference is white.
     #[arg(long, value_name = "FILE")]
     difference: Option<PathBuf>,
-    /// Replaces an existing file of --difference even if it is no picture.
+    /// Replaces an existing file of --difference even if it is one of the two, or no picture.
     #[arg(long, requires = "difference")]
     overwrite: bool,
     /// Instead of comparing, measures how the pictures look to the eye. Streaks: the mean difference of
@@ -88,6 +88,10 @@ pub fn run(args: &CompareArgs, terminal: &Terminal) -> Result<()> {
     if let Some(path) = &args.difference {
         developed("--difference", path)?;
         if !args.overwrite {
+            if args.files.iter().any(|file| is_same_file(file, path)) {
+                let what = "is one of the pictures; choose another name, or replace it with --overwrite";
+                return Err(Error::Usage(format!("--difference {} {what}", path.display())));
+            }
             check_replaced(path)?;
         }
     }

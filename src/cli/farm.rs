@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 
 use super::grammar;
-use super::parse::shard_memory;
+use super::parse::{minutes, shard_memory, within};
+use super::terminal::Terminal;
 use crate::farm::{Job, check_name, kubernetes, openjd, slurm};
-use crate::job::batch::Pattern;
+use crate::job::batch::{NUMBER_IT, Pattern};
 use crate::job::check_kind;
 use crate::output::frame::{Format, Output};
 use crate::scene::STDIN;
@@ -86,7 +87,7 @@ enum Engine {
 struct JobArgs {
     /// Number of shards that the batch is split into. Each shard is one task of the farm.
     #[arg(long, value_name = "N", default_value_t = 8)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(value_parser = within::<1, 10_000>)]
     shards: u32,
     /// Job file to write; a job file of this name is replaced. Default: stdout.
     #[arg(short, long, value_name = "FILE")]
@@ -102,20 +103,20 @@ struct JobArgs {
     taki: OsString,
     /// Number of times that one shard may be run again after a temporary fault.
     #[arg(long, value_name = "N", default_value_t = 3)]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=1000))]
+    #[arg(value_parser = within::<0, 1000>)]
     retries: u32,
     /// Time limit of one run of a shard, in minutes. Default: the site's limit.
-    #[arg(long, value_name = "MINUTES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "MINUTES", value_parser = minutes)]
     time: Option<u32>,
     /// CPU cores for each shard. Default: the site's default.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = within::<1, 100_000>)]
     cpus: Option<u32>,
     /// Memory for each shard, such as 8GiB, 8GB or 512MiB, rounded up to whole MiB. A number alone counts
     /// MiB. Default: the site's default. The budget of taki batch is another option, --memory after --.
     #[arg(long, value_name = "SIZE", value_parser = shard_memory)]
     memory: Option<u32>,
     /// GPUs for each shard. Default: the site's default.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = within::<1, 1000>)]
     gpus: Option<u32>,
     /// Scene and options of `taki batch`. They are passed on unchanged, and --shard is added.
     #[arg(last = true, required = true, value_name = "BATCH ARGUMENTS")]
@@ -148,6 +149,7 @@ fn name(text: &str) -> std::result::Result<String, String> {
 /// Parses the arguments as `taki batch` will, so that a typing error is found here and not on every node.
 /// Does not read the scene, which may exist only on the nodes.
 fn check_batch(job: &Job) -> Result<()> {
+    check_words(&job.batch)?;
     let shard = format!("0/{}", job.shards);
     let start = ["taki", "batch", "--shard", &shard].map(OsString::from);
     let matches = grammar().try_get_matches_from(start.iter().chain(&job.batch)).map_err(|e| {
@@ -162,6 +164,22 @@ fn check_batch(job: &Job) -> Result<()> {
     if batch.get_one::<PathBuf>("scene").is_some_and(|scene| scene == Path::new(STDIN)) {
         let what = "the shards of a job cannot read their scene from stdin; give a preset or a scene file";
         return Err(Error::Usage(what.into()));
+    }
+    let swept = batch.contains_id("sweeps");
+    for path in batch.get_many::<PathBuf>("outputs").into_iter().flatten() {
+        let pattern = Pattern::new(path, &[])?;
+        if !swept {
+            pattern.check_placeholders()?;
+        }
+        Pattern::check_kind(path)?;
+        // A .png is one movie then.
+        let alone = !swept && !pattern.has_frame();
+        if alone && Format::of(path).is_some_and(|format| format != Format::Png) {
+            return Err(Error::Usage(format!(
+                "{}: all frames would share one name; {NUMBER_IT}",
+                path.display()
+            )));
+        }
     }
     let whole = |path: &&PathBuf| {
         let sweeps = path.file_name().unwrap_or_default().to_string_lossy().contains('{');
@@ -180,10 +198,29 @@ fn check_batch(job: &Job) -> Result<()> {
     }
 }
 
+/// Refuses the name of the program or of a command before the scene.
+fn check_words(batch: &[OsString]) -> Result<()> {
+    let mut words: Vec<String> =
+        batch.iter().take(2).map(|word| word.to_string_lossy().into_owned()).collect();
+    let program = batch.first().is_some_and(|word| Path::new(word).file_stem() == Some("taki".as_ref()));
+    let is_command = |word: &String| ["batch", "render"].contains(&word.as_str());
+    let surplus = usize::from(program);
+    let surplus = surplus + usize::from(words.get(surplus).is_some_and(is_command));
+    words.truncate(surplus);
+    if words.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "leave out {} after --: only the scene and the options of taki batch stand there, such as \
+         -- fall.toml --frames 0-239",
+        words.join(" ")
+    )))
+}
+
 /// Words at the start of every job file that taki writes.
 const MARK: &[u8] = b"written by taki farm";
 
-pub fn run(args: &FarmArgs) -> Result<()> {
+pub fn run(args: &FarmArgs, terminal: &Terminal) -> Result<()> {
     let (job, text) = match &args.engine {
         Engine::Slurm { job, partition } => {
             (job, slurm::script(&job.job()?, &slurm::Options { partition: partition.clone() })?)
@@ -201,7 +238,9 @@ pub fn run(args: &FarmArgs) -> Result<()> {
                 let marked = |start: &[u8]| start.windows(MARK.len()).any(|w| w == MARK);
                 check_kind(path, "job file of taki", marked)?;
             }
-            Output::create(path)?.finish_with(text.as_bytes())
+            Output::create(path)?.finish_with(text.as_bytes())?;
+            terminal.note(&format!("taki: wrote {}", path.display()));
+            Ok(())
         }
         // Half a job file in a pipe is useless, so unlike with other output a broken pipe is an error too.
         None => {

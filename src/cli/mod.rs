@@ -13,6 +13,7 @@ mod render;
 mod scene;
 mod stitch;
 mod terminal;
+mod tips;
 #[cfg(feature = "viewer")]
 mod view;
 mod volume;
@@ -37,9 +38,10 @@ use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
-use parse::{crop, memory, seconds, size, wait, whole};
+use parse::{crop, frame, memory, samples, seconds, size, wait, whole};
 use quiet::without_noise;
 use terminal::{Terminal, say};
+use tips::with_tips;
 
 const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
 65 bad input · 69 no GPU adapter (with --engine gpu or --adapter), no window or no ffmpeg · \
@@ -136,20 +138,47 @@ impl SceneOptions {
 
     /// Loads the scene. `more` holds settings from other options; they override --set.
     fn load(&self, more: &[String]) -> Result<Scene> {
+        self.check_sets()?;
         Scene::load(&self.scene, &self.all_sets(more), &self.limits())
     }
 
     /// Loads the scene's animation. `more` is as in [`SceneOptions::load`].
     fn animation(&self, more: &[String], limits: &Limits) -> Result<Animation> {
+        self.check_sets()?;
         Animation::load(&self.scene, &self.all_sets(more), limits)
+    }
+
+    /// Refuses a setting written with a space, as in `--set h 1.2`, whose value was taken for the scene.
+    fn check_sets(&self) -> Result<()> {
+        let scene = self.scene.to_string_lossy();
+        if presets().any(|(name, _)| name == scene) || scene == STDIN || self.scene.exists() {
+            return Ok(());
+        }
+        match self.sets.iter().find(|set| !set.contains('=')) {
+            Some(set) => Err(Error::Usage(format!("--set {set} has no value; write --set {set}={scene}"))),
+            None => Ok(()),
+        }
     }
 
     /// Warns of settings and sweeps that have no effect.
     fn warn_of_settings(&self, values: &Values, sweeps: &[String], terminal: &Terminal) {
-        let without = settings_without_effect(values, &self.sets, sweeps);
+        let seed = self.seed.map(|n| format!("volume.seed={n}"));
+        let sets: Vec<String> = self.sets.iter().cloned().chain(seed).collect();
+        let without = settings_without_effect(values, &sets, sweeps);
         // A map without effect is warned of by the scene itself, wherever it comes from.
         let said_later = |text: &&String| text.starts_with("environment.file ");
         without.iter().filter(|text| !said_later(text)).for_each(|text| terminal.warn(text));
+    }
+
+    /// Warns where a picture stands in place of its scene and is asked for another frame than its own.
+    fn warn_of_moved(&self, frame: i32, terminal: &Terminal) {
+        if frame != 0 && Format::of(&self.scene).is_some() {
+            terminal.warn(&format!(
+                "{} holds the scene of its own frame, and frame {frame} counts from there; leave the frame \
+                 out to get that picture again, or give the scene file for a frame of its animation",
+                self.scene.display()
+            ));
+        }
     }
 
     fn all_sets(&self, more: &[String]) -> Vec<String> {
@@ -339,7 +368,7 @@ fn grammar() -> clap::Command {
 /// Parses the command line.
 fn parsed() -> std::result::Result<Cli, clap::Error> {
     let mut grammar = grammar();
-    let matches = grammar.try_get_matches_from_mut(std::env::args_os())?;
+    let matches = grammar.try_get_matches_from_mut(std::env::args_os()).map_err(with_tips)?;
     Cli::from_arg_matches(&matches).map_err(|e| e.format(&mut grammar))
 }
 
@@ -401,7 +430,7 @@ fn run(cli: Cli, terminal: &Terminal) -> Result<()> {
         Command::New(args) => new::run(&args, terminal),
         Command::Scene(args) => scene::run(&args, terminal),
         Command::Volume(args) => volume::run(&args, terminal),
-        Command::Farm(args) => farm::run(&args),
+        Command::Farm(args) => farm::run(&args, terminal),
         Command::Bench(args) => bench::run(&args, terminal),
         Command::Stitch(args) => stitch::run(&args, terminal),
         Command::Compare(args) => compare::run(&args, terminal),

@@ -29,7 +29,11 @@ pub fn run(args: &NewArgs, terminal: &Terminal) -> Result<()> {
     // A folder is refused where the file is opened.
     let is_folder = path.is_dir() || name.to_string().ends_with(std::path::is_separator);
     if !is_folder && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let what = format!("{name}: the name of a scene file ends with .toml; write taki new {name}.toml");
+        // A version such as v1.2 has no extension that could be replaced.
+        let replaced = path.extension().is_some_and(|e| e.to_string_lossy().chars().any(char::is_alphabetic));
+        let toml = if replaced { path.with_extension("toml") } else { format!("{name}.toml").into() };
+        let toml = toml.display();
+        let what = format!("{name}: the name of a scene file ends with .toml; write taki new {toml}");
         return Err(Error::Usage(what));
     }
     if path.symlink_metadata().is_ok() && !is_folder && !args.overwrite {

@@ -1,5 +1,7 @@
 //! Values of options as users write them.
 
+use crate::scene::{Kind, Param, fraction};
+
 /// Result of a parser; the error tells how to write the value.
 type Parsed<T> = std::result::Result<T, String>;
 
@@ -11,11 +13,71 @@ pub fn seconds(text: &str) -> Parsed<f64> {
     }
 }
 
+/// Frame with the largest number; the smallest has the opposite sign.
+pub const LAST_FRAME: i32 = 999_999_999;
+
+/// Parses the number of a frame.
+pub fn frame(text: &str) -> Parsed<i32> {
+    let given = text.trim().parse().ok().filter(|n| (-LAST_FRAME..=LAST_FRAME).contains(n));
+    given.ok_or_else(|| format!("give a whole number from -{LAST_FRAME} to {LAST_FRAME}"))
+}
+
+/// Parses a whole number from MIN to MAX.
+pub fn within<const MIN: u32, const MAX: u32>(text: &str) -> Parsed<u32> {
+    let given = text.trim().parse().ok().filter(|n| (MIN..=MAX).contains(n));
+    given.ok_or_else(|| format!("give a whole number from {MIN} to {MAX}"))
+}
+
+/// Parses a time in whole minutes.
+pub fn minutes(text: &str) -> Parsed<u32> {
+    const MOST: u32 = 1_000_000;
+    within::<1, MOST>(text)
+        .map_err(|_| format!("give a whole number of minutes from 1 to {MOST}, such as 90"))
+}
+
+/// Parses a whole number in the range of a parameter, which an option is short for.
+fn of_parameter(key: &str, text: &str) -> Parsed<u32> {
+    let param = Param::find(key).ok_or("unknown parameter")?;
+    let fits = |n: &u32| matches!(param.kind, Kind::Int(min, max, _) if (min..=max).contains(&i64::from(*n)));
+    let given = text.trim().parse().ok().filter(fits);
+    given.ok_or_else(|| format!("give a whole number from {}", param.range()))
+}
+
+/// Parses a number of samples.
+pub fn samples(text: &str) -> Parsed<u32> {
+    of_parameter("image.samples", text)
+}
+
+/// Parses the length of a loop.
+pub fn period(text: &str) -> Parsed<u32> {
+    of_parameter("animate.loop", text)
+}
+
+/// Parses a frame rate, and returns it as `--set` takes it.
+pub fn fps(text: &str) -> Parsed<String> {
+    let (text, param) = (text.trim(), Param::find("animate.fps").ok_or("unknown parameter")?);
+    let fits = |rate: f64| matches!(param.kind, Kind::Float(min, max, _) if (min..=max).contains(&rate));
+    match text.parse::<f64>() {
+        Ok(rate) if fits(rate) => return Ok(rate.to_string()),
+        Err(_) if fraction(text).is_some_and(fits) => return Ok(text.to_owned()),
+        _ => {}
+    }
+    let point = text.replace(',', ".");
+    Err(match point.parse::<f64>() {
+        Ok(rate) if point != text && fits(rate) => format!("the decimal mark is a point: write {point}"),
+        _ => format!("give a rate from {}, such as 25, 23.976 or 24000/1001", param.range()),
+    })
+}
+
 /// Parses `WIDTHxHEIGHT`; the sign between them may also be `X` or `×`.
 pub fn size(text: &str) -> Parsed<[u32; 2]> {
     let parts = text.split_once(['x', 'X', '×']);
     let sides = parts.and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));
-    sides.ok_or_else(|| "give WIDTHxHEIGHT in pixels, such as 1280x720".into())
+    let [w, h]: [u32; 2] = sides.ok_or("give WIDTHxHEIGHT in pixels, such as 1280x720")?;
+    let side = |key: &str, side: u32| {
+        of_parameter(key, &side.to_string()).map_err(|how| format!("{how} for each side, such as 1280x720"))
+    };
+    Ok([side("image.width", w)?, side("image.height", h)?])
 }
 
 /// Parses `X,Y,W,H`.

@@ -9,9 +9,10 @@ use serde_json::json;
 
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
-use super::{crop, default_output, measured_words, size, whole, window};
+use super::{crop, default_output, frame, measured_words, samples, size, window};
 use crate::engine::exposure::exposed;
 use crate::engine::{Engine, RenderOptions};
+use crate::job::batch::Pattern;
 use crate::job::{STDOUT, Still, beside_encoders, check_bloom, strips};
 use crate::output::frame::{Exr, Figures, Format, folder_of, real_file};
 use crate::output::movie::fraction;
@@ -26,8 +27,9 @@ pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneOptions,
     /// File to write: .png, .jpg, .tif or .webp (the picture as shown, sRGB) or .exr (linear, half or float,
-    /// with layers). Give -o several times to write several; - is stdout, as PNG. Default: the scene's name
-    /// with .png, in the current folder.
+    /// with layers). Give -o several times to write several; - is stdout, as PNG. In a name, '####', '%04d',
+    /// '$F4' and '@@@@' stand for the number of --frame. Default: the scene's name with .png, in the current
+    /// folder.
     #[arg(short, long = "output", value_name = "FILE")]
     outputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -43,15 +45,14 @@ pub struct RenderArgs {
     #[arg(long, value_name = "X,Y,W,H", value_parser = crop)]
     crop: Option<[u32; 4]>,
     /// Number of samples per pixel. More samples give smoother edges and take longer.
-    #[arg(long, value_name = "N", value_parser = whole::<u32>)]
+    #[arg(long, value_name = "N", value_parser = samples)]
     samples: Option<u32>,
     /// Makes the background transparent: the same as --set image.alpha=true. The picture can then be put over
     /// a photograph.
     #[arg(long)]
     alpha: bool,
     /// Frame of the scene's animation to render. It may lie before 0.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    #[arg(value_parser = clap::value_parser!(i32).range(-999_999_999..=999_999_999))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = frame, allow_negative_numbers = true)]
     frame: i32,
     #[command(flatten)]
     engine: EngineOptions,
@@ -78,6 +79,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     // The volume is made once more for the picture and warns then.
     let animation = args.scene.animation(&more, &limits)?;
     args.scene.warn_of_settings(animation.values(), &[], terminal);
+    args.scene.warn_of_moved(args.frame, terminal);
     let (animation, measured) = exposed(animation, &Unwarned(terminal))?;
     let scene = animation.at(args.frame)?;
     let window = window("--crop", args.crop, [scene.image.width, scene.image.height])?;
@@ -94,7 +96,11 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
             _ => vec![path],
         }
     };
-    let outputs: Vec<PathBuf> = outputs.into_iter().flat_map(files).collect();
+    let outputs = outputs.into_iter().flat_map(files);
+    let outputs: Vec<PathBuf> = match args.outputs.is_empty() {
+        true => outputs.collect(),
+        false => outputs.map(|path| Pattern::numbered(&path, args.frame)).collect::<Result<_>>()?,
+    };
     check_twice(&outputs)?;
     let still = Still::create(&outputs)?.with_depth(args.depth.depth());
     still.check(&scene.image, window)?;

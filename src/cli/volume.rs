@@ -75,7 +75,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         }
         VolumeCommand::Info { file, json, memory } => {
             terminal.watch();
-            let options = ReadOptions { budget: memory.saturating_mul(1 << 20), ..Default::default() };
+            let options = ReadOptions { budget: *memory, ..Default::default() };
             let notes = Notes { terminal, texts: Mutex::default() };
             let statistics = read_npz(file, &options, &notes)?.statistics();
             let prefix = format!("{}: ", file.display());

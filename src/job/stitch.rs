@@ -77,13 +77,14 @@ pub fn stitch_with(
         let what = format!("{} is a {}, whose pixels are not exact", first.path.display(), format.name());
         return Err(Error::input(what, "render the crops as .png, .tif, .webp or .exr files"));
     }
-    check_parts(first, &parts)?;
     check_extension(output, format)?;
     check_side(output, format, Window::whole(whole))?;
     if format != Format::Exr && (options.half || options.compression.is_some()) {
         let what = format!("--half and --compression are for EXR files, but the crops are {}", format.name());
         return Err(Error::Usage(what));
     }
+    // What no further crop would change has been refused by now.
+    check_parts(first, &parts)?;
     if !options.overwrite {
         check_replaced(output)?;
     }
@@ -116,7 +117,8 @@ pub fn stitch_with(
     Ok(sum.total)
 }
 
-fn is_same_file(a: &Path, b: &Path) -> bool {
+/// Whether two paths, of which links are followed, lead to one file.
+pub(crate) fn is_same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 

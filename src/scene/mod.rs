@@ -34,7 +34,7 @@ pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{REFERENCES, STDIN, Source, read_stdin, set_by_hand};
 pub use record::{MAP_COMMENT, Record, VOLUME_COMMENT};
 pub use remove::REMOVE;
-pub use typed::parse_value;
+pub use typed::{fraction, parse_value};
 pub use value::{Key, Place, Raw, Value, Values};
 
 use crate::light::environment::{self, Environment, EnvironmentMemo};

@@ -6,6 +6,7 @@ use image::RgbImage;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::pattern::NUMBER_IT;
 use super::report::{Event, Watcher, word, words};
 use super::shown::Shown;
 use super::{Batch, Pattern, Sweep, existing};
@@ -27,6 +28,21 @@ pub struct MovieFile {
     pub kind: MovieKind,
     /// Codec and depth, if it is a video.
     pub video: Option<Video>,
+}
+
+impl MovieFile {
+    /// Whether it is a movie only because a .png without the frame's number has several frames.
+    pub fn is_unnumbered(&self) -> bool {
+        self.kind == MovieKind::Apng && self.pattern.format() == Some(Format::Png)
+    }
+
+    /// The error where such a movie does not do.
+    pub fn unnumbered(&self, why: &str) -> Error {
+        Error::Usage(format!(
+            "-o {}: without the frame's number in its name it is one animated PNG, and {why}; {NUMBER_IT}",
+            self.pattern.given().display()
+        ))
+    }
 }
 
 /// A manifest's entry about one picture.

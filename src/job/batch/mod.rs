@@ -21,6 +21,7 @@ mod sweep;
 mod writer;
 
 pub use needs::Needs;
+pub(crate) use pattern::NUMBER_IT;
 pub use pattern::Pattern;
 pub use report::{Event, Name, Summary, Watcher};
 pub use sweep::Sweep;
@@ -171,6 +172,8 @@ impl Batch {
             if request.outputs[..i].contains(path) {
                 return Err(Error::Usage(format!("-o {} is given twice", path.display())));
             }
+            pattern.check_placeholders()?;
+            Pattern::check_kind(path)?;
             match movie_kind(&pattern, frames.len()) {
                 Some(kind) => {
                     check_pattern(&pattern, &sweeps, 1)?;
@@ -193,7 +196,7 @@ impl Batch {
             }
         }
         check_videos(&request, &movies)?;
-        let (sheet, manifests) = sheet_and_manifests(&request, &base, &sweeps, &pictures)?;
+        let (sheet, manifests) = sheet_and_manifests(&request, &base, &sweeps, &pictures, &movies)?;
         let mut batch = Batch {
             base,
             measured,
@@ -362,6 +365,9 @@ impl Batch {
         let files = self.pictures.iter().filter_map(|pattern| Some((pattern.given(), pattern.format()?)));
         check_alpha(&scene.image, files)?;
         if let Some(movie) = self.movies.first().filter(|_| scene.image.alpha) {
+            if movie.is_unnumbered() {
+                return Err(movie.unnumbered("movies of taki have no alpha channel"));
+            }
             return Err(Error::Usage(format!(
                 "-o {}: movies of taki have no alpha channel, and image.alpha is true; write .png, .tif, \
                  .webp or .exr frames",
@@ -450,13 +456,16 @@ fn sheet_and_manifests(
     base: &Animation,
     sweeps: &[Sweep],
     pictures: &[Pattern],
+    movies: &[MovieFile],
 ) -> Result<(Option<PathBuf>, Vec<PathBuf>)> {
     let (mut sheet, mut manifests) = (request.sheet.clone(), request.manifests.clone());
     let Some(first) = pictures.first() else {
         if sheet.is_some() || !manifests.is_empty() || !sweeps.is_empty() {
-            return Err(Error::Usage(
-                "a sweep, a sheet and a manifest need pictures; add -o with a .png or .exr".into(),
-            ));
+            let why = "a sweep, a sheet and a manifest need pictures";
+            if let Some(movie) = movies.iter().find(|movie| movie.is_unnumbered()) {
+                return Err(movie.unnumbered(why));
+            }
+            return Err(Error::Usage(format!("{why}; add -o with a .png or .exr")));
         }
         return Ok((None, Vec::new()));
     };

@@ -3,11 +3,15 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use crate::output::frame::Format;
+use crate::output::frame::{Format, check_regular};
+use crate::output::movie::MovieKind;
 use crate::util::error::{Error, Result};
 
 /// Most digits that a placeholder may ask for. File systems allow names of 255 bytes.
 const MOST_DIGITS: usize = 200;
+
+/// The advice to number files.
+pub(crate) const NUMBER_IT: &str = "put #### where the frame's number goes, such as fall.####.png";
 
 /// A file name with placeholders for the frame's number and the values of sweeps.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,6 +103,68 @@ impl Pattern {
         Ok(Pattern { given: path.to_owned(), folder, parts })
     }
 
+    /// Returns the path of a still: `path` with the number of its frame, where the name has a place for it.
+    ///
+    /// # Errors
+    /// Those of [`Pattern::check_placeholders`].
+    pub fn numbered(path: &Path, frame: i32) -> Result<PathBuf> {
+        if path.file_name().is_none() {
+            // It is refused where it is opened.
+            return Ok(path.to_owned());
+        }
+        let pattern = Pattern::new(path, &[])?;
+        pattern.check_placeholders()?;
+        Ok(if pattern.has_frame() { pattern.at(frame, &[]) } else { path.to_owned() })
+    }
+
+    /// Refuses a name without the frame's number that has something in its place: a placeholder of another
+    /// program, or of a sweep that is not given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for such a name.
+    pub fn check_placeholders(&self) -> Result<()> {
+        if self.has_frame() {
+            return Ok(());
+        }
+        let texts = self.parts.iter().filter_map(|part| match part {
+            Part::Text(text) => text.to_str(),
+            _ => None,
+        });
+        let why = texts.into_iter().find_map(slip).map(|slip| match slip.strip_prefix('{') {
+            Some(name) => format!(
+                "{slip} stands for a value of taki batch --sweep {}=…, which is not given",
+                name.trim_end_matches('}')
+            ),
+            None => format!("{slip} does not stand for the frame's number"),
+        });
+        let emptied = || {
+            let stem = self.given.file_stem()?.to_str()?.ends_with('.');
+            stem.then(|| "nothing stands between its two dots, as where a shell replaced \"$F4\"".into())
+        };
+        match why.or_else(emptied) {
+            Some(why) => Err(Error::Usage(format!("-o {}: {why}; {NUMBER_IT}", self.given.display()))),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a path whose ending is that of no picture and no movie.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for such an ending, [`Error::CannotCreate`] for a device.
+    pub fn check_kind(path: &Path) -> Result<()> {
+        if Format::of(path).is_some() || MovieKind::of(path).is_some() {
+            return Ok(());
+        }
+        check_regular(path)?;
+        let [others @ .., last] = MovieKind::ALL.map(|kind| format!(".{}", kind.extension()));
+        Err(Error::Usage(format!(
+            "-o {}: unknown kind of file; pictures are {}, movies {} or {last}",
+            path.display(),
+            Format::EXTENSIONS,
+            others.join(", ")
+        )))
+    }
+
     /// The pattern as the user wrote it.
     pub fn given(&self) -> &Path {
         &self.given
@@ -145,6 +211,43 @@ fn safe(value: &str) -> String {
     value.replace(|c: char| c.is_control() || r#"/\:*?"<>|"#.contains(c), "_").replace([' ', '[', ']'], "")
 }
 
+/// Returns the part of a name that looks like a placeholder but is none.
+fn slip(text: &str) -> Option<&str> {
+    text.char_indices().find_map(|(at, first)| {
+        let whole = &text[at..];
+        let rest = &whole[first.len_utf8()..];
+        let until = |close: char| rest.find(close).map(|end| &whole[..=end + close.len_utf8()]);
+        match first {
+            '{' => until('}'),
+            '<' => until('>'),
+            // A range of frames, as other programs list it; a single number is part of many names.
+            '[' => until(']').filter(|part| {
+                let inner = &part[1..part.len() - 1];
+                inner.starts_with(|c: char| c.is_ascii_digit())
+                    && inner.contains(['-', ':', ','])
+                    && inner.chars().all(|c| c.is_ascii_digit() || "-:,".contains(c))
+            }),
+            '%' => {
+                let digits = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+                let mut after = rest[digits..].chars();
+                let number = after.next().is_some_and(|c| "dDiu".contains(c));
+                let ends = digits > 0 || !after.next().is_some_and(char::is_alphanumeric);
+                (number && ends).then(|| &whole[..digits + 2])
+            }
+            '$' if rest.starts_with('{') => rest.find('}').map(|end| &whole[..=end + 1]),
+            '$' => {
+                let end = rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(rest.len());
+                let word = rest[..end].to_ascii_lowercase();
+                let digits = word.trim_start_matches('f');
+                let frame = digits.len() < word.len() && digits.chars().all(|c| c.is_ascii_digit());
+                (frame || word == "frame").then(|| &whole[..1 + end])
+            }
+            '*' => Some(&whole[..1]),
+            _ => None,
+        }
+    })
+}
+
 /// Splits a file name into its parts.
 fn read(text: &str, names: &[Vec<String>], parts: &mut Vec<Part>) -> std::result::Result<(), String> {
     let notation = Notation::of(text);
@@ -165,8 +268,10 @@ fn read(text: &str, names: &[Vec<String>], parts: &mut Vec<Part>) -> std::result
         {
             let known = || names.iter().map(|n| format!("{{{}}}", n[0])).collect::<Vec<_>>().join(", ");
             let sweep = names.iter().position(|all| all.iter().any(|n| n == name));
-            let sweep =
-                sweep.ok_or_else(|| format!("there is no --sweep for {{{name}}}; there is {}", known()))?;
+            let sweep = sweep.ok_or_else(|| {
+                let number = "the frame's number is ####";
+                format!("there is no --sweep for {{{name}}}; there is {}, and {number}", known())
+            })?;
             flush(&mut literal, parts);
             parts.push(Part::Sweep(sweep));
             rest = after;

@@ -41,7 +41,13 @@ impl Sweep {
         }
         let values = match range(list) {
             Some(range) => range.map_err(&usage)?,
-            None => listed(list),
+            None => match range(&list.replace(',', ".")) {
+                Some(Ok(_)) => {
+                    let point = list.replace(',', ".");
+                    return Err(usage(format!("the decimal mark is a point: write {name}={point}")));
+                }
+                _ => listed(list),
+            },
         };
         if values.is_empty() || values.len() > MAX_VALUES {
             return Err(usage(format!("{} values, but a sweep has 1 to {MAX_VALUES}; {how}", values.len())));

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::Encoding;
+use super::{Encoding, check_regular};
 use crate::picture::Gamut;
 use crate::util::error::{Error, Result};
 
@@ -51,12 +51,16 @@ impl Format {
     /// Returns the format that a path's extension names.
     ///
     /// # Errors
-    /// [`Error::Usage`] for other extensions; `option` names what the path was given with.
+    /// [`Error::Usage`] for other extensions, and [`Error::CannotCreate`] for a device; `option` names what
+    /// the path was given with.
     pub fn wanted(option: &str, path: &Path) -> Result<Format> {
-        Format::of(path).ok_or_else(|| {
-            let extensions = Format::EXTENSIONS;
-            Error::Usage(format!("{option} {}: unknown kind of picture; use {extensions}", path.display()))
-        })
+        if let Some(format) = Format::of(path) {
+            return Ok(format);
+        }
+        check_regular(path)?;
+        let extensions = Format::EXTENSIONS;
+        let what = format!("{option} {}: unknown kind of picture; use {extensions}", path.display());
+        Err(Error::Usage(what))
     }
 
     /// Detects the format of a file by its first bytes.

@@ -30,7 +30,7 @@ pub use exr_lines::ExrLines;
 pub use exr_read::{Channels, ExrColours, ExrPicture, read_exr, read_exr_picture};
 pub use figures::{Figures, KnownFigures, figures_of};
 pub use format::Format;
-pub use output::{Output, folder_of, real_file, remove_left_by, remove_stale};
+pub use output::{Output, check_regular, folder_of, real_file, remove_left_by, remove_stale};
 pub use owner::{Life, Owner};
 pub use png_file::encode_png;
 pub use read::{ReadPicture, read_picture, read_png};

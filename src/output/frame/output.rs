@@ -139,6 +139,21 @@ impl Output {
     }
 }
 
+/// Refuses a device or a pipe, whose name tells no format.
+///
+/// # Errors
+/// [`Error::CannotCreate`] for such a path.
+pub fn check_regular(path: &Path) -> Result<()> {
+    match std::fs::metadata(path) {
+        Ok(meta) if !meta.is_file() && !meta.is_dir() => Err(Error::CannotCreate {
+            path: path.to_owned(),
+            why: "it is not a regular file".into(),
+            fix: "choose another name".into(),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Options that create a temporary file: with the permissions of any new file under the umask, or `private`
 /// until it is known whose permissions it gets.
 fn new_file(private: bool) -> std::fs::OpenOptions {

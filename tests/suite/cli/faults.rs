@@ -453,9 +453,8 @@ fn sizes_of_zero_are_refused() {
     let dir = tempdir().unwrap();
     let out = dir.path().join("x.png");
     let zeros = [
-        ("--size=0x16", "image.width"),
-        ("--size=16x0", "image.height"),
-        ("--samples=0", "image.samples"),
+        ("--set=image.width=0", "image.width"),
+        ("--set=image.samples=0", "image.samples"),
         ("--set=volume.nx=0", "volume.nx"),
         ("--set=curves.deep=0", "curves.deep"),
         ("--set=camera.fov=0", "camera.fov"),
@@ -465,6 +464,10 @@ fn sizes_of_zero_are_refused() {
     for (argument, key) in zeros {
         let run = run(taki(["render", "front", argument, "-o"]).arg(&out));
         run.refused(65, &[&format!("{key} = 0"), "allowed: "]);
+    }
+    for option in ["--size=0x16", "--size=16x0", "--samples=0"] {
+        let run = run(taki(["render", "front", option, "-o"]).arg(&out));
+        assert_eq!(run.exit_code(), Some(2), "{option}: {run:?}");
     }
     has_only(dir.path(), &[]);
 }

@@ -48,6 +48,11 @@ fn memory_may_have_a_unit() {
         needs(memory).refused(33, &[&format!("the budget is {budget};")]);
     }
     run(&mut taki(["scene", "front", "--memory", "99999999999999999999GiB"])).done();
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    at(&["volume", "build", "front", "-o", "v.npz", "--set=nx=8", "--set=ny=8", "--set=nz=8"]).done();
+    at(&["volume", "info", "v.npz", "--memory", "1"]).done();
+    at(&["volume", "info", "v.npz", "--memory", "1KiB"]).refused(33, &["the budget is 1.0 KiB"]);
     for memory in ["lots", "", "GiB", "-1", "4GiBs", "nan", "4,5GiB"] {
         let refused = run(taki(["scene", "front"]).arg(format!("--memory={memory}")));
         assert_eq!(refused.exit_code(), Some(2), "{memory:?}");
@@ -191,7 +196,11 @@ fn a_rate_may_be_a_fraction() {
     assert_eq!(printed(&mut taki(["scene", "front", "--set", "fps=25"])), "fps = 25.0");
     planned(&["--fps", "24000/1001"]).done();
     for wrong in ["24/0", "1e9/1", "/1001", "24/", "a/b", "-24/1"] {
-        planned(&[&format!("--fps={wrong}")]).refused(65, &["animate.fps", "allowed: 0.01 to 1000"]);
+        let refused = planned(&[&format!("--fps={wrong}")]);
+        assert_eq!(refused.exit_code(), Some(2), "{wrong}: {refused:?}");
+        assert!(refused.stderr().contains("give a rate from 0.01 to 1000"), "{refused:?}");
+        let set = planned(&["--set", &format!("fps={wrong}")]);
+        set.refused(65, &["animate.fps", "allowed: 0.01 to 1000"]);
     }
     // Only a rate is a fraction.
     planned(&["--set", "h=1/2"]).refused(65, &["curves.h", "allowed: 0 to 8"]);
@@ -200,7 +209,7 @@ fn a_rate_may_be_a_fraction() {
 #[test]
 fn numbers_that_options_do_not_take_are_refused_in_plain_words() {
     for (arguments, words) in [
-        (&["render", "front", "--samples", "-1"][..], "give a whole number, 0 or more"),
+        (&["render", "front", "--samples", "-1"][..], "give a whole number from 1 to 4096"),
         (&["render", "front", "--samples", "1.5"], "give a whole number"),
         (&["render", "front", "--seed", "-1"], "give a whole number"),
         (&["render", "front", "--seed", "1e3"], "give a whole number"),
@@ -213,8 +222,8 @@ fn numbers_that_options_do_not_take_are_refused_in_plain_words() {
         (&["batch", "front", "--loop", "-5"], "give a whole number"),
         (&["batch", "front", "--retries", "-1"], "give a whole number"),
         (&["batch", "front", "--stale", "-1"], "give a number of seconds from 1"),
-        (&["farm", "slurm", "--shards", "-1", "--", "front"], "-1 is not in 1..=10000"),
-        (&["bench", "--runs", "-1"], "-1 is not in 1..=1000"),
+        (&["farm", "slurm", "--shards", "-1", "--", "front"], "give a whole number from 1 to 10000"),
+        (&["bench", "--runs", "-1"], "give a whole number from 1 to 1000"),
         (&["compare", "a.png", "b.png", "--share", "-1"], "give a share from 0 to 1"),
         (&["compare", "a.png", "b.png", "--share", "2"], "give a share from 0 to 1"),
         (&["compare", "a.png", "b.png", "--share", "nan"], "give a share from 0 to 1"),
@@ -320,4 +329,213 @@ fn a_job_file_replaces_nothing_else_unasked() {
             run(command.current_dir(&dir)).done();
         }
     }
+}
+
+#[test]
+fn a_compared_picture_is_not_replaced_by_the_difference_unasked() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    for (name, seed) in [("a.png", "1"), ("b.png", "2")] {
+        at(&[&["render", "front"], &TINY[..], &["--seed", seed, "-o", name]].concat()).done();
+    }
+    std::os::unix::fs::symlink("b.png", dir.path().join("link.png")).unwrap();
+    let read = || ["a.png", "b.png"].map(|name| fs::read(dir.path().join(name)).unwrap());
+    let before = read();
+    for output in ["a.png", "./b.png", "link.png"] {
+        let refused = at(&["compare", "a.png", "b.png", "--difference", output]);
+        refused.refused(2, &[&format!("--difference {output}"), "is one of the pictures"]);
+        assert!(read() == before, "{output}");
+    }
+    at(&["compare", "a.png", "b.png", "--share", "1", "--difference", "d.png"]).done();
+    at(&["compare", "a.png", "b.png", "--share", "1", "--difference", "a.png", "--overwrite"]).done();
+    assert!(read()[0] != before[0]);
+}
+
+#[test]
+fn a_moved_picture_is_not_moved_again_unsaid() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    let warned = |run: &Run| {
+        run.done();
+        run.lines("taki: warning").iter().any(|line| line.contains("f5.png holds the scene of its own frame"))
+    };
+    at(&[&["render", "front"], &TINY[..], &["--frame", "5", "-o", "f5.png"]].concat()).done();
+    let again = |more: &[&str]| at(&[&["render", "f5.png", "--engine", "cpu"], more].concat());
+    assert!(warned(&again(&["--frame", "5", "-o", "x.png"])));
+    assert!(!warned(&again(&["-o", "x.png"])));
+    assert!(warned(&at(&["scene", "f5.png", "--frame", "5"])));
+    assert!(!warned(&at(&["scene", "f5.png"])));
+    let batch =
+        |frames| at(&["batch", "f5.png", "--engine=cpu", "--dry-run", "-o=####.png", "--frames", frames]);
+    assert!(warned(&batch("5-6")));
+    // Frames that begin with that of the picture go on from it.
+    assert!(!warned(&batch("0-6")));
+    assert!(!warned(&at(&["scene", "front", "--frame", "5"])));
+}
+
+#[test]
+fn parameters_that_options_set_are_refused_by_the_option() {
+    for (option, values, words) in [
+        ("--size", &["0x0", "0x5", "5x1000001"][..], "1 to 1000000 for each side"),
+        ("--samples", &["0", "4097"], "1 to 4096"),
+        ("--loop", &["1000001"], "0 to 1000000"),
+        ("--fps", &["0", "abc", "-24", "1001", "inf"], "0.01 to 1000"),
+        ("--fps", &["23,976"], "23.976"),
+    ] {
+        for value in values {
+            let refused = planned(&[option, value]);
+            assert_eq!(refused.exit_code(), Some(2), "{option} {value}: {refused:?}");
+            assert!(refused.stderr().contains(words), "{option} {value}: {refused:?}");
+            assert!(refused.stderr().contains(option) && !refused.stderr().contains("--set"), "{refused:?}");
+        }
+    }
+    for (option, value) in [("--samples", "4096"), ("--loop", "0"), ("--fps", " 23.976 "), ("--fps", "1e2")] {
+        planned(&[option, value, "--size", "8x8"]).done();
+    }
+    let still = run(&mut taki(["render", "front", "--samples", "0"]));
+    assert!(still.exit_code() == Some(2) && still.stderr().contains("1 to 4096"), "{still:?}");
+}
+
+#[test]
+fn a_decimal_comma_in_a_range_is_told_to_be_a_point() {
+    let swept = |values: &str| planned(&["--sweep", values, "-o", "x{h}.png"]);
+    swept("h=0,5:1:0,25").refused(2, &["--sweep h=0,5:1:0,25", "write h=0.5:1:0.25"]);
+    swept("h=1:2:0,5").refused(2, &["write h=1:2:0.5"]);
+}
+
+#[test]
+fn numbers_of_frames_and_tasks_are_refused_in_plain_words() {
+    for (arguments, words) in [
+        (&["render", "front", "--frame", "7.5"][..], "give a whole number from -999999999 to 999999999"),
+        (&["scene", "front", "--frame", "x"], "give a whole number from -999999999 to 999999999"),
+        (
+            &["farm", "slurm", "--time", "1h", "--", "front"],
+            "give a whole number of minutes from 1 to 1000000",
+        ),
+        (&["farm", "slurm", "--time", "01:00:00", "--", "front"], "minutes"),
+        (&["farm", "slurm", "--gpus", "one", "--", "front"], "give a whole number from 1 to 1000"),
+        (&["farm", "slurm", "--shards", "0", "--", "front"], "give a whole number from 1 to 10000"),
+        (&["bench", "--cells", "1.5"], "give a whole number from 1 to 8192"),
+    ] {
+        let refused = run(&mut taki(arguments));
+        assert_eq!(refused.exit_code(), Some(2), "{arguments:?}: {refused:?}");
+        assert!(refused.stderr().contains(words), "{arguments:?}: {refused:?}");
+    }
+}
+
+#[test]
+fn a_farm_is_told_what_its_shards_would_refuse() {
+    let farm = |batch: &[&str]| run(&mut taki([&["farm", "slurm", "--"], batch].concat()));
+    let f = farm(&["fig5", "-o", "f.exr"]);
+    f.refused(2, &["f.exr", "share one name", "put ####"]);
+    assert!(!f.stderr().contains("without --shard"), "{f:?}");
+    farm(&["fig5", "-o", "f.png"]).refused(2, &["f.png needs all pictures", "without --shard"]);
+    farm(&["fig5", "-o", "f.mp4"]).refused(2, &["f.mp4 needs all pictures"]);
+    farm(&["fig5", "-o", "f.####.mkv"]).refused(2, &["unknown kind", ".webm"]);
+    for (word, rest) in [
+        ("render", &["render", "fig5", "-o", "f.####.exr"][..]),
+        ("batch", &["batch", "fig5"]),
+        ("taki batch", &["taki", "batch", "fig5"]),
+        ("./taki render", &["./taki", "render", "fig5"]),
+        ("render", &["render"]),
+    ] {
+        farm(rest).refused(2, &[&format!("leave out {word} after --")]);
+    }
+}
+
+#[test]
+fn a_job_file_that_was_written_is_named() {
+    let dir = tempdir().unwrap();
+    for kind in [&["slurm"][..], &["openjd"], &["kubernetes", "--image=i", "--claim=c"]] {
+        let rest = ["-o", "job", "--overwrite", "--", "front", "-o", "x.####.png"];
+        let wrote = run(taki([&["farm"], kind, &rest].concat()).current_dir(&dir));
+        wrote.done();
+        assert_eq!(wrote.lines("taki: wrote job"), ["taki: wrote job"]);
+        let printed = run(&mut taki([&["farm"], kind, &["--", "front"]].concat()));
+        assert!(printed.stderr().is_empty() && !printed.done().is_empty(), "{printed:?}");
+    }
+}
+
+#[test]
+fn parts_that_cannot_become_the_file_are_not_asked_for_more() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    at(&[&["render", "front"], &TINY[..], &["--crop", "0,0,16,8", "-o", "c1.png"]].concat()).done();
+    at(&["stitch", "c1.png", "-o", "c.exr"]).refused(2, &["must end with .png"]);
+    at(&["stitch", "c1.png", "-o", "c.png", "--half"]).refused(2, &["--half"]);
+    at(&["stitch", "c1.png", "-o", "c.png"]).refused(65, &["leave a gap"]);
+}
+
+#[test]
+fn tips_lead_to_what_works() {
+    for (arguments, tip) in [
+        (&["render", "front", "--loop", "10"][..], "--loop belongs to taki batch"),
+        (&["render", "--sweep=h=1,2"], "--sweep belongs to taki batch"),
+        (&["scene", "front", "--crop", "0,0,1,1"], "--crop belongs to taki render and taki batch"),
+        (&["compare", "a.png", "--frame", "3"], "--frame belongs to taki render and taki scene"),
+        (&["render", "front", "x.png"], "use -o x.png"),
+        (&["batch", "front", "x.####.exr"], "use -o x.####.exr"),
+        (&["batch", "front", "x.mp4"], "use -o x.mp4"),
+        (&["render", "front", "--set", "h", "1.2"], "use --set h=1.2"),
+        (&["render", "front", "--set", "h=", "1.2"], "use --set h=1.2"),
+        (&["render", "front", "--set", "h", "=1.2"], "use --set h=1.2"),
+        (&["render", "front", "--set", "h", "=", "1.2"], "use --set h=1.2"),
+        (&["batch", "front", "--sweep", "h", "1,2"], "use --sweep h=1,2"),
+        (
+            &["farm", "slurm", "--frames", "0-9", "--", "front"],
+            "--frames belongs to taki batch: write it after --",
+        ),
+        // Other tips stay.
+        (&["render", "front", "--sizes", "8x8"], "a similar argument exists: '--size'"),
+    ] {
+        let refused = run(&mut taki(arguments));
+        assert_eq!(refused.exit_code(), Some(2), "{arguments:?}: {refused:?}");
+        assert!(refused.stderr().contains(tip), "{arguments:?}: {refused:?}");
+        assert!(!refused.stderr().contains("as a value"), "{arguments:?}: {refused:?}");
+    }
+    // The value is taken for the scene here.
+    run(&mut taki(["render", "--set", "h", "1.2"]))
+        .refused(2, &["--set h has no value", "write --set h=1.2"]);
+    let refused = run(&mut taki(["render", "--nonsense"]));
+    assert!(!refused.stderr().contains("tip:"), "{refused:?}");
+}
+
+#[test]
+fn a_device_is_no_picture_to_be_replaced() {
+    for path in ["/dev/full", "/dev/null"] {
+        let words = [path, "not a regular file"];
+        run(taki(["render", "front"]).args(TINY).args(["-o", path])).refused(73, &words);
+        planned(&["-o", path]).refused(73, &words);
+    }
+}
+
+#[test]
+fn a_new_scene_in_place_of_a_picture_is_named_after_it() {
+    for (given, wanted) in [
+        ("p.png", "p.toml"),
+        ("d/p.EXR", "d/p.toml"),
+        ("p.mp4", "p.toml"),
+        ("p.txt", "p.toml"),
+        ("p.json", "p.toml"),
+        ("v1.2", "v1.2.toml"),
+        ("p", "p.toml"),
+    ] {
+        run(&mut taki(["new", given])).refused(2, &[&format!("write taki new {wanted}")]);
+    }
+}
+
+#[test]
+fn a_seed_beside_a_volume_file_is_told_to_have_no_effect() {
+    let dir = tempdir().unwrap();
+    let at = |arguments: &[&str]| run(taki(arguments).current_dir(&dir));
+    let small = ["--set=nx=8", "--set=ny=8", "--set=nz=8"];
+    at(&[&["volume", "build", "front", "-o", "v.npz"], &small[..]].concat()).done();
+    for seed in [&["--seed", "5"][..], &["--set", "volume.seed=5"], &["--seed=5", "--set=seed=4"]] {
+        let told = at(&[&["scene", "front", "--set", "volume.file=v.npz"], seed].concat());
+        told.done();
+        let warnings = told.lines("taki: warning");
+        let [warning] = warnings[..] else { panic!("{seed:?}: {warnings:?}") };
+        assert!(warning.contains("volume.seed has no effect"), "{warning}");
+    }
+    assert!(at(&["scene", "front", "--seed", "5"]).lines("taki: warning").is_empty());
 }

@@ -364,7 +364,7 @@ fn faulty_sheets_are_refused_with_their_name() {
         assert!(words.iter().all(|word| error.contains(word)), "{text}: {error}");
     };
     let sheet = |more: &str| format!("[sheets.a]\npoints = [[0, 1, 0], [0, 0, 1]]\n{more}\n");
-    bad("[sheets.a]\n", &["sheet a", "no profile", "sheets.a.points"]);
+    bad("[sheets.a]\n", &["s.toml:", "sheets.a has no points", "give sheets.a.points"]);
     bad("[sheets.a]\npoints = [[0, 0, 0]]\n", &["sheet a", "at least two"]);
     bad("[sheets.a]\npoints = [1.0, 2.0]\n", &["sheet a", "three numbers"]);
     bad("[sheets.a]\npoints = [[0, 0, 0], [0, 2e7, 0]]\n", &["sheet a", "±1e7"]);
@@ -374,7 +374,7 @@ fn faulty_sheets_are_refused_with_their_name() {
     bad(&sheet("widths = [[1, 1, 1]]"), &["sheet a", "sheets.a.widths"]);
     bad(&sheet("across = [0, 0, 0]"), &["sheet a", "sheets.a.across"]);
     bad(&sheet("across = [0, -1, 1]"), &["sheet a", "quad 0 along, 0 across", "sheets.a.across"]);
-    bad(&sheet("material = \"mud\""), &["sheet a", "sheets.a.material", "mud", "water"]);
+    bad(&sheet("material = \"mud\""), &["s.toml:6: ", "sheets.a.material", "mud", "water"]);
     bad(&sheet("round = 1.0\ncolumns = 2"), &["sheet a", "tube", "3 columns"]);
     bad(&sheet("round = 1.0\ncolumns = 8\n[materials.water]\nrepeat_u = 1.5"), &["tube", "whole number"]);
     bad(&sheet("segments = 1024\ncolumns = 256"), &["262144 quads", "at most 65536"]);

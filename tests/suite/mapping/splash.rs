@@ -138,7 +138,7 @@ fn faulty_splashes_are_refused_with_their_name() {
     };
     bad("toward = [0, 1, 0]", &["splash a", "splashes.a.toward", "not vertical"]);
     bad("toward = [0, 0, 0]", &["splash a", "splashes.a.toward"]);
-    bad("material = \"mud\"", &["splash a", "splashes.a.material", "mud", "water"]);
+    bad("material = \"mud\"", &["s.toml:5: ", "splashes.a.material", "mud", "water"]);
     bad("count = 1024\nsegments = 64", &["splash a makes 131072 quads", "splashes.a.count", "at most 65536"]);
     bad("count = 0", &["splashes.a.count = 0", "1 to 1024"]);
     bad("segments = 65", &["splashes.a.segments = 65", "1 to 64"]);

@@ -96,7 +96,9 @@ fn what_has_no_alpha_is_refused_before_the_work() {
     render(dir.path(), &["-o", "a.jpg", "--alpha"]).refused(2, &["a.jpg", "JPEG", "alpha", ".png"]);
     let batch = ["batch", "front", "--engine", "cpu", "--size", "16x12", "--frames", "0-1", "--alpha"];
     for movie in ["a.gif", "a.png", "a.mp4"] {
-        run(taki(batch).args(["-o", movie]).current_dir(dir.path())).refused(2, &[movie, "alpha", "frames"]);
+        // A picture's ending without the frame's number names a movie too.
+        let way_out = if movie.ends_with(".png") { "####" } else { "frames" };
+        run(taki(batch).args(["-o", movie]).current_dir(dir.path())).refused(2, &[movie, "alpha", way_out]);
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }

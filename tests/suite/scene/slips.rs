@@ -337,7 +337,7 @@ fn a_key_in_the_wrong_table_is_told_its_own() {
         ("camera.elevation=5", "did you mean sky.elevation?"),
         // A table that is misspelt goes before one with another name.
         ("light.sun.color=1", "did you mean lights.sun.color?"),
-        ("ligth.ambient=1", "did you mean light.ambient?"),
+        ("lght.ambient=1", "did you mean light.ambient?"),
     ] {
         scene("fig5", &[setting]).refused(65, &["--set", "unknown key", words]);
     }
@@ -354,8 +354,8 @@ fn a_misspelt_name_is_told_with_its_line() {
         ("[rocks.a]\nlevels = 3", &["s.toml:2: rocks.a has no corners", "give rocks.a.corners four points"]),
         ("[pools.a]\nfoam = 0.5", &["s.toml:2: pools.a has no corners", "give pools.a.corners four points"]),
         (
-            "base = \"waterfall\"\n[sheets.thred]\nsegments = 3",
-            &["s.toml:3: sheets.thred has no points", "did you mean [sheets.thread]?"],
+            "base = \"waterfall\"\n[sheets.threa]\nsegments = 3",
+            &["s.toml:3: sheets.threa has no points", "did you mean [sheets.thread]?"],
         ),
         (
             "[materials.water]\n[sheets.a]\npoints = [[0, 1, 0], [0, 0, 0]]\nmaterial = \"wter\"",

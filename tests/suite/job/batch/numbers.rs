@@ -107,3 +107,80 @@ fn keyframes_may_lie_before_frame_0_but_not_before_a_loop() {
     assert!(track("").done().contains("\nh = 1.25\n"));
     track("loop = 8").refused(65, &["frame -4, which is before the loop"]);
 }
+
+#[test]
+fn a_placeholder_that_is_none_is_refused_with_the_one_that_is() {
+    let dir = folder();
+    for (pattern, slip) in [
+        ("R.<frame>.png", "<frame>"),
+        ("frm.{frame}.png", "{frame}"),
+        ("R.%04D.png", "%04D"),
+        ("R.%4d.png", "%4d"),
+        ("R.%i.png", "%i"),
+        ("R.$FF.png", "$FF"),
+        ("R.${F4}.png", "${F4}"),
+        ("R.$f4.png", "$f4"),
+        ("R.$FRAME.png", "$FRAME"),
+        ("R.[0009-0010].png", "[0009-0010]"),
+        ("R.*.png", "*"),
+        ("R..png", "two dots"),
+        ("R.{frame}.mp4", "{frame}"),
+        ("R.<frame>.exr", "<frame>"),
+    ] {
+        for frames in ["9-10", "9"] {
+            let refused = run(&mut batch(dir.path(), ["--frames", frames, "-o", pattern]));
+            refused.refused(2, &[&format!("-o {pattern}: "), slip, "put #### where the frame's number goes"]);
+        }
+        let mut farm = taki(["farm", "slurm", "--", "front", "-o", pattern]);
+        run(&mut farm).refused(2, &[slip, "put ####"]);
+        let mut still = taki(["render"]);
+        still.args(super::TINY).args(["-o", pattern]).current_dir(dir.path());
+        run(&mut still).refused(2, &[slip, "put ####"]);
+    }
+    assert!(files(dir.path()).is_empty());
+    // The frame's number beside a sweep has the same name.
+    let swept = ["--sweep", "h=1,2", "--frames", "0-1", "-o", "T{h}.{frame}.png"];
+    run(&mut batch(dir.path(), swept)).refused(2, &["no --sweep for {frame}", "####"]);
+    // Movies and other names stay as they are.
+    for name in ["fall.png", "50%.gif", "a[2].gif", "v1.2@2x.gif", "a b's (1).png", "$Fall.gif"] {
+        run(&mut batch(dir.path(), ["--frames", "0-1", "-o", name])).done();
+        assert!(dir.path().join(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn a_still_has_the_number_of_its_frame_in_its_name() {
+    let dir = folder();
+    let still = |more: &[&str]| {
+        let mut command = taki(["render"]);
+        run(command.args(super::TINY).args(more).current_dir(dir.path()))
+    };
+    still(&["--frame", "7", "-o", "w.####.png", "-o", "%03d.exr", "-o", "$F2.png"]).done();
+    still(&["-o", "z.@@.png"]).done();
+    still(&["--frame", "-3", "-o", "w.####.exr", "--split-layers", "--layers", "rgb,depth"]).done();
+    let names = ["007.exr", "07.png", "w.0007.png", "w.depth.-003.exr", "w.rgb.-003.exr", "z.00.png"];
+    assert_eq!(files(dir.path()).into_keys().collect::<Vec<_>>(), names);
+    let swept = still(&["-o", "U{h}.png"]);
+    swept.refused(2, &["-o U{h}.png", "taki batch --sweep h=", "put ####"]);
+    still(&["-o", "w.##.png", "-o", "w.%02d.png"]).refused(2, &["are one file"]);
+}
+
+#[test]
+fn a_batch_whose_names_lack_the_number_is_told_so_first() {
+    let dir = folder();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        run(&mut batch(dir.path(), arguments)).refused(2, words);
+    };
+    // A sweep needs pictures, and a .png without the number is a movie.
+    refused(&["--sweep", "h=1,2", "--frames", "0-1", "-o", "T{h}.png"], &["T{h}.png", "put ####"]);
+    refused(&["--frames", "0-1", "--alpha", "-o", "w.png"], &["-o w.png", "put ####"]);
+    refused(&["--frames", "0-1", "--alpha", "-o", "w.gif"], &["-o w.gif", "no alpha channel", ".exr frames"]);
+    // The ending comes before the number.
+    for name in ["e.mkv", "e.####.mkv", "e", "e.####"] {
+        for frames in ["0-5", "0"] {
+            let words = [&format!("-o {name}: unknown kind"), ".png, .jpg", ".gif", ".mp4, .mov or .webm"];
+            refused(&["--frames", frames, "-o", name], &words);
+        }
+    }
+    assert!(files(dir.path()).is_empty());
+}
