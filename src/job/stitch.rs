@@ -31,7 +31,7 @@ pub struct StitchOptions {
 /// Does as [`stitch_with`], with the number types and the compression of the crops.
 ///
 /// # Errors
-/// Those of [`stitch_with`].
+/// Errors of [`stitch_with`].
 pub fn stitch(
     parts: &[PathBuf],
     output: &Path,
@@ -83,7 +83,7 @@ pub fn stitch_with(
         let what = format!("--half and --compression are for EXR files, but the crops are {}", format.name());
         return Err(Error::Usage(what));
     }
-    // What no further crop would change has been refused by now.
+    // Faults that no further crop can mend have been refused by now.
     check_parts(first, &parts)?;
     if !options.overwrite {
         check_replaced(output)?;

@@ -2,7 +2,7 @@
 
 use crate::util::words::words;
 
-/// What a picture shows of a rock or a pool.
+/// Choice of what a picture shows of a rock or a pool.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Show {
     /// The thing itself.

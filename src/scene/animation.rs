@@ -40,7 +40,7 @@ pub struct Animation {
     path: Option<CameraPath>,
     /// Measured stops, which replace the automatic exposure.
     measured: Option<f32>,
-    /// What the picture tells that the scene was read from.
+    /// Record of the picture that the scene was read from.
     record: Option<Record>,
 }
 

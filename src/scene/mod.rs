@@ -68,7 +68,7 @@ pub struct Scene {
     /// None after the parts were edited.
     values: Option<Values>,
     parts: Parts,
-    /// What the picture tells that the scene was read from.
+    /// Record of the picture that the scene was read from.
     record: Option<Record>,
 }
 

@@ -13,7 +13,7 @@ pub const VOLUME_COMMENT: &str = "# volume texture: crc32 ";
 /// Start of the comment that tells the checksum of a picture's environment map, in hex.
 pub const MAP_COMMENT: &str = "# environment map: crc32 ";
 
-/// What a picture tells of the files that its scene had.
+/// Record in a picture of the files that its scene had.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// Checksum of the volume.

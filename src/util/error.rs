@@ -106,7 +106,7 @@ impl Error {
         Error::Input { what: what.into(), fix: fix.into() }
     }
 
-    /// What happened, without the advice: for a message about what taki does by itself.
+    /// The cause without the advice, for a message about what taki does by itself.
     pub fn cause(&self) -> String {
         match self {
             Error::Device { what, .. } => what.clone(),

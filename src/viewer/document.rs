@@ -25,7 +25,7 @@ pub struct Document {
     /// hand: references are then trusted.
     folder: Option<PathBuf>,
     limits: Limits,
-    /// What the picture tells that the scene was read from.
+    /// Record of the picture that the scene was read from.
     record: Option<Record>,
     /// The name of the scene for a command line. `None` if it came from stdin.
     source: Option<PathBuf>,

@@ -73,7 +73,7 @@ pub struct Request {
     pub retries: u32,
     /// The part of every picture to render; `None`: all of it.
     pub crop: Option<Window>,
-    /// What goes into EXR files, and how. The rate is that of the animation.
+    /// Settings of EXR files. The rate is that of the animation.
     pub exr: Exr,
     /// Depth of developed pictures.
     pub depth: Depth,

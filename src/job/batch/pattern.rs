@@ -106,7 +106,7 @@ impl Pattern {
     /// Returns the path of a still: `path` with the number of its frame, where the name has a place for it.
     ///
     /// # Errors
-    /// Those of [`Pattern::check_placeholders`].
+    /// Errors of [`Pattern::check_placeholders`].
     pub fn numbered(path: &Path, frame: i32) -> Result<PathBuf> {
         if path.file_name().is_none() {
             // It is refused where it is opened.

@@ -120,7 +120,7 @@ impl<'a> Slab<'a> {
         let sum = |w: &[f64], k: usize| w.iter().zip(arriving).map(|(w, a)| w * a[k]).sum::<f64>();
         let lit = sum(w, 0);
         let once = psi * crossings(face, x, mu_0, mu);
-        // What the walk finds of the light scattered once, and the rest.
+        // The part of the light scattered once that the walk finds, and the part that it misses.
         let found = psi * lit;
         let fill = (once - found).max(0.0) / -(-x / mu).exp_m1();
         let mut twice = sum(w_reduced, 1) - self.isotropic * lit;

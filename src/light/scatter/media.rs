@@ -33,7 +33,7 @@ pub struct MultipleMedium {
     pub profile: Arc<Profile>,
 }
 
-/// What sheets with the same multiple scattering share.
+/// Properties that sheets with the same multiple scattering share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kind {
     /// Thickness of the slab in metres.

@@ -30,7 +30,7 @@ const DEPTHS: &str = "metres to the first surface, 0: none; depth.Z along the ca
 /// Largest finite half float.
 const HALF_MAX: f32 = 65504.0;
 
-/// What goes into EXR files, and how.
+/// Settings of EXR files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exr {
     /// Layers.

@@ -146,7 +146,7 @@ pub fn fits_half(name: &str) -> bool {
     }
 }
 
-/// What an EXR tells of its picture, besides texts.
+/// Attributes that tell of an EXR's picture, besides texts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExrHead {
     /// Compression.

@@ -85,7 +85,7 @@ impl ExrColours {
 /// Reads a whole picture; see [`ExrColours`].
 ///
 /// # Errors
-/// Those of [`ExrColours::open`] and [`ExrColours::read`].
+/// Errors of [`ExrColours::open`] and [`ExrColours::read`].
 pub fn read_exr_picture(path: &Path, memory: u64) -> Result<ExrPicture> {
     let colours = ExrColours::open(path)?;
     let whole = Window::whole(colours.size);

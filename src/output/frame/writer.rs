@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 
 use super::{Encoding, Format, jpeg_file, png_file, tiff_file, webp_file};
 
-/// What is known of a picture before its rows.
+/// Facts of a picture that are known before its rows.
 #[derive(Clone, Debug)]
 pub struct Head {
     /// Format of the file, one of those that hold developed pictures.
