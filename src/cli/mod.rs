@@ -7,6 +7,7 @@ mod compare;
 mod devices;
 mod farm;
 mod new;
+mod options;
 mod parse;
 mod quiet;
 mod render;
@@ -20,26 +21,16 @@ mod volume;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::error::{ContextKind, ContextValue};
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::engine::gpu::DeviceOptions;
-use crate::engine::{Engine, EngineChoice};
-use crate::job::Depth;
-use crate::output::frame::{Compression, Exr, Format};
-use crate::picture::Layer;
-use crate::scene::{
-    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin,
-    settings_without_effect,
-};
-use crate::util::cache::Cache;
+use crate::output::frame::Format;
+use crate::scene::{Scene, presets};
 use crate::util::error::{Error, Result};
-use crate::util::monitor::Monitor;
 use crate::util::window::Window;
-use parse::{crop, frame, memory, samples, seconds, size, wait, whole};
-use quiet::without_noise;
+use options::{CacheOptions, DepthOptions, EngineOptions, ExrOptions, LayerOptions, SceneOptions};
+use parse::{crop, frame, samples, seconds, size, whole};
 use terminal::{Terminal, say};
 use tips::with_tips;
 
@@ -92,227 +83,6 @@ enum Command {
         /// The shell to complete for.
         shell: clap_complete::Shell,
     },
-}
-
-/// Options of every command that reads a scene.
-#[derive(Args, Clone)]
-struct SceneOptions {
-    /// Name of a preset (see `taki presets`), path of a scene file, such as fall.toml, or of a picture that
-    /// taki wrote, or - to read the scene from stdin.
-    #[arg(default_value = DEFAULT_PRESET)]
-    scene: PathBuf,
-    /// Sets a parameter of the scene, such as `--set curves.h=1.4`. The last part of a key is enough where it
-    /// means one parameter: `--set h=1.4`. Can be given more than once. docs/parameters.md explains all
-    /// parameters; `taki scene` prints their values.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    sets: Vec<String>,
-    /// Removes a part of the scene, such as `--remove rocks.wall` or `--remove pools`, before the settings of
-    /// --set apply. Can be given more than once. Short for --set remove=NAME.
-    #[arg(long = "remove", value_name = "NAME")]
-    removes: Vec<String>,
-    /// Seed of the volume's random numbers. Short for --set volume.seed=N.
-    #[arg(long, value_name = "N", value_parser = whole::<u64>)]
-    seed: Option<u64>,
-    /// Allows the scene to read files in this folder too. Can be given more than once.
-    #[arg(long = "allow-path", value_name = "DIR")]
-    allow_paths: Vec<PathBuf>,
-    /// Memory budget, such as 6GiB (2^30 bytes each), 6GB (10^9 bytes each) or 512MiB. A number alone counts
-    /// MiB. Work that would need more is refused before it starts.
-    #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
-    memory: u64,
-}
-
-impl SceneOptions {
-    /// Begins work that a signal asks to stop. A scene on stdin is read before: it may take any time to
-    /// come, and until then a signal has nothing to clean up.
-    fn begin(&self, terminal: &Terminal) {
-        if self.scene == Path::new(STDIN) {
-            read_stdin();
-        }
-        terminal.watch();
-    }
-
-    fn limits(&self) -> Limits {
-        Limits { allow_paths: self.allow_paths.clone(), memory: self.memory, ..Limits::default() }
-    }
-
-    /// Loads the scene. `more` holds settings from other options; they override --set.
-    fn load(&self, more: &[String]) -> Result<Scene> {
-        self.check_sets()?;
-        Scene::load(&self.scene, &self.all_sets(more), &self.limits())
-    }
-
-    /// Loads the scene's animation. `more` is as in [`SceneOptions::load`].
-    fn animation(&self, more: &[String], limits: &Limits) -> Result<Animation> {
-        self.check_sets()?;
-        Animation::load(&self.scene, &self.all_sets(more), limits)
-    }
-
-    /// Refuses a setting written with a space, as in `--set h 1.2`, whose value was taken for the scene.
-    fn check_sets(&self) -> Result<()> {
-        let scene = self.scene.to_string_lossy();
-        if presets().any(|(name, _)| name == scene) || scene == STDIN || self.scene.exists() {
-            return Ok(());
-        }
-        match self.sets.iter().find(|set| !set.contains('=')) {
-            Some(set) => Err(Error::Usage(format!("--set {set} has no value; write --set {set}={scene}"))),
-            None => Ok(()),
-        }
-    }
-
-    /// Warns of settings and sweeps that have no effect.
-    fn warn_of_settings(&self, values: &Values, sweeps: &[String], terminal: &Terminal) {
-        let seed = self.seed.map(|n| format!("volume.seed={n}"));
-        let sets: Vec<String> = self.sets.iter().cloned().chain(seed).collect();
-        let without = settings_without_effect(values, &sets, sweeps);
-        // A map without effect is warned of by the scene itself, wherever it comes from.
-        let said_later = |text: &&String| text.starts_with("environment.file ");
-        without.iter().filter(|text| !said_later(text)).for_each(|text| terminal.warn(text));
-    }
-
-    /// Warns where a picture stands in place of its scene and is asked for another frame than its own.
-    fn warn_of_moved(&self, frame: i32, terminal: &Terminal) {
-        if frame != 0 && Format::of(&self.scene).is_some() {
-            terminal.warn(&format!(
-                "{} holds the scene of its own frame, and frame {frame} counts from there; leave the frame \
-                 out to get that picture again, or give the scene file for a frame of its animation",
-                self.scene.display()
-            ));
-        }
-    }
-
-    fn all_sets(&self, more: &[String]) -> Vec<String> {
-        let mut sets: Vec<String> = self.removes.iter().map(|name| format!("{REMOVE}={name}")).collect();
-        sets.extend_from_slice(&self.sets);
-        sets.extend(self.seed.map(|n| format!("volume.seed={n}")));
-        sets.extend_from_slice(more);
-        sets
-    }
-}
-
-/// Options of commands that render.
-#[derive(Args, Clone)]
-struct CacheOptions {
-    /// Rebuilds volumes and meshes instead of reusing those of earlier runs, and stores none for later runs.
-    #[arg(long)]
-    no_cache: bool,
-}
-
-impl CacheOptions {
-    fn add_to(&self, limits: Limits) -> Limits {
-        let cache = (!self.no_cache).then(Cache::of_user).flatten();
-        Limits { cache, ..limits }
-    }
-}
-
-/// Options of commands that write developed pictures.
-#[derive(Args, Clone)]
-struct DepthOptions {
-    /// Bits per channel of .png and .tif files: 8 or 16. Default: 8 for .png, 16 for .tif. The other formats
-    /// of developed pictures always have 8.
-    #[arg(long, value_name = "N", value_parser = choice::bits())]
-    bits: Option<u8>,
-    /// Writes .png and .tif files with 16 bits of linear light, for programs that grade or composite. Needs
-    /// --set image.tone=none; light above 1 is cut off, so prefer .exr where you can.
-    #[arg(long)]
-    linear: bool,
-}
-
-impl DepthOptions {
-    fn depth(&self) -> Depth {
-        Depth { bits: self.bits, linear: self.linear }
-    }
-}
-
-/// Options of commands that write EXR files.
-#[derive(Args, Clone)]
-struct ExrOptions {
-    /// Stores colours, transmittance and normals of EXR files as half floats: half of the size, three digits.
-    /// Depths, numbers and texture coordinates stay floats.
-    #[arg(long)]
-    half: bool,
-    /// Compression of EXR files. All methods are lossless. Default: zip; zips where 16 lines of the picture
-    /// take more than 8 MiB.
-    #[arg(long, value_parser = choice::compression(), value_name = "METHOD")]
-    compression: Option<Compression>,
-}
-
-/// Options that choose the layers of EXR files.
-#[derive(Args, Clone)]
-struct LayerOptions {
-    /// Layers of EXR files, separated by commas. Default: all. Example: --layers rgb,depth
-    #[arg(long, value_parser = choice::layer(), value_delimiter = ',', value_name = "A,B,…")]
-    layers: Option<Vec<Layer>>,
-    /// Writes each layer into an EXR file of its own: -o fall.exr gives fall.rgb.exr, fall.depth.exr and so
-    /// on.
-    #[arg(long)]
-    split_layers: bool,
-    #[command(flatten)]
-    pixels: ExrOptions,
-}
-
-impl LayerOptions {
-    fn exr(&self) -> Exr {
-        let ExrOptions { half, compression } = self.pixels;
-        let mut layers = Vec::new();
-        for layer in self.layers.as_deref().unwrap_or(&Layer::ALL) {
-            // A layer given twice is written once.
-            if !layers.contains(layer) {
-                layers.push(*layer);
-            }
-        }
-        Exr { half, compression, split: self.split_layers, ..Exr::of(&layers) }
-    }
-
-    /// Refuses the options where no EXR is written.
-    fn check(&self, has_exr: bool) -> Result<()> {
-        let given = [
-            ("--layers", self.layers.is_some()),
-            ("--half", self.pixels.half),
-            ("--compression", self.pixels.compression.is_some()),
-            ("--split-layers", self.split_layers),
-        ];
-        match given.into_iter().find(|(_, given)| *given && !has_exr) {
-            Some((option, _)) => Err(Error::Usage(format!("{option} needs an EXR file; add -o FILE.exr"))),
-            None => Ok(()),
-        }
-    }
-}
-
-/// Options that choose the engine and its device.
-#[derive(Args, Clone)]
-struct EngineOptions {
-    /// Engine that renders. auto uses a GPU adapter if there is one, otherwise the CPU.
-    #[arg(long, value_parser = choice::engine(), default_value = "auto")]
-    engine: EngineChoice,
-    /// Uses the GPU adapter whose name contains this text, such as `--adapter nvidia`. `taki devices` lists
-    /// all.
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
-    /// Longest wait for one piece of GPU work, in seconds. After that, taki exits with code 124.
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = wait)]
-    watchdog: f64,
-}
-
-impl EngineOptions {
-    /// Opens the engine. Returns it with a line that tells what it runs on.
-    fn open(&self) -> Result<(Engine, String)> {
-        self.check()?;
-        without_noise(|| Engine::open(self.engine, &self.device()))
-    }
-
-    /// Checks that the options fit one another.
-    fn check(&self) -> Result<()> {
-        if self.engine == EngineChoice::Cpu && self.adapter.is_some() {
-            let what = "--adapter chooses a GPU, which --engine cpu does not use; leave out one of them";
-            return Err(Error::Usage(what.into()));
-        }
-        Ok(())
-    }
-
-    fn device(&self) -> DeviceOptions {
-        DeviceOptions { adapter: self.adapter.clone(), watchdog: Duration::from_secs_f64(self.watchdog) }
-    }
 }
 
 /// Returns the format of a developed picture, which `option` names.

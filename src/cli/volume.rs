@@ -5,8 +5,9 @@ use std::sync::Mutex;
 
 use clap::{Args, Subcommand};
 
+use super::parse::memory;
 use super::terminal::{Terminal, say};
-use super::{SceneOptions, default_output, memory};
+use super::{SceneOptions, default_output};
 use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
 use crate::util::error::{Error, Result};

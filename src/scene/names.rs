@@ -104,7 +104,7 @@ fn brackets(key: &str, raw: &Raw) -> Option<String> {
         && NAMED.contains(&section)
         && Param::find(&format!("{section}.NAME.{last}")).is_some()
     {
-        return Some(format!("each of them has a table of its own: [{section}.NAME]"));
+        return Some(own_header(section));
     }
     let Raw::List(items) = raw else { return None };
     let tables = !items.is_empty() && items.iter().all(|item| matches!(item, Raw::Other("a table")));
@@ -178,7 +178,7 @@ fn own_table(key: &str) -> Option<String> {
         return Some("write image.width and image.height".into());
     }
     if NAMED.contains(&last) || NUMBERED.contains(&last) {
-        return misplaced(last);
+        return Some(own_header(last));
     }
     let keys = keys_within(last);
     (!keys.is_empty()).then(|| format!("[{last}] is a table of its own, with the keys {}", listed(&keys)))
@@ -197,14 +197,20 @@ pub(super) fn likeliest<'a>(name: &str, names: impl Iterator<Item = &'a str>) ->
     names.filter(|other| alike(other) > 0.8).max_by(|a, b| alike(a).total_cmp(&alike(b)))
 }
 
+/// Returns advice on the header of one part of a section, such as one light.
+fn own_header(section: &str) -> String {
+    let header = match NUMBERED.contains(&section) {
+        true => format!("[[{section}]]"),
+        false => format!("[{section}.NAME]"),
+    };
+    format!("each of them has a table of its own: {header}")
+}
+
 /// Returns advice on a key that is unknown because a table or a name was written in another way.
 fn misplaced(key: &str) -> Option<String> {
     let parts: Vec<&str> = key.split('.').collect();
-    if NAMED.contains(&key) {
-        return Some(format!("each of them has a table of its own: [{key}.NAME]"));
-    }
-    if NUMBERED.contains(&key) {
-        return Some(format!("each of them has a table of its own: [[{key}]]"));
+    if NAMED.contains(&key) || NUMBERED.contains(&key) {
+        return Some(own_header(key));
     }
     let named = NAMED.contains(&parts[0]);
     if named && parts[1..].contains(&"") {
@@ -221,7 +227,7 @@ fn misplaced(key: &str) -> Option<String> {
             .is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()))
     };
     if let Some(list) = NUMBERED.iter().find(unnumbered) {
-        return Some(format!("each of them has a table of its own: [[{list}]]"));
+        return Some(own_header(list));
     }
     let keys = keys_within(key);
     (!keys.is_empty()).then(|| format!("it is a table, with the keys {}", listed(&keys)))
