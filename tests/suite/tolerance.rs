@@ -19,7 +19,8 @@ pub const PARITY_SHARE: f64 = 0.999;
 
 /// GPU against CPU, where the device snaps corners to 1/16 pixel and not, as the CPU engine and most devices
 /// do, to 1/256. Corners then lie up to 1/32 pixel elsewhere: what rock shows varies by a few hundredths
-/// inside a pixel, and one pixel in sixteen along an edge lies on its other side.
+/// inside a pixel, and one pixel in sixteen along an edge lies on its other side
+/// (`findings/swiftshader-sub-pixels.sh`).
 pub const COARSE_CORNERS: Parity = Parity { relative: 0.05, absolute: 0.005, share: 0.985 };
 
 /// GPU against CPU on all other devices.
