@@ -192,8 +192,10 @@ fn what_lies_behind_stays_behind_at_any_distance() {
 
 #[test]
 fn beds_of_rock_waves_and_foam_are_fixed_to_the_world() {
-    // The origin follows the water, and rock and pool stay where they are.
-    let strata = "[[quads]]\ncorners = WATER\n\
+    // The origin follows most of the water. Rock, the pool and the fall that makes foam in it stay where they
+    // are.
+    let strata = "[[quads]]\ncorners = WATER\n[[quads]]\ncorners = WATER\n\
+        [[quads]]\ncorners = [[500.5, 0.3, 2], [503.5, 0.3, 2], [503.5, -0.3, 2], [500.5, -0.3, 2]]\n\
         [rocks.cliff]\ncorners = [[500, 0, 0], [504, 0, 0], [504, 3, 0], [500, 3, 0]]\nlevels = 6\n\
         strata = 1.0\nstrata_height = 0.3\nstrata_tilt = 10.0\nwet = 0.0\n\
         [pools.pond]\ncorners = [[500, 0, 4], [504, 0, 4], [504, 0, 0], [500, 0, 0]]\nfoam = 1.0\n\
