@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use crate::engine::gpu::{SURFACE, both, renderer, scene};
-use crate::tolerance::{PARITY_ABSOLUTE, PARITY_RELATIVE, PARITY_SHARE};
+use crate::tolerance::Parity;
 use glam::Vec2;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -210,9 +210,10 @@ fn the_engines_agree_on_rock_of_mixed_steps() {
     let steps = chosen(&scene, &scene.mesh());
     assert!([1, 2, 4].iter().all(|step| steps.contains(step)), "{steps:?}");
     let [a, b] = both(&mut renderer, &scene).map(|frame| frame.surface.expect("asked for"));
-    let near = |a: f32, b: f32| (a - b).abs() <= PARITY_ABSOLUTE.max(PARITY_RELATIVE * a.abs().max(b.abs()));
+    let parity = Parity::of_adapter();
+    let near = |a: f32, b: f32| (a - b).abs() <= parity.absolute.max(parity.relative * a.abs().max(b.abs()));
     let same = a.depth.iter().zip(&b.depth).filter(|(a, b)| near(**a, **b)).count();
-    assert!(same as f64 >= PARITY_SHARE * a.depth.len() as f64, "{same} of {}", a.depth.len());
+    assert!(same as f64 >= parity.share * a.depth.len() as f64, "{same} of {}", a.depth.len());
 }
 
 #[test]
