@@ -149,6 +149,10 @@ fn frames(text: &str) -> std::result::Result<FrameList, String> {
     let mut list = Vec::new();
     for part in text.split(',').map(str::trim) {
         let (range, step) = part.split_once(':').map_or((part, Ok(1)), |(range, step)| (range, number(step)));
+        // A single frame has no step, so it is a range that is written as in a sweep.
+        if part.contains(':') && number(range).is_ok() {
+            return Err(format!("a range is written with a hyphen: {}", part.replacen(':', "-", 1)));
+        }
         let step = step.ok().filter(|&s| s > 0).ok_or_else(how)?;
         // The first character may be the sign of the first frame.
         let dash = range.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at);
@@ -255,7 +259,7 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     }
     let (mut engine, line) = args.engine.open()?;
     terminal.note(&format!("taki: {line}"));
-    let screen = Screen::new(terminal, args.events.is_some());
+    let screen = Screen::new(terminal, args.events.is_some(), batch.keeps_pictures());
     let result = batch.run(&mut engine, &screen);
     terminal.close();
     if args.json
@@ -277,6 +281,8 @@ fn dry_run(args: &BatchArgs, batch: &Batch) -> Result<()> {
 struct Screen<'a> {
     terminal: &'a Terminal,
     events: bool,
+    /// Whether pictures are kept, so that a stopped run can continue.
+    keeps: bool,
     state: Mutex<State>,
     /// The first error of writing to stdout. The batch goes on to write its files.
     unsaid: Mutex<Option<Error>>,
@@ -298,7 +304,7 @@ struct State {
 }
 
 impl<'a> Screen<'a> {
-    fn new(terminal: &'a Terminal, events: bool) -> Self {
+    fn new(terminal: &'a Terminal, events: bool, keeps: bool) -> Self {
         let state = State {
             begun: Instant::now(),
             pictures: 0,
@@ -308,7 +314,7 @@ impl<'a> Screen<'a> {
             told: None,
             summary: None,
         };
-        Screen { terminal, events, state: Mutex::new(state), unsaid: Mutex::new(None) }
+        Screen { terminal, events, keeps, state: Mutex::new(state), unsaid: Mutex::new(None) }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
@@ -414,7 +420,7 @@ impl Watcher for Screen<'_> {
             Event::Assembled { file } => line = Some(format!("wrote {file}")),
             Event::Done(summary) => {
                 state.summary = Some((*summary).clone());
-                line = Some(outcome(summary));
+                line = Some(outcome(summary, self.keeps));
             }
         }
         if self.events {
@@ -431,8 +437,8 @@ impl Watcher for Screen<'_> {
     }
 }
 
-/// Formats the summary as one line.
-fn outcome(s: &Summary) -> String {
+/// Formats the summary as one line. `keeps` tells whether the run kept pictures.
+fn outcome(s: &Summary, keeps: bool) -> String {
     let mut parts = vec![format!("{} of {} pictures rendered", s.rendered, s.pictures)];
     let mut add = |count: u64, what: &str| {
         if count > 0 {
@@ -442,6 +448,12 @@ fn outcome(s: &Summary) -> String {
     add(s.kept, "kept");
     add(s.elsewhere, "rendered by other processes");
     add(s.failed, "failed");
-    add(s.left, "left (run the same command again to continue)");
+    add(
+        s.left,
+        match keeps {
+            true => "left (run the same command again to continue)",
+            false => "left (a movie alone begins anew; with -o NAME.####.png too, a stopped run continues)",
+        },
+    );
     format!("{} in {:.1} s", parts.join(", "), s.elapsed)
 }

@@ -165,6 +165,11 @@ fn check_batch(job: &Job) -> Result<()> {
         let what = "the shards of a job cannot read their scene from stdin; give a preset or a scene file";
         return Err(Error::Usage(what.into()));
     }
+    if batch.get_flag("overwrite") {
+        let what =
+            "--overwrite after -- renders every picture anew whenever a shard is run again; leave it out";
+        return Err(Error::Usage(what.into()));
+    }
     let swept = batch.contains_id("sweeps");
     for path in batch.get_many::<PathBuf>("outputs").into_iter().flatten() {
         let pattern = Pattern::new(path, &[])?;

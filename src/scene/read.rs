@@ -105,7 +105,7 @@ impl Source {
 
     /// Returns the scene of a picture, whose `text` was read.
     fn picture(path: &Path, text: Result<Option<String>>) -> Result<Source> {
-        let fix = "a picture in place of a scene is a PNG or EXR that taki wrote";
+        let fix = "a picture in place of a scene is one that taki wrote";
         match text {
             Ok(Some(text)) => Ok(Source::file(path, text)),
             Ok(None) => Err(Error::input(format!("{} holds no scene", path.display()), fix)),

@@ -228,6 +228,11 @@ impl Batch {
         self.measured
     }
 
+    /// Whether the batch keeps pictures, from which a stopped run continues. A movie alone keeps none.
+    pub fn keeps_pictures(&self) -> bool {
+        !self.pictures.is_empty()
+    }
+
     /// Number of pictures, over all shards.
     pub fn count(&self) -> usize {
         self.whole.len()

@@ -230,9 +230,11 @@ fn slip(text: &str) -> Option<&str> {
             '%' => {
                 let digits = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len();
                 let mut after = rest[digits..].chars();
-                let number = after.next().is_some_and(|c| "dDiu".contains(c));
+                let number = after.next().is_some_and(|c| "dDius".contains(c));
                 let ends = digits > 0 || !after.next().is_some_and(char::is_alphanumeric);
-                (number && ends).then(|| &whole[..digits + 2])
+                // Digits after a zero pad a number, whatever follows.
+                let pads = digits > 1 && rest.starts_with('0');
+                (number && ends).then(|| &whole[..digits + 2]).or(pads.then(|| &whole[..digits + 1]))
             }
             '$' if rest.starts_with('{') => rest.find('}').map(|end| &whole[..=end + 1]),
             '$' => {
@@ -243,6 +245,7 @@ fn slip(text: &str) -> Option<&str> {
                 (frame || word == "frame").then(|| &whole[..1 + end])
             }
             '*' => Some(&whole[..1]),
+            '?' if rest.starts_with('?') => Some(&whole[..whole.len() - rest.trim_start_matches('?').len()]),
             _ => None,
         }
     })

@@ -120,6 +120,6 @@ fn a_picture_without_a_scene_is_no_scene() {
     fs::write(folder.join("cut.png"), &bytes[..40]).unwrap();
     for name in ["plain.png", "plain.exr", "alpha.png", "cut.png"] {
         let refused = run(taki(["render", name, "-o", "x.png"]).current_dir(folder));
-        refused.refused(65, &[name, "a PNG or EXR that taki wrote"]);
+        refused.refused(65, &[name, "one that taki wrote"]);
     }
 }

@@ -432,6 +432,7 @@ fn a_farm_is_told_what_its_shards_would_refuse() {
     farm(&["fig5", "-o", "f.png"]).refused(2, &["f.png needs all pictures", "without --shard"]);
     farm(&["fig5", "-o", "f.mp4"]).refused(2, &["f.mp4 needs all pictures"]);
     farm(&["fig5", "-o", "f.####.mkv"]).refused(2, &["unknown kind", ".webm"]);
+    farm(&["fig5", "-o", "f.####.png", "--overwrite"]).refused(2, &["--overwrite after --", "anew"]);
     for (word, rest) in [
         ("render", &["render", "fig5", "-o", "f.####.exr"][..]),
         ("batch", &["batch", "fig5"]),

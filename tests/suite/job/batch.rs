@@ -175,13 +175,14 @@ fn faults_are_known_before_any_picture() {
          values = [[0, 0, 2], [0, 0, -2]]\n",
     )
     .unwrap();
-    let cases: [(&[&str], i32, &[&str]); 16] = [
+    let cases: [(&[&str], i32, &[&str]); 17] = [
         (&["--frames", "0-3", "-o", "absent/f.####.png"], 73, &["make the folder"]),
         (&["--frames", "0-3", "-o", "f.####.png"], 73, &["f.0002.png", "a folder has this name"]),
         (&["--frames", "0-3", "-o", "f.exr"], 2, &["4 frames would share one name", "fall.####.png"]),
         (&["--frames", "0-3", "-o", "f.####.bmp"], 2, &["unknown kind"]),
         (&["--frames", "3-0", "-o", "f.####.png"], 2, &["ends before it begins"]),
         (&["--frames", "x", "-o", "f.####.png"], 2, &["0-239"]),
+        (&["--frames", "0:95", "-o", "f.####.png"], 2, &["written with a hyphen: 0-95"]),
         (&["--frames", "0-999999999", "-o", "f.####.png"], 2, &["more than 1000000 frames"]),
         (&["--shard", "8/8", "-o", "f.####.png"], 2, &["0/8"]),
         (&["--sweep", "h=0.5,0.7", "-o", "f.####.png"], 2, &["{h}"]),

@@ -101,6 +101,24 @@ fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
 }
 
 #[test]
+fn a_movie_alone_that_is_stopped_does_not_claim_that_it_continues() {
+    let dir = folder();
+    let mut command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=512"]);
+    command.args(["--frames", "0-7", "-o", "f.gif", "--events=json"]).current_dir(dir.path());
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let events = std::io::BufReader::new(child.stdout.take().unwrap());
+    let mut lines = std::io::BufRead::lines(events).map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("\"saved\"")), "no picture");
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    lines.for_each(drop);
+    assert_eq!(wait(&mut child), Some(130));
+    let mut said = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut said).unwrap();
+    assert!(said.contains("begins anew") && said.contains("-o NAME.####.png"), "{said}");
+    assert!(!said.contains("to continue"), "{said}");
+}
+
+#[test]
 fn workers_that_share_a_folder_make_every_picture_once_even_if_some_are_killed() {
     let arguments = ["--frames", "0-39", "-o", "f.####.png", "--events", "json", "--stale", "2"];
     let alone = folder();

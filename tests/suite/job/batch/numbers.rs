@@ -123,6 +123,9 @@ fn a_placeholder_that_is_none_is_refused_with_the_one_that_is() {
         ("R.$FRAME.png", "$FRAME"),
         ("R.[0009-0010].png", "[0009-0010]"),
         ("R.*.png", "*"),
+        ("R.????.png", "????"),
+        ("R.%04.png", "%04"),
+        ("R.%s.png", "%s"),
         ("R..png", "two dots"),
         ("R.{frame}.mp4", "{frame}"),
         ("R.<frame>.exr", "<frame>"),
@@ -142,7 +145,16 @@ fn a_placeholder_that_is_none_is_refused_with_the_one_that_is() {
     let swept = ["--sweep", "h=1,2", "--frames", "0-1", "-o", "T{h}.{frame}.png"];
     run(&mut batch(dir.path(), swept)).refused(2, &["no --sweep for {frame}", "####"]);
     // Movies and other names stay as they are.
-    for name in ["fall.png", "50%.gif", "a[2].gif", "v1.2@2x.gif", "a b's (1).png", "$Fall.gif"] {
+    for name in [
+        "fall.png",
+        "50%.gif",
+        "a[2].gif",
+        "v1.2@2x.gif",
+        "5%0.gif",
+        "why?.gif",
+        "a b's (1).png",
+        "$Fall.gif",
+    ] {
         run(&mut batch(dir.path(), ["--frames", "0-1", "-o", name])).done();
         assert!(dir.path().join(name).exists(), "{name}");
     }
