@@ -297,6 +297,17 @@ impl Document {
         }
     }
 
+    /// Says why saving to `path` loses something, if it does: another file, or comments, a base or changes
+    /// from outside in the scene's own.
+    pub fn lost_by_saving(&self, path: &Path) -> Option<&'static str> {
+        let text = std::fs::read(path).ok()?;
+        match self.path.as_deref() == Some(path) {
+            true if text == self.saved.to_toml().as_bytes() => None,
+            true => Some("holds comments, a base or changes from outside, which saving leaves out"),
+            false => Some("exists already"),
+        }
+    }
+
     /// Writes the scene to a file, completely or not at all.
     ///
     /// # Errors

@@ -56,13 +56,12 @@ impl PathDialog {
         self.open.is_some()
     }
 
-    /// Whether the user agreed to replace the existing file `path`. Otherwise asks, unless the dialog is
-    /// closed.
-    pub fn may_replace(&mut self, path: &Path) -> bool {
+    /// Whether the user agreed to replace the existing file `path`. Otherwise asks and says `why`.
+    pub fn may_replace(&mut self, path: &Path, why: &str) -> bool {
         if self.replaced.as_deref() == Some(path) {
             return true;
         }
-        self.fault = Some(format!("{} exists already", path.display()));
+        self.fault = Some(format!("{} {why}", path.display()));
         self.replaced = Some(path.to_owned());
         false
     }

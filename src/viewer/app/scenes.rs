@@ -43,7 +43,13 @@ impl Viewer {
 
     pub(super) fn save(&mut self) {
         match self.document.path.clone() {
-            Some(path) => self.save_to(&path),
+            Some(path) => match self.document.lost_by_saving(&path) {
+                Some(why) => {
+                    self.ask_where_to_save();
+                    self.paths.may_replace(&path, why);
+                }
+                None => self.save_to(&path),
+            },
             None => self.ask_where_to_save(),
         }
     }
@@ -56,11 +62,11 @@ impl Viewer {
         self.paths.ask(Purpose::Save, &guess);
     }
 
-    /// Saves the scene to a path that the user gave, after asking whether to replace another file.
+    /// Saves the scene to a path that the user gave, after asking whether to replace what is there.
     pub(super) fn save_as(&mut self, path: &Path) {
-        let is_own = self.document.path.as_deref() == Some(path);
-        if is_own || !path.exists() || self.paths.may_replace(path) {
-            self.save_to(path);
+        match self.document.lost_by_saving(path) {
+            Some(why) if !self.paths.may_replace(path, why) => {}
+            _ => self.save_to(path),
         }
     }
 

@@ -158,6 +158,10 @@ fn changes_are_asked_about_before_another_scene_is_opened() {
     window.set("curves.h", Raw::Float(0.1));
     open(&mut window, &other);
     window.press("Save");
+    // The file is written by hand.
+    assert!(window.reads("holds comments, a base or changes from outside"));
+    assert_eq!(window.viewer().document().name, "small");
+    window.press("Replace");
     assert_eq!(window.viewer().document().name, "other");
     assert!(std::fs::read_to_string(small).expect("a file").contains("h = 0.1"));
     window.settle();
@@ -421,10 +425,22 @@ fn what_exists_is_replaced_only_after_a_question() {
     assert!(window.reads("notes.toml exists already") && old(&other));
     window.press("Replace");
     assert!(!old(&other) && window.reads("saved "));
-    // A scene's own file is saved without a question.
+    // A scene's own file is saved without a question, as long as it is what was saved last.
     window.set("curves.h", Raw::Float(0.4));
     save_as(&mut window, &other);
     assert!(!is_changed(&window));
+    for more in ["# by hand\n", ""] {
+        let text = std::fs::read_to_string(&other).expect("a scene");
+        std::fs::write(&other, format!("{more}{text}")).expect("written");
+        window.set("curves.h", Raw::Float(0.5 + more.len() as f64 / 100.0));
+        window.chord(Modifiers::COMMAND, Key::S);
+        assert_eq!(window.reads("changes from outside"), !more.is_empty());
+        if !more.is_empty() {
+            assert!(is_changed(&window) && std::fs::read_to_string(&other).unwrap().starts_with(more));
+            window.press("Replace");
+        }
+        assert!(!is_changed(&window) && !std::fs::read_to_string(&other).unwrap().starts_with('#'));
+    }
 }
 
 #[test]
