@@ -1,6 +1,6 @@
 //! `taki batch`: renders the frames of an animation or the grid of a sweep.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -12,6 +12,7 @@ use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, measured_words, samples, seconds, size, whole, window};
 use crate::job::batch::{Batch, Event, Request, Summary, Watcher};
+use crate::output::frame::Format;
 use crate::output::movie::Codec;
 use crate::scene::Animation;
 use crate::util::error::{Error, Result};
@@ -249,6 +250,10 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     let first = args.frames.as_ref().and_then(|frames| frames.0.first().copied()).unwrap_or(0);
     args.scene.warn_of_moved(first, terminal);
     let request = args.request(&animation)?;
+    // Sheets and movies show the pictures.
+    let as_shown = !args.sweeps.is_empty() || request.outputs.iter().any(|path| !is_exr(path));
+    let linear = request.depth.linear || request.outputs.iter().any(|path| is_exr(path));
+    args.scene.warn_of_files(animation.values(), as_shown, linear, terminal);
     let batch = Batch::plan(animation, request, terminal)?;
     terminal.close();
     if args.dry_run {
@@ -268,6 +273,10 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
         screen.say(&serde_json::json!(summary));
     }
     result.and(screen.unsaid())
+}
+
+fn is_exr(path: &Path) -> bool {
+    Format::of(path) == Some(Format::Exr)
 }
 
 fn dry_run(args: &BatchArgs, batch: &Batch) -> Result<()> {
@@ -353,12 +362,13 @@ impl State {
             return counts;
         }
         let rate = made / seconds;
-        let seconds_left = (self.pictures as f64 - self.settled as f64 - self.share).max(0.0) / rate;
+        let pictures_left = self.pictures as f64 - self.settled as f64 - self.share;
         let pace = if rate >= 1.0 { format!("{rate:.1}/s") } else { format!("{:.1} s each", 1.0 / rate) };
-        format!(
-            "{counts} · {pace} · {} left",
-            indicatif::HumanDuration(Duration::from_secs_f64(seconds_left))
-        )
+        if pictures_left <= 0.0 {
+            return format!("{counts} · {pace}");
+        }
+        let left = indicatif::HumanDuration(Duration::from_secs_f64(pictures_left / rate));
+        format!("{counts} · {pace} · {left} left")
     }
 }
 

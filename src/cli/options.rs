@@ -16,7 +16,7 @@ use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
 use crate::scene::{
     Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin,
-    settings_without_effect,
+    settings_without_effect, settings_without_file,
 };
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -94,6 +94,13 @@ impl SceneOptions {
         // A map without effect is warned of by the scene itself, wherever it comes from.
         let said_later = |text: &&String| text.starts_with("environment.file ");
         without.iter().filter(|text| !said_later(text)).for_each(|text| terminal.warn(text));
+    }
+
+    /// Warns of settings that have no effect on files of these kinds: pictures `as_shown`, and those of
+    /// `linear` light.
+    pub fn warn_of_files(&self, values: &Values, as_shown: bool, linear: bool, terminal: &Terminal) {
+        let without = settings_without_file(values, &self.own_sets(), as_shown, linear);
+        without.iter().for_each(|text| terminal.warn(text));
     }
 
     /// Warns where a picture stands in place of its scene and is asked for another frame than its own.

@@ -15,7 +15,7 @@ use crate::engine::{Engine, RenderOptions};
 use crate::job::batch::Pattern;
 use crate::job::{STDOUT, Still, beside_encoders, check_bloom, strips};
 use crate::output::frame::{Exr, Figures, Format, folder_of, real_file};
-use crate::output::movie::fraction;
+use crate::output::movie::{MovieKind, fraction};
 use crate::picture::Layer;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
@@ -102,6 +102,12 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         false => outputs.map(|path| Pattern::numbered(&path, args.frame)).collect::<Result<_>>()?,
     };
     check_twice(&outputs)?;
+    if let Some(movie) = outputs.iter().find(|path| MovieKind::of(path).is_some()) {
+        let movie = movie.display();
+        return Err(Error::Usage(format!(
+            "-o {movie}: taki batch makes movies, and taki render one picture"
+        )));
+    }
     let still = Still::create(&outputs)?.with_depth(args.depth.depth());
     still.check(&scene.image, window)?;
     if !args.overwrite {
@@ -109,6 +115,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     }
     let has_exr = still.has_exr();
     args.layers.check(has_exr)?;
+    let linear = has_exr || args.depth.depth().linear;
+    args.scene.warn_of_files(animation.values(), still.has_developed(), linear, terminal);
     let surface = has_exr && exr.layers.iter().any(|l| l.of_surface());
 
     // Opening the device is slow, so the CPU builds the volume and the mesh at the same time.
@@ -146,7 +154,13 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
         engine.render_volume(&scene, &volume, &mesh, options, monitor)
     })?;
-    let not_finite = writer.figures().non_finite_pixels;
+    let Figures { non_finite_pixels: not_finite, covered_pixels, .. } = *writer.figures();
+    if covered_pixels == 0 && args.crop.is_none() && !scene.quads.is_empty() {
+        terminal.warn(
+            "no water is in the picture: it is outside the view, or behind rock; turn the camera to it \
+             with camera.target",
+        );
+    }
     if not_finite > 0 {
         terminal.warn(&format!("{not_finite} pixels are not finite; please report this scene as a bug"));
     }

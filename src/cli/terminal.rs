@@ -56,6 +56,10 @@ impl Terminal {
             let _ = signal_hook::flag::register(number, at_once.clone());
             let _ = signal_hook::flag::register_usize(number, signal.clone(), code as usize);
         }
+        // A file that grows past the user's limit (ulimit -f) shall be an error of its write, which removes
+        // the file. By default the signal ends the process and leaves the file.
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
         Terminal { bar: Mutex::new(None), signal, at_once }
     }
 

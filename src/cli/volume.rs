@@ -59,6 +59,13 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
                     format!("-o {}: a volume is an .npz file; use -o {}", path.display(), npz.display());
                 return Err(Error::Usage(what));
             }
+            let same = |file: &PathBuf| {
+                file.canonicalize().ok().is_some_and(|f| path.canonicalize().ok() == Some(f))
+            };
+            if scene.volume_file.as_ref().is_some_and(same) {
+                let what = format!("-o {}: the scene reads its volume from this file", path.display());
+                return Err(Error::Usage(format!("{what}; give another name with -o")));
+            }
             if !overwrite {
                 check_volume_replaced(&path)?;
             }

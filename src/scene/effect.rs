@@ -92,6 +92,18 @@ const RULES: &[Rule] = &[
         works: |v, switch| v.float(switch) > 0.0,
     },
     Rule {
+        keys: &["background.*"],
+        switch: "environment.kind",
+        needs: "none, because the environment is seen in its place",
+        works: |v, switch| is(v, switch, EnvironmentKind::None.word()),
+    },
+    Rule {
+        keys: &["image.filter"],
+        switch: "image.samples",
+        needs: "2 or more",
+        works: |v, switch| v.int(switch) > 1,
+    },
+    Rule {
         keys: &["image.bloom_radius"],
         switch: "image.bloom",
         needs: "a number above 0",
@@ -131,6 +143,34 @@ pub fn without_effect(values: &Values, key: &str) -> Option<String> {
     let (rule, switch) = rule(values, key)?;
     let now = values.get(&switch).to_toml();
     Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
+}
+
+/// Parameters of the picture as shown, which EXR files do not hold.
+const OF_SHOWN_PICTURES: [&str; 7] = [
+    "image.exposure",
+    "image.bloom",
+    "image.bloom_radius",
+    "image.temperature",
+    "image.tint",
+    "image.tone",
+    "image.dither",
+];
+
+/// Returns a sentence for each `--set` that has no effect on files of these kinds: pictures `as_shown`, and
+/// those of `linear` light.
+pub fn settings_without_file(values: &Values, sets: &[String], as_shown: bool, linear: bool) -> Vec<String> {
+    let keys = sets.iter().filter_map(|setting| full_key(split(setting)?.0, values).ok());
+    let why = |key: &str| match key {
+        "image.primaries" if !linear => Some("pictures as shown are sRGB; add --linear or write .exr"),
+        key if !as_shown && OF_SHOWN_PICTURES.contains(&key) => {
+            Some("EXR files hold the light before it; add -o FILE.png")
+        }
+        _ => None,
+    };
+    let mut said: Vec<String> =
+        keys.filter_map(|key| Some(format!("{key} has no effect: {}", why(&key)?))).collect();
+    said.dedup();
+    said
 }
 
 /// Returns a sentence for each `--set` without effect, and for each sweep, whose pictures would be equal.

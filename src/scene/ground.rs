@@ -1,7 +1,7 @@
 //! Builders of a scene's rocks and pools. They take values that the table accepted and check them against one
 //! another.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::Values;
 use crate::mapping::QuadMap;
@@ -23,9 +23,16 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
         if show == Show::Hidden {
             continue;
         }
+        let corners = v.local_corners(&key("corners"), origin);
+        if crosses_itself(corners) {
+            return Err(Error::input(
+                format!("rock {name} ({}): two of its edges cross", key("corners")),
+                "list the corners in order around the edge",
+            ));
+        }
         rocks.push(Rock {
             holdout: show == Show::Holdout,
-            corners: v.local_corners(&key("corners"), origin),
+            corners,
             levels: v.count(&key("levels")),
             h: v.float(&key("h")),
             amplitude: v.float(&key("amplitude")),
@@ -125,4 +132,15 @@ pub(super) fn pools(v: &Values, origin: DVec3) -> Result<Vec<Pool>> {
         ));
     }
     Ok(pools)
+}
+
+/// Whether the edges of a patch cross, because its corners are not in order around it.
+fn crosses_itself(corners: [Vec3; 4]) -> bool {
+    let normal = |i: usize| {
+        let [before, own, next] = [i + 3, i, i + 1].map(|i| corners[i % 4]);
+        (next - own).cross(before - own).normalize_or_zero()
+    };
+    // Edges that cross turn the patch over at two of its corners. A hollow edge turns one.
+    let against = (1..4).filter(|&i| normal(0).dot(normal(i)) < -0.5).count();
+    against == 2
 }

@@ -27,7 +27,7 @@ use glam::Vec3;
 
 pub use animation::Animation;
 pub use build::resolve;
-pub use effect::{settings_without_effect, without_effect};
+pub use effect::{settings_without_effect, settings_without_file, without_effect};
 pub use names::{NAMED, check_names, full_key, unknown_key};
 pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
@@ -440,6 +440,12 @@ impl Scene {
             ));
         }
         warnings.extend(self.other_files(volume));
+        warnings.extend(self.values.iter().flat_map(quads::unused_materials));
+        let is_holdout =
+            self.rocks.iter().any(|rock| rock.holdout) || self.pools.iter().any(|pool| pool.holdout);
+        if is_holdout && !self.image.alpha {
+            warnings.push("a holdout is a hole only in a picture with an alpha channel: add --alpha".into());
+        }
         let has_map = |v: &&Values| !v.text("environment.file").is_empty();
         let map = self.values.as_ref().filter(has_map);
         warnings.extend(map.and_then(|values| without_effect(values, "environment.file")));

@@ -10,19 +10,42 @@ pub const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets",
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;
+/// Least likeness of the last part of a key to another one of its own table, such as `width` and `widths`,
+/// that makes that one likelier than a key of the right name in another table.
+const ALIKE_IN_TABLE: f64 = 0.9;
 
-/// Returns the full key that `name` stands for: `name` itself, or the one key of the scene that ends with it.
+/// Words that other programs use for parameters, by the patterns of the keys. The words stand in the same
+/// table.
+const OTHER_WORDS: &[(&str, &[&str])] = &[
+    ("animate.fps", &["frame_rate", "framerate", "rate"]),
+    ("camera.eye", &["from", "location", "origin", "pos", "position"]),
+    ("camera.fov", &["focal_length", "lens", "zoom"]),
+    ("camera.target", &["at", "aim", "center", "centre", "interest", "look_at", "lookat", "to"]),
+    ("environment.file", &["hdr", "hdri", "image", "map", "path", "texture"]),
+    ("environment.intensity", &["brightness", "energy", "power", "strength"]),
+    ("environment.turn", &["azimuth", "rotate", "rotation"]),
+    ("image.exposure", &["brightness", "ev"]),
+    ("image.samples", &["aa", "antialiasing", "spp"]),
+    ("lights.*.direction", &["azimuth", "elevation", "rotation", "target"]),
+    ("lights.*.intensity", &["brightness", "energy", "power", "strength"]),
+    ("materials.*.thickness", &["depth"]),
+    ("rocks.*.color", &["albedo", "base_color", "diffuse"]),
+    ("volume.alpha", &["density", "opacity"]),
+    ("volume.seed", &["random", "random_seed", "rng"]),
+];
+
+/// Returns the full key that `name` stands for: `name` itself, or the one key of the scene that ends with it,
+/// such as `rocks.wall.show` for `wall.show`.
 /// Parameters that a scene has once take precedence over those of lights, rocks and materials, and all of
 /// them over those of the animation. Switches come last: `alpha` is the paper's α, not that of the image.
 ///
 /// # Errors
 /// The candidates, where `name` can mean several.
 pub fn full_key(name: &str, values: &Values) -> std::result::Result<String, String> {
-    if name.is_empty() || name.contains('.') {
+    if name.is_empty() || Param::find(name).is_some() {
         return Ok(name.into());
     }
-    let mut keys: Vec<String> =
-        values.known_keys().into_iter().filter(|key| last_part(key) == name).collect();
+    let mut keys = ending_with(name, values);
     let is_switch = |key: &String| Param::find(key).is_some_and(|p| matches!(p.kind, Kind::Switch(_)));
     if !keys.iter().all(is_switch) {
         keys.retain(|key| !is_switch(key));
@@ -38,6 +61,12 @@ pub fn full_key(name: &str, values: &Values) -> std::result::Result<String, Stri
         ([], []) => Ok(name.into()),
         (_, several) => Err(format!("{name} can mean {}; write one of them in full", listed(several))),
     }
+}
+
+/// Returns the keys of the scene whose last parts are `name`.
+fn ending_with(name: &str, values: &Values) -> Vec<String> {
+    let ends = |key: &String| key.strip_suffix(name).is_some_and(|rest| rest.ends_with('.'));
+    values.known_keys().into_iter().filter(ends).collect()
 }
 
 /// Joins at most eight keys.
@@ -88,11 +117,14 @@ pub fn unknown_key_in_file(key: &str, raw: &Raw, values: &Values, place: &Place)
 }
 
 fn unknown(key: &str, raw: Option<&Raw>, values: &Values, near: Option<String>, place: &Place) -> Error {
+    let mean = |key: String| format!("did you mean {key}?");
     let fix = misplaced(key)
         .or_else(|| word_of_choice(key, raw))
+        .or_else(|| in_the_part_of_its_name(key, values).map(mean))
+        .or_else(|| in_the_same_table(key).map(mean))
         .or_else(|| elsewhere(key, raw, values))
         .or_else(|| own_table(key))
-        .or_else(|| near.map(|near| format!("did you mean {near}?")))
+        .or_else(|| near.map(mean))
         .unwrap_or_else(|| "docs/parameters.md lists every key".into());
     Error::input(format!("{}: unknown key {key}", place.0), fix)
 }
@@ -129,6 +161,43 @@ fn word_of_choice(key: &str, raw: Option<&Raw>) -> Option<String> {
         let here = words.contains(&word) && matches(param.key, &format!("{table}.{own}"));
         here.then(|| format!("write {own} = {word:?}"))
     })
+}
+
+/// Returns the key that is meant where a table has the name of one part of the scene, such as `[sun]` for
+/// `[lights.sun]`.
+fn in_the_part_of_its_name(key: &str, values: &Values) -> Option<String> {
+    let (name, rest) = key.split_once('.')?;
+    let mut parts = NAMED.iter().filter(|section| values.names(section).iter().any(|part| part == name));
+    let (section, None) = (parts.next()?, parts.next()) else { return None };
+    let key = format!("{section}.{key}");
+    let in_part = |last: &str| format!("{section}.{name}.{last}");
+    match Param::find(&key) {
+        Some(_) => Some(key),
+        None => in_the_same_table(&key).or_else(|| {
+            let keys = PARAMS.iter().filter_map(|param| param.key.strip_prefix(section)?.strip_prefix(".*."));
+            likeliest(rest, keys).map(in_part)
+        }),
+    }
+}
+
+/// Returns the key that is meant where its own table has one that is spelt nearly so, or that other programs
+/// call so.
+fn in_the_same_table(key: &str) -> Option<String> {
+    let key = key.to_lowercase();
+    let (table, last) = key.rsplit_once('.')?;
+    // The key of a parameter in this table, if it has the parameter.
+    let own = |pattern: &str| {
+        let full = format!("{table}.{}", last_part(pattern));
+        matches(pattern, &full).then_some(full)
+    };
+    let alike = PARAMS.iter().filter_map(|param| {
+        let full = own(param.key)?;
+        let alike = strsim::jaro_winkler(last, last_part(&full));
+        (last_part(&full).len() > 1 && alike > ALIKE_IN_TABLE).then_some((alike, full))
+    });
+    let alike = alike.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, full)| full);
+    let mut meant = OTHER_WORDS.iter().filter(|(_, words)| words.contains(&last));
+    alike.or_else(|| meant.find_map(|(pattern, _)| own(pattern)))
 }
 
 /// Returns advice on a key that stands in the wrong table. Keys of a table with a similar name go first, then

@@ -1,5 +1,7 @@
 //! Builders of the volume's quads: the scene's own, those of its sheets and those of its splashes.
 
+use std::collections::BTreeSet;
+
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Values;
@@ -48,6 +50,28 @@ pub(super) fn unknown_material(name: &str, materials: &[String]) -> Option<Strin
         Some(near) => format!("did you mean {near}? Otherwise add [materials.{name}]"),
         None => format!("add [materials.{name}], or use one of these: {}", known.join(", ")),
     })
+}
+
+/// Returns a warning about each material of the user's own that nothing has.
+pub(super) fn unused_materials(v: &Values) -> Vec<String> {
+    let users = ["quads", "sheets", "splashes"].into_iter().flat_map(|section| {
+        v.names(section).into_iter().map(move |name| v.text(&format!("{section}.{name}.material")))
+    });
+    let used: BTreeSet<String> = users.collect();
+    let names = v.names("materials").into_iter();
+    let unused = names.filter(|name| {
+        let path = format!("materials.{name}");
+        // A scene without water of its own uses none of the materials of its base.
+        !used.is_empty() && !used.contains(name) && !v.has_base_under(&path)
+    });
+    let warning = |name: String| {
+        let fix = match likeliest(&name, used.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean {near}?"),
+            None => format!("give a sheet, splash or quad material = {name:?}"),
+        };
+        format!("nothing has the material {name}: {fix}")
+    };
+    unused.map(warning).collect()
 }
 
 /// Returns the material that `key` names, and its mist. `what` names the user of the material in messages.

@@ -12,7 +12,7 @@ use super::names::NAMED;
 use super::names::{check_names, full_key, likeliest, unknown_key};
 use super::param::{Kind, PARAMS, Param};
 use super::remove::{self, REMOVE};
-use super::slips::{foreign_signs_at, not_allowed, slip_at};
+use super::slips::{foreign_signs_at, given_twice, not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, presets, quads};
@@ -154,10 +154,9 @@ impl Source {
                 return not_allowed(&file.place(at), &key, &value, param, Some(advice));
             }
             let message = e.message().lines().collect::<Vec<_>>().join(", ");
-            Error::input(
-                format!("{}: {message}", file.place(at).0),
-                "a scene file is TOML, see docs/scenes-and-files.md",
-            )
+            let fix = given_twice(&self.text, at, &message, |byte| file.line(byte))
+                .unwrap_or_else(|| "a scene file is TOML, see docs/scenes-and-files.md".into());
+            Error::input(format!("{}: {message}", file.place(at).0), fix)
         })?;
         let root = root.into_inner();
         file.version(&root)?;
@@ -238,8 +237,12 @@ struct File<'a> {
 
 impl File<'_> {
     fn place(&self, byte: usize) -> Place {
-        let line = 1 + self.newlines.partition_point(|&end| end < byte);
-        Place(format!("{}:{line}", self.source.origin))
+        Place(format!("{}:{}", self.source.origin, self.line(byte)))
+    }
+
+    /// Returns the number of the line that holds a byte.
+    fn line(&self, byte: usize) -> usize {
+        1 + self.newlines.partition_point(|&end| end < byte)
     }
 
     fn version(&self, root: &DeTable) -> Result<()> {

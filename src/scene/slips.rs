@@ -36,6 +36,9 @@ pub fn advice(param: &Param, raw: &Raw) -> Option<String> {
         }
         (Kind::Int(..), Raw::Float(_)) => Some("write a whole number".into()),
         (Kind::Switch(_), Raw::Int(number @ 0..=1)) => Some(format!("write {}", *number == 1)),
+        (Kind::Series | Kind::Frames, Raw::Int(_) | Raw::Float(_)) => {
+            Some(format!("write the list in brackets: [{}]", raw.words()))
+        }
         (_, Raw::Text(text)) => advice_on_text(param, text.trim()),
         (_, Raw::List(items)) => advice_on_list(param.kind, items),
         _ => None,
@@ -106,6 +109,47 @@ fn foreign_signs(line: &str) -> Option<String> {
         }
     }
     None
+}
+
+/// Returns advice on a key or table that a scene file has twice; `message` is what the reader of TOML says of
+/// byte `at`, and `line_of` gives the number of the line of a byte.
+pub fn given_twice(text: &str, at: usize, message: &str, line_of: impl Fn(usize) -> usize) -> Option<String> {
+    if !message.contains("duplicate") {
+        return None;
+    }
+    let start = text.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
+    let own = text.get(start..)?.lines().next()?;
+    let header = |line: &str| {
+        section(line).map(|section| match section {
+            Section::Table(name) => format!("[{name}]"),
+            Section::List(name) => format!("[[{name}]]"),
+        })
+    };
+    let key = |line: &str| line.split_once('=').map(|(key, _)| key.trim().to_owned());
+    let lines: Vec<(usize, &str)> = text[..start]
+        .split_inclusive('\n')
+        .scan(0, |at, line| {
+            let begin = *at;
+            *at += line.len();
+            Some((begin, line))
+        })
+        .collect();
+    let (twice, first) = match header(own) {
+        Some(own) => {
+            let same = |(_, line): &&(usize, &str)| header(line).as_ref() == Some(&own);
+            let first = lines.iter().find(same)?.0;
+            (own, first)
+        }
+        None => {
+            let own = key(own)?;
+            // The table that the key stands in begins with the last header above.
+            let table = lines.iter().rposition(|(_, line)| header(line).is_some()).unwrap_or(0);
+            let same = |(_, line): &&(usize, &str)| key(line).as_ref() == Some(&own);
+            let first = lines[table..].iter().find(same)?.0;
+            (own, first)
+        }
+    };
+    Some(format!("{twice} stands already in line {}; join the two", line_of(first)))
 }
 
 /// Returns the key and value on the line of a scene file that holds byte `at`, and advice on that value.

@@ -6,11 +6,13 @@ use super::param::{Kind, Param};
 use super::read::raw;
 use super::value::Raw;
 
-/// Parses a value of `--set` for a parameter: TOML, otherwise a word. A point or colour needs no brackets,
-/// and a number no digit before or after its point.
+/// Parses a value of `--set` for a parameter: TOML, otherwise a word. A point, a colour or a list of numbers
+/// needs no brackets, and a number no digit before or after its point.
 pub fn parse_for(param: &Param, text: &str) -> Raw {
     match (param.kind, parse_value(text)) {
         (Kind::Color(_) | Kind::Point(_), word @ Raw::Text(_)) => in_brackets(text).unwrap_or(word),
+        (Kind::Series | Kind::Frames, one @ (Raw::Int(_) | Raw::Float(_))) => Raw::List(vec![one]),
+        (Kind::Series | Kind::Frames, word @ Raw::Text(_)) => in_brackets(text).unwrap_or(word),
         (Kind::Float(..), word @ Raw::Text(_)) => {
             let digits = text.chars().any(|c| c.is_ascii_digit());
             text.parse().ok().filter(|_| digits).map_or(word, Raw::Float)

@@ -132,6 +132,12 @@ impl Values {
         self.0.contains_key(&key) && !self.1.contains(&key)
     }
 
+    /// Whether any key under `prefix` has the value of a preset or picture.
+    pub(super) fn has_base_under(&self, prefix: &str) -> bool {
+        let prefix = Key::new(prefix);
+        self.1.range(&prefix..).next().is_some_and(|key| key.0.starts_with(&prefix.0))
+    }
+
     /// Removes every key under `prefix`.
     pub fn clear_under(&mut self, prefix: &str) {
         let prefix = Key::new(prefix);

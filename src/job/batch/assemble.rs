@@ -1,5 +1,6 @@
 //! Makes the files that need all pictures: movies, the contact sheet, manifests.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
@@ -193,7 +194,7 @@ impl Batch {
             let sheet = self.draw_sheet(watcher)?;
             let format = Format::wanted("--sheet", path)?;
             check_side(path, format, Window::whole([sheet.width(), sheet.height()]))?;
-            let bytes = encoded(sheet, format).map_err(|e| Error::write(path, e))?;
+            let bytes = self.encoded(sheet, format).map_err(|e| Error::write(path, e))?;
             Output::create(path)?.finish_with(&bytes)?;
             watcher.event(&Event::Assembled { file: word(path) });
         }
@@ -256,6 +257,58 @@ impl Batch {
             let Shown { size: [width, height], samples } = self.shown(number, 8)?;
             Ok(RgbImage::from_raw(width, height, samples))
         })
+    }
+
+    /// Encodes the sheet with the texts by which [`Batch::check_replaced`] knows it.
+    fn encoded(&self, sheet: RgbImage, format: Format) -> std::io::Result<Vec<u8>> {
+        let (width, height) = sheet.dimensions();
+        let texts =
+            vec![("Software".to_owned(), SOFTWARE.to_owned()), (SHEET_TEXT.to_owned(), self.sheet_text())];
+        let head = Head { format, encoding: Encoding::DISPLAY, size: [width, height], texts };
+        encode(&head, sheet.into_raw())
+    }
+
+    /// Text of the sheet: what it shows. More values of the same sweeps make another sheet of the same text.
+    fn sheet_text(&self) -> String {
+        let keys: Vec<&str> = self.sweeps.iter().map(|sweep| sweep.key.as_str()).collect();
+        let name = self.pictures.first().and_then(|p| p.given().file_name()).unwrap_or_default();
+        format!("{} by {}", name.display(), keys.join(", "))
+    }
+
+    /// Refuses to replace a file that is not the sheet or a manifest of an earlier run of this batch.
+    pub(super) fn check_replaced(&self, path: &Path) -> Result<()> {
+        if real_file(path)?.symlink_metadata().is_err() {
+            return Ok(());
+        }
+        let start = existing::start_of(path).unwrap_or_default();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let (known, own) = match extension.as_deref() {
+            Some("csv") => (start.starts_with(b"number,frame,"), self.is_named_in(path)),
+            Some("json") => (start.starts_with(b"[\n  {\n    \"number\": "), self.is_named_in(path)),
+            _ => (existing::is_ours(path), existing::holds(path, self.sheet_text().as_bytes())),
+        };
+        if known && own || start.is_empty() && path.is_file() {
+            return Ok(());
+        }
+        let why = match known {
+            true => "a file of another batch has this name",
+            false => "a file that taki did not write has this name",
+        };
+        Err(Error::CannotCreate {
+            path: path.to_owned(),
+            why: why.into(),
+            fix: "choose another name with --sheet or --manifest, or replace the file with --overwrite"
+                .into(),
+        })
+    }
+
+    /// Whether a manifest lists a picture of this batch.
+    fn is_named_in(&self, manifest: &Path) -> bool {
+        let Ok(text) = std::fs::read_to_string(manifest) else { return false };
+        // JSON and CSV quote names differently, but both end them with a quote or a comma.
+        let names: HashSet<&str> = text.split(['"', ',', '/', '\\', '\n']).collect();
+        let name = |file: PathBuf| Some(file.file_name()?.to_str()?.to_owned());
+        (0..self.count()).flat_map(|n| self.files(n)).filter_map(name).any(|name| names.contains(&*name))
     }
 
     fn row(&self, number: usize, watcher: &dyn Watcher) -> Result<Row> {
@@ -322,35 +375,8 @@ impl Batch {
     }
 }
 
-/// Encodes the sheet with the program's name, by which [`check_replaced`] recognises it.
-fn encoded(sheet: RgbImage, format: Format) -> std::io::Result<Vec<u8>> {
-    let (width, height) = sheet.dimensions();
-    let texts = vec![("Software".to_owned(), SOFTWARE.to_owned())];
-    let head = Head { format, encoding: Encoding::DISPLAY, size: [width, height], texts };
-    encode(&head, sheet.into_raw())
-}
-
-/// Refuses to replace a file that is not a sheet or manifest written by this program.
-pub(super) fn check_replaced(path: &Path) -> Result<()> {
-    if real_file(path)?.symlink_metadata().is_err() {
-        return Ok(());
-    }
-    let start = existing::start_of(path).unwrap_or_default();
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let ours = match extension.as_deref() {
-        Some("csv") => start.starts_with(b"number,frame,"),
-        Some("json") => start.starts_with(b"[\n  {\n    \"number\": "),
-        _ => existing::is_ours(path),
-    };
-    if ours || start.is_empty() && path.is_file() {
-        return Ok(());
-    }
-    Err(Error::CannotCreate {
-        path: path.to_owned(),
-        why: "a file that taki did not write has this name".into(),
-        fix: "choose another name with --sheet or --manifest, or replace the file with --overwrite".into(),
-    })
-}
+/// Key of the text by which a sheet is told from those of other batches.
+const SHEET_TEXT: &str = "taki.sheet";
 
 /// Whether a manifest is CSV; otherwise it is JSON.
 pub(super) fn is_csv(path: &Path) -> bool {

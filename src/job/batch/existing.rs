@@ -9,6 +9,7 @@ use super::{Batch, stamp};
 use crate::job::still::{SOFTWARE, scene_text, volume_line};
 use crate::job::{Claims, VolumeMemo};
 use crate::output::frame::{Compression, Format, Verified, listed, real_file, verify};
+use crate::output::movie::mark_of;
 use crate::picture::Layer;
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
@@ -36,18 +37,23 @@ pub(super) fn start_of(path: &Path) -> Option<Vec<u8>> {
     Some(start)
 }
 
-/// Whether a file is a picture of this program, whose name then stands in it: near the start, but in a WebP
-/// after the pixels.
+/// Whether a file is a picture of this program, whose name then stands in it.
 pub(super) fn is_ours(path: &Path) -> bool {
+    // Other versions of the program count too.
+    let name = &SOFTWARE.as_bytes()[..SOFTWARE.find(' ').map_or(SOFTWARE.len(), |space| space + 1)];
+    holds(path, name)
+}
+
+/// Whether a file is a picture with `text` among its texts: near the start, but in WebP and TIFF after the
+/// pixels.
+pub(super) fn holds(path: &Path, text: &[u8]) -> bool {
     let start = start_of(path).unwrap_or_default();
     let bytes = match Format::of_start(&start) {
         None => return false,
-        Some(Format::Webp) => std::fs::read(path).unwrap_or(start),
+        Some(Format::Webp | Format::Tiff) => std::fs::read(path).unwrap_or(start),
         Some(_) => start,
     };
-    // Other versions of the program count too.
-    let name = &SOFTWARE.as_bytes()[..SOFTWARE.find(' ').map_or(SOFTWARE.len(), |space| space + 1)];
-    bytes.windows(name.len()).any(|w| w == name)
+    bytes.windows(text.len()).any(|w| w == text)
 }
 
 /// The error for a name that another picture has.
@@ -162,7 +168,10 @@ impl Batch {
                 return Ok(if ours {
                     FileState::Broken(what)
                 } else {
-                    FileState::Other("it is not a picture that taki wrote".into())
+                    FileState::Other(match mark_of(file) {
+                        Some(_) => "it is a movie that taki wrote".into(),
+                        None => "it is not a picture that taki wrote".into(),
+                    })
                 });
             }
             Err(e) => return Err(e),

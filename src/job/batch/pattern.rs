@@ -87,7 +87,8 @@ impl Pattern {
     /// there are sweeps, `{NAME}` for a sweep's value. `names` lists by sweep every name it may have.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the path has no file name, or names a sweep that does not exist.
+    /// [`Error::Usage`] if the path has no file name, names a sweep that does not exist, or has a folder with
+    /// the frame's number.
     pub fn new(path: &Path, names: &[Vec<String>]) -> Result<Pattern> {
         let Some(file) = path.file_name() else {
             return Err(Error::Usage(format!("-o {}: it has no file name", path.display())));
@@ -100,6 +101,15 @@ impl Pattern {
                 .map_err(|why| Error::Usage(format!("-o {}: {why}", path.display())))?,
         }
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let numbered = |part: &&str| Notation::of(part).is_some();
+        let mut folders = folder.components().filter_map(|part| part.as_os_str().to_str());
+        if let Some(part) = folders.find(numbered).filter(|_| !folder.exists()) {
+            return Err(Error::Usage(format!(
+                "-o {}: the frame's number stands in a file's name, not in that of the folder {part}; \
+                 {NUMBER_IT}",
+                path.display()
+            )));
+        }
         Ok(Pattern { given: path.to_owned(), folder, parts })
     }
 

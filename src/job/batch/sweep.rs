@@ -46,6 +46,9 @@ impl Sweep {
                     let point = list.replace(',', ".");
                     return Err(usage(format!("the decimal mark is a point: write {name}={point}")));
                 }
+                _ if is_range_without_step(list) => {
+                    return Err(usage(format!("the step is missing: write {name}={list}:STEP")));
+                }
                 _ => listed(list),
             },
         };
@@ -78,6 +81,12 @@ impl Sweep {
             _ => name,
         }
     }
+}
+
+/// Whether a text is `FIRST:LAST`, which no value of a parameter is.
+fn is_range_without_step(text: &str) -> bool {
+    let is_number = |n: &str| n.trim().replace(',', ".").parse::<f64>().is_ok();
+    text.split_once(':').is_some_and(|(first, last)| is_number(first) && is_number(last))
 }
 
 /// Parses `FIRST:LAST:STEP`. `None` if the text has another form.

@@ -14,12 +14,19 @@ pub(super) fn list(p: [f64; 3]) -> Raw {
     Raw::List(p.into_iter().map(Raw::Float).collect())
 }
 
+/// Parses a typed number. Many people write a comma as its decimal mark.
+fn typed_number(text: &str) -> Option<f64> {
+    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+    text.replace('−', "-").replace(',', ".").parse().ok()
+}
+
 /// Shows three numbers in one row. Returns whether one of them was changed.
 pub(super) fn triple(ui: &mut Ui, key: &str, t: &mut [f64; 3], speed: f64) -> bool {
     let mut changed = false;
     let width = ((ui.available_width() - MARKS_WIDTH) / 3.0 - ui.spacing().item_spacing.x).max(36.0);
     for (x, axis) in t.iter_mut().zip(["x", "y", "z"]) {
         let drag = DragValue::new(x).speed(speed).max_decimals(3).update_while_editing(false).clip_text(true);
+        let drag = drag.custom_parser(typed_number);
         let response = ui.add_sized([width, ui.spacing().interact_size.y], drag);
         name(&response, &format!("{key} {axis}"));
         changed |= response.changed();
@@ -48,7 +55,7 @@ pub(super) fn direction_angles(ui: &mut Ui, key: &str, t: [f64; 3]) -> Option<Ra
             ui.spacing_mut().slider_width = slider_width(ui);
             let before = *angle;
             let slider = Slider::new(angle, range).suffix("°").max_decimals(1).update_while_editing(false);
-            let response = ui.add(slider);
+            let response = ui.add(slider.custom_parser(typed_number));
             name(&response, &format!("{key} {label}"));
             // A slider rounds its value to one decimal, which alone is no change.
             changed |= response.changed() && (*angle - before).abs() > 0.051;
@@ -116,6 +123,7 @@ impl Field<'_> {
             .smallest_positive((high * 1e-4).min(default.abs() * 0.1).max(1e-6))
             .clamping(SliderClamping::Never)
             .max_decimals(4)
+            .custom_parser(typed_number)
             .update_while_editing(false)
             .suffix(self.suffix());
         let response = ui.add(slider);

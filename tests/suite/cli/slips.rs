@@ -540,3 +540,26 @@ fn a_seed_beside_a_volume_file_is_told_to_have_no_effect() {
     }
     assert!(at(&["scene", "front", "--seed", "5"]).lines("taki: warning").is_empty());
 }
+
+#[test]
+fn settings_that_no_file_of_the_run_holds_are_told() {
+    let dir = tempdir().unwrap();
+    let said = |arguments: &[&str]| {
+        let small = ["--engine=cpu", "--size=8x8", "--samples=1", "--overwrite"];
+        let run = run(taki(arguments).args(small).current_dir(&dir));
+        run.done();
+        run.lines("taki: warning:").concat()
+    };
+    for setting in ["exposure=1", "tone=none", "dither=none", "image.temperature=5000"] {
+        let only = said(&["render", "front", "-o", "a.exr", "--set", setting]);
+        assert!(only.contains("has no effect: EXR files hold the light before it"), "{setting}: {only}");
+        assert_eq!(said(&["render", "front", "-o", "a.exr", "-o", "a.png", "--set", setting]), "");
+        let batch = said(&["batch", "front", "--frames=0", "-o", "b.#.exr", "--set", setting]);
+        assert!(batch.contains("has no effect"), "{setting}: {batch}");
+    }
+    let wide = "image.primaries=rec2020";
+    assert!(said(&["render", "front", "-o", "a.png", "--set", wide]).contains("sRGB; add --linear"));
+    assert_eq!(said(&["render", "front", "-o", "a.exr", "--set", wide]), "");
+    let linear = ["--linear", "--set", "tone=none"];
+    assert_eq!(said(&[&["render", "front", "-o", "a.png", "--set", wide][..], &linear].concat()), "");
+}

@@ -178,7 +178,7 @@ fn every_choice_and_material_can_be_chosen() {
 #[test]
 fn a_typed_number_is_taken_when_the_field_is_left_and_may_lie_beyond_the_slider() {
     let mut window = open_groups();
-    for (text, want) in [("17.5", 17.5), ("450", 450.0), ("-3", 0.0)] {
+    for (text, want) in [("17.5", 17.5), ("0,5", 0.5), ("450", 450.0), ("-3", 0.0)] {
         window.widget(Role::SpinButton, "trace.sigma").focus();
         window.harness.run_steps(2);
         window.chord(Modifiers::COMMAND, Key::A);

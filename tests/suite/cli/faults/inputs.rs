@@ -164,6 +164,18 @@ fn a_volume_is_built_only_under_its_own_ending() {
 }
 
 #[test]
+fn a_volume_is_not_built_onto_the_file_it_is_read_from() {
+    let dir = tempdir().unwrap();
+    small_volume(&dir.path().join("v.npz"));
+    let before = fs::read(dir.path().join("v.npz")).unwrap();
+    for output in ["v.npz", "./v.npz"] {
+        let build = ["volume", "build", "front", "--set", "volume.file=v.npz", "-o", output];
+        run(taki(build).current_dir(&dir)).refused(2, &[output, "reads its volume from this file"]);
+    }
+    assert!(fs::read(dir.path().join("v.npz")).unwrap() == before);
+}
+
+#[test]
 fn an_empty_table_over_parts_of_the_base_is_refused_with_the_way_out() {
     let dir = tempdir().unwrap();
     let scene = dir.path().join("s.toml");

@@ -101,3 +101,13 @@ fn a_reader_that_has_gone_is_no_error() {
     }
     is_picture(&dir.path().join("front.0000.png"));
 }
+
+#[test]
+fn a_file_that_grows_past_the_users_limit_is_an_error_and_leaves_nothing() {
+    let dir = tempdir().unwrap();
+    let mut command = taki(["render", "front", "-o", "p.exr"]);
+    command.args(["--engine=cpu", "--size=256x256", "--samples=1"]);
+    let limited = run(in_shell("ulimit -f 16;", "", &command).current_dir(&dir));
+    limited.refused(74, &["cannot write p.exr", "File too large"]);
+    assert!(fs::read_dir(dir.path()).unwrap().next().is_none());
+}

@@ -135,10 +135,13 @@ fn movies_and_sheets_are_made_of_any_format() {
         let table = fs::read_to_string(sheets.path().join("m.csv")).unwrap();
         assert!(table.starts_with(&format!("number,frame,curves.h,{kind},")), "{table}");
         assert!(table.lines().nth(1).is_some_and(|row| !row.contains(",,")), "{table}");
-        // A sheet is replaced by its own kind, without being asked.
+        // The same batch replaces its sheet without being asked, and another one does not.
+        let more = ["--sweep", "h=0.5,1,1.5", "-o", &pattern, "--sheet", &sheet, "--manifest", "m.csv"];
+        run(&mut batch(sheets.path(), more)).done();
+        assert!(read_picture(&path).expect("a sheet") != drawn);
         let other = format!("b{pattern}");
         let again = ["--sweep", "h=0.5,1", "-o", &other, "--sheet", &sheet, "--manifest", "m.csv"];
-        run(&mut batch(sheets.path(), again)).done();
+        run(&mut batch(sheets.path(), again)).refused(73, &["a file of another batch has this name"]);
     }
 }
 

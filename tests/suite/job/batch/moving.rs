@@ -5,7 +5,7 @@ use std::fs;
 use image::AnimationDecoder;
 
 use super::{batch, files, folder};
-use crate::cli::faults::{Run, run};
+use crate::cli::faults::{Run, run, taki};
 
 fn frames_of_gif(bytes: &[u8]) -> usize {
     let mut options = gif::DecodeOptions::new();
@@ -89,4 +89,14 @@ fn what_a_movie_needs_is_known_before_the_work() {
     missing.refused(69, &["ffmpeg"]);
     run(&mut batch(dir.path(), ["--loop", "3", "--fps", "60", "-o", "f.gif"])).refused(73, &["f.gif", "50"]);
     assert!(files(dir.path()).is_empty());
+}
+
+#[test]
+fn a_movie_in_the_place_of_a_picture_is_called_one() {
+    let dir = folder();
+    run(&mut batch(dir.path(), ["--frames", "0-1", "-o", "w.png"])).done();
+    let still = run(&mut batch(dir.path(), ["--frames", "0", "-o", "w.png"]));
+    still.refused(73, &["w.png", "it is a movie that taki wrote"]);
+    let render = run(taki(["render", "front", "-o", "w.mp4"]).current_dir(&dir));
+    render.refused(2, &["-o w.mp4: taki batch makes movies"]);
 }

@@ -196,3 +196,24 @@ fn a_batch_whose_names_lack_the_number_is_told_so_first() {
     }
     assert!(files(dir.path()).is_empty());
 }
+
+#[test]
+fn a_number_in_the_wrong_place_is_told() {
+    let dir = folder();
+    let frames = |name: &str| run(&mut batch(dir.path(), ["--frames", "0-1", "-o", name]));
+    for name in ["out_####/w.####.png", "%04d/w.####.png", "a/$F4/w.png"] {
+        frames(name).refused(2, &[name, "not in that of the folder", "put ####"]);
+    }
+    // A folder that is really called so may be meant.
+    std::fs::create_dir(dir.path().join("##")).unwrap();
+    frames("##/w.##.png").done();
+    let one = frames("w.0000.png");
+    one.done();
+    assert!(
+        one.stderr().contains("w.0000.png becomes one animated PNG, because 0000 is the same"),
+        "{one:?}"
+    );
+    let plain = frames("w2.png");
+    plain.done();
+    assert!(plain.lines("taki: warning:").is_empty(), "{plain:?}");
+}

@@ -31,6 +31,7 @@ fn sweeps_that_cannot_be_are_refused_with_the_reason() {
     let cases = [
         ("alpha", 2, "the values are missing"),
         ("alpha=", 2, "0 values"),
+        ("alpha=0.25:1", 2, "the step is missing: write alpha=0.25:1:STEP"),
         ("alpha=0:1:0", 2, "steps of 0 do not lead"),
         ("alpha=1:0:0.1", 2, "steps of 0.1 do not lead"),
         ("alpha=0:1:0.00001", 2, "at most 1000"),
@@ -165,4 +166,29 @@ fn frames_of_a_sweep_have_a_table_too() {
     let starts: Vec<&str> =
         text.lines().skip(1).map(|l| l.split(",1.").next().unwrap().split(",0.6.").next().unwrap()).collect();
     assert_eq!(starts.len(), 4, "{text}");
+}
+
+#[test]
+fn a_sweep_replaces_its_own_sheet_and_manifests_and_no_others() {
+    let dir = folder();
+    let sweep = |arguments: &[&str]| run(&mut batch(dir.path(), arguments));
+    let alpha = ["--sweep", "alpha=0.5,1", "-o", "a{alpha}.png"];
+    sweep(&alpha).done();
+    let first = files(dir.path());
+    let h = ["--sweep", "h=0.6,1", "-o", "h{h}.png"];
+    sweep(&h).refused(73, &["front.sheet.png", "a file of another batch", "--sheet"]);
+    let named = [&h[..], &["--sheet", "h.png"]].concat();
+    sweep(&named).refused(73, &["front.manifest.csv", "a file of another batch"]);
+    assert!(files(dir.path()) == first, "nothing was written");
+    sweep(&[&named[..], &["--manifest", "h.csv"]].concat()).done();
+    // A picture of taki is no sheet.
+    let picture = ["--sheet", "a1.png", "--manifest", "h.csv"];
+    sweep(&[&h[..], &picture].concat()).refused(73, &["a1.png"]);
+    // More values make the same sheet larger.
+    sweep(&["--sweep", "alpha=0.25,0.5,1", "-o", "a{alpha}.png"]).done();
+    let second = files(dir.path());
+    assert!(second["front.manifest.csv"].len() > first["front.manifest.csv"].len());
+    assert!(second["front.sheet.png"] != first["front.sheet.png"]);
+    sweep(&[&h[..], &["--overwrite"]].concat()).done();
+    assert!(files(dir.path())["front.manifest.json"] != second["front.manifest.json"]);
 }
