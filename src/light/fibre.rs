@@ -9,6 +9,7 @@
 
 use glam::Vec3;
 
+use crate::util::powers::pow;
 use crate::volume::Moments;
 
 /// Metric in which a cell's direction v is measured, constant along one ray (§3).
@@ -43,10 +44,10 @@ pub fn fibre_angles(t_dot_l: f32, t_dot_e: f32, inverse_q: f32) -> (f32, f32) {
 /// Returns x^p for x ≥ 0.
 ///
 /// A whole p from 1 to 255 is computed by repeated squaring, as the shader specialised to p does; there it
-/// costs a third of `pow`. Any other p uses `powf`.
+/// costs a third of `pow`.
 pub fn specular_power(x: f32, p: f32) -> f32 {
     let Some(mut bits) = whole_exponent(p) else {
-        return x.powf(p);
+        return pow(x, p);
     };
     let (mut power, mut result) = (x, 1.0);
     while bits != 0 {
@@ -147,6 +148,6 @@ impl Spread {
         // accounts for the variance already, so it is added back here.
         let base = (root - product + 0.5 * variance).clamp(0.0, 1.0);
         let wide = 1.0 + p * variance;
-        k_d * sin2_l.sqrt() + k_s * base.powf(p / wide) / wide.sqrt()
+        k_d * sin2_l.sqrt() + k_s * pow(base, p / wide) / wide.sqrt()
     }
 }

@@ -24,6 +24,7 @@ pub use splash::Splash;
 pub use view::PlaneView;
 
 /// Cross product of two vectors in a plane: its component along the normal.
+#[inline]
 pub fn cross(a: Vec2, b: Vec2) -> f32 {
     a.x * b.y - a.y * b.x
 }
@@ -120,11 +121,13 @@ impl QuadMap {
     }
 
     /// Point at (u, v) in the plane, metres from A.
+    #[inline]
     pub fn point(&self, u: f32, v: f32) -> Vec2 {
         self.e * u + self.f * v + self.g * (u * v)
     }
 
     /// Point at (u, v) in the world, metres.
+    #[inline]
     pub fn point_world(&self, u: f32, v: f32) -> Vec3 {
         let p = self.point(u, v);
         self.a_world + self.e1_world * p.x + self.e2_world * p.y
@@ -179,6 +182,7 @@ pub struct CellFrame {
 
 impl CellFrame {
     /// Jacobian at the texture coordinates (u, v), for a volume of `size` cells.
+    #[inline]
     pub fn new(quad: &QuadMap, material: &Material, size: [u32; 3], uv: Vec2) -> Self {
         let cx = (quad.e + quad.g * uv.y) / (material.repeat_u * size[0] as f32);
         let cy = (quad.f + quad.g * uv.x) / (material.repeat_v * size[1] as f32);
@@ -186,6 +190,7 @@ impl CellFrame {
     }
 
     /// d_cell = J⁻¹·d, where d is given in the plane's axes e1, e2 and seen normal.
+    #[inline]
     pub fn cell_from_plane(&self, d: Vec3) -> Vec3 {
         let d2 = d.truncate();
         Vec3::new(cross(d2, self.cy) / self.det, cross(self.cx, d2) / self.det, -d.z / self.depth)
@@ -193,6 +198,7 @@ impl CellFrame {
 
     /// Jᵀ·d, where d is given in the plane's axes. The dot product of this vector with a direction v in cells
     /// is (J·v)·d.
+    #[inline]
     pub fn transposed(&self, d: Vec3) -> Vec3 {
         let d2 = d.truncate();
         Vec3::new(self.cx.dot(d2), self.cy.dot(d2), -self.depth * d.z)

@@ -187,6 +187,7 @@ impl Camera {
 
     /// The point (X, Y) of the image at `offset` pixels from the top left corner of a pixel: −1 to 1 from
     /// left to right and from bottom to top. Twin: `image_point` in `shaders/layout.wgsl`.
+    #[inline]
     pub fn image_point(width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec2 {
         Vec2::new(
             2.0 * (pixel[0] as f32 + offset[0]) / width as f32 - 1.0,
@@ -195,6 +196,7 @@ impl Camera {
     }
 
     /// Vector from the eye to the point `at` of the image plane at distance 1.
+    #[inline]
     pub fn ray_to(&self, width: u32, height: u32, at: Vec2) -> Vec3 {
         let [forward, right, up] = self.rays(width, height).map(|v| v.as_vec3());
         forward + right * at.x + up * at.y
@@ -202,6 +204,7 @@ impl Camera {
 
     /// Unit direction through a pixel of the whole image, at `offset` pixels from the pixel's top left
     /// corner. Twin: `view_ray` in `shaders/layout.wgsl`.
+    #[inline]
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
         let d = self.ray_to(width, height, Self::image_point(width, height, pixel, offset));
         d / d.dot(d).sqrt()

@@ -47,6 +47,7 @@ impl<'a> Level<'a> {
     }
 
     /// Depth of one cell of the level, in cells of the volume.
+    #[inline]
     pub fn depth_in_cells(&self) -> f32 {
         1.0 / self.scale.z
     }
@@ -137,6 +138,7 @@ pub struct CellSample {
 ///
 /// `footprint` is the solid angle of one sample at the image centre, in sr; `forward` and `d_world` are unit
 /// vectors; `t` is the distance along the ray in metres; `d_cell` is the ray's direction in cells per metre.
+#[inline]
 pub fn level_at(
     footprint: f32,
     forward: Vec3,

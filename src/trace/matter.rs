@@ -34,6 +34,7 @@ pub struct SheetDensity {
 
 impl SheetDensity {
     /// Density map at the texture coordinates `uv` of a quad, for the volume's own cells.
+    #[inline]
     pub fn new(quad: &Quad, uv: Vec2) -> Self {
         let [a, b, c, d] = quad.erosion;
         let near = a + (b - a) * uv.x;
@@ -53,6 +54,7 @@ impl SheetDensity {
 
     /// Density map at `uv` for cells of a coarse level. ρ of a coarse cell belongs to none of the cells in
     /// it, so erosion scales it by the mean loss instead of subtracting e.
+    #[inline]
     pub fn of_coarse(quad: &Quad, uv: Vec2) -> Self {
         let matter = SheetDensity::new(quad, uv);
         match quad.mist > 0.0 {
@@ -62,6 +64,7 @@ impl SheetDensity {
     }
 
     /// Whether empty cells stay empty. Mist fills them.
+    #[inline]
     pub fn keeps_empty(&self) -> bool {
         self.shift <= 0.0
     }
@@ -73,6 +76,12 @@ impl SheetDensity {
     #[inline]
     pub fn rho(&self, code: f32) -> f32 {
         (code * self.scale + self.shift).max(0.0)
+    }
+
+    /// Factor and summand of [`SheetDensity::rho`].
+    #[inline]
+    pub fn line(&self) -> [f32; 2] {
+        [self.scale, self.shift]
     }
 
     /// Optical depth from the centre of a mist cell in layer `z` of `layers` to the point where the light ray
@@ -96,6 +105,7 @@ impl SheetDensity {
 /// The paper's ρ is clamp(N + ½, 0, 1) with N a standard normal variable.
 /// The exact value is 2∫_e^1 Φ(½ − x) dx. Φ is linear to within 0.002 from Φ(½) = 0.6915 to Φ(−½) = 0.3085,
 /// and the linear Φ gives (1 − e)(1 − [`MEAN_EROSION`] e).
+#[inline]
 fn mean_left(e: f32) -> f32 {
     (1.0 - e) * (1.0 - MEAN_EROSION * e)
 }

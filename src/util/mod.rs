@@ -1,11 +1,12 @@
-//! Foundations that every other module builds on: errors, progress, random numbers, the disk cache, unit
-//! vectors, parts of an image, colour spaces, and EXR files of any program.
+//! Foundations that every other module builds on: errors, progress, random numbers, powers, the disk cache,
+//! unit vectors, parts of an image, colour spaces, and EXR files of any program.
 
 pub mod cache;
 pub mod colour;
 pub mod error;
 pub mod monitor;
 pub mod open_exr;
+pub mod powers;
 pub mod random;
 pub mod unit;
 pub mod window;

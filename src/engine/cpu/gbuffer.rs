@@ -41,9 +41,14 @@ impl Gbuffer {
     /// Iterates over the quads under pixel `i` in order of depth: the quad's number, and u, v and metres from
     /// the eye.
     pub fn faces(&self, i: usize) -> impl Iterator<Item = (usize, [f32; 3])> {
-        let own = i * self.layers..(i + 1) * self.layers;
-        let ids = self.quad_id[own.clone()].iter().take_while(|&&id| id != 0);
-        ids.zip(&self.surface[own]).map(|(&id, &hit)| (id as usize - 1, hit))
+        (0..).map_while(move |layer| self.face(i, layer))
+    }
+
+    /// One of [`Gbuffer::faces`], given by its position.
+    pub fn face(&self, i: usize, layer: usize) -> Option<(usize, [f32; 3])> {
+        let at = i * self.layers + layer;
+        let id = if layer < self.layers { self.quad_id[at] } else { 0 };
+        (id != 0).then(|| (id as usize - 1, self.surface[at]))
     }
 }
 

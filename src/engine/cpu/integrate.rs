@@ -2,6 +2,7 @@
 //! `shaders/engine/integrate.wgsl`, with the same operations in the same order.
 
 mod light;
+mod lockstep;
 mod walk;
 
 use glam::{Vec2, Vec3};
@@ -22,8 +23,10 @@ use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells}
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
-use crate::walk::Crossing;
-use walk::LevelResult;
+use crate::walk::{Crossing, floor_cell};
+pub use lockstep::Lanes;
+use lockstep::Lockstep;
+use walk::{LevelResult, Lit};
 
 /// Everything that the rays of a frame share.
 pub struct Integrator<'a> {
@@ -46,6 +49,7 @@ pub struct Integrator<'a> {
     /// Index of each quad's medium in `media`.
     medium_of_quad: Vec<u32>,
     haze: EyeHaze,
+    lanes: Lanes,
 }
 
 /// The result of one ray.
@@ -116,6 +120,36 @@ struct SheetOrder {
     behind: Vec3,
 }
 
+/// A ray through a pixel, on its way through the sheets.
+struct PixelRay {
+    /// Index of the pixel in the targets of the raster pass.
+    i: usize,
+    d: Vec3,
+    /// Linear radiance behind all sheets.
+    behind: Vec3,
+    /// Share of a backdrop that shows behind them.
+    shows: f32,
+    /// Result so far.
+    all: RayResult,
+    /// Number of sheets passed.
+    sheets: usize,
+    /// Whether the ray ended in the last of them.
+    ended: bool,
+}
+
+impl PixelRay {
+    /// The quad that the ray meets next, the point where it does, and the sheet's position.
+    #[inline]
+    fn next_sheet(&self, gbuffer: &Gbuffer) -> Option<(usize, [f32; 3], SheetOrder)> {
+        if self.ended {
+            return None;
+        }
+        let (quad, hit) = gbuffer.face(self.i, self.sheets)?;
+        let is_last = gbuffer.face(self.i, self.sheets + 1).is_none();
+        Some((quad, hit, SheetOrder { before: self.all.transmittance, is_last, behind: self.behind }))
+    }
+}
+
 impl<'a> Integrator<'a> {
     /// Prepares a scene and its volume for many rays. With cached visibility the light volumes come from
     /// `cache`, which fills them if they changed; otherwise `cache` drops the old ones.
@@ -171,6 +205,7 @@ impl<'a> Integrator<'a> {
             media: scene.media(volume),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
+            lanes: Lanes::best(),
             levels,
         }
     }
@@ -178,6 +213,11 @@ impl<'a> Integrator<'a> {
     /// Returns the scene.
     pub fn scene(&self) -> &'a Scene {
         self.scene
+    }
+
+    /// Returns the integrator with other lanes for [`Integrator::pixels`].
+    pub fn with_lanes(self, lanes: Lanes) -> Self {
+        Integrator { lanes, ..self }
     }
 
     /// Traces sample `sample` of a pixel, given by column and row of the whole image. The pixel lies inside
@@ -189,31 +229,73 @@ impl<'a> Integrator<'a> {
         sample: u32,
         observer: &mut O,
     ) -> RayResult {
+        let mut ray = match self.pixel_ray(gbuffer, pixel, sample) {
+            Ok(ray) => ray,
+            Err(dry) => return dry,
+        };
+        while let Some((quad, hit, order)) = ray.next_sheet(gbuffer) {
+            observer.sheet();
+            let sheet = self.sheet(quad, ray.d, hit, order, observer);
+            self.add(&mut ray, sheet);
+        }
+        self.seen(gbuffer, ray)
+    }
+
+    /// Traces sample `sample` of several pixels inside the window of `gbuffer`, each with the result of
+    /// [`Integrator::pixel`], and calls `result` with the position of each in the list.
+    pub fn pixels(
+        &self,
+        gbuffer: &Gbuffer,
+        pixels: &[[u32; 2]],
+        sample: u32,
+        mut result: impl FnMut(usize, RayResult),
+    ) {
+        match Lockstep::of(self) {
+            Some(mut lockstep) => lockstep.pixels(gbuffer, pixels, sample, &mut result),
+            None => pixels
+                .iter()
+                .enumerate()
+                .for_each(|(i, &pixel)| result(i, self.pixel(gbuffer, pixel, sample, &mut ()))),
+        }
+    }
+
+    /// Ray of a pixel before its first sheet, or its result if it meets none.
+    #[inline]
+    fn pixel_ray(
+        &self,
+        gbuffer: &Gbuffer,
+        pixel: [u32; 2],
+        sample: u32,
+    ) -> std::result::Result<PixelRay, RayResult> {
         let image = &self.scene.image;
         let i = gbuffer.window.index(pixel);
         let behind = Vec3::from_slice(&gbuffer.opaque[i]);
         let shows = gbuffer.normal[i].w;
-        let mut faces = gbuffer.faces(i).peekable();
-        if faces.peek().is_none() {
-            return RayResult { radiance: behind, transmittance: 1.0, uncovered: shows, cells: [0, 0] };
+        if gbuffer.face(i, 0).is_none() {
+            return Err(RayResult { radiance: behind, transmittance: 1.0, uncovered: shows, cells: [0, 0] });
         }
         let offset = sample_offset(image, sample);
         let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
-        let mut all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
-        while let Some((quad, hit)) = faces.next() {
-            observer.sheet();
-            let is_last = faces.peek().is_none();
-            let order = SheetOrder { before: all.transmittance, is_last, behind };
-            let sheet = self.sheet(quad, d, hit, order, observer);
-            all.radiance += sheet.radiance;
-            all.transmittance = sheet.transmittance;
-            all.cells = [0, 1].map(|c| all.cells[c] + sheet.cells[c]);
-            if all.transmittance < self.scene.trace.early_end {
-                break;
-            }
-        }
+        let all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
+        Ok(PixelRay { i, d, behind, shows, all, sheets: 0, ended: false })
+    }
+
+    /// Adds a sheet to those that a ray has passed.
+    #[inline]
+    fn add(&self, ray: &mut PixelRay, sheet: RayResult) {
+        ray.all.radiance += sheet.radiance;
+        ray.all.transmittance = sheet.transmittance;
+        ray.all.cells = [0, 1].map(|c| ray.all.cells[c] + sheet.cells[c]);
+        ray.sheets += 1;
+        ray.ended = ray.all.transmittance < self.scene.trace.early_end;
+    }
+
+    /// Result of a ray that has passed all its sheets.
+    #[inline]
+    fn seen(&self, gbuffer: &Gbuffer, ray: PixelRay) -> RayResult {
+        let PixelRay { i, d, behind, shows, mut all, .. } = ray;
         if self.haze.density != 0.0
-            && let Some((_, [.., t])) = gbuffer.faces(i).next()
+            && let Some((_, [.., t])) = gbuffer.face(i, 0)
         {
             let haze = self.haze.transmittance(d.y, t);
             all.radiance = self.haze.over_water(all.radiance, behind, all.transmittance, haze);
@@ -254,13 +336,27 @@ impl<'a> Integrator<'a> {
             let next = self.walk(&ray, &Level::in_pyramid(&self.levels, level + 1), before, observer);
             result = result.mixed(next, share);
         }
-        let LevelResult { transmittance, lights, cells } = result;
+        let LevelResult { transmittance, lit, cells } = result;
+        self.composed(&ray, transmittance, cells, &lit, SheetOrder { before, is_last, behind })
+    }
+
+    /// Result of a sheet that lets `transmittance` pass, in which the lights send `lit` to the eye.
+    #[inline]
+    fn composed(
+        &self,
+        ray: &SheetHit,
+        transmittance: f32,
+        cells: [u32; 2],
+        lit: &[Lit],
+        SheetOrder { before, is_last, behind }: SheetOrder,
+    ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
         let mut radiance = self.scene.ambient * (before - transmittance) + passed;
-        for light in &lights {
-            let sum = if self.in_colour() { light.colour } else { Vec3::splat(light.sum * (1.0 / 255.0)) };
-            radiance += light.intensity * sum;
+        for (light, lit) in self.lights.iter().zip(lit) {
+            let (_, intensity) = light.at(ray.point);
+            let sum = if self.in_colour() { lit.colour } else { Vec3::splat(lit.sum * (1.0 / 255.0)) };
+            radiance += intensity * sum;
         }
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
@@ -271,17 +367,20 @@ impl<'a> Integrator<'a> {
     }
 
     /// Whether the light of a cell has a colour of its own.
+    #[inline]
     fn in_colour(&self) -> bool {
         self.strand.is_some() || self.media.is_some()
     }
 
     /// Extinction in the cells of a level.
+    #[inline]
     fn extinction_in(&self, level: &Level) -> f32 {
         if self.per_cell { self.extinction * level.depth_in_cells() } else { self.extinction }
     }
 
     /// Maps a ray to the cells of quad number `number`, which it meets at `hit` = (u, v, metres from the
     /// eye).
+    #[inline]
     fn sheet_hit(&self, number: usize, d_world: Vec3, hit: [f32; 3]) -> SheetHit<'_> {
         let scene = self.scene;
         let quad = &scene.quads[number];
@@ -326,16 +425,19 @@ impl<'a> Integrator<'a> {
     }
 
     /// Returns the point on the face z = 0 where the walk begins, in cells, inside the tile.
+    #[inline]
     fn face_point(&self, quad: &Quad, uv: Vec2) -> Vec3 {
         let [nx, ny, _] = self.levels[0].size.map(|n| n as f32);
         let x = (uv.x * quad.material.repeat_u + quad.offset.x) * nx;
         // After the volume has moved down the flow, the ray meets a point further up in it.
         let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - self.flow_cells;
-        Vec3::new(x - nx * (x / nx).floor(), y - ny * (y / ny).floor(), 0.0)
+        let copy = |at: f32, n: f32| floor_cell(at / n) as f32;
+        Vec3::new(x - nx * copy(x, nx), y - ny * copy(y, ny), 0.0)
     }
 
     /// Returns the finer of the two levels whose cells suit the ray `t` metres from the eye, and the share of
     /// the coarser.
+    #[inline]
     fn level_of(&self, ray: &SheetHit, t: f32) -> (u32, f32) {
         if self.scene.trace.filter == Prefilter::None {
             return (0, 0.0);

@@ -116,16 +116,15 @@ pub fn render_with(
                 .zip(uncovered)
                 .zip(band.y..band.bottom())
                 .try_for_each(|(((radiance, counts), uncovered), y)| {
-                    for x in 0..width {
-                        let pixel = [band.x + x as u32, y];
-                        let result = integrator.pixel(&gbuffer, pixel, sample, &mut ());
+                    let row: Vec<[u32; 2]> = (band.x..band.right()).map(|x| [x, y]).collect();
+                    integrator.pixels(&gbuffer, &row, sample, |x, result| {
                         let new = result.radiance.extend(result.transmittance).to_array();
                         radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
                         counts[x] = [0, 1].map(|c| counts[x][c] + result.cells[c]);
                         if let Some(sum) = uncovered.get_mut(x) {
                             *sum += result.uncovered;
                         }
-                    }
+                    });
                     let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
                     monitor.progress("pixels", pixels, total)
                 })?;

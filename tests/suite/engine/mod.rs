@@ -6,6 +6,7 @@ pub mod exposure;
 pub mod far;
 pub mod gpu;
 pub mod layers;
+pub mod lockstep;
 pub mod long_walks;
 pub mod overlap;
 pub mod ray;

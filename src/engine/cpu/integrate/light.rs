@@ -10,6 +10,7 @@ use crate::light::visibility::{Form, LightVolumes, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Visibility};
 use crate::trace::SheetDensity;
 use crate::trace::lookup::Level;
+use crate::util::powers::{exp2, log2};
 use crate::walk::NEVER;
 
 /// Terms of one light that are constant along a ray.
@@ -18,50 +19,44 @@ pub struct RayLight {
     /// Jᵀl, or J⁻¹l normalised.
     pub l_v: Vec3,
     /// J⁻¹l, in the level's cells.
-    l_cell: Vec3,
-    corners: PatchCorners,
+    pub l_cell: Vec3,
+    pub corners: PatchCorners,
     pub intensity: Vec3,
-    /// Light sent to the eye so far, in 255ths of `intensity`; for cells without a colour of their own.
-    pub sum: f32,
-    /// Light sent to the eye so far, relative to `intensity`; for cells with a colour of their own.
-    pub colour: Vec3,
     /// Cosine between light and eye, in the frame where angles are measured.
     pub l_dot_e: f32,
-    /// Row of the profile of multiple scattering.
+}
+
+/// Terms of multiple scattering of one light that are constant along a ray.
+#[derive(Clone, Copy)]
+pub struct RayScatter {
+    /// Row of the profile.
     pub row: Row,
-    /// Gain and fill of multiple scattering.
+    /// Gain and fill.
     pub gain: Vec4,
-    /// Forward peaks of the orders of multiple scattering.
+    /// Forward peaks of the orders.
     pub peak: [f32; ORDERS - 1],
 }
 
 /// The light volumes at the corners of a patch, and the ray's position in the patch.
 #[derive(Clone, Copy, Default)]
-struct PatchCorners {
+pub struct PatchCorners {
     /// Numbers of the light volumes at (0, 0), (1, 0), (0, 1) and (1, 1) of the patch; all equal if it has
     /// one.
-    numbers: [u32; 4],
+    pub numbers: [u32; 4],
     /// Position in the patch, 0 to 1.
-    at: Vec2,
+    pub at: Vec2,
     /// Whether rays walk to the light instead, because it is too close.
-    marched: bool,
+    pub marched: bool,
 }
 
 impl Integrator<'_> {
     /// Computes the terms of all lights for a ray in a level of the volume.
-    pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> Vec<RayLight> {
+    #[inline]
+    pub(super) fn ray_lights(&self, ray: &SheetHit, level: &Level) -> impl Iterator<Item = RayLight> {
         let texture_frame = self.scene.angles == AngleFrame::Texture;
-        let medium = self.medium_of(ray.quad);
-        // Cosines with the slab's normal; with per-cell attenuation in the sense of `Row::new`.
-        let slab = |in_cells: Vec3, cosine: f32| {
-            let c = in_cells.abs();
-            if self.per_cell { -in_cells.z / (c.x + c.y + c.z) } else { cosine }
-        };
-        let e_n = slab(-ray.d_cell, -ray.side * ray.d_world.dot(ray.map.n_world));
-        let terms = |(i, light): (usize, &crate::light::Light)| {
+        let terms = move |(i, light): (usize, &crate::light::Light)| {
             let (to_light, intensity) = light.at(ray.point);
-            let l_n = to_light.dot(ray.map.n_world) * ray.side;
-            let l = Vec3::new(to_light.dot(ray.map.e1_world), to_light.dot(ray.map.e2_world), l_n);
+            let l = self.in_plane(ray, to_light);
             let l_cell = ray.frame.cell_from_plane(l);
             let l_v =
                 if texture_frame { l_cell / l_cell.dot(l_cell).sqrt() } else { ray.frame.transposed(l) };
@@ -69,16 +64,36 @@ impl Integrator<'_> {
                 Some(volumes) => patch_corners(volumes, ray.quad, i, ray.uv),
                 None => PatchCorners::default(),
             };
-            let cosine = to_light.dot(ray.d_world);
-            let l_dot_e = if texture_frame { l_v.dot(ray.e_v) } else { -cosine };
-            let row = Row::new(slab(l_cell, l_n), self.levels[0].size[2]);
-            let gain = medium.map_or(Vec4::ZERO, |m| m.profile.gain(&row, e_n));
-            let peak = forward_peak(medium.map_or(0.0, |m| m.similarity.g), cosine);
-            let (sum, colour) = (0.0, Vec3::ZERO);
-            let l_cell = l_cell * level.scale;
-            RayLight { l_v, l_cell, corners, intensity, sum, colour, l_dot_e, row, gain, peak }
+            let l_dot_e = if texture_frame { l_v.dot(ray.e_v) } else { -to_light.dot(ray.d_world) };
+            RayLight { l_v, l_cell: l_cell * level.scale, corners, intensity, l_dot_e }
         };
-        self.lights.iter().enumerate().map(terms).collect()
+        self.lights.iter().enumerate().map(terms)
+    }
+
+    /// Computes the terms of multiple scattering of all lights for a ray.
+    pub(super) fn ray_scatter(&self, ray: &SheetHit) -> Option<Vec<RayScatter>> {
+        let medium = self.medium_of(ray.quad)?;
+        // Cosines with the slab's normal; with per-cell attenuation in the sense of `Row::new`.
+        let slab = |in_cells: Vec3, cosine: f32| {
+            let c = in_cells.abs();
+            if self.per_cell { -in_cells.z / (c.x + c.y + c.z) } else { cosine }
+        };
+        let e_n = slab(-ray.d_cell, -ray.side * ray.d_world.dot(ray.map.n_world));
+        let terms = |light: &crate::light::Light| {
+            let (to_light, _) = light.at(ray.point);
+            let l = self.in_plane(ray, to_light);
+            let row = Row::new(slab(ray.frame.cell_from_plane(l), l.z), self.levels[0].size[2]);
+            let gain = medium.profile.gain(&row, e_n);
+            RayScatter { row, gain, peak: forward_peak(medium.similarity.g, to_light.dot(ray.d_world)) }
+        };
+        Some(self.lights.iter().map(terms).collect())
+    }
+
+    /// Direction to a light in the plane's axes e1, e2 and seen normal.
+    #[inline]
+    fn in_plane(&self, ray: &SheetHit, to_light: Vec3) -> Vec3 {
+        let l_n = to_light.dot(ray.map.n_world) * ray.side;
+        Vec3::new(to_light.dot(ray.map.e1_world), to_light.dot(ray.map.e2_world), l_n)
     }
 
     /// Returns V_i(k) of a light and a cell, and −log₂ of it, which is 0 if light volumes hold codes.
@@ -106,7 +121,7 @@ impl Integrator<'_> {
                 if self.light_volumes.as_ref().is_some_and(|volumes| volumes.form == Form::Codes) {
                     let transmittance = value * value * TRANSMITTANCE_OF_CODE;
                     if matter.left < 1.0 {
-                        return ((matter.left * transmittance.max(1e-9).log2()).exp2(), 0.0);
+                        return (exp2(matter.left * log2(transmittance.max(1e-9))), 0.0);
                     }
                     return (transmittance, 0.0);
                 }
@@ -115,7 +130,7 @@ impl Integrator<'_> {
                 value * (extinction * matter.left * if self.per_cell { 1.0 } else { ray.frame.depth })
             }
         };
-        ((-depth).exp2(), depth)
+        (exp2(-depth), depth)
     }
 
     /// Optical depth from a cell to the light, in the units of [`optical_depth`]. Inlined at two places, the

@@ -4,13 +4,14 @@
 
 use glam::Vec3;
 
-use super::light::RayLight;
+use super::light::{RayLight, RayScatter};
 use super::{Integrator, Observer, SheetHit};
 use crate::light::fibre::{Spread, fibre_angles, specular_power};
 use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::{CellSample, Level};
+use crate::util::powers::{exp2, log2};
 use crate::volume::large_box;
 use crate::walk::Walk;
 
@@ -18,8 +19,8 @@ use crate::walk::Walk;
 pub struct LevelResult {
     /// T at the end of the walk.
     pub transmittance: f32,
-    /// The lights, with the light they sent to the eye.
-    pub lights: Vec<RayLight>,
+    /// Light that each of the scene's lights sent to the eye.
+    pub lit: Vec<Lit>,
     /// Number of cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
 }
@@ -27,14 +28,27 @@ pub struct LevelResult {
 impl LevelResult {
     /// Interpolates between two levels; `share` is that of `other`.
     pub fn mixed(mut self, other: LevelResult, share: f32) -> LevelResult {
-        let own = 1.0 - share;
-        self.transmittance = self.transmittance * own + other.transmittance * share;
-        for (light, next) in self.lights.iter_mut().zip(other.lights) {
-            light.sum = light.sum * own + next.sum * share;
-            light.colour = light.colour * own + next.colour * share;
-        }
+        self.transmittance = self.transmittance * (1.0 - share) + other.transmittance * share;
+        self.lit.iter_mut().zip(&other.lit).for_each(|(lit, next)| *lit = lit.mixed(next, share));
         self.cells = [0, 1].map(|c| self.cells[c] + other.cells[c]);
         self
+    }
+}
+
+/// Light that a ray's cells sent to the eye from one light.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lit {
+    /// In 255ths of the light's intensity; for cells without a colour of their own.
+    pub sum: f32,
+    /// Relative to the light's intensity; for cells with a colour of their own.
+    pub colour: Vec3,
+}
+
+impl Lit {
+    /// Interpolates between two levels; `share` is that of `other`.
+    pub fn mixed(&self, other: &Lit, share: f32) -> Lit {
+        let own = 1.0 - share;
+        Lit { sum: self.sum * own + other.sum * share, colour: self.colour * own + other.colour * share }
     }
 }
 
@@ -48,14 +62,16 @@ impl Integrator<'_> {
         observer: &mut O,
     ) -> LevelResult {
         let scene = self.scene;
-        let mut lights = self.ray_lights(ray, level);
+        let lights: Vec<RayLight> = self.ray_lights(ray, level).collect();
+        let scatter = self.ray_scatter(ray);
+        let mut lit_by = vec![Lit::default(); lights.len()];
         let matter = ray.matter(level);
         let medium = self.medium_of(ray.quad);
         let extinction = self.extinction_in(level);
         let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
         let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
         let mut transmittance = before;
-        let mut depth = -before.max(1e-30).log2();
+        let mut depth = -log2(before.max(1e-30));
         let mut walked = [0u32; 2];
         let mut walk = Walk::new(level.size, origin, d_cell, f32::INFINITY);
         let octant = walk.octant();
@@ -85,7 +101,7 @@ impl Integrator<'_> {
             if !self.per_cell {
                 tau_bits *= crossing.t_exit - crossing.t_enter;
             }
-            let passed = transmittance * (-tau_bits).exp2();
+            let passed = transmittance * exp2(-tau_bits);
             let weight = transmittance - passed;
             observer.ambient(scene.ambient * weight);
 
@@ -97,7 +113,7 @@ impl Integrator<'_> {
                 let moments = moments.unwrap_or_else(|| level.moments(cell));
                 Spread::new(&ray.metric, moments, ray.e_v)
             });
-            for light in &mut lights {
+            for (i, (light, total)) in lights.iter().zip(&mut lit_by).enumerate() {
                 let (visibility, light_depth) =
                     self.visibility_of(ray, level, crossing.cell, light, &mut walked[1]);
                 let fibre = || {
@@ -112,7 +128,7 @@ impl Integrator<'_> {
                 };
                 if !self.in_colour() {
                     let lit = weight * fibre() * visibility;
-                    light.sum += lit;
+                    total.sum += lit;
                     observer.light(visibility, light.intensity * (lit * (1.0 / 255.0)));
                     continue;
                 }
@@ -126,22 +142,23 @@ impl Integrator<'_> {
                     }
                     _ => Vec3::splat(weight * visibility * fibre() * (1.0 / 255.0)),
                 };
-                if let Some(MultipleMedium { similarity, profile }) = medium {
-                    let diffuse = profile.at(&light.row, self.layer_in(level, crossing.cell.z));
-                    let more = multiple(similarity, &light.peak, diffuse, depth, tau_bits, light_depth);
-                    lit += light.gain.truncate() * more + similarity.albedo * (light.gain.w * weight);
+                if let (Some(MultipleMedium { similarity, profile }), Some(scatter)) = (medium, &scatter) {
+                    let RayScatter { row, gain, peak } = &scatter[i];
+                    let diffuse = profile.at(row, self.layer_in(level, crossing.cell.z));
+                    let more = multiple(similarity, peak, diffuse, depth, tau_bits, light_depth);
+                    lit += gain.truncate() * more + similarity.albedo * (gain.w * weight);
                 }
-                light.colour += lit;
+                total.colour += lit;
                 observer.light(visibility, light.intensity * lit);
             }
             transmittance = passed;
             depth += tau_bits;
         }
-        LevelResult { transmittance, lights, cells: walked }
+        LevelResult { transmittance, lit: lit_by, cells: walked }
     }
 
     /// Returns the volume's own layer at the middle of layer `z` of a level.
-    fn layer_in(&self, level: &Level, z: i32) -> u32 {
+    pub(super) fn layer_in(&self, level: &Level, z: i32) -> u32 {
         if level.is_whole {
             return z as u32;
         }

@@ -1,0 +1,122 @@
+//! Cells of one level for eight rays: fetched ray by ray, decoded side by side.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, u32x8};
+
+use super::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
+use super::walk::{NO_CELL, Passed, ROW, Units};
+use crate::trace::lookup::Level;
+use crate::volume::{Bricks, Cell, Cells};
+
+/// Cells of a row of steps, as the walk passes them.
+pub type Row = [[Cell; LANES]; ROW];
+
+/// The cells of a level, found by an index in the units of the walk.
+#[derive(Clone, Copy)]
+pub struct Store<'a> {
+    cells: Stored<'a>,
+    /// Units of the index.
+    pub units: Units,
+}
+
+#[derive(Clone, Copy)]
+enum Stored<'a> {
+    Dense(&'a [Cell]),
+    Sparse(&'a Bricks),
+}
+
+impl<'a> Store<'a> {
+    /// Cells of a level. `None` if the level is too large for an index.
+    pub fn new(level: &Level<'a>) -> Option<Self> {
+        let size = level.volume.size;
+        Some(match &level.volume.cells {
+            Cells::Dense(cells) => Store { cells: Stored::Dense(cells), units: Units::linear(size)? },
+            Cells::Sparse(bricks) => Store { cells: Stored::Sparse(bricks), units: Units::apart(size)? },
+        })
+    }
+
+    /// Coordinates of the cell with this index.
+    #[inline]
+    pub fn coordinates(&self, index: i32) -> [u32; 3] {
+        let index = index as u32;
+        match self.cells {
+            Stored::Dense(_) => {
+                let [nx, ny, _] = self.units.size.as_uvec3().to_array();
+                [index % nx, index / nx % ny, index / nx / ny]
+            }
+            Stored::Sparse(_) => {
+                let side = (1 << Units::BITS) - 1;
+                [index & side, index >> Units::BITS & side, index >> (2 * Units::BITS)]
+            }
+        }
+    }
+
+    /// Linear index of a cell, as light volumes have it; outside of them for no cell.
+    #[inline(always)]
+    pub fn linear(&self, index: i32) -> usize {
+        match self.cells {
+            Stored::Dense(_) => index as u32 as usize,
+            Stored::Sparse(bricks) => {
+                let [nx, ny, _] = bricks.size().map(|n| n as usize);
+                let [x, y, z] = self.coordinates(index).map(|c| c as usize);
+                (z * ny + y) * nx + x
+            }
+        }
+    }
+
+    /// Fetches the cells that the rays passed in `steps` steps. No cell is an empty one.
+    #[inline(always)]
+    pub fn fetch(&self, passed: &Passed, steps: usize, row: &mut Row) {
+        match self.cells {
+            Stored::Dense(cells) => fetch_by(passed, steps, row, |index| {
+                cells.get(index as u32 as usize).copied().unwrap_or_default()
+            }),
+            Stored::Sparse(bricks) => fetch_by(passed, steps, row, |index| {
+                let [x, y, z] = self.coordinates(index);
+                if index == NO_CELL { Cell::default() } else { *bricks.at(x, y, z) }
+            }),
+        }
+    }
+}
+
+#[inline(always)]
+fn fetch_by(passed: &Passed, steps: usize, row: &mut Row, cell: impl Fn(i32) -> Cell) {
+    for (i, cells) in passed.index.iter().zip(row).take(steps) {
+        *cells =
+            [cell(i[0]), cell(i[1]), cell(i[2]), cell(i[3]), cell(i[4]), cell(i[5]), cell(i[6]), cell(i[7])];
+    }
+}
+
+/// Both words of eight cells.
+#[inline(always)]
+pub fn words<S: Simd>(simd: S, cells: &[Cell; LANES]) -> [Words<S>; 2] {
+    let words: &[u32] = bytemuck::cast_slice(cells);
+    let (low, high) = words.split_at(LANES);
+    let (low, high) = (u32x8::from_slice(simd, low), u32x8::from_slice(simd, high));
+    [low.unzip_low(high), low.unzip_high(high)]
+}
+
+/// ρ codes of the cells' first words.
+#[inline(always)]
+pub fn rho_codes<S: Simd>(first: Words<S>) -> Floats<S> {
+    whole(signed(first & 0xffff))
+}
+
+/// Codes of k_d and k_s of the cells' first words.
+#[inline(always)]
+pub fn k_codes<S: Simd>(first: Words<S>) -> [Floats<S>; 2] {
+    [whole(signed((first >> 16) & 0xff)), whole(signed(first >> 24))]
+}
+
+/// Codes of v of the cells' second words.
+#[inline(always)]
+pub fn v_codes<S: Simd>(second: Words<S>) -> Lanes3<S> {
+    let component = |shift: u32| whole(signed(second << shift) >> 22);
+    Lanes3 { x: component(22), y: component(12), z: component(2) }
+}
+
+/// Whole numbers as floats.
+#[inline(always)]
+fn whole<S: Simd>(ints: Ints<S>) -> Floats<S> {
+    ints.to_float::<f32x8<S>>()
+}

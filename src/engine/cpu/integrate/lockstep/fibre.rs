@@ -1,0 +1,186 @@
+//! Kajiya and Kay's model for eight cells. Twin of `src/light/fibre.rs`, with the same operations in the same
+//! order.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+
+use super::lanes::{Floats, Lanes3, Stored, Words, signed};
+use super::powers::pow;
+use crate::light::fibre::whole_exponent;
+
+/// Metric of every ray; see [`crate::light::fibre::Metric`].
+#[derive(Clone, Copy)]
+pub struct Metric<S: Simd>(pub [Floats<S>; 4]);
+
+impl<S: Simd> Metric<S> {
+    /// Loads the entries of M.
+    #[inline(always)]
+    pub fn load(simd: S, [a, b, c, d]: &[Stored; 4]) -> Self {
+        Metric([a.load(simd), b.load(simd), c.load(simd), d.load(simd)])
+    }
+
+    /// Returns vᵀ M v.
+    #[inline(always)]
+    pub fn squared(&self, v: Lanes3<S>) -> Floats<S> {
+        let [m00, m01x2, m11, m22] = self.0;
+        (m00 * v.x + m01x2 * v.y) * v.x + m11 * v.y * v.y + m22 * v.z * v.z
+    }
+}
+
+/// See [`crate::light::fibre::fibre_angles`].
+#[inline(always)]
+pub fn fibre_angles<S: Simd>(
+    simd: S,
+    t_dot_l: Floats<S>,
+    t_dot_e: Floats<S>,
+    inverse_q: Floats<S>,
+) -> [Floats<S>; 2] {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let sin2_l = (one - t_dot_l * t_dot_l * inverse_q).max(zero);
+    let sin2_e = (one - t_dot_e * t_dot_e * inverse_q).max(zero);
+    [sin2_l.sqrt(), (sin2_l * sin2_e).sqrt() - t_dot_l * t_dot_e * inverse_q]
+}
+
+/// Exponent of the specular term.
+#[derive(Clone, Copy)]
+pub struct Exponent {
+    p: f32,
+    /// p as an integer, where powers of it are products.
+    whole: Option<u32>,
+}
+
+impl Exponent {
+    /// Exponent p.
+    pub fn new(p: f32) -> Self {
+        Exponent { p, whole: whole_exponent(p) }
+    }
+
+    /// See [`crate::light::fibre::specular_power`].
+    #[inline(always)]
+    pub fn power<S: Simd>(&self, simd: S, x: Floats<S>) -> Floats<S> {
+        let Some(mut bits) = self.whole else {
+            return pow(simd, x, f32x8::splat(simd, self.p));
+        };
+        let (mut power, mut result) = (x, f32x8::splat(simd, 1.0));
+        while bits != 0 {
+            if bits & 1 == 1 {
+                result *= power;
+            }
+            power *= power;
+            bits >>= 1;
+        }
+        result
+    }
+}
+
+/// Second moments of directions; see [`crate::volume::Moments`].
+#[derive(Clone, Copy)]
+pub struct Moments<S: Simd> {
+    diagonal: Lanes3<S>,
+    mixed: Lanes3<S>,
+}
+
+impl<S: Simd> Moments<S> {
+    /// Unpacks the second words of coarse cells.
+    #[inline(always)]
+    pub fn unpacked(simd: S, word: Words<S>) -> Self {
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let float = |word: Words<S>| signed(word).to_float::<f32x8<S>>();
+        let share = |shift: u32| float((word >> shift) & 127) * (1.0 / 127.0);
+        let (x, z) = (share(0), share(7));
+        let yy = (one - x * x - z * z).max(zero);
+        let y = yy.sqrt();
+        let r = |shift: u32| (signed(word << shift) >> 26).to_float::<f32x8<S>>() * (1.0 / 31.0);
+        Moments {
+            diagonal: Lanes3 { x: x * x, y: yy, z: z * z },
+            mixed: Lanes3 { x: r(12) * (x * y), y: r(6) * (x * z), z: r(0) * (y * z) },
+        }
+    }
+
+    /// Product S·v.
+    #[inline(always)]
+    fn times(&self, v: Lanes3<S>) -> Lanes3<S> {
+        let (d, m) = (self.diagonal, self.mixed);
+        Lanes3 {
+            x: d.x * v.x + m.x * v.y + m.y * v.z,
+            y: m.x * v.x + d.y * v.y + m.z * v.z,
+            z: m.y * v.x + m.z * v.y + d.z * v.z,
+        }
+    }
+}
+
+/// Reflection by fibres with a distribution of directions; see [`crate::light::fibre::Spread`].
+#[derive(Clone, Copy)]
+pub struct Spread<S: Simd> {
+    simd: S,
+    s_e: Lanes3<S>,
+    moments: Moments<S>,
+    inverse_q: Floats<S>,
+    cos2_e: Floats<S>,
+    variance: Floats<S>,
+}
+
+impl<S: Simd> Spread<S> {
+    /// Prepares the terms that all lights of a cell share.
+    #[inline(always)]
+    pub fn new(simd: S, metric: &Metric<S>, moments: Moments<S>, e_v: Lanes3<S>) -> Self {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let [a, b2, c, d] = metric.0;
+        let (s, m, b) = (moments.diagonal, moments.mixed, splat(0.5) * b2);
+        let row = |x, y, z| Lanes3 { x, y, z };
+        let p = [
+            row(a * s.x + b * m.x, a * m.x + b * s.y, a * m.y + b * m.z),
+            row(b * s.x + c * m.x, b * m.x + c * s.y, b * m.y + c * m.z),
+            row(d * m.y, d * m.z, d * s.z),
+        ];
+        let inverse_q = splat(1.0) / (p[0].x + p[1].y + p[2].z).max(splat(1e-30));
+        let crossed = p[0].y * p[1].x + p[0].z * p[2].x + p[1].z * p[2].y;
+        let squares = p[0].x * p[0].x + p[1].y * p[1].y + p[2].z * p[2].z + splat(2.0) * crossed;
+        let s_e = moments.times(e_v).times(inverse_q);
+        Spread {
+            simd,
+            s_e,
+            moments,
+            inverse_q,
+            cos2_e: s_e.dot(e_v),
+            variance: (splat(0.5) - splat(0.5) * squares * inverse_q * inverse_q).max(splat(0.0)),
+        }
+    }
+
+    /// Means of (t·l)² and of (t·l)(t·e) over the distribution.
+    #[inline(always)]
+    fn cosines(&self, l_v: Lanes3<S>) -> [Floats<S>; 2] {
+        [self.moments.times(l_v).dot(l_v) * self.inverse_q, self.s_e.dot(l_v)]
+    }
+
+    /// Returns t·l and t·e of a single direction with these means.
+    #[inline(always)]
+    pub fn of_one(&self, l_v: Lanes3<S>) -> [Floats<S>; 2] {
+        let (zero, one) = (f32x8::splat(self.simd, 0.0), f32x8::splat(self.simd, 1.0));
+        let [cos2_l, product] = self.cosines(l_v);
+        let e = self.cos2_e.max(zero).min(one).sqrt();
+        [cos2_l.max(zero).min(one).sqrt(), product.simd_lt(zero).select(-e, e)]
+    }
+
+    /// Reflection Ψ, with the highlight convolved with the spread of the directions.
+    #[inline(always)]
+    pub fn psi(
+        &self,
+        [k_d, k_s]: [Floats<S>; 2],
+        p: &Exponent,
+        l_v: Lanes3<S>,
+        l_dot_e: Floats<S>,
+    ) -> Floats<S> {
+        let splat = |x: f32| f32x8::splat(self.simd, x);
+        let (zero, one) = (splat(0.0), splat(1.0));
+        let [cos2_l, product] = self.cosines(l_v);
+        let sin2_l = (one - cos2_l).max(zero);
+        let sin2_e = (one - self.cos2_e).max(zero);
+        let root = (sin2_l * sin2_e).sqrt();
+        let cos_phi = ((l_dot_e - product) / root.max(splat(1e-6))).max(-one).min(one);
+        let variance = self.variance * (one + cos_phi);
+        let base = (root - product + splat(0.5) * variance).max(zero).min(one);
+        let wide = one + splat(p.p) * variance;
+        k_d * sin2_l.sqrt() + k_s * pow(self.simd, base, splat(p.p) / wide) / wide.sqrt()
+    }
+}

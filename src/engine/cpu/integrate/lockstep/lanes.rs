@@ -1,0 +1,116 @@
+//! Vectors of eight lanes, one lane a ray. Functions that take them are inlined into the code of one
+//! instruction set; a call would leave its registers.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
+use glam::Vec3;
+
+/// Number of rays that are walked side by side.
+pub const LANES: usize = 8;
+
+/// One float a lane.
+pub type Floats<S> = f32x8<S>;
+/// One signed whole number a lane.
+pub type Ints<S> = i32x8<S>;
+/// One word of bits a lane.
+pub type Words<S> = u32x8<S>;
+/// One truth value a lane.
+pub type Mask<S> = mask32x8<S>;
+
+/// Floats of eight lanes in memory.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub struct Stored(pub [f32; LANES]);
+
+impl Stored {
+    /// The value of every lane, given by its number.
+    #[inline(always)]
+    pub fn from_fn(value: impl Fn(usize) -> f32) -> Self {
+        let mut out = Stored::default();
+        for lane in 0..LANES {
+            out.0[lane] = value(lane);
+        }
+        out
+    }
+
+    /// Loads the lanes.
+    #[inline(always)]
+    pub fn load<S: Simd>(&self, simd: S) -> Floats<S> {
+        f32x8::load_array_ref(simd, &self.0)
+    }
+
+    /// Stores the lanes.
+    #[inline(always)]
+    pub fn store<S: Simd>(&mut self, lanes: Floats<S>) {
+        lanes.store_array(&mut self.0);
+    }
+}
+
+/// Vectors of eight lanes in memory.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stored3(pub [Stored; 3]);
+
+impl Stored3 {
+    /// The vector of every lane, given by its number.
+    #[inline(always)]
+    pub fn from_fn(value: impl Fn(usize) -> Vec3) -> Self {
+        let mut out = Stored3::default();
+        for lane in 0..LANES {
+            out.set(lane, value(lane));
+        }
+        out
+    }
+
+    /// The vector of a lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Vec3 {
+        Vec3::new(self.0[0].0[lane], self.0[1].0[lane], self.0[2].0[lane])
+    }
+
+    /// Replaces the vector of a lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, v: Vec3) {
+        (self.0[0].0[lane], self.0[1].0[lane], self.0[2].0[lane]) = v.into();
+    }
+
+    /// Loads the lanes.
+    #[inline(always)]
+    pub fn load<S: Simd>(&self, simd: S) -> Lanes3<S> {
+        let [x, y, z] = &self.0;
+        Lanes3 { x: x.load(simd), y: y.load(simd), z: z.load(simd) }
+    }
+}
+
+/// One vector a lane. Products have the order of operations of [`Vec3`].
+#[derive(Clone, Copy)]
+pub struct Lanes3<S: Simd> {
+    pub x: Floats<S>,
+    pub y: Floats<S>,
+    pub z: Floats<S>,
+}
+
+impl<S: Simd> Lanes3<S> {
+    /// Scalar product.
+    #[inline(always)]
+    pub fn dot(self, other: Lanes3<S>) -> Floats<S> {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Product with one number a lane.
+    #[inline(always)]
+    pub fn times(self, factor: Floats<S>) -> Lanes3<S> {
+        Lanes3 { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+}
+
+/// Signed whole numbers with the same bits.
+#[inline(always)]
+pub fn signed<S: Simd>(words: Words<S>) -> Ints<S> {
+    words.bitcast()
+}
+
+/// Words with the same bits.
+#[inline(always)]
+pub fn unsigned<S: Simd>(ints: Ints<S>) -> Words<S> {
+    ints.bitcast()
+}

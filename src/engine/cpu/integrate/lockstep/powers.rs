@@ -1,0 +1,38 @@
+//! 2^x, log₂ x and x^p of eight lanes. Twin of `src/util/powers.rs`, with the same bits.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x8, u32x8};
+
+use super::lanes::{Floats, signed, unsigned};
+use crate::util::powers::{EXP2, LEAST_EXPONENT, LOG2, ROOT_HALF_BITS, ROUNDER};
+
+/// See [`crate::util::powers::exp2`].
+#[inline(always)]
+pub fn exp2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
+    let x = x.max(f32x8::splat(simd, LEAST_EXPONENT));
+    let rounded = x + ROUNDER;
+    let f = x - (rounded - ROUNDER);
+    let [a, b, c, d, e, g] = EXP2;
+    let power = f * (f * (f * (f * (f * (f * g + e) + d) + c) + b) + a) + 1.0;
+    let exponent = rounded.to_bits() - u32x8::splat(simd, ROUNDER.to_bits().wrapping_sub(127));
+    power * f32x8::from_bits(exponent << 23)
+}
+
+/// See [`crate::util::powers::log2`].
+#[inline(always)]
+pub fn log2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
+    let bits = x.to_bits();
+    let exponent: i32x8<S> = signed(bits - ROOT_HALF_BITS) >> 23;
+    let m = f32x8::from_bits(bits - unsigned(exponent << 23));
+    let one = f32x8::splat(simd, 1.0);
+    let s = (m - one) / (m + one);
+    let z = s * s;
+    let [a, b, c, d] = LOG2;
+    exponent.to_float::<f32x8<S>>() + s * (z * (z * (z * d + c) + b) + a)
+}
+
+/// See [`crate::util::powers::pow`].
+#[inline(always)]
+pub fn pow<S: Simd>(simd: S, x: Floats<S>, p: Floats<S>) -> Floats<S> {
+    exp2(simd, p * log2(simd, x))
+}
