@@ -190,7 +190,7 @@ impl Tile {
     /// Returns the three vertices around a position in the tile, in squares, with their weights. Twin:
     /// `opaque_point` in shaders/engine/gbuffer.wgsl.
     pub fn around(&self, position: Vec2) -> ([u32; 3], Vec3) {
-        let cell = position.floor().clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0));
+        let cell = position.clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0)).as_uvec2().as_vec2();
         let f = (position - cell).clamp(Vec2::ZERO, Vec2::ONE);
         let a = self.vertex([cell.x as u32, cell.y as u32]);
         let b = if f.x >= f.y { a + 1 } else { a + self.pitch };

@@ -27,6 +27,12 @@ impl Window {
         (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
     }
 
+    /// Iterates over the pixels, row by row.
+    pub fn each(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let columns = self.x..self.right();
+        (self.y..self.bottom()).flat_map(move |y| columns.clone().map(move |x| [x, y]))
+    }
+
     /// Number of pixels.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)

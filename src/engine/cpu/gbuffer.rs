@@ -3,11 +3,12 @@
 
 mod raster;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{BVec3, Mat4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::opaque::{Opaque, shade_opaque};
 use super::pool::shade_pool;
+use super::waves::Waves;
 use crate::engine::pool_surface::Surface;
 use crate::engine::{overlap, pool_surface};
 use crate::light::haze::EyeHaze;
@@ -17,7 +18,7 @@ use crate::picture::{Camera, Image};
 use crate::place::{Mesh, tiles};
 use crate::scene::{Parts, Scene};
 use crate::util::window::Window;
-use raster::{Covered, Rasteriser, ScreenTriangle};
+use raster::{Covered, Rasteriser, ScreenPoint, ScreenTriangle};
 
 /// The targets of one sample of a window of the image, row by row.
 pub struct Gbuffer {
@@ -38,6 +39,28 @@ pub struct Gbuffer {
 }
 
 impl Gbuffer {
+    /// Targets without pixels.
+    pub fn empty(scene: &Scene) -> Self {
+        Gbuffer {
+            window: Window { x: 0, y: 0, width: 0, height: 0 },
+            opaque: Vec::new(),
+            normal: Vec::new(),
+            layers: overlap::sheets(scene) as usize,
+            surface: Vec::new(),
+            quad_id: Vec::new(),
+        }
+    }
+
+    /// Makes the targets those of another window. Their contents are of no use.
+    fn resize(&mut self, window: Window) {
+        let pixels = window.pixels() as usize;
+        self.window = window;
+        self.opaque.resize(pixels, [0.0; 4]);
+        self.normal.resize(pixels, Vec4::ZERO);
+        self.surface.resize(pixels * self.layers, [0.0; 3]);
+        self.quad_id.resize(pixels * self.layers, 0);
+    }
+
     /// Iterates over the quads under pixel `i` in order of depth: the quad's number, and u, v and metres from
     /// the eye.
     pub fn faces(&self, i: usize) -> impl Iterator<Item = (usize, [f32; 3])> {
@@ -63,28 +86,13 @@ pub fn run(scene: &Scene, mesh: &Mesh, sample: u32) -> Gbuffer {
     run_window(scene, mesh, Window { x: 0, y: 0, width, height }, sample)
 }
 
-/// Rows of a window that one task fills.
-const BAND_ROWS: usize = 16;
-
 /// Fills the targets of a window inside the image with sample `sample`. The bits are those of the whole
 /// image's targets.
 pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gbuffer {
-    let (width, height) = (window.width as usize, window.height as usize);
-    let rows = BAND_ROWS.min(height);
-    let frame = WindowFrame::new(scene, mesh, window, sample);
-    let rock = Rasteriser::new(frame.rock_triangles(), window, rows);
-    let water = Rasteriser::new(frame.water_triangles(), window, rows);
-
-    let layers = overlap::sheets(scene) as usize;
-    let mut out = Gbuffer {
-        window,
-        opaque: vec![[0.0; 4]; width * height],
-        normal: vec![Vec4::ZERO; width * height],
-        layers,
-        surface: vec![[0.0; 3]; width * height * layers],
-        quad_id: vec![0; width * height * layers],
-    };
-    let band = rows * width;
+    let drawing = Drawing::new(scene, mesh, window, sample);
+    let mut out = Gbuffer::empty(scene);
+    out.resize(window);
+    let (layers, band) = (out.layers, BAND_ROWS as usize * window.width as usize);
     out.opaque
         .par_chunks_mut(band)
         .zip(out.normal.par_chunks_mut(band))
@@ -92,17 +100,129 @@ pub fn run_window(scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> Gb
         .zip(out.quad_id.par_chunks_mut(band * layers))
         .enumerate()
         .for_each(|(i, (((opaque, normal), surface), quad_id))| {
-            let band =
-                Window { y: window.y + (i * rows) as u32, height: (opaque.len() / width) as u32, ..window };
-            let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
-            rock.draw(i, band, &mut covered, 1);
-            frame.shade_rock(&rock, &covered, band, opaque, normal);
-            let mut covered: Vec<Covered> =
-                covered.iter().flat_map(|&(depth, _)| std::iter::repeat_n((depth, 0), layers)).collect();
-            water.draw(i, band, &mut covered, layers);
-            frame.map_water(&water, &covered, band, layers, surface, quad_id);
+            drawing.draw(i, Targets { opaque, normal, surface, quad_id });
         });
     out
+}
+
+/// Rows of a window that are drawn at a time.
+pub const BAND_ROWS: u32 = 16;
+
+/// Targets of a band of rows.
+struct Targets<'a> {
+    opaque: &'a mut [[f32; 4]],
+    normal: &'a mut [Vec4],
+    surface: &'a mut [[f32; 3]],
+    quad_id: &'a mut [u32],
+}
+
+/// One sample of a window, whose triangles are projected and which is drawn band by band: each has
+/// [`BAND_ROWS`] rows, the last one as many as are left.
+pub struct Drawing<'a> {
+    frame: WindowFrame<'a>,
+    rock: Rasteriser,
+    water: Rasteriser,
+    layers: usize,
+}
+
+impl<'a> Drawing<'a> {
+    /// Projects sample `sample` of a window inside the image.
+    pub fn new(scene: &'a Scene, mesh: &'a Mesh, window: Window, sample: u32) -> Self {
+        let frame = WindowFrame::new(scene, mesh, window, sample);
+        let rock = Rasteriser::new(frame.rock_triangles(), window, BAND_ROWS as usize);
+        let water = Rasteriser::new(frame.water_triangles(), window, BAND_ROWS as usize);
+        Drawing { frame, rock, water, layers: overlap::sheets(scene) as usize }
+    }
+
+    /// Fills the targets of band number `i`.
+    pub fn band(&self, i: usize, out: &mut Gbuffer) {
+        out.resize(self.window_of(i));
+        let Gbuffer { opaque, normal, surface, quad_id, .. } = out;
+        surface.fill([0.0; 3]);
+        quad_id.fill(0);
+        self.draw(i, Targets { opaque, normal, surface, quad_id });
+    }
+
+    fn window_of(&self, i: usize) -> Window {
+        let window = self.frame.window;
+        let y = window.y + i as u32 * BAND_ROWS;
+        Window { y, height: BAND_ROWS.min(window.bottom() - y), ..window }
+    }
+
+    /// Fills the targets of band number `i`, whose `surface` and `quad_id` are 0.
+    fn draw(&self, i: usize, Targets { opaque, normal, surface, quad_id }: Targets) {
+        let (band, layers) = (self.window_of(i), self.layers);
+        let mut covered: Vec<Covered> = vec![(0.0, 0); opaque.len()];
+        self.rock.draw(i, band, &mut covered, 1);
+        self.frame.shade_rock(&self.rock, &covered, band, opaque, normal);
+        let mut covered: Vec<Covered> =
+            covered.iter().flat_map(|&(depth, _)| std::iter::repeat_n((depth, 0), layers)).collect();
+        self.water.draw(i, band, &mut covered, layers);
+        self.frame.map_water(&self.water, &covered, band, layers, surface, quad_id);
+    }
+}
+
+/// Corners of the largest tile.
+const GRID: usize = ((tiles::SIDE + 1) * (tiles::SIDE + 1)) as usize;
+
+/// The projection of one sample.
+struct Projection {
+    clip_from_world: Mat4,
+    /// Width and height of the image, pixels.
+    size: [usize; 2],
+    near: f32,
+    window: Window,
+}
+
+/// A point in clip space, and on the screen.
+type Projected = (Vec4, ScreenPoint);
+
+impl Projection {
+    fn point(&self, point: Vec3) -> Projected {
+        let clip = self.clip_from_world * point.extend(1.0);
+        (clip, ScreenPoint::new(clip, self.size))
+    }
+
+    /// Adds the parts of a triangle that may cover a pixel's centre.
+    fn triangle(&self, points: [Projected; 3], id: u32, corners: [u16; 3], out: &mut Vec<ScreenTriangle>) {
+        let mut add = |triangle: ScreenTriangle| {
+            // Most triangles of a fine mesh lie between the pixels' centres.
+            if triangle.covers_centres(self.window) {
+                out.push(triangle);
+            }
+        };
+        // Almost all triangles lie wholly in front.
+        if points.iter().all(|(clip, _)| clip.w >= self.near) {
+            add(ScreenTriangle::new(points.map(|(_, screen)| screen), id, corners));
+        } else {
+            raster::clip_near(points.map(|(clip, _)| clip), self.near, |part| {
+                add(ScreenTriangle::part(part, self.size, id, corners));
+            });
+        }
+    }
+
+    /// Whether anything in a box may cover a pixel's centre of the window. Only boxes that lie wholly beyond
+    /// one side of the view, or behind the eye, are left out.
+    fn may_show(&self, low: Vec3, high: Vec3) -> bool {
+        let [width, height] = self.size.map(|n| n as f32);
+        // The sides of the window with a pixel around it, in clip space over w.
+        let Window { x, y, .. } = self.window;
+        let side = |pixels: f32, size: f32| 2.0 * pixels / size - 1.0;
+        let [left, right] =
+            [x as f32 - 1.0, self.window.right() as f32 + 1.0].map(|pixels| side(pixels, width));
+        let [top, bottom] =
+            [y as f32 - 1.0, self.window.bottom() as f32 + 1.0].map(|pixels| -side(pixels, height));
+        let mut beyond = [true; 5];
+        for corner in 0..8 {
+            let point =
+                Vec3::select(BVec3::new(corner & 1 == 0, corner & 2 == 0, corner & 4 == 0), low, high);
+            let c = self.clip_from_world * point.extend(1.0);
+            let outside =
+                [c.w < self.near, c.x < left * c.w, c.x > right * c.w, c.y > top * c.w, c.y < bottom * c.w];
+            beyond = [0, 1, 2, 3, 4].map(|i| beyond[i] && outside[i]);
+        }
+        !beyond.contains(&true)
+    }
 }
 
 /// Everything that the pixels of one sample of a window share.
@@ -113,8 +233,12 @@ struct WindowFrame<'a> {
     /// Offset of the sample from the pixel's centre, pixels.
     offset: [f32; 2],
     shadow_light: Option<usize>,
-    pools: Vec<Surface>,
+    pools: Vec<(Surface, Waves)>,
     haze: EyeHaze,
+    /// Vectors forward, right and up of the camera; see [`Camera::rays`].
+    rays: [Vec3; 3],
+    /// Position of the eye, metres.
+    eye: Vec3,
     /// The planes of the quads.
     planes: Vec<PlaneView>,
     depth: DepthRange,
@@ -124,6 +248,10 @@ struct WindowFrame<'a> {
 impl<'a> WindowFrame<'a> {
     fn new(scene: &'a Scene, mesh: &'a Mesh, window: Window, sample: u32) -> Self {
         let Parts { camera, image, .. } = &**scene;
+        let with_waves = |surface: Surface| {
+            let waves = Waves::new(&surface);
+            (surface, waves)
+        };
         let (eye, rays) = (camera.eye_local(), camera.rays(image.width, image.height));
         let depth = scene.depth_range(mesh);
         WindowFrame {
@@ -132,8 +260,10 @@ impl<'a> WindowFrame<'a> {
             window,
             offset: sample_offset(&scene.image, sample),
             shadow_light: scene.shadow_light(),
-            pools: pool_surface::surfaces(scene, mesh),
+            pools: pool_surface::surfaces(scene, mesh).into_iter().map(with_waves).collect(),
             haze: scene.haze.seen_from(eye),
+            rays: rays.map(|v| v.as_vec3()),
+            eye: eye.as_vec3(),
             planes: scene.quads.iter().map(|quad| PlaneView::of_quad(&quad.map, eye, rays)).collect(),
             depth,
             to_point: camera.depth_to_point(&depth),
@@ -158,41 +288,40 @@ impl<'a> WindowFrame<'a> {
         self.scene.camera.view_ray(image.width, image.height, self.pixel(band, k), self.offset)
     }
 
-    /// Projects a triangle and hands on the parts that may cover a pixel's centre.
-    fn project(&self) -> impl Fn([Vec3; 3], u32, [u16; 3], &mut Vec<ScreenTriangle>) {
+    /// Returns the projection from the world to the window's image.
+    fn projection(&self) -> Projection {
         let Parts { camera, image, .. } = &**self.scene;
-        let window = self.window;
-        let clip_from_world = camera.clip_from_world(image.width, image.height, self.offset, &self.depth);
-        let size = [image.width as usize, image.height as usize];
-        let near = camera.near;
-        move |points, id, corners, out| {
-            let clip = points.map(|p| clip_from_world * p.extend(1.0));
-            raster::clip_near(clip, near, |part| {
-                let triangle = raster::to_screen(part, size, id, corners);
-                // Most triangles of a fine mesh lie between the pixels' centres.
-                if triangle.covers_centres(window) {
-                    out.push(triangle);
-                }
-            });
+        Projection {
+            clip_from_world: camera.clip_from_world(image.width, image.height, self.offset, &self.depth),
+            size: [image.width as usize, image.height as usize],
+            near: camera.near,
+            window: self.window,
         }
     }
 
     /// Triangles of the opaque mesh, whose ids are numbers of tiles.
     fn rock_triangles(&self) -> Vec<ScreenTriangle> {
         let (scene, mesh) = (self.scene, self.mesh);
-        let project = self.project();
+        let projection = self.projection();
         let steps = tiles::steps(&mesh.tiles, &scene.camera, &scene.image);
         mesh.tiles
             .par_iter()
             .enumerate()
             .flat_map_iter(|(i, tile)| {
                 let mut out = Vec::new();
-                let point = |corner| {
-                    Vec3::from(mesh.vertices[tile.vertex(tiles::grid_point(corner)) as usize].position)
-                };
-                let drawn = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
-                for &corners in drawn.as_chunks::<3>().0 {
-                    project(corners.map(point), i as u32, corners, &mut out);
+                if projection.may_show(tile.low, tile.high) {
+                    // Six triangles meet in a vertex, which is projected once.
+                    let mut points = [None; GRID];
+                    let drawn = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
+                    for &corners in drawn.as_chunks::<3>().0 {
+                        let points = corners.map(|corner| {
+                            *points[usize::from(corner)].get_or_insert_with(|| {
+                                let vertex = tile.vertex(tiles::grid_point(corner));
+                                projection.point(mesh.vertices[vertex as usize].position.into())
+                            })
+                        });
+                        projection.triangle(points, i as u32, corners, &mut out);
+                    }
                 }
                 out
             })
@@ -201,12 +330,12 @@ impl<'a> WindowFrame<'a> {
 
     /// Triangles of the volume quads, whose ids are numbers of quads.
     fn water_triangles(&self) -> Vec<ScreenTriangle> {
-        let project = self.project();
+        let projection = self.projection();
         let mut water = Vec::new();
         for (i, quad) in self.scene.quads.iter().enumerate() {
-            let [a, b, c, d] = quad.corners;
-            project([a, b, c], i as u32, [0; 3], &mut water);
-            project([a, c, d], i as u32, [0; 3], &mut water);
+            let [a, b, c, d] = quad.corners.map(|corner| projection.point(corner));
+            projection.triangle([a, b, c], i as u32, [0; 3], &mut water);
+            projection.triangle([a, c, d], i as u32, [0; 3], &mut water);
         }
         water
     }
@@ -256,18 +385,16 @@ impl<'a> WindowFrame<'a> {
         depth: f32,
     ) -> ([f32; 4], Vec4) {
         let (scene, mesh) = (self.scene, self.mesh);
-        let Parts { camera, image, .. } = &**scene;
         let weights = triangle.weights_at(centre).to_array();
         let in_tile = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
-        let rays = camera.rays(image.width, image.height).map(|v| v.as_vec3());
-        let position = self.to_point.point(rays, at, depth);
+        let position = self.to_point.point(self.rays, at, depth);
         let point = Opaque::at(mesh, &mesh.tiles[triangle.id as usize], in_tile, position);
         let (radiance, n) = match point.pool {
             0 => shade_opaque(scene, self.shadow_light, &point),
             pool => shade_pool(scene, self.shadow_light, &self.pools[pool as usize - 1], &point, at),
         };
         let distance = radiance[3];
-        let d_y = (point.position.y - camera.eye_local().y as f32) / distance.max(1e-20);
+        let d_y = (point.position.y - self.eye.y) / distance.max(1e-20);
         let hole = point.holdout && scene.image.alpha;
         let seen = if hole { Vec3::ZERO } else { Vec3::from_slice(&radiance) };
         let passes = if hole { self.haze.passes(d_y, distance) } else { 0.0 };
@@ -285,13 +412,16 @@ impl<'a> WindowFrame<'a> {
         surface: &mut [[f32; 3]],
         quad_id: &mut [u32],
     ) {
-        let Parts { camera, image, .. } = &**self.scene;
-        for (k, &(_, id)) in covered.iter().enumerate() {
-            if id != 0 {
+        let [forward, right, up] = self.rays;
+        for (i, faces) in covered.chunks(layers).enumerate() {
+            if faces[0].1 == 0 {
+                continue;
+            }
+            let at = self.image_point(band, i);
+            let length = (forward + right * at.x + up * at.y).length();
+            for (k, &(_, id)) in (i * layers..).zip(faces).take_while(|(_, (_, id))| *id != 0) {
                 let quad = water.triangles[id as usize - 1].id;
                 quad_id[k] = quad + 1;
-                let at = self.image_point(band, k / layers);
-                let length = camera.ray_to(image.width, image.height, at).length();
                 let plane = &self.planes[quad as usize];
                 surface[k] = map_quad(&self.scene.quads[quad as usize], plane, at, length);
             }

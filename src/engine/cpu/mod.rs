@@ -8,19 +8,22 @@ pub mod pixels;
 pub mod pool;
 pub mod ray;
 pub mod visibility;
+mod waves;
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
+use gbuffer::{BAND_ROWS, Gbuffer};
 pub use pixels::render_pixels;
 pub use visibility::LightVolumeCache;
 
 use crate::engine::options::RenderOptions;
 use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::resolve::develop;
-use crate::picture::{Frame, Seconds};
+use crate::picture::{Frame, Seconds, Surface};
 use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::util::error::Result;
@@ -43,7 +46,7 @@ pub fn render(
     render_with(scene, volume, mesh, &options, &mut LightVolumeCache::default(), monitor)
 }
 
-/// Pixels rendered at once. Each takes 32 bytes, and 16 for every layer of quads, besides the frame.
+/// Pixels whose triangles are held at once.
 const BAND_PIXELS: u64 = 1 << 21;
 
 /// Renders the options' part of the image and of the samples. A pixel has the same bits in every window.
@@ -84,51 +87,57 @@ pub fn render_with(
         let only_layers = frame.surface.is_some() && !samples.contains(&CENTRE);
         for sample in only_layers.then_some(CENTRE).into_iter().chain(samples.clone()) {
             let clock = Instant::now();
-            let gbuffer = gbuffer::run_window(scene, mesh, band, sample);
+            let drawing = gbuffer::Drawing::new(scene, mesh, band, sample);
             seconds.gbuffer += clock.elapsed().as_secs_f64();
-            if sample == CENTRE
-                && let Some(surface) = &mut frame.surface
-            {
-                for i in 0..gbuffer.opaque.len() {
-                    let nearest = i * gbuffer.layers;
-                    let [u, v, t] = gbuffer.surface[nearest];
-                    let behind = (gbuffer.opaque[i][3], gbuffer.normal[i].truncate());
-                    surface.set(
-                        first + i,
-                        (&scene.quads, scene.camera.eye_local().as_vec3()),
-                        gbuffer.quad_id[nearest],
-                        [u, v, t, 0.0],
-                        behind,
-                    );
-                }
-            }
-            if !samples.contains(&sample) {
-                continue;
-            }
-            let clock = Instant::now();
+            let is_seen = samples.contains(&sample);
+            let surface = Mutex::new(frame.surface.as_mut().filter(|_| sample == CENTRE));
+            let part = width * BAND_ROWS as usize;
             let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {
-                Some(alpha) => alpha[pixels.clone()].chunks_mut(width).collect(),
-                None => (0..band.height).map(|_| <&mut [f32]>::default()).collect(),
+                Some(alpha) => alpha[pixels.clone()].chunks_mut(part).collect(),
+                None => (0..band.height.div_ceil(BAND_ROWS)).map(|_| <&mut [f32]>::default()).collect(),
             };
+            // Rows are integrated as soon as they are drawn, while their targets are in the caches.
+            let clock = Instant::now();
+            let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
             frame.radiance[pixels.clone()]
-                .par_chunks_mut(width)
-                .zip(frame.counts[pixels.clone()].par_chunks_mut(width))
+                .par_chunks_mut(part)
+                .zip(frame.counts[pixels.clone()].par_chunks_mut(part))
                 .zip(uncovered)
-                .zip(band.y..band.bottom())
-                .try_for_each(|(((radiance, counts), uncovered), y)| {
-                    let row: Vec<[u32; 2]> = (band.x..band.right()).map(|x| [x, y]).collect();
-                    integrator.pixels(&gbuffer, &row, sample, |x, result| {
-                        let new = result.radiance.extend(result.transmittance).to_array();
-                        radiance[x] = [0, 1, 2, 3].map(|c| new[c] + radiance[x][c]);
-                        counts[x] = [0, 1].map(|c| counts[x][c] + result.cells[c]);
-                        if let Some(sum) = uncovered.get_mut(x) {
-                            *sum += result.uncovered;
+                .enumerate()
+                .try_for_each_init(
+                    || Gbuffer::empty(scene),
+                    |gbuffer, (i, ((radiance, counts), uncovered))| {
+                        let clock = Instant::now();
+                        drawing.band(i, gbuffer);
+                        if let Some(surface) = surface.lock().unwrap_or_else(|e| e.into_inner()).as_mut() {
+                            set_surface(surface, scene, gbuffer, first + i * part);
                         }
-                    });
-                    let pixels = done.fetch_add(width as u64, Ordering::Relaxed) + width as u64;
-                    monitor.progress("pixels", pixels, total)
-                })?;
-            seconds.integrate += clock.elapsed().as_secs_f64();
+                        let drawn = clock.elapsed();
+                        nanoseconds[0].fetch_add(drawn.as_nanos() as u64, Ordering::Relaxed);
+                        if !is_seen {
+                            return Ok(());
+                        }
+                        let of_band: Vec<[u32; 2]> = gbuffer.window.each().collect();
+                        integrator.pixels(gbuffer, &of_band, sample, |k, result| {
+                            let new = result.radiance.extend(result.transmittance).to_array();
+                            radiance[k] = [0, 1, 2, 3].map(|c| new[c] + radiance[k][c]);
+                            counts[k] = [0, 1].map(|c| counts[k][c] + result.cells[c]);
+                            if let Some(sum) = uncovered.get_mut(k) {
+                                *sum += result.uncovered;
+                            }
+                        });
+                        let integrated = clock.elapsed() - drawn;
+                        nanoseconds[1].fetch_add(integrated.as_nanos() as u64, Ordering::Relaxed);
+                        let pixels = of_band.len() as u64;
+                        monitor.progress("pixels", done.fetch_add(pixels, Ordering::Relaxed) + pixels, total)
+                    },
+                )?;
+            // The passes share the time as they share the work of the threads.
+            let [drawn, integrated] = nanoseconds.map(|n| n.into_inner() as f64);
+            let share = drawn / (drawn + integrated).max(1.0);
+            let all = clock.elapsed().as_secs_f64();
+            seconds.gbuffer += all * share;
+            seconds.integrate += all * (1.0 - share);
         }
     }
     if let Some(surface) = &mut frame.surface {
@@ -142,4 +151,20 @@ pub fn render_with(
     seconds.resolve = clock.elapsed().as_secs_f64();
     frame.seconds = seconds;
     Ok(frame)
+}
+
+/// Sets the layers of a band of pixels, the first of which is number `first` of the frame.
+fn set_surface(surface: &mut Surface, scene: &Scene, gbuffer: &Gbuffer, first: usize) {
+    for i in 0..gbuffer.opaque.len() {
+        let nearest = i * gbuffer.layers;
+        let [u, v, t] = gbuffer.surface[nearest];
+        let behind = (gbuffer.opaque[i][3], gbuffer.normal[i].truncate());
+        surface.set(
+            first + i,
+            (&scene.quads, scene.camera.eye_local().as_vec3()),
+            gbuffer.quad_id[nearest],
+            [u, v, t, 0.0],
+            behind,
+        );
+    }
 }

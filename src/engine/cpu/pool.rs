@@ -3,23 +3,22 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use super::opaque::{Opaque, fresnel};
+use super::waves::Waves;
 use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface, turn};
 use crate::mapping::PlaneView;
 use crate::scene::Scene;
+use crate::walk::floor_cell;
 
 /// Returns sin(2πt) with an error below 3e-5. It replaces WGSL's `sin`, whose error the standard leaves open.
 pub fn sin_turns(t: f32) -> f32 {
     let x = t - (t + 0.5).floor();
     let x2 = x * x;
-    let mut sum = 3.8199526;
-    sum = sum * x2 - 15.094643;
-    sum = sum * x2 + 42.058694;
-    sum = sum * x2 - 76.70586;
-    sum = sum * x2 + 81.60525;
-    sum = sum * x2 - 41.341_7;
-    sum = sum * x2 + std::f32::consts::TAU;
-    sum * x
+    SINE[1..].iter().fold(SINE[0], |sum, c| sum * x2 + c) * x
 }
+
+/// Coefficients of [`sin_turns`], that of the highest power first.
+pub const SINE: [f32; 7] =
+    [3.8199526, -15.094643, 42.058694, -76.70586, 81.60525, -41.341_7, std::f32::consts::TAU];
 
 /// Hashes a lattice point to a number from 0 to 1.
 fn lattice(x: u32, y: u32) -> f32 {
@@ -33,10 +32,10 @@ fn lattice(x: u32, y: u32) -> f32 {
 /// `p` is measured from the scene's origin, in cells.
 fn value_noise(p: Vec2, origin: &Foam) -> f32 {
     let p = p + Vec2::from(origin.rest);
-    let cell = p.floor();
-    let f = p - cell;
+    let cell = [p.x, p.y].map(floor_cell);
+    let f = p - Vec2::from(cell.map(|c| c as f32));
     let s = f * f * (Vec2::splat(3.0) - f * 2.0);
-    let [x, y] = [0, 1].map(|c| (cell[c] as i32 + origin.cells[c]) as u32);
+    let [x, y] = [0, 1].map(|c| (cell[c] + origin.cells[c]) as u32);
     let (right, above) = (x.wrapping_add(1), y.wrapping_add(1));
     let near = lattice(x, y) + (lattice(right, y) - lattice(x, y)) * s.x;
     let far = lattice(x, above) + (lattice(right, above) - lattice(x, above)) * s.x;
@@ -61,7 +60,7 @@ fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, at: Vec2) -> Vec3 {
 
 /// Returns the unit normal of the waves. A wave fades out as the pixel's footprint reaches half its length,
 /// because the pixel then sees the wave's mean.
-pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
+fn pool_normal(scene: &Scene, waves: &Waves, point: &Opaque) -> Vec3 {
     let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let e = to_eye / distance.max(1e-6);
@@ -70,26 +69,7 @@ pub fn pool_normal(scene: &Scene, surface: &Surface, point: &Opaque) -> Vec3 {
     let p = Vec2::new(point.position.x, point.position.z);
     // The surface is rougher where water falls in.
     let churn = 1.0 + 1.5 * point.albedo.y;
-    let mut slope = Vec2::ZERO;
-    let mut lift = 0.0;
-    for wave in &surface.waves {
-        let mut toward = Vec2::from(wave.toward);
-        let mut along = toward.dot(p);
-        let mut steep = wave.slope * churn;
-        if wave.ring > 0.5 {
-            let away = p - Vec2::from(wave.toward);
-            along = away.dot(away).sqrt().max(1e-3);
-            toward = away / along;
-            let fall = 1.0 + along * wave.decay;
-            steep /= fall * fall;
-        }
-        let wide = 3.0 * wave.k * footprint;
-        let blur = 1.0 + wide * wide;
-        steep /= blur * blur;
-        let t = wave.k * along + wave.phase;
-        slope += toward * (steep * sin_turns(t + 0.25));
-        lift += steep * sin_turns(t);
-    }
+    let (slope, lift) = waves.slopes(p, churn, footprint);
     let n = Vec3::new(-slope.x, (1.0 - lift).max(0.3), -slope.y);
     n / n.dot(n).sqrt()
 }
@@ -113,11 +93,12 @@ fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
     let [columns, rows] = AROUND;
     let s = turn(d) * columns as f32 - 0.5;
     let t = (d.y * rows as f32 - 0.5).clamp(0.0, rows as f32 - 1.0);
-    let (f, g) = (s - s.floor(), t - t.floor());
-    let x0 = (s.floor() + columns as f32) as usize % columns;
+    let (column, row) = (floor_cell(s), t as usize);
+    let (f, g) = (s - column as f32, t - row as f32);
+    let x0 = (column + columns as i32) as usize % columns;
     let x1 = (x0 + 1) % columns;
-    let y0 = t.floor() as usize * columns;
-    let y1 = (t.floor() as usize + 1).min(rows - 1) * columns;
+    let y0 = row * columns;
+    let y1 = (row + 1).min(rows - 1) * columns;
     let at = |i: usize| Vec4::from(surface.around[i]);
     let low = at(y0 + x0) * (1.0 - f) + at(y0 + x1) * f;
     let high = at(y1 + x0) * (1.0 - f) + at(y1 + x1) * f;
@@ -131,12 +112,12 @@ fn around(surface: &Surface, position: Vec3, r: Vec3) -> Vec4 {
 pub fn shade_pool(
     scene: &Scene,
     shadow_light: Option<usize>,
-    surface: &Surface,
+    (surface, waves): &(Surface, Waves),
     point: &Opaque,
     at: Vec2,
 ) -> ([f32; 4], Vec3) {
     let point = &Opaque { position: on_pool(scene, surface, point.position, at), ..*point };
-    let n = pool_normal(scene, surface, point);
+    let n = pool_normal(scene, waves, point);
     let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let e = to_eye / distance.max(1e-6);

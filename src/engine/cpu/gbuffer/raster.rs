@@ -1,24 +1,62 @@
 //! The rasteriser of the CPU engine. It follows the fill rule of a GPU: corners snap to 1/256 pixel, and
 //! points on an edge belong to the triangle whose top or left edge it is.
 
+use std::ops::Range;
+
 use glam::{Vec3, Vec4};
 
 use crate::util::window::Window;
 
-/// A triangle in pixels, clipped at the near plane.
-pub struct ScreenTriangle {
-    x: [f64; 3],
-    y: [f64; 3],
-    inverse_w: [f64; 3],
+/// A corner of a triangle in pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct ScreenPoint {
+    x: f64,
+    y: f64,
+    inverse_w: f64,
     /// Reversed depth z/w.
-    depth: [f64; 3],
-    /// Weights of the corners before clipping, for each corner.
-    weights: [Vec3; 3],
+    depth: f64,
+}
+
+impl ScreenPoint {
+    /// Projects a point in clip space to an image of `width` × `height` pixels. It snaps to 1/256 pixel, as
+    /// on a GPU.
+    #[inline]
+    pub fn new(c: Vec4, [width, height]: [usize; 2]) -> Self {
+        ScreenPoint {
+            x: snapped((c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64),
+            y: snapped((0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64),
+            inverse_w: 1.0 / c.w as f64,
+            depth: c.z as f64 / c.w as f64,
+        }
+    }
+}
+
+/// Rounds to 1/256, halves away from zero. Far outside the image, snapping has no meaning and would lose the
+/// fraction's bits. `f64::round` is a call into the C library on processors without SSE 4.1.
+#[inline]
+fn snapped(x: f64) -> f64 {
+    let scaled = x.clamp(-1e9, 1e9) * 256.0;
+    let whole = scaled as i64;
+    let rest = scaled - whole as f64;
+    let away = i64::from(rest >= 0.5) - i64::from(rest <= -0.5);
+    (whole + away) as f64 / 256.0
+}
+
+/// A triangle in pixels, clipped at the near plane. Its area is positive.
+pub struct ScreenTriangle {
+    points: [ScreenPoint; 3],
+    /// Weights of the original corners in `points` where the near plane has cut the triangle.
+    weights: Option<Box<[Vec3; 3]>>,
     /// Number of the tile or the quad.
     pub id: u32,
     /// Corners in the tile, numbered as in [`crate::place::tiles`].
     pub corners: [u16; 3],
+    /// Whether the last two points were exchanged to make the area positive.
+    flipped: bool,
 }
+
+/// Columns of a bounding box that are tested one by one.
+const NARROW: usize = 4;
 
 /// A covered pixel: depth (reversed, 0 is far), and the index of the triangle plus 1 (0: none).
 pub type Covered = (f32, u32);
@@ -50,76 +88,106 @@ pub fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3);
     }
 }
 
-/// Projects a part of [`clip_near`] to an image of `width` × `height` pixels. Its corners snap to 1/256
-/// pixel, as on a GPU, and are ordered so that its area is positive.
-#[inline]
-pub fn to_screen(
-    part: [(Vec4, Vec3); 3],
-    [width, height]: [usize; 2],
-    id: u32,
-    corners: [u16; 3],
-) -> ScreenTriangle {
-    // Far outside the image, snapping has no meaning and would lose the fraction's bits.
-    let snap = |x: f64| (x.clamp(-1e9, 1e9) * 256.0).round() / 256.0;
-    let mut t = ScreenTriangle {
-        x: part.map(|(c, _)| snap((c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64)),
-        y: part.map(|(c, _)| snap((0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64)),
-        inverse_w: part.map(|(c, _)| 1.0 / c.w as f64),
-        depth: part.map(|(c, _)| c.z as f64 / c.w as f64),
-        weights: part.map(|(_, w)| w),
-        id,
-        corners,
-    };
-    if t.area() < 0.0 {
-        t.x.swap(1, 2);
-        t.y.swap(1, 2);
-        t.inverse_w.swap(1, 2);
-        t.depth.swap(1, 2);
-        t.weights.swap(1, 2);
-    }
-    t
-}
-
 impl ScreenTriangle {
+    /// Triangle between three points, in either order.
+    #[inline]
+    pub fn new(points: [ScreenPoint; 3], id: u32, corners: [u16; 3]) -> Self {
+        let mut t = ScreenTriangle { points, weights: None, id, corners, flipped: false };
+        if t.area() < 0.0 {
+            t.points.swap(1, 2);
+            t.flipped = true;
+        }
+        t
+    }
+
+    /// A part of a triangle that [`clip_near`] has cut.
+    pub fn part(part: [(Vec4, Vec3); 3], size: [usize; 2], id: u32, corners: [u16; 3]) -> Self {
+        let t = ScreenTriangle::new(part.map(|(c, _)| ScreenPoint::new(c, size)), id, corners);
+        ScreenTriangle { weights: Some(Box::new(part.map(|(_, w)| w))), ..t }
+    }
+
     /// Twice the signed area of the triangle between edge `i` and the point `p`.
+    #[inline]
     fn edge(&self, i: usize, p: [f64; 2]) -> f64 {
-        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-        (self.x[b] - self.x[a]) * (p[1] - self.y[a]) - (self.y[b] - self.y[a]) * (p[0] - self.x[a])
+        let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+        (b.x - a.x) * (p[1] - a.y) - (b.y - a.y) * (p[0] - a.x)
     }
 
     /// Twice the signed area.
+    #[inline]
     fn area(&self) -> f64 {
-        self.edge(2, [self.x[2], self.y[2]])
+        self.edge(2, [self.points[2].x, self.points[2].y])
     }
 
     /// Whether the triangle has an area and its bounding box holds the centre of a pixel of the window.
+    #[inline]
     pub fn covers_centres(&self, window: Window) -> bool {
         let ((x0, x1), (y0, y1)) = self.centres(window);
-        self.area() > 0.0 && x0 < x1 && y0 < y1
+        x0 < x1 && y0 < y1 && self.area() > 0.0
     }
 
     /// Half-open ranges of the columns and rows of the window whose centres lie in the bounding box.
+    #[inline]
     fn centres(&self, window: Window) -> ((usize, usize), (usize, usize)) {
         let range = |v: [f64; 3], first: u32, count: u32| {
-            let low = (v[0].min(v[1]).min(v[2]) - 0.5).ceil().max(first as f64);
-            let high = (v[0].max(v[1]).max(v[2]) - 0.5).floor() + 1.0;
-            (low as usize, (high.max(0.0) as usize).min((first + count) as usize))
+            let (mut low, mut high) = (v[0], v[0]);
+            for x in [v[1], v[2]] {
+                low = if x < low { x } else { low };
+                high = if x > high { x } else { high };
+            }
+            // A point is a whole number of 256ths, so whole numbers find the centres exactly.
+            let [low, high] = [low, high].map(|x| (x * 256.0) as i64 - 128);
+            let (first, end) = (i64::from(first), i64::from(first + count));
+            (((low + 255) >> 8).clamp(first, end) as usize, ((high >> 8) + 1).clamp(first, end) as usize)
         };
-        (range(self.x, window.x, window.width), range(self.y, window.y, window.height))
+        let [a, b, c] = &self.points;
+        (range([a.x, b.x, c.x], window.x, window.width), range([a.y, b.y, c.y], window.y, window.height))
+    }
+
+    /// Returns the part of `columns` in which the triangle may cover centres of row `y`, at most two columns
+    /// too wide.
+    #[inline]
+    fn span(&self, y: usize, columns: Range<usize>) -> Range<usize> {
+        // In few columns, to divide takes longer than to test them all.
+        if columns.len() <= NARROW {
+            return columns;
+        }
+        let (mut low, mut high) = (columns.start as f64, columns.end as f64);
+        for i in 0..3 {
+            let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+            let (dx, dy) = (b.x - a.x, b.y - a.y);
+            // The column where the edge crosses the row.
+            let at = a.x - 0.5 + dx * (y as f64 + 0.5 - a.y) / dy;
+            if dy < 0.0 {
+                low = low.max(at - 1.0);
+            } else if dy > 0.0 {
+                high = high.min(at + 2.0);
+            }
+        }
+        (low as usize).max(columns.start)..(high.max(0.0) as usize).min(columns.end)
     }
 
     /// Whether points on edge `i` belong to this triangle: true for top and left edges.
+    #[inline]
     fn owns_edge(&self, i: usize) -> bool {
-        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-        let (dx, dy) = (self.x[b] - self.x[a], self.y[b] - self.y[a]);
+        let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
         dy < 0.0 || (dy == 0.0 && dx > 0.0)
     }
 
     /// Returns the perspective-correct weights of the original corners at a position in pixels.
+    #[inline]
     pub fn weights_at(&self, p: [f64; 2]) -> Vec3 {
-        let w = [0, 1, 2].map(|i| self.edge(i, p) * self.inverse_w[i]);
+        let mut w = [0, 1, 2].map(|i| self.edge(i, p) * self.points[i].inverse_w);
         let sum: f64 = w.iter().sum();
-        (0..3).map(|i| self.weights[i] * (w[i] / sum) as f32).sum()
+        if self.flipped {
+            w.swap(1, 2);
+        }
+        let w = w.map(|w| (w / sum) as f32);
+        match &self.weights {
+            None => Vec3::from(w),
+            Some(weights) => (0..3).map(|i| weights[i] * w[i]).sum(),
+        }
     }
 }
 
@@ -163,11 +231,11 @@ impl Rasteriser {
             let ((x0, x1), (y0, y1)) = t.centres(band);
             let owns = [0, 1, 2].map(|i| t.owns_edge(i));
             for y in y0..y1 {
-                for x in x0..x1 {
+                for x in t.span(y, x0..x1) {
                     let p = [x as f64 + 0.5, y as f64 + 0.5];
                     let e = [0, 1, 2].map(|i| t.edge(i, p));
                     if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
-                        let depth = ((0..3).map(|i| e[i] * t.depth[i]).sum::<f64>() / area) as f32;
+                        let depth = ((0..3).map(|i| e[i] * t.points[i].depth).sum::<f64>() / area) as f32;
                         let pixel = ((y - top) * width + x - left) * layers;
                         insert(&mut covered[pixel..pixel + layers], (depth, number + 1), |other| {
                             self.triangles[other as usize - 1].id == t.id
