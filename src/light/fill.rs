@@ -27,15 +27,6 @@ pub enum Numbers {
 }
 
 impl Numbers {
-    /// Value of the cell with this index, if there is one.
-    #[inline]
-    pub fn get(&self, index: usize) -> Option<f32> {
-        match self {
-            Numbers::Codes(codes) => codes.get(index).map(|&code| code.into()),
-            Numbers::Depths(depths) => depths.get(index).copied(),
-        }
-    }
-
     /// Value of the cell with this index, as a number.
     pub fn at(&self, index: usize) -> f32 {
         match self {

@@ -6,6 +6,7 @@ use glam::{IVec3, UVec3, Vec3};
 
 use super::matter::SheetDensity;
 use crate::mapping::CellFrame;
+use crate::util::powers::log2;
 use crate::volume::{Cell, Moments, Pyramid, VolumeTexture};
 use crate::walk::Crossing;
 
@@ -150,5 +151,5 @@ pub fn level_at(
     let c = d_world.dot(forward);
     let area = footprint * (c * c * c) * (t * t);
     let across = area / (frame.det.abs() * frame.depth * d_cell.length());
-    0.5 * across.max(1e-30).log2()
+    0.5 * log2(across.max(1e-30))
 }

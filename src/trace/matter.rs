@@ -78,12 +78,6 @@ impl SheetDensity {
         (code * self.scale + self.shift).max(0.0)
     }
 
-    /// Factor and summand of [`SheetDensity::rho`].
-    #[inline]
-    pub fn line(&self) -> [f32; 2] {
-        [self.scale, self.shift]
-    }
-
     /// Optical depth from the centre of a mist cell in layer `z` of `layers` to the point where the light ray
     /// leaves the slab. The mist is treated as uniform.
     ///

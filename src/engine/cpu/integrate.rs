@@ -337,14 +337,15 @@ impl<'a> Integrator<'a> {
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, cells } = result;
-        self.composed(&ray, transmittance, cells, &lit, SheetOrder { before, is_last, behind })
+        self.composed(ray.point, transmittance, cells, &lit, SheetOrder { before, is_last, behind })
     }
 
-    /// Result of a sheet that lets `transmittance` pass, in which the lights send `lit` to the eye.
+    /// Result of a sheet that a ray meets at `point` of the world and that lets `transmittance` pass, in
+    /// which the lights send `lit` to the eye.
     #[inline]
     fn composed(
         &self,
-        ray: &SheetHit,
+        point: Vec3,
         transmittance: f32,
         cells: [u32; 2],
         lit: &[Lit],
@@ -354,7 +355,7 @@ impl<'a> Integrator<'a> {
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
         let mut radiance = self.scene.ambient * (before - transmittance) + passed;
         for (light, lit) in self.lights.iter().zip(lit) {
-            let (_, intensity) = light.at(ray.point);
+            let (_, intensity) = light.at(point);
             let sum = if self.in_colour() { lit.colour } else { Vec3::splat(lit.sum * (1.0 / 255.0)) };
             radiance += intensity * sum;
         }

@@ -172,7 +172,7 @@ impl Integrator<'_> {
 }
 
 /// Returns the light volumes around the point `uv` of a quad.
-fn patch_corners(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> PatchCorners {
+pub(super) fn patch_corners(volumes: &LightVolumes, quad: usize, light: usize, uv: Vec2) -> PatchCorners {
     let patches = volumes.patches[quad * volumes.lights + light];
     let [nu, nv] = patches.count;
     let at = uv * Vec2::new(nu as f32, nv as f32);

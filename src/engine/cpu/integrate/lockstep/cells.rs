@@ -51,17 +51,21 @@ impl<'a> Store<'a> {
         }
     }
 
-    /// Linear index of a cell, as light volumes have it; outside of them for no cell.
+    /// Linear indices of cells, as light volumes have them; outside of them for no cell.
     #[inline(always)]
-    pub fn linear(&self, index: i32) -> usize {
+    pub fn linear(&self, index: &[i32; LANES]) -> [usize; LANES] {
+        let mut out = [0; LANES];
         match self.cells {
-            Stored::Dense(_) => index as u32 as usize,
+            Stored::Dense(_) => out.iter_mut().zip(index).for_each(|(out, &i)| *out = i as u32 as usize),
             Stored::Sparse(bricks) => {
                 let [nx, ny, _] = bricks.size().map(|n| n as usize);
-                let [x, y, z] = self.coordinates(index).map(|c| c as usize);
-                (z * ny + y) * nx + x
+                for (out, &index) in out.iter_mut().zip(index) {
+                    let [x, y, z] = self.coordinates(index).map(|c| c as usize);
+                    *out = (z * ny + y) * nx + x;
+                }
             }
         }
+        out
     }
 
     /// Fetches the cells that the rays passed in `steps` steps. No cell is an empty one.

@@ -7,16 +7,16 @@ use glam::Vec3;
 
 use super::cells::{Row, Store, k_codes, rho_codes, v_codes, words};
 use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
-use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
+use super::hits::{Hits, Values};
+use super::lanes::{Floats, LANES, Lanes3, Stored, Words};
 use super::light::{LaneLight, lanes_of};
 use super::powers::exp2;
 use super::walk::{NO_CELL, Passed, ROW, Walk};
+use crate::engine::cpu::integrate::Integrator;
 use crate::engine::cpu::integrate::light::RayScatter;
 use crate::engine::cpu::integrate::walk::Lit;
-use crate::engine::cpu::integrate::{Integrator, SheetHit};
 use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
-use crate::trace::SheetDensity;
 use crate::trace::lookup::Level;
 use crate::util::powers::log2;
 
@@ -29,20 +29,7 @@ pub struct Group<'a> {
     /// Extinction in the level's cells.
     pub extinction: f32,
     exponent: Exponent,
-    rays: [&'a SheetHit<'a>; LANES],
-    /// Where each ray meets its sheet, and its direction, in the level's cells.
-    origin: Stored3,
-    direction: Stored3,
-    e_v: Stored3,
-    metric: [Stored; 4],
-    /// What each ray's sheet makes of ρ.
-    pub matter: [SheetDensity; LANES],
-    /// Factors and summands of it.
-    pub line: [Stored; 2],
-    /// Share of the mean ρ that erosion leaves.
-    pub left: Stored,
-    /// Depth of one of the volume's own cells, metres.
-    pub cell_depth: Stored,
+    pub hits: Hits,
     /// T before the sheets.
     before: Stored,
 }
@@ -56,6 +43,8 @@ pub struct Steps {
     /// Rays that see matter in their cell, one bit each.
     pub lit: [u8; ROW],
     cells: Row,
+    /// Share of T that each cell lets pass.
+    share: [Stored; ROW],
     /// Share of the cells in what the eye sees.
     weight: [Stored; ROW],
     /// Depth of the cells, and before them, in bits.
@@ -77,8 +66,6 @@ pub struct Ends {
 pub struct Scratch<'a> {
     steps: Steps,
     lights: Vec<LaneLight<'a>>,
-    /// Terms of multiple scattering of each ray and light.
-    scatter: Vec<Option<Vec<RayScatter>>>,
 }
 
 impl Scratch<'_> {
@@ -89,60 +76,65 @@ impl Scratch<'_> {
 }
 
 impl<'a> Group<'a> {
-    /// Group of rays, and T before each of them. Missing ones are filled up with the first.
+    /// Group of rays with the sheets `hits`, and T before each of them.
     pub fn new(
         integrator: &'a Integrator<'a>,
         level: Level<'a>,
         store: Store<'a>,
-        rays: [&'a SheetHit<'a>; LANES],
+        hits: Hits,
         before: [f32; LANES],
     ) -> Self {
-        let matter = rays.map(|ray| *ray.matter(&level));
         Group {
             integrator,
             level,
             store,
-            is_mist: matter[0].mist > 0.0,
+            is_mist: hits.values.mist.0[0] > 0.0,
             extinction: integrator.extinction_in(&level),
             exponent: Exponent::new(integrator.scene.p),
-            rays,
-            origin: Stored3::from_fn(|lane| rays[lane].origin * level.scale),
-            direction: Stored3::from_fn(|lane| rays[lane].d_cell * level.scale),
-            e_v: Stored3::from_fn(|lane| rays[lane].e_v),
-            metric: [0, 1, 2, 3].map(|i| Stored::from_fn(|lane| rays[lane].metric.m[i])),
-            matter,
-            line: [0, 1].map(|i| Stored::from_fn(|lane| matter[lane].line()[i])),
-            left: Stored::from_fn(|lane| matter[lane].left),
-            cell_depth: Stored::from_fn(|lane| rays[lane].frame.depth),
+            hits,
             before: Stored(before),
         }
     }
 
-    /// Computes the terms of all lights for the rays.
-    pub fn prepare(&self, scratch: &mut Scratch<'a>) {
-        let Scratch { lights, scatter, .. } = scratch;
-        lights.resize_with(self.integrator.lights.len(), LaneLight::default);
-        lights.iter_mut().for_each(LaneLight::reset);
-        for (lane, ray) in self.rays.iter().enumerate() {
-            let terms = self.integrator.ray_lights(ray, &self.level);
-            lights.iter_mut().zip(terms).for_each(|(light, terms)| light.set(self, lane, &terms));
-        }
-        scatter.clear();
-        if self.integrator.media.is_some() {
-            scatter.extend(self.rays.iter().map(|ray| self.integrator.ray_scatter(ray)));
+    /// Factors and summands of ρ in the level.
+    #[inline(always)]
+    pub fn line(&self) -> &[Stored; 2] {
+        &self.hits.values.lines[usize::from(!self.level.is_whole)]
+    }
+
+    /// Terms of multiple scattering of each ray and light.
+    fn scatter(&self) -> Vec<Option<Vec<RayScatter>>> {
+        let scatter_of = |lane: usize| {
+            let Values { at, d_world, .. } = &self.hits.values;
+            let (quad, d) = (self.hits.quads[lane], d_world.get(lane));
+            self.integrator.ray_scatter(&self.integrator.sheet_hit(quad, d, at.get(lane).to_array()))
+        };
+        match self.integrator.media.is_some() {
+            true => (0..LANES).map(scatter_of).collect(),
+            false => Vec::new(),
         }
     }
 
     /// Walks the rays to the end of the slab, or to their own.
     #[inline(always)]
     pub fn walk<S: Simd>(&self, simd: S, scratch: &mut Scratch<'a>) -> Ends {
-        let Scratch { steps, lights, scatter } = scratch;
+        let Scratch { steps, lights } = scratch;
+        lights.resize_with(self.integrator.lights.len(), LaneLight::default);
+        for (i, light) in lights.iter_mut().enumerate() {
+            light.reset(simd, self, i);
+        }
+        let scatter = self.scatter();
         let trace = &self.integrator.scene.trace;
-        let mut walk = Walk::new(simd, &self.store.units, self.origin.load(simd), self.direction.load(simd));
+        let mut walk = Walk::new(
+            simd,
+            &self.store.units,
+            self.hits.values.origin.load(simd).scaled(self.level.scale),
+            self.hits.values.d_cell.load(simd).scaled(self.level.scale),
+        );
         let mut view = View {
             transmittance: self.before.load(simd),
             depth: Stored::from_fn(|lane| -log2(self.before.0[lane].max(1e-30))).load(simd),
-            counts: i32x8::splat(simd, 0),
+            early: i32x8::splat(simd, 0),
         };
         let mut walked = [0; LANES];
         let mut n = 0;
@@ -159,39 +151,60 @@ impl<'a> Group<'a> {
                 self.visibility(simd, steps, light, &mut walked);
             }
             for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                self.shade(simd, steps, j, lights, scatter);
+                self.shade(simd, steps, j, lights, &scatter);
             }
             n += steps.count as u32;
         }
-        let seen = view.counts.to_array().map(|count| count as u32);
+        let seen = (walk.count - view.early).to_array().map(|count| count as u32);
         Ends { transmittance: view.transmittance.to_array(), cells: [seen, walked] }
     }
 
     /// Follows T through the cells of a row.
     #[inline(always)]
     fn attenuate<S: Simd>(&self, simd: S, steps: &mut Steps, view: &mut View<S>) {
-        let zero = f32x8::splat(simd, 0.0);
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let early_end = f32x8::splat(simd, self.integrator.scene.trace.early_end);
-        let (scale, shift) = (self.line[0].load(simd), self.line[1].load(simd));
+        let (scale, shift) = (self.line()[0].load(simd), self.line()[1].load(simd));
+        let before = view.transmittance;
+        let mut after = before;
         for j in 0..steps.count {
-            let [first, _] = words(simd, &steps.cells[j]);
-            let rho = (rho_codes(first) * scale + shift).max(zero);
+            let rho = (rho_codes(words(simd, &steps.cells[j])[0]) * scale + shift).max(zero);
             let mut tau_bits = rho * self.extinction;
             if !self.integrator.per_cell {
                 tau_bits *= steps.passed.length[j].load(simd);
             }
-            let index = i32x8::load_array_ref(simd, &steps.passed.index[j]);
-            let visits = !index.simd_eq(NO_CELL) & view.transmittance.simd_ge(early_end);
-            let lit = visits & rho.simd_gt(zero);
-            let passes = view.transmittance * exp2(simd, -tau_bits);
-            let passed = lit.select(passes, view.transmittance);
-            view.counts += visits.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0));
+            let inside = !i32x8::load_array_ref(simd, &steps.passed.index[j]).simd_eq(NO_CELL);
+            let lit = inside & rho.simd_gt(zero);
+            let share = lit.select(exp2(simd, -tau_bits), one);
+            let passed = after * share;
             steps.lit[j] = lit.to_bitmask() as u8;
-            steps.weight[j].store(view.transmittance - passed);
-            steps.tau_bits[j].store(tau_bits);
-            steps.depth[j].store(view.depth);
-            view.transmittance = passed;
-            view.depth += lit.select(tau_bits, zero);
+            steps.share[j].store(share);
+            steps.weight[j].store(after - passed);
+            steps.tau_bits[j].store(lit.select(tau_bits, zero));
+            after = passed;
+        }
+        // T never grows, so no ray has ended if none has at the end of the row.
+        let ends = after.simd_lt(early_end);
+        if ends.any_true() {
+            after = before;
+            for j in 0..steps.count {
+                let lives = after.simd_ge(early_end);
+                let inside = !i32x8::load_array_ref(simd, &steps.passed.index[j]).simd_eq(NO_CELL);
+                let passed = lives.select(after * steps.share[j].load(simd), after);
+                view.early += (inside & !lives).select(i32x8::splat(simd, 1), i32x8::splat(simd, 0));
+                steps.lit[j] &= lives.to_bitmask() as u8;
+                steps.weight[j].store(after - passed);
+                let tau_bits = steps.tau_bits[j].load(simd);
+                steps.tau_bits[j].store(lives.select(tau_bits, zero));
+                after = passed;
+            }
+        }
+        view.transmittance = after;
+        if self.integrator.media.is_some() {
+            for j in 0..steps.count {
+                steps.depth[j].store(view.depth);
+                view.depth += steps.tau_bits[j].load(simd);
+            }
         }
     }
 
@@ -211,8 +224,8 @@ impl<'a> Group<'a> {
         let weight = steps.weight[j].load(simd);
         let [first, second] = words(simd, &steps.cells[j]);
         let k = k_codes(first);
-        let e_v = self.e_v.load(simd);
-        let metric = Metric::load(simd, &self.metric);
+        let e_v = self.hits.values.e_v.load(simd);
+        let metric = Metric::load(simd, &self.hits.values.metric);
         let angles = Angles::new(simd, self, &metric, second, e_v);
         for (i, light) in lights.iter_mut().enumerate() {
             let l_v = light.l_v.load(simd);
@@ -267,10 +280,10 @@ impl<'a> Group<'a> {
                 }
                 _ => Vec3::splat(weight * visibility * fibre * (1.0 / 255.0)),
             };
-            let medium = self.integrator.medium_of(self.rays[lane].quad);
+            let medium = self.integrator.medium_of(self.hits.quads[lane]);
             let terms = scatter.get(lane).and_then(|scatter| Some(&scatter.as_ref()?[i]));
             if let (Some(MultipleMedium { similarity, profile }), Some(terms)) = (medium, terms) {
-                let z = self.store.coordinates(steps.passed.index[j][lane])[2] as i32;
+                let z = self.level.size.z - steps.passed.layers[j][lane];
                 let diffuse = profile.at(&terms.row, self.integrator.layer_in(&self.level, z));
                 let [view, cell, depth] = [&steps.depth[j], &steps.tau_bits[j], &light.depth[j]];
                 let more =
@@ -287,8 +300,8 @@ struct View<S: Simd> {
     transmittance: Floats<S>,
     /// −log₂ T.
     depth: Floats<S>,
-    /// Number of cells visited.
-    counts: i32x8<S>,
+    /// Number of cells behind those where T ended the ray.
+    early: i32x8<S>,
 }
 
 /// Directions in eight cells.
@@ -305,7 +318,7 @@ impl<S: Simd> Angles<S> {
     #[inline(always)]
     fn new(simd: S, group: &Group, metric: &Metric<S>, second: Words<S>, e_v: Lanes3<S>) -> Self {
         if group.is_mist {
-            return Angles::Mist(Stored::from_fn(|lane| group.matter[lane].mist).load(simd));
+            return Angles::Mist(group.hits.values.mist.load(simd));
         }
         if !group.level.is_whole {
             return Angles::Many(Spread::new(simd, metric, Moments::unpacked(simd, second), e_v));

@@ -1,6 +1,7 @@
 //! Vectors of eight lanes, one lane a ray. Functions that take them are inlined into the code of one
 //! instruction set; a call would leave its registers.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
 use glam::Vec3;
@@ -18,8 +19,8 @@ pub type Words<S> = u32x8<S>;
 pub type Mask<S> = mask32x8<S>;
 
 /// Floats of eight lanes in memory.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(32))]
 pub struct Stored(pub [f32; LANES]);
 
 impl Stored {
@@ -47,7 +48,8 @@ impl Stored {
 }
 
 /// Vectors of eight lanes in memory.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Stored3(pub [Stored; 3]);
 
 impl Stored3 {
@@ -79,6 +81,14 @@ impl Stored3 {
         let [x, y, z] = &self.0;
         Lanes3 { x: x.load(simd), y: y.load(simd), z: z.load(simd) }
     }
+
+    /// Stores the lanes.
+    #[inline(always)]
+    pub fn store<S: Simd>(&mut self, lanes: Lanes3<S>) {
+        self.0[0].store(lanes.x);
+        self.0[1].store(lanes.y);
+        self.0[2].store(lanes.z);
+    }
 }
 
 /// One vector a lane. Products have the order of operations of [`Vec3`].
@@ -94,6 +104,12 @@ impl<S: Simd> Lanes3<S> {
     #[inline(always)]
     pub fn dot(self, other: Lanes3<S>) -> Floats<S> {
         self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Products with the components of a vector.
+    #[inline(always)]
+    pub fn scaled(self, factors: Vec3) -> Lanes3<S> {
+        Lanes3 { x: self.x * factors.x, y: self.y * factors.y, z: self.z * factors.z }
     }
 
     /// Product with one number a lane.

@@ -8,12 +8,11 @@ use super::cells::{Row, rho_codes, words};
 use super::group::{Group, Steps};
 use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use super::powers::{exp2, log2};
-use super::walk::{NO_CELL, Passed, ROW, Walk};
-use crate::engine::cpu::integrate::light::RayLight;
-use crate::light::Visibility;
+use super::walk::{Passed, ROW, Walk};
+use crate::engine::cpu::integrate::light::patch_corners;
 use crate::light::fill::Numbers;
 use crate::light::visibility::{Form, TRANSMITTANCE_OF_CODE};
-use crate::walk::NEVER;
+use crate::light::{AngleFrame, Light, Visibility};
 
 /// Terms of one light for eight rays, and what it has sent along them.
 #[derive(Default)]
@@ -24,8 +23,9 @@ pub struct LaneLight<'a> {
     pub l_dot_e: Stored,
     /// J⁻¹l, in the level's cells.
     l_cell: Stored3,
-    /// Light volumes at the corners of each ray's patch, if there are any.
-    corners: [[Option<&'a Numbers>; LANES]; 4],
+    /// Light volumes at the corners of each ray's patch, if there are any: codes or depths.
+    codes: [[&'a [u8]; LANES]; 4],
+    depths: [[&'a [f32]; LANES]; 4],
     /// Each ray's position in its patch.
     at: [Stored; 2],
     /// Whether each ray interpolates between light volumes, and whether any does.
@@ -44,36 +44,92 @@ pub struct LaneLight<'a> {
 }
 
 impl<'a> LaneLight<'a> {
-    /// Forgets the last rays.
-    pub fn reset(&mut self) {
+    /// Takes the terms of light number `i` for the rays of a group, and starts without light. Twin of
+    /// `ray_lights` in `src/engine/cpu/integrate/light.rs`.
+    #[inline(always)]
+    pub fn reset<S: Simd>(&mut self, simd: S, group: &Group<'a>, i: usize) {
+        let integrator = group.integrator;
+        let (light, quads) = (&integrator.lights[i], &integrator.scene.quads);
+        let hits = &group.hits;
+        let to_light = match light {
+            Light::Directional { to_light: l, .. } => {
+                let splat = |x: f32| f32x8::splat(simd, x);
+                Lanes3 { x: splat(l.x), y: splat(l.y), z: splat(l.z) }
+            }
+            _ => Stored3::from_fn(|lane| light.at(hits.values.point.get(lane)).0).load(simd),
+        };
+        let frame = hits.frame(simd);
+        let e1 = hits.vectors_of_quads(simd, quads, |quad| quad.map.e1_world);
+        let e2 = hits.vectors_of_quads(simd, quads, |quad| quad.map.e2_world);
+        let n = hits.vectors_of_quads(simd, quads, |quad| quad.map.n_world);
+        let l = Lanes3 {
+            x: to_light.dot(e1),
+            y: to_light.dot(e2),
+            z: to_light.dot(n) * hits.values.side.load(simd),
+        };
+        let l_cell = frame.cell_from_plane(l);
+        let (l_v, l_dot_e) = match integrator.scene.angles {
+            AngleFrame::World => (frame.transposed(l), -to_light.dot(hits.values.d_world.load(simd))),
+            AngleFrame::Texture => {
+                let length = l_cell.dot(l_cell).sqrt();
+                let l_v = Lanes3 { x: l_cell.x / length, y: l_cell.y / length, z: l_cell.z / length };
+                (l_v, l_v.dot(hits.values.e_v.load(simd)))
+            }
+        };
+        self.l_v.store(l_v);
+        self.l_dot_e.store(l_dot_e);
+        self.l_cell.store(l_cell.scaled(group.level.scale));
         self.sum = Stored::default();
         self.colour = Stored3::default();
         self.marches = 0;
         self.is_between = false;
-    }
-
-    /// Takes the terms of ray `lane` of a group.
-    #[inline]
-    pub fn set(&mut self, group: &Group<'a>, lane: usize, terms: &RayLight) {
-        self.l_v.set(lane, terms.l_v);
-        self.l_cell.set(lane, terms.l_cell);
-        self.l_dot_e.0[lane] = terms.l_dot_e;
-        match group.integrator.scene.visibility {
-            Visibility::None => (0..ROW).for_each(|j| self.visible[j].0[lane] = 1.0),
+        match integrator.scene.visibility {
+            Visibility::None => self.visible = [Stored([1.0; LANES]); ROW],
             _ if group.is_mist => {}
             Visibility::March => self.marches = u8::MAX,
-            Visibility::Cached => {
-                let (corners, level) = (&terms.corners, group.level.number as usize);
-                self.marches |= u8::from(corners.marched) << lane;
-                let Some(filled) = &group.integrator.filled else { return };
-                for (corner, number) in corners.numbers.iter().enumerate() {
-                    self.corners[corner][lane] = Some(&filled[*number as usize][level]);
+            Visibility::Cached => self.take_volumes(group, i),
+        }
+    }
+
+    /// Finds the light volumes of every ray's patch.
+    fn take_volumes(&mut self, group: &Group<'a>, i: usize) {
+        let integrator = group.integrator;
+        let (Some(plan), Some(filled)) = (&integrator.light_volumes, &integrator.filled) else { return };
+        for lane in 0..LANES {
+            let uv = group.hits.values.at.get(lane).truncate();
+            let corners = patch_corners(plan, group.hits.quads[lane], i, uv);
+            self.marches |= u8::from(corners.marched) << lane;
+            (self.at[0].0[lane], self.at[1].0[lane]) = corners.at.into();
+            self.between[lane] = corners.numbers != [corners.numbers[0]; 4];
+            self.is_between |= self.between[lane];
+            for (corner, number) in corners.numbers.iter().enumerate() {
+                match &filled[*number as usize][group.level.number as usize] {
+                    Numbers::Codes(codes) => self.codes[corner][lane] = codes,
+                    Numbers::Depths(depths) => self.depths[corner][lane] = depths,
                 }
-                (self.at[0].0[lane], self.at[1].0[lane]) = corners.at.into();
-                self.between[lane] = corners.numbers != [corners.numbers[0]; 4];
-                self.is_between |= self.between[lane];
             }
         }
+    }
+
+    /// Values of eight cells in the light volumes at one corner of each ray's patch; 0 for no cell.
+    #[inline(always)]
+    fn values(&self, form: Form, corner: usize, at: &[usize; LANES]) -> Stored {
+        let mut out = Stored::default();
+        match form {
+            Form::Codes => {
+                let volumes = self.codes[corner].iter().zip(at);
+                for (out, (codes, &at)) in out.0.iter_mut().zip(volumes) {
+                    *out = codes.get(at).map_or(0.0, |&code| code.into());
+                }
+            }
+            Form::Depths => {
+                let volumes = self.depths[corner].iter().zip(at);
+                for (out, (depths, &at)) in out.0.iter_mut().zip(volumes) {
+                    *out = depths.get(at).copied().unwrap_or_default();
+                }
+            }
+        }
+        out
     }
 }
 
@@ -102,52 +158,51 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// V in mist, which is treated as uniform.
+    /// V in mist, which is treated as uniform. Twin of [`crate::trace::SheetDensity::depth`].
     #[inline(always)]
     fn through_mist<S: Simd>(&self, simd: S, steps: &Steps, light: &mut LaneLight) {
-        let layers = self.level.size.z;
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let layers = splat(self.level.size.z as f32);
+        let direction = light.l_cell.load(simd);
+        let is_down = direction.z.simd_lt(0.0);
+        let (x, y, z) = (direction.x.abs(), direction.y.abs(), direction.z.abs());
+        let even = self.hits.values.even.load(simd);
         for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-            let mut depth = Stored::default();
-            for lane in lanes_of(steps.lit[j]) {
-                let z = self.store.coordinates(steps.passed.index[j][lane])[2] as i32;
-                let matter = self.matter[lane];
-                let [x, y, c] = [0, 1, 2].map(|axis| light.l_cell.0[axis].0[lane]);
-                let own = matter.depth(z, glam::Vec3::new(x, y, c), layers, self.integrator.per_cell);
-                depth.0[lane] = own * self.extinction;
-            }
-            light.visible[j].store(exp2(simd, -depth.load(simd)));
-            light.depth[j] = depth;
+            // View rays go upwards, through the layers that are left to them.
+            let left = i32x8::load_array_ref(simd, &steps.passed.layers[j]).to_float::<f32x8<S>>();
+            let height = layers - left + 0.5;
+            let t = is_down.select(height, layers - height) / z.max(splat(1e-6));
+            let length = if self.integrator.per_cell { t * (x + y + z) } else { t };
+            let depth = even * length.min(splat(1e9)) * self.extinction;
+            light.visible[j].store(exp2(simd, -depth));
+            light.depth[j].store(depth);
         }
     }
 
     /// V from light volumes.
     #[inline(always)]
     fn looked_up<S: Simd>(&self, simd: S, steps: &Steps, light: &mut LaneLight) {
-        let form = self.integrator.light_volumes.as_ref().map(|volumes| volumes.form);
+        let Some(form) = self.integrator.light_volumes.as_ref().map(|volumes| volumes.form) else { return };
         let one = f32x8::splat(simd, 1.0);
-        let left = self.left.load(simd);
+        let left = self.hits.values.left.load(simd);
         let is_eroded = left.simd_lt(1.0);
         for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-            let at = steps.passed.index[j].map(|index| self.store.linear(index));
-            let value = |corner: usize| {
-                Stored::from_fn(|lane| {
-                    light.corners[corner][lane].and_then(|numbers| numbers.get(at[lane])).unwrap_or_default()
-                })
-            };
-            let mut values = value(0);
+            let at = self.store.linear(&steps.passed.index[j]);
+            let mut values = light.values(form, 0, &at);
             if light.is_between {
-                let (p00, p10) = (values.load(simd), value(1).load(simd));
-                let (p01, p11) = (value(2).load(simd), value(3).load(simd));
+                let (p00, p10) = (values.load(simd), light.values(form, 1, &at).load(simd));
+                let p01 = light.values(form, 2, &at).load(simd);
+                let p11 = light.values(form, 3, &at).load(simd);
                 let (x, y) = (light.at[0].load(simd), light.at[1].load(simd));
-                let mix = |a: Floats<S>, b: Floats<S>, x: Floats<S>| a * (one - x) + b * x;
                 let mut mixed = Stored::default();
-                mixed.store(mix(mix(p00, p10, x), mix(p01, p11, x), y));
+                let (near, far) = (mix(simd, p00, p10, x), mix(simd, p01, p11, x));
+                mixed.store(mix(simd, near, far, y));
                 for lane in (0..LANES).filter(|&lane| light.between[lane]) {
                     values.0[lane] = mixed.0[lane];
                 }
             }
             let value = values.load(simd);
-            if form == Some(Form::Codes) {
+            if form == Form::Codes {
                 let transmittance = value * value * TRANSMITTANCE_OF_CODE;
                 let visible = if is_eroded.any_true() {
                     let bright = transmittance.max(f32x8::splat(simd, 1e-9));
@@ -160,7 +215,7 @@ impl<'a> Group<'a> {
             } else {
                 // Light volumes are filled without the sheet's erosion; `left` is the mean share of ρ it
                 // leaves.
-                let path = if self.integrator.per_cell { one } else { self.cell_depth.load(simd) };
+                let path = if self.integrator.per_cell { one } else { self.hits.values.depth.load(simd) };
                 let depth = value * (f32x8::splat(simd, self.extinction) * left * path);
                 light.visible[j].store(exp2(simd, -depth));
                 light.depth[j].store(depth);
@@ -168,23 +223,19 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// V by walks to the light, eight cells at a time.
+    /// V by walks to the light, from the lit cells of a row in the order of steps.
     #[inline(always)]
     fn marched<S: Simd>(&self, simd: S, steps: &Steps, light: &mut LaneLight, walked: &mut [u32; LANES]) {
-        let mut cells = [(0, 0); LANES];
+        let mut cells = [(0, 0); LANES * ROW];
         let mut count = 0;
         for j in 0..steps.count {
             for lane in lanes_of(steps.lit[j] & light.marches) {
                 cells[count] = (j, lane);
                 count += 1;
-                if count == LANES {
-                    self.march(simd, steps, &cells, light, walked);
-                    count = 0;
-                }
             }
         }
-        if count > 0 {
-            self.march(simd, steps, &cells[..count], light, walked);
+        for cells in cells[..count].chunks(LANES) {
+            self.march(simd, steps, cells, light, walked);
         }
     }
 
@@ -201,18 +252,23 @@ impl<'a> Group<'a> {
         simd.vectorize(
             #[inline(always)]
             || {
-                // Idle lanes repeat the first cell.
-                let cell_of = |i: usize| cells.get(i).copied().unwrap_or(cells[0]);
-                let start = Stored3::from_fn(|i| {
-                    let (j, lane) = cell_of(i);
+                let (mut start, mut direction) = (Stored3::default(), Stored3::default());
+                let mut line = [Stored::default(); 2];
+                for i in 0..LANES {
+                    // Idle lanes repeat the first cell.
+                    let (j, lane) = cells.get(i).copied().unwrap_or(cells[0]);
                     let cell = self.store.coordinates(steps.passed.index[j][lane]);
-                    glam::UVec3::from(cell).as_vec3() + 0.5
-                });
-                let ray = |value: &Stored| Stored::from_fn(|i| value.0[cell_of(i).1]).load(simd);
-                let [x, y, z] = &light.l_cell.0;
-                let direction = Lanes3 { x: ray(x), y: ray(y), z: ray(z) };
-                let line = [ray(&self.line[0]), ray(&self.line[1])];
-                let (depth, counts) = self.optical_depth(simd, start.load(simd), direction, line);
+                    start.set(i, glam::UVec3::from(cell).as_vec3() + 0.5);
+                    direction.set(i, light.l_cell.get(lane));
+                    line[0].0[i] = self.line()[0].0[lane];
+                    line[1].0[i] = self.line()[1].0[lane];
+                }
+                let (depth, counts) = self.optical_depth(
+                    simd,
+                    start.load(simd),
+                    direction.load(simd),
+                    [line[0].load(simd), line[1].load(simd)],
+                );
                 let depth = depth * self.extinction;
                 let (mut visible, mut depths) = (Stored::default(), Stored::default());
                 visible.store(exp2(simd, -depth));
@@ -241,17 +297,14 @@ impl<'a> Group<'a> {
         let mut walk = Walk::new(simd, &self.store.units, start, direction);
         let (mut passed, mut row) = (Passed::default(), Row::default());
         let mut depth = zero;
-        let mut counts = i32x8::splat(simd, 0);
         let mut n = 0;
         while n < medium.max_cells && walk.inside().any_true() {
             let count = (medium.max_cells - n).min(ROW as u32) as usize;
             walk.row(count, &mut passed);
             self.store.fetch(&passed, count, &mut row);
             for (j, cells) in row.iter().enumerate().take(count) {
-                let [first, _] = words(simd, cells);
-                let rho = (rho_codes(first) * scale + shift).max(zero);
-                let index = i32x8::load_array_ref(simd, &passed.index[j]);
-                let goes_on = !index.simd_eq(NO_CELL) & depth.simd_le(NEVER);
+                // Outside the slab ρ is 0.
+                let rho = (rho_codes(words(simd, cells)[0]) * scale + shift).max(zero);
                 let path = if medium.per_cell {
                     // A cell of the volume does not shadow itself. In a coarse cell, half of the others do.
                     let is_own = n == 0 && j == 0;
@@ -260,12 +313,11 @@ impl<'a> Group<'a> {
                 } else {
                     passed.length[j].load(simd)
                 };
-                depth += goes_on.select(rho * path, zero);
-                counts += goes_on.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0));
+                depth += rho * path;
             }
             n += count as u32;
         }
-        (depth, *counts)
+        (depth, *walk.count)
     }
 }
 
@@ -278,4 +330,10 @@ pub fn lanes_of(bits: u8) -> impl Iterator<Item = usize> {
         bits &= bits - 1;
         Some(lane)
     })
+}
+
+/// Interpolates from a to b.
+#[inline(always)]
+fn mix<S: Simd>(simd: S, a: Floats<S>, b: Floats<S>, x: Floats<S>) -> Floats<S> {
+    a * (f32x8::splat(simd, 1.0) - x) + b * x
 }

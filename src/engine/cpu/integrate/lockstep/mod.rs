@@ -15,6 +15,7 @@
 mod cells;
 mod fibre;
 mod group;
+mod hits;
 mod lanes;
 mod light;
 mod powers;
@@ -24,9 +25,10 @@ use fearless_simd::dispatch;
 
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
-use self::lanes::LANES;
+use self::hits::Hits;
+use self::lanes::{LANES, Stored3};
 use super::walk::Lit;
-use super::{Integrator, PixelRay, RayResult, SheetHit, SheetOrder};
+use super::{Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
 use crate::trace::Lookup;
@@ -77,16 +79,22 @@ pub struct Lockstep<'a> {
 }
 
 /// A sheet that a ray of a stretch meets.
-struct Sheet<'a> {
+struct Sheet {
     /// Number of the ray in the stretch.
     ray: usize,
-    hit: SheetHit<'a>,
     order: SheetOrder,
-    /// Finer of its two levels, and the share of the coarser.
-    level: u32,
-    share: f32,
-    /// T and numbers of cells at the end of the walk through each level.
+    /// T and numbers of cells at the end of the walk through each of the two levels.
     ends: [(f32, [u32; 2]); 2],
+}
+
+/// Sheets that the rays of a stretch meet next.
+#[derive(Default)]
+struct Met {
+    sheets: Vec<Sheet>,
+    /// Eight sheets in each pack, in their order. Missing ones are those before them.
+    packs: Vec<Hits>,
+    /// Light of each sheet's two levels, light by light.
+    lit: Vec<Lit>,
 }
 
 impl<'a> Lockstep<'a> {
@@ -115,8 +123,7 @@ impl<'a> Lockstep<'a> {
     ) {
         let integrator = self.integrator;
         let mut rays: Vec<(usize, PixelRay)> = Vec::with_capacity(STRETCH);
-        let mut sheets = Vec::with_capacity(STRETCH);
-        let mut lit = Vec::new();
+        let mut met = Met::default();
         for (number, stretch) in pixels.chunks(STRETCH).enumerate() {
             rays.clear();
             for (i, &pixel) in (number * STRETCH..).zip(stretch) {
@@ -125,73 +132,98 @@ impl<'a> Lockstep<'a> {
                     Err(dry) => result(i, dry),
                 }
             }
-            while self.meet(gbuffer, &rays, &mut sheets) {
-                self.walk(&mut sheets, &mut lit);
-                let lights = integrator.lights.len();
-                for (i, sheet) in sheets.iter().enumerate() {
-                    let (own, next) = lit[2 * i * lights..][..2 * lights].split_at_mut(lights);
-                    let [(mut transmittance, mut cells), (other, more)] = sheet.ends;
-                    if sheet.share > 0.0 {
-                        transmittance = transmittance * (1.0 - sheet.share) + other * sheet.share;
-                        cells = [0, 1].map(|c| cells[c] + more[c]);
-                        own.iter_mut()
-                            .zip(&*next)
-                            .for_each(|(lit, next)| *lit = lit.mixed(next, sheet.share));
-                    }
-                    let passed = integrator.composed(&sheet.hit, transmittance, cells, own, sheet.order);
-                    integrator.add(&mut rays[sheet.ray].1, passed);
-                }
+            while self.meet(gbuffer, &rays, &mut met) {
+                self.walk(&mut met);
+                self.compose(&mut met, &mut rays);
             }
             rays.drain(..).for_each(|(i, ray)| result(i, integrator.seen(gbuffer, ray)));
         }
     }
 
     /// Finds the next sheet of every ray. Returns whether there is any.
-    fn meet(&self, gbuffer: &Gbuffer, rays: &[(usize, PixelRay)], sheets: &mut Vec<Sheet<'a>>) -> bool {
-        sheets.clear();
-        sheets.extend(rays.iter().enumerate().filter_map(|(ray, (_, pixel))| {
-            let (quad, at, order) = pixel.next_sheet(gbuffer)?;
-            let hit = self.integrator.sheet_hit(quad, pixel.d, at);
-            let (level, share) = self.integrator.level_of(&hit, at[2]);
-            Some(Sheet { ray, hit, order, level, share, ends: Default::default() })
-        }));
-        !sheets.is_empty()
+    fn meet(&self, gbuffer: &Gbuffer, rays: &[(usize, PixelRay)], met: &mut Met) -> bool {
+        met.sheets.clear();
+        met.packs.clear();
+        let mut quads = [0; LANES];
+        let (mut d, mut at) = (Stored3::default(), Stored3::default());
+        let mut count = 0;
+        for (ray, (_, pixel)) in rays.iter().enumerate() {
+            let Some((quad, hit, order)) = pixel.next_sheet(gbuffer) else { continue };
+            met.sheets.push(Sheet { ray, order, ends: Default::default() });
+            // The places behind it belong to it too until others come.
+            for lane in count..LANES {
+                quads[lane] = quad;
+                d.set(lane, pixel.d);
+                at.set(lane, hit.into());
+            }
+            count = (count + 1) % LANES;
+            if count == 0 {
+                met.packs.push(self.hits(quads, &d, &at));
+            }
+        }
+        if count > 0 {
+            met.packs.push(self.hits(quads, &d, &at));
+        }
+        !met.sheets.is_empty()
     }
 
-    /// Walks the sheets' levels. `lit` gets the light of each sheet's two levels, light by light.
-    fn walk(&self, sheets: &mut [Sheet<'a>], lit: &mut Vec<Lit>) {
+    fn hits(&self, quads: [usize; LANES], d: &Stored3, at: &Stored3) -> Hits {
+        dispatch!(self.simd, simd => Hits::new(simd, self.integrator, quads, d, at))
+    }
+
+    /// Walks the levels of the sheets.
+    fn walk(&self, met: &mut Met) {
         let lights = self.integrator.lights.len();
+        let Met { sheets, packs, lit } = met;
         lit.clear();
         lit.resize(2 * lights * sheets.len(), Lit::default());
-        let mut ends = Vec::with_capacity(2 * sheets.len());
         let mut scratch = Scratch::default();
-        for (number, &(level, store)) in (0u32..).zip(&self.levels) {
-            for mist in [false, true] {
-                let walks = sheets.iter().enumerate().flat_map(|(i, sheet)| {
-                    let levels = if sheet.share > 0.0 { 2 } else { 1 };
-                    let which = number.wrapping_sub(sheet.level);
-                    let is_mist = sheet.hit.matter[0].mist > 0.0;
-                    (which < levels && is_mist == mist).then_some((i, which as usize))
-                });
-                let walks: Vec<(usize, usize)> = walks.collect();
+        let mut walks = Vec::with_capacity(sheets.len());
+        for (number, &(level, store)) in self.levels.iter().enumerate() {
+            for is_mist in [false, true] {
+                walks.clear();
+                walks.extend((0..sheets.len()).filter_map(|i| {
+                    let values = &packs[i / LANES].values;
+                    let levels = if values.share.0[i % LANES] > 0.0 { 2 } else { 1 };
+                    let which = number.wrapping_sub(values.level.0[i % LANES] as usize);
+                    let walks = which < levels && (values.mist.0[i % LANES] > 0.0) == is_mist;
+                    walks.then_some((i, which))
+                }));
                 for walks in walks.chunks(LANES) {
-                    let of = |lane: usize| &sheets[walks[if lane < walks.len() { lane } else { 0 }].0];
-                    let hits = std::array::from_fn(|lane| &of(lane).hit);
-                    let before = std::array::from_fn(|lane| of(lane).order.before);
+                    // Missing rays are filled up with the first.
+                    let of = |lane: usize| walks[if lane < walks.len() { lane } else { 0 }].0;
+                    let picks = std::array::from_fn(|lane| (of(lane) / LANES, of(lane) % LANES));
+                    let before = std::array::from_fn(|lane| sheets[of(lane)].order.before);
+                    let hits = Hits::picked(packs, picks);
                     let group = Group::new(self.integrator, level, store, hits, before);
-                    group.prepare(&mut scratch);
                     let Ends { transmittance, cells } =
                         dispatch!(self.simd, simd => group.walk(simd, &mut scratch));
                     for (lane, &(i, which)) in walks.iter().enumerate() {
-                        ends.push((i, which, transmittance[lane], cells.map(|cells| cells[lane])));
+                        sheets[i].ends[which] = (transmittance[lane], cells.map(|cells| cells[lane]));
                         let own = &mut lit[(2 * i + which) * lights..][..lights];
                         own.iter_mut().zip(scratch.lit(lane)).for_each(|(own, lit)| *own = lit);
                     }
                 }
             }
         }
-        for (i, which, transmittance, cells) in ends {
-            sheets[i].ends[which] = (transmittance, cells);
+    }
+
+    /// Adds the sheets to their rays.
+    fn compose(&self, met: &mut Met, rays: &mut [(usize, PixelRay)]) {
+        let lights = self.integrator.lights.len();
+        for (i, sheet) in met.sheets.iter().enumerate() {
+            let values = &met.packs[i / LANES].values;
+            let share = values.share.0[i % LANES];
+            let (own, next) = met.lit[2 * i * lights..][..2 * lights].split_at_mut(lights);
+            let [(mut transmittance, mut cells), (other, more)] = sheet.ends;
+            if share > 0.0 {
+                transmittance = transmittance * (1.0 - share) + other * share;
+                cells = [0, 1].map(|c| cells[c] + more[c]);
+                own.iter_mut().zip(&*next).for_each(|(lit, next)| *lit = lit.mixed(next, share));
+            }
+            let point = values.point.get(i % LANES);
+            let passed = self.integrator.composed(point, transmittance, cells, own, sheet.order);
+            self.integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }
 }

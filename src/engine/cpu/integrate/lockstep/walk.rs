@@ -23,6 +23,8 @@ pub const NO_CELL: i32 = -1;
 pub struct Passed {
     /// Index of each step's and ray's cell in the units of [`Units`], or [`NO_CELL`].
     pub index: [[i32; LANES]; ROW],
+    /// Layers before each ray leaves the slab, its cell's own included.
+    pub layers: [[i32; LANES]; ROW],
     /// Difference of the parameters where the ray leaves the cell and enters it.
     pub length: [Stored; ROW],
 }
@@ -68,11 +70,14 @@ impl Units {
 pub struct Walk<S: Simd> {
     simd: S,
     /// Steps of the boundaries: 1, −1, or 0 for an axis that is never crossed.
-    step: [Floats<S>; 3],
+    unit: [Floats<S>; 3],
     origin: [Floats<S>; 3],
     inverse: [Floats<S>; 3],
+    /// Boundary behind the next one of each axis.
     boundary: [Floats<S>; 3],
     t_next: [Floats<S>; 3],
+    /// Parameter of `boundary`, computed one step before it is needed.
+    t_after: [Floats<S>; 3],
     t: Floats<S>,
     /// Coordinates of the cell times their factors.
     offset: [Ints<S>; 3],
@@ -83,6 +88,8 @@ pub struct Walk<S: Simd> {
     /// Layers before the ray leaves the slab, its own included.
     layers: Ints<S>,
     layer_step: Ints<S>,
+    /// Number of cells passed inside the slab.
+    pub count: Ints<S>,
 }
 
 impl<S: Simd> Walk<S> {
@@ -96,11 +103,12 @@ impl<S: Simd> Walk<S> {
         let [o, d] = [[origin.x, origin.y, origin.z], [direction.x, direction.y, direction.z]];
         let mut walk = Walk {
             simd,
-            step: [zero; 3],
+            unit: [zero; 3],
             origin: [zero; 3],
             inverse: [zero; 3],
             boundary: [one; 3],
             t_next: [zero; 3],
+            t_after: [zero; 3],
             t: zero,
             offset: [none; 3],
             offset_step: [none; 3],
@@ -108,6 +116,7 @@ impl<S: Simd> Walk<S> {
             wrapped: [none; 2],
             layers: none,
             layer_step: none,
+            count: none,
         };
         for axis in 0..3 {
             let size = i32x8::splat(simd, units.size[axis]);
@@ -116,11 +125,13 @@ impl<S: Simd> Walk<S> {
             let up = d[axis].simd_gt(0.0);
             let cell = start_cell(simd, o[axis], d[axis]);
             let boundary = (cell + up.select(i32x8::splat(simd, 1), none)).to_float::<f32x8<S>>();
-            walk.step[axis] = parallel.select(zero, up.select(one, -one));
+            walk.unit[axis] = parallel.select(zero, up.select(one, -one));
             walk.origin[axis] = parallel.select(zero, o[axis]);
             walk.inverse[axis] = parallel.select(f32x8::splat(simd, NEVER), one / d[axis]);
             walk.boundary[axis] = parallel.select(one, boundary);
-            walk.t_next[axis] = (walk.boundary[axis] - walk.origin[axis]) * walk.inverse[axis];
+            walk.t_next[axis] = walk.parameter(axis);
+            walk.boundary[axis] += walk.unit[axis];
+            walk.t_after[axis] = walk.parameter(axis);
             let offset_step = up.select(factor, -factor);
             walk.offset_step[axis] = parallel.select(none, offset_step);
             if axis < 2 {
@@ -138,6 +149,12 @@ impl<S: Simd> Walk<S> {
         walk
     }
 
+    /// Parameter of each ray's `boundary`.
+    #[inline(always)]
+    fn parameter(&self, axis: usize) -> Floats<S> {
+        (self.boundary[axis] - self.origin[axis]) * self.inverse[axis]
+    }
+
     /// Which rays are inside the slab.
     #[inline(always)]
     pub fn inside(&self) -> Mask<S> {
@@ -147,33 +164,42 @@ impl<S: Simd> Walk<S> {
     /// Walks the next `steps` cells of each ray.
     #[inline(always)]
     pub fn row(&mut self, steps: usize, passed: &mut Passed) {
-        let none = i32x8::splat(self.simd, 0);
-        let zero = f32x8::splat(self.simd, 0.0);
-        let no_cell = i32x8::splat(self.simd, NO_CELL);
-        for (index, length) in passed.index.iter_mut().zip(&mut passed.length).take(steps) {
-            let [tx, ty, tz] = self.t_next;
-            let [ox, oy, oz] = self.offset;
-            let t_yz = ty.min(tz);
-            let t_exit = tx.min(t_yz);
-            self.inside().select(ox + oy + oz, no_cell).store_array(index);
-            length.store(t_exit - self.t);
-            self.t = t_exit;
-            // One axis steps, x before y before z if several boundaries coincide.
-            let x_steps = tx.simd_le(t_yz);
-            let y_first = ty.simd_le(tz);
-            let y_steps = y_first & !x_steps;
-            let z_steps = !(x_steps | y_first);
-            for (axis, steps) in [x_steps, y_steps, z_steps].into_iter().enumerate() {
-                self.boundary[axis] += steps.select(self.step[axis], zero);
-                self.t_next[axis] = (self.boundary[axis] - self.origin[axis]) * self.inverse[axis];
-                let offset = self.offset[axis] + steps.select(self.offset_step[axis], none);
-                self.offset[axis] = match axis {
-                    2 => offset,
-                    _ => offset.simd_eq(self.past[axis]).select(self.wrapped[axis], offset),
-                };
-            }
-            self.layers -= z_steps.select(self.layer_step, none);
+        for j in 0..steps {
+            self.step(passed, j);
         }
+    }
+
+    /// Walks one cell of each ray, step `j` of the row.
+    #[inline(always)]
+    fn step(&mut self, passed: &mut Passed, j: usize) {
+        let (none, one) = (i32x8::splat(self.simd, 0), i32x8::splat(self.simd, 1));
+        let zero = f32x8::splat(self.simd, 0.0);
+        let [tx, ty, tz] = self.t_next;
+        let [ox, oy, oz] = self.offset;
+        let t_yz = ty.min(tz);
+        let t_exit = tx.min(t_yz);
+        let inside = self.inside();
+        inside.select(ox + oy + oz, i32x8::splat(self.simd, NO_CELL)).store_array(&mut passed.index[j]);
+        self.layers.store_array(&mut passed.layers[j]);
+        self.count += inside.select(one, none);
+        passed.length[j].store(t_exit - self.t);
+        self.t = t_exit;
+        // One axis steps, x before y before z if several boundaries coincide.
+        let x_steps = tx.simd_le(t_yz);
+        let y_first = ty.simd_le(tz);
+        let y_steps = y_first & !x_steps;
+        let z_steps = !(x_steps | y_first);
+        for (axis, steps) in [x_steps, y_steps, z_steps].into_iter().enumerate() {
+            self.t_next[axis] = steps.select(self.t_after[axis], self.t_next[axis]);
+            self.boundary[axis] += steps.select(self.unit[axis], zero);
+            self.t_after[axis] = self.parameter(axis);
+            let offset = self.offset[axis] + steps.select(self.offset_step[axis], none);
+            self.offset[axis] = match axis {
+                2 => offset,
+                _ => offset.simd_eq(self.past[axis]).select(self.wrapped[axis], offset),
+            };
+        }
+        self.layers -= z_steps.select(self.layer_step, none);
     }
 }
 
@@ -187,7 +213,7 @@ fn start_cell<S: Simd>(simd: S, x: Floats<S>, direction: Floats<S>) -> Ints<S> {
 
 /// Largest whole number that is not above x, |x| < 2^23.
 #[inline(always)]
-fn floor_cell<S: Simd>(simd: S, x: Floats<S>) -> Ints<S> {
+pub fn floor_cell<S: Simd>(simd: S, x: Floats<S>) -> Ints<S> {
     let whole = x.to_int::<i32x8<S>>();
     let above = x.simd_lt(whole.to_float::<f32x8<S>>());
     whole - above.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0))
