@@ -195,18 +195,43 @@ impl Camera {
         )
     }
 
-    /// Vector from the eye to the point `at` of the image plane at distance 1.
-    #[inline]
-    pub fn ray_to(&self, width: u32, height: u32, at: Vec2) -> Vec3 {
+    /// Vectors of [`Camera::rays`], rounded.
+    pub fn ray_frame(&self, width: u32, height: u32) -> RayFrame {
         let [forward, right, up] = self.rays(width, height).map(|v| v.as_vec3());
-        forward + right * at.x + up * at.y
+        RayFrame { forward, right, up }
+    }
+
+    /// Vector from the eye to the point `at` of the image plane at distance 1.
+    pub fn ray_to(&self, width: u32, height: u32, at: Vec2) -> Vec3 {
+        self.ray_frame(width, height).to(at)
     }
 
     /// Unit direction through a pixel of the whole image, at `offset` pixels from the pixel's top left
     /// corner. Twin: `view_ray` in `shaders/layout.wgsl`.
-    #[inline]
     pub fn view_ray(&self, width: u32, height: u32, pixel: [u32; 2], offset: [f32; 2]) -> Vec3 {
-        let d = self.ray_to(width, height, Self::image_point(width, height, pixel, offset));
+        self.ray_frame(width, height).direction(Self::image_point(width, height, pixel, offset))
+    }
+}
+
+/// Vectors from the eye to the middle of the image plane at distance 1, and from there to its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct RayFrame {
+    forward: Vec3,
+    right: Vec3,
+    up: Vec3,
+}
+
+impl RayFrame {
+    /// Vector from the eye to the point `at` of the image plane.
+    #[inline]
+    pub fn to(&self, at: Vec2) -> Vec3 {
+        self.forward + self.right * at.x + self.up * at.y
+    }
+
+    /// Unit direction to the point `at` of the image plane.
+    #[inline]
+    pub fn direction(&self, at: Vec2) -> Vec3 {
+        let d = self.to(at);
         d / d.dot(d).sqrt()
     }
 }

@@ -16,7 +16,8 @@ use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
 use crate::light::{AngleFrame, Light, Reflection, Visibility};
 use crate::mapping::{CellFrame, Quad, QuadMap};
-use crate::picture::camera::{footprint, sample_offset};
+use crate::picture::Camera;
+use crate::picture::camera::{RayFrame, footprint, sample_offset};
 use crate::scene::Scene;
 use crate::trace::lookup::{Level, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
@@ -49,6 +50,8 @@ pub struct Integrator<'a> {
     /// Index of each quad's medium in `media`.
     medium_of_quad: Vec<u32>,
     haze: EyeHaze,
+    /// Directions of the view rays.
+    rays: RayFrame,
     lanes: Lanes,
 }
 
@@ -205,6 +208,7 @@ impl<'a> Integrator<'a> {
             media: scene.media(volume),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
+            rays: scene.camera.ray_frame(scene.image.width, scene.image.height),
             lanes: Lanes::best(),
             levels,
         }
@@ -275,7 +279,7 @@ impl<'a> Integrator<'a> {
             return Err(RayResult { radiance: behind, transmittance: 1.0, uncovered: shows, cells: [0, 0] });
         }
         let offset = sample_offset(image, sample);
-        let d = self.scene.camera.view_ray(image.width, image.height, pixel, offset);
+        let d = self.rays.direction(Camera::image_point(image.width, image.height, pixel, offset));
         let all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
         Ok(PixelRay { i, d, behind, shows, all, sheets: 0, ended: false })
     }

@@ -4,7 +4,8 @@
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::lanes::{Floats, Lanes3, Stored, Words, signed};
+use super::cells::v_codes;
+use super::lanes::{Floats, Lanes3, Stored, Stored3, Words, signed};
 use super::powers::pow;
 use crate::light::fibre::whole_exponent;
 
@@ -81,6 +82,56 @@ pub struct Moments<S: Simd> {
 }
 
 impl<S: Simd> Moments<S> {
+    /// No directions.
+    #[inline(always)]
+    pub fn zero(simd: S) -> Self {
+        let zero = f32x8::splat(simd, 0.0);
+        let none = Lanes3 { x: zero, y: zero, z: zero };
+        Moments { diagonal: none, mixed: none }
+    }
+
+    /// Moments of the directions in the second words of cells.
+    #[inline(always)]
+    pub fn of(word: Words<S>) -> Self {
+        let v = v_codes(word);
+        Moments {
+            diagonal: Lanes3 { x: v.x * v.x, y: v.y * v.y, z: v.z * v.z },
+            mixed: Lanes3 { x: v.x * v.y, y: v.x * v.z, z: v.y * v.z },
+        }
+    }
+
+    /// xx + yy + zz.
+    #[inline(always)]
+    pub fn trace(&self) -> Floats<S> {
+        self.diagonal.x + self.diagonal.y + self.diagonal.z
+    }
+
+    /// Adds `share` times other moments.
+    #[inline(always)]
+    pub fn add(&mut self, other: Moments<S>, share: Floats<S>) {
+        self.diagonal = self.diagonal.plus(other.diagonal.times(share));
+        self.mixed = self.mixed.plus(other.mixed.times(share));
+    }
+
+    /// Products with one number a lane.
+    #[inline(always)]
+    pub fn scaled(&self, factor: Floats<S>) -> Self {
+        Moments { diagonal: self.diagonal.times(factor), mixed: self.mixed.times(factor) }
+    }
+
+    /// Stores the moments.
+    #[inline(always)]
+    pub fn store(&self, [diagonal, mixed]: &mut [Stored3; 2]) {
+        diagonal.store(self.diagonal);
+        mixed.store(self.mixed);
+    }
+
+    /// Loads the moments.
+    #[inline(always)]
+    pub fn load(simd: S, [diagonal, mixed]: &[Stored3; 2]) -> Self {
+        Moments { diagonal: diagonal.load(simd), mixed: mixed.load(simd) }
+    }
+
     /// Unpacks the second words of coarse cells.
     #[inline(always)]
     pub fn unpacked(simd: S, word: Words<S>) -> Self {

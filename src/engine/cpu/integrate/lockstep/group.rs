@@ -5,10 +5,11 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 use glam::Vec3;
 
+use super::between::Between;
 use super::cells::{Row, Store, k_codes, rho_codes, v_codes, words};
 use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
 use super::hits::{Hits, Values};
-use super::lanes::{Floats, LANES, Lanes3, Stored, Words};
+use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
 use super::light::{LaneLight, lanes_of};
 use super::powers::exp2;
 use super::walk::{NO_CELL, Passed, ROW, Walk};
@@ -17,19 +18,22 @@ use crate::engine::cpu::integrate::light::RayScatter;
 use crate::engine::cpu::integrate::walk::Lit;
 use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
+use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::powers::log2;
 
 /// Up to eight rays in one level, of sheets that are all mist or all strands.
-pub struct Group<'a> {
+pub struct Group<'a, 'h> {
     pub integrator: &'a Integrator<'a>,
     pub level: Level<'a>,
     pub store: Store<'a>,
     pub is_mist: bool,
+    /// Whether rays interpolate between cells.
+    is_between: bool,
     /// Extinction in the level's cells.
     pub extinction: f32,
     exponent: Exponent,
-    pub hits: Hits,
+    pub hits: &'h Hits,
     /// T before the sheets.
     before: Stored,
 }
@@ -43,6 +47,7 @@ pub struct Steps {
     /// Rays that see matter in their cell, one bit each.
     pub lit: [u8; ROW],
     cells: Row,
+    between: Between,
     /// Share of T that each cell lets pass.
     share: [Stored; ROW],
     /// Share of the cells in what the eye sees.
@@ -75,13 +80,13 @@ impl Scratch<'_> {
     }
 }
 
-impl<'a> Group<'a> {
+impl<'a, 'h> Group<'a, 'h> {
     /// Group of rays with the sheets `hits`, and T before each of them.
     pub fn new(
         integrator: &'a Integrator<'a>,
         level: Level<'a>,
         store: Store<'a>,
-        hits: Hits,
+        hits: &'h Hits,
         before: [f32; LANES],
     ) -> Self {
         Group {
@@ -89,6 +94,7 @@ impl<'a> Group<'a> {
             level,
             store,
             is_mist: hits.values.mist.0[0] > 0.0,
+            is_between: integrator.scene.trace.lookup == Lookup::Trilinear,
             extinction: integrator.extinction_in(&level),
             exponent: Exponent::new(integrator.scene.p),
             hits,
@@ -144,8 +150,13 @@ impl<'a> Group<'a> {
                 break;
             }
             steps.count = (trace.max_cells - n).min(ROW as u32) as usize;
-            walk.row(steps.count, &mut steps.passed);
-            self.store.fetch(&steps.passed, steps.count, &mut steps.cells);
+            if self.is_between {
+                walk.row_between(steps.count, &mut steps.passed);
+                self.interpolate(simd, &steps.passed, steps.count, &mut steps.between);
+            } else {
+                walk.row(steps.count, &mut steps.passed);
+                self.store.fetch(&steps.passed, steps.count, &mut steps.cells);
+            }
             self.attenuate(simd, steps, &mut view);
             for light in &mut *lights {
                 self.visibility(simd, steps, light, &mut walked);
@@ -168,7 +179,10 @@ impl<'a> Group<'a> {
         let before = view.transmittance;
         let mut after = before;
         for j in 0..steps.count {
-            let rho = (rho_codes(words(simd, &steps.cells[j])[0]) * scale + shift).max(zero);
+            let rho = match self.is_between {
+                true => steps.between.rho[j].load(simd),
+                false => (rho_codes(words(simd, &steps.cells[j])[0]) * scale + shift).max(zero),
+            };
             let mut tau_bits = rho * self.extinction;
             if !self.integrator.per_cell {
                 tau_bits *= steps.passed.length[j].load(simd);
@@ -223,10 +237,13 @@ impl<'a> Group<'a> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let weight = steps.weight[j].load(simd);
         let [first, second] = words(simd, &steps.cells[j]);
-        let k = k_codes(first);
+        let k = match self.is_between {
+            true => [steps.between.k[j][0].load(simd), steps.between.k[j][1].load(simd)],
+            false => k_codes(first),
+        };
         let e_v = self.hits.values.e_v.load(simd);
         let metric = Metric::load(simd, &self.hits.values.metric);
-        let angles = Angles::new(simd, self, &metric, second, e_v);
+        let angles = Angles::new(simd, self, &metric, second, &steps.between.moments[j], e_v);
         for (i, light) in lights.iter_mut().enumerate() {
             let l_v = light.l_v.load(simd);
             let visibility = light.visible[j].load(simd);
@@ -316,9 +333,19 @@ enum Angles<S: Simd> {
 
 impl<S: Simd> Angles<S> {
     #[inline(always)]
-    fn new(simd: S, group: &Group, metric: &Metric<S>, second: Words<S>, e_v: Lanes3<S>) -> Self {
+    fn new(
+        simd: S,
+        group: &Group,
+        metric: &Metric<S>,
+        second: Words<S>,
+        between: &[Stored3; 2],
+        e_v: Lanes3<S>,
+    ) -> Self {
         if group.is_mist {
             return Angles::Mist(group.hits.values.mist.load(simd));
+        }
+        if group.is_between {
+            return Angles::Many(Spread::new(simd, metric, Moments::load(simd, between), e_v));
         }
         if !group.level.is_whole {
             return Angles::Many(Spread::new(simd, metric, Moments::unpacked(simd, second), e_v));

@@ -56,13 +56,14 @@ pub struct Values {
 }
 
 impl Hits {
-    /// Hits of eight rays, each given by its pack and its place there.
-    pub fn picked(packs: &[Hits], picks: [(usize, usize); LANES]) -> Self {
+    /// Hits of eight rays, each given by its pack and its place there. If they are not one of the packs, they
+    /// are put together in `room`.
+    pub fn picked<'a>(packs: &'a [Hits], picks: [(usize, usize); LANES], room: &'a mut Hits) -> &'a Self {
         let first = picks[0].0;
         if (0..LANES).all(|lane| picks[lane] == (first, lane)) {
-            return packs[first];
+            return &packs[first];
         }
-        let mut out = Hits::default();
+        let out = room;
         for (lane, &(pack, from)) in picks.iter().enumerate() {
             out.quads[lane] = packs[pack].quads[from];
             let values: &[Stored] = bytemuck::cast_slice(std::slice::from_ref(&packs[pack].values));
@@ -109,18 +110,21 @@ impl Hits {
         }
     }
 
-    /// Maps eight rays to the cells of the quads `quads`, which they meet at `at`.
+    /// Puts a ray in direction `d_world` in place `lane`, which meets a quad at `at`.
+    #[inline]
+    pub fn set(&mut self, lane: usize, quad: usize, d_world: Vec3, at: [f32; 3]) {
+        self.quads[lane] = quad;
+        self.values.d_world.set(lane, d_world);
+        self.values.at.set(lane, at.into());
+    }
+
+    /// Maps the eight rays to the cells of their quads, once all are in place.
     #[inline(always)]
-    pub fn new<S: Simd>(
-        simd: S,
-        integrator: &Integrator,
-        quads: [usize; LANES],
-        d_world: &Stored3,
-        at: &Stored3,
-    ) -> Self {
+    pub fn map<S: Simd>(&mut self, simd: S, integrator: &Integrator) {
         let scene = integrator.scene;
         let all = &scene.quads;
-        let mut hits = Hits { quads, ..Default::default() };
+        let hits = &*self;
+        let at = &hits.values.at;
         let splat = |x: f32| f32x8::splat(simd, x);
         let (zero, one) = (splat(0.0), splat(1.0));
         let [nx, ny, nz] = integrator.levels[0].size.map(|n| n as f32);
@@ -136,7 +140,7 @@ impl Hits {
         let depth = hits.of_quads(simd, all, |quad| quad.material.thickness_m / nz);
         let det = cx_x * cy_y - cx_y * cy_x;
 
-        let d = d_world.load(simd);
+        let d = hits.values.d_world.load(simd);
         let d_n = d.dot(hits.vectors_of_quads(simd, all, |quad| quad.map.n_world));
         let side = d_n.simd_gt(0.0).select(-one, one);
         let e1 = hits.vectors_of_quads(simd, all, |quad| quad.map.e1_world);
@@ -206,13 +210,12 @@ impl Hits {
             share = exact - level;
         }
 
-        let Values { lines: [fine, coarse], .. } = &mut hits.values;
+        let values = &mut self.values;
+        let [fine, coarse] = &mut values.lines;
         fine[0].store(is_mist.select(mist_scale, one));
         fine[1].store(is_mist.select(mist_shift, e * splat(-65535.0)));
         coarse[0].store(is_mist.select(mist_scale, left));
         coarse[1].store(is_mist.select(mist_shift, zero));
-        let values = &mut hits.values;
-        (values.at, values.d_world) = (*at, *d_world);
         values.cx[0].store(cx_x);
         values.cx[1].store(cx_y);
         values.cy[0].store(cy_x);
@@ -233,7 +236,6 @@ impl Hits {
         values.even.store(even);
         values.level.store(level);
         values.share.store(share);
-        hits
     }
 
     /// Frames of the cells.

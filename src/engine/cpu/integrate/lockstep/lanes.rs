@@ -106,6 +106,12 @@ impl<S: Simd> Lanes3<S> {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// Sum of two vectors.
+    #[inline(always)]
+    pub fn plus(self, other: Lanes3<S>) -> Lanes3<S> {
+        Lanes3 { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+
     /// Products with the components of a vector.
     #[inline(always)]
     pub fn scaled(self, factors: Vec3) -> Lanes3<S> {

@@ -47,10 +47,10 @@ impl<'a> LaneLight<'a> {
     /// Takes the terms of light number `i` for the rays of a group, and starts without light. Twin of
     /// `ray_lights` in `src/engine/cpu/integrate/light.rs`.
     #[inline(always)]
-    pub fn reset<S: Simd>(&mut self, simd: S, group: &Group<'a>, i: usize) {
+    pub fn reset<S: Simd>(&mut self, simd: S, group: &Group<'a, '_>, i: usize) {
         let integrator = group.integrator;
         let (light, quads) = (&integrator.lights[i], &integrator.scene.quads);
-        let hits = &group.hits;
+        let hits = group.hits;
         let to_light = match light {
             Light::Directional { to_light: l, .. } => {
                 let splat = |x: f32| f32x8::splat(simd, x);
@@ -92,7 +92,7 @@ impl<'a> LaneLight<'a> {
     }
 
     /// Finds the light volumes of every ray's patch.
-    fn take_volumes(&mut self, group: &Group<'a>, i: usize) {
+    fn take_volumes(&mut self, group: &Group<'a, '_>, i: usize) {
         let integrator = group.integrator;
         let (Some(plan), Some(filled)) = (&integrator.light_volumes, &integrator.filled) else { return };
         for lane in 0..LANES {
@@ -133,7 +133,7 @@ impl<'a> LaneLight<'a> {
     }
 }
 
-impl<'a> Group<'a> {
+impl Group<'_, '_> {
     /// Computes the visibility of every lit cell of the row, from one light. `walked` grows by the number of
     /// cells that light rays pass.
     #[inline(always)]

@@ -12,6 +12,7 @@
 //! - **Lanes** are rays that meet sheets of one kind (strands or mist) in one level, of one stretch of a row
 //!   of pixels. They may belong to different quads.
 
+mod between;
 mod cells;
 mod fibre;
 mod group;
@@ -21,17 +22,16 @@ mod light;
 mod powers;
 mod walk;
 
-use fearless_simd::dispatch;
+use fearless_simd::{Simd, dispatch};
 
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
 use self::hits::Hits;
-use self::lanes::{LANES, Stored3};
+use self::lanes::LANES;
 use super::walk::Lit;
 use super::{Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
-use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 
 /// Registers that rays are walked in.
@@ -91,7 +91,7 @@ struct Sheet {
 #[derive(Default)]
 struct Met {
     sheets: Vec<Sheet>,
-    /// Eight sheets in each pack, in their order. Missing ones are those before them.
+    /// Eight sheets in each pack, in their order.
     packs: Vec<Hits>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
@@ -102,8 +102,8 @@ impl<'a> Lockstep<'a> {
     pub fn of(integrator: &'a Integrator<'a>) -> Option<Self> {
         let Lanes::Lockstep(simd) = integrator.lanes else { return None };
         let scene = integrator.scene;
-        let is_filled = scene.visibility != Visibility::Cached || integrator.filled.is_some();
-        if scene.trace.lookup != Lookup::Nearest || !is_filled {
+        // Light volumes that are walked on demand serve a few rays.
+        if scene.visibility == Visibility::Cached && integrator.filled.is_none() {
             return None;
         }
         let levels = (0..integrator.levels.len() as u32).map(|number| {
@@ -144,31 +144,25 @@ impl<'a> Lockstep<'a> {
     fn meet(&self, gbuffer: &Gbuffer, rays: &[(usize, PixelRay)], met: &mut Met) -> bool {
         met.sheets.clear();
         met.packs.clear();
-        let mut quads = [0; LANES];
-        let (mut d, mut at) = (Stored3::default(), Stored3::default());
-        let mut count = 0;
         for (ray, (_, pixel)) in rays.iter().enumerate() {
             let Some((quad, hit, order)) = pixel.next_sheet(gbuffer) else { continue };
+            let lane = met.sheets.len() % LANES;
+            if lane == 0 {
+                met.packs.push(Hits::default());
+            }
+            let Some(pack) = met.packs.last_mut() else { continue };
+            pack.set(lane, quad, pixel.d, hit);
             met.sheets.push(Sheet { ray, order, ends: Default::default() });
-            // The places behind it belong to it too until others come.
-            for lane in count..LANES {
-                quads[lane] = quad;
-                d.set(lane, pixel.d);
-                at.set(lane, hit.into());
-            }
-            count = (count + 1) % LANES;
-            if count == 0 {
-                met.packs.push(self.hits(quads, &d, &at));
-            }
         }
-        if count > 0 {
-            met.packs.push(self.hits(quads, &d, &at));
+        // Missing rays are those before them.
+        let missing = met.sheets.len().next_multiple_of(LANES) - met.sheets.len();
+        if let Some(pack) = met.packs.last_mut() {
+            let last = LANES - missing - 1;
+            let (quad, d, at) = (pack.quads[last], pack.values.d_world.get(last), pack.values.at.get(last));
+            (last + 1..LANES).for_each(|lane| pack.set(lane, quad, d, at.into()));
         }
+        dispatch!(self.simd, simd => map_all(simd, self.integrator, &mut met.packs));
         !met.sheets.is_empty()
-    }
-
-    fn hits(&self, quads: [usize; LANES], d: &Stored3, at: &Stored3) -> Hits {
-        dispatch!(self.simd, simd => Hits::new(simd, self.integrator, quads, d, at))
     }
 
     /// Walks the levels of the sheets.
@@ -179,6 +173,7 @@ impl<'a> Lockstep<'a> {
         lit.resize(2 * lights * sheets.len(), Lit::default());
         let mut scratch = Scratch::default();
         let mut walks = Vec::with_capacity(sheets.len());
+        let mut room = Hits::default();
         for (number, &(level, store)) in self.levels.iter().enumerate() {
             for is_mist in [false, true] {
                 walks.clear();
@@ -194,7 +189,7 @@ impl<'a> Lockstep<'a> {
                     let of = |lane: usize| walks[if lane < walks.len() { lane } else { 0 }].0;
                     let picks = std::array::from_fn(|lane| (of(lane) / LANES, of(lane) % LANES));
                     let before = std::array::from_fn(|lane| sheets[of(lane)].order.before);
-                    let hits = Hits::picked(packs, picks);
+                    let hits = Hits::picked(packs, picks, &mut room);
                     let group = Group::new(self.integrator, level, store, hits, before);
                     let Ends { transmittance, cells } =
                         dispatch!(self.simd, simd => group.walk(simd, &mut scratch));
@@ -226,4 +221,13 @@ impl<'a> Lockstep<'a> {
             self.integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }
+}
+
+/// Maps the rays of all packs to their cells.
+#[inline(always)]
+fn map_all<S: Simd>(simd: S, integrator: &Integrator, packs: &mut [Hits]) {
+    packs.iter_mut().for_each(
+        #[inline(always)]
+        |pack| pack.map(simd, integrator),
+    );
 }

@@ -13,7 +13,8 @@ pub fn exp2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
     let rounded = x + ROUNDER;
     let f = x - (rounded - ROUNDER);
     let [a, b, c, d, e, g] = EXP2;
-    let power = f * (f * (f * (f * (f * (f * g + e) + d) + c) + b) + a) + 1.0;
+    let f2 = f * f;
+    let power = f * ((f * b + a) + f2 * (f * d + c) + (f2 * f2) * (f * g + e)) + 1.0;
     let exponent = rounded.to_bits() - u32x8::splat(simd, ROUNDER.to_bits().wrapping_sub(127));
     power * f32x8::from_bits(exponent << 23)
 }

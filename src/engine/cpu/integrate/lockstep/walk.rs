@@ -25,6 +25,10 @@ pub struct Passed {
     pub index: [[i32; LANES]; ROW],
     /// Layers before each ray leaves the slab, its cell's own included.
     pub layers: [[i32; LANES]; ROW],
+    /// Offsets of the cell along x and y, and the parameter of the middle of the ray's segment in it; only
+    /// for rows that interpolate.
+    pub offsets: [[[i32; LANES]; 2]; ROW],
+    pub middle: [Stored; ROW],
     /// Difference of the parameters where the ray leaves the cell and enters it.
     pub length: [Stored; ROW],
 }
@@ -166,6 +170,18 @@ impl<S: Simd> Walk<S> {
     pub fn row(&mut self, steps: usize, passed: &mut Passed) {
         for j in 0..steps {
             self.step(passed, j);
+        }
+    }
+
+    /// Walks the next `steps` cells of each ray, and keeps what interpolation needs.
+    #[inline(always)]
+    pub fn row_between(&mut self, steps: usize, passed: &mut Passed) {
+        for j in 0..steps {
+            self.offset[0].store_array(&mut passed.offsets[j][0]);
+            self.offset[1].store_array(&mut passed.offsets[j][1]);
+            let t = self.t;
+            self.step(passed, j);
+            passed.middle[j].store((t + self.t) * 0.5);
         }
     }
 
