@@ -246,6 +246,7 @@ pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     args.engine.check()?;
     let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
     args.scene.warn_of_settings(animation.values(), &args.sweeps, terminal);
+    args.scene.warn_of_replaced(animation.values(), &args.settings(), terminal);
     // Frames from 0 on continue from the picture.
     let first = args.frames.as_ref().and_then(|frames| frames.0.first().copied()).unwrap_or(0);
     args.scene.warn_of_moved(first, terminal);

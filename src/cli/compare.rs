@@ -227,7 +227,8 @@ fn is_exr(path: &Path) -> bool {
 fn one_kind(files: &[PathBuf]) -> Result<()> {
     if files.iter().any(|path| is_exr(path) != is_exr(&files[0])) {
         return Err(Error::Usage(
-            "PNG values are encoded and EXR values linear; compare files of the same format".into(),
+            "one of the files holds linear light and the other values as shown; compare two of one kind"
+                .into(),
         ));
     }
     Ok(())

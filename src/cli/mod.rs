@@ -37,7 +37,7 @@ use tips::with_tips;
 const EXIT_CODES: &str = "Exit codes: 0 success · 1 comparison failed · 2 usage error · 33 out of memory · \
 65 bad input · 69 no GPU adapter (with --engine gpu or --adapter), no window or no ffmpeg · \
 73 cannot create an output · 74 I/O error · 75 GPU device lost, try again · 101 a bug, please report it · \
-124 the GPU did not answer · 130/143 interrupted.";
+124 the GPU did not answer · 129/130/143 interrupted.";
 
 /// Renders water, and other matter too fine for geometry, as volume textures on the GPU.
 ///

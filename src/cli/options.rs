@@ -15,7 +15,7 @@ use crate::job::Depth;
 use crate::output::frame::{Compression, Exr, Format};
 use crate::picture::Layer;
 use crate::scene::{
-    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, presets, read_stdin,
+    Animation, DEFAULT_PRESET, Limits, REMOVE, STDIN, Scene, Values, full_key, presets, read_stdin,
     settings_without_effect, settings_without_file,
 };
 use crate::util::cache::Cache;
@@ -94,6 +94,17 @@ impl SceneOptions {
         // A map without effect is warned of by the scene itself, wherever it comes from.
         let said_later = |text: &&String| text.starts_with("environment.file ");
         without.iter().filter(|text| !said_later(text)).for_each(|text| terminal.warn(text));
+    }
+
+    /// Warns of settings that `more`, the settings of other options, replace.
+    pub fn warn_of_replaced(&self, values: &Values, more: &[String], terminal: &Terminal) {
+        let key = |setting: &str| full_key(setting.split('=').next()?.trim(), values).ok();
+        for setting in self.own_sets() {
+            let replaces = |other: &&String| key(other).is_some() && key(other) == key(&setting);
+            if let Some(other) = more.iter().find(replaces) {
+                terminal.warn(&format!("{setting} has no effect: another option sets {other}"));
+            }
+        }
     }
 
     /// Warns of settings that have no effect on files of these kinds: pictures `as_shown`, and those of

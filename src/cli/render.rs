@@ -48,7 +48,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = samples)]
     samples: Option<u32>,
     /// Makes the background transparent: the same as --set image.alpha=true. The picture can then be put over
-    /// a photograph.
+    /// a photograph: an .exr exactly, other files only roughly, and too dark over a dark one.
     #[arg(long)]
     alpha: bool,
     /// Frame of the scene's animation to render. It may lie before 0.
@@ -79,6 +79,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     // The volume is made once more for the picture and warns then.
     let animation = args.scene.animation(&more, &limits)?;
     args.scene.warn_of_settings(animation.values(), &[], terminal);
+    args.scene.warn_of_replaced(animation.values(), &more, terminal);
     args.scene.warn_of_moved(args.frame, terminal);
     let (animation, measured) = exposed(animation, &Unwarned(terminal))?;
     let scene = animation.at(args.frame)?;
@@ -144,6 +145,12 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     }
     let (mut engine, line) = opened?;
     terminal.note(&format!("taki: {line}"));
+    if scene.image.alpha && !has_exr {
+        terminal.note(
+            "taki: over a dark backdrop bright water becomes too dark in this file; write .exr to composite \
+             (docs/compositing.md)",
+        );
+    }
     let options = RenderOptions { surface, ..Default::default() };
     let memory = beside_encoders(limits.memory, &still.formats(), window)?;
     let strips = strips(&scene, window, surface, memory)?;

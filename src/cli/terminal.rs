@@ -43,12 +43,18 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// Handles SIGINT (Ctrl-C) and SIGTERM. They end the process at once until [`Terminal::watch`] is called.
+    /// Handles SIGINT (Ctrl-C), SIGTERM and SIGHUP (a closed terminal). They end the process at once until
+    /// [`Terminal::watch`] is called.
     pub fn new() -> Self {
         let signal = Arc::new(AtomicUsize::new(0));
         let at_once = Arc::new(AtomicBool::new(true));
         use signal_hook::consts::{SIGINT, SIGTERM};
-        for (number, code) in [(SIGINT, 130), (SIGTERM, 143)] {
+        let mut signals = vec![(SIGINT, 130), (SIGTERM, 143)];
+        #[cfg(unix)]
+        if !ignores_hangup() {
+            signals.push((signal_hook::consts::SIGHUP, 129));
+        }
+        for (number, code) in signals {
             // The shutdown must be registered before the flag, so that it acts only if the flag was set
             // before this signal. If registering fails, the system's default action ends the process, which
             // is acceptable.
@@ -106,6 +112,15 @@ impl Terminal {
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<(&'static str, ProgressBar)>> {
         self.bar.lock().unwrap_or_else(|e| e.into_inner())
     }
+}
+
+/// Whether the process was started to go on without its terminal, as by `nohup`. Only Linux tells it.
+#[cfg(unix)]
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_none_or(|mask| mask & 1 << (signal_hook::consts::SIGHUP - 1) != 0)
 }
 
 impl Terminal {

@@ -23,6 +23,13 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
         if show == Show::Hidden {
             continue;
         }
+        let color = v.triple(&key("color"));
+        if color.max_element() > 1.0 {
+            return Err(Error::input(
+                format!("{} = {color} reflects more light than it receives", key("color")),
+                "an albedo is at most 1 in each component; write \"#rrggbb\" for numbers up to 255",
+            ));
+        }
         let corners = v.local_corners(&key("corners"), origin);
         if crosses_itself(corners) {
             return Err(Error::input(
@@ -38,7 +45,7 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
             amplitude: v.float(&key("amplitude")),
             bulge: v.float(&key("bulge")),
             seed: v.int(&key("seed")) as u64,
-            color: v.triple(&key("color")),
+            color,
             color_noise: v.float(&key("color_noise")),
             cavity: v.float(&key("cavity")),
             ridges: v.float(&key("ridges")),

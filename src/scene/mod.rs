@@ -157,6 +157,10 @@ impl Default for Limits {
     }
 }
 
+/// Component of a light's colour above which it is taken for one from 0 to 255: `intensity` is for
+/// brightness.
+const BRIGHT_COLOUR: f32 = 64.0;
+
 /// Returns an exposure with more stops, within the range of `image.exposure`.
 fn exposure_with(exposure: f32, stops: f32) -> f32 {
     (exposure + stops).clamp(-32.0, 32.0)
@@ -426,6 +430,13 @@ impl Scene {
         notes
     }
 
+    /// Whether the eye sees the back of a rock's patch.
+    fn is_behind(&self, rock: &Rock) -> bool {
+        let [a, b, c, d] = rock.corners;
+        let eye = self.camera.eye_local().as_vec3();
+        (c - a).cross(d - b).dot(eye - (a + b + c + d) / 4.0) < 0.0
+    }
+
     /// Returns warnings about what is valid but probably a mistake.
     pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
@@ -441,6 +452,14 @@ impl Scene {
         }
         warnings.extend(self.other_files(volume));
         warnings.extend(self.values.iter().flat_map(quads::unused_materials));
+        warnings.extend(self.values.iter().flat_map(bright_colours));
+        if !self.rocks.is_empty() && self.rocks.iter().all(|rock| self.is_behind(rock)) {
+            warnings.push(
+                "all rock is seen from behind, and has the wrong light: list its corners counter-clockwise \
+                 as you look at the side that is seen"
+                    .into(),
+            );
+        }
         let is_holdout =
             self.rocks.iter().any(|rock| rock.holdout) || self.pools.iter().any(|pool| pool.holdout);
         if is_holdout && !self.image.alpha {
@@ -464,4 +483,15 @@ impl Scene {
         warnings.extend(origin::rounded(self));
         warnings
     }
+}
+
+/// Returns a warning about each light whose colour seems to be written from 0 to 255.
+fn bright_colours(values: &Values) -> Vec<String> {
+    let keys = values.names("lights").into_iter().map(|name| format!("lights.{name}.color"));
+    let bright = keys.filter(|key| values.triple(key).max_element() > BRIGHT_COLOUR);
+    let said = |key: String| {
+        let [r, g, b] = values.triple(&key).to_array().map(|x| x.clamp(0.0, 255.0).round() as u8);
+        format!("{key} is linear, with 1 for full; for numbers up to 255 write \"#{r:02x}{g:02x}{b:02x}\"")
+    };
+    bright.map(said).collect()
 }

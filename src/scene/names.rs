@@ -26,7 +26,7 @@ const OTHER_WORDS: &[(&str, &[&str])] = &[
     ("environment.turn", &["azimuth", "rotate", "rotation"]),
     ("image.exposure", &["brightness", "ev"]),
     ("image.samples", &["aa", "antialiasing", "spp"]),
-    ("lights.*.direction", &["azimuth", "elevation", "rotation", "target"]),
+    ("lights.*.direction", &["rotation", "target"]),
     ("lights.*.intensity", &["brightness", "energy", "power", "strength"]),
     ("materials.*.thickness", &["depth"]),
     ("rocks.*.color", &["albedo", "base_color", "diffuse"]),
@@ -312,7 +312,10 @@ fn nearest(key: &str, candidates: impl IntoIterator<Item = String>) -> Option<St
             // The commonest slip is in a bare last part, such as `sgima` for `trace.sigma`.
             let low = candidate.to_lowercase();
             let score = strsim::jaro_winkler(&key, &low);
-            (score.max(strsim::jaro_winkler(&key, last_part(&low))), candidate)
+            let score = score.max(strsim::jaro_winkler(&key, last_part(&low)));
+            // As in `full_key`, a switch comes last.
+            let is_switch = Param::find(&candidate).is_some_and(|p| matches!(p.kind, Kind::Switch(_)));
+            (score - if is_switch { 1e-6 } else { 0.0 }, candidate)
         })
         .filter(|(score, _)| *score > ALIKE)
         .max_by(|a, b| a.0.total_cmp(&b.0))

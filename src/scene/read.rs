@@ -68,7 +68,8 @@ impl Source {
         let meta = std::fs::metadata(scene).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
                 let given = scene.display().to_string();
-                let near = presets::nearest(&given).map(|n| format!("did you mean {n}?"));
+                let near = presets::nearest(&given).map(str::to_owned).or_else(|| nearest_file(scene));
+                let near = near.map(|near| format!("did you mean {near}?"));
                 let what = format!("no preset and no file is named {given}");
                 Error::input(what, near.unwrap_or_else(presets::listed))
             }
@@ -205,6 +206,15 @@ impl Source {
         file.check_parts(&root, &values)?;
         Ok(values)
     }
+}
+
+/// Returns the scene file whose name is most like that of a path that does not exist, in the same folder.
+fn nearest_file(path: &Path) -> Option<String> {
+    let files = std::fs::read_dir(folder_of(path)).ok()?.flatten().map(|entry| entry.file_name());
+    let names: Vec<String> = files.filter_map(|name| name.into_string().ok()).collect();
+    let scenes = names.iter().map(String::as_str).filter(|name| name.ends_with(".toml"));
+    let near = likeliest(path.file_name()?.to_str()?, scenes)?;
+    Some(path.with_file_name(near).display().to_string())
 }
 
 /// Reads stdin to its end, or to the size of the largest scene. Some commands read their scene twice, but

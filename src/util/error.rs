@@ -92,7 +92,7 @@ pub enum Error {
     /// A signal of the user or the system ended the program.
     #[error("interrupted: nothing unfinished was kept; run the same command again")]
     Interrupted {
-        /// Exit code: 130 after SIGINT, 143 after SIGTERM.
+        /// Exit code: 129 after SIGHUP, 130 after SIGINT, 143 after SIGTERM.
         code: u8,
     },
 }

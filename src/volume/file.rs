@@ -152,8 +152,19 @@ impl Default for ReadOptions {
 /// and [`Error::Memory`] if the volume does not fit into the budget.
 pub fn read_npz(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let file = open(path)?;
-    let zip = ZipArchive::new(BufReader::new(file))
-        .map_err(|e| invalid(path, format!("it is no .npz ({e})"), FORMAT))?;
+    let zip = ZipArchive::new(BufReader::new(file)).map_err(|e| {
+        let mut start = [0; 6];
+        let is_array = File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok()
+            && &start == b"\x93NUMPY";
+        match is_array {
+            true => invalid(
+                path,
+                "it is an .npy, which holds one array".into(),
+                "write all of them with numpy.savez(\"volume.npz\", rho=rho, v=v)",
+            ),
+            false => invalid(path, format!("it is no .npz ({e})"), FORMAT),
+        }
+    })?;
     let mut reader = Reader { path, options, spare: 0, zip, notes: Vec::new() };
     let volume = reader.volume()?;
     reader.notes.iter().for_each(|note| monitor.warn(&format!("{}: {note}", path.display())));
@@ -407,12 +418,12 @@ impl Reader<'_> {
     fn out_of_range(&mut self, fault: Error, head: &Head, most: f32, more: &str) -> Error {
         let Error::Input { what, .. } = fault else { return fault };
         let name = head.name;
+        let factor = if most == 1.0 { String::new() } else { format!("{most} * ") };
         let fix = match self.divisor(head) {
+            // Codes from 0 to 255 that were taken for bytes with a sign.
+            _ if head.number.is_signed_byte() => format!("{name} = {factor}{name}.view(numpy.uint8) / 255"),
             None => format!("{name} = numpy.clip(numpy.nan_to_num({name}), 0, {most})"),
-            Some(by) => {
-                let factor = if most == 1.0 { String::new() } else { format!("{most} * ") };
-                format!("{name} = {factor}numpy.clip(numpy.nan_to_num({name}) / {by}, 0, 1)")
-            }
+            Some(by) => format!("{name} = {factor}numpy.clip(numpy.nan_to_num({name}) / {by}, 0, 1)"),
         };
         Error::input(what, format!("{fix} brings it into the range{more}"))
     }

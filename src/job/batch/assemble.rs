@@ -297,7 +297,7 @@ impl Batch {
         Err(Error::CannotCreate {
             path: path.to_owned(),
             why: why.into(),
-            fix: "choose another name with --sheet or --manifest, or replace the file with --overwrite"
+            fix: "choose other names with --sheet and --manifest, or replace the files with --overwrite"
                 .into(),
         })
     }

@@ -1,6 +1,6 @@
 //! Sweeps: a parameter and the values to try, such as `alpha=0.25:1:0.25` or `h=0.6,1,1.4`.
 
-use crate::scene::{Param, Place, Raw, Values, check_names, full_key, parse_value, unknown_key};
+use crate::scene::{Kind, Param, Place, Raw, Values, check_names, full_key, parse_value, unknown_key};
 use crate::util::error::{Error, Result};
 
 /// Most values in one sweep.
@@ -52,6 +52,11 @@ impl Sweep {
                 _ => listed(list),
             },
         };
+        let is_number = |(raw, _): &(Raw, String)| matches!(raw, Raw::Int(_) | Raw::Float(_));
+        if matches!(param.kind, Kind::Point(_) | Kind::Color(_)) && values.iter().all(is_number) {
+            let each = "write each value in brackets";
+            return Err(usage(format!("{each}: {name}=[{list}],[…], in quotes for the shell")));
+        }
         if values.is_empty() || values.len() > MAX_VALUES {
             return Err(usage(format!("{} values, but a sweep has 1 to {MAX_VALUES}; {how}", values.len())));
         }

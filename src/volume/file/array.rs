@@ -40,6 +40,11 @@ enum Kind {
 }
 
 impl Number {
+    /// Whether a value is a byte with a sign.
+    pub(super) fn is_signed_byte(self) -> bool {
+        self.kind == Kind::Signed && self.bytes == 1
+    }
+
     /// The type in which volume files are written.
     pub(super) const FLOAT32: Number = Number { kind: Kind::Float, bytes: 4, big_endian: false };
 

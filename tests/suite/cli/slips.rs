@@ -563,3 +563,16 @@ fn settings_that_no_file_of_the_run_holds_are_told() {
     let linear = ["--linear", "--set", "tone=none"];
     assert_eq!(said(&[&["render", "front", "-o", "a.png", "--set", wide][..], &linear].concat()), "");
 }
+
+#[test]
+fn a_setting_that_another_option_replaces_is_told() {
+    let said = |more: &[&str]| {
+        let run = run(taki(["batch", "front", "--dry-run", "-o", "x.##.png"]).args(more));
+        run.done();
+        run.lines("taki: warning:").concat()
+    };
+    let both = said(&["--set", "width=64", "--size", "16x16"]);
+    assert!(both.contains("width=64 has no effect: another option sets image.width=16"), "{both}");
+    assert!(said(&["--set", "image.samples=4", "--samples", "1"]).contains("image.samples=1"));
+    assert_eq!(said(&["--set", "image.samples=4", "--size", "16x16"]), "");
+}

@@ -84,8 +84,10 @@ fn another(param: &Param) -> String {
         Kind::Int(min, max, d) => (if d == min { max.min(min + 1) } else { min }).to_string(),
         Kind::Choice(words) => words[1].into(),
         Kind::Switch(on) => (!on).to_string(),
-        // Colours of pools are albedos.
-        Kind::Color(_) if param.key.starts_with("pools") => "[0.25, 0.5, 1.0]".into(),
+        // Colours of pools and rocks are albedos.
+        Kind::Color(_) if param.key.starts_with("pools") || param.key == "rocks.*.color" => {
+            "[0.25, 0.5, 1.0]".into()
+        }
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),

@@ -356,6 +356,9 @@ fn a_key_in_the_wrong_table_is_told_its_own() {
         ("light.sun.color=1", "did you mean lights.sun.color?"),
         ("lght.ambient=1", "did you mean light.ambient?"),
         ("sun.strength=1", "did you mean lights.sun.intensity?"),
+        ("sun.elevation=8", "did you mean sky.elevation?"),
+        // A switch comes last, as for `alpha` alone.
+        ("aplha=0.4", "did you mean volume.alpha?"),
     ] {
         scene("fig5", &[setting]).refused(65, &["--set", "unknown key", words]);
     }
@@ -528,5 +531,51 @@ fn corners_of_rock_go_around_it() {
         "[0, 0, 0], [1, 0, 1], [1, 1, 0], [0, 1, 1]",
     ] {
         rock(corners).done();
+    }
+}
+
+#[test]
+fn colours_from_0_to_255_are_told_to_be_linear() {
+    scene("fig5", &["rocks.wall.color=128,120,100"])
+        .refused(65, &["rocks.wall.color", "at most 1", "#rrggbb"]);
+    let dir = tempdir().unwrap();
+    let picture = |color: &str| {
+        let mut command =
+            taki(["render", "front", "--engine=cpu", "--size=16x16", "--samples=1", "--overwrite"]);
+        let run = run(command.args(["-o", "p.png", "--set", color]).current_dir(&dir));
+        run.done();
+        run.lines("taki: warning:").concat()
+    };
+    let bright = picture("lights.key.color=255,240,220");
+    assert!(bright.contains("lights.key.color is linear") && bright.contains("\"#fff0dc\""), "{bright}");
+    assert_eq!(picture("lights.key.color=3,2,1"), "");
+}
+
+#[test]
+fn rock_that_is_all_seen_from_behind_is_told() {
+    let dir = tempdir().unwrap();
+    let file = dir.path().join("s.toml");
+    let said = |corners: &str| {
+        let text = format!("version = 1\nbase = \"front\"\n[rocks.a]\nlevels = 1\ncorners = [{corners}]\n");
+        fs::write(&file, text).unwrap();
+        let small = ["--engine=cpu", "--size=16x16", "--samples=1", "--overwrite", "-o", "p.png"];
+        let run = run(taki(["render"]).arg(&file).args(small).current_dir(&dir));
+        run.done();
+        run.lines("taki: warning:").concat()
+    };
+    let corners = ["[-1, -1, -1]", "[1, -1, -1]", "[1, 1, -1]", "[-1, 1, -1]"];
+    assert_eq!(said(&corners.join(", ")), "");
+    let turned: Vec<&str> = corners.into_iter().rev().collect();
+    assert!(said(&turned.join(", ")).contains("all rock is seen from behind"));
+}
+
+#[test]
+fn a_misspelt_scene_file_is_told_the_one_beside_it() {
+    let dir = tempdir().unwrap();
+    fs::write(dir.path().join("film.toml"), "version = 1\n").unwrap();
+    for name in ["film.tml", "fim.toml", "./flim.toml"] {
+        let near =
+            if name.starts_with('.') { "did you mean ./film.toml?" } else { "did you mean film.toml?" };
+        run(taki(["scene", name]).current_dir(&dir)).refused(65, &[name, near]);
     }
 }

@@ -73,12 +73,13 @@ fn killed_at_any_moment_nothing_is_torn_or_lost_and_the_next_run_completes() {
 
 #[test]
 fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
-    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let dir = folder();
         // Enough samples that the signal arrives during the work.
         let slow = || {
-            let mut command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=512"]);
-            command.args(["--frames", "0-7", "-o", "f.####.png", "--events=json"]).current_dir(dir.path());
+            let mut command = with_hangup("--default-signal=HUP", &taki(["batch", "front", "--engine=cpu"]));
+            command.args(["--size=32x32", "--samples=4096", "--frames", "0-7", "-o", "f.####.png"]);
+            command.arg("--events=json").current_dir(dir.path());
             command
         };
         let mut child = slow().stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
@@ -98,6 +99,30 @@ fn a_signal_ends_the_run_with_its_code_and_the_next_run_goes_on() {
         let next = run(&mut slow());
         assert_eq!(counts(&next)[..3], [8, left.len() as u64, 8 - left.len() as u64]);
     }
+}
+
+/// A command with an option of `env` for the signal SIGHUP, which the tests' own parent may ignore.
+fn with_hangup(option: &str, command: &Command) -> Command {
+    let mut with = Command::new("env");
+    with.arg(option).arg(command.get_program()).args(command.get_args());
+    with
+}
+
+#[test]
+fn a_run_that_is_to_outlive_its_terminal_does() {
+    let dir = folder();
+    let command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=4096"]);
+    let mut command = with_hangup("--ignore-signal=HUP", &command);
+    command.args(["--frames", "0-2", "-o", "f.####.png"]).current_dir(dir.path());
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begun = Instant::now();
+    while !dir.path().join("f.0000.png").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no picture");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-HUP", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(wait(&mut child), Some(0));
+    assert_eq!(files(dir.path()).len(), 3);
 }
 
 #[test]

@@ -38,6 +38,7 @@ fn sweeps_that_cannot_be_are_refused_with_the_reason() {
         ("alpha=0.5,0.5", 2, "given twice"),
         ("alpha=0.5:2:0.5", 65, "allowed: 0 to 1"),
         ("alfa=1", 65, "unknown key"),
+        ("camera.eye=4.5,-2.4,15", 2, "write each value in brackets: camera.eye=[4.5,-2.4,15]"),
         ("h=x", 65, "allowed: 0 to 8"),
         ("width=8,16", 2, "cannot be swept"),
         ("animate.fps=1,2", 2, "cannot be swept"),

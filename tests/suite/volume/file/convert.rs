@@ -582,10 +582,23 @@ fn densities_of_a_larger_range_are_to_be_divided() {
         .refused(&["rho = 0.5 * numpy.clip(numpy.nan_to_num(rho) / 255, 0, 1)"]);
     let k = Array { values: (0..2 * CELLS).map(|i| (i * 5) as f64).collect(), ..ok().k.unwrap() };
     Foreign { k: Some(k.of("<i2")), ..ok() }.refused(&["k = numpy.clip(numpy.nan_to_num(k) / 255, 0, 1)"]);
+    // Codes of 8 bits become negative where they are taken for bytes with a sign.
+    let signed = ramp(255.0).iter().map(|x| if *x > 127.0 { x - 256.0 } else { *x }).collect();
+    Foreign { rho: of(signed, "|i1"), ..ok() }.refused(&["rho = rho.view(numpy.uint8) / 255"]);
     // Noise around 0 and 1 is cut, and the density stays as it is.
     let mut noisy = ok().rho;
     (noisy.values[3], noisy.values[5]) = (-0.001, 1.001);
     Foreign { rho: noisy, ..ok() }.refused(&["rho = numpy.clip(numpy.nan_to_num(rho), 0, 1)"]);
+}
+
+#[test]
+fn an_array_in_place_of_a_volume_is_told_to_be_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("rho.npy");
+    std::fs::write(&path, b"\x93NUMPY\x01\x00").unwrap();
+    let read = read_npz(&path, &ReadOptions::default(), &Unwatched);
+    let error = read.err().expect("a refusal").to_string();
+    assert!(error.contains("an .npy, which holds one array") && error.contains("numpy.savez"), "{error}");
 }
 
 #[test]
