@@ -133,12 +133,8 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     terminal.watch();
     let sizes = args.size.map_or(SIZES.to_vec(), |s| vec![s]);
     let mut rows = Rows::default();
-    let (engine, line) = args.engine.open()?;
+    let (mut gpu, line) = open_gpu(args)?;
     terminal.note(&format!("taki: {line}"));
-    let mut gpu = match engine {
-        Engine::Gpu { renderer, .. } => Some(GpuBench::new(*renderer)),
-        Engine::Cpu(_) => None,
-    };
     let volumes: Vec<Vec<String>> = match &args.volume {
         Some(file) => {
             let file = file.to_str().ok_or_else(|| Error::Usage("--volume: the path is not UTF-8".into()))?;
@@ -187,6 +183,25 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
     match rows.first {
         Some(e) if rows.rows.iter().all(|row| row.error.is_some()) => Err(e),
         _ => print(args.json, &line, &rows.rows),
+    }
+}
+
+/// Opens the device to measure, also where it is software, which an automatic choice leaves to the CPU
+/// engine. Returns it with a line that tells what it is; `None` with `--engine cpu`, or without a device.
+fn open_gpu(args: &BenchArgs) -> Result<(Option<GpuBench>, String)> {
+    let wanted = match args.engine.engine {
+        EngineChoice::Auto => EngineOptions { engine: EngineChoice::Gpu, ..args.engine.clone() },
+        _ => args.engine.clone(),
+    };
+    match wanted.open() {
+        Ok((Engine::Gpu { renderer, .. }, line)) => Ok((Some(GpuBench::new(*renderer)), line)),
+        Ok((Engine::Cpu(_), line)) => Ok((None, line)),
+        Err(Error::NoAdapter { .. })
+            if args.engine.engine == EngineChoice::Auto && wanted.adapter.is_none() =>
+        {
+            Ok((None, args.engine.open()?.1))
+        }
+        Err(e) => Err(e),
     }
 }
 
@@ -309,10 +324,7 @@ fn passes(
     }
     if gpu.is_some() && !is_ready {
         // A device that has failed once is not trusted with the next scene.
-        *gpu = match Engine::open(args.engine.engine, &args.engine.device()) {
-            Ok((Engine::Gpu { renderer, .. }, _)) => Some(GpuBench::new(*renderer)),
-            _ => None,
-        };
+        *gpu = open_gpu(args)?.0;
     }
     for (pass, e) in failed {
         rows.failed(row(name, cells.clone(), direct, "gpu", pass, [0.0; 2], 0), e)?;

@@ -25,8 +25,12 @@ fn choice<T: Copy + Send + Sync + 'static>(choices: &'static Choices<T>) -> impl
 /// Parser of `--engine`.
 pub fn engine() -> impl TypedValueParser<Value = EngineChoice> {
     choice(&[
-        ("auto", "A GPU adapter if there is one, otherwise the CPU", EngineChoice::Auto),
-        ("gpu", "A GPU adapter; without one, taki exits with code 69", EngineChoice::Gpu),
+        ("auto", "A GPU if there is one, otherwise the CPU", EngineChoice::Auto),
+        (
+            "gpu",
+            "A GPU adapter, also one that is software; without one, taki exits with code 69",
+            EngineChoice::Gpu,
+        ),
         ("cpu", "All cores of the CPU", EngineChoice::Cpu),
     ])
 }

@@ -230,7 +230,7 @@ impl LayerOptions {
 /// Options that choose the engine and its device.
 #[derive(Args, Clone)]
 pub struct EngineOptions {
-    /// Engine that renders. auto uses a GPU adapter if there is one, otherwise the CPU.
+    /// Engine that renders. auto uses a GPU if there is one, otherwise the CPU; software Vulkan is slower.
     #[arg(long, value_parser = choice::engine(), default_value = "auto")]
     pub engine: EngineChoice,
     /// Uses the GPU adapter whose name contains this text, such as `--adapter nvidia`. `taki devices` lists

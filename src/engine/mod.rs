@@ -4,7 +4,6 @@ pub mod cpu;
 pub mod exposure;
 mod frame;
 pub mod gpu;
-mod long_walks;
 mod options;
 pub mod overlap;
 pub mod pool_surface;
@@ -17,12 +16,13 @@ use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::VolumeTexture;
-use gpu::{DeviceOptions, Gpu, GpuRenderer};
+use gpu::{DeviceOptions, Gpu, GpuRenderer, is_software};
 
 /// The engine a user asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineChoice {
-    /// A GPU adapter if there is one, otherwise the CPU.
+    /// A GPU if there is one, otherwise the CPU. Adapters that are software, such as Mesa's llvmpipe, run on
+    /// the CPU too, and more slowly than the CPU engine.
     #[default]
     Auto,
     /// A GPU adapter; exit code 69 if there is none.
@@ -79,20 +79,26 @@ impl Engine {
         match choice {
             EngineChoice::Cpu => Ok(cpu("")),
             EngineChoice::Gpu => Engine::open_gpu(device, false),
-            EngineChoice::Auto => match Engine::open_gpu(device, device.adapter.is_none()) {
-                Ok(opened) => Ok(opened),
-                // A named adapter that is missing is a user error, not a reason to fall back.
-                Err(e) if device.adapter.is_some() => Err(e),
-                Err(Error::NoAdapter { what, .. }) => Ok(cpu(&format!(
-                    ": {what}; a Vulkan driver (Debian: mesa-vulkan-drivers) enables the GPU engine"
-                ))),
+            // A named adapter is meant: it may be software, but must not be missing.
+            EngineChoice::Auto if device.adapter.is_some() => Engine::open_gpu(device, false),
+            EngineChoice::Auto => match Gpu::adapter(device) {
+                Ok(adapter) if is_software(&adapter.get_info()) => {
+                    let name = adapter.get_info().name;
+                    Ok(cpu(&format!(": no GPU but {name}, which is software and slower")))
+                }
+                Ok(adapter) => Engine::open_on(adapter, device, true),
+                Err(Error::NoAdapter { what, .. }) => Ok(cpu(&format!(": {what}"))),
                 Err(e) => Err(e),
             },
         }
     }
 
     fn open_gpu(device: &DeviceOptions, falls_back: bool) -> Result<(Engine, String)> {
-        let renderer = GpuRenderer::new(Gpu::open(device)?);
+        Engine::open_on(Gpu::adapter(device)?, device, falls_back)
+    }
+
+    fn open_on(adapter: wgpu::Adapter, device: &DeviceOptions, falls_back: bool) -> Result<(Engine, String)> {
+        let renderer = GpuRenderer::new(Gpu::open_on(adapter, device)?);
         renderer.gpu.check()?;
         let line = format!("engine gpu on {}", renderer.gpu.name());
         Ok((
@@ -178,9 +184,7 @@ impl Engine {
     /// early are finished by the CPU engine, with a warning.
     ///
     /// # Errors
-    /// Errors of [`cpu::render_with`] or [`GpuRenderer::render_marked`], and those of `monitor`. Where the
-    /// engine was opened by [`EngineChoice::Auto`] and the device would end most walks, [`Error::Device`]
-    /// before the work.
+    /// Errors of [`cpu::render_with`] or [`GpuRenderer::render_marked`], and those of `monitor`.
     pub fn render_once(
         &mut self,
         scene: &Scene,
@@ -189,15 +193,12 @@ impl Engine {
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
-        let (renderer, falls_back, told) = match self {
+        let (renderer, told) = match self {
             Engine::Cpu(light_volumes) => {
                 return cpu::render_with(scene, volume, mesh, options, light_volumes, monitor);
             }
-            Engine::Gpu { renderer, falls_back, told, .. } => (renderer, *falls_back, told),
+            Engine::Gpu { renderer, told, .. } => (renderer, told),
         };
-        if falls_back && renderer.gpu.limits_loops() {
-            long_walks::check(scene, volume, &renderer.gpu.name())?;
-        }
         let (mut frame, cut) = renderer.render_marked(scene, volume, mesh, options, monitor)?;
         if !cut.is_empty() {
             let levels = renderer.levels(scene, volume);

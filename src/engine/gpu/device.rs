@@ -20,9 +20,6 @@ impl Default for DeviceOptions {
     }
 }
 
-/// Turns after which a driver that limits loops ends those of an invocation.
-pub const MOST_TURNS: u64 = 65_535;
-
 /// An open device.
 pub struct Gpu {
     /// The device.
@@ -47,7 +44,8 @@ enum Fault {
     Bug(String),
 }
 
-fn is_software(info: &wgpu::AdapterInfo) -> bool {
+/// Whether an adapter is a program that runs on the CPU, such as Mesa's llvmpipe.
+pub fn is_software(info: &wgpu::AdapterInfo) -> bool {
     info.device_type == wgpu::DeviceType::Cpu
 }
 
@@ -69,7 +67,15 @@ impl Gpu {
     /// [`Error::NoAdapter`] if there is no such adapter, or if it lacks a feature or limit that the passes
     /// need.
     pub fn open(options: &DeviceOptions) -> Result<Gpu> {
-        let adapter = match &options.adapter {
+        Gpu::open_on(Gpu::adapter(options)?, options)
+    }
+
+    /// Returns the fastest adapter, or the first whose name contains `options.adapter`.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if there is no such adapter.
+    pub fn adapter(options: &DeviceOptions) -> Result<wgpu::Adapter> {
+        Ok(match &options.adapter {
             Some(name) => {
                 let wanted = name.to_lowercase();
                 let all = adapters();
@@ -86,7 +92,14 @@ impl Gpu {
                 what: "no GPU adapter was found".into(),
                 fix: "install a Vulkan driver (Debian: mesa-vulkan-drivers) or use --engine cpu".into(),
             })?,
-        };
+        })
+    }
+
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if it lacks a feature or limit that the passes need.
+    pub fn open_on(adapter: wgpu::Adapter, options: &DeviceOptions) -> Result<Gpu> {
         let info = adapter.get_info();
         let has = adapter.limits();
         let required_limits = wgpu::Limits {
@@ -149,7 +162,7 @@ impl Gpu {
         is_software(&self.info)
     }
 
-    /// Whether the driver ends all loops of an invocation after [`MOST_TURNS`] turns together. lavapipe does,
+    /// Whether the driver ends all loops of an invocation after 65,535 turns together. lavapipe does,
     /// without a word (`findings/lavapipe-loops.sh`).
     pub fn limits_loops(&self) -> bool {
         self.info.driver == "llvmpipe"

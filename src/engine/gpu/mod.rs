@@ -26,7 +26,7 @@ mod upload;
 mod visibility;
 
 pub use bench::GpuBench;
-pub use device::{DeviceOptions, Gpu, MOST_TURNS, adapters};
+pub use device::{DeviceOptions, Gpu, adapters, is_software};
 pub use gbuffer::{Gbuffer, Redraw, gbuffer_source};
 pub use groups::GroupList;
 pub use integrate::{CUT, Integrate, Sums, Tiler, Variant, source as integrate_source};

@@ -3,8 +3,9 @@
 use std::process::Command;
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};
-use taki::engine::RenderOptions;
-use taki::engine::gpu::GpuRenderer;
+use crate::engine::long_walks::Watch;
+use taki::engine::gpu::{DeviceOptions, GpuRenderer};
+use taki::engine::{Engine, RenderOptions, cpu};
 use taki::util::error::Error;
 use taki::util::monitor::Unwatched;
 
@@ -61,6 +62,33 @@ fn a_volume_that_is_to_be_dense_is_refused_with_the_way_out() {
         .expect_err("too long");
     assert!(matches!(refused, Error::Device { .. }), "{refused:?}");
     assert!(refused.to_string().contains("volume.storage=sparse"), "{refused}");
+}
+
+#[test]
+fn an_automatic_engine_leaves_what_the_device_cannot_hold_to_the_cpu() {
+    let Some(renderer) = small_device("taking over") else { return };
+    let scene = long(&["volume.storage=dense"]);
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let mut engine = Engine::Gpu {
+        renderer: Box::new(renderer),
+        device: DeviceOptions::default(),
+        falls_back: true,
+        told: false,
+    };
+    let mut render = || {
+        let watch = Watch::default();
+        let options = RenderOptions::default();
+        let frame = engine.render_volume(&scene, &volume, &scene.mesh(), &options, &watch).expect("a frame");
+        (frame, engine.word(), watch.warnings.into_inner().unwrap())
+    };
+    let (frame, word, warnings) = render();
+    assert_eq!(word, "cpu");
+    let on_cpu = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame");
+    assert!(frame.radiance == on_cpu.radiance && frame.counts == on_cpu.counts);
+    assert!(warnings.len() == 1 && warnings[0].ends_with("the CPU engine takes over"), "{warnings:?}");
+    // No advice stands beside what taki does by itself, and nothing is said twice.
+    assert!(!warnings[0].contains("--engine cpu"), "{warnings:?}");
+    assert!(render().2.is_empty());
 }
 
 #[test]

@@ -1,10 +1,9 @@
-//! Walks that the device ends early are finished by the CPU engine, or left to it before the work.
+//! Walks that the device ends early are finished by the CPU engine.
 
 use std::sync::Mutex;
 
 use crate::engine::gpu::{SURFACE, assert_parity, renderer, scene};
-use taki::engine::gpu::DeviceOptions;
-use taki::engine::{Engine, EngineChoice, RenderOptions, cpu};
+use taki::engine::{Engine, RenderOptions, cpu};
 use taki::picture::Frame;
 use taki::scene::Scene;
 use taki::util::error::Result;
@@ -13,8 +12,8 @@ use taki::util::window::Window;
 
 /// Keeps the warnings.
 #[derive(Default)]
-struct Watch {
-    warnings: Mutex<Vec<String>>,
+pub struct Watch {
+    pub warnings: Mutex<Vec<String>>,
 }
 
 impl Monitor for Watch {
@@ -40,11 +39,6 @@ fn along_the_face(cells: u64) -> Scene {
             &max_cells,
         ],
     )
-}
-
-fn render(engine: &mut Engine, scene: &Scene, watch: &Watch) -> Result<Frame> {
-    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
-    engine.render_volume(scene, &volume, &scene.mesh(), &RenderOptions::default(), watch)
 }
 
 /// Turns of the longest walk of a pixel, as the integrate pass counts them.
@@ -145,33 +139,6 @@ fn crops_with_finished_pixels_equal_the_whole() {
             assert!(crop.counts[a..a + n] == whole.counts[b..b + n], "{window}, row {y}");
             assert!(crop.picture[a..a + n] == whole.picture[b..b + n], "{window}, row {y}");
         }
-    }
-}
-
-#[test]
-fn an_automatic_engine_leaves_a_picture_of_long_walks_to_the_cpu_before_the_work() {
-    let (mut engine, _) = Engine::open(EngineChoice::Auto, &DeviceOptions::default()).expect("an engine");
-    let limited = matches!(&engine, Engine::Gpu { renderer, .. } if renderer.gpu.limits_loops());
-    let few = scene("front", &["light.visibility=march", "image.width=9", "image.height=9"]);
-    let watch = Watch::default();
-    let was = engine.word();
-    render(&mut engine, &few, &watch).expect("a frame");
-    assert_eq!(engine.word(), was);
-    assert!(watch.warnings.into_inner().unwrap().is_empty());
-    let most = along_the_face(65536);
-    let watch = Watch::default();
-    let frame = render(&mut engine, &most, &watch).expect("a frame");
-    let warnings = watch.warnings.into_inner().unwrap();
-    if limited {
-        assert_eq!(engine.word(), "cpu");
-        let on_cpu = render(&mut Engine::cpu(), &most, &Watch::default()).expect("a frame");
-        assert!(frame.radiance == on_cpu.radiance && frame.counts == on_cpu.counts);
-        assert_eq!(warnings.len(), 1, "{warnings:?}");
-        assert!(warnings[0].ends_with("the CPU engine takes over"), "{warnings:?}");
-        // No advice stands beside what taki does by itself.
-        assert!(!warnings[0].contains("--engine cpu"), "{warnings:?}");
-    } else {
-        assert!(warnings.is_empty(), "{warnings:?}");
     }
 }
 

@@ -29,7 +29,7 @@ fn front(sets: &[&str]) -> Scene {
 const TINY: [&str; 2] = ["image.width=16", "image.height=16"];
 
 #[test]
-fn without_an_adapter_gpu_is_refused_and_auto_takes_the_cpu_with_advice() {
+fn without_an_adapter_gpu_is_refused_and_auto_takes_the_cpu() {
     let dir = tempdir().unwrap();
     let out = dir.path().join("x.png");
     let blind = |arguments: &[&str]| {
@@ -44,10 +44,28 @@ fn without_an_adapter_gpu_is_refused_and_auto_takes_the_cpu_with_advice() {
     let auto = blind(&["--json"]);
     let json: serde_json::Value = serde_json::from_str(auto.done()).unwrap();
     assert_eq!(json["engine"], "cpu");
-    let advice = auto.lines("taki: engine");
-    assert_eq!(advice.len(), 1, "{}", auto.err);
-    assert!(advice[0].contains("no GPU adapter") && advice[0].contains("mesa-vulkan-drivers"));
+    let said = auto.lines("taki: engine");
+    assert_eq!(said.len(), 1, "{}", auto.err);
+    assert!(said[0].contains("no GPU adapter"), "{}", auto.err);
     is_picture(&out);
+}
+
+#[test]
+fn auto_leaves_software_to_the_cpu_unless_it_is_named() {
+    let Ok(gpu) = Gpu::open(&DeviceOptions::default()) else { return };
+    let dir = tempdir().unwrap();
+    let word = |more: &[&str]| {
+        let mut command = taki(["render", "front", "--size=16x16", "--samples=1", "--json", "--overwrite"]);
+        let run = run(command.args(["-o", "p.png"]).args(more).current_dir(&dir));
+        let json: serde_json::Value = serde_json::from_str(run.done()).unwrap();
+        (json["engine"].as_str().unwrap().to_owned(), run.lines("taki: engine").concat())
+    };
+    let (auto, line) = word(&[]);
+    assert_eq!(auto, if gpu.is_software() { "cpu" } else { "gpu" }, "{line}");
+    assert_eq!(line.contains("which is software and slower"), gpu.is_software(), "{line}");
+    let name = adapters()[0].get_info().name;
+    assert_eq!(word(&["--adapter", &name]).0, "gpu");
+    assert_eq!(word(&["--engine", "gpu"]).0, "gpu");
 }
 
 #[test]

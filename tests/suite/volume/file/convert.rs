@@ -597,7 +597,7 @@ fn an_array_in_place_of_a_volume_is_told_to_be_one() {
     let path = dir.path().join("rho.npy");
     std::fs::write(&path, b"\x93NUMPY\x01\x00").unwrap();
     let read = read_npz(&path, &ReadOptions::default(), &Unwatched);
-    let error = read.err().expect("a refusal").to_string();
+    let error = read.expect_err("a refusal").to_string();
     assert!(error.contains("an .npy, which holds one array") && error.contains("numpy.savez"), "{error}");
 }
 
