@@ -73,6 +73,10 @@ const MOST_CACHE: u128 = 65_536;
 /// thousandth of a cell over a slab of 1000 cells.
 const DIRECTION_TOLERANCE: f32 = 1e-6;
 
+/// Columns of cells along z whose light volume is filled in the time in which a view ray's walks to a light
+/// are taken. Rows of cells are summed side by side, and a ray walks from all its cells.
+const COLUMNS_A_RAY: u64 = 2;
+
 /// Plan of a frame's light volumes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightVolumes {
@@ -201,6 +205,29 @@ impl LightVolumes {
         ))
     }
 
+    /// Plans light volumes of optical depths that equal the walk from every cell to every light. `None` where
+    /// there are none (a light that is not directional, a quad that is no parallelogram, matter that a sheet
+    /// makes thinner), where they take more than `budget` bytes, or where filling them would take longer than
+    /// the walks of `rays` view rays.
+    pub fn exact(lit: &LitQuads, rays: u64, budget: u64) -> Option<Self> {
+        let is_directional = |light: &Light| matches!(light, Light::Directional { .. });
+        let is_even =
+            |quad: &Quad| quad.mist > 0.0 || quad.erosion == [0.0; 4] && quad.map.is_parallelogram();
+        let fits = lit.trace.max_cells <= MAX_WALK_CELLS
+            && lit.lights.iter().all(is_directional)
+            && lit.quads.iter().all(is_even);
+        let [nx, ny, _] = lit.size.map(u64::from);
+        // More light volumes are not planned than there are quads and lights.
+        if !fits || nx * ny > COLUMNS_A_RAY * rays {
+            return None;
+        }
+        let whole = LightVolumes::planned(lit, Form::Depths, |_| 0.0, [f64::INFINITY; 2]);
+        let columns = nx * ny * whole.volumes.len() as u64;
+        let pays = columns <= COLUMNS_A_RAY * rays * lit.lights.len() as u64;
+        let bytes = whole.bytes(level_atlas(lit.trace, lit.size).extent());
+        (pays && bytes <= u128::from(budget)).then_some(whole)
+    }
+
     /// Memory of all light volumes in bytes, for textures of `size` cells.
     pub fn bytes(&self, size: [u32; 3]) -> u128 {
         let [nx, ny, nz] = self.words(size).map(u128::from);
@@ -228,13 +255,21 @@ impl LightVolumes {
     /// Plan for patches of the given maximum turns, in radians. Directions that differ by less than
     /// `tolerance` times their length share a light volume.
     fn at_angles(lit: &LitQuads, angles: [f64; 2], tolerance: f32) -> Self {
-        let &LitQuads { quads, lights, own_lights, eye, trace, scattering, size, alpha } = lit;
-        let mut medium = Medium::of(trace);
-        medium.max_cells = medium.max_cells.min(MAX_WALK_CELLS);
-        let form = match scattering {
+        let form = match lit.scattering {
             Scattering::Single => Form::Codes,
             Scattering::Multiple => Form::Depths,
         };
+        let own =
+            |i| if i < lit.own_lights { tolerance } else { tolerance.max(ENVIRONMENT_DIRECTION_TOLERANCE) };
+        LightVolumes::planned(lit, form, own, angles)
+    }
+
+    /// Plan of light volumes of a form. Directions to light `i` that differ by less than `tolerance(i)` times
+    /// their length share a light volume; with 0, equal ones do.
+    fn planned(lit: &LitQuads, form: Form, tolerance: impl Fn(usize) -> f32, angles: [f64; 2]) -> Self {
+        let &LitQuads { quads, lights, eye, trace, size, alpha, .. } = lit;
+        let mut medium = Medium::of(trace);
+        medium.max_cells = medium.max_cells.min(MAX_WALK_CELLS);
         let mut volumes: Vec<LightVolume> = Vec::new();
         let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
         let mut number_of = |direction: Vec3, bits: f32, tolerance: f32| {
@@ -242,7 +277,11 @@ impl LightVolumes {
             // The step is rounded to a power of two. Directions that are nearly equal then round to the same
             // grid.
             let step = step.log2().floor().exp2();
-            let key = (direction.to_array().map(|x| (x / step).round() as i64), bits.to_bits());
+            let place = |x: f32| match tolerance {
+                0.0 => i64::from(x.to_bits()),
+                _ => (x / step).round() as i64,
+            };
+            let key = (direction.to_array().map(place), bits.to_bits());
             *known.entry(key).or_insert_with(|| {
                 volumes.push(LightVolume { direction, bits });
                 volumes.len() as u32 - 1
@@ -258,8 +297,7 @@ impl LightVolumes {
             };
             let side_seen = if quad_seen_from_behind(quad, eye) { -1.0 } else { 1.0 };
             for (i, light) in lights.iter().enumerate() {
-                let tolerance =
-                    if i < own_lights { tolerance } else { tolerance.max(ENVIRONMENT_DIRECTION_TOLERANCE) };
+                let tolerance = tolerance(i);
                 if quad.mist > 0.0 {
                     // Mist computes its light without light volumes; the entry only keeps the indices
                     // regular.

@@ -147,6 +147,11 @@ impl QuadMap {
         (Vec2::new(u, v), s)
     }
 
+    /// Whether the quad is a parallelogram but for rounding, so that the map is affine.
+    pub fn is_parallelogram(&self) -> bool {
+        self.g.length() <= 1e-6 * (self.e.length() + self.f.length())
+    }
+
     /// Inverse bilinear map, clamped to the quad. The centre of a fragment that the quad covers may lie
     /// outside its edge by a rounding error.
     pub fn uv(&self, hh: Vec2) -> Vec2 {

@@ -347,22 +347,47 @@ impl Scene {
         pyramid_spec(&self.trace, &self.quads, volume)
     }
 
+    /// Plans the light volumes of a frame, within [`Scene::light_cache`]: with cached visibility, and in place
+    /// of walks to the lights where light volumes equal them. `None` where rays walk, or nothing is
+    /// attenuated.
+    ///
+    /// # Errors
+    /// With cached visibility, `Error::Memory` where even the coarsest light volumes need more than the budget.
+    pub fn light_plan(&self, volume: &VolumeTexture) -> Result<Option<LightVolumes>> {
+        match self.visibility {
+            Visibility::None => Ok(None),
+            Visibility::Cached => self.light_volumes(volume.size, volume.alpha, self.light_cache).map(Some),
+            // Cells of a sparse volume are filled one by one, as they are walked.
+            Visibility::March if volume.is_sparse() => Ok(None),
+            Visibility::March => {
+                let lights = self.volume_lights();
+                let lit = self.lit_quads(&lights, volume.size, volume.alpha);
+                let Image { width, height, samples, .. } = self.image;
+                let rays = u64::from(width) * u64::from(height) * u64::from(samples);
+                Ok(LightVolumes::exact(&lit, rays, self.light_cache))
+            }
+        }
+    }
+
     /// Plans the light volumes of a frame with a volume of `size` cells whose density is scaled by `alpha`.
     ///
     /// # Errors
     /// `Error::Memory` where even the coarsest light volumes need more than `budget` bytes.
     pub fn light_volumes(&self, size: [u32; 3], alpha: f32, budget: u64) -> Result<LightVolumes> {
-        let lit = LitQuads {
+        LightVolumes::new(&self.lit_quads(&self.volume_lights(), size, alpha), budget)
+    }
+
+    fn lit_quads<'a>(&'a self, lights: &'a [Light], size: [u32; 3], alpha: f32) -> LitQuads<'a> {
+        LitQuads {
             quads: &self.quads,
-            lights: &self.volume_lights(),
+            lights,
             own_lights: self.lights.len(),
             eye: self.camera.eye_local(),
             trace: &self.trace,
             scattering: self.scattering,
             size,
             alpha,
-        };
-        LightVolumes::new(&lit, budget)
+        }
     }
 
     /// Returns the media of diffuse light, one for each material in `volume`; `None` with single scattering.

@@ -41,6 +41,8 @@ pub struct Integrator<'a> {
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
     lights: Vec<Light>,
+    /// That of the scene, or cached where light volumes stand for walks to the lights.
+    visibility: Visibility,
     light_volumes: Option<LightVolumes>,
     /// `None`: values of light volumes are walked on demand.
     filled: Option<Filled>,
@@ -170,13 +172,14 @@ impl<'a> Integrator<'a> {
     ) -> Result<Self> {
         let mut integrator =
             Integrator::with_levels(scene, volume, cache.levels.get(volume, scene.pyramid_spec(volume)));
-        if scene.visibility == Visibility::Cached {
-            let light_volumes = scene.light_volumes(volume.size, volume.alpha, scene.light_cache)?;
-            integrator.filled =
-                Some(cache.get(&light_volumes, &integrator.levels, scene.trace.lookup, monitor)?);
-            integrator.light_volumes = Some(light_volumes);
-        } else {
-            cache.forget();
+        match scene.light_plan(volume)? {
+            Some(plan) => {
+                integrator.filled =
+                    Some(cache.get(&plan, &integrator.levels, scene.trace.lookup, monitor)?);
+                integrator.visibility = Visibility::Cached;
+                integrator.light_volumes = Some(plan);
+            }
+            None => cache.forget(),
         }
         Ok(integrator)
     }
@@ -199,6 +202,7 @@ impl<'a> Integrator<'a> {
             light_volumes: (scene.visibility == Visibility::Cached).then(|| {
                 scene.light_volumes(volume.size, volume.alpha, u64::MAX).expect("the largest budget fits")
             }),
+            visibility: scene.visibility,
             filled: None,
             medium: Medium::of(&scene.trace),
             strand: match &scene.reflection {

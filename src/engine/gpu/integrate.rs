@@ -58,7 +58,7 @@ pub struct Variant {
 
 impl Variant {
     /// Returns the variant for a scene with at most `layers` sheets under a pixel. `light_volumes` is the
-    /// plan of its light volumes if visibility is cached. `leaps` tells whether the levels are made for
+    /// plan of its light volumes, if it has one. `leaps` tells whether the levels are made for
     /// leaps, `sparse` whether cells are stored in bricks.
     pub fn of(
         scene: &Scene,
@@ -69,7 +69,7 @@ impl Variant {
         Variant {
             lights: scene.volume_lights().len().min(2) as u32,
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
-            march: scene.visibility == Visibility::March,
+            march: scene.visibility == Visibility::March && light_volumes.is_none(),
             cached: light_volumes.is_some(),
             codes: light_volumes.is_some_and(|volumes| volumes.form == Form::Codes),
             cornered: light_volumes.is_some_and(LightVolumes::cornered),

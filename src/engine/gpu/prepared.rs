@@ -5,7 +5,6 @@ use super::integrate::Variant;
 use super::reflection::{BoundReflection, Reflections};
 use super::upload::{Resident, Uploaded};
 use crate::engine::overlap;
-use crate::light::Visibility;
 use crate::light::visibility::LightVolumes;
 use crate::picture::camera::DepthRange;
 use crate::place::Mesh;
@@ -19,7 +18,7 @@ pub struct PreparedScene {
     pub up: Uploaded,
     /// Layers of volume quads: see [`overlap::sheets`].
     pub layers: u32,
-    /// The light volumes to fill; `None` unless visibility is cached.
+    /// The light volumes to fill, if there are any: see [`Scene::light_plan`].
     pub light_volumes: Option<LightVolumes>,
     /// The reflection model and multiple scattering.
     pub reflection: BoundReflection,
@@ -40,10 +39,7 @@ impl PreparedScene {
         mesh: &Mesh,
     ) -> Result<Self> {
         let layers = overlap::sheets(scene);
-        let light_volumes = match scene.visibility {
-            Visibility::Cached => Some(scene.light_volumes(volume.size, volume.alpha, scene.light_cache)?),
-            _ => None,
-        };
+        let light_volumes = scene.light_plan(volume)?;
         let up = Uploaded::new(gpu, resident, scene, volume, mesh)?;
         let reflection = reflections.bind(gpu, scene, volume);
         let storage = [up.levels.leaps, up.levels[0].is_sparse()];

@@ -77,7 +77,8 @@ impl GpuRenderer {
         let GpuRenderer { gpu, gbuffer, integrate, .. } = self;
         std::thread::scope(|scope| {
             scope.spawn(|| gbuffer.compile(gpu, scene, layers));
-            if scene.visibility != Visibility::Cached {
+            // Whether light volumes stand for walks to the lights is known with the volume.
+            if scene.visibility == Visibility::None {
                 // Most volumes are too full for leaps.
                 let variant = Variant::of(scene, layers, None, [false, scene.storage == Storage::Sparse]);
                 let matches = |pass: &Integrate| pass.variant == variant;

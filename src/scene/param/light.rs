@@ -23,8 +23,8 @@ pub(super) const LIGHT: Group = Group {
         p("light.visibility", "V", "", Choice(Visibility::WORDS), Uniform)
             .doc(
                 "Attenuation between a cell and a light: `march` walks from one to the other for every \
-                 cell of every ray; `cached` makes that walk once for every cell of the volume and keeps \
-                 the result; `none` leaves it out.",
+                 cell of every ray, or once for every cell of the volume where that gives the same; `cached` \
+                 always makes the walk once for every cell and keeps the result; `none` leaves it out.",
             )
             .when(
                 "Choose `cached` for several lights or an environment; choose `none` for quick drafts; \

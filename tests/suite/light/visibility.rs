@@ -240,6 +240,75 @@ fn the_engines_agree_on_light_volumes() {
     }
 }
 
+/// Light rays of a scene's frame on the CPU and, if there is a device, on the GPU, with the frames.
+fn with_and_without_plan(test: &str, scene: &Scene) -> Vec<[Frame; 2]> {
+    // Without a budget for light volumes, rays walk.
+    let mut walked = scene.clone();
+    walked.edit().light_cache = 0;
+    let (volume, mesh) = (volume(scene), scene.mesh());
+    let on_cpu = [scene, &walked].map(on_cpu);
+    let on_gpu = renderer(test).map(|mut renderer| {
+        [scene, &walked].map(|scene| {
+            let options = RenderOptions::default();
+            renderer.render(scene, &volume, &mesh, &options, &Unwatched).expect("a frame")
+        })
+    });
+    [Some(on_cpu), on_gpu].into_iter().flatten().collect()
+}
+
+#[test]
+fn where_light_volumes_equal_the_walks_to_the_lights_they_take_their_place() {
+    let small = ["image.width=96", "image.height=80", "light.visibility=march"];
+    let odd = ["volume.nx=37", "volume.ny=41", "volume.nz=23", "camera.eye=[0.9,0.4,2.2]"];
+    let behind = ["camera.eye=[0.3,0.2,-3.5]", "lights.key.direction=[0.4,-0.3,0.5]"];
+    for more in [
+        &odd[..],
+        &behind,
+        &["lights.key.direction=[1,0,0.02]", "trace.max_cells=200"],
+        &["trace.attenuation=per-cell", "light.frame=texture", "trace.max_cells=30"],
+        &["trace.filter=pyramid", "camera.eye=[0,0,9]"],
+        &["trace.lookup=trilinear", "volume.nx=24", "volume.ny=24"],
+        &["light.scattering=multiple", "light.reflection=strand"],
+        &["environment.kind=sky", "environment.lights=5", "image.samples=2"],
+    ] {
+        let sets: Vec<&str> = small.iter().chain(more).copied().collect();
+        for [planned, walked] in with_and_without_plan("exact light volumes", &scene("front", &sets)) {
+            let [own, light] = planned.cells_walked();
+            assert_eq!((own, light), (walked.cells_walked()[0], 0), "{more:?}");
+            assert!(walked.cells_walked()[1] > 10 * own / 4, "{more:?}: rays walk");
+            let brightest = walked.radiance.iter().flatten().fold(0f32, |a, b| a.max(*b));
+            for (a, b) in planned.radiance.iter().zip(&walked.radiance) {
+                let near = |c: usize| (a[c] - b[c]).abs() <= 1e-5 * b[c].abs() + 1e-7 * brightest;
+                assert!((0..4).all(near), "{more:?}: {a:?} for {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn where_light_volumes_would_not_equal_the_walks_or_cost_more_rays_walk() {
+    let small = ["image.width=48", "image.height=40", "image.samples=1", "light.visibility=march"];
+    let plan = |preset: &str, more: &[&str]| {
+        let sets: Vec<&str> = small.iter().chain(more).copied().collect();
+        let scene = scene(preset, &sets);
+        scene.light_plan(&volume(&scene)).expect("march needs no budget").is_some()
+    };
+    assert!(plan("front", &[]));
+    for (preset, more) in [
+        // A light that is near, quads that fan out, matter that a sheet makes thinner.
+        ("front", &CLOSE[..]),
+        ("fig5", &[]),
+        ("waterfall", &["volume.nx=8", "volume.ny=8"]),
+        // Longer walks than a light volume holds.
+        ("front", &["trace.max_cells=65536"]),
+        // More cells than the rays meet, and sparse ones.
+        ("front", &["image.width=8", "image.height=8"]),
+        ("front", &["volume.storage=sparse"]),
+    ] {
+        assert!(!plan(preset, more), "{preset} {more:?}");
+    }
+}
+
 #[test]
 fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
     let of = |sets: &[&str]| {

@@ -107,7 +107,7 @@ impl Integrator<'_> {
     ) -> (f32, f32) {
         let matter = &ray.matter(level);
         let extinction = self.extinction_in(level);
-        let depth = match self.scene.visibility {
+        let depth = match self.visibility {
             Visibility::None => 0.0,
             _ if matter.mist > 0.0 => {
                 matter.depth(cell.z, light.l_cell, level.size.z, self.per_cell) * extinction

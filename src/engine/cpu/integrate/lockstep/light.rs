@@ -83,7 +83,7 @@ impl<'a> LaneLight<'a> {
         self.colour = Stored3::default();
         self.marches = 0;
         self.is_between = false;
-        match integrator.scene.visibility {
+        match integrator.visibility {
             Visibility::None => self.visible = [Stored([1.0; LANES]); ROW],
             _ if group.is_mist => {}
             Visibility::March => self.marches = u8::MAX,
@@ -144,7 +144,7 @@ impl Group<'_, '_> {
         light: &mut LaneLight,
         walked: &mut [u32; LANES],
     ) {
-        if self.integrator.scene.visibility == Visibility::None {
+        if self.integrator.visibility == Visibility::None {
             return;
         }
         if self.is_mist {

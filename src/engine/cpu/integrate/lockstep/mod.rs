@@ -101,9 +101,8 @@ impl<'a> Lockstep<'a> {
     /// Returns what walks the rays of `integrator`, if it covers all that the scene asks for.
     pub fn of(integrator: &'a Integrator<'a>) -> Option<Self> {
         let Lanes::Lockstep(simd) = integrator.lanes else { return None };
-        let scene = integrator.scene;
         // Light volumes that are walked on demand serve a few rays.
-        if scene.visibility == Visibility::Cached && integrator.filled.is_none() {
+        if integrator.visibility == Visibility::Cached && integrator.filled.is_none() {
             return None;
         }
         let levels = (0..integrator.levels.len() as u32).map(|number| {
