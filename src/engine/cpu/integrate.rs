@@ -125,6 +125,32 @@ struct SheetOrder {
     behind: Vec3,
 }
 
+/// Walks the rays of many pixels, in lockstep where that covers the scene.
+pub struct Walker<'a> {
+    integrator: &'a Integrator<'a>,
+    lockstep: Option<Lockstep<'a>>,
+}
+
+impl Walker<'_> {
+    /// Traces sample `sample` of several pixels inside the window of `gbuffer`, each with the bits of
+    /// [`Integrator::pixel`], and calls `result` with the position of each in the list.
+    pub fn pixels(
+        &mut self,
+        gbuffer: &Gbuffer,
+        pixels: &[[u32; 2]],
+        sample: u32,
+        mut result: impl FnMut(usize, RayResult),
+    ) {
+        match &mut self.lockstep {
+            Some(lockstep) => lockstep.pixels(gbuffer, pixels, sample, &mut result),
+            None => pixels
+                .iter()
+                .enumerate()
+                .for_each(|(i, &pixel)| result(i, self.integrator.pixel(gbuffer, pixel, sample, &mut ()))),
+        }
+    }
+}
+
 /// A ray through a pixel, on its way through the sheets.
 struct PixelRay {
     /// Index of the pixel in the targets of the raster pass.
@@ -223,7 +249,7 @@ impl<'a> Integrator<'a> {
         self.scene
     }
 
-    /// Returns the integrator with other lanes for [`Integrator::pixels`].
+    /// Returns the integrator with other lanes for [`Integrator::walker`].
     pub fn with_lanes(self, lanes: Lanes) -> Self {
         Integrator { lanes, ..self }
     }
@@ -249,22 +275,9 @@ impl<'a> Integrator<'a> {
         self.seen(gbuffer, ray)
     }
 
-    /// Traces sample `sample` of several pixels inside the window of `gbuffer`, each with the result of
-    /// [`Integrator::pixel`], and calls `result` with the position of each in the list.
-    pub fn pixels(
-        &self,
-        gbuffer: &Gbuffer,
-        pixels: &[[u32; 2]],
-        sample: u32,
-        mut result: impl FnMut(usize, RayResult),
-    ) {
-        match Lockstep::of(self) {
-            Some(mut lockstep) => lockstep.pixels(gbuffer, pixels, sample, &mut result),
-            None => pixels
-                .iter()
-                .enumerate()
-                .for_each(|(i, &pixel)| result(i, self.pixel(gbuffer, pixel, sample, &mut ()))),
-        }
+    /// Returns a walker of the rays of many pixels. Each thread has its own.
+    pub fn walker(&self) -> Walker<'_> {
+        Walker { integrator: self, lockstep: Lockstep::of(self) }
     }
 
     /// Ray of a pixel before its first sheet, or its result if it meets none.

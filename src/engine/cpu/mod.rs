@@ -105,8 +105,8 @@ pub fn render_with(
                 .zip(uncovered)
                 .enumerate()
                 .try_for_each_init(
-                    || Gbuffer::empty(scene),
-                    |gbuffer, (i, ((radiance, counts), uncovered))| {
+                    || (Gbuffer::empty(scene), integrator.walker()),
+                    |(gbuffer, walker), (i, ((radiance, counts), uncovered))| {
                         let clock = Instant::now();
                         drawing.band(i, gbuffer);
                         if let Some(surface) = surface.lock().unwrap_or_else(|e| e.into_inner()).as_mut() {
@@ -118,7 +118,7 @@ pub fn render_with(
                             return Ok(());
                         }
                         let of_band: Vec<[u32; 2]> = gbuffer.window.each().collect();
-                        integrator.pixels(gbuffer, &of_band, sample, |k, result| {
+                        walker.pixels(gbuffer, &of_band, sample, |k, result| {
                             let new = result.radiance.extend(result.transmittance).to_array();
                             radiance[k] = [0, 1, 2, 3].map(|c| new[c] + radiance[k][c]);
                             counts[k] = [0, 1].map(|c| counts[k][c] + result.cells[c]);

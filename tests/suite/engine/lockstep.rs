@@ -168,7 +168,7 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk() {
         for (name, lanes) in Lanes::all() {
             let integrator = prepared().with_lanes(lanes);
             let mut seen = vec![None; pixels.len()];
-            integrator.pixels(&gbuffer, &pixels, 0, |i, result| seen[i] = Some(result));
+            integrator.walker().pixels(&gbuffer, &pixels, 0, |i, result| seen[i] = Some(result));
             for (pixel, (seen, truth)) in pixels.iter().zip(seen.iter().zip(&truth)) {
                 let seen = seen.as_ref().expect("every pixel has a result");
                 assert_eq!(
@@ -196,7 +196,7 @@ fn results_do_not_depend_on_the_rays_beside_them() {
     let pixels: Vec<[u32; 2]> = (0..SIZE[0] * SIZE[1]).map(|i| [i % SIZE[0], i / SIZE[0]]).collect();
     let run = |pixels: &[[u32; 2]]| {
         let mut out = vec![None; pixels.len()];
-        integrator.pixels(&gbuffer, pixels, 0, |i, result| out[i] = Some(bits(&result)));
+        integrator.walker().pixels(&gbuffer, pixels, 0, |i, result| out[i] = Some(bits(&result)));
         out
     };
     let all = run(&pixels);

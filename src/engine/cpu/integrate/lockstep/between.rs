@@ -1,47 +1,64 @@
 //! Values interpolated between the eight cell centres around the middle of each ray's segment in a cell. Twin
 //! of `Level::sample_trilinear` in `src/trace/lookup.rs`.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 
-use super::cells::{Row, k_codes, rho_codes, words};
+use super::cells::{k_codes, rho_codes, words};
 use super::fibre::Moments;
 use super::group::Group;
 use super::lanes::{Floats, Ints, LANES, Stored, Stored3};
-use super::walk::{Passed, ROW};
+use super::walk::{BATCH, Passed};
+use crate::volume::Cell;
 
-/// Interpolated values of a row of steps.
-#[derive(Default)]
+/// Interpolated values of a batch of steps.
 pub struct Between {
     /// ρ on the sheet, in codes.
-    pub rho: [Stored; ROW],
+    pub rho: [Stored; BATCH],
     /// k_d and k_s, in codes.
-    pub k: [[Stored; 2]; ROW],
+    pub k: [[Stored; 2]; BATCH],
     /// Second moments of the directions: xx, yy and zz, and xy, xz and yz.
-    pub moments: [[Stored3; 2]; ROW],
+    pub moments: [[Stored3; 2]; BATCH],
+}
+
+impl Default for Between {
+    fn default() -> Self {
+        Between {
+            rho: [Stored::default(); BATCH],
+            k: [[Stored::default(); 2]; BATCH],
+            moments: [[Stored3::default(); 2]; BATCH],
+        }
+    }
 }
 
 impl Group<'_, '_> {
-    /// Interpolates the values of the first `steps` steps of a row. Outside the slab they have no meaning.
+    /// Interpolates the values of some steps. Outside the slab they have no meaning.
     #[inline(always)]
-    pub fn interpolate<S: Simd>(&self, simd: S, passed: &Passed, steps: usize, between: &mut Between) {
+    pub fn interpolate<S: Simd>(
+        &self,
+        simd: S,
+        passed: &Passed<BATCH>,
+        steps: Range<usize>,
+        between: &mut Between,
+    ) {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let values = &self.hits.values;
         let origin = values.origin.load(simd).scaled(self.level.scale);
         let direction = values.d_cell.load(simd).scaled(self.level.scale);
         let (scale, shift) = (self.line()[0].load(simd), self.line()[1].load(simd));
-        let mut indices = Passed::default();
-        let mut cells = Row::default();
-        for j in 0..steps {
+        let mut indices = [[0; LANES]; 8];
+        let mut cells = [[Cell::default(); LANES]; 8];
+        for j in steps {
             let middle = passed.middle[j].load(simd);
             let (x, x_share) = self.neighbours(simd, passed, j, 0, origin.x + direction.x * middle);
             let (y, y_share) = self.neighbours(simd, passed, j, 1, origin.y + direction.y * middle);
             let (z, z_share) = self.neighbours(simd, passed, j, 2, origin.z + direction.z * middle);
-            for corner in 0..8 {
-                let index = x[corner & 1] + y[corner >> 1 & 1] + z[corner >> 2];
-                index.store_array(&mut indices.index[corner]);
+            for (corner, index) in indices.iter_mut().enumerate() {
+                (x[corner & 1] + y[corner >> 1 & 1] + z[corner >> 2]).store_array(index);
             }
-            self.store.fetch(&indices, LANES, &mut cells);
+            self.store.fetch(&indices, &mut cells);
             let mut rho = zero;
             let mut k = [zero; 2];
             let mut sum = Moments::zero(simd);
@@ -72,7 +89,7 @@ impl Group<'_, '_> {
     fn neighbours<S: Simd>(
         &self,
         simd: S,
-        passed: &Passed,
+        passed: &Passed<BATCH>,
         j: usize,
         axis: usize,
         p: Floats<S>,

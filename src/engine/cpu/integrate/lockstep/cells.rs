@@ -4,12 +4,12 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
 use super::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
-use super::walk::{NO_CELL, Passed, ROW, Units};
+use super::walk::{NO_CELL, Units};
 use crate::trace::lookup::Level;
 use crate::volume::{Bricks, Cell, Cells};
 
-/// Cells of a row of steps, as the walk passes them.
-pub type Row = [[Cell; LANES]; ROW];
+/// Cells of `N` steps, as the walk passes them.
+pub type Row<const N: usize> = [[Cell; LANES]; N];
 
 /// The cells of a level, found by an index in the units of the walk.
 #[derive(Clone, Copy)]
@@ -68,14 +68,14 @@ impl<'a> Store<'a> {
         out
     }
 
-    /// Fetches the cells that the rays passed in `steps` steps. No cell is an empty one.
+    /// Fetches the cells of some steps. No cell is an empty one.
     #[inline(always)]
-    pub fn fetch(&self, passed: &Passed, steps: usize, row: &mut Row) {
+    pub fn fetch(&self, index: &[[i32; LANES]], row: &mut [[Cell; LANES]]) {
         match self.cells {
-            Stored::Dense(cells) => fetch_by(passed, steps, row, |index| {
-                cells.get(index as u32 as usize).copied().unwrap_or_default()
-            }),
-            Stored::Sparse(bricks) => fetch_by(passed, steps, row, |index| {
+            Stored::Dense(cells) => {
+                fetch_by(index, row, |index| cells.get(index as u32 as usize).copied().unwrap_or_default())
+            }
+            Stored::Sparse(bricks) => fetch_by(index, row, |index| {
                 let [x, y, z] = self.coordinates(index);
                 if index == NO_CELL { Cell::default() } else { *bricks.at(x, y, z) }
             }),
@@ -84,8 +84,8 @@ impl<'a> Store<'a> {
 }
 
 #[inline(always)]
-fn fetch_by(passed: &Passed, steps: usize, row: &mut Row, cell: impl Fn(i32) -> Cell) {
-    for (i, cells) in passed.index.iter().zip(row).take(steps) {
+fn fetch_by(index: &[[i32; LANES]], row: &mut [[Cell; LANES]], cell: impl Fn(i32) -> Cell) {
+    for (i, cells) in index.iter().zip(row) {
         *cells =
             [cell(i[0]), cell(i[1]), cell(i[2]), cell(i[3]), cell(i[4]), cell(i[5]), cell(i[6]), cell(i[7])];
     }

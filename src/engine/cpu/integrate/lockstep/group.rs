@@ -1,6 +1,8 @@
 //! The walk of eight rays through one level, and the light of their cells. Twin of
 //! `src/engine/cpu/integrate/walk.rs`: every ray gets the bits that it gets alone.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 use glam::Vec3;
@@ -12,7 +14,7 @@ use super::hits::{Hits, Values};
 use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
 use super::light::{LaneLight, lanes_of};
 use super::powers::exp2;
-use super::walk::{NO_CELL, Passed, ROW, Walk};
+use super::walk::{BATCH, NO_CELL, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::Integrator;
 use crate::engine::cpu::integrate::light::RayScatter;
 use crate::engine::cpu::integrate::walk::Lit;
@@ -21,6 +23,10 @@ use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::powers::log2;
+use crate::volume::Cell;
+
+/// Number of lit cells after which they are lit and shaded: walks to a light start from eight at a time.
+const PENDING: u32 = 3 * LANES as u32;
 
 /// Up to eight rays in one level, of sheets that are all mist or all strands.
 pub struct Group<'a, 'h> {
@@ -38,23 +44,38 @@ pub struct Group<'a, 'h> {
     before: Stored,
 }
 
-/// A row of steps: the cells that the rays pass, and what they let through.
-#[derive(Default)]
+/// A batch of steps: the cells that the rays pass, and what they let through.
 pub struct Steps {
     /// Number of steps.
     pub count: usize,
-    pub passed: Passed,
+    pub passed: Passed<BATCH>,
     /// Rays that see matter in their cell, one bit each.
-    pub lit: [u8; ROW],
-    cells: Row,
+    pub lit: [u8; BATCH],
+    cells: Row<BATCH>,
     between: Between,
     /// Share of T that each cell lets pass.
-    share: [Stored; ROW],
+    share: [Stored; BATCH],
     /// Share of the cells in what the eye sees.
-    weight: [Stored; ROW],
+    weight: [Stored; BATCH],
     /// Depth of the cells, and before them, in bits.
-    tau_bits: [Stored; ROW],
-    depth: [Stored; ROW],
+    tau_bits: [Stored; BATCH],
+    depth: [Stored; BATCH],
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Steps {
+            count: 0,
+            passed: Passed::default(),
+            lit: [0; BATCH],
+            cells: [[Cell::default(); LANES]; BATCH],
+            between: Between::default(),
+            share: [Stored::default(); BATCH],
+            weight: [Stored::default(); BATCH],
+            tau_bits: [Stored::default(); BATCH],
+            depth: [Stored::default(); BATCH],
+        }
+    }
 }
 
 /// What eight rays have met at the end of their walk.
@@ -66,14 +87,19 @@ pub struct Ends {
     pub cells: [[u32; LANES]; 2],
 }
 
-/// Memory that is used again by every group of a thread.
-#[derive(Default)]
+/// Memory that every group uses again.
 pub struct Scratch<'a> {
     steps: Steps,
     lights: Vec<LaneLight<'a>>,
 }
 
 impl Scratch<'_> {
+    /// Memory for rays of an integrator.
+    pub fn new(integrator: &Integrator) -> Self {
+        let lights = integrator.lights.iter().map(|_| LaneLight::default()).collect();
+        Scratch { steps: Steps::default(), lights }
+    }
+
     /// Light that each light sent along ray `lane`.
     pub fn lit(&self, lane: usize) -> impl Iterator<Item = Lit> {
         self.lights.iter().map(move |light| Lit { sum: light.sum.0[lane], colour: light.colour.get(lane) })
@@ -125,7 +151,6 @@ impl<'a, 'h> Group<'a, 'h> {
     #[inline(always)]
     pub fn walk<S: Simd>(&self, simd: S, scratch: &mut Scratch<'a>) -> Ends {
         let Scratch { steps, lights } = scratch;
-        lights.resize_with(self.integrator.lights.len(), LaneLight::default);
         for (i, light) in lights.iter_mut().enumerate() {
             light.reset(simd, self, i);
         }
@@ -143,28 +168,38 @@ impl<'a, 'h> Group<'a, 'h> {
             early: i32x8::splat(simd, 0),
         };
         let mut walked = [0; LANES];
-        let mut n = 0;
-        while n < trace.max_cells {
+        let (mut n, mut pending) = (0, 0);
+        steps.count = 0;
+        loop {
             let goes_on = walk.inside() & view.transmittance.simd_ge(trace.early_end);
-            if !goes_on.any_true() {
+            let ends = n == trace.max_cells || !goes_on.any_true();
+            // Cells wait until there are enough of them to keep all lanes of walks to the light busy.
+            let is_enough = pending >= PENDING || lights.iter().all(|light| !light.marches());
+            if ends || is_enough || steps.count + ROW > BATCH {
+                for light in &mut *lights {
+                    self.visibility(simd, steps, light, &mut walked);
+                }
+                for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
+                    self.shade(simd, steps, j, lights, &scatter);
+                }
+                (steps.count, pending) = (0, 0);
+            }
+            if ends {
                 break;
             }
-            steps.count = (trace.max_cells - n).min(ROW as u32) as usize;
+            let count = (trace.max_cells - n).min(ROW as u32) as usize;
+            let row = steps.count..steps.count + count;
             if self.is_between {
-                walk.row_between(steps.count, &mut steps.passed);
-                self.interpolate(simd, &steps.passed, steps.count, &mut steps.between);
+                walk.row_between(row.clone(), &mut steps.passed);
+                self.interpolate(simd, &steps.passed, row.clone(), &mut steps.between);
             } else {
-                walk.row(steps.count, &mut steps.passed);
-                self.store.fetch(&steps.passed, steps.count, &mut steps.cells);
+                walk.row(row.clone(), &mut steps.passed);
+                self.store.fetch(&steps.passed.index[row.clone()], &mut steps.cells[row.clone()]);
             }
-            self.attenuate(simd, steps, &mut view);
-            for light in &mut *lights {
-                self.visibility(simd, steps, light, &mut walked);
-            }
-            for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                self.shade(simd, steps, j, lights, &scatter);
-            }
-            n += steps.count as u32;
+            self.attenuate(simd, steps, row.clone(), &mut view);
+            pending += steps.lit[row].iter().map(|lit| lit.count_ones()).sum::<u32>();
+            steps.count += count;
+            n += count as u32;
         }
         let seen = (walk.count - view.early).to_array().map(|count| count as u32);
         Ends { transmittance: view.transmittance.to_array(), cells: [seen, walked] }
@@ -172,13 +207,13 @@ impl<'a, 'h> Group<'a, 'h> {
 
     /// Follows T through the cells of a row.
     #[inline(always)]
-    fn attenuate<S: Simd>(&self, simd: S, steps: &mut Steps, view: &mut View<S>) {
+    fn attenuate<S: Simd>(&self, simd: S, steps: &mut Steps, row: Range<usize>, view: &mut View<S>) {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let early_end = f32x8::splat(simd, self.integrator.scene.trace.early_end);
         let (scale, shift) = (self.line()[0].load(simd), self.line()[1].load(simd));
         let before = view.transmittance;
         let mut after = before;
-        for j in 0..steps.count {
+        for j in row.clone() {
             let rho = match self.is_between {
                 true => steps.between.rho[j].load(simd),
                 false => (rho_codes(words(simd, &steps.cells[j])[0]) * scale + shift).max(zero),
@@ -201,7 +236,7 @@ impl<'a, 'h> Group<'a, 'h> {
         let ends = after.simd_lt(early_end);
         if ends.any_true() {
             after = before;
-            for j in 0..steps.count {
+            for j in row.clone() {
                 let lives = after.simd_ge(early_end);
                 let inside = !i32x8::load_array_ref(simd, &steps.passed.index[j]).simd_eq(NO_CELL);
                 let passed = lives.select(after * steps.share[j].load(simd), after);
@@ -215,7 +250,7 @@ impl<'a, 'h> Group<'a, 'h> {
         }
         view.transmittance = after;
         if self.integrator.media.is_some() {
-            for j in 0..steps.count {
+            for j in row.clone() {
                 steps.depth[j].store(view.depth);
                 view.depth += steps.tau_bits[j].load(simd);
             }

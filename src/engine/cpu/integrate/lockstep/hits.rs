@@ -18,8 +18,9 @@ use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
 /// Sheets of eight rays. Names and units are those of `SheetHit`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Hits {
-    /// Numbers of the quads.
+    /// Numbers of the quads, and whether they are one.
     pub quads: [usize; LANES],
+    is_one_quad: bool,
     pub values: Values,
 }
 
@@ -70,6 +71,7 @@ impl Hits {
             let own: &mut [Stored] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut out.values));
             own.iter_mut().zip(values).for_each(|(own, value)| own.0[lane] = value.0[from]);
         }
+        out.is_one_quad = out.quads == [out.quads[0]; LANES];
         out
     }
 
@@ -77,7 +79,7 @@ impl Hits {
     #[inline(always)]
     pub fn of_quads<S: Simd>(&self, simd: S, quads: &[Quad], number: impl Fn(&Quad) -> f32) -> Floats<S> {
         let own = |lane: usize| number(&quads[self.quads[lane]]);
-        match self.quads == [self.quads[0]; LANES] {
+        match self.is_one_quad {
             true => f32x8::splat(simd, own(0)),
             false => Stored::from_fn(own).load(simd),
         }
@@ -121,6 +123,7 @@ impl Hits {
     /// Maps the eight rays to the cells of their quads, once all are in place.
     #[inline(always)]
     pub fn map<S: Simd>(&mut self, simd: S, integrator: &Integrator) {
+        self.is_one_quad = self.quads == [self.quads[0]; LANES];
         let scene = integrator.scene;
         let all = &scene.quads;
         let hits = &*self;

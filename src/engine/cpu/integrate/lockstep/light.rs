@@ -8,14 +8,13 @@ use super::cells::{Row, rho_codes, words};
 use super::group::{Group, Steps};
 use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use super::powers::{exp2, log2};
-use super::walk::{Passed, ROW, Walk};
+use super::walk::{BATCH, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::light::patch_corners;
 use crate::light::fill::Numbers;
 use crate::light::visibility::{Form, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Light, Visibility};
 
 /// Terms of one light for eight rays, and what it has sent along them.
-#[derive(Default)]
 pub struct LaneLight<'a> {
     /// Jᵀl, or J⁻¹l normalised.
     pub l_v: Stored3,
@@ -33,14 +32,34 @@ pub struct LaneLight<'a> {
     is_between: bool,
     /// Rays that walk to the light, one bit each.
     marches: u8,
-    /// V of the cells of the row.
-    pub visible: [Stored; ROW],
-    /// −log₂ V of the cells of the row, 0 if light volumes hold codes.
-    pub depth: [Stored; ROW],
+    /// V of the cells of the batch.
+    pub visible: [Stored; BATCH],
+    /// −log₂ V of the cells of the batch, 0 if light volumes hold codes.
+    pub depth: [Stored; BATCH],
     /// Light sent to the eye so far, in 255ths of the light's intensity.
     pub sum: Stored,
     /// Light sent to the eye so far, relative to the light's intensity.
     pub colour: Stored3,
+}
+
+impl Default for LaneLight<'_> {
+    fn default() -> Self {
+        LaneLight {
+            l_v: Stored3::default(),
+            l_dot_e: Stored::default(),
+            l_cell: Stored3::default(),
+            codes: [[&[]; LANES]; 4],
+            depths: [[&[]; LANES]; 4],
+            at: [Stored::default(); 2],
+            between: [false; LANES],
+            is_between: false,
+            marches: 0,
+            visible: [Stored([1.0; LANES]); BATCH],
+            depth: [Stored::default(); BATCH],
+            sum: Stored::default(),
+            colour: Stored3::default(),
+        }
+    }
 }
 
 impl<'a> LaneLight<'a> {
@@ -84,11 +103,18 @@ impl<'a> LaneLight<'a> {
         self.marches = 0;
         self.is_between = false;
         match integrator.visibility {
-            Visibility::None => self.visible = [Stored([1.0; LANES]); ROW],
+            // It stays 1.
+            Visibility::None => {}
             _ if group.is_mist => {}
             Visibility::March => self.marches = u8::MAX,
             Visibility::Cached => self.take_volumes(group, i),
         }
+    }
+
+    /// Whether cells walk to the light.
+    #[inline(always)]
+    pub fn marches(&self) -> bool {
+        self.marches != 0
     }
 
     /// Finds the light volumes of every ray's patch.
@@ -134,7 +160,7 @@ impl<'a> LaneLight<'a> {
 }
 
 impl Group<'_, '_> {
-    /// Computes the visibility of every lit cell of the row, from one light. `walked` grows by the number of
+    /// Computes the visibility of every lit cell of the batch, from one light. `walked` grows by the number of
     /// cells that light rays pass.
     #[inline(always)]
     pub fn visibility<S: Simd>(
@@ -223,19 +249,23 @@ impl Group<'_, '_> {
         }
     }
 
-    /// V by walks to the light, from the lit cells of a row in the order of steps.
+    /// V by walks to the light, from eight lit cells at a time in the order of steps.
     #[inline(always)]
     fn marched<S: Simd>(&self, simd: S, steps: &Steps, light: &mut LaneLight, walked: &mut [u32; LANES]) {
-        let mut cells = [(0, 0); LANES * ROW];
+        let mut cells = [(0, 0); LANES];
         let mut count = 0;
         for j in 0..steps.count {
             for lane in lanes_of(steps.lit[j] & light.marches) {
                 cells[count] = (j, lane);
                 count += 1;
+                if count == LANES {
+                    self.march(simd, steps, &cells, light, walked);
+                    count = 0;
+                }
             }
         }
-        for cells in cells[..count].chunks(LANES) {
-            self.march(simd, steps, cells, light, walked);
+        if count > 0 {
+            self.march(simd, steps, &cells[..count], light, walked);
         }
     }
 
@@ -295,13 +325,14 @@ impl Group<'_, '_> {
         let medium = self.integrator.medium;
         let zero = f32x8::splat(simd, 0.0);
         let mut walk = Walk::new(simd, &self.store.units, start, direction);
-        let (mut passed, mut row) = (Passed::default(), Row::default());
+        let mut passed = Passed::<ROW>::default();
+        let mut row = Row::<ROW>::default();
         let mut depth = zero;
         let mut n = 0;
         while n < medium.max_cells && walk.inside().any_true() {
             let count = (medium.max_cells - n).min(ROW as u32) as usize;
-            walk.row(count, &mut passed);
-            self.store.fetch(&passed, count, &mut row);
+            walk.row(0..count, &mut passed);
+            self.store.fetch(&passed.index[..count], &mut row);
             for (j, cells) in row.iter().enumerate().take(count) {
                 // Outside the slab ρ is 0.
                 let rho = (rho_codes(words(simd, cells)[0]) * scale + shift).max(zero);

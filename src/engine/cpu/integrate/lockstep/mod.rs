@@ -76,6 +76,10 @@ pub struct Lockstep<'a> {
     simd: fearless_simd::Level,
     /// Levels of the volume, with their cells.
     levels: Vec<(Level<'a>, Store<'a>)>,
+    // Memory that every stretch uses again.
+    rays: Vec<(usize, PixelRay)>,
+    met: Met,
+    scratch: Box<Scratch<'a>>,
 }
 
 /// A sheet that a ray of a stretch meets.
@@ -93,6 +97,8 @@ struct Met {
     sheets: Vec<Sheet>,
     /// Eight sheets in each pack, in their order.
     packs: Vec<Hits>,
+    /// Sheets and which of their two levels is walked, by level and by strands or mist.
+    walks: Vec<[Vec<(usize, usize)>; 2]>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
 }
@@ -109,10 +115,13 @@ impl<'a> Lockstep<'a> {
             let level = Level::in_pyramid(&integrator.levels, number);
             Some((level, Store::new(&level)?))
         });
-        Some(Lockstep { integrator, simd, levels: levels.collect::<Option<_>>()? })
+        let levels: Vec<_> = levels.collect::<Option<_>>()?;
+        let met = Met { walks: levels.iter().map(|_| Default::default()).collect(), ..Default::default() };
+        let scratch = Box::new(Scratch::new(integrator));
+        Some(Lockstep { integrator, simd, levels, rays: Vec::new(), met, scratch })
     }
 
-    /// See [`Integrator::pixels`].
+    /// See [`super::Walker::pixels`].
     pub fn pixels(
         &mut self,
         gbuffer: &Gbuffer,
@@ -121,26 +130,24 @@ impl<'a> Lockstep<'a> {
         result: &mut impl FnMut(usize, RayResult),
     ) {
         let integrator = self.integrator;
-        let mut rays: Vec<(usize, PixelRay)> = Vec::with_capacity(STRETCH);
-        let mut met = Met::default();
         for (number, stretch) in pixels.chunks(STRETCH).enumerate() {
-            rays.clear();
             for (i, &pixel) in (number * STRETCH..).zip(stretch) {
                 match integrator.pixel_ray(gbuffer, pixel, sample) {
-                    Ok(ray) => rays.push((i, ray)),
+                    Ok(ray) => self.rays.push((i, ray)),
                     Err(dry) => result(i, dry),
                 }
             }
-            while self.meet(gbuffer, &rays, &mut met) {
-                self.walk(&mut met);
-                self.compose(&mut met, &mut rays);
+            while self.meet(gbuffer) {
+                self.walk();
+                self.compose();
             }
-            rays.drain(..).for_each(|(i, ray)| result(i, integrator.seen(gbuffer, ray)));
+            self.rays.drain(..).for_each(|(i, ray)| result(i, integrator.seen(gbuffer, ray)));
         }
     }
 
     /// Finds the next sheet of every ray. Returns whether there is any.
-    fn meet(&self, gbuffer: &Gbuffer, rays: &[(usize, PixelRay)], met: &mut Met) -> bool {
+    fn meet(&mut self, gbuffer: &Gbuffer) -> bool {
+        let Lockstep { rays, met, .. } = self;
         met.sheets.clear();
         met.packs.clear();
         for (ray, (_, pixel)) in rays.iter().enumerate() {
@@ -165,24 +172,23 @@ impl<'a> Lockstep<'a> {
     }
 
     /// Walks the levels of the sheets.
-    fn walk(&self, met: &mut Met) {
+    fn walk(&mut self) {
         let lights = self.integrator.lights.len();
-        let Met { sheets, packs, lit } = met;
+        let Met { sheets, packs, walks, lit } = &mut self.met;
         lit.clear();
         lit.resize(2 * lights * sheets.len(), Lit::default());
-        let mut scratch = Scratch::default();
-        let mut walks = Vec::with_capacity(sheets.len());
         let mut room = Hits::default();
-        for (number, &(level, store)) in self.levels.iter().enumerate() {
-            for is_mist in [false, true] {
-                walks.clear();
-                walks.extend((0..sheets.len()).filter_map(|i| {
-                    let values = &packs[i / LANES].values;
-                    let levels = if values.share.0[i % LANES] > 0.0 { 2 } else { 1 };
-                    let which = number.wrapping_sub(values.level.0[i % LANES] as usize);
-                    let walks = which < levels && (values.mist.0[i % LANES] > 0.0) == is_mist;
-                    walks.then_some((i, which))
-                }));
+        walks.iter_mut().flatten().for_each(Vec::clear);
+        for i in 0..sheets.len() {
+            let (values, lane) = (&packs[i / LANES].values, i % LANES);
+            let (level, kind) = (values.level.0[lane] as usize, usize::from(values.mist.0[lane] > 0.0));
+            walks[level][kind].push((i, 0));
+            if values.share.0[lane] > 0.0 {
+                walks[level + 1][kind].push((i, 1));
+            }
+        }
+        for (&(level, store), kinds) in self.levels.iter().zip(&*walks) {
+            for walks in kinds {
                 for walks in walks.chunks(LANES) {
                     // Missing rays are filled up with the first.
                     let of = |lane: usize| walks[if lane < walks.len() { lane } else { 0 }].0;
@@ -191,11 +197,11 @@ impl<'a> Lockstep<'a> {
                     let hits = Hits::picked(packs, picks, &mut room);
                     let group = Group::new(self.integrator, level, store, hits, before);
                     let Ends { transmittance, cells } =
-                        dispatch!(self.simd, simd => group.walk(simd, &mut scratch));
+                        dispatch!(self.simd, simd => group.walk(simd, &mut self.scratch));
                     for (lane, &(i, which)) in walks.iter().enumerate() {
                         sheets[i].ends[which] = (transmittance[lane], cells.map(|cells| cells[lane]));
                         let own = &mut lit[(2 * i + which) * lights..][..lights];
-                        own.iter_mut().zip(scratch.lit(lane)).for_each(|(own, lit)| *own = lit);
+                        own.iter_mut().zip(self.scratch.lit(lane)).for_each(|(own, lit)| *own = lit);
                     }
                 }
             }
@@ -203,8 +209,9 @@ impl<'a> Lockstep<'a> {
     }
 
     /// Adds the sheets to their rays.
-    fn compose(&self, met: &mut Met, rays: &mut [(usize, PixelRay)]) {
-        let lights = self.integrator.lights.len();
+    fn compose(&mut self) {
+        let Lockstep { integrator, rays, met, .. } = self;
+        let lights = integrator.lights.len();
         for (i, sheet) in met.sheets.iter().enumerate() {
             let values = &met.packs[i / LANES].values;
             let share = values.share.0[i % LANES];
@@ -216,8 +223,8 @@ impl<'a> Lockstep<'a> {
                 own.iter_mut().zip(&*next).for_each(|(lit, next)| *lit = lit.mixed(next, share));
             }
             let point = values.point.get(i % LANES);
-            let passed = self.integrator.composed(point, transmittance, cells, own, sheet.order);
-            self.integrator.add(&mut rays[sheet.ray].1, passed);
+            let passed = integrator.composed(point, transmittance, cells, own, sheet.order);
+            integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }
 }
@@ -225,8 +232,8 @@ impl<'a> Lockstep<'a> {
 /// Maps the rays of all packs to their cells.
 #[inline(always)]
 fn map_all<S: Simd>(simd: S, integrator: &Integrator, packs: &mut [Hits]) {
-    packs.iter_mut().for_each(
-        #[inline(always)]
-        |pack| pack.map(simd, integrator),
-    );
+    // A closure might not be inlined here, and would lose the instruction set.
+    for pack in packs {
+        pack.map(simd, integrator);
+    }
 }

@@ -4,6 +4,8 @@
 //! No lane waits for another and none branches: each step moves each ray by one cell along one axis. A ray
 //! that has left the slab goes on without cells.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 use glam::IVec3;
@@ -15,22 +17,37 @@ use crate::walk::{NEVER, PARALLEL};
 /// that the processor waits for none of them.
 pub const ROW: usize = 8;
 
+/// Most steps whose cells wait to be lit together.
+pub const BATCH: usize = 8 * ROW;
+
 /// Index of no cell: outside the slab.
 pub const NO_CELL: i32 = -1;
 
-/// Cells that eight rays pass in [`ROW`] steps.
-#[derive(Clone, Default)]
-pub struct Passed {
+/// Cells that eight rays pass in up to `N` steps.
+#[derive(Clone)]
+pub struct Passed<const N: usize> {
     /// Index of each step's and ray's cell in the units of [`Units`], or [`NO_CELL`].
-    pub index: [[i32; LANES]; ROW],
+    pub index: [[i32; LANES]; N],
     /// Layers before each ray leaves the slab, its cell's own included.
-    pub layers: [[i32; LANES]; ROW],
+    pub layers: [[i32; LANES]; N],
     /// Offsets of the cell along x and y, and the parameter of the middle of the ray's segment in it; only
     /// for rows that interpolate.
-    pub offsets: [[[i32; LANES]; 2]; ROW],
-    pub middle: [Stored; ROW],
+    pub offsets: [[[i32; LANES]; 2]; N],
+    pub middle: [Stored; N],
     /// Difference of the parameters where the ray leaves the cell and enters it.
-    pub length: [Stored; ROW],
+    pub length: [Stored; N],
+}
+
+impl<const N: usize> Default for Passed<N> {
+    fn default() -> Self {
+        Passed {
+            index: [[NO_CELL; LANES]; N],
+            layers: [[0; LANES]; N],
+            offsets: [[[0; LANES]; 2]; N],
+            middle: [Stored::default(); N],
+            length: [Stored::default(); N],
+        }
+    }
 }
 
 /// Sum of multiples of a cell's coordinates by which the walk numbers it.
@@ -165,18 +182,18 @@ impl<S: Simd> Walk<S> {
         self.layers.simd_gt(0)
     }
 
-    /// Walks the next `steps` cells of each ray.
+    /// Walks the next cells of each ray, one in each of `steps`.
     #[inline(always)]
-    pub fn row(&mut self, steps: usize, passed: &mut Passed) {
-        for j in 0..steps {
+    pub fn row<const N: usize>(&mut self, steps: Range<usize>, passed: &mut Passed<N>) {
+        for j in steps {
             self.step(passed, j);
         }
     }
 
-    /// Walks the next `steps` cells of each ray, and keeps what interpolation needs.
+    /// Walks as [`Walk::row`] does, and keeps what interpolation needs.
     #[inline(always)]
-    pub fn row_between(&mut self, steps: usize, passed: &mut Passed) {
-        for j in 0..steps {
+    pub fn row_between<const N: usize>(&mut self, steps: Range<usize>, passed: &mut Passed<N>) {
+        for j in steps {
             self.offset[0].store_array(&mut passed.offsets[j][0]);
             self.offset[1].store_array(&mut passed.offsets[j][1]);
             let t = self.t;
@@ -185,9 +202,9 @@ impl<S: Simd> Walk<S> {
         }
     }
 
-    /// Walks one cell of each ray, step `j` of the row.
+    /// Walks one cell of each ray, in step `j`.
     #[inline(always)]
-    fn step(&mut self, passed: &mut Passed, j: usize) {
+    fn step<const N: usize>(&mut self, passed: &mut Passed<N>, j: usize) {
         let (none, one) = (i32x8::splat(self.simd, 0), i32x8::splat(self.simd, 1));
         let zero = f32x8::splat(self.simd, 0.0);
         let [tx, ty, tz] = self.t_next;
