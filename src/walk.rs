@@ -16,7 +16,8 @@
 //!   accumulates along the ray, and parameters never decrease.
 //! - A leap ([`Walk::leap`]) advances to the last cell of an empty box without visiting the cells between. It
 //!   counts the boundaries it passes instead of accumulating parameters, so it always lands in a state that
-//!   the plain walk would reach. The count is rounded down: at worst the box takes one more leap.
+//!   the plain walk would reach. The count is rounded down: at worst the box takes one more leap. Only rays
+//!   of the GPU engine leap; here leaps are tested.
 //!
 //! Twin: `shaders/walk.wgsl`, with the same operations in the same order.
 

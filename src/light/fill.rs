@@ -59,7 +59,7 @@ impl<'a> Rows<'a> {
                 |cells: &Arc<Vec<Cell>>| cells.par_iter().map(|cell| cell.rho_code() as f32).collect();
             (level, level.volume.cells.dense().map(codes))
         };
-        let levels = (0..levels.len() as u32).map(|number| rows(Level::in_pyramid(levels, number))).collect();
+        let levels = (0..levels.len() as u32).map(|number| rows(Level::new(levels, number))).collect();
         Rows { levels, lookup }
     }
 

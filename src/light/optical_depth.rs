@@ -6,7 +6,6 @@ use glam::{IVec3, Vec3};
 use super::visibility::{DARK_BITS, Form, LightVolume, Medium, transmittance_code};
 use crate::trace::SheetDensity;
 use crate::trace::lookup::Level;
-use crate::volume::large_box;
 use crate::walk::{NEVER, Walk};
 
 /// Value that a light volume of the given form stores for a cell: a code as a number (0 to 255), or an
@@ -48,18 +47,8 @@ pub fn optical_depth(
     let mut depth = 0.0f32;
     let mut n = 0;
     let mut walk = Walk::new(level.size, start.as_vec3() + 0.5, direction, f32::INFINITY);
-    let octant = walk.octant();
-    let leaps = level.leaps && matter.keeps_empty();
     while n < medium.max_cells && (0..level.size.z).contains(&walk.cell().z) {
         let cell = level.cell(walk.cell());
-        if leaps
-            && cell.rho_code() == 0
-            && let Some(exponents) = large_box(cell, octant)
-        {
-            n += 1 + walk.leap(exponents);
-            walk.next();
-            continue;
-        }
         let Some(crossing) = walk.next() else { break };
         let rho = matter.rho(cell.rho_code() as f32);
         if medium.per_cell {

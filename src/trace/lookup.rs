@@ -7,7 +7,7 @@ use glam::{IVec3, UVec3, Vec3};
 use super::matter::SheetDensity;
 use crate::mapping::CellFrame;
 use crate::util::powers::log2;
-use crate::volume::{Cell, Moments, Pyramid, VolumeTexture};
+use crate::volume::{Cell, Moments, VolumeTexture};
 use crate::walk::Crossing;
 
 /// One level of the volume, with what a walk needs to know about it.
@@ -23,12 +23,10 @@ pub struct Level<'a> {
     pub scale: Vec3,
     /// Number of cells along x, y and z.
     pub size: IVec3,
-    /// Whether empty cells hold boxes of empty cells that a walk can leap over.
-    pub leaps: bool,
 }
 
 impl<'a> Level<'a> {
-    /// Level `number` of `levels`, without leaps.
+    /// Level `number` of `levels`.
     pub fn new(levels: &'a [VolumeTexture], number: u32) -> Self {
         let volume = &levels[number as usize];
         let [whole, size] = [levels[0].size, volume.size].map(UVec3::from);
@@ -38,13 +36,7 @@ impl<'a> Level<'a> {
             is_whole: number == 0,
             scale: size.as_vec3() / whole.as_vec3(),
             size: size.as_ivec3(),
-            leaps: false,
         }
-    }
-
-    /// Level `number` of a pyramid, with leaps where the pyramid has them.
-    pub fn in_pyramid(levels: &'a Pyramid, number: u32) -> Self {
-        Level { leaps: levels.leaps, ..Level::new(levels, number) }
     }
 
     /// Depth of one cell of the level, in cells of the volume.

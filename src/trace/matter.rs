@@ -63,12 +63,6 @@ impl SheetDensity {
         }
     }
 
-    /// Whether empty cells stay empty. Mist fills them.
-    #[inline]
-    pub fn keeps_empty(&self) -> bool {
-        self.shift <= 0.0
-    }
-
     /// Identity: a sheet without erosion or mist.
     pub const WHOLE: SheetDensity = SheetDensity { scale: 1.0, shift: 0.0, mist: 0.0, even: 0.0, left: 1.0 };
 

@@ -1,4 +1,5 @@
-//! Boxes of empty cells that rays leap over. Every empty cell holds the size of an empty box ahead of it.
+//! Boxes of empty cells that rays of the GPU engine leap over. Every empty cell holds the size of an empty
+//! box ahead of it.
 //!
 //! A cell has one box for each octant of directions. The box begins with the cell, extends along the octant,
 //! and is 1, 2, 4 or 8 cells long along each axis. It continues into the copies of the volume in x and y, but
@@ -39,18 +40,6 @@ pub fn box_exponents(cell: Cell, octant: u32) -> [u32; 3] {
     let shift = 2 * octant;
     [cell.y >> shift & 3, cell.y >> (16 + shift) & 3, cell.x >> (16 + shift) & 3]
 }
-
-/// Exponents of an empty cell's box, if a leap over it costs a CPU less than the steps it saves.
-#[inline]
-pub fn large_box(cell: Cell, octant: u32) -> Option<[u32; 3]> {
-    let exponents = box_exponents(cell, octant);
-    (exponents.iter().sum::<u32>() >= LARGE_SUM).then_some(exponents)
-}
-
-/// Smallest sum of exponents of the boxes that the CPU leaps over: 4×4×4 cells, for example. A leap has to
-/// wait for the cell and takes as long as about five steps, which a processor begins before the cell has
-/// arrived.
-const LARGE_SUM: u32 = 6;
 
 /// Number of layers whose boxes are computed at once, with 8 bytes of memory per cell.
 const SLAB: usize = 32;

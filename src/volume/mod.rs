@@ -21,7 +21,7 @@ pub use bundle::curve_points;
 pub use cell::{Cell, V_SCALE};
 pub use cells::Cells;
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
-pub use leaps::{box_exponents, empty_share, large_box, with_boxes, worth_leaping};
+pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
 pub use pyramid::{
     Leaps, LevelAtlas, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels, level_count,
     level_size, levels_of, stored_levels,

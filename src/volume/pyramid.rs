@@ -180,7 +180,7 @@ pub struct PyramidSpec {
 /// Computes the levels of a volume without boxes to leap over. For a few rays, boxes cost more time than they
 /// save.
 pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
-    LevelsCache { leaps: Leaps::Never, last: None }.get(volume, spec)
+    LevelsCache::with_leaps(Leaps::Never).get(volume, spec)
 }
 
 /// Wraps a sparse volume, which has no coarser levels, as the levels of itself.
@@ -213,6 +213,11 @@ impl PartialEq for Key {
 }
 
 impl LevelsCache {
+    /// Cache that makes its levels for this choice.
+    pub fn with_leaps(leaps: Leaps) -> Self {
+        LevelsCache { leaps, last: None }
+    }
+
     /// Returns the levels of a volume. Computes them unless they are those of the last call.
     pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
         let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };

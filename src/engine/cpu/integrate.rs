@@ -352,9 +352,9 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ray = self.sheet_hit(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
-        let mut result = self.walk(&ray, &Level::in_pyramid(&self.levels, level), before, observer);
+        let mut result = self.walk(&ray, &Level::new(&self.levels, level), before, observer);
         if share > 0.0 {
-            let next = self.walk(&ray, &Level::in_pyramid(&self.levels, level + 1), before, observer);
+            let next = self.walk(&ray, &Level::new(&self.levels, level + 1), before, observer);
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, cells } = result;

@@ -8,14 +8,20 @@ use crate::light::visibility::LightVolumes;
 use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::volume::{Levels, LevelsCache};
+use crate::volume::{Leaps, Levels, LevelsCache};
 
 /// The light volumes of the last frame, and the volume's levels.
-#[derive(Default)]
 pub struct LightVolumeCache {
     /// Levels of the last volume.
     pub levels: LevelsCache,
     last: Option<FilledCache>,
+}
+
+impl Default for LightVolumeCache {
+    /// Keeps nothing yet. Rays in lockstep do not leap, so empty cells hold no boxes.
+    fn default() -> Self {
+        LightVolumeCache { levels: LevelsCache::with_leaps(Leaps::Never), last: None }
+    }
 }
 
 /// Light volumes, and the inputs they were filled from.

@@ -340,7 +340,7 @@ fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
                 let filled = Rows::new(levels, lookup).fill(&light_volume, medium, form);
                 assert_eq!(filled.len(), levels.len());
                 for (at, numbers) in filled.iter().enumerate() {
-                    let level = Level::in_pyramid(levels, at as u32);
+                    let level = Level::new(levels, at as u32);
                     let [nx, ny, _] = level.volume.size.map(|n| n as usize);
                     for (index, cell) in level.volume.cells.iter().enumerate() {
                         let place = [index % nx, index / nx % ny, index / nx / ny].map(|c| c as i32);

@@ -12,7 +12,6 @@ use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::{CellSample, Level};
 use crate::util::powers::{exp2, log2};
-use crate::volume::large_box;
 use crate::walk::Walk;
 
 /// The result of walking one level.
@@ -74,19 +73,9 @@ impl Integrator<'_> {
         let mut depth = -log2(before.max(1e-30));
         let mut walked = [0u32; 2];
         let mut walk = Walk::new(level.size, origin, d_cell, f32::INFINITY);
-        let octant = walk.octant();
-        let leaps = level.leaps && matter.keeps_empty();
         let most = scene.trace.max_cells;
         while walked[0] < most && walk.cell().z < level.size.z && transmittance >= scene.trace.early_end {
             let cell = level.cell(walk.cell());
-            if leaps
-                && cell.rho_code() == 0
-                && let Some(exponents) = large_box(cell, octant)
-            {
-                walked[0] = (walked[0] + walk.leap(exponents) + 1).min(most);
-                walk.next();
-                continue;
-            }
             let Some(crossing) = walk.next() else { break };
             walked[0] += 1;
             let CellSample { rho, k: [k_d, k_s], moments } = match scene.trace.lookup {

@@ -1,5 +1,5 @@
 //! The points where eight rays meet their sheets, and everything that is constant along the rays behind
-//! them. Twin of `SheetHit` in `src/engine/cpu/integrate.rs` and of [`SheetDensity`](crate::trace::SheetDensity),
+//! them. Twin of `SheetHit` in `src/engine/cpu/integrate.rs` and of `SheetDensity` in `src/trace/matter.rs`,
 //! with the same bits.
 
 use bytemuck::{Pod, Zeroable};

@@ -160,8 +160,8 @@ impl<'a> LaneLight<'a> {
 }
 
 impl Group<'_, '_> {
-    /// Computes the visibility of every lit cell of the batch, from one light. `walked` grows by the number of
-    /// cells that light rays pass.
+    /// Computes the visibility of every lit cell of the batch, from one light. `walked` grows by the number
+    /// of cells that light rays pass.
     #[inline(always)]
     pub fn visibility<S: Simd>(
         &self,

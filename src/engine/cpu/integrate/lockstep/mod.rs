@@ -112,7 +112,7 @@ impl<'a> Lockstep<'a> {
             return None;
         }
         let levels = (0..integrator.levels.len() as u32).map(|number| {
-            let level = Level::in_pyramid(&integrator.levels, number);
+            let level = Level::new(&integrator.levels, number);
             Some((level, Store::new(&level)?))
         });
         let levels: Vec<_> = levels.collect::<Option<_>>()?;
