@@ -347,12 +347,13 @@ impl Scene {
         pyramid_spec(&self.trace, &self.quads, volume)
     }
 
-    /// Plans the light volumes of a frame, within [`Scene::light_cache`]: with cached visibility, and in place
-    /// of walks to the lights where light volumes equal them. `None` where rays walk, or nothing is
+    /// Plans the light volumes of a frame, within the budget of the scene: with cached visibility, and in
+    /// place of walks to the lights where light volumes equal them. `None` where rays walk, or nothing is
     /// attenuated.
     ///
     /// # Errors
-    /// With cached visibility, `Error::Memory` where even the coarsest light volumes need more than the budget.
+    /// With cached visibility, `Error::Memory` where even the coarsest light volumes need more than the
+    /// budget.
     pub fn light_plan(&self, volume: &VolumeTexture) -> Result<Option<LightVolumes>> {
         match self.visibility {
             Visibility::None => Ok(None),

@@ -100,6 +100,10 @@ fn what_is_not_eroded_stays_as_it_is_beside_what_is() {
             let mut frames = [&plain, &with].map(|scene| {
                 let mut scene = scene.clone();
                 scene.edit().visibility = visibility;
+                if visibility == Visibility::March {
+                    // Beside eroded matter rays walk. Alone they do so without a budget for light volumes.
+                    scene.edit().light_cache = 0;
+                }
                 frame(engine, &scene, &volume)
             });
             let [a, b] = &mut frames;
