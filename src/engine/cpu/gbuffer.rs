@@ -18,7 +18,7 @@ use crate::picture::{Camera, Image};
 use crate::place::{Mesh, tiles};
 use crate::scene::{Parts, Scene};
 use crate::util::window::Window;
-use raster::{Covered, Rasteriser, ScreenPoint, ScreenTriangle};
+use raster::{Covered, Rasteriser, ScreenPoint, Triangles};
 
 /// The targets of one sample of a window of the image, row by row.
 pub struct Gbuffer {
@@ -174,31 +174,24 @@ struct Projection {
     window: Window,
 }
 
-/// A point in clip space, and on the screen.
-type Projected = (Vec4, ScreenPoint);
-
 impl Projection {
-    fn point(&self, point: Vec3) -> Projected {
+    /// Adds a point. Returns it in clip space, with its index.
+    fn point(&self, point: Vec3, out: &mut Triangles) -> (Vec4, u32) {
         let clip = self.clip_from_world * point.extend(1.0);
-        (clip, ScreenPoint::new(clip, self.size))
+        (clip, out.add_point(ScreenPoint::new(clip, self.size)))
     }
 
-    /// Adds the parts of a triangle that may cover a pixel's centre.
-    fn triangle(&self, points: [Projected; 3], id: u32, corners: [u16; 3], out: &mut Vec<ScreenTriangle>) {
-        let mut add = |triangle: ScreenTriangle| {
-            // Most triangles of a fine mesh lie between the pixels' centres.
-            if triangle.covers_centres(self.window) {
-                out.push(triangle);
-            }
-        };
+    /// Adds the parts of a triangle that may cover a pixel's centre. Its points are given in clip space and by
+    /// their indices.
+    fn triangle(&self, points: [(Vec4, u32); 3], of: (u32, [u16; 3]), out: &mut Triangles) {
         // Almost all triangles lie wholly in front.
         if points.iter().all(|(clip, _)| clip.w >= self.near) {
-            add(ScreenTriangle::new(points.map(|(_, screen)| screen), id, corners));
-        } else {
-            raster::clip_near(points.map(|(clip, _)| clip), self.near, |part| {
-                add(ScreenTriangle::part(part, self.size, id, corners));
-            });
+            return out.add(points.map(|(_, number)| number), None, of, self.window);
         }
+        raster::clip_near(points.map(|(clip, _)| clip), self.near, |part| {
+            let points = part.map(|(clip, _)| out.add_point(ScreenPoint::new(clip, self.size)));
+            out.add(points, Some(part.map(|(_, weights)| weights)), of, self.window);
+        });
     }
 
     /// Whether anything in a box may cover a pixel's centre of the window. Only boxes that lie wholly beyond
@@ -300,15 +293,16 @@ impl<'a> WindowFrame<'a> {
     }
 
     /// Triangles of the opaque mesh, whose ids are numbers of tiles.
-    fn rock_triangles(&self) -> Vec<ScreenTriangle> {
+    fn rock_triangles(&self) -> Triangles {
         let (scene, mesh) = (self.scene, self.mesh);
         let projection = self.projection();
         let steps = tiles::steps(&mesh.tiles, &scene.camera, &scene.image);
-        mesh.tiles
+        let of_tiles = mesh
+            .tiles
             .par_iter()
             .enumerate()
-            .flat_map_iter(|(i, tile)| {
-                let mut out = Vec::new();
+            .map(|(i, tile)| {
+                let mut out = Triangles::default();
                 if projection.may_show(tile.low, tile.high) {
                     // Six triangles meet in a vertex, which is projected once.
                     let mut points = [None; GRID];
@@ -317,25 +311,26 @@ impl<'a> WindowFrame<'a> {
                         let points = corners.map(|corner| {
                             *points[usize::from(corner)].get_or_insert_with(|| {
                                 let vertex = tile.vertex(tiles::grid_point(corner));
-                                projection.point(mesh.vertices[vertex as usize].position.into())
+                                projection.point(mesh.vertices[vertex as usize].position.into(), &mut out)
                             })
                         });
-                        projection.triangle(points, i as u32, corners, &mut out);
+                        projection.triangle(points, (i as u32, corners), &mut out);
                     }
                 }
                 out
             })
-            .collect()
+            .collect();
+        Triangles::joined(of_tiles)
     }
 
     /// Triangles of the volume quads, whose ids are numbers of quads.
-    fn water_triangles(&self) -> Vec<ScreenTriangle> {
+    fn water_triangles(&self) -> Triangles {
         let projection = self.projection();
-        let mut water = Vec::new();
+        let mut water = Triangles::default();
         for (i, quad) in self.scene.quads.iter().enumerate() {
-            let [a, b, c, d] = quad.corners.map(|corner| projection.point(corner));
-            projection.triangle([a, b, c], i as u32, [0; 3], &mut water);
-            projection.triangle([a, c, d], i as u32, [0; 3], &mut water);
+            let [a, b, c, d] = quad.corners.map(|corner| projection.point(corner, &mut water));
+            projection.triangle([a, b, c], (i as u32, [0; 3]), &mut water);
+            projection.triangle([a, c, d], (i as u32, [0; 3]), &mut water);
         }
         water
     }
@@ -353,10 +348,12 @@ impl<'a> WindowFrame<'a> {
             if id == 0 {
                 (opaque[k], normal[k]) = self.shade_background(self.ray(band, k));
             } else {
-                let triangle = &rock.triangles[id as usize - 1];
+                let triangle = rock.triangle(id - 1);
                 let centre = self.pixel(band, k).map(|p| p as f64 + 0.5);
                 let at = self.image_point(band, k);
-                (opaque[k], normal[k]) = self.shade_point(triangle, centre, at, depth);
+                let weights = rock.weights_at(triangle, centre).to_array();
+                let in_tile = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
+                (opaque[k], normal[k]) = self.shade_point(triangle.id, in_tile, at, depth);
             }
         }
     }
@@ -374,21 +371,13 @@ impl<'a> WindowFrame<'a> {
         (radiance.extend(0.0).to_array(), Vec3::ZERO.extend(passes))
     }
 
-    /// Radiance, metres from the eye, and normal of the opaque point under a pixel whose centre is `centre`.
-    /// `at` is its point of the image, `depth` the reversed depth of `triangle` there. Of a holdout in a
-    /// picture with alpha, only the haze in front of it has a radiance.
-    fn shade_point(
-        &self,
-        triangle: &ScreenTriangle,
-        centre: [f64; 2],
-        at: Vec2,
-        depth: f32,
-    ) -> ([f32; 4], Vec4) {
+    /// Radiance, metres from the eye, and normal of the opaque point at the position `in_tile` of tile number
+    /// `tile`, in squares of its grid. `at` is its point of the image, and `depth` its reversed depth. Of a
+    /// holdout in a picture with alpha, only the haze in front of it has a radiance.
+    fn shade_point(&self, tile: u32, in_tile: Vec2, at: Vec2, depth: f32) -> ([f32; 4], Vec4) {
         let (scene, mesh) = (self.scene, self.mesh);
-        let weights = triangle.weights_at(centre).to_array();
-        let in_tile = (0..3).map(|c| tiles::at(triangle.corners[c]) * weights[c]).sum();
         let position = self.to_point.point(self.rays, at, depth);
-        let point = Opaque::at(mesh, &mesh.tiles[triangle.id as usize], in_tile, position);
+        let point = Opaque::at(mesh, &mesh.tiles[tile as usize], in_tile, position);
         let (radiance, n) = match point.pool {
             0 => shade_opaque(scene, self.shadow_light, &point),
             pool => shade_pool(scene, self.shadow_light, &self.pools[pool as usize - 1], &point, at),
@@ -420,7 +409,7 @@ impl<'a> WindowFrame<'a> {
             let at = self.image_point(band, i);
             let length = (forward + right * at.x + up * at.y).length();
             for (k, &(_, id)) in (i * layers..).zip(faces).take_while(|(_, (_, id))| *id != 0) {
-                let quad = water.triangles[id as usize - 1].id;
+                let quad = water.triangle(id - 1).id;
                 quad_id[k] = quad + 1;
                 let plane = &self.planes[quad as usize];
                 surface[k] = map_quad(&self.scene.quads[quad as usize], plane, at, length);

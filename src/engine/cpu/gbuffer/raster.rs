@@ -42,9 +42,17 @@ fn snapped(x: f64) -> f64 {
     (whole + away) as f64 / 256.0
 }
 
-/// A triangle in pixels, clipped at the near plane. Its area is positive.
+/// Triangles in pixels, clipped at the near plane, and the points between which they lie.
+#[derive(Default)]
+pub struct Triangles {
+    points: Vec<ScreenPoint>,
+    all: Vec<ScreenTriangle>,
+}
+
+/// A triangle in pixels, whose points may be those of others too.
 pub struct ScreenTriangle {
-    points: [ScreenPoint; 3],
+    /// Indices of its points, ordered so that its area is positive.
+    points: [u32; 3],
     /// Weights of the original corners in `points` where the near plane has cut the triangle.
     weights: Option<Box<[Vec3; 3]>>,
     /// Number of the tile or the quad.
@@ -54,6 +62,10 @@ pub struct ScreenTriangle {
     /// Whether the last two points were exchanged to make the area positive.
     flipped: bool,
 }
+
+/// The points of a triangle.
+#[derive(Clone, Copy)]
+struct Corners([ScreenPoint; 3]);
 
 /// Columns of a bounding box that are tested one by one.
 const NARROW: usize = 4;
@@ -88,40 +100,77 @@ pub fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3);
     }
 }
 
-impl ScreenTriangle {
-    /// Triangle between three points, in either order.
+impl Triangles {
+    /// Adds a point and returns its index.
     #[inline]
-    pub fn new(points: [ScreenPoint; 3], id: u32, corners: [u16; 3]) -> Self {
-        let mut t = ScreenTriangle { points, weights: None, id, corners, flipped: false };
-        if t.area() < 0.0 {
-            t.points.swap(1, 2);
-            t.flipped = true;
+    pub fn add_point(&mut self, point: ScreenPoint) -> u32 {
+        self.points.push(point);
+        self.points.len() as u32 - 1
+    }
+
+    /// Adds the triangle between three points, in either order, if it may cover the centre of a pixel of the
+    /// window. `weights` are those of the original corners where the triangle is a part of [`clip_near`].
+    #[inline]
+    pub fn add(
+        &mut self,
+        mut points: [u32; 3],
+        weights: Option<[Vec3; 3]>,
+        (id, corners): (u32, [u16; 3]),
+        window: Window,
+    ) {
+        let mut seen = self.corners(&points);
+        let flipped = seen.area() < 0.0;
+        if flipped {
+            seen.0.swap(1, 2);
+            points.swap(1, 2);
         }
-        t
+        // Most triangles of a fine mesh lie between the pixels' centres.
+        if seen.covers_centres(window) {
+            self.all.push(ScreenTriangle { points, weights: weights.map(Box::new), id, corners, flipped });
+        }
     }
 
-    /// A part of a triangle that [`clip_near`] has cut.
-    pub fn part(part: [(Vec4, Vec3); 3], size: [usize; 2], id: u32, corners: [u16; 3]) -> Self {
-        let t = ScreenTriangle::new(part.map(|(c, _)| ScreenPoint::new(c, size)), id, corners);
-        ScreenTriangle { weights: Some(Box::new(part.map(|(_, w)| w))), ..t }
+    /// Joins lists, in order.
+    pub fn joined(lists: Vec<Triangles>) -> Triangles {
+        let mut joined = Triangles {
+            points: Vec::with_capacity(lists.iter().map(|list| list.points.len()).sum()),
+            all: Vec::with_capacity(lists.iter().map(|list| list.all.len()).sum()),
+        };
+        for list in lists {
+            let first = joined.points.len() as u32;
+            joined.points.extend(list.points);
+            joined.all.extend(
+                list.all
+                    .into_iter()
+                    .map(|t| ScreenTriangle { points: t.points.map(|point| first + point), ..t }),
+            );
+        }
+        joined
     }
 
+    #[inline]
+    fn corners(&self, points: &[u32; 3]) -> Corners {
+        Corners(points.map(|point| self.points[point as usize]))
+    }
+}
+
+impl Corners {
     /// Twice the signed area of the triangle between edge `i` and the point `p`.
     #[inline]
     fn edge(&self, i: usize, p: [f64; 2]) -> f64 {
-        let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+        let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
         (b.x - a.x) * (p[1] - a.y) - (b.y - a.y) * (p[0] - a.x)
     }
 
     /// Twice the signed area.
     #[inline]
     fn area(&self) -> f64 {
-        self.edge(2, [self.points[2].x, self.points[2].y])
+        self.edge(2, [self.0[2].x, self.0[2].y])
     }
 
     /// Whether the triangle has an area and its bounding box holds the centre of a pixel of the window.
     #[inline]
-    pub fn covers_centres(&self, window: Window) -> bool {
+    fn covers_centres(&self, window: Window) -> bool {
         let ((x0, x1), (y0, y1)) = self.centres(window);
         x0 < x1 && y0 < y1 && self.area() > 0.0
     }
@@ -140,7 +189,7 @@ impl ScreenTriangle {
             let (first, end) = (i64::from(first), i64::from(first + count));
             (((low + 255) >> 8).clamp(first, end) as usize, ((high >> 8) + 1).clamp(first, end) as usize)
         };
-        let [a, b, c] = &self.points;
+        let [a, b, c] = &self.0;
         (range([a.x, b.x, c.x], window.x, window.width), range([a.y, b.y, c.y], window.y, window.height))
     }
 
@@ -154,7 +203,7 @@ impl ScreenTriangle {
         }
         let (mut low, mut high) = (columns.start as f64, columns.end as f64);
         for i in 0..3 {
-            let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+            let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
             let (dx, dy) = (b.x - a.x, b.y - a.y);
             // The column where the edge crosses the row.
             let at = a.x - 0.5 + dx * (y as f64 + 0.5 - a.y) / dy;
@@ -170,33 +219,18 @@ impl ScreenTriangle {
     /// Whether points on edge `i` belong to this triangle: true for top and left edges.
     #[inline]
     fn owns_edge(&self, i: usize) -> bool {
-        let (a, b) = (&self.points[(i + 1) % 3], &self.points[(i + 2) % 3]);
+        let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
         let (dx, dy) = (b.x - a.x, b.y - a.y);
         dy < 0.0 || (dy == 0.0 && dx > 0.0)
-    }
-
-    /// Returns the perspective-correct weights of the original corners at a position in pixels.
-    #[inline]
-    pub fn weights_at(&self, p: [f64; 2]) -> Vec3 {
-        let mut w = [0, 1, 2].map(|i| self.edge(i, p) * self.points[i].inverse_w);
-        let sum: f64 = w.iter().sum();
-        if self.flipped {
-            w.swap(1, 2);
-        }
-        let w = w.map(|w| (w / sum) as f32);
-        match &self.weights {
-            None => Vec3::from(w),
-            Some(weights) => (0..3).map(|i| weights[i] * w[i]).sum(),
-        }
     }
 }
 
 /// Returns, for each band of `rows` rows of the window, the indices of the triangles that reach into it, in
 /// order.
-fn bins(triangles: &[ScreenTriangle], window: Window, rows: usize) -> Vec<Vec<u32>> {
+fn bins(triangles: &Triangles, window: Window, rows: usize) -> Vec<Vec<u32>> {
     let mut bins = vec![Vec::new(); (window.height as usize).div_ceil(rows)];
-    for (number, t) in triangles.iter().enumerate() {
-        let (_, (top, bottom)) = t.centres(window);
+    for (number, t) in triangles.all.iter().enumerate() {
+        let (_, (top, bottom)) = triangles.corners(&t.points).centres(window);
         let [first, last] = [top, bottom - 1].map(|y| (y - window.y as usize) / rows);
         for bin in &mut bins[first..=last] {
             bin.push(number as u32);
@@ -208,15 +242,36 @@ fn bins(triangles: &[ScreenTriangle], window: Window, rows: usize) -> Vec<Vec<u3
 /// Triangles of a window, sorted into bands of rows.
 pub struct Rasteriser {
     /// All triangles, in drawing order.
-    pub triangles: Vec<ScreenTriangle>,
+    triangles: Triangles,
     bins: Vec<Vec<u32>>,
 }
 
 impl Rasteriser {
     /// Sorts triangles into the bands of `rows` rows that a window is cut into.
-    pub fn new(triangles: Vec<ScreenTriangle>, window: Window, rows: usize) -> Self {
+    pub fn new(triangles: Triangles, window: Window, rows: usize) -> Self {
         let bins = bins(&triangles, window, rows);
         Rasteriser { triangles, bins }
+    }
+
+    /// Returns the triangle with an index.
+    pub fn triangle(&self, number: u32) -> &ScreenTriangle {
+        &self.triangles.all[number as usize]
+    }
+
+    /// Returns the perspective-correct weights of the original corners of a triangle at a position in pixels.
+    #[inline]
+    pub fn weights_at(&self, triangle: &ScreenTriangle, p: [f64; 2]) -> Vec3 {
+        let corners = self.triangles.corners(&triangle.points);
+        let mut w = [0, 1, 2].map(|i| corners.edge(i, p) * corners.0[i].inverse_w);
+        let sum: f64 = w.iter().sum();
+        if triangle.flipped {
+            w.swap(1, 2);
+        }
+        let w = w.map(|w| (w / sum) as f32);
+        match &triangle.weights {
+            None => Vec3::from(w),
+            Some(weights) => (0..3).map(|i| weights[i] * w[i]).sum(),
+        }
     }
 
     /// Draws the triangles of band number `bin`, whose pixels are `band`. `covered` holds `layers` entries
@@ -226,7 +281,8 @@ impl Rasteriser {
     pub fn draw(&self, bin: usize, band: Window, covered: &mut [Covered], layers: usize) {
         let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
         for &number in &self.bins[bin] {
-            let t = &self.triangles[number as usize];
+            let ScreenTriangle { id, points, .. } = &self.triangles.all[number as usize];
+            let t = self.triangles.corners(points);
             let area = t.area();
             let ((x0, x1), (y0, y1)) = t.centres(band);
             let owns = [0, 1, 2].map(|i| t.owns_edge(i));
@@ -235,10 +291,10 @@ impl Rasteriser {
                     let p = [x as f64 + 0.5, y as f64 + 0.5];
                     let e = [0, 1, 2].map(|i| t.edge(i, p));
                     if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
-                        let depth = ((0..3).map(|i| e[i] * t.points[i].depth).sum::<f64>() / area) as f32;
+                        let depth = ((0..3).map(|i| e[i] * t.0[i].depth).sum::<f64>() / area) as f32;
                         let pixel = ((y - top) * width + x - left) * layers;
                         insert(&mut covered[pixel..pixel + layers], (depth, number + 1), |other| {
-                            self.triangles[other as usize - 1].id == t.id
+                            self.triangles.all[other as usize - 1].id == *id
                         });
                     }
                 }
