@@ -181,8 +181,8 @@ impl Projection {
         (clip, out.add_point(ScreenPoint::new(clip, self.size)))
     }
 
-    /// Adds the parts of a triangle that may cover a pixel's centre. Its points are given in clip space and by
-    /// their indices.
+    /// Adds the parts of a triangle that may cover a pixel's centre. Its points are in clip space, with their
+    /// indices.
     fn triangle(&self, points: [(Vec4, u32); 3], of: (u32, [u16; 3]), out: &mut Triangles) {
         // Almost all triangles lie wholly in front.
         if points.iter().all(|(clip, _)| clip.w >= self.near) {
