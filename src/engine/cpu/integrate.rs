@@ -41,7 +41,7 @@ pub struct Integrator<'a> {
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
     lights: Vec<Light>,
-    /// That of the scene, or cached where light volumes stand for walks to the lights.
+    /// Visibility of the scene, or `Cached` where light volumes stand for walks to the lights.
     visibility: Visibility,
     light_volumes: Option<LightVolumes>,
     /// `None`: values of light volumes are walked on demand.

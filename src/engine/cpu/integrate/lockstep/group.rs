@@ -78,7 +78,7 @@ impl Default for Steps {
     }
 }
 
-/// What eight rays have met at the end of their walk.
+/// Results of eight rays at the end of their walk.
 #[derive(Default)]
 pub struct Ends {
     /// T at the end.
