@@ -163,7 +163,7 @@ fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
 }
 
 // Unit direction from a point to a light, and the factor of its intensity at the point. Twin: Light::at in
-// src/engine/cpu/opaque.rs.
+// src/light/lights.rs.
 fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
     if light.has_position == 0u {
         return vec4<f32>(light.vector, 1.0);
@@ -180,7 +180,7 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
 }
 
 // Share of light that water reflects, after Fresnel, by Schlick's approximation (1994). `cos_angle` is the
-// cosine between the light and the normal. Twin: fresnel in src/engine/cpu/opaque.rs.
+// cosine between the light and the normal. Twin: fresnel in src/engine/cpu/opaque.rs and pool.rs.
 fn fresnel(cos_angle: f32) -> f32 {
     let m = 1.0 - clamp(cos_angle, 0.0, 1.0);
     let m2 = m * m;

@@ -115,7 +115,7 @@ fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
     return out;
 }
 
-// The visible point of rock under a pixel, on the pixel's own ray at the drawn depth. Twin: Opaque::at.
+// The visible point of rock under a pixel, on the pixel's own ray at the drawn depth. Twin: Points::at.
 fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     let drawn = textureLoad(rock_surface, pixel, 0);
     let tile = tiles[u32(drawn.z)];
@@ -191,7 +191,7 @@ fn behind_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<
 }
 
 // Targets where no opaque geometry is, marked by distance and normal 0. `d_y` is the view direction's y
-// component. Twin: WindowFrame::shade_background.
+// component. Twin: Shading::background.
 fn background_targets(radiance: vec3<f32>, d_y: f32) -> OpaqueTargets {
     let seen = select(radiance, vec3<f32>(0.0), frame.alpha != 0u);
     var out: OpaqueTargets;

@@ -53,7 +53,7 @@ fn shade_opaque(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32
     return opaque_targets(radiance, n, to_eye, in.holdout);
 }
 
-// Targets of a point with this radiance, behind haze. Twin: WindowFrame::shade_point.
+// Targets of a point with this radiance, behind haze. Twin: Shading::rock.
 fn opaque_targets(radiance: vec3<f32>, n: vec3<f32>, to_eye: vec3<f32>, holdout: bool) -> OpaqueTargets {
     let distance = sqrt(dot3(to_eye, to_eye));
     let d_y = -to_eye.y / max(distance, 1e-20);

@@ -10,9 +10,9 @@ use glam::{DVec3, Vec3};
 /// Maximum extinction at the eye, 1/m. An eye so far below y₀ that β exceeds it sees only haze anyway.
 const DENSEST: f64 = 1e6;
 /// |x| below which (1 − e^(−x))/x is computed from its series, with an error of 4·10⁻⁸.
-const SERIES: f32 = 1e-2;
+pub const SERIES: f32 = 1e-2;
 /// Minimum of x: e⁶⁰ is finite in float32, and the haze is opaque there.
-const LEAST_X: f32 = -60.0;
+pub const LEAST_X: f32 = -60.0;
 
 /// Haze of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -54,6 +54,30 @@ impl Light {
             Light::Spot { .. } => LightKind::Spot,
         }
     }
+
+    /// Returns the unit direction from a point to the light, and the light's intensity at the point. Twin:
+    /// `light_from` of `shaders/layout.wgsl`.
+    pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {
+        match *self {
+            Light::Directional { to_light, intensity } => (to_light, intensity),
+            Light::Point { position, intensity } => {
+                let (to_light, falloff) = from_point(position, point);
+                (to_light, intensity * falloff)
+            }
+            Light::Spot { position, intensity, cone } => {
+                let (to_light, falloff) = from_point(position, point);
+                let s = ((cone.axis.dot(to_light) - cone.cos_edge) * cone.inverse_soft).clamp(0.0, 1.0);
+                (to_light, intensity * (falloff * (s * s * (3.0 - 2.0 * s))))
+            }
+        }
+    }
+}
+
+/// Returns the unit direction from `point` to a light at `position`, and the falloff 1/d² there.
+fn from_point(position: Vec3, point: Vec3) -> (Vec3, f32) {
+    let away = position - point;
+    let d2 = away.dot(away).max(1e-12);
+    (away / d2.sqrt(), 1.0 / d2)
 }
 
 /// The cone of a spot light.

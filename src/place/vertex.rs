@@ -20,3 +20,12 @@ pub struct Vertex {
     /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
 }
+
+impl Vertex {
+    /// Numbers that are interpolated over a triangle: normal, albedo, occlusion, shadow and film of water.
+    #[inline]
+    pub fn coat(&self) -> &[f32; 9] {
+        let all: &[f32; 13] = bytemuck::cast_ref(self);
+        all[3..].first_chunk().expect("twelve numbers before the pool's")
+    }
+}

@@ -2,6 +2,7 @@
 //! engine of machines without a GPU.
 
 pub mod gbuffer;
+mod haze;
 pub mod integrate;
 pub mod opaque;
 pub mod pixels;
@@ -16,7 +17,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use gbuffer::{BAND_ROWS, Gbuffer};
+use gbuffer::{Canvas, Drawing, Gbuffer, SAMPLES};
 pub use pixels::render_pixels;
 pub use visibility::LightVolumeCache;
 
@@ -85,37 +86,42 @@ pub fn render_with(
         let pixels = first..first + band.pixels() as usize;
         // Layers lie at the pixels' centres, where the picture need not have a sample.
         let only_layers = frame.surface.is_some() && !samples.contains(&CENTRE);
-        for sample in only_layers.then_some(CENTRE).into_iter().chain(samples.clone()) {
-            let clock = Instant::now();
-            let drawing = gbuffer::Drawing::new(scene, mesh, band, sample);
-            seconds.gbuffer += clock.elapsed().as_secs_f64();
-            let is_seen = samples.contains(&sample);
-            let surface = Mutex::new(frame.surface.as_mut().filter(|_| sample == CENTRE));
-            let part = width * BAND_ROWS as usize;
-            let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {
-                Some(alpha) => alpha[pixels.clone()].chunks_mut(part).collect(),
-                None => (0..band.height.div_ceil(BAND_ROWS)).map(|_| <&mut [f32]>::default()).collect(),
-            };
-            // Rows are integrated as soon as they are drawn, while their targets are in the caches.
-            let clock = Instant::now();
-            let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
-            frame.radiance[pixels.clone()]
-                .par_chunks_mut(part)
-                .zip(frame.counts[pixels.clone()].par_chunks_mut(part))
-                .zip(uncovered)
-                .enumerate()
-                .try_for_each_init(
-                    || (Gbuffer::empty(scene), integrator.walker()),
-                    |(gbuffer, walker), (i, ((radiance, counts), uncovered))| {
+        let numbers: Vec<u32> = only_layers.then_some(CENTRE).into_iter().chain(samples.clone()).collect();
+        let clock = Instant::now();
+        let drawing = Drawing::new(fearless_simd::Level::new(), scene, mesh, band, &numbers);
+        seconds.gbuffer += clock.elapsed().as_secs_f64();
+        let surface = Mutex::new(frame.surface.as_mut());
+        let part = width * drawing.rows();
+        let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {
+            Some(alpha) => alpha[pixels.clone()].chunks_mut(part).collect(),
+            None => (0..drawing.bands()).map(|_| <&mut [f32]>::default()).collect(),
+        };
+        // Rows are integrated as soon as they are drawn, while their targets are in the caches.
+        let clock = Instant::now();
+        let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
+        frame.radiance[pixels.clone()]
+            .par_chunks_mut(part)
+            .zip(frame.counts[pixels.clone()].par_chunks_mut(part))
+            .zip(uncovered)
+            .enumerate()
+            .try_for_each_init(
+                || (Canvas::empty(scene), integrator.walker()),
+                |(canvas, walker), (i, ((radiance, counts), uncovered))| {
+                    for (k, &sample) in numbers.iter().enumerate() {
                         let clock = Instant::now();
-                        drawing.band(i, gbuffer);
-                        if let Some(surface) = surface.lock().unwrap_or_else(|e| e.into_inner()).as_mut() {
+                        if k % SAMPLES == 0 {
+                            drawing.cover(i, k, canvas);
+                        }
+                        let gbuffer = drawing.shade(i, k, canvas);
+                        if sample == CENTRE
+                            && let Some(surface) = surface.lock().unwrap_or_else(|e| e.into_inner()).as_mut()
+                        {
                             set_surface(surface, scene, gbuffer, first + i * part);
                         }
                         let drawn = clock.elapsed();
                         nanoseconds[0].fetch_add(drawn.as_nanos() as u64, Ordering::Relaxed);
-                        if !is_seen {
-                            return Ok(());
+                        if !samples.contains(&sample) {
+                            continue;
                         }
                         let of_band: Vec<[u32; 2]> = gbuffer.window.each().collect();
                         walker.pixels(gbuffer, &of_band, sample, |k, result| {
@@ -129,16 +135,18 @@ pub fn render_with(
                         let integrated = clock.elapsed() - drawn;
                         nanoseconds[1].fetch_add(integrated.as_nanos() as u64, Ordering::Relaxed);
                         let pixels = of_band.len() as u64;
-                        monitor.progress("pixels", done.fetch_add(pixels, Ordering::Relaxed) + pixels, total)
-                    },
-                )?;
-            // The passes share the time as they share the work of the threads.
-            let [drawn, integrated] = nanoseconds.map(|n| n.into_inner() as f64);
-            let share = drawn / (drawn + integrated).max(1.0);
-            let all = clock.elapsed().as_secs_f64();
-            seconds.gbuffer += all * share;
-            seconds.integrate += all * (1.0 - share);
-        }
+                        let done = done.fetch_add(pixels, Ordering::Relaxed) + pixels;
+                        monitor.progress("pixels", done, total)?;
+                    }
+                    Ok(())
+                },
+            )?;
+        // The passes share the time as they share the work of the threads.
+        let [drawn, integrated] = nanoseconds.map(|n| n.into_inner() as f64);
+        let share = drawn / (drawn + integrated).max(1.0);
+        let all = clock.elapsed().as_secs_f64();
+        seconds.gbuffer += all * share;
+        seconds.integrate += all * (1.0 - share);
     }
     if let Some(surface) = &mut frame.surface {
         surface.set_planar(&scene.camera, image, window);

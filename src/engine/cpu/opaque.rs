@@ -1,127 +1,203 @@
-//! §3 Shading of a point of rock in the raster pass. Twin: `shaders/engine/opaque.wgsl`.
+//! §3 Shading of rock in the raster pass, eight points side by side. Twin: `shaders/engine/opaque.wgsl`.
 
-use glam::{Vec2, Vec3};
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+use glam::Vec3;
 
-use crate::light::Light;
+use super::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored};
+use crate::light::environment::Irradiance;
+use crate::light::{Background, Light};
+use crate::place::Vertex;
 use crate::place::tiles::Tile;
-use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 
-/// A point of the opaque mesh, with values interpolated between its vertices.
-pub struct Opaque {
+/// Points of the opaque mesh, one a lane, with values interpolated between its vertices.
+pub struct Points<S: Simd> {
     /// Position in the world, metres.
-    pub position: Vec3,
+    pub position: Lanes3<S>,
     /// Normal, not normalised.
-    pub normal: Vec3,
-    /// Linear albedo.
-    pub albedo: Vec3,
-    /// Occlusion, shadow and film of water, 0 to 1 each.
-    pub shade: Vec3,
-    /// Number of the pool plus 1; 0 for rock.
-    pub pool: u32,
-    /// Whether a picture with an alpha channel has a hole here.
-    pub holdout: bool,
+    pub normal: Lanes3<S>,
+    /// Linear albedo. A pool has its depth (metres) and the density of its foam (0 to 1) here.
+    pub albedo: Lanes3<S>,
+    /// Share of the surroundings' light that is blocked, 0 to 1.
+    pub occlusion: Floats<S>,
+    /// Share of the light of [`Scene::shadow_light`] that is blocked, 0 to 1.
+    pub shadow: Floats<S>,
+    /// Strength of the film of water, 0 to 1.
+    pub wet: Floats<S>,
 }
 
-impl Opaque {
-    /// Interpolates the vertices around `in_tile`, a position in a tile in squares of its grid. `position` is
-    /// the point in the world. Twin: `opaque_point`.
-    pub fn at(mesh: &Mesh, tile: &Tile, in_tile: Vec2, position: Vec3) -> Opaque {
-        let (corners, weights) = tile.around(in_tile);
-        let corners = corners.map(|number| &mesh.vertices[number as usize]);
-        let mix = |get: fn(&Vertex) -> [f32; 3]| {
-            (0..3).map(|c| Vec3::from(get(corners[c])) * weights[c]).sum::<Vec3>()
-        };
-        Opaque {
+/// Numbers of a vertex that are interpolated: from its normal to its film of water.
+const NUMBERS: usize = 9;
+
+impl<S: Simd> Points<S> {
+    /// Interpolates the vertices around a place in each lane's tile, in squares of its grid. `position` are
+    /// the points in the world. Twin: `opaque_point`.
+    #[inline(always)]
+    pub fn at(
+        simd: S,
+        vertices: &[Vertex],
+        tiles: [&Tile; LANES],
+        places: &[[f32; LANES]; 2],
+        position: Lanes3<S>,
+    ) -> Self {
+        let [x, y] = [f32x8::load_array(simd, places[0]), f32x8::load_array(simd, places[1])];
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let last = Stored::from_fn(|lane| tiles[lane].side as f32 - 1.0).load(simd);
+        let cell = [x.max(zero).min(last).floor(), y.max(zero).min(last).floor()];
+        let f = [(x - cell[0]).max(zero).min(one), (y - cell[1]).max(zero).min(one)];
+        let (low, high) = (f[0].min(f[1]), f[0].max(f[1]));
+        let weights: [[f32; LANES]; 3] = [(one - high).into(), (high - low).into(), low.into()];
+        let is_right = f[0].simd_ge(f[1]).to_bitmask();
+        let cell: [[f32; LANES]; 2] = [cell[0].into(), cell[1].into()];
+        let mut mixed = [Stored::default(); NUMBERS];
+        for lane in 0..LANES {
+            let tile = tiles[lane];
+            let a = tile.vertex([cell[0][lane] as u32, cell[1][lane] as u32]);
+            let b = if is_right >> lane & 1 == 1 { a + 1 } else { a + tile.pitch };
+            let corners = [a, b, a + tile.pitch + 1].map(|number| vertices[number as usize].coat());
+            let w = [weights[0][lane], weights[1][lane], weights[2][lane]];
+            for i in 0..NUMBERS {
+                mixed[i].0[lane] = corners[0][i] * w[0] + corners[1][i] * w[1] + corners[2][i] * w[2];
+            }
+        }
+        let [nx, ny, nz, red, green, blue, occlusion, shadow, wet] = &mixed;
+        Points {
             position,
-            normal: mix(|v| v.normal),
-            albedo: mix(|v| v.albedo),
-            shade: mix(|v| [v.occlusion, v.shadow, v.wet]),
-            pool: tile.pool,
-            holdout: tile.holdout,
+            normal: Lanes3 { x: nx.load(simd), y: ny.load(simd), z: nz.load(simd) },
+            albedo: Lanes3 { x: red.load(simd), y: green.load(simd), z: blue.load(simd) },
+            occlusion: occlusion.load(simd),
+            shadow: shadow.load(simd),
+            wet: wet.load(simd),
         }
     }
-}
 
-/// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance with the
-/// metres from the eye, and the unit normal. `shadow_light` is [`Scene::shadow_light`].
-pub fn shade_opaque(scene: &Scene, shadow_light: Option<usize>, point: &Opaque) -> ([f32; 4], Vec3) {
-    let to_eye = scene.camera.eye_local().as_vec3() - point.position;
-    let distance = to_eye.dot(to_eye).sqrt();
-    let mut n = point.normal / point.normal.dot(point.normal).max(1e-30).sqrt();
-    if n.dot(to_eye) < 0.0 {
-        n = -n;
-    }
-    let e = to_eye / distance.max(1e-6);
-    let mirrored = n * (2.0 * n.dot(e)) - e;
-    let (ambient, sky) = match &scene.environment {
-        None => (scene.ambient, scene.background.radiance(mirrored)),
-        // A film on rough rock reflects the light from all around the mirrored view.
-        Some(environment) => {
-            (scene.ambient + environment.irradiance.at(n), environment.irradiance.at(mirrored))
+    /// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance, metres
+    /// from the eye, and the unit normal. `shadow_light` is [`Scene::shadow_light`].
+    #[inline(always)]
+    pub fn shade(
+        &self,
+        simd: S,
+        scene: &Scene,
+        shadow_light: Option<usize>,
+    ) -> (Lanes3<S>, Floats<S>, Lanes3<S>) {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let (zero, one) = (splat(0.0), splat(1.0));
+        let to_eye = Lanes3::splat(simd, scene.camera.eye_local().as_vec3()).minus(self.position);
+        let distance = to_eye.dot(to_eye).sqrt();
+        let n = self.normal.over(self.normal.dot(self.normal).max(splat(1e-30)).sqrt());
+        let n = n.times(n.dot(to_eye).simd_lt(zero).select(splat(-1.0), one));
+        let e = to_eye.over(distance.max(splat(1e-6)));
+        let mirrored = n.times(splat(2.0) * n.dot(e)).minus(e);
+        let ambient = Lanes3::splat(simd, scene.ambient);
+        let (ambient, sky) = match &scene.environment {
+            None => (ambient, background_at(simd, &scene.background, mirrored)),
+            // A film on rough rock reflects the light from all around the mirrored view.
+            Some(environment) => {
+                let irradiance = &environment.irradiance;
+                (ambient.plus(irradiance_at(simd, irradiance, n)), irradiance_at(simd, irradiance, mirrored))
+            }
+        };
+        let open = one - self.occlusion;
+        let is_wet = self.wet.simd_gt(zero);
+        let mut irradiance = ambient.times(open);
+        let mut gloss = Lanes3::splat(simd, Vec3::ZERO);
+        for (i, light) in scene.lights.iter().enumerate() {
+            let (to_light, intensity) = light_at(simd, light, self.position);
+            let lit = if shadow_light == Some(i) { one - self.shadow } else { one };
+            let cos_light = n.dot(to_light).max(zero);
+            irradiance = irradiance.plus(intensity.times(lit * cos_light));
+            if is_wet.any_true() {
+                let lobe = film_lobe(simd, n, to_light, e);
+                gloss = gloss.plus(intensity.times(lit * cos_light * lobe));
+            }
         }
-    };
-    let open = 1.0 - point.shade.x;
-    let mut irradiance = ambient * open;
-    let mut gloss = Vec3::ZERO;
-    for (i, light) in scene.lights.iter().enumerate() {
-        let (to_light, intensity) = light.at(point.position);
-        let lit = if shadow_light == Some(i) { 1.0 - point.shade.y } else { 1.0 };
-        let cos_light = n.dot(to_light).max(0.0);
-        irradiance += intensity * (lit * cos_light);
-        if point.shade.z > 0.0 {
-            gloss += intensity * (lit * cos_light * film_lobe(n, to_light, e));
+        let dry = Lanes3 {
+            x: self.albedo.x * irradiance.x,
+            y: self.albedo.y * irradiance.y,
+            z: self.albedo.z * irradiance.z,
+        };
+        if !is_wet.any_true() {
+            return (dry, distance, n);
         }
+        let mirror = sky.times(open * fresnel(simd, n.dot(e)));
+        (dry.plus(gloss.plus(mirror).times(self.wet)), distance, n)
     }
-    let mut radiance = point.albedo * irradiance;
-    if point.shade.z > 0.0 {
-        radiance += (gloss + sky * (open * fresnel(n.dot(e)))) * point.shade.z;
-    }
-    (radiance.extend(distance).to_array(), n)
 }
 
 /// Returns π times the reflectance of a film of water on rough rock: Blinn 1977 with the exponent s = 32,
 /// normalised by (s + 8)/8π. All directions are unit vectors away from the point.
-pub fn film_lobe(n: Vec3, l: Vec3, e: Vec3) -> f32 {
-    let sum = l + e;
-    let h = sum / sum.dot(sum).max(1e-12).sqrt();
-    let c = n.dot(h).max(0.0);
+#[inline(always)]
+pub fn film_lobe<S: Simd>(simd: S, n: Lanes3<S>, l: Lanes3<S>, e: Lanes3<S>) -> Floats<S> {
+    let splat = |x: f32| f32x8::splat(simd, x);
+    let sum = l.plus(e);
+    let h = sum.over(sum.dot(sum).max(splat(1e-12)).sqrt());
+    let c = n.dot(h).max(splat(0.0));
     let c2 = c * c;
     let c4 = c2 * c2;
     let c8 = c4 * c4;
     let c16 = c8 * c8;
-    5.0 * fresnel(l.dot(h)) * (c16 * c16)
+    splat(5.0) * fresnel(simd, l.dot(h)) * (c16 * c16)
 }
 
 /// Returns the Fresnel reflectance of water for light at an angle to the normal (Schlick 1994).
-pub fn fresnel(cos_angle: f32) -> f32 {
-    let m = 1.0 - cos_angle.clamp(0.0, 1.0);
+#[inline(always)]
+pub fn fresnel<S: Simd>(simd: S, cos_angle: Floats<S>) -> Floats<S> {
+    let splat = |x: f32| f32x8::splat(simd, x);
+    let m = splat(1.0) - cos_angle.max(splat(0.0)).min(splat(1.0));
     let m2 = m * m;
-    0.02 + 0.98 * (m2 * m2 * m)
+    splat(0.02) + splat(0.98) * (m2 * m2 * m)
 }
 
-impl Light {
-    /// Returns the unit direction from a point to the light, and the light's intensity at the point. Twin:
-    /// `light_from` of `shaders/layout.wgsl`.
-    pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {
-        match *self {
-            Light::Directional { to_light, intensity } => (to_light, intensity),
-            Light::Point { position, intensity } => {
-                let (to_light, falloff) = from_point(position, point);
-                (to_light, intensity * falloff)
-            }
-            Light::Spot { position, intensity, cone } => {
-                let (to_light, falloff) = from_point(position, point);
-                let s = ((cone.axis.dot(to_light) - cone.cos_edge) * cone.inverse_soft).clamp(0.0, 1.0);
-                (to_light, intensity * (falloff * (s * s * (3.0 - 2.0 * s))))
-            }
+/// Returns the radiance of the background along unit directions. See [`Background::radiance`].
+#[inline(always)]
+pub fn background_at<S: Simd>(simd: S, background: &Background, d: Lanes3<S>) -> Lanes3<S> {
+    let up = d.y.max(f32x8::splat(simd, 0.0));
+    let rise = Lanes3::splat(simd, background.zenith - background.horizon);
+    Lanes3::splat(simd, background.horizon).plus(rise.times(up))
+}
+
+/// See [`Irradiance::at`].
+#[inline(always)]
+fn irradiance_at<S: Simd>(simd: S, irradiance: &Irradiance, n: Lanes3<S>) -> Lanes3<S> {
+    let splat = |x: f32| f32x8::splat(simd, x);
+    let Lanes3 { x, y, z } = n;
+    let terms = [x, y, z, x * y, y * z, splat(3.0) * y * y - splat(1.0), x * z, x * x - z * z];
+    let mut sum = Lanes3::splat(simd, irradiance.0[0]);
+    for i in 0..terms.len() {
+        sum = sum.plus(Lanes3::splat(simd, irradiance.0[i + 1]).times(terms[i]));
+    }
+    let zero = splat(0.0);
+    Lanes3 { x: sum.x.max(zero), y: sum.y.max(zero), z: sum.z.max(zero) }
+}
+
+/// See [`Light::at`].
+#[inline(always)]
+fn light_at<S: Simd>(simd: S, light: &Light, point: Lanes3<S>) -> (Lanes3<S>, Lanes3<S>) {
+    let splat = |x: f32| f32x8::splat(simd, x);
+    match *light {
+        Light::Directional { to_light, intensity } => {
+            (Lanes3::splat(simd, to_light), Lanes3::splat(simd, intensity))
+        }
+        Light::Point { position, intensity } => {
+            let (to_light, falloff) = from_point(simd, position, point);
+            (to_light, Lanes3::splat(simd, intensity).times(falloff))
+        }
+        Light::Spot { position, intensity, cone } => {
+            let (to_light, falloff) = from_point(simd, position, point);
+            let s = (Lanes3::splat(simd, cone.axis).dot(to_light) - splat(cone.cos_edge))
+                * splat(cone.inverse_soft);
+            let s = s.max(splat(0.0)).min(splat(1.0));
+            let falloff = falloff * (s * s * (splat(3.0) - splat(2.0) * s));
+            (to_light, Lanes3::splat(simd, intensity).times(falloff))
         }
     }
 }
 
-/// Returns the unit direction from `point` to a light at `position`, and the falloff 1/d² there.
-fn from_point(position: Vec3, point: Vec3) -> (Vec3, f32) {
-    let away = position - point;
-    let d2 = away.dot(away).max(1e-12);
-    (away / d2.sqrt(), 1.0 / d2)
+/// Returns the unit directions from points to a light at `position`, and the falloff 1/d² there.
+#[inline(always)]
+fn from_point<S: Simd>(simd: S, position: Vec3, point: Lanes3<S>) -> (Lanes3<S>, Floats<S>) {
+    let away = Lanes3::splat(simd, position).minus(point);
+    let d2 = away.dot(away).max(f32x8::splat(simd, 1e-12));
+    (away.over(d2.sqrt()), f32x8::splat(simd, 1.0) / d2)
 }

@@ -2,7 +2,6 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::opaque::{Opaque, fresnel};
 use super::waves::Waves;
 use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface, turn};
 use crate::mapping::PlaneView;
@@ -58,9 +57,24 @@ fn on_pool(scene: &Scene, surface: &Surface, position: Vec3, at: Vec2) -> Vec3 {
     if metres > 0.0 && metres < surface.far { met } else { position }
 }
 
+/// A point of a pool's surface, with values interpolated between the vertices of the mesh.
+#[derive(Clone, Copy)]
+pub struct PoolPoint {
+    /// Position in the world, metres.
+    pub position: Vec3,
+    /// Depth of the water, metres.
+    pub depth: f32,
+    /// Density of the foam, 0 to 1.
+    pub foam: f32,
+    /// Share of the surroundings' light that is blocked, 0 to 1.
+    pub occlusion: f32,
+    /// Share of the light of [`Scene::shadow_light`] that is blocked, 0 to 1.
+    pub shadow: f32,
+}
+
 /// Returns the unit normal of the waves. A wave fades out as the pixel's footprint reaches half its length,
 /// because the pixel then sees the wave's mean.
-fn pool_normal(scene: &Scene, waves: &Waves, point: &Opaque) -> Vec3 {
+fn pool_normal(scene: &Scene, waves: &Waves, point: &PoolPoint) -> Vec3 {
     let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
     let e = to_eye / distance.max(1e-6);
@@ -68,7 +82,7 @@ fn pool_normal(scene: &Scene, waves: &Waves, point: &Opaque) -> Vec3 {
     let footprint = distance * pixel / e.y.max(0.05);
     let p = Vec2::new(point.position.x, point.position.z);
     // The surface is rougher where water falls in.
-    let churn = 1.0 + 1.5 * point.albedo.y;
+    let churn = 1.0 + 1.5 * point.foam;
     let (slope, lift) = waves.slopes(p, churn, footprint);
     let n = Vec3::new(-slope.x, (1.0 - lift).max(0.3), -slope.y);
     n / n.dot(n).sqrt()
@@ -113,10 +127,10 @@ pub fn shade_pool(
     scene: &Scene,
     shadow_light: Option<usize>,
     (surface, waves): &(Surface, Waves),
-    point: &Opaque,
+    point: &PoolPoint,
     at: Vec2,
 ) -> ([f32; 4], Vec3) {
-    let point = &Opaque { position: on_pool(scene, surface, point.position, at), ..*point };
+    let point = &PoolPoint { position: on_pool(scene, surface, point.position, at), ..*point };
     let n = pool_normal(scene, waves, point);
     let to_eye = scene.camera.eye_local().as_vec3() - point.position;
     let distance = to_eye.dot(to_eye).sqrt();
@@ -129,11 +143,11 @@ pub fn shade_pool(
             (scene.ambient + environment.irradiance.at(Vec3::Y), environment.irradiance.at(r))
         }
     };
-    let mut irradiance = ambient * (1.0 - point.shade.x);
+    let mut irradiance = ambient * (1.0 - point.occlusion);
     let mut glint = Vec3::ZERO;
     for (i, light) in scene.lights.iter().enumerate() {
         let (to_light, intensity) = light.at(point.position);
-        let lit = if shadow_light == Some(i) { 1.0 - point.shade.y } else { 1.0 };
+        let lit = if shadow_light == Some(i) { 1.0 - point.shadow } else { 1.0 };
         irradiance += intensity * (lit * to_light.y.max(0.0));
         let sum = to_light + e;
         let h = sum / sum.dot(sum).max(1e-12).sqrt();
@@ -147,7 +161,7 @@ pub fn shade_pool(
     let mirrors = around(surface, point.position, r);
     let mirror = mirrors.truncate() + sky * (1.0 - mirrors.w);
     // log₂e · 2.2: light travels 2.2 depths on its way down and, slanted by refraction, up again.
-    let through = (Vec3::from(surface.absorption) * (-3.174 * point.albedo.x)).exp2();
+    let through = (Vec3::from(surface.absorption) * (-3.174 * point.depth)).exp2();
     let body = Vec3::from(surface.color) * (1.0 - through) + Vec3::from(surface.bottom) * through;
     let back = fresnel(n.dot(e).max(0.02));
     let clear = mirror * back + glint + body * irradiance * (1.0 - back);
@@ -155,7 +169,14 @@ pub fn shade_pool(
     let p = Vec2::new(point.position.x, point.position.z) + Vec2::new(n.x, n.z) * 0.3;
     let noise = |i: usize| value_noise(p * FOAM[i], &surface.foam[i]);
     let noise = 0.45 * noise(0) + 0.27 * noise(1) + 0.17 * noise(2) + 0.11 * noise(3);
-    let cover = ((1.6 * point.albedo.y + noise - 1.05) * 2.2).clamp(0.0, 1.0);
+    let cover = ((1.6 * point.foam + noise - 1.05) * 2.2).clamp(0.0, 1.0);
     let radiance = clear * (1.0 - cover) + irradiance * ((0.25 + 0.5 * noise) * cover);
     (radiance.extend(distance).to_array(), n)
+}
+
+/// Returns the Fresnel reflectance of water for light at an angle to the normal (Schlick 1994).
+pub fn fresnel(cos_angle: f32) -> f32 {
+    let m = 1.0 - cos_angle.clamp(0.0, 1.0);
+    let m2 = m * m;
+    0.02 + 0.98 * (m2 * m2 * m)
 }

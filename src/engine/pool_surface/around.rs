@@ -74,7 +74,7 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
     (radius, cells)
 }
 
-/// Returns the radiance of a vertex of rock: Lambert, as in `shade_opaque` of `src/engine/cpu/opaque.rs`.
+/// Returns the radiance of a vertex of rock: Lambert, as in `src/engine/cpu/opaque.rs`.
 fn radiance(scene: &Scene, vertex: &Vertex) -> Vec3 {
     let n = Vec3::from(vertex.normal);
     let surroundings = scene.environment.as_ref().map_or(Vec3::ZERO, |e| e.irradiance.at(n));

@@ -36,6 +36,7 @@ pub(super) fn write(out: impl Write, head: &Head, rows: &mut Rows) -> io::Result
     let [width, height] = head.size;
     let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(if head.encoding.alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
+    encoder.set_compression(png::Compression::Fast);
     encoder.set_depth(if head.encoding.bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Sixteen });
     if head.encoding.linear {
         encoder.set_source_gamma(png::ScaledFloat::new(1.0));

@@ -4,17 +4,22 @@
 pub mod tiles;
 
 use std::f32::consts::PI;
+use std::path::Path;
 
 use crate::engine::gpu::{SURFACE, assert_parity, both, renderer};
 use crate::tolerance::{Parity, close};
+use fearless_simd::{Level, dispatch};
 use glam::Vec3;
 use taki::engine::RenderOptions;
+use taki::engine::cpu::integrate::Lanes;
+use taki::engine::cpu::integrate::lockstep::lanes::Lanes3;
 use taki::engine::cpu::{self, gbuffer, opaque, pool};
 use taki::engine::pool_surface::{Surface, WAVES, surfaces, turns};
 use taki::picture::Frame;
 use taki::place::{Mesh, Vertex, wet_albedo, wetness};
 use taki::scene::{Limits, Scene};
 use taki::util::monitor::Unwatched;
+use taki::util::window::Window;
 use tempfile::tempdir;
 
 fn read(text: &str) -> Result<Scene, String> {
@@ -293,6 +298,15 @@ fn a_pool_between_black_walls_mirrors_less_than_one_under_the_sky() {
     assert!(closed < 0.3 * open, "{closed} {open}");
 }
 
+/// One lane of [`opaque::film_lobe`].
+fn lobe(n: Vec3, l: Vec3, e: Vec3) -> f32 {
+    let lobes: [f32; 8] = dispatch!(Level::new(), simd => {
+        let [n, l, e] = [n, l, e].map(|v| Lanes3::splat(simd, v));
+        opaque::film_lobe(simd, n, l, e).into()
+    });
+    lobes[0]
+}
+
 #[test]
 fn the_lobe_of_a_film_sends_back_no_more_than_fresnel_allows() {
     let n = Vec3::Y;
@@ -305,13 +319,13 @@ fn the_lobe_of_a_film_sends_back_no_more_than_fresnel_allows() {
             for j in 0..count {
                 let (y, a) = ((i as f32 + 0.5) / count as f32, (j as f32 + 0.5) / count as f32 * 2.0 * PI);
                 let r = (1.0 - y * y).sqrt();
-                sum += f64::from(opaque::film_lobe(n, l, Vec3::new(r * a.cos(), y, r * a.sin())) * y);
+                sum += f64::from(lobe(n, l, Vec3::new(r * a.cos(), y, r * a.sin())) * y);
             }
         }
         let share = 2.0 * sum / f64::from(count * count);
         // The lobe uses (s + 8)/8π instead of the exact (s + 2)(s + 4)/8π(s + 2^(−s/2)).
         let normalised = 40.0 / 38.25;
-        assert!(share < 1.001 * normalised * f64::from(opaque::fresnel(cos)), "{degrees}: {share}");
+        assert!(share < 1.001 * normalised * f64::from(pool::fresnel(cos)), "{degrees}: {share}");
         if degrees == 0.0 {
             assert!(close(share, 0.02 * normalised, 0.02, 0.0), "{share}");
         }
@@ -451,5 +465,40 @@ fn what_is_no_pool_is_refused_with_what_to_do() {
         let told = read(&text).expect_err(&text);
         words.iter().for_each(|word| assert!(told.contains(word), "{word}: {told}"));
         assert_eq!(told.lines().count(), 1);
+    }
+}
+
+#[test]
+fn targets_have_the_same_bits_with_each_instruction_set() {
+    let sets = |more: &[&str]| -> Vec<String> {
+        let own = ["image.width=93", "image.height=52"];
+        own.iter().chain(more).map(|set| set.to_string()).collect()
+    };
+    // Rock, pools and haze; spot lights; an environment; holes.
+    let scenes = [
+        ("waterfall", sets(&["haze.density=0.02", "haze.height=3"])),
+        ("night", sets(&[])),
+        ("evening", sets(&[])),
+        ("waterfall", sets(&["image.alpha=true", "rocks.bed.show=holdout"])),
+    ];
+    for (preset, sets) in scenes {
+        let scene = Scene::load(Path::new(preset), &sets, &Limits::default()).expect("a scene");
+        let (mesh, window) = (scene.mesh(), Window { x: 3, y: 5, width: 83, height: 41 });
+        for sample in [0, 2] {
+            let mut all = Lanes::all().into_iter().filter_map(|(name, lanes)| match lanes {
+                Lanes::Lockstep(level) => Some((name, level)),
+                Lanes::Scalar => None,
+            });
+            let (first, level) = all.next().expect("an instruction set");
+            let one = gbuffer::run_on(level, &scene, &mesh, window, sample);
+            assert!(one.opaque.iter().any(|seen| seen[3] > 0.0) && one.quad_id.iter().any(|id| *id > 0));
+            for (name, level) in all {
+                let other = gbuffer::run_on(level, &scene, &mesh, window, sample);
+                let what = format!("{preset}, sample {sample}: {first} and {name}");
+                assert_eq!(one.opaque, other.opaque, "{what}");
+                assert_eq!(one.normal, other.normal, "{what}");
+                assert!(one.surface == other.surface && one.quad_id == other.quad_id, "{what}");
+            }
+        }
     }
 }

@@ -1,13 +1,27 @@
-//! The rasteriser of the CPU engine. It follows the fill rule of a GPU: corners snap to 1/256 pixel, and
-//! points on an edge belong to the triangle whose top or left edge it is.
+//! The rasteriser of the CPU engine. It follows the fill rule of a GPU: points snap to 1/256 pixel, and
+//! centres on an edge belong to the triangle whose top or left edge it is.
+//!
+//! Points are projected once, as the pixels' centres see them. The sample of a pixel that lies elsewhere sees
+//! them shifted by its distance from the centre, and snapped after that, as if they were projected for it
+//! alone. Four samples are drawn at a time, one a lane.
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec4};
+use fearless_simd::f64x4;
+use fearless_simd::prelude::*;
+use glam::{Vec2, Vec4};
 
+use crate::engine::cpu::integrate::lockstep::lanes::LANES;
 use crate::util::window::Window;
 
-/// A corner of a triangle in pixels.
+/// Samples that are drawn at a time.
+pub const SAMPLES: usize = 4;
+
+/// Numbers that the triangles of one piece may have. A tile has 512 triangles, and the near plane cuts a
+/// triangle into two at most.
+const NUMBERS: u32 = 1024;
+
+/// A point in pixels, as the pixels' centres see it.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenPoint {
     x: f64,
@@ -15,73 +29,125 @@ pub struct ScreenPoint {
     inverse_w: f64,
     /// Reversed depth z/w.
     depth: f64,
+    /// Position in the tile, in squares of its grid.
+    place: Vec2,
 }
 
 impl ScreenPoint {
-    /// Projects a point in clip space to an image of `width` × `height` pixels. It snaps to 1/256 pixel, as
-    /// on a GPU.
+    /// Projects a point in clip space to an image of `width` × `height` pixels.
     #[inline]
-    pub fn new(c: Vec4, [width, height]: [usize; 2]) -> Self {
+    pub fn new(c: Vec4, [width, height]: [usize; 2], place: Vec2) -> Self {
         ScreenPoint {
-            x: snapped((c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64),
-            y: snapped((0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64),
+            x: (c.x as f64 / c.w as f64 * 0.5 + 0.5) * width as f64,
+            y: (0.5 - c.y as f64 / c.w as f64 * 0.5) * height as f64,
             inverse_w: 1.0 / c.w as f64,
             depth: c.z as f64 / c.w as f64,
+            place,
         }
     }
 }
 
-/// Rounds to 1/256, halves away from zero. Far outside the image, snapping has no meaning and would lose the
-/// fraction's bits. `f64::round` is a call into the C library on processors without SSE 4.1.
-#[inline]
-fn snapped(x: f64) -> f64 {
-    let scaled = x.clamp(-1e9, 1e9) * 256.0;
-    let whole = scaled as i64;
-    let rest = scaled - whole as f64;
-    let away = i64::from(rest >= 0.5) - i64::from(rest <= -0.5);
-    (whole + away) as f64 / 256.0
+/// A triangle between points of its piece.
+struct ScreenTriangle {
+    points: [u16; 3],
+    /// First and last band that it reaches into.
+    bands: [u16; 2],
 }
 
-/// Triangles in pixels, clipped at the near plane, and the points between which they lie.
+/// Triangles of one tile of rock or of one quad, clipped at the near plane, in drawing order.
 #[derive(Default)]
-pub struct Triangles {
+pub struct Piece {
     points: Vec<ScreenPoint>,
-    all: Vec<ScreenTriangle>,
+    triangles: Vec<ScreenTriangle>,
 }
 
-/// A triangle in pixels, whose points may be those of others too.
-pub struct ScreenTriangle {
-    /// Indices of its points, ordered so that its area is positive.
-    points: [u32; 3],
-    /// Weights of the original corners in `points` where the near plane has cut the triangle.
-    weights: Option<Box<[Vec3; 3]>>,
-    /// Number of the tile or the quad.
-    pub id: u32,
-    /// Corners in the tile, numbered as in [`crate::place::tiles`].
-    pub corners: [u16; 3],
-    /// Whether the last two points were exchanged to make the area positive.
-    flipped: bool,
+/// What the triangles of a window are drawn into.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// The window, pixels.
+    pub window: Window,
+    /// Rows of the window that are drawn at a time.
+    pub rows: u32,
+    /// Smallest and largest shift of points for a sample, along x and y.
+    pub shifts: [[f64; 2]; 2],
 }
 
-/// The points of a triangle.
-#[derive(Clone, Copy)]
-struct Corners([ScreenPoint; 3]);
+/// Shifts of points for up to [`SAMPLES`] samples, pixels. Unused ones repeat the first.
+#[derive(Clone, Debug)]
+pub struct Shifts {
+    pub x: [f64; SAMPLES],
+    pub y: [f64; SAMPLES],
+    /// Number of samples.
+    pub count: usize,
+}
 
-/// Columns of a bounding box that are tested one by one.
-const NARROW: usize = 4;
+impl Shifts {
+    /// Shifts of the samples with these offsets from the top left corners of pixels.
+    pub fn new(offsets: &[[f32; 2]]) -> Self {
+        let of = |i: usize, c: usize| shift(offsets.get(i).unwrap_or(&offsets[0])[c]);
+        let [x, y] = [0, 1].map(|c| [0, 1, 2, 3].map(|i| of(i, c)));
+        Shifts { x, y, count: offsets.len() }
+    }
+}
 
-/// A covered pixel: depth (reversed, 0 is far), and the index of the triangle plus 1 (0: none).
+/// How far a sample sees points from where the pixel's centre sees them, along one axis.
+pub fn shift(offset: f32) -> f64 {
+    0.5 - f64::from(offset)
+}
+
+impl Grid {
+    /// Grid of a window for samples with these offsets, drawn `rows` rows at a time.
+    pub fn new(window: Window, rows: u32, offsets: &[[f32; 2]]) -> Self {
+        let shifts = [0, 1].map(|c| {
+            let all = offsets.iter().map(|offset| shift(offset[c]));
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        });
+        Grid { window, rows, shifts }
+    }
+
+    /// Returns the number of bands.
+    pub fn bands(&self) -> usize {
+        self.window.height.div_ceil(self.rows) as usize
+    }
+
+    /// Returns the window of a band.
+    pub fn band(&self, i: usize) -> Window {
+        let y = self.window.y + i as u32 * self.rows;
+        Window { y, height: self.rows.min(self.window.bottom() - y), ..self.window }
+    }
+
+    /// Returns the columns and rows of a window that may see a triangle: no sample of another pixel lies in
+    /// its bounding box.
+    #[inline(always)]
+    fn seen(&self, points: &[&ScreenPoint; 3], window: Window) -> [Range<usize>; 2] {
+        let [a, b, c] = points;
+        let Window { x, y, width, height } = window;
+        let range = |v: [f64; 3], [least, most]: [f64; 2], first: u32, count: u32| {
+            let (mut low, mut high) = (v[0], v[0]);
+            for x in [v[1], v[2]] {
+                low = if x < low { x } else { low };
+                high = if x > high { x } else { high };
+            }
+            // Centres from the low to the high edge, which may snap by half of 1/256. Rounding towards zero
+            // in the 256ths adds a little.
+            const SNAP: f64 = 1.0 / 256.0;
+            let low = ((low + least - SNAP).max(-1e9) * 256.0) as i64 - 128;
+            let high = ((high + most + SNAP).min(1e9) * 256.0) as i64 - 128;
+            let (first, end) = (i64::from(first), i64::from(first + count));
+            let start = ((low + 255) >> 8).clamp(first, end) as usize;
+            start..(((high >> 8) + 1).clamp(first, end) as usize).max(start)
+        };
+        [range([a.x, b.x, c.x], self.shifts[0], x, width), range([a.y, b.y, c.y], self.shifts[1], y, height)]
+    }
+}
+
+/// A covered sample: depth (reversed, 0 is far), and the number of the triangle plus 1 (0: none).
 pub type Covered = (f32, u32);
 
-/// Clips a triangle at w = near. Calls `part` for each resulting triangle, with its corners in clip space and
-/// their weights of the original three.
-pub fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3); 3])) {
-    let corners = [(clip[0], Vec3::X), (clip[1], Vec3::Y), (clip[2], Vec3::Z)];
-    // Almost all triangles lie wholly in front.
-    if clip.iter().all(|corner| corner.w >= near) {
-        return part(corners);
-    }
-    let mut polygon: Vec<(Vec4, Vec3)> = Vec::with_capacity(4);
+/// Clips a triangle at w = near. Its corners are in clip space, with their positions in the tile. Calls `part`
+/// for each resulting triangle.
+pub fn clip_near(corners: [(Vec4, Vec2); 3], near: f32, mut part: impl FnMut([(Vec4, Vec2); 3])) {
+    let mut polygon: Vec<(Vec4, Vec2)> = Vec::with_capacity(4);
     for i in 0..3 {
         let (a, b) = (corners[i], corners[(i + 1) % 3]);
         let (inside_a, inside_b) = (a.0.w >= near, b.0.w >= near);
@@ -100,217 +166,338 @@ pub fn clip_near(clip: [Vec4; 3], near: f32, mut part: impl FnMut([(Vec4, Vec3);
     }
 }
 
-impl Triangles {
+impl Piece {
     /// Adds a point and returns its index.
     #[inline]
-    pub fn add_point(&mut self, point: ScreenPoint) -> u32 {
+    pub fn add_point(&mut self, point: ScreenPoint) -> u16 {
         self.points.push(point);
-        self.points.len() as u32 - 1
+        (self.points.len() - 1) as u16
     }
 
-    /// Adds the triangle between three points, in either order, if it may cover the centre of a pixel of the
-    /// window. `weights` are those of the original corners where the triangle is a part of [`clip_near`].
+    /// Returns the position of a point in the tile.
+    pub fn place(&self, point: u16) -> Vec2 {
+        self.points[usize::from(point)].place
+    }
+
+    /// Adds the triangle between three points, in either order, if a sample of the grid may see it.
     #[inline]
-    pub fn add(
-        &mut self,
-        mut points: [u32; 3],
-        weights: Option<[Vec3; 3]>,
-        (id, corners): (u32, [u16; 3]),
-        window: Window,
-    ) {
-        let mut seen = self.corners(&points);
-        let flipped = seen.area() < 0.0;
-        if flipped {
-            seen.0.swap(1, 2);
-            points.swap(1, 2);
+    pub fn add(&mut self, points: [u16; 3], grid: &Grid) {
+        let [columns, rows] = grid.seen(&points.map(|i| &self.points[usize::from(i)]), grid.window);
+        // Most triangles of a fine mesh lie between the samples of a small picture.
+        if !columns.is_empty() && !rows.is_empty() {
+            let band = |y: usize| ((y - grid.window.y as usize) / grid.rows as usize) as u16;
+            let bands = [band(rows.start), band(rows.end - 1)];
+            self.triangles.push(ScreenTriangle { points, bands });
         }
-        // Most triangles of a fine mesh lie between the pixels' centres.
-        if seen.covers_centres(window) {
-            self.all.push(ScreenTriangle { points, weights: weights.map(Box::new), id, corners, flipped });
-        }
-    }
-
-    /// Joins lists, in order.
-    pub fn joined(lists: Vec<Triangles>) -> Triangles {
-        let mut joined = Triangles {
-            points: Vec::with_capacity(lists.iter().map(|list| list.points.len()).sum()),
-            all: Vec::with_capacity(lists.iter().map(|list| list.all.len()).sum()),
-        };
-        for list in lists {
-            let first = joined.points.len() as u32;
-            joined.points.extend(list.points);
-            joined.all.extend(
-                list.all
-                    .into_iter()
-                    .map(|t| ScreenTriangle { points: t.points.map(|point| first + point), ..t }),
-            );
-        }
-        joined
-    }
-
-    #[inline]
-    fn corners(&self, points: &[u32; 3]) -> Corners {
-        Corners(points.map(|point| self.points[point as usize]))
     }
 }
 
-impl Corners {
-    /// Twice the signed area of the triangle between edge `i` and the point `p`.
-    #[inline]
-    fn edge(&self, i: usize, p: [f64; 2]) -> f64 {
-        let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
-        (b.x - a.x) * (p[1] - a.y) - (b.y - a.y) * (p[0] - a.x)
-    }
-
-    /// Twice the signed area.
-    #[inline]
-    fn area(&self) -> f64 {
-        self.edge(2, [self.0[2].x, self.0[2].y])
-    }
-
-    /// Whether the triangle has an area and its bounding box holds the centre of a pixel of the window.
-    #[inline]
-    fn covers_centres(&self, window: Window) -> bool {
-        let ((x0, x1), (y0, y1)) = self.centres(window);
-        x0 < x1 && y0 < y1 && self.area() > 0.0
-    }
-
-    /// Half-open ranges of the columns and rows of the window whose centres lie in the bounding box.
-    #[inline]
-    fn centres(&self, window: Window) -> ((usize, usize), (usize, usize)) {
-        let range = |v: [f64; 3], first: u32, count: u32| {
-            let (mut low, mut high) = (v[0], v[0]);
-            for x in [v[1], v[2]] {
-                low = if x < low { x } else { low };
-                high = if x > high { x } else { high };
-            }
-            // A point is a whole number of 256ths, so whole numbers find the centres exactly.
-            let [low, high] = [low, high].map(|x| (x * 256.0) as i64 - 128);
-            let (first, end) = (i64::from(first), i64::from(first + count));
-            (((low + 255) >> 8).clamp(first, end) as usize, ((high >> 8) + 1).clamp(first, end) as usize)
-        };
-        let [a, b, c] = &self.0;
-        (range([a.x, b.x, c.x], window.x, window.width), range([a.y, b.y, c.y], window.y, window.height))
-    }
-
-    /// Returns the part of `columns` in which the triangle may cover centres of row `y`, at most two columns
-    /// too wide.
-    #[inline]
-    fn span(&self, y: usize, columns: Range<usize>) -> Range<usize> {
-        // In few columns, to divide takes longer than to test them all.
-        if columns.len() <= NARROW {
-            return columns;
-        }
-        let (mut low, mut high) = (columns.start as f64, columns.end as f64);
-        for i in 0..3 {
-            let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
-            let (dx, dy) = (b.x - a.x, b.y - a.y);
-            // The column where the edge crosses the row.
-            let at = a.x - 0.5 + dx * (y as f64 + 0.5 - a.y) / dy;
-            if dy < 0.0 {
-                low = low.max(at - 1.0);
-            } else if dy > 0.0 {
-                high = high.min(at + 2.0);
-            }
-        }
-        (low as usize).max(columns.start)..(high.max(0.0) as usize).min(columns.end)
-    }
-
-    /// Whether points on edge `i` belong to this triangle: true for top and left edges.
-    #[inline]
-    fn owns_edge(&self, i: usize) -> bool {
-        let (a, b) = (&self.0[(i + 1) % 3], &self.0[(i + 2) % 3]);
-        let (dx, dy) = (b.x - a.x, b.y - a.y);
-        dy < 0.0 || (dy == 0.0 && dx > 0.0)
-    }
-}
-
-/// Returns, for each band of `rows` rows of the window, the indices of the triangles that reach into it, in
-/// order.
-fn bins(triangles: &Triangles, window: Window, rows: usize) -> Vec<Vec<u32>> {
-    let mut bins = vec![Vec::new(); (window.height as usize).div_ceil(rows)];
-    for (number, t) in triangles.all.iter().enumerate() {
-        let (_, (top, bottom)) = triangles.corners(&t.points).centres(window);
-        let [first, last] = [top, bottom - 1].map(|y| (y - window.y as usize) / rows);
-        for bin in &mut bins[first..=last] {
-            bin.push(number as u32);
-        }
-    }
-    bins
-}
-
-/// Triangles of a window, sorted into bands of rows.
+/// Triangles of a window, in bands of rows.
 pub struct Rasteriser {
-    /// All triangles, in drawing order.
-    triangles: Triangles,
-    bins: Vec<Vec<u32>>,
+    /// The pieces, in drawing order.
+    pieces: Vec<Piece>,
+    /// For each band, the numbers of the pieces that reach into it, in order.
+    bands: Vec<Vec<u32>>,
 }
 
 impl Rasteriser {
-    /// Sorts triangles into the bands of `rows` rows that a window is cut into.
-    pub fn new(triangles: Triangles, window: Window, rows: usize) -> Self {
-        let bins = bins(&triangles, window, rows);
-        Rasteriser { triangles, bins }
-    }
-
-    /// Returns the triangle with an index.
-    pub fn triangle(&self, number: u32) -> &ScreenTriangle {
-        &self.triangles.all[number as usize]
-    }
-
-    /// Returns the perspective-correct weights of the original corners of a triangle at a position in pixels.
-    #[inline]
-    pub fn weights_at(&self, triangle: &ScreenTriangle, p: [f64; 2]) -> Vec3 {
-        let corners = self.triangles.corners(&triangle.points);
-        let mut w = [0, 1, 2].map(|i| corners.edge(i, p) * corners.0[i].inverse_w);
-        let sum: f64 = w.iter().sum();
-        if triangle.flipped {
-            w.swap(1, 2);
+    /// Sorts pieces into the bands of a grid.
+    pub fn new(pieces: Vec<Piece>, grid: &Grid) -> Self {
+        let mut bands = vec![Vec::new(); grid.bands()];
+        for (number, piece) in pieces.iter().enumerate() {
+            let first = piece.triangles.iter().map(|t| t.bands[0]).min();
+            let last = piece.triangles.iter().map(|t| t.bands[1]).max();
+            if let (Some(first), Some(last)) = (first, last) {
+                for band in &mut bands[usize::from(first)..=usize::from(last)] {
+                    band.push(number as u32);
+                }
+            }
         }
-        let w = w.map(|w| (w / sum) as f32);
-        match &triangle.weights {
-            None => Vec3::from(w),
-            Some(weights) => (0..3).map(|i| weights[i] * w[i]).sum(),
-        }
+        Rasteriser { pieces, bands }
     }
 
-    /// Draws the triangles of band number `bin`, whose pixels are `band`. `covered` holds `layers` entries
-    /// per pixel, the nearest first; of equal depths the first drawn comes first. Of several triangles with
-    /// one `id` only the nearest stays: where snapping folds a quad that is seen edge-on, its two triangles
-    /// overlap.
-    pub fn draw(&self, bin: usize, band: Window, covered: &mut [Covered], layers: usize) {
+    /// Whether any piece reaches into band number `i`.
+    pub fn reaches(&self, i: usize) -> bool {
+        !self.bands[i].is_empty()
+    }
+
+    /// Returns the number of the piece of a triangle, which is that of a tile or a quad.
+    pub fn piece_of(triangle: u32) -> u32 {
+        triangle / NUMBERS
+    }
+
+    fn points(&self, triangle: u32) -> [&ScreenPoint; 3] {
+        let piece = &self.pieces[(triangle / NUMBERS) as usize];
+        let points = piece.triangles[(triangle % NUMBERS) as usize].points;
+        points.map(|i| &piece.points[usize::from(i)])
+    }
+
+    /// Draws the triangles of band number `i` as the samples see them. `covered` holds `layers` entries per
+    /// sample of each pixel of the band, the nearest first; of equal depths the first drawn comes first. Of
+    /// several triangles of one piece only the nearest stays: where snapping folds a quad that is seen
+    /// edge-on, its two triangles overlap.
+    #[inline(always)]
+    pub fn draw<S: Simd>(
+        &self,
+        simd: S,
+        i: usize,
+        grid: &Grid,
+        samples: &Shifts,
+        covered: &mut [Covered],
+        layers: usize,
+    ) {
+        let band = grid.band(i);
         let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
-        for &number in &self.bins[bin] {
-            let ScreenTriangle { id, points, .. } = &self.triangles.all[number as usize];
-            let t = self.triangles.corners(points);
-            let area = t.area();
-            let ((x0, x1), (y0, y1)) = t.centres(band);
-            let owns = [0, 1, 2].map(|i| t.owns_edge(i));
-            for y in y0..y1 {
-                for x in t.span(y, x0..x1) {
-                    let p = [x as f64 + 0.5, y as f64 + 0.5];
-                    let e = [0, 1, 2].map(|i| t.edge(i, p));
-                    if (0..3).all(|i| e[i] > 0.0 || (e[i] == 0.0 && owns[i])) {
-                        let depth = ((0..3).map(|i| e[i] * t.0[i].depth).sum::<f64>() / area) as f32;
-                        let pixel = ((y - top) * width + x - left) * layers;
-                        insert(&mut covered[pixel..pixel + layers], (depth, number + 1), |other| {
-                            self.triangles.all[other as usize - 1].id == *id
-                        });
+        let shift = Shift { x: f64x4::load_array(simd, samples.x), y: f64x4::load_array(simd, samples.y) };
+        for &piece in &self.bands[i] {
+            let Piece { points, triangles } = &self.pieces[piece as usize];
+            for (number, triangle) in triangles.iter().enumerate() {
+                if usize::from(triangle.bands[0]) > i || usize::from(triangle.bands[1]) < i {
+                    continue;
+                }
+                let points = triangle.points.map(|p| &points[usize::from(p)]);
+                let [columns, rows] = grid.seen(&points, band);
+                if columns.is_empty() || rows.is_empty() {
+                    continue;
+                }
+                let id = piece * NUMBERS + number as u32 + 1;
+                let edges = Edges::new(simd, points, &shift);
+                for y in rows {
+                    let row = edges.row(y);
+                    for x in span(&points, grid, y, columns.clone()) {
+                        let (inside, depth) = row.at(simd, x);
+                        if inside == 0 {
+                            continue;
+                        }
+                        let pixel = ((y - top) * width + x - left) * samples.count;
+                        for sample in 0..samples.count {
+                            if inside >> sample & 1 == 0 {
+                                continue;
+                            }
+                            let new = (depth[sample] as f32, id);
+                            let faces = &mut covered[(pixel + sample) * layers..][..layers];
+                            if let [face] = faces {
+                                if new.0 > face.0 {
+                                    *face = new;
+                                }
+                            } else {
+                                insert(faces, new);
+                            }
+                        }
                     }
                 }
             }
         }
     }
+
+    /// Returns where samples of eight pixels lie in the tiles of their triangles, in squares of the grids.
+    /// `triangles` and `pixels` are the number of each one's triangle, and its column and row; all see points
+    /// with one shift.
+    #[inline(always)]
+    pub fn places<S: Simd>(
+        &self,
+        simd: S,
+        triangles: &[u32; LANES],
+        pixels: &[[u32; LANES]; 2],
+        shift: [f64; 2],
+    ) -> [[f32; LANES]; 2] {
+        let mut out = [[0.0; LANES]; 2];
+        let shift = Shift { x: f64x4::splat(simd, shift[0]), y: f64x4::splat(simd, shift[1]) };
+        for half in (0..LANES).step_by(HALF) {
+            let mut centre = [[0.0; HALF]; 2];
+            let mut screen = [[[0.0; HALF]; 3]; 3];
+            let mut place = [[[0.0; HALF]; 2]; 3];
+            for lane in 0..HALF {
+                let points = self.points(triangles[half + lane]);
+                for c in 0..3 {
+                    let ScreenPoint { x, y, inverse_w, place: at, .. } = *points[c];
+                    [screen[c][0][lane], screen[c][1][lane], screen[c][2][lane]] = [x, y, inverse_w];
+                    [place[c][0][lane], place[c][1][lane]] = [at.x, at.y];
+                }
+                for axis in 0..2 {
+                    centre[axis][lane] = f64::from(pixels[axis][half + lane]) + 0.5;
+                }
+            }
+            let weights = weights(simd, &screen, centre, &shift);
+            for lane in 0..HALF {
+                for axis in 0..2 {
+                    let of = |c: usize| place[c][axis][lane] * weights[c][lane] as f32;
+                    out[axis][half + lane] = of(0) + of(1) + of(2);
+                }
+            }
+        }
+        out
+    }
 }
 
-/// Inserts a triangle by depth into those that cover a pixel, and drops the last one. `same` tells whether a
-/// triangle has the new one's id. Twin: `peel_fragment`.
-fn insert(faces: &mut [Covered], new: Covered, same: impl Fn(u32) -> bool) {
+/// Pixels whose places are computed at a time, in float64.
+const HALF: usize = 4;
+
+/// Returns the perspective-correct weights of the three points at each lane's pixel. `screen` are x, y and
+/// 1/w of each point.
+#[inline(always)]
+fn weights<S: Simd>(
+    simd: S,
+    screen: &[[[f64; HALF]; 3]; 3],
+    centre: [[f64; HALF]; 2],
+    shift: &Shift<S>,
+) -> [[f64; HALF]; 3] {
+    let zero = f64x4::splat(simd, 0.0);
+    let (mut x, mut y, mut w) = ([zero; 3], [zero; 3], [zero; 3]);
+    for c in 0..3 {
+        x[c] = snapped(simd, f64x4::load_array(simd, screen[c][0]) + shift.x);
+        y[c] = snapped(simd, f64x4::load_array(simd, screen[c][1]) + shift.y);
+    }
+    let [px, py] = [f64x4::load_array(simd, centre[0]), f64x4::load_array(simd, centre[1])];
+    for c in 0..3 {
+        let (a, b) = ((c + 1) % 3, (c + 2) % 3);
+        let edge = (x[b] - x[a]) * (py - y[a]) - (y[b] - y[a]) * (px - x[a]);
+        w[c] = edge * f64x4::load_array(simd, screen[c][2]);
+    }
+    let sum = w[0] + w[1] + w[2];
+    [(w[0] / sum).into(), (w[1] / sum).into(), (w[2] / sum).into()]
+}
+
+/// Shifts of the points for each lane's sample.
+struct Shift<S: Simd> {
+    x: f64x4<S>,
+    y: f64x4<S>,
+}
+
+/// Rounds to 1/256, halves away from zero. Far outside the image, snapping has no meaning and would lose the
+/// fraction's bits.
+#[inline(always)]
+fn snapped<S: Simd>(simd: S, x: f64x4<S>) -> f64x4<S> {
+    let splat = |x: f64| f64x4::splat(simd, x);
+    let scaled = x.max(splat(-1e9)).min(splat(1e9)) * splat(256.0);
+    (scaled + splat(0.5).copysign(scaled)).trunc() * splat(1.0 / 256.0)
+}
+
+/// Edges of a triangle as each lane's sample sees them. Edge i lies opposite of point i.
+struct Edges<S: Simd> {
+    /// A point of each edge.
+    x: [f64x4<S>; 3],
+    y: [f64x4<S>; 3],
+    /// Direction of each edge, with the triangle on its left.
+    dx: [f64x4<S>; 3],
+    dy: [f64x4<S>; 3],
+    /// What the function of each edge exceeds inside.
+    least: [f64x4<S>; 3],
+    /// Depth of each point over twice the area.
+    depth: [f64x4<S>; 3],
+}
+
+impl<S: Simd> Edges<S> {
+    #[inline(always)]
+    fn new(simd: S, points: [&ScreenPoint; 3], shift: &Shift<S>) -> Self {
+        let splat = |x: f64| f64x4::splat(simd, x);
+        let zero = splat(0.0);
+        let mut x = [zero; 3];
+        let mut y = [zero; 3];
+        for c in 0..3 {
+            x[c] = snapped(simd, splat(points[c].x) + shift.x);
+            y[c] = snapped(simd, splat(points[c].y) + shift.y);
+        }
+        let area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]);
+        let sign = splat(1.0).copysign(area);
+        let inverse = splat(1.0) / area.abs();
+        let mut edges = Edges {
+            x: [zero; 3],
+            y: [zero; 3],
+            dx: [zero; 3],
+            dy: [zero; 3],
+            least: [zero; 3],
+            depth: [zero; 3],
+        };
+        for i in 0..3 {
+            let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+            let (dx, dy) = ((x[b] - x[a]) * sign, (y[b] - y[a]) * sign);
+            // Centres on top and left edges belong to the triangle. The functions are multiples of 2^-16.
+            let owns = dy.simd_lt(zero) | (dy.simd_eq(zero) & dx.simd_gt(zero));
+            edges.least[i] = owns.select(splat(-1.0 / 131_072.0), zero);
+            (edges.x[i], edges.y[i], edges.dx[i], edges.dy[i]) = (x[a], y[a], dx, dy);
+            edges.depth[i] = splat(points[i].depth) * inverse;
+        }
+        edges
+    }
+
+    /// The edges in row `y`.
+    #[inline(always)]
+    fn row(&self, y: usize) -> EdgesInRow<'_, S> {
+        let centre = y as f64 + 0.5;
+        let mut across = self.y;
+        for i in 0..3 {
+            across[i] = self.dx[i] * (-(self.y[i] - centre));
+        }
+        EdgesInRow { edges: self, across }
+    }
+}
+
+/// Edges in one row of pixels.
+struct EdgesInRow<'a, S: Simd> {
+    edges: &'a Edges<S>,
+    /// Part of each edge's function that is the same in the whole row.
+    across: [f64x4<S>; 3],
+}
+
+impl<S: Simd> EdgesInRow<'_, S> {
+    /// Returns which samples of the pixel in column `x` lie inside, one bit each, and their depths.
+    #[inline(always)]
+    fn at(&self, simd: S, x: usize) -> (u64, [f64; SAMPLES]) {
+        let centre = f64x4::splat(simd, x as f64 + 0.5);
+        let Edges { x, dy, least, depth, .. } = self.edges;
+        let mut e = self.across;
+        for i in 0..3 {
+            e[i] -= dy[i] * (centre - x[i]);
+        }
+        let inside = e[0].simd_gt(least[0]) & e[1].simd_gt(least[1]) & e[2].simd_gt(least[2]);
+        let depth = e[0] * depth[0] + e[1] * depth[1] + e[2] * depth[2];
+        (inside.to_bitmask(), depth.into())
+    }
+}
+
+/// Columns of a bounding box that are tested one by one.
+const NARROW: usize = 4;
+
+/// Returns the part of `columns` in which samples of row `y` may lie inside a triangle.
+#[inline(always)]
+fn span(points: &[&ScreenPoint; 3], grid: &Grid, y: usize, columns: Range<usize>) -> Range<usize> {
+    // In few columns, to divide takes longer than to test them all.
+    if columns.len() <= NARROW {
+        return columns;
+    }
+    let [[left, right], [up, down]] = grid.shifts;
+    let area = (points[1].x - points[0].x) * (points[2].y - points[0].y)
+        - (points[1].y - points[0].y) * (points[2].x - points[0].x);
+    let (mut low, mut high) = (columns.start as f64, columns.end as f64);
+    for i in 0..3 {
+        let (a, b) = (points[(i + 1) % 3], points[(i + 2) % 3]);
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
+        // Columns where the edge crosses the row, for the samples that see it farthest up and down.
+        let at = |shift: f64| a.x + dx * (y as f64 + 0.5 - shift - a.y) / dy;
+        let [first, second] = [at(up), at(down)];
+        // Snapping moves the crossing with a flatter edge by more than a column.
+        if dy.abs() < (dx.abs() / 256.0).max(0.05) {
+            continue;
+        }
+        if dy * area < 0.0 {
+            low = low.max(first.min(second) + left - 2.5);
+        } else {
+            high = high.min(first.max(second) + right + 2.5);
+        }
+    }
+    (low as usize).max(columns.start)..(high.max(0.0) as usize).min(columns.end)
+}
+
+/// Inserts a triangle by depth into those that cover a sample, and drops the last one. Twin:
+/// `peel_fragment`.
+fn insert(faces: &mut [Covered], new: Covered) {
+    let is_same = |face: &Covered| face.1 != 0 && (face.1 - 1) / NUMBERS == (new.1 - 1) / NUMBERS;
     let Some(index) = faces.iter().position(|face| new.0 > face.0) else { return };
-    if faces[..index].iter().any(|face| face.1 != 0 && same(face.1)) {
+    if faces[..index].iter().any(is_same) {
         return;
     }
-    let last = faces[index..].iter().position(|face| face.1 != 0 && same(face.1));
+    let last = faces[index..].iter().position(is_same);
     let last = last.map_or(faces.len() - 1, |behind| index + behind);
     faces.copy_within(index..last, index + 1);
     faces[index] = new;

@@ -94,12 +94,21 @@ impl Stored3 {
 /// One vector a lane. Products have the order of operations of [`Vec3`].
 #[derive(Clone, Copy)]
 pub struct Lanes3<S: Simd> {
+    /// First component.
     pub x: Floats<S>,
+    /// Second component.
     pub y: Floats<S>,
+    /// Third component.
     pub z: Floats<S>,
 }
 
 impl<S: Simd> Lanes3<S> {
+    /// The same vector in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, v: Vec3) -> Lanes3<S> {
+        Lanes3 { x: f32x8::splat(simd, v.x), y: f32x8::splat(simd, v.y), z: f32x8::splat(simd, v.z) }
+    }
+
     /// Scalar product.
     #[inline(always)]
     pub fn dot(self, other: Lanes3<S>) -> Floats<S> {
@@ -112,10 +121,22 @@ impl<S: Simd> Lanes3<S> {
         Lanes3 { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
     }
 
+    /// Difference of two vectors.
+    #[inline(always)]
+    pub fn minus(self, other: Lanes3<S>) -> Lanes3<S> {
+        Lanes3 { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+
     /// Products with the components of a vector.
     #[inline(always)]
     pub fn scaled(self, factors: Vec3) -> Lanes3<S> {
         Lanes3 { x: self.x * factors.x, y: self.y * factors.y, z: self.z * factors.z }
+    }
+
+    /// Quotient by one number a lane.
+    #[inline(always)]
+    pub fn over(self, divisor: Floats<S>) -> Lanes3<S> {
+        Lanes3 { x: self.x / divisor, y: self.y / divisor, z: self.z / divisor }
     }
 
     /// Product with one number a lane.

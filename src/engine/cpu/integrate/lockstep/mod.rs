@@ -17,9 +17,9 @@ mod cells;
 mod fibre;
 mod group;
 mod hits;
-mod lanes;
+pub mod lanes;
 mod light;
-mod powers;
+pub mod powers;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};

@@ -1,0 +1,126 @@
+//! Projection of the opaque mesh and of the volume quads to pixels.
+
+use glam::{BVec3, Mat4, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::raster::{Grid, Piece, ScreenPoint, clip_near};
+use crate::mapping::Quad;
+use crate::picture::camera::{CENTRE, DepthRange, sample_offset};
+use crate::place::tiles::{self, Tile};
+use crate::place::{Mesh, Vertex};
+use crate::scene::Scene;
+
+/// Corners of the largest tile.
+const GRID: usize = ((tiles::SIDE + 1) * (tiles::SIDE + 1)) as usize;
+
+/// The projection from the world to the pixels of a grid.
+pub struct Projection<'a> {
+    scene: &'a Scene,
+    grid: &'a Grid,
+    clip_from_world: Mat4,
+    /// Width and height of the image, pixels.
+    size: [usize; 2],
+}
+
+impl<'a> Projection<'a> {
+    /// Returns the projection of a scene, whose z-buffer has this range of depths.
+    pub fn new(scene: &'a Scene, depth: &DepthRange, grid: &'a Grid) -> Self {
+        let [width, height] = [scene.image.width, scene.image.height];
+        let centre = sample_offset(&scene.image, CENTRE);
+        Projection {
+            scene,
+            grid,
+            clip_from_world: scene.camera.clip_from_world(width, height, centre, depth),
+            size: [width as usize, height as usize],
+        }
+    }
+
+    /// Returns the triangles of each tile of the opaque mesh.
+    pub fn rock(&self, mesh: &Mesh) -> Vec<Piece> {
+        let steps = tiles::steps(&mesh.tiles, &self.scene.camera, &self.scene.image);
+        let piece = |(i, tile): (usize, &Tile)| {
+            if !self.may_show(tile.low, tile.high) {
+                return Piece::default();
+            }
+            let corners = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
+            self.tile(tile, corners, &mesh.vertices)
+        };
+        mesh.tiles.par_iter().enumerate().map(piece).collect()
+    }
+
+    /// Returns the triangles of each volume quad.
+    pub fn water(&self) -> Vec<Piece> {
+        let piece = |quad: &Quad| {
+            let mut out = Piece::default();
+            let [a, b, c, d] = quad.corners.map(|corner| self.point(corner, Vec2::ZERO, &mut out));
+            self.triangle([a, b, c], &mut out);
+            self.triangle([a, c, d], &mut out);
+            out
+        };
+        self.scene.quads.iter().map(piece).collect()
+    }
+
+    /// Triangles between corners of a tile, three at a time.
+    fn tile(&self, tile: &Tile, corners: &[u16], vertices: &[Vertex]) -> Piece {
+        let mut out = Piece::default();
+        // Six triangles meet in a vertex, which is projected once.
+        let mut points = [None; GRID];
+        for &corners in corners.as_chunks::<3>().0 {
+            let points = corners.map(|corner| {
+                *points[usize::from(corner)].get_or_insert_with(|| {
+                    let vertex = &vertices[tile.vertex(tiles::grid_point(corner)) as usize];
+                    self.point(vertex.position.into(), tiles::at(corner), &mut out)
+                })
+            });
+            self.triangle(points, &mut out);
+        }
+        out
+    }
+
+    /// Adds a point. Returns it in clip space, with its index.
+    #[inline]
+    fn point(&self, point: Vec3, place: Vec2, out: &mut Piece) -> (Vec4, u16) {
+        let clip = self.clip_from_world * point.extend(1.0);
+        (clip, out.add_point(ScreenPoint::new(clip, self.size, place)))
+    }
+
+    /// Adds the parts of a triangle that a sample may see. Its points are in clip space, with their indices.
+    #[inline]
+    fn triangle(&self, points: [(Vec4, u16); 3], out: &mut Piece) {
+        let near = self.scene.camera.near;
+        // Almost all triangles lie wholly in front.
+        if points.iter().all(|(clip, _)| clip.w >= near) {
+            return out.add(points.map(|(_, number)| number), self.grid);
+        }
+        let corners = points.map(|(clip, number)| (clip, out.place(number)));
+        clip_near(corners, near, |part| {
+            let points = part.map(|(clip, place)| out.add_point(ScreenPoint::new(clip, self.size, place)));
+            out.add(points, self.grid);
+        });
+    }
+
+    /// Whether a sample of the window may see anything in a box. Only boxes that lie wholly beyond one side
+    /// of the view, or behind the eye, are left out.
+    fn may_show(&self, low: Vec3, high: Vec3) -> bool {
+        let [width, height] = self.size.map(|n| n as f32);
+        // The sides of the window in clip space over w. Samples lie up to two pixels outside.
+        const MARGIN: f32 = 3.0;
+        let window = self.grid.window;
+        let side = |pixels: f32, size: f32| 2.0 * pixels / size - 1.0;
+        let [left, right] =
+            [window.x as f32 - MARGIN, window.right() as f32 + MARGIN].map(|pixels| side(pixels, width));
+        let [top, bottom] =
+            [window.y as f32 - MARGIN, window.bottom() as f32 + MARGIN].map(|pixels| -side(pixels, height));
+        let near = self.scene.camera.near;
+        let mut beyond = [true; 5];
+        for corner in 0..8 {
+            let point =
+                Vec3::select(BVec3::new(corner & 1 == 0, corner & 2 == 0, corner & 4 == 0), low, high);
+            let c = self.clip_from_world * point.extend(1.0);
+            let outside =
+                [c.w < near, c.x < left * c.w, c.x > right * c.w, c.y > top * c.w, c.y < bottom * c.w];
+            beyond = [0, 1, 2, 3, 4].map(|i| beyond[i] && outside[i]);
+        }
+        !beyond.contains(&true)
+    }
+}

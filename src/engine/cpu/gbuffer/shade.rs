@@ -1,0 +1,360 @@
+//! What the samples of a band see: the opaque scene or the background, shaded eight side by side, and the
+//! volume quads in front of it.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, mask32x8, u32x8};
+use glam::{Vec2, Vec3, Vec4};
+
+use super::raster::{self, Covered, Rasteriser};
+use super::{Gbuffer, map_quad};
+use crate::engine::cpu::haze;
+use crate::engine::cpu::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
+use crate::engine::cpu::opaque::{Points, background_at};
+use crate::engine::cpu::pool::{PoolPoint, shade_pool};
+use crate::engine::cpu::waves::Waves;
+use crate::engine::pool_surface::{self, Surface};
+use crate::light::haze::EyeHaze;
+use crate::mapping::PlaneView;
+use crate::picture::camera::{DepthRange, DepthToPoint};
+use crate::picture::{Camera, Image};
+use crate::place::Mesh;
+use crate::scene::{Parts, Scene};
+use crate::util::window::Window;
+
+/// Everything that the samples of a frame share.
+pub struct Shading<'a> {
+    scene: &'a Scene,
+    mesh: &'a Mesh,
+    shadow_light: Option<usize>,
+    pools: Vec<(Surface, Waves)>,
+    haze: EyeHaze,
+    /// Vectors forward, right and up of the camera; see [`Camera::rays`].
+    rays: [Vec3; 3],
+    /// Position of the eye, metres.
+    eye: Vec3,
+    /// The planes of the quads.
+    planes: Vec<PlaneView>,
+    to_point: DepthToPoint,
+}
+
+/// One of the samples that a band's triangles are drawn for.
+#[derive(Clone, Copy)]
+pub struct Which {
+    /// Its place among them, and their number.
+    pub index: usize,
+    pub count: usize,
+    /// Its offset from the top left corner of a pixel, pixels.
+    pub offset: [f32; 2],
+}
+
+/// Up to eight pixels of a band, one a lane; those that are missing repeat the last one.
+struct Pixels {
+    /// Column and row in the image.
+    at: [[u32; LANES]; 2],
+    /// Number of the triangle that the sample sees plus 1 (0: none), and its reversed depth.
+    ids: [u32; LANES],
+    depth: Stored,
+}
+
+/// Radiance with the metres from the eye, and normal with the share of a backdrop that shows.
+struct Seen<S: Simd> {
+    opaque: (Lanes3<S>, Floats<S>),
+    normal: (Lanes3<S>, Floats<S>),
+}
+
+impl<'a> Shading<'a> {
+    /// Collects what the samples share. `depth` is the range of the z-buffer.
+    pub fn new(scene: &'a Scene, mesh: &'a Mesh, depth: &DepthRange) -> Self {
+        let Parts { camera, image, .. } = &**scene;
+        let with_waves = |surface: Surface| {
+            let waves = Waves::new(&surface);
+            (surface, waves)
+        };
+        let (eye, rays) = (camera.eye_local(), camera.rays(image.width, image.height));
+        Shading {
+            scene,
+            mesh,
+            shadow_light: scene.shadow_light(),
+            pools: pool_surface::surfaces(scene, mesh).into_iter().map(with_waves).collect(),
+            haze: scene.haze.seen_from(eye),
+            rays: rays.map(|v| v.as_vec3()),
+            eye: eye.as_vec3(),
+            planes: scene.quads.iter().map(|quad| PlaneView::of_quad(&quad.map, eye, rays)).collect(),
+            to_point: camera.depth_to_point(depth),
+        }
+    }
+
+    /// Shades the opaque scene or the background under each pixel of a band.
+    #[inline(always)]
+    pub fn opaque<S: Simd>(
+        &self,
+        simd: S,
+        rock: &Rasteriser,
+        covered: &[Covered],
+        sample: Which,
+        out: &mut Gbuffer,
+    ) {
+        for first in (0..out.opaque.len()).step_by(LANES) {
+            let count = LANES.min(out.opaque.len() - first);
+            let pixels = Pixels::new(out.window, first, count, covered, sample);
+            let at = self.image_points(simd, &pixels, sample.offset);
+            let is_rock = !u32x8::load_array(simd, pixels.ids).simd_eq(0);
+            let seen = match (is_rock.any_true(), is_rock.all_true()) {
+                (false, _) => self.background(simd, at, is_rock),
+                (true, true) => self.rock(simd, rock, &pixels, at, sample),
+                (true, false) => {
+                    let near = self.rock(simd, rock, &pixels, at, sample);
+                    let far = self.background(simd, at, is_rock);
+                    near.or(far, is_rock)
+                }
+            };
+            seen.store(&mut out.opaque[first..first + count], &mut out.normal[first..first + count]);
+        }
+    }
+
+    /// The points of the image under the samples.
+    #[inline(always)]
+    fn image_points<S: Simd>(&self, simd: S, pixels: &Pixels, offset: [f32; 2]) -> [Floats<S>; 2] {
+        let Image { width, height, .. } = self.scene.image;
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let [x, y] = [u32x8::load_array(simd, pixels.at[0]), u32x8::load_array(simd, pixels.at[1])];
+        let [x, y]: [f32x8<S>; 2] = [x.to_float(), y.to_float()];
+        [
+            splat(2.0) * (x + splat(offset[0])) / splat(width as f32) - splat(1.0),
+            splat(1.0) - splat(2.0) * (y + splat(offset[1])) / splat(height as f32),
+        ]
+    }
+
+    /// Radiance of the background; in a picture with alpha only that of the haze in front of it. Lanes that
+    /// are `skipped` get any values. Twin: `background_targets`.
+    #[inline(always)]
+    fn background<S: Simd>(&self, simd: S, at: [Floats<S>; 2], skipped: mask32x8<S>) -> Seen<S> {
+        let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));
+        let d = forward.plus(right.times(at[0])).plus(up.times(at[1]));
+        let d = d.over(d.dot(d).sqrt());
+        let zero = f32x8::splat(simd, 0.0);
+        let nothing = Lanes3 { x: zero, y: zero, z: zero };
+        let radiance = match &self.scene.environment {
+            _ if self.scene.image.alpha => nothing,
+            None => background_at(simd, &self.scene.background, d),
+            Some(environment) => {
+                let mut directions = Stored3::default();
+                directions.store(d);
+                let skipped = skipped.to_bitmask();
+                let of = |lane: usize| match skipped >> lane & 1 {
+                    0 => environment.radiance(directions.get(lane)),
+                    _ => Vec3::ZERO,
+                };
+                Stored3::from_fn(of).load(simd)
+            }
+        };
+        if self.haze.density == 0.0 {
+            let one = f32x8::splat(simd, 1.0);
+            return Seen { opaque: (radiance, zero), normal: (nothing, one) };
+        }
+        let passes = haze::transmittance(simd, &self.haze, d.y, f32x8::splat(simd, self.haze.far));
+        let radiance = haze::in_front_of(simd, &self.haze, radiance, passes);
+        Seen { opaque: (radiance, zero), normal: (nothing, passes) }
+    }
+
+    /// Radiance, metres from the eye, and normal of the opaque points under the samples. Of a holdout in a
+    /// picture with alpha, only the haze in front of it has a radiance. Lanes without rock get any values.
+    #[inline(always)]
+    fn rock<S: Simd>(
+        &self,
+        simd: S,
+        rock: &Rasteriser,
+        pixels: &Pixels,
+        at: [Floats<S>; 2],
+        sample: Which,
+    ) -> Seen<S> {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let scene = self.scene;
+        let triangles = pixels.triangles();
+        let places = rock.places(simd, &triangles, &pixels.at, sample.shift());
+        let position = self.points(simd, at, pixels.depth.load(simd));
+        let mut tiles = [&self.mesh.tiles[0]; LANES];
+        let (mut pools, mut holes) = (0, [0u32; LANES]);
+        for lane in 0..LANES {
+            tiles[lane] = &self.mesh.tiles[Rasteriser::piece_of(triangles[lane]) as usize];
+            pools |= u32::from(tiles[lane].pool > 0) << lane;
+            holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
+        }
+        let points = Points::at(simd, &self.mesh.vertices, tiles, &places, position);
+        let (mut radiance, mut distance, mut normal) = points.shade(simd, scene, self.shadow_light);
+        if pools != 0 {
+            let mut seen = Stored4::default();
+            let mut normals = Stored3::default();
+            seen.store(radiance, distance);
+            normals.store(normal);
+            let mut stored = [Stored::default(); 4];
+            let values = [points.albedo.x, points.albedo.y, points.occlusion, points.shadow];
+            for i in 0..4 {
+                stored[i].store(values[i]);
+            }
+            let mut positions = Stored3::default();
+            positions.store(position);
+            let [x, y]: [[f32; LANES]; 2] = [at[0].into(), at[1].into()];
+            for lane in (0..LANES).filter(|lane| pools >> lane & 1 == 1) {
+                let [depth, foam, occlusion, shadow] = [0, 1, 2, 3].map(|i| stored[i].0[lane]);
+                let point = PoolPoint { position: positions.get(lane), depth, foam, occlusion, shadow };
+                let pool = &self.pools[tiles[lane].pool as usize - 1];
+                let (of_pool, n) =
+                    shade_pool(scene, self.shadow_light, pool, &point, Vec2::new(x[lane], y[lane]));
+                seen.set(lane, of_pool);
+                normals.set(lane, n);
+            }
+            (radiance, distance) = seen.load(simd);
+            normal = normals.load(simd);
+        }
+        let is_hole = !u32x8::load_array(simd, holes).simd_eq(0);
+        let zero = splat(0.0);
+        let mut passes = zero;
+        if is_hole.any_true() {
+            radiance = radiance.times(is_hole.select(zero, splat(1.0)));
+            passes = is_hole.select(splat(1.0), zero);
+        }
+        if self.haze.density != 0.0 {
+            let d_y = (position.y - splat(self.eye.y)) / distance.max(splat(1e-20));
+            let transmittance = haze::transmittance(simd, &self.haze, d_y, distance);
+            radiance = haze::in_front_of(simd, &self.haze, radiance, transmittance);
+            passes = is_hole.select(transmittance, zero);
+        }
+        Seen { opaque: (radiance, distance), normal: (normal, passes) }
+    }
+
+    /// The points at these depths under points of the image. See [`DepthToPoint::point`].
+    #[inline(always)]
+    fn points<S: Simd>(&self, simd: S, at: [Floats<S>; 2], z: Floats<S>) -> Lanes3<S> {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let DepthToPoint { anchor, shift, rise, slope, scale } = self.to_point;
+        let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));
+        let inverse = splat(1.0) / (z - splat(shift));
+        let along = (splat(rise) + splat(slope) * z) * inverse;
+        let aside = right.times(at[0]).plus(up.times(at[1])).times(splat(scale) * inverse);
+        Lanes3::splat(simd, anchor).plus(forward.times(along)).plus(aside)
+    }
+
+    /// Maps the volume quads under each pixel of a band, `layers` per sample.
+    pub fn water(&self, covered: &[Covered], sample: Which, out: &mut Gbuffer) {
+        let [forward, right, up] = self.rays;
+        let Image { width, height, .. } = self.scene.image;
+        let layers = out.layers;
+        let window = out.window;
+        for (i, pixel) in window.each().enumerate() {
+            let faces = &covered[(i * sample.count + sample.index) * layers..][..layers];
+            if faces[0].1 == 0 {
+                continue;
+            }
+            let at = Camera::image_point(width, height, pixel, sample.offset);
+            let length = (forward + right * at.x + up * at.y).length();
+            for (k, &(_, id)) in (i * layers..).zip(faces).take_while(|(_, (_, id))| *id != 0) {
+                let quad = Rasteriser::piece_of(id - 1);
+                out.quad_id[k] = quad + 1;
+                let plane = &self.planes[quad as usize];
+                out.surface[k] = map_quad(&self.scene.quads[quad as usize], plane, at, length);
+            }
+        }
+    }
+}
+
+impl Which {
+    /// How far the sample sees points from where the pixel's centre sees them, pixels.
+    fn shift(&self) -> [f64; 2] {
+        self.offset.map(raster::shift)
+    }
+}
+
+impl Pixels {
+    /// The pixels of a window from number `first`, of which there are `count`.
+    #[inline(always)]
+    fn new(window: Window, first: usize, count: usize, covered: &[Covered], sample: Which) -> Self {
+        let mut pixels = Pixels { at: [[0; LANES]; 2], ids: [0; LANES], depth: Stored::default() };
+        let [mut x, mut y] = [first as u32 % window.width, first as u32 / window.width];
+        for lane in 0..LANES {
+            let (depth, id) = covered[(first + lane.min(count - 1)) * sample.count + sample.index];
+            (pixels.depth.0[lane], pixels.ids[lane]) = (depth, id);
+            (pixels.at[0][lane], pixels.at[1][lane]) = (window.x + x, window.y + y);
+            if lane + 1 < count {
+                x += 1;
+                if x == window.width {
+                    (x, y) = (0, y + 1);
+                }
+            }
+        }
+        pixels
+    }
+
+    /// Number of the triangle of each pixel. Pixels without one get that of another.
+    #[inline(always)]
+    fn triangles(&self) -> [u32; LANES] {
+        let mut any = 1;
+        for lane in 0..LANES {
+            any = any.max(self.ids[lane]);
+        }
+        let mut out = [any - 1; LANES];
+        for lane in 0..LANES {
+            if self.ids[lane] != 0 {
+                out[lane] = self.ids[lane] - 1;
+            }
+        }
+        out
+    }
+}
+
+impl<S: Simd> Seen<S> {
+    /// Takes what `other` sees in the lanes that are not `own`.
+    #[inline(always)]
+    fn or(self, other: Seen<S>, own: mask32x8<S>) -> Seen<S> {
+        let of = |(v, w): (Lanes3<S>, Floats<S>), (other, more): (Lanes3<S>, Floats<S>)| {
+            let v = Lanes3 {
+                x: own.select(v.x, other.x),
+                y: own.select(v.y, other.y),
+                z: own.select(v.z, other.z),
+            };
+            (v, own.select(w, more))
+        };
+        Seen { opaque: of(self.opaque, other.opaque), normal: of(self.normal, other.normal) }
+    }
+
+    /// Stores the first lanes, one for each pixel.
+    #[inline(always)]
+    fn store(self, opaque: &mut [[f32; 4]], normal: &mut [Vec4]) {
+        let (mut radiance, mut normals) = (Stored4::default(), Stored4::default());
+        radiance.store(self.opaque.0, self.opaque.1);
+        normals.store(self.normal.0, self.normal.1);
+        for lane in 0..opaque.len() {
+            opaque[lane] = radiance.get(lane);
+            normal[lane] = normals.get(lane).into();
+        }
+    }
+}
+
+/// Vectors of eight lanes in memory, with a fourth number each.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stored4(Stored3, Stored);
+
+impl Stored4 {
+    #[inline(always)]
+    fn store<S: Simd>(&mut self, v: Lanes3<S>, w: Floats<S>) {
+        self.0.store(v);
+        self.1.store(w);
+    }
+
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S) -> (Lanes3<S>, Floats<S>) {
+        (self.0.load(simd), self.1.load(simd))
+    }
+
+    #[inline(always)]
+    fn get(&self, lane: usize) -> [f32; 4] {
+        let [x, y, z] = &self.0.0;
+        [x.0[lane], y.0[lane], z.0[lane], self.1.0[lane]]
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, [x, y, z, w]: [f32; 4]) {
+        self.0.set(lane, Vec3::new(x, y, z));
+        self.1.0[lane] = w;
+    }
+}
