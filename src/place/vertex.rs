@@ -22,10 +22,11 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Numbers that are interpolated over a triangle: normal, albedo, occlusion, shadow and film of water.
+    /// Numbers that are interpolated over a triangle: normal, albedo, occlusion and shadow; and the film of
+    /// water.
     #[inline]
-    pub fn coat(&self) -> &[f32; 9] {
+    pub fn coat(&self) -> (&[f32; 8], f32) {
         let all: &[f32; 13] = bytemuck::cast_ref(self);
-        all[3..].first_chunk().expect("twelve numbers before the pool's")
+        (all[3..].first_chunk().expect("ten numbers"), self.wet)
     }
 }

@@ -1,6 +1,7 @@
 //! §3 The raster pass on the CPU. Twin: `shaders/engine/gbuffer.wgsl`. The rasteriser follows a GPU's fill
 //! rule, so that both engines cover the same pixels.
 
+mod edges;
 mod projection;
 mod raster;
 mod shade;

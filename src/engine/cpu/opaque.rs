@@ -27,9 +27,6 @@ pub struct Points<S: Simd> {
     pub wet: Floats<S>,
 }
 
-/// Numbers of a vertex that are interpolated: from its normal to its film of water.
-const NUMBERS: usize = 9;
-
 impl<S: Simd> Points<S> {
     /// Interpolates the vertices around a place in each lane's tile, in squares of its grid. `position` are
     /// the points in the world. Twin: `opaque_point`.
@@ -50,18 +47,29 @@ impl<S: Simd> Points<S> {
         let weights: [[f32; LANES]; 3] = [(one - high).into(), (high - low).into(), low.into()];
         let is_right = f[0].simd_ge(f[1]).to_bitmask();
         let cell: [[f32; LANES]; 2] = [cell[0].into(), cell[1].into()];
-        let mut mixed = [Stored::default(); NUMBERS];
+        // Eight of the numbers lie side by side; the ninth is apart.
+        let mut rows = [[0.0; LANES]; LANES];
+        let mut wet = Stored::default();
         for lane in 0..LANES {
             let tile = tiles[lane];
             let a = tile.vertex([cell[0][lane] as u32, cell[1][lane] as u32]);
             let b = if is_right >> lane & 1 == 1 { a + 1 } else { a + tile.pitch };
-            let corners = [a, b, a + tile.pitch + 1].map(|number| vertices[number as usize].coat());
-            let w = [weights[0][lane], weights[1][lane], weights[2][lane]];
-            for i in 0..NUMBERS {
-                mixed[i].0[lane] = corners[0][i] * w[0] + corners[1][i] * w[1] + corners[2][i] * w[2];
+            let coats = [a, b, a + tile.pitch + 1].map(|number| vertices[number as usize].coat());
+            let mut row = f32x8::splat(simd, 0.0);
+            for c in 0..3 {
+                let (first, last) = coats[c];
+                row += f32x8::load_array_ref(simd, first) * weights[c][lane];
+                wet.0[lane] += last * weights[c][lane];
+            }
+            row.store_array(&mut rows[lane]);
+        }
+        let mut mixed = [Stored::default(); LANES];
+        for lane in 0..LANES {
+            for i in 0..LANES {
+                mixed[i].0[lane] = rows[lane][i];
             }
         }
-        let [nx, ny, nz, red, green, blue, occlusion, shadow, wet] = &mixed;
+        let [nx, ny, nz, red, green, blue, occlusion, shadow] = &mixed;
         Points {
             position,
             normal: Lanes3 { x: nx.load(simd), y: ny.load(simd), z: nz.load(simd) },

@@ -476,7 +476,7 @@ fn targets_have_the_same_bits_with_each_instruction_set() {
     };
     // Rock, pools and haze; spot lights; an environment; holes.
     let scenes = [
-        ("waterfall", sets(&["haze.density=0.02", "haze.height=3"])),
+        ("waterfall", sets(&["haze.density=0.02", "haze.scale_height=3"])),
         ("night", sets(&[])),
         ("evening", sets(&[])),
         ("waterfall", sets(&["image.alpha=true", "rocks.bed.show=holdout"])),
