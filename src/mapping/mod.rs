@@ -21,7 +21,7 @@ use glam::{Vec2, Vec3};
 pub use quad::Quad;
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use splash::Splash;
-pub use view::PlaneView;
+pub use view::{FARTHEST, PlaneView};
 
 /// Cross product of two vectors in a plane: its component along the normal.
 #[inline]

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::QuadMap;
 
 /// Largest distance of a point, metres. It keeps products of coordinates inside float32.
-const FARTHEST: f32 = 1e9;
+pub const FARTHEST: f32 = 1e9;
 
 /// A plane through a point A, seen from an eye.
 ///

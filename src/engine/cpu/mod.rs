@@ -9,7 +9,6 @@ pub mod pixels;
 pub mod pool;
 pub mod ray;
 pub mod visibility;
-mod waves;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -120,11 +120,7 @@ impl<S: Simd> Points<S> {
                 gloss = gloss.plus(intensity.times(lit * cos_light * lobe));
             }
         }
-        let dry = Lanes3 {
-            x: self.albedo.x * irradiance.x,
-            y: self.albedo.y * irradiance.y,
-            z: self.albedo.z * irradiance.z,
-        };
+        let dry = self.albedo.by(irradiance);
         if !is_wet.any_true() {
             return (dry, distance, n);
         }
@@ -167,7 +163,7 @@ pub fn background_at<S: Simd>(simd: S, background: &Background, d: Lanes3<S>) ->
 
 /// See [`Irradiance::at`].
 #[inline(always)]
-fn irradiance_at<S: Simd>(simd: S, irradiance: &Irradiance, n: Lanes3<S>) -> Lanes3<S> {
+pub fn irradiance_at<S: Simd>(simd: S, irradiance: &Irradiance, n: Lanes3<S>) -> Lanes3<S> {
     let splat = |x: f32| f32x8::splat(simd, x);
     let Lanes3 { x, y, z } = n;
     let terms = [x, y, z, x * y, y * z, splat(3.0) * y * y - splat(1.0), x * z, x * x - z * z];
@@ -181,7 +177,7 @@ fn irradiance_at<S: Simd>(simd: S, irradiance: &Irradiance, n: Lanes3<S>) -> Lan
 
 /// See [`Light::at`].
 #[inline(always)]
-fn light_at<S: Simd>(simd: S, light: &Light, point: Lanes3<S>) -> (Lanes3<S>, Lanes3<S>) {
+pub fn light_at<S: Simd>(simd: S, light: &Light, point: Lanes3<S>) -> (Lanes3<S>, Lanes3<S>) {
     let splat = |x: f32| f32x8::splat(simd, x);
     match *light {
         Light::Directional { to_light, intensity } => {

@@ -3,15 +3,14 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8, u32x8};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 
 use super::raster::{self, Covered, Rasteriser};
 use super::{Gbuffer, map_quad};
 use crate::engine::cpu::haze;
 use crate::engine::cpu::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::engine::cpu::opaque::{Points, background_at};
-use crate::engine::cpu::pool::{PoolPoint, shade_pool};
-use crate::engine::cpu::waves::Waves;
+use crate::engine::cpu::pool;
 use crate::engine::pool_surface::{self, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
@@ -26,7 +25,7 @@ pub struct Shading<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     shadow_light: Option<usize>,
-    pools: Vec<(Surface, Waves)>,
+    pools: Vec<Surface>,
     haze: EyeHaze,
     /// Vectors forward, right and up of the camera; see [`Camera::rays`].
     rays: [Vec3; 3],
@@ -66,16 +65,12 @@ impl<'a> Shading<'a> {
     /// Collects what the samples share. `depth` is the range of the z-buffer.
     pub fn new(scene: &'a Scene, mesh: &'a Mesh, depth: &DepthRange) -> Self {
         let Parts { camera, image, .. } = &**scene;
-        let with_waves = |surface: Surface| {
-            let waves = Waves::new(&surface);
-            (surface, waves)
-        };
         let (eye, rays) = (camera.eye_local(), camera.rays(image.width, image.height));
         Shading {
             scene,
             mesh,
             shadow_light: scene.shadow_light(),
-            pools: pool_surface::surfaces(scene, mesh).into_iter().map(with_waves).collect(),
+            pools: pool_surface::surfaces(scene, mesh),
             haze: scene.haze.seen_from(eye),
             rays: rays.map(|v| v.as_vec3()),
             eye: eye.as_vec3(),
@@ -174,38 +169,27 @@ impl<'a> Shading<'a> {
         let places = rock.places(simd, &triangles, &pixels.at, sample.shift());
         let position = self.points(simd, at, pixels.depth.load(simd));
         let mut tiles = [&self.mesh.tiles[0]; LANES];
-        let (mut pools, mut holes) = (0, [0u32; LANES]);
+        let mut holes = [0u32; LANES];
         for lane in 0..LANES {
             tiles[lane] = &self.mesh.tiles[Rasteriser::piece_of(triangles[lane]) as usize];
-            pools |= u32::from(tiles[lane].pool > 0) << lane;
             holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
         }
         let points = Points::at(simd, &self.mesh.vertices, tiles, &places, position);
         let (mut radiance, mut distance, mut normal) = points.shade(simd, scene, self.shadow_light);
-        if pools != 0 {
-            let mut seen = Stored4::default();
-            let mut normals = Stored3::default();
-            seen.store(radiance, distance);
-            normals.store(normal);
-            let mut stored = [Stored::default(); 4];
-            let values = [points.albedo.x, points.albedo.y, points.occlusion, points.shadow];
-            for i in 0..4 {
-                stored[i].store(values[i]);
+        let mut of_pools = [0u32; LANES];
+        for number in 0..self.pools.len() as u32 {
+            for lane in 0..LANES {
+                of_pools[lane] = u32::from(tiles[lane].pool == number + 1);
             }
-            let mut positions = Stored3::default();
-            positions.store(position);
-            let [x, y]: [[f32; LANES]; 2] = [at[0].into(), at[1].into()];
-            for lane in (0..LANES).filter(|lane| pools >> lane & 1 == 1) {
-                let [depth, foam, occlusion, shadow] = [0, 1, 2, 3].map(|i| stored[i].0[lane]);
-                let point = PoolPoint { position: positions.get(lane), depth, foam, occlusion, shadow };
-                let pool = &self.pools[tiles[lane].pool as usize - 1];
-                let (of_pool, n) =
-                    shade_pool(scene, self.shadow_light, pool, &point, Vec2::new(x[lane], y[lane]));
-                seen.set(lane, of_pool);
-                normals.set(lane, n);
+            let is_here = !u32x8::load_array(simd, of_pools).simd_eq(0);
+            if is_here.any_true() {
+                let pool = &self.pools[number as usize];
+                let seen = pool::shade(simd, scene, self.shadow_light, &self.rays, pool, &points, at);
+                let seen = Seen { opaque: (seen.0, seen.1), normal: (seen.2, distance) };
+                let others = Seen { opaque: (radiance, distance), normal: (normal, distance) };
+                let Seen { opaque, normal: (n, _) } = seen.or(others, is_here);
+                ((radiance, distance), normal) = (opaque, n);
             }
-            (radiance, distance) = seen.load(simd);
-            normal = normals.load(simd);
         }
         let is_hole = !u32x8::load_array(simd, holes).simd_eq(0);
         let zero = splat(0.0);
@@ -342,19 +326,8 @@ impl Stored4 {
     }
 
     #[inline(always)]
-    fn load<S: Simd>(&self, simd: S) -> (Lanes3<S>, Floats<S>) {
-        (self.0.load(simd), self.1.load(simd))
-    }
-
-    #[inline(always)]
     fn get(&self, lane: usize) -> [f32; 4] {
         let [x, y, z] = &self.0.0;
         [x.0[lane], y.0[lane], z.0[lane], self.1.0[lane]]
-    }
-
-    #[inline(always)]
-    fn set(&mut self, lane: usize, [x, y, z, w]: [f32; 4]) {
-        self.0.set(lane, Vec3::new(x, y, z));
-        self.1.0[lane] = w;
     }
 }

@@ -133,6 +133,12 @@ impl<S: Simd> Lanes3<S> {
         Lanes3 { x: self.x * factors.x, y: self.y * factors.y, z: self.z * factors.z }
     }
 
+    /// Products of the components.
+    #[inline(always)]
+    pub fn by(self, other: Lanes3<S>) -> Lanes3<S> {
+        Lanes3 { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
+    }
+
     /// Quotient by one number a lane.
     #[inline(always)]
     pub fn over(self, divisor: Floats<S>) -> Lanes3<S> {

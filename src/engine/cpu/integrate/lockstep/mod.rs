@@ -20,7 +20,7 @@ mod hits;
 pub mod lanes;
 mod light;
 pub mod powers;
-mod walk;
+pub mod walk;
 
 use fearless_simd::{Simd, dispatch};
 
