@@ -4,6 +4,7 @@
 pub mod cache;
 pub mod colour;
 pub mod error;
+pub(crate) mod lane_powers;
 pub mod monitor;
 pub mod open_exr;
 pub mod powers;

@@ -2,7 +2,7 @@
 //!
 //! The C library's functions would be called once a cell, and they differ between systems. These consist of
 //! sums, products and one quotient alone, so eight of them run side by side in SIMD registers with the same
-//! bits (`src/engine/cpu/integrate/lockstep/powers.rs`, their twin).
+//! bits (`src/util/lane_powers.rs`, their twin).
 
 use std::f32::consts::LN_2;
 

@@ -6,8 +6,8 @@ use fearless_simd::prelude::*;
 
 use super::cells::v_codes;
 use super::lanes::{Floats, Lanes3, Stored, Stored3, Words, signed};
-use super::powers::pow;
 use crate::light::fibre::whole_exponent;
+use crate::util::lane_powers::pow;
 
 /// Metric of every ray; see [`crate::light::fibre::Metric`].
 #[derive(Clone, Copy)]

@@ -13,7 +13,6 @@ use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
 use super::hits::{Hits, Values};
 use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
 use super::light::{LaneLight, lanes_of};
-use super::powers::exp2;
 use super::walk::{BATCH, NO_CELL, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::Integrator;
 use crate::engine::cpu::integrate::light::RayScatter;
@@ -22,6 +21,7 @@ use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
+use crate::util::lane_powers::exp2;
 use crate::util::powers::log2;
 use crate::volume::Cell;
 

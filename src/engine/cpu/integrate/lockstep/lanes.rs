@@ -157,9 +157,3 @@ impl<S: Simd> Lanes3<S> {
 pub fn signed<S: Simd>(words: Words<S>) -> Ints<S> {
     words.bitcast()
 }
-
-/// Words with the same bits.
-#[inline(always)]
-pub fn unsigned<S: Simd>(ints: Ints<S>) -> Words<S> {
-    ints.bitcast()
-}

@@ -19,8 +19,7 @@ mod group;
 mod hits;
 pub mod lanes;
 mod light;
-pub mod powers;
-pub mod walk;
+mod walk;
 
 use fearless_simd::{Simd, dispatch};
 

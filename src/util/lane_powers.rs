@@ -3,12 +3,11 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 
-use super::lanes::{Floats, signed, unsigned};
-use crate::util::powers::{EXP2, LEAST_EXPONENT, LOG2, ROOT_HALF_BITS, ROUNDER};
+use super::powers::{EXP2, LEAST_EXPONENT, LOG2, ROOT_HALF_BITS, ROUNDER};
 
-/// See [`crate::util::powers::exp2`].
+/// See [`super::powers::exp2`].
 #[inline(always)]
-pub fn exp2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
+pub fn exp2<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let x = x.max(f32x8::splat(simd, LEAST_EXPONENT));
     let rounded = x + ROUNDER;
     let f = x - (rounded - ROUNDER);
@@ -19,12 +18,12 @@ pub fn exp2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
     power * f32x8::from_bits(exponent << 23)
 }
 
-/// See [`crate::util::powers::log2`].
+/// See [`super::powers::log2`].
 #[inline(always)]
-pub fn log2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
+pub fn log2<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let bits = x.to_bits();
-    let exponent: i32x8<S> = signed(bits - ROOT_HALF_BITS) >> 23;
-    let m = f32x8::from_bits(bits - unsigned(exponent << 23));
+    let exponent = (bits - ROOT_HALF_BITS).bitcast::<i32x8<S>>() >> 23;
+    let m = f32x8::from_bits(bits - (exponent << 23).bitcast::<u32x8<S>>());
     let one = f32x8::splat(simd, 1.0);
     let s = (m - one) / (m + one);
     let z = s * s;
@@ -32,8 +31,8 @@ pub fn log2<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
     exponent.to_float::<f32x8<S>>() + s * (z * (z * (z * d + c) + b) + a)
 }
 
-/// See [`crate::util::powers::pow`].
+/// See [`super::powers::pow`].
 #[inline(always)]
-pub fn pow<S: Simd>(simd: S, x: Floats<S>, p: Floats<S>) -> Floats<S> {
+pub fn pow<S: Simd>(simd: S, x: f32x8<S>, p: f32x8<S>) -> f32x8<S> {
     exp2(simd, p * log2(simd, x))
 }
