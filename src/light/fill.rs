@@ -6,16 +6,17 @@
 //! depths of a row of cells are summed side by side, one cell of the ray at a time. This gives the bits of
 //! [`optical_depth`](super::optical_depth::optical_depth) for a twentieth of the work.
 
-use std::sync::Arc;
+mod row_sums;
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
+use self::row_sums::{Codes, Tap};
 use super::optical_depth::light_volume_value;
-use super::visibility::{Form, LightVolume, Medium, transmittance_code};
+use super::visibility::{Form, LightVolume, Medium};
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
-use crate::volume::{Cell, Pyramid};
+use crate::volume::Pyramid;
 use crate::walk::Walk;
 
 /// Values that one light volume stores for a level, in the order of the level's cells.
@@ -39,44 +40,39 @@ impl Numbers {
 /// Levels of a volume as rows of ρ codes, from which light volumes are filled.
 pub struct Rows<'a> {
     /// Each level with its ρ codes. A sparse level has none, because rows of all its cells would not fit.
-    levels: Vec<(Level<'a>, Option<Vec<f32>>)>,
+    levels: Vec<(Level<'a>, Option<Codes>)>,
     lookup: Lookup,
-}
-
-/// A cell on the light ray.
-struct Tap {
-    /// Position relative to the cell where the ray starts.
-    offset: IVec3,
-    /// Factor on the cell's ρ: a length, or with per-cell attenuation a count.
-    weight: f32,
+    simd: fearless_simd::Level,
 }
 
 impl<'a> Rows<'a> {
-    /// Rows of all levels of a pyramid.
+    /// Rows of all levels of a pyramid, summed with the best instruction set of this processor.
     pub fn new(levels: &'a Pyramid, lookup: Lookup) -> Self {
+        Rows::summed_with(fearless_simd::Level::new(), levels, lookup)
+    }
+
+    /// Rows of all levels of a pyramid, summed with an instruction set. The values do not depend on it.
+    pub fn summed_with(simd: fearless_simd::Level, levels: &'a Pyramid, lookup: Lookup) -> Self {
         let rows = |level: Level<'a>| {
-            let codes =
-                |cells: &Arc<Vec<Cell>>| cells.par_iter().map(|cell| cell.rho_code() as f32).collect();
-            (level, level.volume.cells.dense().map(codes))
+            let cells = level.volume.cells.dense();
+            (level, cells.map(|cells| Codes::new(level.volume.size, cells)))
         };
         let levels = (0..levels.len() as u32).map(|number| rows(Level::new(levels, number))).collect();
-        Rows { levels, lookup }
+        Rows { levels, lookup, simd }
     }
 
     /// Values of a light volume, level by level. Empty cells have 0, because no view ray reads them; only
     /// with [`Lookup::Trilinear`] are they computed.
     pub fn fill(&self, light_volume: &LightVolume, medium: Medium, form: Form) -> Vec<Numbers> {
-        let fill_level = |(level, rho): &(Level, Option<Vec<f32>>)| {
-            let Some(rho) = rho else { return self.walked(level, light_volume, medium, form) };
+        let fill_level = |(level, codes): &(Level, Option<Codes>)| {
+            let Some(codes) = codes else { return self.walked(level, light_volume, medium, form) };
             let taps = taps(level, light_volume.direction, medium);
+            let everywhere = self.lookup == Lookup::Trilinear;
             let bits =
                 if medium.per_cell { light_volume.bits * level.depth_in_cells() } else { light_volume.bits };
             match form {
-                Form::Codes => {
-                    let code = |depth: f32| transmittance_code(depth * bits);
-                    Numbers::Codes(self.sums(level, rho, &taps, code))
-                }
-                Form::Depths => Numbers::Depths(self.sums(level, rho, &taps, |depth| depth)),
+                Form::Codes => Numbers::Codes(codes.sums(self.simd, &taps, bits, everywhere)),
+                Form::Depths => Numbers::Depths(codes.sums(self.simd, &taps, 1.0, everywhere)),
             }
         };
         self.levels.iter().map(fill_level).collect()
@@ -93,47 +89,6 @@ impl<'a> Rows<'a> {
             Form::Depths => Numbers::Depths(in_order(level, value)),
         }
     }
-
-    /// Sums the depths of all cells of a level and converts each with `value_of`.
-    fn sums<T: Copy + Default + Send>(
-        &self,
-        level: &Level,
-        rho: &[f32],
-        taps: &[Tap],
-        value_of: impl Fn(f32) -> T + Sync,
-    ) -> Vec<T> {
-        let [nx, ny, nz] = level.volume.size.map(|n| n as usize);
-        let mut numbers = vec![T::default(); rho.len()];
-        let everywhere = self.lookup == Lookup::Trilinear;
-        numbers.par_chunks_mut(nx).enumerate().for_each_init(
-            || vec![0.0f32; nx],
-            |depths, (row, numbers)| {
-                depths.fill(0.0);
-                let (y, z) = ((row % ny) as i64, (row / ny) as i64);
-                for tap in taps {
-                    let z = z + i64::from(tap.offset.z);
-                    if !(0..nz as i64).contains(&z) {
-                        break;
-                    }
-                    let y = (y + i64::from(tap.offset.y)).rem_euclid(ny as i64);
-                    let first = (z as usize * ny + y as usize) * nx;
-                    // The row wraps into the next copy of the volume.
-                    let shift = i64::from(tap.offset.x).rem_euclid(nx as i64) as usize;
-                    let (left, right) = rho[first..first + nx].split_at(shift);
-                    let (near, far) = depths.split_at_mut(nx - shift);
-                    add(near, right, tap.weight);
-                    add(far, left, tap.weight);
-                }
-                let own = &rho[row * nx..][..nx];
-                for ((number, &depth), &rho) in numbers.iter_mut().zip(&*depths).zip(own) {
-                    if everywhere || rho > 0.0 {
-                        *number = value_of(depth);
-                    }
-                }
-            },
-        );
-        numbers
-    }
 }
 
 fn in_order<T: Send>(level: &Level, value: impl Fn(IVec3) -> T + Sync) -> Vec<T> {
@@ -141,14 +96,6 @@ fn in_order<T: Send>(level: &Level, value: impl Fn(IVec3) -> T + Sync) -> Vec<T>
     let cell =
         |index: usize| IVec3::new((index % nx) as i32, (index / nx % ny) as i32, (index / nx / ny) as i32);
     (0..nx * ny * nz).into_par_iter().map(|index| value(cell(index))).collect()
-}
-
-/// Adds `rho` × `weight` to the depths.
-#[inline]
-fn add(depths: &mut [f32], rho: &[f32], weight: f32) {
-    for (depth, rho) in depths.iter_mut().zip(rho) {
-        *depth += rho * weight;
-    }
 }
 
 /// Cells on the light ray from the centre of any cell of a level, long enough for the cell farthest from the

@@ -25,6 +25,7 @@ use super::{Light, Scattering};
 use crate::mapping::{CellFrame, Quad};
 use crate::trace::{Attenuation, Trace, extinction, level_atlas};
 use crate::util::error::{Error, Result};
+use crate::util::powers::exp2;
 
 /// Transmittance codes in one word of a light volume; their cells follow one another along z.
 pub const CELLS_A_WORD: u32 = 4;
@@ -123,7 +124,7 @@ pub const TRANSMITTANCE_OF_CODE: f32 = 1.0 / 65025.0;
 
 /// Code of a transmittance, √T in 255ths, from its depth −log₂ T. The steps of T are finest in the dark.
 pub fn transmittance_code(depth_bits: f32) -> u8 {
-    (255.0 * (-0.5 * depth_bits).exp2() + 0.5) as u8
+    (255.0 * exp2(-0.5 * depth_bits) + 0.5) as u8
 }
 
 /// Patches into which a quad is cut for one light.

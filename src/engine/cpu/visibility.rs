@@ -3,12 +3,17 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::light::fill::{Numbers, Rows};
-use crate::light::visibility::LightVolumes;
+use crate::light::visibility::{LightVolume, LightVolumes};
 use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Leaps, Levels, LevelsCache};
+
+/// Cells of all light volumes that are filled together. Threads wait for one another once for each such lot.
+const CELLS_AT_ONCE: usize = 1 << 22;
 
 /// The light volumes of the last frame, and the volume's levels.
 pub struct LightVolumeCache {
@@ -63,12 +68,13 @@ impl LightVolumeCache {
         }
         // The old ones are dropped first, because both might not fit.
         self.last = None;
-        let total = plan.volumes.len() as u64;
         let mut all = Vec::with_capacity(plan.volumes.len());
         let rows = Rows::new(levels, lookup);
-        for (number, light_volume) in plan.volumes.iter().enumerate() {
-            monitor.progress("light volumes", number as u64, total)?;
-            all.push(rows.fill(light_volume, plan.medium, plan.form));
+        let cells: usize = levels.iter().map(|level| level.cells.len()).sum();
+        for volumes in plan.volumes.chunks((CELLS_AT_ONCE / cells).max(1)) {
+            monitor.progress("light volumes", all.len() as u64, plan.volumes.len() as u64)?;
+            let fill = |light_volume: &LightVolume| rows.fill(light_volume, plan.medium, plan.form);
+            all.par_extend(volumes.par_iter().map(fill));
         }
         let filled = Arc::new(all);
         let (levels, plan) = (levels.clone(), plan.clone());

@@ -4,6 +4,7 @@ use crate::engine::gpu::renderer;
 use glam::{IVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use taki::engine::cpu::integrate::Lanes;
 use taki::engine::gpu::Filling;
 use taki::engine::{RenderOptions, cpu};
 use taki::light::Light;
@@ -15,7 +16,7 @@ use taki::scene::{Limits, Scene};
 use taki::trace::lookup::Level;
 use taki::trace::{Lookup, SheetDensity};
 use taki::util::monitor::Unwatched;
-use taki::volume::{VolumeTexture, levels_of};
+use taki::volume::{Cell, VolumeTexture, levels_of};
 use taki::walk::NEVER;
 
 /// Settings of a point light 8 cm before `front`.
@@ -357,6 +358,46 @@ fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
         }
     }
     assert!(compared > 100_000, "{compared} were above 0");
+}
+
+#[test]
+fn rows_of_any_width_have_the_sums_of_the_walk_on_every_instruction_set() {
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let mut compared = 0;
+    for nx in [1, 7, 8, 13, 21, 29, 37, 45, 48, 70, 100] {
+        let size = [nx, 3, 5];
+        let mut cell = || match rng.random::<f32>() {
+            x if x < 0.6 => Cell::from_direction(Vec3::Y).with_density(x, 1.0, 1.0),
+            _ => Cell::default(),
+        };
+        let cells: Vec<Cell> = (0..size.iter().product::<u32>()).map(|_| cell()).collect();
+        let volume = VolumeTexture { size, alpha: 1.0, cells: cells.into() };
+        let levels = levels_of(&volume, scene("front", &[]).pyramid_spec(&volume));
+        let level = Level::new(&levels, 0);
+        for direction in [Vec3::new(3.7, 0.2, 1.0), Vec3::new(-30.0, -2.0, -1.0)] {
+            let light_volume = LightVolume { direction, bits: 3e-5 };
+            let medium = Medium { per_cell: false, max_cells: 512 };
+            for form in [Form::Codes, Form::Depths] {
+                let walked: Vec<f32> = (0..nx * 15)
+                    .map(|index| {
+                        let cell = [index % nx, index / nx % 3, index / nx / 3].map(|c| c as i32).into();
+                        let is_read = level.cell(cell).rho_code() > 0;
+                        let value = light_volume_value(&level, cell, &light_volume, medium, form);
+                        compared += u32::from(is_read && value > 0.0);
+                        if is_read { value } else { 0.0 }
+                    })
+                    .collect();
+                for (name, lanes) in Lanes::all() {
+                    let Lanes::Lockstep(simd) = lanes else { continue };
+                    let rows = Rows::summed_with(simd, &levels, Lookup::Nearest);
+                    let filled = rows.fill(&light_volume, medium, form);
+                    let summed: Vec<f32> = (0..walked.len()).map(|index| filled[0].at(index)).collect();
+                    assert_eq!(summed, walked, "{nx} cells, {direction}, {form:?}, {name}");
+                }
+            }
+        }
+    }
+    assert!(compared > 10_000, "{compared} were above 0");
 }
 
 #[test]
