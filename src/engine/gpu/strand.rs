@@ -14,7 +14,7 @@ pub struct StrandTexture {
 impl StrandTexture {
     /// Uploads a table, 1 MB.
     pub fn new(gpu: &Gpu, table: &StrandTable) -> Self {
-        Self::with(gpu, SIZE.map(|n| n as u32), &table.texels())
+        Self::with(gpu, SIZE.map(|n| n as u32), table.texels())
     }
 
     /// Uploads one texel, which is bound for scenes without the strand model.

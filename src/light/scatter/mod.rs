@@ -52,6 +52,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::trace::Attenuation;
+use crate::util::powers::exp2;
 use crate::volume::VolumeTexture;
 use gain::cosine_of_row;
 use slab::Slab;
@@ -362,11 +363,10 @@ pub fn multiple(
     cell: f32,
     light: f32,
 ) -> Vec3 {
-    let exp2 = |v: Vec3| Vec3::new(v.x.exp2(), v.y.exp2(), v.z.exp2());
-    let passed = exp2(similarity.extinction * -view);
-    let weight_reduced = passed - exp2(similarity.extinction * -(view + cell));
-    let seen_reduced = exp2(similarity.extinction * -light);
-    let once = (-(view + light)).exp2() * (1.0 - (-cell).exp2());
+    let passed = (similarity.extinction * -view).map(exp2);
+    let weight_reduced = passed - (similarity.extinction * -(view + cell)).map(exp2);
+    let seen_reduced = (similarity.extinction * -light).map(exp2);
+    let once = exp2(-(view + light)) * (1.0 - exp2(-cell));
     let s = similarity.albedo * (light * std::f32::consts::LN_2);
     // Σ h_n s^(n−1)/(n−1)! by Horner's rule.
     let mut forward = Vec3::splat(peak[4] * 0.2);

@@ -30,6 +30,8 @@ pub const SIZE: [usize; 3] = [40, 48, 128];
 /// Weight w of the z axis. With w = 1 the steps of φ would grow without bound at the far side, with w = 0 at
 /// the side of the light.
 pub const SINE_SHARE: f32 = 0.75;
+/// Exponent bits of the unit of a texel whose shared exponent is 0, 2^−24.
+pub const UNIT_BITS: u32 = 127 - 24;
 /// Number of cached tables, for a slider that moves back and forth or the scenes of a gallery.
 const CACHED_TABLES: usize = 4;
 
@@ -40,8 +42,8 @@ pub struct StrandTable {
     pub squeeze: f32,
     /// v_R/2, with v_R the longitudinal variance of lobe R.
     pub spread: f32,
-    /// Texels rounded to `rgb9e5ufloat`; x runs fastest, then y.
-    texels: Vec<Vec3>,
+    /// Texels as `rgb9e5ufloat`; x runs fastest, then y.
+    texels: Vec<u32>,
     moments: OnceLock<Moments>,
 }
 
@@ -106,7 +108,7 @@ impl StrandTable {
                 let n = n[i / ny];
                 m.iter().map(move |m| {
                     let psi: DVec3 = (0..n.len()).map(|p| n[p] * m[p]).sum();
-                    unpack_rgb9e5(pack_rgb9e5(psi.as_vec3()))
+                    pack_rgb9e5(psi.as_vec3())
                 })
             })
             .collect();
@@ -114,8 +116,8 @@ impl StrandTable {
     }
 
     /// Returns the texels as `rgb9e5ufloat`; x runs fastest, then y, then z.
-    pub fn texels(&self) -> Vec<u32> {
-        self.texels.iter().map(|t| pack_rgb9e5(*t)).collect()
+    pub fn texels(&self) -> &[u32] {
+        &self.texels
     }
 
     /// Reflection Ψ of the strands alone, from the cosines t·l, t·e and l·e between unit vectors.
@@ -141,7 +143,8 @@ impl StrandTable {
         let (ix, fx) = split(position.x, nx);
         let (iy, fy) = split(position.y, ny);
         let (iz, fz) = split(position.z, nz);
-        let along_x = |i: usize| self.texels[i].lerp(self.texels[i + 1], fx);
+        let texel = |i: usize| unpack_rgb9e5(self.texels[i]);
+        let along_x = |i: usize| texel(i).lerp(texel(i + 1), fx);
         let along_y = |i: usize| along_x(i).lerp(along_x(i + nx), fy);
         let i = (iz * ny + iy) * nx + ix;
         along_y(i).lerp(along_y(i + nx * ny), fz)
@@ -207,7 +210,7 @@ fn pack_rgb9e5(rgb: Vec3) -> u32 {
 
 fn unpack_rgb9e5(word: u32) -> Vec3 {
     let bits = |shift: u32| (word >> shift & 0x1ff) as f32;
-    Vec3::new(bits(0), bits(9), bits(18)) / unit(-((word >> 27) as i32))
+    Vec3::new(bits(0), bits(9), bits(18)) * f32::from_bits(((word >> 27) + UNIT_BITS) << 23)
 }
 
 /// Factor 2^(24 + e), exact, that scales a number with the shared exponent −e to a 9-bit integer.

@@ -5,20 +5,18 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
-use glam::Vec3;
 
 use super::between::Between;
 use super::cells::{Row, Store, k_codes, rho_codes, v_codes, words};
 use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
-use super::hits::{Hits, Values};
-use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
-use super::light::{LaneLight, lanes_of};
+use super::hits::Hits;
+use super::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words};
+use super::light::LaneLight;
+use super::scatter::{Depths, LaneScatter};
+use super::strand;
 use super::walk::{BATCH, NO_CELL, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::Integrator;
-use crate::engine::cpu::integrate::light::RayScatter;
 use crate::engine::cpu::integrate::walk::Lit;
-use crate::light::scatter::media::MultipleMedium;
-use crate::light::scatter::multiple;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::lane_powers::exp2;
@@ -134,19 +132,6 @@ impl<'a, 'h> Group<'a, 'h> {
         &self.hits.values.lines[usize::from(!self.level.is_whole)]
     }
 
-    /// Terms of multiple scattering of each ray and light.
-    fn scatter(&self) -> Vec<Option<Vec<RayScatter>>> {
-        let scatter_of = |lane: usize| {
-            let Values { at, d_world, .. } = &self.hits.values;
-            let (quad, d) = (self.hits.quads[lane], d_world.get(lane));
-            self.integrator.ray_scatter(&self.integrator.sheet_hit(quad, d, at.get(lane).to_array()))
-        };
-        match self.integrator.media.is_some() {
-            true => (0..LANES).map(scatter_of).collect(),
-            false => Vec::new(),
-        }
-    }
-
     /// Walks the rays to the end of the slab, or to their own.
     #[inline(always)]
     pub fn walk<S: Simd>(&self, simd: S, scratch: &mut Scratch<'a>) -> Ends {
@@ -154,7 +139,7 @@ impl<'a, 'h> Group<'a, 'h> {
         for (i, light) in lights.iter_mut().enumerate() {
             light.reset(simd, self, i);
         }
-        let scatter = self.scatter();
+        let scatter = LaneScatter::of(self);
         let trace = &self.integrator.scene.trace;
         let mut walk = Walk::new(
             simd,
@@ -180,7 +165,7 @@ impl<'a, 'h> Group<'a, 'h> {
                     self.visibility(simd, steps, light, &mut walked);
                 }
                 for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                    self.shade(simd, steps, j, lights, &scatter);
+                    self.shade(simd, steps, j, lights, scatter.as_ref());
                 }
                 (steps.count, pending) = (0, 0);
             }
@@ -265,7 +250,7 @@ impl<'a, 'h> Group<'a, 'h> {
         steps: &Steps,
         j: usize,
         lights: &mut [LaneLight],
-        scatter: &[Option<Vec<RayScatter>>],
+        scatter: Option<&LaneScatter>,
     ) {
         let integrator = self.integrator;
         let p = &self.exponent;
@@ -279,71 +264,58 @@ impl<'a, 'h> Group<'a, 'h> {
         let e_v = self.hits.values.e_v.load(simd);
         let metric = Metric::load(simd, &self.hits.values.metric);
         let angles = Angles::new(simd, self, &metric, second, &steps.between.moments[j], e_v);
+        let of_strands = integrator.strand.as_ref().filter(|_| !self.is_mist);
+        let layers = scatter.map(|_| self.layers(&steps.passed.layers[j])).unwrap_or_default();
         for (i, light) in lights.iter_mut().enumerate() {
             let l_v = light.l_v.load(simd);
-            let visibility = light.visible[j].load(simd);
-            let fibre = match &angles {
-                Angles::Mist(psi) => *psi,
-                Angles::Many(spread) => spread.psi(k, p, l_v, light.l_dot_e.load(simd)),
-                Angles::One { v, t_dot_e, inverse_q } => {
-                    let [sin_l, base] = fibre_angles(simd, v.dot(l_v), *t_dot_e, *inverse_q);
-                    k[0] * sin_l + k[1] * p.power(simd, base.max(splat(0.0)))
+            let l_dot_e = light.l_dot_e.load(simd);
+            let visible = weight * light.visible[j].load(simd);
+            let mut lit = match of_strands {
+                Some(shading) => {
+                    let cosines = angles.cosines(l_v);
+                    strand::psi(simd, shading, k, cosines, l_dot_e).times(visible)
+                }
+                None => {
+                    let fibre = match &angles {
+                        Angles::Mist(psi) => *psi,
+                        Angles::Many(spread) => spread.psi(k, p, l_v, l_dot_e),
+                        Angles::One { v, t_dot_e, inverse_q } => {
+                            let [sin_l, base] = fibre_angles(simd, v.dot(l_v), *t_dot_e, *inverse_q);
+                            k[0] * sin_l + k[1] * p.power(simd, base.max(splat(0.0)))
+                        }
+                    };
+                    if !integrator.in_colour() {
+                        let lit = weight * fibre * light.visible[j].load(simd);
+                        let sum = light.sum.load(simd) + weight.simd_gt(0.0).select(lit, splat(0.0));
+                        light.sum.store(sum);
+                        continue;
+                    }
+                    let grey = visible * fibre * (1.0 / 255.0);
+                    Lanes3 { x: grey, y: grey, z: grey }
                 }
             };
-            if !integrator.in_colour() {
-                let lit = weight * fibre * visibility;
-                let sum = light.sum.load(simd) + weight.simd_gt(0.0).select(lit, splat(0.0));
-                light.sum.store(sum);
-                continue;
+            if let Some(scatter) = scatter {
+                let depths = Depths {
+                    view: steps.depth[j].load(simd),
+                    cell: steps.tau_bits[j].load(simd),
+                    light: light.depth[j].load(simd),
+                };
+                lit = lit.plus(scatter.more(simd, i, &layers, &depths, weight));
             }
-            let [t_dot_l, t_dot_e] = match &angles {
-                Angles::Mist(psi) => [*psi, *psi],
-                Angles::Many(spread) => spread.of_one(l_v),
-                Angles::One { v, t_dot_e, inverse_q } => {
-                    let root = inverse_q.sqrt();
-                    [v.dot(l_v) * root, *t_dot_e * root]
-                }
-            };
-            let mut values = [Stored::default(); 5];
-            for (stored, value) in values.iter_mut().zip([k[0], k[1], t_dot_l, t_dot_e, fibre]) {
-                stored.store(value);
-            }
-            self.add_colour(steps, j, &values, light, i, scatter);
+            let is_lit = Mask::from_bitmask(simd, steps.lit[j].into());
+            let colour = light.colour.load(simd);
+            let Lanes3 { x, y, z } = colour.plus(lit);
+            light.colour.store(Lanes3 {
+                x: is_lit.select(x, colour.x),
+                y: is_lit.select(y, colour.y),
+                z: is_lit.select(z, colour.z),
+            });
         }
     }
 
-    /// Adds the coloured light of the cells of step `j`. `values` are k_d, k_s, t·l, t·e, and Ψ of the fibre
-    /// model.
-    fn add_colour(
-        &self,
-        steps: &Steps,
-        j: usize,
-        values: &[Stored; 5],
-        light: &mut LaneLight,
-        i: usize,
-        scatter: &[Option<Vec<RayScatter>>],
-    ) {
-        for lane in lanes_of(steps.lit[j]) {
-            let [k_d, k_s, t_dot_l, t_dot_e, fibre] = values.map(|value| value.0[lane]);
-            let (weight, visibility) = (steps.weight[j].0[lane], light.visible[j].0[lane]);
-            let mut lit = match &self.integrator.strand {
-                Some(strand) if !self.is_mist => {
-                    strand.psi(k_d, k_s, t_dot_l, t_dot_e, light.l_dot_e.0[lane]) * (weight * visibility)
-                }
-                _ => Vec3::splat(weight * visibility * fibre * (1.0 / 255.0)),
-            };
-            let medium = self.integrator.medium_of(self.hits.quads[lane]);
-            let terms = scatter.get(lane).and_then(|scatter| Some(&scatter.as_ref()?[i]));
-            if let (Some(MultipleMedium { similarity, profile }), Some(terms)) = (medium, terms) {
-                let z = self.level.size.z - steps.passed.layers[j][lane];
-                let diffuse = profile.at(&terms.row, self.integrator.layer_in(&self.level, z));
-                let [view, cell, depth] = [&steps.depth[j], &steps.tau_bits[j], &light.depth[j]];
-                let more =
-                    multiple(similarity, &terms.peak, diffuse, view.0[lane], cell.0[lane], depth.0[lane]);
-                lit += terms.gain.truncate() * more + similarity.albedo * (terms.gain.w * weight);
-            }
-            light.colour.set(lane, light.colour.get(lane) + lit);
-        }
+    /// Layers of the whole volume, by the layers of the level before the rays leave the slab.
+    fn layers(&self, left: &[i32; LANES]) -> [u32; LANES] {
+        left.map(|left| self.integrator.layer_in(&self.level, self.level.size.z - left))
     }
 }
 
@@ -389,5 +361,18 @@ impl<S: Simd> Angles<S> {
         let least = f32x8::splat(simd, 1e-30);
         let inverse_q = f32x8::splat(simd, 1.0) / metric.squared(v).max(least);
         Angles::One { v, t_dot_e: v.dot(e_v), inverse_q }
+    }
+
+    /// Cosines of the angles between a single direction and light and eye.
+    #[inline(always)]
+    fn cosines(&self, l_v: Lanes3<S>) -> [Floats<S>; 2] {
+        match self {
+            Angles::Mist(psi) => [*psi, *psi],
+            Angles::Many(spread) => spread.of_one(l_v),
+            Angles::One { v, t_dot_e, inverse_q } => {
+                let root = inverse_q.sqrt();
+                [v.dot(l_v) * root, *t_dot_e * root]
+            }
+        }
     }
 }

@@ -19,6 +19,8 @@ mod group;
 mod hits;
 pub mod lanes;
 mod light;
+mod scatter;
+mod strand;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};
