@@ -5,6 +5,7 @@ pub mod cache;
 pub mod colour;
 pub mod error;
 pub(crate) mod lane_powers;
+pub mod lanes;
 pub mod monitor;
 pub mod open_exr;
 pub mod powers;

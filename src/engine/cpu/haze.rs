@@ -3,9 +3,9 @@
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::integrate::lockstep::lanes::{Floats, Lanes3};
-use super::integrate::lockstep::powers::exp2;
 use crate::light::haze::{EyeHaze, LEAST_X, SERIES};
+use crate::util::lane_powers::exp2;
+use crate::util::lanes::{Floats, Lanes3};
 
 /// Transmittance over `t` metres along unit directions with the y component `d_y`. See
 /// [`EyeHaze::transmittance`].

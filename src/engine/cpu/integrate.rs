@@ -2,7 +2,7 @@
 //! `shaders/engine/integrate.wgsl`, with the same operations in the same order.
 
 mod light;
-pub mod lockstep;
+mod lockstep;
 mod walk;
 
 use glam::{Vec2, Vec3};

@@ -4,12 +4,12 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::Vec3;
 
-use super::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored};
 use crate::light::environment::Irradiance;
 use crate::light::{Background, Light};
 use crate::place::Vertex;
 use crate::place::tiles::Tile;
 use crate::scene::Scene;
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored};
 
 /// Points of the opaque mesh, one a lane, with values interpolated between its vertices.
 pub struct Points<S: Simd> {

@@ -5,13 +5,13 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 use glam::Vec3;
 
-use super::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored, Words, unsigned};
-use super::integrate::lockstep::powers::exp2;
-use super::integrate::lockstep::walk::floor_cell;
 use super::opaque::{Points, background_at, fresnel, irradiance_at, light_at};
 use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface};
 use crate::mapping::FARTHEST;
 use crate::scene::Scene;
+use crate::util::lane_powers::exp2;
+use crate::util::lanes::floor_cell;
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Words, unsigned};
 
 /// Returns sin(2πt) with an error below 3e-5. It replaces WGSL's `sin`, whose error the standard leaves open.
 #[inline(always)]

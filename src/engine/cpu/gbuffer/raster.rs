@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use glam::{Vec2, Vec4};
 
 use super::edges::{Edges, HALF, Shift, span, weights};
-use crate::engine::cpu::integrate::lockstep::lanes::LANES;
+use crate::util::lanes::LANES;
 use crate::util::window::Window;
 
 /// Samples that are drawn at a time.

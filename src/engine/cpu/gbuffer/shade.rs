@@ -8,7 +8,6 @@ use glam::{Vec3, Vec4};
 use super::raster::{self, Covered, Rasteriser};
 use super::{Gbuffer, map_quad};
 use crate::engine::cpu::haze;
-use crate::engine::cpu::integrate::lockstep::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::engine::cpu::opaque::{Points, background_at};
 use crate::engine::cpu::pool;
 use crate::engine::pool_surface::{self, Surface};
@@ -18,6 +17,7 @@ use crate::picture::camera::{DepthRange, DepthToPoint};
 use crate::picture::{Camera, Image};
 use crate::place::Mesh;
 use crate::scene::{Parts, Scene};
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::util::window::Window;
 
 /// Everything that the samples of a frame share.

@@ -9,8 +9,8 @@ use fearless_simd::{f32x8, i32x8};
 use super::cells::{k_codes, rho_codes, words};
 use super::fibre::Moments;
 use super::group::Group;
-use super::lanes::{Floats, Ints, LANES, Stored, Stored3};
 use super::walk::{BATCH, Passed};
+use crate::util::lanes::{Floats, Ints, LANES, Stored, Stored3};
 use crate::volume::Cell;
 
 /// Interpolated values of a batch of steps.

@@ -3,9 +3,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
-use super::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 use super::walk::{NO_CELL, Units};
 use crate::trace::lookup::Level;
+use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 use crate::volume::{Bricks, Cell, Cells};
 
 /// Cells of `N` steps, as the walk passes them.

@@ -5,9 +5,9 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::cells::v_codes;
-use super::lanes::{Floats, Lanes3, Stored, Stored3, Words, signed};
 use crate::light::fibre::whole_exponent;
 use crate::util::lane_powers::pow;
+use crate::util::lanes::{Floats, Lanes3, Stored, Stored3, Words, signed};
 
 /// Metric of every ray; see [`crate::light::fibre::Metric`].
 #[derive(Clone, Copy)]

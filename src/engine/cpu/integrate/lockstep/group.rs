@@ -10,7 +10,6 @@ use super::between::Between;
 use super::cells::{Row, Store, k_codes, rho_codes, v_codes, words};
 use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
 use super::hits::Hits;
-use super::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words};
 use super::light::LaneLight;
 use super::scatter::{Depths, LaneScatter};
 use super::strand;
@@ -20,6 +19,7 @@ use crate::engine::cpu::integrate::walk::Lit;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::lane_powers::exp2;
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words};
 use crate::util::powers::log2;
 use crate::volume::Cell;
 

@@ -7,13 +7,12 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::{Vec2, Vec3};
 
-use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
-use super::walk::floor_cell;
 use crate::engine::cpu::integrate::Integrator;
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
 use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
 use crate::util::lane_powers::log2;
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
 
 /// Sheets of eight rays. Names and units are those of `SheetHit`.
 #[derive(Clone, Copy, Debug, Default)]

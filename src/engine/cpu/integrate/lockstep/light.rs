@@ -6,13 +6,13 @@ use fearless_simd::{f32x8, i32x8};
 
 use super::cells::{Row, rho_codes, words};
 use super::group::{Group, Steps};
-use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use super::walk::{BATCH, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::light::patch_corners;
 use crate::light::fill::Numbers;
 use crate::light::visibility::{Form, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Light, Visibility};
 use crate::util::lane_powers::{exp2, log2};
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 
 /// Terms of one light for eight rays, and what it has sent along them.
 pub struct LaneLight<'a> {

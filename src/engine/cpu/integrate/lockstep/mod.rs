@@ -17,7 +17,6 @@ mod cells;
 mod fibre;
 mod group;
 mod hits;
-pub mod lanes;
 mod light;
 mod scatter;
 mod strand;
@@ -28,12 +27,12 @@ use fearless_simd::{Simd, dispatch};
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
 use self::hits::Hits;
-use self::lanes::LANES;
 use super::walk::Lit;
 use super::{Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
 use crate::trace::lookup::Level;
+use crate::util::lanes::LANES;
 
 /// Registers that rays are walked in.
 #[derive(Clone, Copy, Debug)]

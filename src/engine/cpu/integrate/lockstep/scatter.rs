@@ -7,9 +7,9 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::group::Group;
-use super::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::light::scatter::{ORDERS, Profile, Row};
 use crate::util::lane_powers::exp2;
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 
 /// Multiple scattering of eight rays.
 pub struct LaneScatter<'a> {

@@ -4,8 +4,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 
-use super::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 use crate::light::strand::table::{SINE_SHARE, SIZE, StrandShading, StrandTable, UNIT_BITS};
+use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 
 /// Texels from the first to the last that one lookup reads.
 const SPAN: usize = SIZE[0] * SIZE[1] + SIZE[0] + 2;

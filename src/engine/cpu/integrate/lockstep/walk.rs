@@ -10,7 +10,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 use glam::IVec3;
 
-use super::lanes::{Floats, Ints, LANES, Lanes3, Mask, Stored};
+use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Mask, Stored, floor_cell};
 use crate::walk::{NEVER, PARALLEL};
 
 /// Number of steps between two looks at the cells. The cells of a row are fetched and shaded together, so
@@ -242,12 +242,4 @@ fn start_cell<S: Simd>(simd: S, x: Floats<S>, direction: Floats<S>) -> Ints<S> {
     let down = direction.simd_lt(0.0);
     let below = floor_cell(simd, down.select(-x, x));
     down.select(-below - i32x8::splat(simd, 1), below)
-}
-
-/// Largest whole number that is not above x, |x| < 2^23.
-#[inline(always)]
-pub fn floor_cell<S: Simd>(simd: S, x: Floats<S>) -> Ints<S> {
-    let whole = x.to_int::<i32x8<S>>();
-    let above = x.simd_lt(whole.to_float::<f32x8<S>>());
-    whole - above.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0))
 }

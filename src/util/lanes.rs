@@ -157,3 +157,17 @@ impl<S: Simd> Lanes3<S> {
 pub fn signed<S: Simd>(words: Words<S>) -> Ints<S> {
     words.bitcast()
 }
+
+/// Words with the same bits.
+#[inline(always)]
+pub fn unsigned<S: Simd>(ints: Ints<S>) -> Words<S> {
+    ints.bitcast()
+}
+
+/// Largest whole number that is not above x, |x| < 2^23.
+#[inline(always)]
+pub fn floor_cell<S: Simd>(simd: S, x: Floats<S>) -> Ints<S> {
+    let whole = x.to_int::<i32x8<S>>();
+    let above = x.simd_lt(whole.to_float::<f32x8<S>>());
+    whole - above.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0))
+}
