@@ -13,7 +13,7 @@ pub struct RenderOptions {
     /// Whether the frame also holds depth, texture coordinates, quads and normals.
     pub surface: bool,
     /// Numbers of the samples to render, as in [`sample_offset`]; `None` renders all of the scene's. The
-    /// radiance is their mean.
+    /// radiance is their mean. An empty range renders only the layers of `surface`.
     ///
     /// [`sample_offset`]: crate::picture::camera::sample_offset
     pub samples: Option<Range<u32>>,

@@ -133,6 +133,8 @@ pub struct State {
     pub fault: Option<String>,
     /// Time that the last volume took to build or read, seconds.
     pub volume_seconds: f64,
+    /// Number of samples of full-size pictures taken, by which tests see what is taken twice.
+    pub samples_taken: u64,
     /// Number of devices lost.
     pub devices_lost: usize,
     /// Number of exports that ended, successfully or not.

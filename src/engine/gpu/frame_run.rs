@@ -182,6 +182,9 @@ impl<'a> FrameRun<'a> {
             self.sample(window, [area, drawn], &groups, sample, frame)?;
             self.done += wanted.pixels();
         }
+        if self.samples.is_empty() {
+            return Ok(());
+        }
         let inputs = ResolveInputs {
             sums: &self.canvas.sums,
             picture: &self.canvas.picture,

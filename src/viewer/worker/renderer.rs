@@ -2,6 +2,7 @@
 
 mod export;
 mod faults;
+mod kept;
 mod watch;
 
 use std::collections::VecDeque;
@@ -9,16 +10,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use eframe::egui;
-use rayon::prelude::*;
-
 use super::{Export, MessageKind, Picture, Request, Shared, lock};
 use crate::engine::gpu::DeviceOptions;
 use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
-use crate::picture::camera::{CENTRE, sample_numbers};
-use crate::picture::resolve::develop_whole;
-use crate::picture::{AutoExposure, Frame, Image, Look};
+use crate::picture::camera::CENTRE;
+use crate::picture::{AutoExposure, Frame, Look};
 use crate::place::{Ground, Mesh};
 use crate::scene::{Cost, Scene, Values};
 use crate::util::cache::Cache;
@@ -27,6 +24,8 @@ use crate::util::monitor::Monitor;
 use crate::viewer::document::changed_keys;
 use crate::viewer::layer_image::layer_image;
 use crate::volume::VolumeTexture;
+use eframe::egui;
+use kept::{Kept, Rendered};
 
 /// Target time of a preview. With the window's own frame and the volume's upload, a preview stays under 150
 /// ms.
@@ -45,22 +44,14 @@ const BUILD_PATIENCE: Duration = Duration::from_secs(2);
 /// Size of the cache of raster passes, bytes. With it, previews skip the raster pass while the water plays or
 /// a slider of the walk moves. It holds the results of several previews, or of one picture of 1.2 times 720p.
 const RASTER_CACHE_BYTES: u64 = 48 << 20;
+/// Share of the memory budget for pictures that are valid but not in the window.
+const KEPT_SHARE: u64 = 16;
 /// Scale from which on rocks are drawn coarsely.
 const COARSE_SCALE: u32 = 3;
 /// Error of coarsely drawn rocks, pixels of the preview. See [`Image::rock_error`](crate::picture::Image).
 const COARSE_ROCK: f32 = 6.0;
 /// Scales of previews to choose from: pixels of the viewport per pixel of the preview, along one side.
 const SCALES: [u32; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
-
-/// The full-size picture that refinement continues from.
-struct Rendered {
-    scene: Arc<Scene>,
-    look: Look,
-    size: [u32; 2],
-    frame: Arc<Frame>,
-    samples: u32,
-    volume: Arc<VolumeTexture>,
-}
 
 /// Times of the last pictures, seconds per sample.
 #[derive(Default)]
@@ -82,7 +73,12 @@ pub struct Renderer {
     /// Disk cache for the mesh of the first scene. `None` once that is made.
     cache: Option<Cache>,
     mesh: Option<(Ground, Mesh)>,
+    /// The full-size picture in the window.
     rendered: Option<Rendered>,
+    /// Other pictures that are still valid.
+    kept: Kept,
+    /// Whether the last request was left for an export and is to be continued.
+    unfinished: bool,
     /// The values that the last automatic exposure was measured for, and the exposure in stops.
     exposed: Option<(Values, f32)>,
     speed: Speed,
@@ -116,6 +112,8 @@ impl Renderer {
             cache,
             mesh: None,
             rendered: None,
+            kept: Kept::default(),
+            unfinished: false,
             exposed: None,
             speed: Speed::default(),
             losses: VecDeque::new(),
@@ -136,8 +134,10 @@ impl Renderer {
                 Task::View(request) => {
                     let serial = request.serial;
                     let retry = (*request).clone();
-                    if self.attempt(|renderer| renderer.view(*request)) {
-                        // Retries on the new device or on the CPU, unless a newer request waits.
+                    let again = self.attempt(|renderer| renderer.view(*request));
+                    if std::mem::take(&mut self.unfinished) || again {
+                        // Continues after an export, or on the new device or the CPU, unless a newer request
+                        // waits.
                         let mut queue = lock(&self.shared.queue);
                         queue.view.get_or_insert(retry);
                         continue;
@@ -209,18 +209,36 @@ impl Renderer {
         };
         let look = self.exposed(&request.scene, &volume, &mesh, request.serial)?.image.look;
         let job = Job { request: &request, volume, mesh, cost, look };
-        if let Some(rendered) = self.continued(&job) {
-            self.keep(&job, rendered, true);
+        let old = self.rendered.take();
+        if let Some(rendered) = self.kept.exchange(old, &job, self.memory / KEPT_SHARE) {
+            self.continued(&job, rendered)?;
         } else {
-            self.rendered = None;
             let scale = self.preview_scale(request.size);
             self.picture(&job, scale, true)?;
             if self.superseded(request.serial, SETTLE) {
+                self.unfinished = true;
                 return Ok(());
             }
             self.enlarge(&job, scale)?;
         }
         self.refine(&job)
+    }
+
+    /// Shows a picture that the request continues.
+    fn continued(&mut self, job: &Job, mut rendered: Rendered) -> Result<()> {
+        let layer = job.request.layer;
+        if layer.of_surface() && rendered.frame.surface.is_none() {
+            // Only the raster pass is run: the rays of the picture stay as they are.
+            match self.render(job, 1, CENTRE..CENTRE, "preview") {
+                Ok(frame) => rendered.set_surface(frame.surface),
+                Err(e) => {
+                    self.rendered = Some(rendered);
+                    return Err(e);
+                }
+            }
+        }
+        self.keep(job, rendered, true);
+        Ok(())
     }
 
     /// Renders pictures of growing size, from a preview's `scale` to full size.
@@ -236,66 +254,40 @@ impl Renderer {
         Ok(())
     }
 
-    /// Adds samples to the full-size picture, until it has as many as requested.
+    /// Adds samples to the full-size picture, until it has as many as requested. Samples that are finished
+    /// stay when the work is interrupted.
     fn refine(&mut self, job: &Job) -> Result<()> {
-        let request = job.request;
-        while let Some(samples) = self.rendered.as_ref().map(|r| r.samples)
-            && samples < request.samples
+        let most = job.request.samples;
+        // A GPU takes all samples of a step in one go, because each reading back costs time.
+        let at_once = if matches!(self.engine, Some(Engine::Gpu { .. })) { u32::MAX } else { 1 };
+        while let Some(rendered) = &mut self.rendered
+            && rendered.samples < most
         {
-            let (kept, samples) = next_step(samples, request.samples);
-            let first = sample_numbers(&Image { samples, ..request.scene.image }).start;
-            let part = self.render(job, 1, first + kept..first + samples, "refining")?;
-            if let Some(rendered) = self.rendered.take() {
-                let mut frame = rendered.frame;
-                add(Arc::make_mut(&mut frame), kept, &part, samples - kept, &job.look);
-                self.keep(job, Rendered { frame, samples, ..rendered }, false);
+            let fork = rendered.fork(most);
+            let numbers = rendered.next_samples(most, at_once);
+            fork.into_iter().for_each(|old| self.kept.put(old));
+            if self.superseded(job.request.serial, Duration::ZERO) {
+                self.unfinished = true;
+                return Ok(());
+            }
+            let part = self.render(job, 1, numbers.clone(), "refining")?;
+            if let Some(mut rendered) = self.rendered.take() {
+                match rendered.add(part, numbers, most) {
+                    true => self.keep(job, rendered, false),
+                    false => self.rendered = Some(rendered),
+                }
             }
         }
         Ok(())
-    }
-
-    /// Takes the last full-size picture if the request only continues it: with more samples, another layer,
-    /// or other `image.` values such as the tone.
-    fn continued(&mut self, job: &Job) -> Option<Rendered> {
-        let Job { request, volume, look, .. } = job;
-        let old = self.rendered.take()?;
-        let same = old.size == request.size
-            && Arc::ptr_eq(&old.volume, volume)
-            && (!request.layer.of_surface() || old.frame.surface.is_some())
-            && old.scene.image.filter == request.scene.image.filter
-            && old.scene.image.rock_error == request.scene.image.rock_error
-            && old.samples <= request.samples.max(1)
-            && changed_keys(old.scene.written(), request.scene.written())
-                .iter()
-                .all(|key| key.starts_with("image."))
-            && old.scene.name == request.scene.name;
-        if !same {
-            return None;
-        }
-        let mut frame = old.frame;
-        if old.look != *look {
-            develop_whole(Arc::make_mut(&mut frame), look);
-        }
-        Some(Rendered { scene: request.scene.clone(), look: *look, frame, ..old })
     }
 
     /// Renders and shows the sample at the pixels' centres at 1/`scale` of the size.
     fn picture(&mut self, job: &Job, scale: u32, first: bool) -> Result<()> {
         let frame =
             self.render(job, scale, CENTRE..CENTRE + 1, if first { "preview" } else { "refining" })?;
-        let frame = Arc::new(frame);
-        if scale == 1 {
-            let rendered = Rendered {
-                scene: job.request.scene.clone(),
-                look: job.look,
-                size: job.request.size,
-                frame,
-                samples: 1,
-                volume: job.volume.clone(),
-            };
-            self.keep(job, rendered, first);
-        } else {
-            self.show(job, frame, scale, 1, first);
+        match scale {
+            1 => self.keep(job, Rendered::first(job, frame), first),
+            _ => self.show(job, Arc::new(frame), scale, 1, first),
         }
         Ok(())
     }
@@ -364,9 +356,15 @@ impl Renderer {
         };
         let clock = Instant::now();
         let mut frame = self.run_engine(&scene, &job.volume, &job.mesh, &options, &watch)?;
+        if scale == 1 {
+            lock(&self.shared.state).samples_taken += samples.len() as u64;
+        }
         let s = &mut frame.seconds;
         let pixel_seconds = s.integrate + s.resolve + s.readback;
         let other_seconds = clock.elapsed().as_secs_f64() - pixel_seconds - s.pipelines - s.upload;
+        if samples.is_empty() {
+            return Ok(frame);
+        }
         let samples = samples.len() as f64;
         self.speed.per_pixel = Some(pixel_seconds / samples / (width as f64 * height as f64));
         // A picture whose raster pass came from the cache does not tell how long the next one takes.
@@ -462,36 +460,4 @@ struct Job<'a> {
     cost: Cost,
     /// The scene's look, including the automatic exposure.
     look: Look,
-}
-
-/// Returns how many of `samples` samples the next picture keeps on the way to `most`, and how many it has.
-///
-/// Each step doubles the number of samples, so that the last one takes half of the time. A picture has the
-/// samples that a render of their number has. These continue fewer samples only if both numbers are even or
-/// odd, so the step from one to the other keeps none.
-fn next_step(samples: u32, most: u32) -> (u32, u32) {
-    if samples % 2 == most % 2 { (samples, most.min(2 * samples + samples % 2)) } else { (0, samples + 1) }
-}
-
-/// Merges `part`, the mean of `more` samples, into `sum`, the mean of `samples`. If that is 0, `part`
-/// replaces everything but the layers.
-fn add(sum: &mut Frame, samples: u32, part: &Frame, more: u32, look: &Look) {
-    if samples == 0 {
-        sum.radiance.copy_from_slice(&part.radiance);
-        sum.counts.copy_from_slice(&part.counts);
-        sum.alpha.clone_from(&part.alpha);
-        sum.seconds = part.seconds;
-        return develop_whole(sum, look);
-    }
-    let share = more as f32 / (samples + more) as f32;
-    sum.radiance
-        .par_iter_mut()
-        .zip(&part.radiance)
-        .for_each(|(a, b)| *a = [0, 1, 2, 3].map(|c| a[c] + (b[c] - a[c]) * share));
-    if let (Some(sum), Some(part)) = (&mut sum.alpha, &part.alpha) {
-        sum.par_iter_mut().zip(part).for_each(|(a, b)| *a += (b - *a) * share);
-    }
-    sum.counts.par_iter_mut().zip(&part.counts).for_each(|(a, b)| *a = [a[0] + b[0], a[1] + b[1]]);
-    sum.seconds = part.seconds;
-    develop_whole(sum, look);
 }

@@ -5,6 +5,7 @@ mod costs;
 mod files;
 mod hand;
 mod handles;
+mod kept;
 mod lights;
 mod lobes;
 mod look;
