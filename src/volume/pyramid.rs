@@ -24,7 +24,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
@@ -278,6 +278,10 @@ struct Mean {
 
 impl Mean {
     fn of(cell: Cell) -> Self {
+        // An empty cell has no weight, so what it reflects is not decoded.
+        if cell.rho_code() == 0 {
+            return Mean::default();
+        }
         let (k_d, k_s) = cell.k_codes();
         let moments = Moments::of(cell.v());
         Mean {
@@ -315,15 +319,17 @@ fn parts(fine: u32, coarse: u32, i: u32) -> (u32, [f64; 3]) {
 /// of a finer cell along z, in bits per unit of its ρ code, and `cell_at` gives a finer cell by its linear
 /// index.
 fn halved(fine: [u32; 3], coarse: [u32; 3], depth: f64, cell_at: impl Fn(usize) -> Mean + Sync) -> Vec<Mean> {
+    let along = [0, 1, 2]
+        .map(|axis| (0..coarse[axis]).map(|i| parts(fine[axis], coarse[axis], i)).collect::<Vec<_>>());
     let [nx, ny, nz] = coarse.map(|n| n as usize);
-    (0..nx * ny * nz)
-        .into_par_iter()
-        .map(|i| {
-            let at = UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32).to_array();
-            let along = [0, 1, 2].map(|axis| parts(fine[axis], coarse[axis], at[axis]));
-            mean_of_parts(fine, along, depth, &cell_at)
-        })
-        .collect()
+    let mut means = vec![Mean::default(); nx * ny * nz];
+    means.par_chunks_mut(nx).enumerate().for_each(|(row, means)| {
+        let (y, z) = (along[1][row % ny], along[2][row / ny]);
+        for (mean, &x) in means.iter_mut().zip(&along[0]) {
+            *mean = mean_of_parts(fine, [x, y, z], depth, &cell_at);
+        }
+    });
+    means
 }
 
 /// Computes one coarse cell from the finer cells that it stands for, given along x, y and z as [`parts`]
@@ -341,6 +347,9 @@ fn mean_of_parts(
             for (z, wz) in (z0..).zip(zs).filter(|part| part.1 > 1e-9) {
                 let index = (z as usize * fine[1] as usize + y as usize) * fine[0] as usize + x as usize;
                 let cell = cell_at(index);
+                if cell.rho == 0.0 {
+                    continue;
+                }
                 let weight = cell.rho * wx * wy * wz;
                 column += cell.rho * wz;
                 sum.rho += weight;
@@ -348,7 +357,8 @@ fn mean_of_parts(
                 sum.diagonal += cell.diagonal * weight;
                 sum.mixed += cell.mixed * weight;
             }
-            passed += wx * wy * (-column * depth).exp2();
+            let through = if column == 0.0 { 1.0 } else { (-column * depth).exp2() };
+            passed += wx * wy * through;
             area += wx * wy;
         }
     }
