@@ -22,7 +22,7 @@ pub struct RenderOptions {
     /// Part of the image to render, in pixels; `None` renders the whole image. It must lie inside the image.
     /// The frame has the window's size and equals the same part of the whole image's frame bit for bit.
     pub window: Option<Window>,
-    /// Bytes of device memory for results of the raster pass that later frames may reuse.
+    /// Bytes of memory, on a GPU the device's, for results of the raster pass that later frames may reuse.
     pub keep_rasters: u64,
     /// Whether rays leap over boxes of empty cells.
     pub leaps: Leaps,

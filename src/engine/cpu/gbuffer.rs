@@ -6,6 +6,8 @@ mod projection;
 mod raster;
 mod shade;
 
+use std::sync::OnceLock;
+
 use fearless_simd::{Level, dispatch};
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;
@@ -18,11 +20,11 @@ use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::util::window::Window;
 use projection::Projection;
-pub use raster::SAMPLES;
-use raster::{Covered, Grid, Rasteriser, Shifts};
-use shade::{Shading, Which};
+use raster::{Covered, Grid, Rasteriser, SAMPLES, Shifts};
+use shade::{PoolPixel, Shading, Which};
 
 /// The targets of one sample of a window of the image, row by row.
+#[derive(Clone)]
 pub struct Gbuffer {
     /// The window, pixels.
     pub window: Window,
@@ -38,6 +40,8 @@ pub struct Gbuffer {
     pub surface: Vec<[f32; 3]>,
     /// Number of each quad under a pixel plus 1; 0: none. Ordered as `surface`.
     pub quad_id: Vec<u32>,
+    /// Pixels that show a pool.
+    pools: Vec<PoolPixel>,
 }
 
 impl Gbuffer {
@@ -50,6 +54,7 @@ impl Gbuffer {
             layers: overlap::sheets(scene) as usize,
             surface: Vec::new(),
             quad_id: Vec::new(),
+            pools: Vec::new(),
         }
     }
 
@@ -109,8 +114,7 @@ pub fn run_on(simd: Level, scene: &Scene, mesh: &Mesh, window: Window, sample: u
         .for_each_init(
             || Canvas::empty(scene),
             |canvas, (i, (((opaque, normal), surface), quad_id))| {
-                drawing.cover(i, 0, canvas);
-                let drawn = drawing.shade(i, 0, canvas);
+                let drawn = drawing.sample(i, 0, canvas);
                 opaque.copy_from_slice(&drawn.opaque);
                 normal.copy_from_slice(&drawn.normal);
                 surface.copy_from_slice(&drawn.surface);
@@ -118,6 +122,21 @@ pub fn run_on(simd: Level, scene: &Scene, mesh: &Mesh, window: Window, sample: u
             },
         );
     out
+}
+
+/// Shades the pools in the drawn bands of a window again, of which nothing but the waves has changed.
+pub fn shade_pools(scene: &Scene, mesh: &Mesh, sample: u32, bands: &mut [OnceLock<Gbuffer>]) {
+    let shading = Shading::new(scene, mesh, &scene.depth_range(mesh));
+    let (simd, offset) = (Level::new(), sample_offset(&scene.image, sample));
+    bands.par_iter_mut().filter_map(OnceLock::get_mut).for_each(|band| {
+        dispatch!(simd, simd => shading.pools(simd, offset, band));
+    });
+}
+
+/// Rows of a window that are drawn at a time.
+pub fn band_rows(window: Window) -> u32 {
+    let bands = BANDS_A_THREAD * rayon::current_num_threads() as u32;
+    window.height.div_ceil(bands).clamp(BAND_ROWS[1], BAND_ROWS[0])
 }
 
 /// Most and least rows of a window that are drawn at a time.
@@ -139,6 +158,8 @@ pub struct Drawing<'a> {
 
 /// Memory that every band uses again.
 pub struct Canvas {
+    /// Band and first sample that are drawn.
+    covered: Option<(usize, usize)>,
     rock: Vec<Covered>,
     water: Vec<Covered>,
     targets: Gbuffer,
@@ -147,7 +168,7 @@ pub struct Canvas {
 impl Canvas {
     /// Memory for bands of a scene.
     pub fn empty(scene: &Scene) -> Self {
-        Canvas { rock: Vec::new(), water: Vec::new(), targets: Gbuffer::empty(scene) }
+        Canvas { covered: None, rock: Vec::new(), water: Vec::new(), targets: Gbuffer::empty(scene) }
     }
 }
 
@@ -155,9 +176,7 @@ impl<'a> Drawing<'a> {
     /// Projects the triangles of a window inside the image for samples, given by their numbers.
     pub fn new(simd: Level, scene: &'a Scene, mesh: &'a Mesh, window: Window, samples: &[u32]) -> Self {
         let offsets: Vec<[f32; 2]> = samples.iter().map(|&s| sample_offset(&scene.image, s)).collect();
-        let bands = BANDS_A_THREAD * rayon::current_num_threads() as u32;
-        let rows = window.height.div_ceil(bands).clamp(BAND_ROWS[1], BAND_ROWS[0]);
-        let grid = Grid::new(window, rows, &offsets);
+        let grid = Grid::new(window, band_rows(window), &offsets);
         let depth = scene.depth_range(mesh);
         let projection = Projection::new(scene, &depth, &grid);
         let rock = Rasteriser::new(projection.rock(mesh), &grid);
@@ -165,22 +184,23 @@ impl<'a> Drawing<'a> {
         Drawing { simd, grid, offsets, rock, water, shading: Shading::new(scene, mesh, &depth) }
     }
 
-    /// Returns the number of bands.
-    pub fn bands(&self) -> usize {
-        self.grid.bands()
-    }
-
-    /// Returns the number of rows of all bands but the last, which may have fewer.
-    pub fn rows(&self) -> usize {
-        self.grid.rows as usize
+    /// Returns the targets of band number `i` for one of the samples. Triangles are drawn for [`SAMPLES`] of
+    /// them at a time, so the next ones should be asked for next.
+    pub fn sample<'c>(&self, i: usize, sample: usize, canvas: &'c mut Canvas) -> &'c Gbuffer {
+        let first = sample - sample % SAMPLES;
+        if canvas.covered != Some((i, first)) {
+            self.cover(i, first, canvas);
+            canvas.covered = Some((i, first));
+        }
+        self.shade(i, sample, canvas)
     }
 
     /// Draws the triangles of band number `i` for the samples from number `first` on, [`SAMPLES`] of them
     /// unless fewer are left.
-    pub fn cover(&self, i: usize, first: usize, canvas: &mut Canvas) {
+    fn cover(&self, i: usize, first: usize, canvas: &mut Canvas) {
         let samples = &self.offsets[first..self.offsets.len().min(first + SAMPLES)];
         let shifts = Shifts::new(samples);
-        let Canvas { rock, water, targets } = canvas;
+        let Canvas { rock, water, targets, .. } = canvas;
         rock.clear();
         rock.resize(samples.len() * self.grid.band(i).pixels() as usize, (0.0, 0));
         dispatch!(self.simd, simd => self.rock.draw(simd, i, &self.grid, &shifts, rock, 1));
@@ -195,12 +215,13 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Shades one of the samples that [`Drawing::cover`] has drawn last in the band, and returns its targets.
-    pub fn shade<'c>(&self, i: usize, sample: usize, canvas: &'c mut Canvas) -> &'c Gbuffer {
-        let Canvas { rock, water, targets } = canvas;
+    /// Shades one of the samples that [`Drawing::cover`] has drawn last in the band.
+    fn shade<'c>(&self, i: usize, sample: usize, canvas: &'c mut Canvas) -> &'c Gbuffer {
+        let Canvas { rock, water, targets, .. } = canvas;
         targets.resize(self.grid.band(i));
         targets.surface.fill([0.0; 3]);
         targets.quad_id.fill(0);
+        targets.pools.clear();
         let first = sample - sample % SAMPLES;
         let count = SAMPLES.min(self.offsets.len() - first);
         let sample = Which { index: sample - first, count, offset: self.offsets[sample] };

@@ -7,17 +7,20 @@ pub mod integrate;
 pub mod opaque;
 pub mod pixels;
 pub mod pool;
+pub mod rasters;
 pub mod ray;
 pub mod visibility;
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use gbuffer::{Canvas, Drawing, Gbuffer, SAMPLES};
+use fearless_simd::Level;
+use gbuffer::{Canvas, Drawing, Gbuffer};
 pub use pixels::render_pixels;
+use rasters::{Bands, is_drawn};
 pub use visibility::LightVolumeCache;
 
 use crate::engine::options::RenderOptions;
@@ -76,6 +79,7 @@ pub fn render_with(
     let clock = Instant::now();
     let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;
     seconds.visibility = clock.elapsed().as_secs_f64();
+    light_volumes.rasters.begin();
     let total = window.pixels() * samples.len() as u64;
     let done = AtomicU64::new(0);
     let rows = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);
@@ -86,14 +90,21 @@ pub fn render_with(
         // Layers lie at the pixels' centres, where the picture need not have a sample.
         let only_layers = frame.surface.is_some() && !samples.contains(&CENTRE);
         let numbers: Vec<u32> = only_layers.then_some(CENTRE).into_iter().chain(samples.clone()).collect();
+        // Nothing between here and the first row can be stopped.
+        monitor.progress("pixels", done.load(Ordering::Relaxed), total)?;
         let clock = Instant::now();
-        let drawing = Drawing::new(fearless_simd::Level::new(), scene, mesh, band, &numbers);
+        let rasters = &mut light_volumes.rasters;
+        let mut kept_of = |&sample: &u32| rasters.get(scene, mesh, band, sample, options.keep_rasters);
+        let kept: Vec<Option<Arc<Bands>>> = numbers.iter().map(&mut kept_of).collect();
+        let is_drawn = kept.iter().all(|bands| bands.as_ref().is_some_and(|bands| is_drawn(bands)));
+        let drawing = (!is_drawn).then(|| Drawing::new(Level::new(), scene, mesh, band, &numbers));
         seconds.gbuffer += clock.elapsed().as_secs_f64();
         let surface = Mutex::new(frame.surface.as_mut());
-        let part = width * drawing.rows();
+        let rows = gbuffer::band_rows(band);
+        let part = width * rows as usize;
         let uncovered: Vec<&mut [f32]> = match &mut frame.alpha {
             Some(alpha) => alpha[pixels.clone()].chunks_mut(part).collect(),
-            None => (0..drawing.bands()).map(|_| <&mut [f32]>::default()).collect(),
+            None => (0..band.height.div_ceil(rows)).map(|_| <&mut [f32]>::default()).collect(),
         };
         // Rows are integrated as soon as they are drawn, while their targets are in the caches.
         let clock = Instant::now();
@@ -108,15 +119,21 @@ pub fn render_with(
                 |(canvas, walker), (i, ((radiance, counts), uncovered))| {
                     for (k, &sample) in numbers.iter().enumerate() {
                         let clock = Instant::now();
-                        if k % SAMPLES == 0 {
-                            drawing.cover(i, k, canvas);
-                        }
-                        let gbuffer = drawing.shade(i, k, canvas);
+                        let place = kept[k].as_ref().map(|bands| &bands[i]);
+                        let gbuffer = match (place.and_then(OnceLock::get), &drawing) {
+                            (Some(known), _) => known,
+                            (None, Some(drawing)) => {
+                                let drawn = drawing.sample(i, k, canvas);
+                                place.map_or(drawn, |place| place.get_or_init(|| drawn.clone()))
+                            }
+                            (None, None) => continue,
+                        };
                         if sample == CENTRE
                             && let Some(surface) = surface.lock().unwrap_or_else(|e| e.into_inner()).as_mut()
                         {
                             set_surface(surface, scene, gbuffer, first + i * part);
                         }
+                        monitor.progress("pixels", done.load(Ordering::Relaxed), total)?;
                         let drawn = clock.elapsed();
                         nanoseconds[0].fetch_add(drawn.as_nanos() as u64, Ordering::Relaxed);
                         if !samples.contains(&sample) {
@@ -149,6 +166,10 @@ pub fn render_with(
     }
     if let Some(surface) = &mut frame.surface {
         surface.set_planar(&scene.camera, image, window);
+    }
+    if samples.is_empty() {
+        frame.seconds = seconds;
+        return Ok(frame);
     }
     if samples.is_empty() {
         frame.seconds = seconds;

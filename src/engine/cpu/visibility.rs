@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::rasters::Rasters;
 use crate::light::fill::{Numbers, Rows};
 use crate::light::visibility::{LightVolume, LightVolumes};
 use crate::trace::Lookup;
@@ -15,8 +16,10 @@ use crate::volume::{Leaps, Levels, LevelsCache};
 /// Cells of all light volumes that are filled together. Threads wait for one another once for each such lot.
 const CELLS_AT_ONCE: usize = 1 << 22;
 
-/// The light volumes of the last frame, and the volume's levels.
+/// The light volumes of the last frame, the volume's levels, and results of the raster pass.
 pub struct LightVolumeCache {
+    /// Results of the raster pass.
+    pub rasters: Box<Rasters>,
     /// Levels of the last volume.
     pub levels: LevelsCache,
     last: Option<FilledCache>,
@@ -25,7 +28,11 @@ pub struct LightVolumeCache {
 impl Default for LightVolumeCache {
     /// Keeps nothing yet. Rays in lockstep do not leap, so empty cells hold no boxes.
     fn default() -> Self {
-        LightVolumeCache { levels: LevelsCache::with_leaps(Leaps::Never), last: None }
+        LightVolumeCache {
+            rasters: Box::default(),
+            levels: LevelsCache::with_leaps(Leaps::Never),
+            last: None,
+        }
     }
 }
 

@@ -114,14 +114,13 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
 fn hits(rng: &mut Pcg64Mcg, scene: &Scene, size: [u32; 3]) -> Gbuffer {
     let layers = scene.trace.layers as usize;
     let pixels = (SIZE[0] * SIZE[1]) as usize;
-    let mut gbuffer = Gbuffer {
-        window: Window::whole(SIZE),
-        opaque: vec![[0.2, 0.3, 0.4, 7.0]; pixels],
-        normal: vec![Vec4::new(0.0, 0.0, 1.0, 0.25); pixels],
-        layers,
-        surface: vec![[0.0; 3]; pixels * layers],
-        quad_id: vec![0; pixels * layers],
-    };
+    let mut gbuffer = Gbuffer::empty(scene);
+    gbuffer.window = Window::whole(SIZE);
+    gbuffer.opaque = vec![[0.2, 0.3, 0.4, 7.0]; pixels];
+    gbuffer.normal = vec![Vec4::new(0.0, 0.0, 1.0, 0.25); pixels];
+    gbuffer.layers = layers;
+    gbuffer.surface = vec![[0.0; 3]; pixels * layers];
+    gbuffer.quad_id = vec![0; pixels * layers];
     for pixel in 0..pixels {
         for layer in 0..rng.random_range(0..=layers) {
             let at = pixel * layers + layer;

@@ -9,6 +9,7 @@ pub mod layers;
 pub mod lockstep;
 pub mod long_walks;
 pub mod overlap;
+pub mod rasters;
 pub mod ray;
 pub mod shaders;
 pub mod specialise;

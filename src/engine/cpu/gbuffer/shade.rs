@@ -55,6 +55,25 @@ struct Pixels {
     depth: Stored,
 }
 
+/// Up to eight points of the opaque mesh, one a lane.
+struct Spots {
+    /// Number of the tile, and the place there in squares of its grid.
+    tiles: [u32; LANES],
+    places: [[f32; LANES]; 2],
+    /// Reversed depth.
+    depth: Stored,
+}
+
+/// A pixel under which a pool is seen: what its shading needs besides the waves, which move.
+#[derive(Clone, Copy)]
+pub struct PoolPixel {
+    /// Index of the pixel in its band.
+    index: u32,
+    tile: u32,
+    place: [f32; 2],
+    depth: f32,
+}
+
 /// Radiance with the metres from the eye, and normal with the share of a backdrop that shows.
 struct Seen<S: Simd> {
     opaque: (Lanes3<S>, Floats<S>),
@@ -92,27 +111,71 @@ impl<'a> Shading<'a> {
         for first in (0..out.opaque.len()).step_by(LANES) {
             let count = LANES.min(out.opaque.len() - first);
             let pixels = Pixels::new(out.window, first, count, covered, sample);
-            let at = self.image_points(simd, &pixels, sample.offset);
+            let at = self.image_points(simd, &pixels.at, sample.offset);
             let is_rock = !u32x8::load_array(simd, pixels.ids).simd_eq(0);
-            let seen = match (is_rock.any_true(), is_rock.all_true()) {
-                (false, _) => self.background(simd, at, is_rock),
-                (true, true) => self.rock(simd, rock, &pixels, at, sample),
-                (true, false) => {
-                    let near = self.rock(simd, rock, &pixels, at, sample);
-                    let far = self.background(simd, at, is_rock);
-                    near.or(far, is_rock)
-                }
+            let seen = if is_rock.any_true() {
+                let spots = Spots::new(simd, rock, &pixels, sample);
+                self.keep_pools(&spots, &pixels, first, count, &mut out.pools);
+                let near = self.rock(simd, &spots, at);
+                if is_rock.all_true() { near } else { near.or(self.background(simd, at, is_rock), is_rock) }
+            } else {
+                self.background(simd, at, is_rock)
             };
             seen.store(&mut out.opaque[first..first + count], &mut out.normal[first..first + count]);
         }
     }
 
-    /// The points of the image under the samples.
+    /// Shades the pools of a band again, of which nothing but the waves has changed.
     #[inline(always)]
-    fn image_points<S: Simd>(&self, simd: S, pixels: &Pixels, offset: [f32; 2]) -> [Floats<S>; 2] {
+    pub fn pools<S: Simd>(&self, simd: S, offset: [f32; 2], out: &mut Gbuffer) {
+        let width = out.window.width;
+        for pixels in out.pools.chunks(LANES) {
+            let mut at = [[0; LANES]; 2];
+            let mut spots = Spots { tiles: [0; LANES], places: [[0.0; LANES]; 2], depth: Stored::default() };
+            for lane in 0..LANES {
+                let PoolPixel { index, tile, place, depth } = pixels[lane.min(pixels.len() - 1)];
+                [at[0][lane], at[1][lane]] = [out.window.x + index % width, out.window.y + index / width];
+                (spots.tiles[lane], spots.depth.0[lane]) = (tile, depth);
+                [spots.places[0][lane], spots.places[1][lane]] = place;
+            }
+            let (mut opaque, mut normal) = ([[0.0; 4]; LANES], [Vec4::ZERO; LANES]);
+            self.rock(simd, &spots, self.image_points(simd, &at, offset)).store(&mut opaque, &mut normal);
+            for (lane, pixel) in pixels.iter().enumerate() {
+                out.opaque[pixel.index as usize] = opaque[lane];
+                out.normal[pixel.index as usize] = normal[lane];
+            }
+        }
+    }
+
+    /// Notes which pixels show a pool.
+    #[inline(always)]
+    fn keep_pools(
+        &self,
+        spots: &Spots,
+        pixels: &Pixels,
+        first: usize,
+        count: usize,
+        pools: &mut Vec<PoolPixel>,
+    ) {
+        if self.pools.is_empty() {
+            return;
+        }
+        for lane in (0..count).filter(|&lane| pixels.ids[lane] != 0) {
+            let tile = spots.tiles[lane];
+            if self.mesh.tiles[tile as usize].pool > 0 {
+                let place = [spots.places[0][lane], spots.places[1][lane]];
+                let index = (first + lane) as u32;
+                pools.push(PoolPixel { index, tile, place, depth: spots.depth.0[lane] });
+            }
+        }
+    }
+
+    /// The points of the image under the samples of pixels, given by their columns and rows.
+    #[inline(always)]
+    fn image_points<S: Simd>(&self, simd: S, pixels: &[[u32; LANES]; 2], offset: [f32; 2]) -> [Floats<S>; 2] {
         let Image { width, height, .. } = self.scene.image;
         let splat = |x: f32| f32x8::splat(simd, x);
-        let [x, y] = [u32x8::load_array(simd, pixels.at[0]), u32x8::load_array(simd, pixels.at[1])];
+        let [x, y] = [u32x8::load_array(simd, pixels[0]), u32x8::load_array(simd, pixels[1])];
         let [x, y]: [f32x8<S>; 2] = [x.to_float(), y.to_float()];
         [
             splat(2.0) * (x + splat(offset[0])) / splat(width as f32) - splat(1.0),
@@ -155,26 +218,17 @@ impl<'a> Shading<'a> {
     /// Radiance, metres from the eye, and normal of the opaque points under the samples. Of a holdout in a
     /// picture with alpha, only the haze in front of it has a radiance. Lanes without rock get any values.
     #[inline(always)]
-    fn rock<S: Simd>(
-        &self,
-        simd: S,
-        rock: &Rasteriser,
-        pixels: &Pixels,
-        at: [Floats<S>; 2],
-        sample: Which,
-    ) -> Seen<S> {
+    fn rock<S: Simd>(&self, simd: S, spots: &Spots, at: [Floats<S>; 2]) -> Seen<S> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let scene = self.scene;
-        let triangles = pixels.triangles();
-        let places = rock.places(simd, &triangles, &pixels.at, sample.shift());
-        let position = self.points(simd, at, pixels.depth.load(simd));
+        let position = self.points(simd, at, spots.depth.load(simd));
         let mut tiles = [&self.mesh.tiles[0]; LANES];
         let mut holes = [0u32; LANES];
         for lane in 0..LANES {
-            tiles[lane] = &self.mesh.tiles[Rasteriser::piece_of(triangles[lane]) as usize];
+            tiles[lane] = &self.mesh.tiles[spots.tiles[lane] as usize];
             holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
         }
-        let points = Points::at(simd, &self.mesh.vertices, tiles, &places, position);
+        let points = Points::at(simd, &self.mesh.vertices, tiles, &spots.places, position);
         let (mut radiance, mut distance, mut normal) = points.shade(simd, scene, self.shadow_light);
         let mut of_pools = [0u32; LANES];
         for number in 0..self.pools.len() as u32 {
@@ -283,6 +337,20 @@ impl Pixels {
             }
         }
         out
+    }
+}
+
+impl Spots {
+    /// Finds the points that samples of pixels see. Pixels without rock get any.
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, rock: &Rasteriser, pixels: &Pixels, sample: Which) -> Self {
+        let triangles = pixels.triangles();
+        let places = rock.places(simd, &triangles, &pixels.at, sample.shift());
+        let mut tiles = [0; LANES];
+        for lane in 0..LANES {
+            tiles[lane] = Rasteriser::piece_of(triangles[lane]);
+        }
+        Spots { tiles, places, depth: pixels.depth }
     }
 }
 
