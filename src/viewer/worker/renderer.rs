@@ -361,7 +361,9 @@ impl Renderer {
         }
         let s = &mut frame.seconds;
         let pixel_seconds = s.integrate + s.resolve + s.readback;
-        let other_seconds = clock.elapsed().as_secs_f64() - pixel_seconds - s.pipelines - s.upload;
+        // A smaller picture would not save these.
+        let unscaled = s.pipelines + s.upload + s.visibility;
+        let other_seconds = clock.elapsed().as_secs_f64() - pixel_seconds - unscaled;
         if samples.is_empty() {
             return Ok(frame);
         }
