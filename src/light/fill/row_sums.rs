@@ -40,8 +40,17 @@ struct Steps {
     y: [usize; TAPS],
     z: [usize; TAPS],
     weight: [f32; TAPS],
-    /// Number of steps.
-    count: usize,
+}
+
+/// The light ray from every cell.
+struct Ray {
+    steps: Vec<Steps>,
+    /// Number of cells on the ray from a cell of each layer.
+    counts: Vec<usize>,
+    /// Bits of transmittance per unit of depth.
+    bits: f32,
+    /// Whether empty cells have values.
+    everywhere: bool,
 }
 
 /// ρ codes of a level, row by row. Each row goes on into the next copy of the volume, far enough for a block
@@ -139,7 +148,7 @@ impl Codes {
         let [nx, ny, nz] = self.size;
         let within = |offset: i32, n: usize| i64::from(offset).rem_euclid(n as i64) as usize;
         let steps_of = |taps: &[Tap]| {
-            let mut steps = Steps { count: taps.len(), ..Default::default() };
+            let mut steps = Steps::default();
             for (i, Tap { offset, weight }) in taps.iter().enumerate() {
                 steps.x[i] = within(offset.x, nx);
                 steps.y[i] = within(offset.y, ny) * self.stride;
@@ -148,43 +157,36 @@ impl Codes {
             }
             steps
         };
-        // The steps from a layer end where the ray leaves the volume.
+        // From a layer, the ray is in the volume for so many cells.
         let inside = |z: usize, tap: &Tap| (0..nz as i64).contains(&(z as i64 + i64::from(tap.offset.z)));
-        let steps_from = |z: usize| {
-            let taps = &taps[..taps.partition_point(|tap| inside(z, tap))];
-            taps.chunks(TAPS).map(steps_of).collect()
+        let count = |z: usize| taps.partition_point(|tap| inside(z, tap));
+        let ray = Ray {
+            steps: taps.chunks(TAPS).map(steps_of).collect(),
+            counts: (0..nz).map(count).collect(),
+            bits,
+            everywhere,
         };
-        let steps: Vec<Vec<Steps>> = (0..nz).map(steps_from).collect();
         let mut numbers = vec![T::default(); nx * ny * nz];
         numbers.par_chunks_mut(nx * ROWS).enumerate().for_each(|(chunk, numbers)| {
-            dispatch!(simd, simd => self.rows(simd, chunk * ROWS, &steps, bits, everywhere, numbers));
+            dispatch!(simd, simd => self.rows(simd, chunk * ROWS, &ray, numbers));
         });
         numbers
     }
 
     /// Values of some rows, beginning with row `first`.
     #[inline(always)]
-    fn rows<S: Simd, T: Number>(
-        &self,
-        simd: S,
-        first: usize,
-        steps: &[Vec<Steps>],
-        bits: f32,
-        everywhere: bool,
-        numbers: &mut [T],
-    ) {
-        let [nx, ny, _] = self.size;
+    fn rows<S: Simd, T: Number>(&self, simd: S, first: usize, ray: &Ray, numbers: &mut [T]) {
+        let nx = self.size[0];
         for (row, numbers) in (first..).zip(numbers.chunks_mut(nx)) {
-            let steps = &steps[row / ny];
             for (block, numbers) in numbers.chunks_mut(self.vectors * LANES).enumerate() {
                 let at = [block * self.vectors * LANES, row];
                 match self.vectors {
-                    1 => self.block::<S, T, 1>(simd, at, steps, bits, everywhere, numbers),
-                    2 => self.block::<S, T, 2>(simd, at, steps, bits, everywhere, numbers),
-                    3 => self.block::<S, T, 3>(simd, at, steps, bits, everywhere, numbers),
-                    4 => self.block::<S, T, 4>(simd, at, steps, bits, everywhere, numbers),
-                    5 => self.block::<S, T, 5>(simd, at, steps, bits, everywhere, numbers),
-                    _ => self.block::<S, T, MOST_VECTORS>(simd, at, steps, bits, everywhere, numbers),
+                    1 => self.block::<S, T, 1>(simd, at, ray, numbers),
+                    2 => self.block::<S, T, 2>(simd, at, ray, numbers),
+                    3 => self.block::<S, T, 3>(simd, at, ray, numbers),
+                    4 => self.block::<S, T, 4>(simd, at, ray, numbers),
+                    5 => self.block::<S, T, 5>(simd, at, ray, numbers),
+                    _ => self.block::<S, T, MOST_VECTORS>(simd, at, ray, numbers),
                 }
             }
         }
@@ -196,18 +198,17 @@ impl Codes {
         &self,
         simd: S,
         [x, row]: [usize; 2],
-        steps: &[Steps],
-        bits: f32,
-        everywhere: bool,
+        ray: &Ray,
         numbers: &mut [T],
     ) {
         let [nx, ny, _] = self.size;
         let (slice, y) = (ny * self.stride, row % ny * self.stride);
         let layer = row * self.stride - y;
+        let mut left = ray.counts[row / ny];
         let Some(own) = self.vectors::<N>(row * self.stride + x) else { return };
         let zero = f32x8::splat(simd, 0.0);
         let mut sums = [zero; N];
-        for steps in steps {
+        for steps in &ray.steps[..left.div_ceil(TAPS)] {
             let mut at = [0; TAPS];
             for i in 0..TAPS {
                 let (x, y) = (x + steps.x[i], y + steps.y[i]);
@@ -215,20 +216,21 @@ impl Codes {
                 let (x, y) = (x.min(x.wrapping_sub(nx)), y.min(y.wrapping_sub(slice)));
                 at[i] = layer.wrapping_add(steps.z[i]).wrapping_add(y).wrapping_add(x);
             }
-            for (&at, &weight) in at.iter().zip(&steps.weight).take(steps.count) {
+            for (&at, &weight) in at.iter().zip(&steps.weight).take(left) {
                 let Some(codes) = self.vectors::<N>(at) else { return };
                 for i in 0..N {
                     sums[i] += f32x8::load_array_ref(simd, &codes[i]) * weight;
                 }
             }
+            left = left.saturating_sub(TAPS);
         }
         let mut read = [zero.simd_eq(zero); N];
-        if !everywhere {
+        if !ray.everywhere {
             for i in 0..N {
                 read[i] = f32x8::load_array_ref(simd, &own[i]).simd_gt(zero);
             }
         }
-        T::of(simd, &sums, &read, bits, numbers);
+        T::of(simd, &sums, &read, ray.bits, numbers);
     }
 
     /// `N` vectors of codes, beginning with code number `first`.
