@@ -210,11 +210,11 @@ impl Codes {
         let mut sums = [zero; N];
         for steps in &ray.steps[..left.div_ceil(TAPS)] {
             let mut at = [0; TAPS];
-            for i in 0..TAPS {
+            for (i, at) in at.iter_mut().enumerate() {
                 let (x, y) = (x + steps.x[i], y + steps.y[i]);
                 // Of x and x − nx, that which is no less than 0 is less as a number without a sign.
                 let (x, y) = (x.min(x.wrapping_sub(nx)), y.min(y.wrapping_sub(slice)));
-                at[i] = layer.wrapping_add(steps.z[i]).wrapping_add(y).wrapping_add(x);
+                *at = layer.wrapping_add(steps.z[i]).wrapping_add(y).wrapping_add(x);
             }
             for (&at, &weight) in at.iter().zip(&steps.weight).take(left) {
                 let Some(codes) = self.vectors::<N>(at) else { return };

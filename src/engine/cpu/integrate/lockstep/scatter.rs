@@ -95,10 +95,10 @@ impl<'a> LaneScatter<'a> {
     ) -> Lanes3<S> {
         let light = &self.lights[i];
         let (mut near, mut far) = (Stored3::default(), Stored3::default());
-        for lane in 0..LANES {
+        for (lane, layer) in layers.iter().enumerate() {
             let values = &self.profiles[lane].values;
             // The layer of an idle lane may be any number.
-            let value = |first: u32| values.get(first.wrapping_add(layers[lane]) as usize);
+            let value = |first: u32| values.get(first.wrapping_add(*layer) as usize);
             if let (Some(n), Some(f)) = (value(light.near[lane]), value(light.far[lane])) {
                 (near.0[0].0[lane], near.0[1].0[lane], near.0[2].0[lane]) = (n[0], n[1], n[2]);
                 (far.0[0].0[lane], far.0[1].0[lane], far.0[2].0[lane]) = (f[0], f[1], f[2]);
@@ -106,8 +106,8 @@ impl<'a> LaneScatter<'a> {
         }
         let share = light.share.load(simd);
         let mut peak = [share; ORDERS - 1];
-        for order in 0..ORDERS - 1 {
-            peak[order] = light.peak[order].load(simd);
+        for (peak, stored) in peak.iter_mut().zip(&light.peak) {
+            *peak = stored.load(simd);
         }
         let Depths { view, cell, light: to_light } = *depths;
         let one = f32x8::splat(simd, 1.0);
@@ -115,7 +115,7 @@ impl<'a> LaneScatter<'a> {
         let length = to_light * LN_2;
         let fill = light.fill.load(simd) * weight;
         let mut out = [share; 3];
-        for c in 0..3 {
+        for (c, out) in out.iter_mut().enumerate() {
             let near = near.0[c].load(simd);
             let diffuse = near + (far.0[c].load(simd) - near) * share;
             let (extinction, albedo) = (self.extinction.0[c].load(simd), self.albedo.0[c].load(simd));
@@ -131,7 +131,7 @@ impl<'a> LaneScatter<'a> {
             let sum = weight_reduced * (diffuse + self.reduced.0[c].load(simd) * seen_reduced)
                 + (albedo * forward - self.isotropic.0[c].load(simd)) * once;
             let more = sum.max(f32x8::splat(simd, 0.0));
-            out[c] = light.gain.0[c].load(simd) * more + albedo * fill;
+            *out = light.gain.0[c].load(simd) * more + albedo * fill;
         }
         Lanes3 { x: out[0], y: out[1], z: out[2] }
     }
