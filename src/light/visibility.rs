@@ -139,6 +139,13 @@ pub struct Patches {
     pub cornered: bool,
 }
 
+impl Patches {
+    /// Whether the quad has one light volume.
+    pub fn is_whole(&self) -> bool {
+        self.count == [1, 1] && !self.cornered
+    }
+}
+
 /// Properties, besides cells and direction, that an optical depth depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Medium {

@@ -184,8 +184,8 @@ impl<'a> Drawing<'a> {
         Drawing { simd, grid, offsets, rock, water, shading: Shading::new(scene, mesh, &depth) }
     }
 
-    /// Returns the targets of band number `i` for one of the samples. Triangles are drawn for [`SAMPLES`] of
-    /// them at a time, so the next ones should be asked for next.
+    /// Returns the targets of band number `i` for one of the samples. Triangles are drawn for several
+    /// at a time, so samples should be asked for in their order.
     pub fn sample<'c>(&self, i: usize, sample: usize, canvas: &'c mut Canvas) -> &'c Gbuffer {
         let first = sample - sample % SAMPLES;
         if canvas.covered != Some((i, first)) {
@@ -234,7 +234,8 @@ impl<'a> Drawing<'a> {
 }
 
 /// Returns where the ray through the point `at` of the image meets a quad, whose plane is `plane`: u, v and
-/// metres from the eye. `length` is that of [`Camera::ray_to`]. Twin: `quad_hit` of `shaders/mapping.wgsl`.
+/// metres from the eye. `length` is that of
+/// [`Camera::ray_to`](crate::picture::Camera::ray_to). Twin: `quad_hit` of `shaders/mapping.wgsl`.
 pub fn map_quad(quad: &Quad, plane: &PlaneView, at: Vec2, length: f32) -> [f32; 3] {
     let (hh, t) = plane.hit(at);
     let uv = quad.map.uv(hh);

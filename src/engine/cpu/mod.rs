@@ -4,6 +4,7 @@
 pub mod gbuffer;
 mod haze;
 pub mod integrate;
+mod lights;
 pub mod opaque;
 pub mod pixels;
 pub mod pool;

@@ -5,7 +5,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 use glam::Vec3;
 
-use super::opaque::{Points, background_at, fresnel, irradiance_at, light_at};
+use super::lights::{background_at, irradiance_at, light_at};
+use super::opaque::{Points, fresnel};
 use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface};
 use crate::mapping::FARTHEST;
 use crate::scene::Scene;

@@ -8,9 +8,10 @@ use super::cells::{Row, rho_codes, words};
 use super::group::{Group, Steps};
 use super::walk::{BATCH, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::light::patch_corners;
+use crate::engine::cpu::lights::light_at;
 use crate::light::fill::Numbers;
 use crate::light::visibility::{Form, TRANSMITTANCE_OF_CODE};
-use crate::light::{AngleFrame, Light, Visibility};
+use crate::light::{AngleFrame, Visibility};
 use crate::util::lane_powers::{exp2, log2};
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 
@@ -70,13 +71,7 @@ impl<'a> LaneLight<'a> {
         let integrator = group.integrator;
         let (light, quads) = (&integrator.lights[i], &integrator.scene.quads);
         let hits = group.hits;
-        let to_light = match light {
-            Light::Directional { to_light: l, .. } => {
-                let splat = |x: f32| f32x8::splat(simd, x);
-                Lanes3 { x: splat(l.x), y: splat(l.y), z: splat(l.z) }
-            }
-            _ => Stored3::from_fn(|lane| light.at(hits.values.point.get(lane)).0).load(simd),
-        };
+        let (to_light, _) = light_at(simd, light, hits.values.point.load(simd));
         let frame = hits.frame(simd);
         let e1 = hits.vectors_of_quads(simd, quads, |quad| quad.map.e1_world);
         let e2 = hits.vectors_of_quads(simd, quads, |quad| quad.map.e2_world);
@@ -121,14 +116,25 @@ impl<'a> LaneLight<'a> {
     fn take_volumes(&mut self, group: &Group<'a, '_>, i: usize) {
         let integrator = group.integrator;
         let (Some(plan), Some(filled)) = (&integrator.light_volumes, &integrator.filled) else { return };
+        let mut last = None;
         for lane in 0..LANES {
-            let uv = group.hits.values.at.get(lane).truncate();
-            let corners = patch_corners(plan, group.hits.quads[lane], i, uv);
+            let quad = group.hits.quads[lane];
+            let patches = &plan.patches[quad * plan.lights + i];
+            // Neighbouring rays mostly meet one quad, which mostly has one patch.
+            if last == Some(quad) && patches.is_whole() {
+                self.codes[0][lane] = self.codes[0][lane - 1];
+                self.depths[0][lane] = self.depths[0][lane - 1];
+                self.between[lane] = false;
+                continue;
+            }
+            last = Some(quad);
+            let corners = patch_corners(plan, quad, i, group.hits.values.at.get(lane).truncate());
             self.marches |= u8::from(corners.marched) << lane;
             (self.at[0].0[lane], self.at[1].0[lane]) = corners.at.into();
             self.between[lane] = corners.numbers != [corners.numbers[0]; 4];
             self.is_between |= self.between[lane];
-            for (corner, number) in corners.numbers.iter().enumerate() {
+            let used = if self.between[lane] { 4 } else { 1 };
+            for (corner, number) in corners.numbers.iter().enumerate().take(used) {
                 match &filled[*number as usize][group.level.number as usize] {
                     Numbers::Codes(codes) => self.codes[corner][lane] = codes,
                     Numbers::Depths(depths) => self.depths[corner][lane] = depths,
