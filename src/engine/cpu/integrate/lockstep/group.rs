@@ -19,7 +19,7 @@ use crate::engine::cpu::integrate::walk::Lit;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::lane_powers::exp2;
-use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words};
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Words};
 use crate::util::powers::log2;
 use crate::volume::Cell;
 
@@ -33,7 +33,7 @@ pub struct Group<'a, 'h> {
     pub store: Store<'a>,
     pub is_mist: bool,
     /// Whether rays interpolate between cells.
-    is_between: bool,
+    pub is_between: bool,
     /// Extinction in the level's cells.
     pub extinction: f32,
     exponent: Exponent,
@@ -49,12 +49,12 @@ pub struct Steps {
     pub passed: Passed<BATCH>,
     /// Rays that see matter in their cell, one bit each.
     pub lit: [u8; BATCH],
-    cells: Row<BATCH>,
+    pub cells: Row<BATCH>,
     between: Between,
     /// Share of T that each cell lets pass.
     share: [Stored; BATCH],
     /// Share of the cells in what the eye sees.
-    weight: [Stored; BATCH],
+    pub weight: [Stored; BATCH],
     /// Depth of the cells, and before them, in bits.
     tau_bits: [Stored; BATCH],
     depth: [Stored; BATCH],
@@ -161,11 +161,18 @@ impl<'a, 'h> Group<'a, 'h> {
             // Cells wait until there are enough of them to keep all lanes of walks to the light busy.
             let is_enough = pending >= PENDING || lights.iter().all(|light| !light.marches());
             if ends || is_enough || steps.count + ROW > BATCH {
+                let is_packed = scatter.is_none() && self.is_packed(steps);
                 for light in &mut *lights {
-                    self.visibility(simd, steps, light, &mut walked);
+                    if !(is_packed && light.looks_up()) {
+                        self.visibility(simd, steps, light, &mut walked);
+                    }
                 }
-                for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                    self.shade(simd, steps, j, lights, scatter.as_ref());
+                if is_packed {
+                    self.shade_packed(simd, steps, lights);
+                } else {
+                    for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
+                        self.shade(simd, steps, j, lights, scatter.as_ref());
+                    }
                 }
                 (steps.count, pending) = (0, 0);
             }
@@ -252,9 +259,6 @@ impl<'a, 'h> Group<'a, 'h> {
         lights: &mut [LaneLight],
         scatter: Option<&LaneScatter>,
     ) {
-        let integrator = self.integrator;
-        let p = &self.exponent;
-        let splat = |x: f32| f32x8::splat(simd, x);
         let weight = steps.weight[j].load(simd);
         let [first, second] = words(simd, &steps.cells[j]);
         let k = match self.is_between {
@@ -263,36 +267,25 @@ impl<'a, 'h> Group<'a, 'h> {
         };
         let e_v = self.hits.values.e_v.load(simd);
         let metric = Metric::load(simd, &self.hits.values.metric);
-        let angles = Angles::new(simd, self, &metric, second, &steps.between.moments[j], e_v);
-        let of_strands = integrator.strand.as_ref().filter(|_| !self.is_mist);
+        let angles = match self.is_between {
+            _ if self.is_mist => Angles::Mist(self.hits.values.mist.load(simd)),
+            true => {
+                let moments = Moments::load(simd, &steps.between.moments[j]);
+                Angles::Many(Spread::new(simd, &metric, moments, e_v))
+            }
+            false => self.angles(simd, &metric, second, e_v),
+        };
         let layers = scatter.map(|_| self.layers(&steps.passed.layers[j])).unwrap_or_default();
         for (i, light) in lights.iter_mut().enumerate() {
-            let l_v = light.l_v.load(simd);
-            let l_dot_e = light.l_dot_e.load(simd);
-            let visible = weight * light.visible[j].load(simd);
-            let mut lit = match of_strands {
-                Some(shading) => {
-                    let cosines = angles.cosines(l_v);
-                    strand::psi(simd, shading, k, cosines, l_dot_e).times(visible)
+            let to_light = (light.l_v.load(simd), light.l_dot_e.load(simd));
+            let visible = light.visible[j].load(simd);
+            let mut lit = match self.lit(simd, &angles, k, to_light, weight, visible) {
+                Light::Grey(lit) => {
+                    let sum = light.sum.load(simd);
+                    light.sum.store(sum + weight.simd_gt(0.0).select(lit, f32x8::splat(simd, 0.0)));
+                    continue;
                 }
-                None => {
-                    let fibre = match &angles {
-                        Angles::Mist(psi) => *psi,
-                        Angles::Many(spread) => spread.psi(k, p, l_v, l_dot_e),
-                        Angles::One { v, t_dot_e, inverse_q } => {
-                            let [sin_l, base] = fibre_angles(simd, v.dot(l_v), *t_dot_e, *inverse_q);
-                            k[0] * sin_l + k[1] * p.power(simd, base.max(splat(0.0)))
-                        }
-                    };
-                    if !integrator.in_colour() {
-                        let lit = weight * fibre * light.visible[j].load(simd);
-                        let sum = light.sum.load(simd) + weight.simd_gt(0.0).select(lit, splat(0.0));
-                        light.sum.store(sum);
-                        continue;
-                    }
-                    let grey = visible * fibre * (1.0 / 255.0);
-                    Lanes3 { x: grey, y: grey, z: grey }
-                }
+                Light::Colour(lit) => lit,
             };
             if let Some(scatter) = scatter {
                 let depths = Depths {
@@ -313,6 +306,55 @@ impl<'a, 'h> Group<'a, 'h> {
         }
     }
 
+    /// Light of one light that eight cells send to the eye, scattered once. Given are the direction to the
+    /// light and its cosine with that to the eye, the cells' share in what the eye sees, and V.
+    #[inline(always)]
+    pub fn lit<S: Simd>(
+        &self,
+        simd: S,
+        angles: &Angles<S>,
+        k: [Floats<S>; 2],
+        (l_v, l_dot_e): (Lanes3<S>, Floats<S>),
+        weight: Floats<S>,
+        visible: Floats<S>,
+    ) -> Light<S> {
+        if let Some(shading) = self.integrator.strand.as_ref().filter(|_| !self.is_mist) {
+            let cosines = angles.cosines(l_v);
+            return Light::Colour(strand::psi(simd, shading, k, cosines, l_dot_e).times(weight * visible));
+        }
+        let fibre = match angles {
+            Angles::Mist(psi) => *psi,
+            Angles::Many(spread) => spread.psi(k, &self.exponent, l_v, l_dot_e),
+            Angles::One { v, t_dot_e, inverse_q } => {
+                let [sin_l, base] = fibre_angles(simd, v.dot(l_v), *t_dot_e, *inverse_q);
+                k[0] * sin_l + k[1] * self.exponent.power(simd, base.max(f32x8::splat(simd, 0.0)))
+            }
+        };
+        if !self.integrator.in_colour() {
+            return Light::Grey(weight * fibre * visible);
+        }
+        let grey = weight * visible * fibre * (1.0 / 255.0);
+        Light::Colour(Lanes3 { x: grey, y: grey, z: grey })
+    }
+
+    /// Directions in eight cells of strands, given by their second words.
+    #[inline(always)]
+    pub fn angles<S: Simd>(
+        &self,
+        simd: S,
+        metric: &Metric<S>,
+        second: Words<S>,
+        e_v: Lanes3<S>,
+    ) -> Angles<S> {
+        if !self.level.is_whole {
+            return Angles::Many(Spread::new(simd, metric, Moments::unpacked(simd, second), e_v));
+        }
+        let v = v_codes(second);
+        let least = f32x8::splat(simd, 1e-30);
+        let inverse_q = f32x8::splat(simd, 1.0) / metric.squared(v).max(least);
+        Angles::One { v, t_dot_e: v.dot(e_v), inverse_q }
+    }
+
     /// Layers of the whole volume, by the layers of the level before the rays leave the slab.
     fn layers(&self, left: &[i32; LANES]) -> [u32; LANES] {
         left.map(|left| self.integrator.layer_in(&self.level, self.level.size.z - left))
@@ -328,8 +370,16 @@ struct View<S: Simd> {
     early: i32x8<S>,
 }
 
+/// Light that eight cells send to the eye.
+pub enum Light<S: Simd> {
+    /// In 255ths of the light's intensity, where nothing colours it.
+    Grey(Floats<S>),
+    /// Relative to the light's intensity.
+    Colour(Lanes3<S>),
+}
+
 /// Directions in eight cells.
-enum Angles<S: Simd> {
+pub enum Angles<S: Simd> {
     /// Mist, with 255·Ψ.
     Mist(Floats<S>),
     /// Many in each cell.
@@ -339,30 +389,6 @@ enum Angles<S: Simd> {
 }
 
 impl<S: Simd> Angles<S> {
-    #[inline(always)]
-    fn new(
-        simd: S,
-        group: &Group,
-        metric: &Metric<S>,
-        second: Words<S>,
-        between: &[Stored3; 2],
-        e_v: Lanes3<S>,
-    ) -> Self {
-        if group.is_mist {
-            return Angles::Mist(group.hits.values.mist.load(simd));
-        }
-        if group.is_between {
-            return Angles::Many(Spread::new(simd, metric, Moments::load(simd, between), e_v));
-        }
-        if !group.level.is_whole {
-            return Angles::Many(Spread::new(simd, metric, Moments::unpacked(simd, second), e_v));
-        }
-        let v = v_codes(second);
-        let least = f32x8::splat(simd, 1e-30);
-        let inverse_q = f32x8::splat(simd, 1.0) / metric.squared(v).max(least);
-        Angles::One { v, t_dot_e: v.dot(e_v), inverse_q }
-    }
-
     /// Cosines of the angles between a single direction and light and eye.
     #[inline(always)]
     fn cosines(&self, l_v: Lanes3<S>) -> [Floats<S>; 2] {

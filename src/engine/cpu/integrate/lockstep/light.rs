@@ -31,6 +31,8 @@ pub struct LaneLight<'a> {
     /// Whether each ray interpolates between light volumes, and whether any does.
     between: [bool; LANES],
     is_between: bool,
+    /// Whether there are light volumes.
+    is_cached: bool,
     /// Rays that walk to the light, one bit each.
     marches: u8,
     /// V of the cells of the batch.
@@ -54,6 +56,7 @@ impl Default for LaneLight<'_> {
             at: [Stored::default(); 2],
             between: [false; LANES],
             is_between: false,
+            is_cached: false,
             marches: 0,
             visible: [Stored([1.0; LANES]); BATCH],
             depth: [Stored::default(); BATCH],
@@ -97,6 +100,7 @@ impl<'a> LaneLight<'a> {
         self.colour = Stored3::default();
         self.marches = 0;
         self.is_between = false;
+        self.is_cached = false;
         match integrator.visibility {
             // It stays 1.
             Visibility::None => {}
@@ -112,10 +116,17 @@ impl<'a> LaneLight<'a> {
         self.marches != 0
     }
 
+    /// Whether V of every cell is one value of a light volume.
+    #[inline(always)]
+    pub fn looks_up(&self) -> bool {
+        self.is_cached && !self.is_between && self.marches == 0
+    }
+
     /// Finds the light volumes of every ray's patch.
     fn take_volumes(&mut self, group: &Group<'a, '_>, i: usize) {
         let integrator = group.integrator;
         let (Some(plan), Some(filled)) = (&integrator.light_volumes, &integrator.filled) else { return };
+        self.is_cached = true;
         let mut last = None;
         for lane in 0..LANES {
             let quad = group.hits.quads[lane];
@@ -140,6 +151,15 @@ impl<'a> LaneLight<'a> {
                     Numbers::Depths(depths) => self.depths[corner][lane] = depths,
                 }
             }
+        }
+    }
+
+    /// Value of a cell in the one light volume of ray `lane`; 0 for no cell.
+    #[inline(always)]
+    pub fn value(&self, form: Form, lane: usize, at: usize) -> f32 {
+        match form {
+            Form::Codes => self.codes[0][lane].get(at).map_or(0.0, |&code| code.into()),
+            Form::Depths => self.depths[0][lane].get(at).copied().unwrap_or_default(),
         }
     }
 
@@ -211,13 +231,20 @@ impl Group<'_, '_> {
         }
     }
 
+    /// Metres of a cell that light passes per unit of depth in a light volume of depths.
+    #[inline(always)]
+    pub fn path<S: Simd>(&self, simd: S) -> Floats<S> {
+        match self.integrator.per_cell {
+            true => f32x8::splat(simd, 1.0),
+            false => self.hits.values.depth.load(simd),
+        }
+    }
+
     /// V from light volumes.
     #[inline(always)]
     fn looked_up<S: Simd>(&self, simd: S, steps: &Steps, light: &mut LaneLight) {
         let Some(form) = self.integrator.light_volumes.as_ref().map(|volumes| volumes.form) else { return };
-        let one = f32x8::splat(simd, 1.0);
-        let left = self.hits.values.left.load(simd);
-        let is_eroded = left.simd_lt(1.0);
+        let (left, path) = (self.hits.values.left.load(simd), self.path(simd));
         for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
             let at = self.store.linear(&steps.passed.index[j]);
             let mut values = light.values(form, 0, &at);
@@ -233,26 +260,36 @@ impl Group<'_, '_> {
                     values.0[lane] = mixed.0[lane];
                 }
             }
-            let value = values.load(simd);
-            if form == Form::Codes {
-                let transmittance = value * value * TRANSMITTANCE_OF_CODE;
-                let visible = if is_eroded.any_true() {
-                    let bright = transmittance.max(f32x8::splat(simd, 1e-9));
-                    is_eroded.select(exp2(simd, left * log2(simd, bright)), transmittance)
-                } else {
-                    transmittance
-                };
-                light.visible[j].store(visible);
-                light.depth[j] = Stored::default();
-            } else {
-                // Light volumes are filled without the sheet's erosion; `left` is the mean share of ρ it
-                // leaves.
-                let path = if self.integrator.per_cell { one } else { self.hits.values.depth.load(simd) };
-                let depth = value * (f32x8::splat(simd, self.extinction) * left * path);
-                light.visible[j].store(exp2(simd, -depth));
-                light.depth[j].store(depth);
-            }
+            let (visible, depth) = self.of_values(simd, form, values.load(simd), left, path);
+            light.visible[j].store(visible);
+            light.depth[j].store(depth);
         }
+    }
+
+    /// V and its depth in bits from values of light volumes. They are filled without the sheets' erosion, of
+    /// whose ρ `left` is the mean share; `path` is the metres in a cell of depth 1.
+    #[inline(always)]
+    pub fn of_values<S: Simd>(
+        &self,
+        simd: S,
+        form: Form,
+        value: Floats<S>,
+        left: Floats<S>,
+        path: Floats<S>,
+    ) -> (Floats<S>, Floats<S>) {
+        if form == Form::Depths {
+            let depth = value * (f32x8::splat(simd, self.extinction) * left * path);
+            return (exp2(simd, -depth), depth);
+        }
+        let transmittance = value * value * TRANSMITTANCE_OF_CODE;
+        let is_eroded = left.simd_lt(1.0);
+        let visible = if is_eroded.any_true() {
+            let bright = transmittance.max(f32x8::splat(simd, 1e-9));
+            is_eroded.select(exp2(simd, left * log2(simd, bright)), transmittance)
+        } else {
+            transmittance
+        };
+        (visible, f32x8::splat(simd, 0.0))
     }
 
     /// V by walks to the light, from eight lit cells at a time in the order of steps.

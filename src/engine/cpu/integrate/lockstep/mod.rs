@@ -18,6 +18,7 @@ mod fibre;
 mod group;
 mod hits;
 mod light;
+mod packed;
 mod scatter;
 mod strand;
 mod walk;
