@@ -311,8 +311,12 @@ fn passes(
             EngineChoice::Gpu => 0,
             _ => scenes.len(),
         };
+        let options = RenderOptions { samples: Some(0..1), ..Default::default() };
+        // Threads that have slept since the last round wake up first.
+        for (_, scene) in scenes.iter().take(on_cpu.min(1)) {
+            cpu::render_with(scene, volume, &mesh, &options, &mut light_volumes, &Unwatched)?;
+        }
         for (pass, scene) in scenes.iter().take(on_cpu) {
-            let options = RenderOptions { samples: Some(0..1), ..Default::default() };
             let frame = cpu::render_with(scene, volume, &mesh, &options, &mut light_volumes, &Unwatched)?;
             if counted {
                 add("cpu", *pass, frame.seconds.integrate, frame.cells_walked().iter().sum());
