@@ -172,10 +172,6 @@ pub fn render_with(
         frame.seconds = seconds;
         return Ok(frame);
     }
-    if samples.is_empty() {
-        frame.seconds = seconds;
-        return Ok(frame);
-    }
     let clock = Instant::now();
     let inverse = 1.0 / samples.len() as f32;
     frame.radiance.par_iter_mut().for_each(|sum| *sum = sum.map(|x| x * inverse));
