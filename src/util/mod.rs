@@ -1,4 +1,4 @@
-//! Foundations that every other module builds on: errors, progress, random numbers, powers, the disk cache,
+//! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk cache,
 //! unit vectors, parts of an image, colour spaces, and EXR files of any program.
 
 pub mod cache;
