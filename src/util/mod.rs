@@ -1,5 +1,5 @@
-//! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk cache,
-//! unit vectors, parts of an image, colour spaces, and EXR files of any program.
+//! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk
+//! cache, unit vectors, parts of an image, colour spaces, and EXR files of any program.
 
 pub mod cache;
 pub mod colour;
