@@ -180,7 +180,7 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
 }
 
 // Share of light that water reflects, after Fresnel, by Schlick's approximation (1994). `cos_angle` is the
-// cosine between the light and the normal. Twin: fresnel in src/engine/cpu/opaque.rs and pool.rs.
+// cosine between the light and the normal. Twin: fresnel in src/engine/cpu/opaque.rs.
 fn fresnel(cos_angle: f32) -> f32 {
     let m = 1.0 - clamp(cos_angle, 0.0, 1.0);
     let m2 = m * m;

@@ -23,7 +23,8 @@ const STRIP_PIXELS: u64 = 1 << 23;
 /// - per pixel of a strip 34; with `surface_layers` 32 more; with bloom 12 more, and one strip if it fits;
 ///   with an alpha channel 6 more, and with both 28 more;
 /// - per pixel of the raster window, at most 2²¹ pixels, 88; where n > 1 quads overlap, the larger of 88 +
-///   4·n and 32 + 16·n; with an alpha channel 4 more;
+///   4·n and 32 + 16·n; with an alpha channel 4 more. The CPU engine takes 60 + 48·n per pixel, but only for
+///   the bands in work, about an eighth of the window;
 /// - 64 MiB for read-back and encoders;
 /// - a quarter of `memory`, at most 256 MiB, for the program and the driver. This share only makes strips
 ///   smaller; it does not cause an error.
@@ -105,7 +106,8 @@ pub fn check_bloom(scene: &Scene, window: Window, strips: usize) -> Result<()> {
 }
 
 /// Bytes that may hold results of the raster pass for reuse by later frames (`RenderOptions::keep_rasters`),
-/// if the work itself takes `needed` of `memory` bytes. Four samples of 1280×720 pixels take 197 MiB.
+/// if the work itself takes `needed` of `memory` bytes. On a GPU, four samples of 1280×720
+/// pixels take 197 MiB.
 pub fn spare_for_rasters(memory: u64, needed: u64) -> u64 {
     (memory.saturating_sub(needed).saturating_sub(PROGRAM_BYTES) / 2).min(256 << 20)
 }

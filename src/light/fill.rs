@@ -3,8 +3,8 @@
 //! A light ray from the centre of any cell passes the same cells, relative to its start, over the same
 //! lengths, equal to the bit. The reason is that the walk computes every parameter from a difference between
 //! a boundary and the origin, and these differences are exact. The ray is therefore walked once, and the
-//! depths of a row of cells are summed side by side, one cell of the ray at a time. This gives the bits of
-//! [`optical_depth`](super::optical_depth::optical_depth) for a twentieth of the work.
+//! depths of neighbouring cells are summed side by side, one cell of the ray at a time. This gives the bits
+//! of [`optical_depth`](super::optical_depth::optical_depth) for a small part of the work.
 
 mod row_sums;
 

@@ -1,12 +1,12 @@
-//! Vectors of eight lanes, one lane a ray. Functions that take them are inlined into the code of one
-//! instruction set; a call would leave its registers.
+//! Vectors of eight lanes, one lane a ray or a point. Functions that take them are inlined into the code of
+//! one instruction set; a call would leave its registers.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
 use glam::Vec3;
 
-/// Number of rays that are walked side by side.
+/// Number of rays or points that are computed side by side.
 pub const LANES: usize = 8;
 
 /// One float a lane.

@@ -84,7 +84,8 @@ impl Gbuffer {
 
 /// Bytes of the targets per pixel of a scene's image.
 pub fn pixel_bytes(scene: &Scene) -> u64 {
-    28 + 16 * u64::from(overlap::sheets(scene))
+    let pools = if scene.pools.is_empty() { 0 } else { size_of::<PoolPixel>() as u64 };
+    32 + pools + 16 * u64::from(overlap::sheets(scene))
 }
 
 /// Fills the targets of the whole image with sample `sample`.
@@ -136,13 +137,14 @@ pub fn shade_pools(scene: &Scene, mesh: &Mesh, sample: u32, bands: &mut [OnceLoc
 /// Rows of a window that are drawn at a time.
 pub fn band_rows(window: Window) -> u32 {
     let bands = BANDS_A_THREAD * rayon::current_num_threads() as u32;
-    window.height.div_ceil(bands).clamp(BAND_ROWS[1], BAND_ROWS[0])
+    window.height.div_ceil(bands).min(MOST_ROWS)
 }
 
-/// Most and least rows of a window that are drawn at a time.
-const BAND_ROWS: [u32; 2] = [16, 4];
+/// Most rows of a window that are drawn at a time.
+const MOST_ROWS: u32 = 16;
 
-/// Bands for each thread, so that threads without work can take over some of the others' work.
+/// Bands for each thread, so that threads without work can take over some of the others' work, and the
+/// memory of the bands in work is an eighth of what the whole window would take.
 const BANDS_A_THREAD: u32 = 8;
 
 /// Samples of a window, whose triangles are projected and which are drawn band by band.

@@ -14,7 +14,7 @@ pub mod visibility;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
@@ -80,12 +80,12 @@ pub fn render_with(
     let clock = Instant::now();
     let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;
     seconds.visibility = clock.elapsed().as_secs_f64();
-    light_volumes.rasters.begin();
+    light_volumes.rasters.begin(scene, mesh);
     let total = window.pixels() * samples.len() as u64;
     let done = AtomicU64::new(0);
-    let rows = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);
-    for y in (0..window.height).step_by(rows as usize) {
-        let band = Window { y: window.y + y, height: rows.min(window.height - y), ..window };
+    let height = ((BAND_PIXELS / u64::from(window.width)) as u32).clamp(1, window.height);
+    for y in (0..window.height).step_by(height as usize) {
+        let band = Window { y: window.y + y, height: height.min(window.height - y), ..window };
         let first = y as usize * width;
         let pixels = first..first + band.pixels() as usize;
         // Layers lie at the pixels' centres, where the picture need not have a sample.
@@ -99,7 +99,9 @@ pub fn render_with(
         let kept: Vec<Option<Arc<Bands>>> = numbers.iter().map(&mut kept_of).collect();
         let is_drawn = kept.iter().all(|bands| bands.as_ref().is_some_and(|bands| is_drawn(bands)));
         let drawing = (!is_drawn).then(|| Drawing::new(Level::new(), scene, mesh, band, &numbers));
-        seconds.gbuffer += clock.elapsed().as_secs_f64();
+        if !is_drawn {
+            seconds.gbuffer += clock.elapsed().as_secs_f64();
+        }
         let surface = Mutex::new(frame.surface.as_mut());
         let rows = gbuffer::band_rows(band);
         let part = width * rows as usize;
@@ -135,7 +137,7 @@ pub fn render_with(
                             set_surface(surface, scene, gbuffer, first + i * part);
                         }
                         monitor.progress("pixels", done.load(Ordering::Relaxed), total)?;
-                        let drawn = clock.elapsed();
+                        let drawn = if is_drawn { Duration::ZERO } else { clock.elapsed() };
                         nanoseconds[0].fetch_add(drawn.as_nanos() as u64, Ordering::Relaxed);
                         if !samples.contains(&sample) {
                             continue;

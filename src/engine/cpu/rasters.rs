@@ -48,12 +48,24 @@ struct Pass {
 struct Kept {
     pass: Pass,
     bands: Arc<Bands>,
+    /// Rows of a band.
+    rows: u32,
     bytes: u64,
     /// Number of the last frame that used them.
     used: u64,
 }
 
 impl Pass {
+    /// Whether a pass holds the memory of this mesh and of this scene's environment.
+    fn shares(&self, scene: &Scene, mesh: &Mesh) -> bool {
+        let is_same_map = match (&self.scene.environment, &scene.environment) {
+            (None, _) => true,
+            (Some(a), Some(b)) => Arc::ptr_eq(&a.map, &b.map),
+            (Some(_), None) => false,
+        };
+        is_same_mesh(&self.mesh, mesh) && is_same_map
+    }
+
     fn is(&self, scene: &Scene, mesh: &Mesh, window: Window, sample: u32) -> bool {
         (self.window, self.sample) == (window, sample)
             && is_same_mesh(&self.mesh, mesh)
@@ -62,9 +74,12 @@ impl Pass {
 }
 
 impl Rasters {
-    /// Begins a new frame.
-    pub fn begin(&mut self) {
+    /// Begins a new frame. Passes that show another mesh or sky are dropped, because they would hold all of
+    /// its memory.
+    pub fn begin(&mut self, scene: &Scene, mesh: &Mesh) {
         self.turn += 1;
+        self.seen.retain(|pass| pass.shares(scene, mesh));
+        self.kept.retain(|kept| kept.pass.shares(scene, mesh));
     }
 
     /// Returns the kept targets of sample `sample` of a window, drawn or still to be drawn. Returns `None` if
@@ -83,6 +98,9 @@ impl Rasters {
         if bytes > most {
             return None;
         }
+        // Their number depends on that of the threads.
+        let rows = band_rows(window);
+        self.kept.retain(|kept| kept.pass.window != window || kept.rows == rows);
         let known = self.kept.iter().position(|kept| kept.pass.is(scene, mesh, window, sample));
         let i = match known {
             Some(i) => i,
@@ -103,9 +121,9 @@ impl Rasters {
                     return None;
                 }
                 let pass = self.seen.remove(seen)?;
-                let count = window.height.div_ceil(band_rows(window));
+                let count = window.height.div_ceil(rows);
                 let bands = (0..count).map(|_| OnceLock::new()).collect();
-                self.kept.push(Kept { pass, bands: Arc::new(bands), bytes, used: self.turn });
+                self.kept.push(Kept { pass, bands: Arc::new(bands), rows, bytes, used: self.turn });
                 self.kept.len() - 1
             }
         };

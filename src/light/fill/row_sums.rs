@@ -9,10 +9,8 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use crate::util::lane_powers::exp2;
+use crate::util::lanes::{LANES, Mask};
 use crate::volume::Cell;
-
-/// Cells in one vector.
-const LANES: usize = 8;
 
 /// Most vectors in one block. With two more for ρ and the weight they fit into 16 registers.
 const MOST_VECTORS: usize = 6;
@@ -75,8 +73,6 @@ pub trait Number: Copy + Default + Send {
         out: &mut [Self],
     );
 }
-
-type Mask<S> = fearless_simd::mask32x8<S>;
 
 impl Number for f32 {
     #[inline(always)]

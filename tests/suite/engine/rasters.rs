@@ -2,6 +2,7 @@
 //! pass reads, and never longer.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use taki::engine::RenderOptions;
 use taki::engine::cpu::{LightVolumeCache, render_with};
@@ -134,4 +135,25 @@ fn a_pass_is_drawn_again_only_when_something_it_reads_has_changed() {
         assert_eq!(engine.drawn(&scene(&[set.into()]).expect("a scene")), 1, "{set}");
     }
     assert_eq!(engine.drawn(&usual), 0, "the first picture is still kept");
+    assert_eq!(engine.render(&usual).seconds.gbuffer, 0.0, "a pass that is kept takes no time");
+}
+
+#[test]
+fn passes_hold_no_mesh_and_no_sky_that_the_scene_has_left() {
+    let mut engine = Engine::new();
+    let sky = |elevation: u32| {
+        ["environment.kind=\"sky\"".into(), format!("sky.elevation={elevation}")].map(String::from).to_vec()
+    };
+    let first = scene(&sky(20)).expect("a scene");
+    engine.render(&first);
+    let map = Arc::downgrade(&first.environment.as_ref().expect("a sky").map);
+    let vertices = Arc::downgrade(&engine.mesh.as_ref().expect("a mesh").1.vertices);
+    drop(first);
+    let mut other = sky(30);
+    other.push("rocks.wall.amplitude=0.31".into());
+    // Another environment is remembered beside the scene's own.
+    for sets in [other, sky(40), sky(50)] {
+        engine.render(&scene(&sets).expect("a scene"));
+    }
+    assert_eq!((vertices.strong_count(), map.strong_count()), (0, 0));
 }

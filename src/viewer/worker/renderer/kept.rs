@@ -62,7 +62,7 @@ impl Sums {
             (self.first, self.radiance, self.counts, self.alpha) = (numbers.start, radiance, counts, alpha);
             return;
         }
-        // The order of a whole rendering, whose bits a picture of as many samples therefore has.
+        // The order of a whole rendering: added one by one, samples give the bits of its radiance.
         self.radiance
             .par_iter_mut()
             .zip(radiance)
