@@ -212,7 +212,7 @@ fn view_ray(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec3<f32> {
     return d / sqrt(dot3(d, d));
 }
 
-// Point at depth `z` of the z-buffer under a point of the image. Twin: DepthToPoint::point.
+// Point at depth `z` of the z-buffer under a point of the image. Twin: Shading::points.
 fn point_at(frame: FrameUniforms, at: vec2<f32>, z: f32) -> vec3<f32> {
     let inverse = 1.0 / (z - frame.depth_shift);
     let along = (frame.depth_rise + frame.depth_slope * z) * inverse;

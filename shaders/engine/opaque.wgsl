@@ -85,7 +85,7 @@ fn mirrored(in: OpaquePoint, n: vec3<f32>) -> vec3<f32> {
     return n * (2.0 * dot3(n, e)) - e;
 }
 
-// Radiance of the background along a unit direction. Twin: Background::radiance.
+// Radiance of the background along a unit direction. Twin: background_at in src/engine/cpu/lights.rs.
 fn background_radiance(d: vec3<f32>) -> vec3<f32> {
     return frame.horizon + (frame.zenith - frame.horizon) * max(d.y, 0.0);
 }

@@ -66,21 +66,6 @@ impl EyeHaze {
         (-(self.density * t * mean)).exp()
     }
 
-    /// As [`EyeHaze::transmittance`], and 1 where there is no haze. Twin: `haze_passes`.
-    pub fn passes(&self, d_y: f32, t: f32) -> f32 {
-        if self.density == 0.0 { 1.0 } else { self.transmittance(d_y, t) }
-    }
-
-    /// Radiance of an opaque surface or the background behind `t` metres of haze along a unit direction with
-    /// the y component `d_y`. Twin: `haze_over`.
-    pub fn in_front_of(&self, radiance: Vec3, d_y: f32, t: f32) -> Vec3 {
-        if self.density == 0.0 {
-            return radiance;
-        }
-        let transmittance = self.transmittance(d_y, t);
-        radiance * transmittance + self.color * (1.0 - transmittance)
-    }
-
     /// Radiance of water and its backdrop, seen through haze of this transmittance.
     ///
     /// `seen` is the radiance without haze in front of the water. It contains `behind`·`through`, the share

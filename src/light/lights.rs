@@ -115,10 +115,3 @@ pub struct Background {
     /// Radiance at and below the horizon, linear RGB.
     pub horizon: Vec3,
 }
-
-impl Background {
-    /// Radiance along the unit direction `d`.
-    pub fn radiance(&self, d: Vec3) -> Vec3 {
-        self.horizon + (self.zenith - self.horizon) * d.y.max(0.0)
-    }
-}

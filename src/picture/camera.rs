@@ -68,16 +68,6 @@ pub struct DepthToPoint {
     pub scale: f32,
 }
 
-impl DepthToPoint {
-    /// Returns the point at depth `z` under the point `at` of the image. `rays` are the camera's vectors
-    /// forward, right and up. Twin: `point_at` of `shaders/layout.wgsl`.
-    pub fn point(&self, [forward, right, up]: [Vec3; 3], at: Vec2, z: f32) -> Vec3 {
-        let inverse = 1.0 / (z - self.shift);
-        let along = (self.rise + self.slope * z) * inverse;
-        self.anchor + forward * along + (right * at.x + up * at.y) * (self.scale * inverse)
-    }
-}
-
 impl Camera {
     /// Position of the eye relative to the scene's origin, metres. It is exact only in float64: a distant eye
     /// and a narrow view leave few digits for the scene.

@@ -20,8 +20,8 @@ pub fn transmittance<S: Simd>(simd: S, haze: &EyeHaze, d_y: Floats<S>, t: Floats
     exp2(simd, splat(haze.density) * t * mean * bits)
 }
 
-/// Radiance of surfaces, or of the background, behind haze of this transmittance. See
-/// [`EyeHaze::in_front_of`].
+/// Radiance of surfaces, or of the background, behind haze of this transmittance. Twin: `haze_over` of
+/// `shaders/light/haze.wgsl`.
 #[inline(always)]
 pub fn in_front_of<S: Simd>(
     simd: S,

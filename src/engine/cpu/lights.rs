@@ -8,7 +8,8 @@ use crate::light::environment::Irradiance;
 use crate::light::{Background, Light};
 use crate::util::lanes::{Floats, Lanes3};
 
-/// Returns the radiance of the background along unit directions. See [`Background::radiance`].
+/// Returns the radiance of the background along unit directions. Twin: `background_radiance` of
+/// `shaders/engine/opaque.wgsl`.
 #[inline(always)]
 pub fn background_at<S: Simd>(simd: S, background: &Background, d: Lanes3<S>) -> Lanes3<S> {
     let up = d.y.max(f32x8::splat(simd, 0.0));

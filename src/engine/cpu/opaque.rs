@@ -2,7 +2,7 @@
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::lights::{background_at, irradiance_at, light_at};
 use crate::place::Vertex;
@@ -37,28 +37,17 @@ impl<S: Simd> Points<S> {
         places: &[[f32; LANES]; 2],
         position: Lanes3<S>,
     ) -> Self {
-        let [x, y] = [f32x8::load_array(simd, places[0]), f32x8::load_array(simd, places[1])];
-        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
-        let last = Stored::from_fn(|lane| tiles[lane].side as f32 - 1.0).load(simd);
-        let cell = [x.max(zero).min(last).floor(), y.max(zero).min(last).floor()];
-        let f = [(x - cell[0]).max(zero).min(one), (y - cell[1]).max(zero).min(one)];
-        let (low, high) = (f[0].min(f[1]), f[0].max(f[1]));
-        let weights: [[f32; LANES]; 3] = [(one - high).into(), (high - low).into(), low.into()];
-        let is_right = f[0].simd_ge(f[1]).to_bitmask();
-        let cell: [[f32; LANES]; 2] = [cell[0].into(), cell[1].into()];
         // Eight of the numbers lie side by side; the ninth is apart.
         let mut rows = [[0.0; LANES]; LANES];
         let mut wet = Stored::default();
         for lane in 0..LANES {
-            let tile = tiles[lane];
-            let a = tile.vertex([cell[0][lane] as u32, cell[1][lane] as u32]);
-            let b = if is_right >> lane & 1 == 1 { a + 1 } else { a + tile.pitch };
-            let coats = [a, b, a + tile.pitch + 1].map(|number| vertices[number as usize].coat());
+            let (numbers, weights) = tiles[lane].around(Vec2::new(places[0][lane], places[1][lane]));
+            let coats = numbers.map(|number| vertices[number as usize].coat());
             let mut row = f32x8::splat(simd, 0.0);
             for c in 0..3 {
                 let (first, last) = coats[c];
-                row += f32x8::load_array_ref(simd, first) * weights[c][lane];
-                wet.0[lane] += last * weights[c][lane];
+                row += f32x8::load_array_ref(simd, first) * weights[c];
+                wet.0[lane] += last * weights[c];
             }
             row.store_array(&mut rows[lane]);
         }

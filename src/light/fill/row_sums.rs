@@ -208,7 +208,7 @@ impl Codes {
             let mut at = [0; TAPS];
             for (i, at) in at.iter_mut().enumerate() {
                 let (x, y) = (x + steps.x[i], y + steps.y[i]);
-                // Of x and x − nx, that which is no less than 0 is less as a number without a sign.
+                // Takes x − nx, or x if that is negative: without a sign, a negative number is a large one.
                 let (x, y) = (x.min(x.wrapping_sub(nx)), y.min(y.wrapping_sub(slice)));
                 *at = layer.wrapping_add(steps.z[i]).wrapping_add(y).wrapping_add(x);
             }

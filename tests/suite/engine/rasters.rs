@@ -5,11 +5,13 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use taki::engine::RenderOptions;
+use taki::engine::cpu::gbuffer::band_rows;
 use taki::engine::cpu::{LightVolumeCache, render_with};
 use taki::picture::Frame;
 use taki::place::Mesh;
 use taki::scene::{Kind, Limits, Param, Scene};
 use taki::util::monitor::Unwatched;
+use taki::util::window::Window;
 use taki::volume::VolumeTexture;
 
 /// A small picture of the default scene, which has rock, a pool, several sheets and mist, with coarse rock.
@@ -136,6 +138,33 @@ fn a_pass_is_drawn_again_only_when_something_it_reads_has_changed() {
     }
     assert_eq!(engine.drawn(&usual), 0, "the first picture is still kept");
     assert_eq!(engine.render(&usual).seconds.gbuffer, 0.0, "a pass that is kept takes no time");
+}
+
+/// What `f` returns on so many threads.
+fn on<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(f)
+}
+
+#[test]
+fn bands_in_work_are_a_small_part_of_a_window_whatever_the_number_of_threads() {
+    for (threads, height) in [(1, 64), (2, 720), (16, 64), (16, 720), (64, 2160)] {
+        let window = Window { x: 0, y: 0, width: 30_000, height };
+        let rows = on(threads, || band_rows(window));
+        assert!(
+            rows >= 1 && rows * threads as u32 <= height / 8 + threads as u32,
+            "{threads} {height} {rows}"
+        );
+    }
+}
+
+#[test]
+fn kept_passes_serve_any_number_of_threads() {
+    let usual = scene(&["image.height=96".into()]).expect("a scene");
+    let mut engine = Engine::new();
+    let first = on(1, || engine.render(&usual));
+    for threads in [1, 1, 3, 3, 3, 1] {
+        assert!(same(&on(threads, || engine.render(&usual)), &first), "{threads} threads");
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use fearless_simd::f64x4;
 use fearless_simd::prelude::*;
 
 use super::raster::{Grid, SAMPLES, ScreenPoint};
+use crate::util::lanes::LANES;
 
 /// Shifts of the points for each lane's sample.
 pub struct Shift<S: Simd> {
@@ -30,7 +31,7 @@ pub struct Edges<S: Simd> {
     /// Direction of each edge, with the triangle on its left.
     dx: [f64x4<S>; 3],
     dy: [f64x4<S>; 3],
-    /// What the function of each edge exceeds inside.
+    /// Number that each edge's function exceeds inside.
     least: [f64x4<S>; 3],
     /// Depth of each point over twice the area.
     depth: [f64x4<S>; 3],
@@ -139,7 +140,7 @@ pub fn span(points: &[&ScreenPoint; 3], grid: &Grid, y: usize, columns: Range<us
 }
 
 /// Pixels whose places are computed at a time, in float64.
-pub const HALF: usize = 4;
+pub const HALF: usize = LANES / 2;
 
 /// Returns the perspective-correct weights of the three points at each lane's pixel. `screen` are x, y and
 /// 1/w of each point.

@@ -62,7 +62,7 @@ pub struct Piece {
     triangles: Vec<ScreenTriangle>,
 }
 
-/// What the triangles of a window are drawn into.
+/// Samples that the triangles of a window are drawn for.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// The window, pixels.

@@ -1,5 +1,5 @@
-//! What the samples of a band see: the opaque scene or the background, shaded eight side by side, and the
-//! volume quads in front of it.
+//! Shading of the samples of a band: the opaque scene or the background, eight side by side, and the volume
+//! quads in front of it.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8, u32x8};
@@ -262,7 +262,8 @@ impl<'a> Shading<'a> {
         Seen { opaque: (radiance, distance), normal: (normal, passes) }
     }
 
-    /// The points at these depths under points of the image. See [`DepthToPoint::point`].
+    /// The points at these depths under points of the image. Twin: `point_at` of
+    /// `shaders/layout.wgsl`.
     #[inline(always)]
     fn points<S: Simd>(&self, simd: S, at: [Floats<S>; 2], z: Floats<S>) -> Lanes3<S> {
         let splat = |x: f32| f32x8::splat(simd, x);

@@ -35,7 +35,7 @@ struct LightScatter {
     peak: [Stored; ORDERS - 1],
 }
 
-/// What light has passed before and in eight cells, in bits.
+/// Depths that light has passed before and in eight cells, in bits.
 #[derive(Clone, Copy)]
 pub struct Depths<S: Simd> {
     /// From the face to the cell.
