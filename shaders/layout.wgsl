@@ -28,7 +28,8 @@ struct FrameUniforms {
     ambient: vec3<f32>,
     // Transmittance below which a ray ends.
     early_end: f32,
-    // nx, ny, nz of the volume.
+    // nx, ny, nz of the volume. With several volumes the shader reads VolumeConstants in place of this and
+    // of the other properties of the volume.
     cells: vec3<i32>,
     // Largest number of cells on one walk.
     max_cells: u32,
@@ -116,7 +117,8 @@ struct Quad {
     erosion: vec4<f32>,
     // Ψ of mist, which replaces that of the cells; 0 if the quad is not mist.
     mist: f32,
-    pad_a: f32,
+    // Number of the quad's volume.
+    volume: u32,
     pad_b: f32,
     pad_c: f32,
 }

@@ -67,6 +67,11 @@ override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 @group(0) @binding(18) var opaque_normal: texture_2d<f32>;
 // Sums over samples of the share of a backdrop that shows through the whole scene: 1 − alpha.
 @group(0) @binding(19) var<storage, read_write> uncovered: array<f32>;
+// Constants of the volumes, if there are several. A single volume has those of `frame` and `reflection`.
+@group(0) @binding(20) var<uniform> volumes: array<VolumeConstants, MAX_VOLUMES>;
+
+// Largest number of volumes. Twin: MAX_VOLUMES of src/scene/volumes.rs.
+const MAX_VOLUMES: u32 = 64u;
 
 // Marker in place of the numbers of cells if the device ended a walk early: software Vulkan limits all loops
 // of a pixel to 65535 turns. Twin: CUT of src/engine/gpu/integrate.rs.
@@ -75,6 +80,37 @@ const CUT: u32 = 0xffffffffu;
 struct Reflection {
     strand: Strand,
     similarity: Similarity,
+}
+
+struct VolumeConstants {
+    // nx, ny, nz.
+    cells: vec3<i32>,
+    // As in `frame`.
+    extinction: f32,
+    // Position of the first cell in the texture.
+    base: vec3<i32>,
+    flow_cells: f32,
+    similarity: Similarity,
+    levels: u32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
+}
+
+// Constants of a quad's volume.
+fn volume_of(quad: Quad) -> VolumeConstants {
+    if SEVERAL {
+        return volumes[quad.volume];
+    }
+    var only: VolumeConstants;
+    only.cells = frame.cells;
+    only.extinction = frame.extinction;
+    only.flow_cells = frame.flow_cells;
+    only.levels = frame.levels;
+    if IN_COLOUR {
+        only.similarity = reflection.similarity;
+    }
+    return only;
 }
 
 @compute @workgroup_size(WORKGROUP, WORKGROUP)
@@ -189,7 +225,8 @@ fn trace(
     is_last: bool,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
-    let jacobian = cell_frame(quad, hit.xy, frame.cells);
+    let own = volume_of(quad);
+    let jacobian = cell_frame(quad, hit.xy, own.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);
     let d = view_in_plane(quad, side, d_world);
@@ -211,21 +248,21 @@ fn trace(
     }
     if IN_COLOUR {
         view.strand = reflection.strand;
-        view.similarity = scatter_similarity(reflection.similarity, quad.mist);
+        view.similarity = scatter_similarity(own.similarity, quad.mist);
     }
     var column: GainColumn;
     if MULTIPLE {
         column = scatter_column(slab_cosine(d.z, -d_cell));
     }
     view.hit = SheetHit(jacobian, quad.e1, quad.e2, quad.n, side, d_world, point_world(quad, hit.xy),
-        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, frame.cells.z,
+        view.e_v, hit.xy, quad_number, frame.texture_frame != 0u, view.similarity.g, own.cells.z,
         view.profile, column);
     view.lights = arrayLength(&lights);
 
     // The level whose cells match the sample's footprint lies between two levels; both are walked.
     var finer = 0.0;
     if PYRAMID {
-        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), 0.0, f32(frame.levels - 1u));
+        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), 0.0, f32(own.levels - 1u));
     }
     let share = fract(finer);
     let walks = select(1u, 2u, share > 0.0);
@@ -234,10 +271,10 @@ fn trace(
     var i = 0u;
     for (; i < walks; i++) {
         let weight = select(share, 1.0 - share, i == 0u);
-        view.level = level_new(frame.cells, u32(finer) + i);
-        view.origin = face_point(quad, hit.xy, frame.cells, frame.flow_cells);
+        view.level = level_new(own.cells, own.base, u32(finer) + i);
+        view.origin = face_point(quad, hit.xy, own.cells, own.flow_cells);
         view.d_cell = d_cell;
-        view.extinction = frame.extinction;
+        view.extinction = own.extinction;
         view.matter = matter_at(quad, hit.xy, view.level.number > 0u);
         view.leaps = view.matter.shift <= 0.0;
         if PYRAMID {
@@ -334,7 +371,7 @@ fn seek(walk: ptr<function, Walk>, ray: ptr<function, Ray>, seeking: ptr<functio
     var rho = 0.0;
     var texel = vec2<u32>(0u);
     if !TRILINEAR | LEAPS {
-        texel = cell_words(in_level((*walk).cell, view.level));
+        texel = cell_words(in_texture((*walk).cell, view.level));
     }
     if TRILINEAR {
         rho = sample_on_ray(*walk, *ray, view).rho;
@@ -366,7 +403,7 @@ fn walk_mist(view: View, ray: ptr<function, Ray>) {
 
 // As `visit`, for a cell of mist.
 fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let code = cell_words(in_level((*walk).cell, view.level)).x & 0xffffu;
+    let code = cell_words(in_texture((*walk).cell, view.level)).x & 0xffffu;
     let t_exit = walk_exit(*walk);
     let rho = select(matter_rho(f32(code), view.matter), 0.0, (*ray).done);
     var tau_bits = rho * view.extinction;
@@ -400,7 +437,7 @@ fn sample_on_ray(walk: Walk, ray: Ray, view: View) -> CellSample {
 
 // Adds the light of one cell and steps to the next. After the end of the walk, nothing changes.
 fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
-    let texel = cell_words(in_level((*walk).cell, view.level));
+    let texel = cell_words(in_texture((*walk).cell, view.level));
     var skipped = 0u;
     if LEAPS {
         skipped = walk_leap(walk, texel, view.leaps);

@@ -46,7 +46,7 @@ fn pass_cell(
     max_cells: u32,
     enough: f32,
 ) {
-    let texel = cell_words(in_level((*walk).cell, level));
+    let texel = cell_words(in_texture((*walk).cell, level));
     var passed_by = 0u;
     if LEAPS {
         passed_by = walk_leap(walk, texel, matter.shift <= 0.0);

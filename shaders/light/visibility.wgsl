@@ -23,27 +23,36 @@ struct LightVolume {
     // Position in the texture that holds all light volumes.
     offset: vec3<i32>,
     column_count: u32,
+    // nx, ny, nz of the volume whose cells are filled.
+    cells: vec3<i32>,
     // Bits of transmittance (−log₂ T) per unit of depth.
     bits: f32,
+    // Position of the volume's first cell in the texture.
+    base: vec3<i32>,
+    // Texels of the volume's levels along x and y.
+    width: u32,
+    height: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<uniform> light_volume: LightVolume;
 @group(0) @binding(2) var volume: texture_storage_3d<rg32uint, read>;
-// Linear indices of the columns (of four cells along z) that contain a cell with density.
+// Linear indices, among the levels of their volume, of the columns (of four cells along z) that contain a cell
+// with density.
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
 // Bricks of sparse storage, see shaders/volume/cells.wgsl.
 @group(0) @binding(5) var bricks: texture_storage_3d<rgba32uint, read>;
 
-// Level whose cells lie at (y, z) of the texture.
+// Level whose cells lie at (y, z) among the levels of the volume.
 fn level_with(size: vec3<i32>, y: i32, z: i32) -> Level {
-    var level = level_new(size, 0u);
+    let base = light_volume.base;
+    var level = level_new(size, base, 0u);
     if PYRAMID {
         if z >= ((size.z + 3) & ~3) {
-            level = level_new(size, 1u);
+            level = level_new(size, base, 1u);
             while y >= level.offset.y + level.size.y && level.number < 32u {
-                level = level_new(size, level.number + 1u);
+                level = level_new(size, base, level.number + 1u);
             }
         }
     }
@@ -55,19 +64,15 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= light_volume.column_count {
         return;
     }
-    var extent = frame.cells;
-    if !SPARSE {
-        extent = vec3<i32>(textureDimensions(volume));
-    }
     let max_cells = frame.max_cells;
     let index = columns[light_volume.first_column + id.x];
-    let slice_columns = u32(extent.x * extent.y);
-    let x = i32(index % u32(extent.x));
-    let y = i32((index % slice_columns) / u32(extent.x));
+    let slice_columns = light_volume.width * light_volume.height;
+    let x = i32(index % light_volume.width);
+    let y = i32((index % slice_columns) / light_volume.width);
     let column = i32(index / slice_columns);
     // All sheets share a light volume, so erosion and mist are left out here.
     let whole = SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);
-    let level = level_with(frame.cells, y, column * CELLS_A_WORD);
+    let level = level_with(light_volume.cells, y, column * CELLS_A_WORD);
     let direction = light_volume.direction * level.scale;
     let bits = light_volume.bits * select(1.0, level.deep, PER_CELL);
     let enough = select(NEVER, DARK_BITS / max(bits, 1e-20), CODES);
@@ -75,7 +80,7 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0; i < CELLS_A_WORD; i++) {
         let texel = vec3<i32>(x, y, column * CELLS_A_WORD + i);
         let cell = texel - level.offset;
-        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(texel).x & 0xffffu) == 0u) {
+        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(in_texture(cell, level)).x & 0xffffu) == 0u) {
             continue;
         }
         let depth = optical_depth(level, whole, cell, direction, max_cells, enough).depth;

@@ -78,7 +78,7 @@ fn sample_trilinear(
         index = select(index, level.size - 1, index < vec3<i32>(0));
         index = select(index, vec3<i32>(0), index >= level.size);
         index.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
-        let texel = cell_words(in_level(index, level));
+        let texel = cell_words(in_texture(index, level));
         let weight = shares.x * shares.y * shares.z * f32(texel.x & 0xffffu);
         rho += weight;
         k += vec2<f32>(f32((texel.x >> 16u) & 0xffu), f32(texel.x >> 24u)) * weight;

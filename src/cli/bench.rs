@@ -154,7 +154,7 @@ pub fn run(args: &BenchArgs, terminal: &Terminal) -> Result<()> {
             let volume = match front.volume(direct_limits().memory, terminal) {
                 Ok(volume) => volume,
                 Err(e) => {
-                    let [nx, ny, nz] = front.water.size;
+                    let [nx, ny, nz] = front.recipes[0].water.size;
                     let cells = format!("{nx}×{ny}×{nz}");
                     let none = row("front", cells, &front, "cpu", "volume build", [0.0; 2], 0);
                     rows.failed(none, e)?;
@@ -409,7 +409,7 @@ fn processes(args: &BenchArgs, terminal: &Terminal, rows: &mut Rows) -> Result<(
     };
     for (preset, more) in [("fig5", &[][..]), ("waterfall", &["--size", "1280x720", "--samples", "1"])] {
         let scene = load(preset, &[])?;
-        let [nx, ny, nz] = scene.water.size;
+        let [nx, ny, nz] = scene.recipes[0].water.size;
         let whole = |times| {
             row(preset, format!("{nx}×{ny}×{nz}"), &scene, engine, "whole process", summary(times), 0)
         };

@@ -76,7 +76,7 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     }
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
     more.extend(args.alpha.then(|| "image.alpha=true".to_owned()));
-    // The volume is made once more for the picture and warns then.
+    // The volumes are made once more for the picture, and warn then.
     let animation = args.scene.animation(&more, &limits)?;
     args.scene.warn_of_settings(animation.values(), &[], terminal);
     args.scene.warn_of_replaced(animation.values(), &more, terminal);
@@ -120,14 +120,14 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     args.scene.warn_of_files(animation.values(), still.has_developed(), linear, terminal);
     let surface = has_exr && exr.layers.iter().any(|l| l.of_surface());
 
-    // Opening the device is slow, so the CPU builds the volume and the mesh at the same time.
+    // Opening the device is slow, so the CPU builds the volumes and the mesh at the same time.
     let cache = limits.cache.as_ref();
     let (made, (opened, device_seconds)) = std::thread::scope(|scope| {
         let made = scope.spawn(|| {
             let clock = Instant::now();
-            let volume = scene.cached_volume(cache, limits.memory, terminal)?;
+            let volumes = scene.cached_volumes(cache, limits.memory, terminal)?;
             let seconds = clock.elapsed().as_secs_f64();
-            Ok((volume, seconds, scene.cached_mesh(cache)))
+            Ok((volumes, seconds, scene.cached_mesh(cache)))
         });
         let clock = Instant::now();
         let mut opened = args.engine.open();
@@ -137,9 +137,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
         let opened = (opened, clock.elapsed().as_secs_f64());
         (made.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), opened)
     });
-    let (volume, volume_seconds, mesh) = made?;
-    scene.warnings(&volume).iter().for_each(|w| terminal.warn(w));
-    scene.notes(&volume).iter().for_each(|n| terminal.note(&format!("taki: {n}")));
+    let (volumes, volume_seconds, mesh) = made?;
+    scene.warnings(&volumes).iter().for_each(|w| terminal.warn(w));
+    scene.notes(&volumes).iter().for_each(|n| terminal.note(&format!("taki: {n}")));
     if let Some(stops) = measured {
         terminal.note(&measured_words(stops));
     }
@@ -157,9 +157,9 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     if still.has_developed() {
         check_bloom(&scene, window, strips.len())?;
     }
-    let mut writer = still.begin(&scene, &volume, window, &exr)?;
+    let mut writer = still.begin(&scene, &volumes, window, &exr)?;
     let mut seconds = writer.fill(&strips, scene.image.samples, &options, terminal, |options, monitor| {
-        engine.render_volume(&scene, &volume, &mesh, options, monitor)
+        engine.render_volume(&scene, &volumes, &mesh, options, monitor)
     })?;
     let Figures { non_finite_pixels: not_finite, covered_pixels, .. } = *writer.figures();
     if covered_pixels == 0 && args.crop.is_none() && !scene.quads.is_empty() {

@@ -10,6 +10,7 @@ use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output};
 use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
+use crate::scene::{Scene, likeliest};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::{ReadOptions, Statistics, read_npz, write_npz};
@@ -26,6 +27,9 @@ enum VolumeCommand {
     Build {
         #[command(flatten)]
         scene: SceneOptions,
+        /// Volume to build, where the scene shows several: water, or the name of a table in [volumes].
+        #[arg(long = "volume", value_name = "NAME")]
+        volume: Option<String>,
         /// File to write. Default: the scene's name with .npz, in the current folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
@@ -49,9 +53,10 @@ enum VolumeCommand {
 
 pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
     match &args.command {
-        VolumeCommand::Build { scene: options, output, overwrite } => {
+        VolumeCommand::Build { scene: options, volume: name, output, overwrite } => {
             options.begin(terminal);
             let scene = options.load(&[])?;
+            let number = number_of(&scene, name.as_deref())?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
                 let npz = path.with_extension("npz");
@@ -62,7 +67,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let same = |file: &PathBuf| {
                 file.canonicalize().ok().is_some_and(|f| path.canonicalize().ok() == Some(f))
             };
-            if scene.volume_file.as_ref().is_some_and(same) {
+            if scene.recipes[number].file.as_ref().is_some_and(same) {
                 let what = format!("-o {}: the scene reads its volume from this file", path.display());
                 return Err(Error::Usage(format!("{what}; give another name with -o")));
             }
@@ -70,8 +75,10 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
                 check_volume_replaced(&path)?;
             }
             let mut out = Output::create(&path)?;
-            let volume = scene.volume(options.limits().memory, terminal)?;
-            scene.notes(&volume).iter().for_each(|n| terminal.note(&format!("taki: {n}")));
+            let volume = scene.cached_volume(number, None, options.limits().memory, terminal)?;
+            let notes = scene.environment.iter().map(|environment| environment.words());
+            let notes = notes.chain(scene.note_on_volume(number, &volume));
+            notes.for_each(|n| terminal.note(&format!("taki: {n}")));
             terminal.progress("saving", 0, 1)?;
             let writer = std::io::BufWriter::with_capacity(1 << 20, out.file());
             write_npz(&volume, writer).map_err(|e| Error::write(&path, e))?;
@@ -101,6 +108,25 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             }
             Ok(())
         }
+    }
+}
+
+/// Returns the number of the volume `name` of a scene, or of its only volume.
+fn number_of(scene: &Scene, name: Option<&str>) -> Result<usize> {
+    let names: Vec<&str> = scene.recipes.iter().map(|recipe| recipe.name.as_str()).collect();
+    match name {
+        None if names.len() == 1 => Ok(0),
+        None => Err(Error::Usage(format!(
+            "the scene shows the volumes {}; choose one with --volume NAME",
+            names.join(", ")
+        ))),
+        Some(name) => names.iter().position(|own| *own == name).ok_or_else(|| {
+            let fix = match likeliest(name, names.iter().copied()) {
+                Some(near) => format!("did you mean {near}?"),
+                None => format!("it shows {}", names.join(", ")),
+            };
+            Error::Usage(format!("--volume {name}: the scene shows no volume of this name; {fix}"))
+        }),
     }
 }
 

@@ -30,7 +30,12 @@ const STEPS: f64 = 64.0;
 ///
 /// # Errors
 /// Errors of [`cpu::render`], including those of `monitor`.
-pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn Monitor) -> Result<f32> {
+pub fn measure(
+    scene: &Scene,
+    volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+    mesh: &Mesh,
+    monitor: &dyn Monitor,
+) -> Result<f32> {
     let method = scene.image.look.auto_exposure;
     if method == AutoExposure::None {
         return Ok(0.0);
@@ -40,7 +45,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
     image.shrink(SIDE);
     // A picture with an alpha channel is exposed as the same picture with its background.
     image.alpha = false;
-    let frame = cpu::render(&small, volume, mesh, false, &Quiet(monitor))?;
+    let frame = cpu::render(&small, volumes, mesh, false, &Quiet(monitor))?;
     Ok(stops(method, frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b])))
 }
 
@@ -49,7 +54,7 @@ pub fn measure(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, monitor: &dyn
 /// exposure).
 ///
 /// # Errors
-/// Errors of [`Animation::at`], of building frame 0's volume, and of [`measure`].
+/// Errors of [`Animation::at`], of building frame 0's volumes, and of [`measure`].
 pub fn exposed(animation: Animation, monitor: &dyn Monitor) -> Result<(Animation, Option<f32>)> {
     let scene = animation.at(0)?;
     if scene.image.look.auto_exposure == AutoExposure::None {
@@ -57,8 +62,8 @@ pub fn exposed(animation: Animation, monitor: &dyn Monitor) -> Result<(Animation
     }
     let limits = animation.limits();
     let cache = limits.cache.as_ref();
-    let volume = scene.cached_volume(cache, limits.memory, monitor)?;
-    let stops = measure(&scene, &volume, &scene.cached_mesh(cache), monitor)?;
+    let volumes = scene.cached_volumes(cache, limits.memory, monitor)?;
+    let stops = measure(&scene, &volumes, &scene.cached_mesh(cache), monitor)?;
     Ok((animation.exposed(stops), Some(stops)))
 }
 

@@ -17,14 +17,14 @@ impl Engine {
         Engine::open(choice, &DeviceOptions::default()).map(|(engine, _)| engine)
     }
 
-    /// Builds the scene's volume and mesh, and renders its image.
+    /// Builds the scene's volumes and mesh, and renders its image.
     ///
-    /// To render many frames of one volume, build both once and call [`Engine::render_volume`].
+    /// To render many frames of the same volumes, build both once and call [`Engine::render_volume`].
     ///
     /// # Errors
-    /// Errors of [`Scene::volume`] with the memory of [`Limits::default`], and of [`Engine::render_volume`].
+    /// Errors of [`Scene::volumes`] with the memory of [`Limits::default`], and of [`Engine::render_volume`].
     pub fn render(&mut self, scene: &Scene, options: &RenderOptions) -> Result<Frame> {
-        let volume = scene.volume(Limits::default().memory, &Unwatched)?;
-        self.render_volume(scene, &volume, &scene.mesh(), options, &Unwatched)
+        let volumes = scene.volumes(Limits::default().memory, &Unwatched)?;
+        self.render_volume(scene, &volumes, &scene.mesh(), options, &Unwatched)
     }
 }

@@ -141,7 +141,7 @@ impl Engine {
         }
     }
 
-    /// Renders a frame. After a lost device or exhausted device memory, it tries once more on a new device
+    /// Renders a frame of a scene with its volumes, or with its only one. After a lost device or exhausted device memory, it tries once more on a new device
     /// with smaller tiles. Where the device cannot render the scene, an engine opened by
     /// [`EngineChoice::Auto`] becomes the CPU engine, with a warning.
     ///
@@ -150,12 +150,12 @@ impl Engine {
     pub fn render_volume(
         &mut self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         mesh: &Mesh,
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
-        let mut result = self.render_once(scene, volume, mesh, options, monitor);
+        let mut result = self.render_once(scene, volumes, mesh, options, monitor);
         let is_the_devices = |e: &Error, engine: &Engine| match engine {
             Engine::Gpu { renderer, .. } => is_the_devices(e, renderer),
             Engine::Cpu(_) => false,
@@ -167,14 +167,14 @@ impl Engine {
             monitor.warn(&format!("{}: trying once more on a new device with smaller tiles", e.cause()));
             self.renew()?;
             let careful = RenderOptions { tile_pixels: Some(CAREFUL_TILE_PIXELS), ..options.clone() };
-            result = self.render_once(scene, volume, mesh, &careful, monitor);
+            result = self.render_once(scene, volumes, mesh, &careful, monitor);
         }
         match &result {
             Err(e) if matches!(self, Engine::Gpu { falls_back: true, .. }) && is_the_devices(e, self) => {
                 // It stays, so that the strips of one picture come from one engine and are warned of once.
                 monitor.warn(&format!("{}: the CPU engine takes over", e.cause()));
                 *self = Engine::cpu();
-                self.render_once(scene, volume, mesh, options, monitor)
+                self.render_once(scene, volumes, mesh, options, monitor)
             }
             _ => result,
         }
@@ -188,21 +188,21 @@ impl Engine {
     pub fn render_once(
         &mut self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         mesh: &Mesh,
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
         let (renderer, told) = match self {
             Engine::Cpu(light_volumes) => {
-                return cpu::render_with(scene, volume, mesh, options, light_volumes, monitor);
+                return cpu::render_with(scene, volumes, mesh, options, light_volumes, monitor);
             }
             Engine::Gpu { renderer, told, .. } => (renderer, told),
         };
-        let (mut frame, cut) = renderer.render_marked(scene, volume, mesh, options, monitor)?;
+        let (mut frame, cut) = renderer.render_marked(scene, volumes, mesh, options, monitor)?;
         if !cut.is_empty() {
-            let levels = renderer.levels(scene, volume);
-            let integrator = cpu::integrate::Integrator::with_levels(scene, volume, levels);
+            let levels = renderer.levels(scene, volumes.as_ref());
+            let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels);
             cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
             // Strips and frames would repeat it.
             if !std::mem::replace(told, true) {

@@ -1,10 +1,10 @@
-//! The volume of the last scene, so that the next scene rebuilds only what differs.
+//! The volumes of the last scene, so that the next scene rebuilds only what differs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use crate::scene::{Cost, Scene};
+use crate::scene::{Cost, Recipe, Scene};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -12,11 +12,20 @@ use crate::volume::{
     Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection, set_density_and_reflection,
 };
 
-/// Keeps the volume texture of the last scene.
+/// Keeps the volume textures of the last scene.
 #[derive(Default)]
 pub struct VolumeMemo {
-    last: Option<(Source, Arc<VolumeTexture>)>,
+    last: Vec<Remembered>,
+    all: Arc<Vec<VolumeTexture>>,
     cache: Option<Cache>,
+}
+
+/// A volume of the last scene.
+#[derive(Clone)]
+struct Remembered {
+    name: String,
+    source: Source,
+    volume: VolumeTexture,
 }
 
 /// The input that a volume was made from.
@@ -37,7 +46,7 @@ enum Source {
 impl VolumeMemo {
     /// A memo that looks volumes up in `cache` and adds new ones to it.
     pub fn with(cache: Option<Cache>) -> VolumeMemo {
-        VolumeMemo { last: None, cache }
+        VolumeMemo { cache, ..VolumeMemo::default() }
     }
 
     /// Stops using the cache. Values that a user tries out by hand would only fill it.
@@ -45,54 +54,78 @@ impl VolumeMemo {
         self.cache = None;
     }
 
-    /// Returns the scene's volume and how much work it took: `None` if the remembered volume fits unchanged.
-    /// `memory` is the budget for building it, bytes.
+    /// Returns the scene's volumes and how much work they took, that of the costliest: `None` if the
+    /// remembered volumes fit unchanged. `memory` is the budget for building them, bytes.
     ///
     /// # Errors
-    /// Any error of building or reading the volume, or of the monitor. The remembered volume stays.
-    pub fn volume(
+    /// Any error of building or reading a volume, or of the monitor. The remembered volumes stay.
+    pub fn volumes(
         &mut self,
         scene: &Scene,
         memory: u64,
         monitor: &dyn Monitor,
-    ) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
-        let source = match &scene.volume_file {
-            None => Source::Water(scene.water, scene.storage),
+    ) -> Result<(Arc<Vec<VolumeTexture>>, Option<Cost>)> {
+        let (mut now, mut made, mut dearest): (Vec<Remembered>, Vec<VolumeTexture>, _) =
+            (Vec::new(), Vec::new(), None);
+        for (number, recipe) in scene.recipes.iter().enumerate() {
+            let source = Source::of(recipe);
+            let old = self.last.iter().find(|old| old.name == recipe.name);
+            let (volume, cost) = match old.map(|old| (&old.source, &old.volume, &source)) {
+                Some((old, volume, new)) if old == new => (volume.clone(), None),
+                Some((Source::Water(old, stored), volume, Source::Water(new, wanted)))
+                    if stored == wanted && same_curves(old, new) =>
+                {
+                    let mut changed = VolumeTexture { alpha: new.alpha, ..volume.clone() };
+                    if (WaterSpec { alpha: new.alpha, ..*old }) == *new {
+                        (changed, Some(Cost::Uniform))
+                    } else {
+                        set_density_and_reflection(new, &mut changed.cells);
+                        (changed, Some(Cost::Upload))
+                    }
+                }
+                _ => {
+                    let memory = scene.memory_for(number, &made, memory);
+                    let volume = scene.cached_volume(number, self.cache.as_ref(), memory, monitor)?;
+                    (volume, Some(Cost::Volume))
+                }
+            };
+            let rank = |cost: &Option<Cost>| match cost {
+                None => 0,
+                Some(Cost::Uniform) => 1,
+                Some(Cost::Upload) => 2,
+                Some(Cost::Volume) => 3,
+            };
+            dearest = [dearest, cost].into_iter().max_by_key(rank).flatten();
+            made.push(volume.clone());
+            now.push(Remembered { name: recipe.name.clone(), source, volume });
+        }
+        let is_same = |(a, b): (&Remembered, &Remembered)| a.name == b.name;
+        if dearest.is_none() && now.len() == self.last.len() && now.iter().zip(&self.last).all(is_same) {
+            return Ok((self.all.clone(), None));
+        }
+        (self.last, self.all) = (now, Arc::new(made));
+        // Volumes that are only shown no more, or in another order, take an upload.
+        Ok((self.all.clone(), dearest.or(Some(Cost::Upload))))
+    }
+}
+
+impl Source {
+    /// The input of a scene's volume.
+    fn of(recipe: &Recipe) -> Source {
+        let Recipe { water, file, storage, asked_storage, .. } = recipe;
+        match file {
+            None => Source::Water(*water, *storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();
                 Source::File {
                     path: path.clone(),
-                    storage: scene.asked_storage,
+                    storage: *asked_storage,
                     modified: meta.as_ref().and_then(|m| m.modified().ok()),
                     bytes: meta.map_or(0, |m| m.len()),
-                    k: (!has_reflection(path)).then_some([scene.water.k_d, scene.water.k_s]),
+                    k: (!has_reflection(path)).then_some([water.k_d, water.k_s]),
                 }
             }
-        };
-        let (volume, cost) = match (self.last.take(), &source) {
-            (Some((old, volume)), new) if old == *new => {
-                self.last = Some((old, volume.clone()));
-                return Ok((volume, None));
-            }
-            (Some((Source::Water(old, stored), volume)), Source::Water(new, wanted))
-                if stored == *wanted && same_curves(&old, new) =>
-            {
-                let mut changed = VolumeTexture { alpha: new.alpha, ..(*volume).clone() };
-                if (WaterSpec { alpha: new.alpha, ..old }) == *new {
-                    (changed, Cost::Uniform)
-                } else {
-                    set_density_and_reflection(new, &mut changed.cells);
-                    (changed, Cost::Upload)
-                }
-            }
-            (old, _) => {
-                self.last = old;
-                (scene.cached_volume(self.cache.as_ref(), memory, monitor)?, Cost::Volume)
-            }
-        };
-        let volume = Arc::new(volume);
-        self.last = Some((source, volume.clone()));
-        Ok((volume, Some(cost)))
+        }
     }
 }
 

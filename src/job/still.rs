@@ -13,7 +13,7 @@ use crate::output::frame::{
     Format, Head, LINEAR_TEXT, Output, RowWriter, SCENE_TEXT, crop_text, lines_of, samples_of,
 };
 use crate::picture::{Frame, Gamut, Image, Layer, Look, Seconds};
-use crate::scene::{MAP_COMMENT, REFERENCES, Scene, VOLUME_COMMENT};
+use crate::scene::{MAP_COMMENT, Place, Raw, Scene, VOLUME_COMMENT, reference_keys};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
@@ -154,14 +154,14 @@ impl Still {
     pub fn begin(
         self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         window: Window,
         exr: &Exr,
     ) -> Result<StillWriter> {
         let whole = [scene.image.width, scene.image.height];
         let alpha = scene.image.alpha;
         // An edited scene has no values, so the picture tells no scene.
-        let text = scene.values().is_some().then(|| metadata(scene, volume));
+        let text = scene.values().is_some().then(|| metadata(scene, volumes.as_ref()));
         let Depth { bits, linear } = self.depth;
         let files = exr.files(Path::new(""));
         let mut layers = files.iter().map(|(_, layers)| layers).cycle();
@@ -197,8 +197,14 @@ impl Still {
     ///
     /// # Errors
     /// [`Error::Io`] if writing fails, [`Error::Usage`] if [`Exr::check`] refuses the picture.
-    pub fn save(self, frame: &Frame, exr: &Exr, scene: &Scene, volume: &VolumeTexture) -> Result<Figures> {
-        let mut writer = self.begin(scene, volume, Window::whole([frame.width, frame.height]), exr)?;
+    pub fn save(
+        self,
+        frame: &Frame,
+        exr: &Exr,
+        scene: &Scene,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+    ) -> Result<Figures> {
+        let mut writer = self.begin(scene, volumes, Window::whole([frame.width, frame.height]), exr)?;
         writer.push(frame)?;
         writer.finish()
     }
@@ -241,14 +247,15 @@ pub(crate) fn check_kind(path: &Path, kind: &str, is: impl Fn(&[u8]) -> bool) ->
     })
 }
 
-/// The text that a file stores about its scene: the volume's checksum, then the scene file.
-fn metadata(scene: &Scene, volume: &VolumeTexture) -> String {
-    format!("{}\n{}", volume_line(volume), scene_text(scene))
+/// The text that a file stores about its scene: the volumes' checksums, then the scene file.
+fn metadata(scene: &Scene, volumes: &[VolumeTexture]) -> String {
+    format!("{}\n{}", volume_line(volumes), scene_text(scene))
 }
 
-/// The first line of that text, with the volume's checksum. Equal volumes have equal lines.
-pub(crate) fn volume_line(volume: &VolumeTexture) -> String {
-    format!("{VOLUME_COMMENT}{:08x}", volume.checksum())
+/// The first line of that text, with the checksum of each volume. Equal volumes have equal lines.
+pub(crate) fn volume_line(volumes: &[VolumeTexture]) -> String {
+    let checksums: Vec<String> = volumes.iter().map(|volume| format!("{:08x}", volume.checksum())).collect();
+    format!("{VOLUME_COMMENT}{}", checksums.join(" "))
 }
 
 /// The scene that made a picture, as a scene file. A volume or environment that was read from a file is
@@ -258,7 +265,13 @@ pub(crate) fn scene_text(scene: &Scene) -> String {
     let map = scene.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
     let map = map.map(|e| format!("{MAP_COMMENT}{:08x}\n", e.map.checksum()));
     let mut values = scene.written().clone();
-    REFERENCES.iter().for_each(|key| values.clear_under(key));
+    for key in reference_keys(&values) {
+        // A volume of which only the file is given stays a volume.
+        match key.starts_with("volumes.") {
+            true => values.set(&key, &Raw::Text(String::new()), &Place(key.clone())).expect("a text"),
+            false => values.clear_under(&key),
+        }
+    }
     map.unwrap_or_default() + &values.to_toml()
 }
 

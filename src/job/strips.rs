@@ -3,10 +3,8 @@
 use crate::engine::overlap;
 use crate::picture::{Grid, LEAST_ROWS, WORK_BYTES, check_image, row_bytes};
 use crate::scene::Scene;
-use crate::trace::Prefilter;
 use crate::util::error::{Error, Result};
 use crate::util::window::Window;
-use crate::volume::{Storage, dense_bytes, expected_cells, sparse_bytes};
 
 /// Bytes for the program and the driver: libraries and compiled shaders. Lavapipe with its compiler takes
 /// about 150 MiB. At most a quarter of the budget is set aside for this.
@@ -15,7 +13,7 @@ const PROGRAM_BYTES: u64 = 256 << 20;
 /// more memory and save no time.
 const STRIP_PIXELS: u64 = 1 << 23;
 /// Cuts the part `window` of a scene's image into strips of its full width, from the top. Each strip can be
-/// rendered within `memory` bytes, together with the device's targets, the scene's volume, its rocks and its
+/// rendered within `memory` bytes, together with the device's targets, the scene's volumes, its rocks and its
 /// environment. Strips end between raster windows (see [`Grid`]) where that fits; else they divide one
 /// raster window evenly.
 ///
@@ -47,16 +45,11 @@ pub fn memory_of(
 ) -> Result<(u64, Vec<Window>)> {
     let image = &scene.image;
     check_image(image, memory)?;
-    let water = &scene.water;
-    let volume = match (&scene.volume_file, scene.storage) {
-        // A volume file has been read by now, and was checked against the whole budget then.
-        (Some(_), _) => 0,
-        (None, Storage::Dense) => dense_bytes(water.size, scene.trace.filter == Prefilter::Pyramid),
-        // Building takes more than storing, and has been checked by now.
-        (None, Storage::Sparse) => sparse_bytes(water.size, expected_cells(water), 0),
-    };
-    let volume = u64::try_from(volume).unwrap_or(u64::MAX);
-    let parts = scene.bytes_beside_volume(overlap::sheets(scene)).saturating_add(volume);
+    // A volume file has been read by now, and was checked against the budget then. Building takes more than
+    // storing, and has been checked by now.
+    let volumes = scene.recipes.iter().map(|recipe| recipe.bytes(scene.has_pyramid())).sum::<u128>();
+    let volumes = u64::try_from(volumes).unwrap_or(u64::MAX);
+    let parts = scene.bytes_beside_volume(overlap::sheets(scene)).saturating_add(volumes);
     let available = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let blooms = image.look.bloom > 0.0;
     let row = row_bytes(image, window.width, surface_layers);

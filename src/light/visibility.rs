@@ -26,6 +26,7 @@ use crate::mapping::{CellFrame, Quad};
 use crate::trace::{Attenuation, Trace, extinction, level_atlas};
 use crate::util::error::{Error, Result};
 use crate::util::powers::exp2;
+use crate::volume::VolumeTexture;
 
 /// Transmittance codes in one word of a light volume; their cells follow one another along z.
 pub const CELLS_A_WORD: u32 = 4;
@@ -101,6 +102,8 @@ pub struct LightVolumes {
 /// One light volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightVolume {
+    /// Number of the volume whose cells it has.
+    pub volume: u32,
     /// Direction towards the light, in cells per cell depth: J⁻¹l·(H/nz).
     pub direction: Vec3,
     /// Bits of transmittance (−log₂ T) per unit of depth, Σ ρ code × length; 1 for [`Form::Depths`].
@@ -180,10 +183,15 @@ pub struct LitQuads<'a> {
     pub trace: &'a Trace,
     /// Single or multiple scattering.
     pub scattering: Scattering,
-    /// Number of cells of the volume along x, y and z.
-    pub size: [u32; 3],
-    /// Scale α of the volume's density.
-    pub alpha: f32,
+    /// Volumes that the quads show, of which size and α count.
+    pub volumes: &'a [VolumeTexture],
+}
+
+impl LitQuads<'_> {
+    /// Number of texels in the levels of each volume along x, y and z.
+    fn extents(&self) -> Vec<[u32; 3]> {
+        self.volumes.iter().map(|volume| level_atlas(self.trace, volume.size).extent()).collect()
+    }
 }
 
 impl LightVolumes {
@@ -199,7 +207,7 @@ impl LightVolumes {
                 let angles = PATCH_ANGLES.map(|degrees| (degrees * 2f64.powi(doubling)).to_radians());
                 let tolerance = if shared { angles[0] as f32 } else { DIRECTION_TOLERANCE };
                 let volumes = LightVolumes::at_angles(lit, angles, tolerance);
-                need = volumes.bytes(level_atlas(lit.trace, lit.size).extent());
+                need = volumes.bytes(&lit.extents());
                 if need <= u128::from(budget) {
                     return Ok(volumes);
                 }
@@ -224,22 +232,24 @@ impl LightVolumes {
         let fits = lit.trace.max_cells <= MAX_WALK_CELLS
             && lit.lights.iter().all(is_directional)
             && lit.quads.iter().all(is_even);
-        let [nx, ny, _] = lit.size.map(u64::from);
+        let columns_of = |volume: &VolumeTexture| u64::from(volume.size[0]) * u64::from(volume.size[1]);
         // More light volumes are not planned than there are quads and lights.
-        if !fits || nx * ny > COLUMNS_A_RAY * rays {
+        if !fits || lit.volumes.iter().any(|volume| columns_of(volume) > COLUMNS_A_RAY * rays) {
             return None;
         }
         let whole = LightVolumes::planned(lit, Form::Depths, |_| 0.0, [f64::INFINITY; 2]);
-        let columns = nx * ny * whole.volumes.len() as u64;
+        let columns =
+            whole.volumes.iter().map(|own| columns_of(&lit.volumes[own.volume as usize])).sum::<u64>();
         let pays = columns <= COLUMNS_A_RAY * rays * lit.lights.len() as u64;
-        let bytes = whole.bytes(level_atlas(lit.trace, lit.size).extent());
+        let bytes = whole.bytes(&lit.extents());
         (pays && bytes <= u128::from(budget)).then_some(whole)
     }
 
-    /// Memory of all light volumes in bytes, for textures of `size` cells.
-    pub fn bytes(&self, size: [u32; 3]) -> u128 {
-        let [nx, ny, nz] = self.words(size).map(u128::from);
-        nx * ny * nz * 4 * self.volumes.len() as u128
+    /// Memory of all light volumes in bytes. `extents` are the sizes of each volume's levels, texels.
+    pub fn bytes(&self, extents: &[[u32; 3]]) -> u128 {
+        let bytes = |extent: &[u32; 3]| self.words(*extent).map(u128::from).iter().product::<u128>() * 4;
+        let each: Vec<u128> = extents.iter().map(bytes).collect();
+        self.volumes.iter().map(|own| each[own.volume as usize]).sum()
     }
 
     /// Number of four-byte words in one light volume along x, y and z, for a texture of that many cells.
@@ -275,12 +285,12 @@ impl LightVolumes {
     /// Plan of light volumes of a form. Directions to light `i` that differ by less than `tolerance(i)` times
     /// their length share a light volume; with 0, equal ones do.
     fn planned(lit: &LitQuads, form: Form, tolerance: impl Fn(usize) -> f32, angles: [f64; 2]) -> Self {
-        let &LitQuads { quads, lights, eye, trace, size, alpha, .. } = lit;
+        let &LitQuads { quads, lights, eye, trace, volumes: textures, .. } = lit;
         let mut medium = Medium::of(trace);
         medium.max_cells = medium.max_cells.min(MAX_WALK_CELLS);
         let mut volumes: Vec<LightVolume> = Vec::new();
-        let mut known: HashMap<([i64; 3], u32), u32> = HashMap::new();
-        let mut number_of = |direction: Vec3, bits: f32, tolerance: f32| {
+        let mut known: HashMap<([i64; 3], u32, u32), u32> = HashMap::new();
+        let mut number_of = |volume: u32, direction: Vec3, bits: f32, tolerance: f32| {
             let step = tolerance * direction.length().max(1e-30);
             // The step is rounded to a power of two. Directions that are nearly equal then round to the same
             // grid.
@@ -289,15 +299,17 @@ impl LightVolumes {
                 0.0 => i64::from(x.to_bits()),
                 _ => (x / step).round() as i64,
             };
-            let key = (direction.to_array().map(place), bits.to_bits());
+            let key = (direction.to_array().map(place), bits.to_bits(), volume);
             *known.entry(key).or_insert_with(|| {
-                volumes.push(LightVolume { direction, bits });
+                volumes.push(LightVolume { volume, direction, bits });
                 volumes.len() as u32 - 1
             })
         };
         let (mut numbers, mut marched, mut patches) = (Vec::new(), Vec::new(), Vec::new());
         let widest = MARCH_ANGLE.to_radians().max(2.0 * angles[1]);
         for quad in quads {
+            let volume = quad.material.volume;
+            let &VolumeTexture { size, alpha, .. } = &textures[volume as usize];
             let cell_depth = if medium.per_cell { 1.0 } else { quad.material.thickness_m / size[2] as f32 };
             let bits = match form {
                 Form::Codes => extinction(&trace.attenuation, alpha) * cell_depth,
@@ -327,14 +339,15 @@ impl LightVolumes {
                     true => walked_and_needed(&directions, [nu, nv], widest),
                     false => (vec![false; directions.len()], vec![true; directions.len()]),
                 };
-                let number =
-                    |(&d, needed): (&Vec3, bool)| if needed { number_of(d, bits, tolerance) } else { 0 };
+                let number = |(&d, needed): (&Vec3, bool)| {
+                    if needed { number_of(volume, d, bits, tolerance) } else { 0 }
+                };
                 numbers.extend(directions.iter().zip(needed).map(number));
                 marched.extend(walked);
             }
         }
         if volumes.is_empty() && !numbers.is_empty() {
-            volumes.push(LightVolume { direction: Vec3::Z, bits: 1.0 });
+            volumes.push(LightVolume { volume: 0, direction: Vec3::Z, bits: 1.0 });
         }
         LightVolumes { volumes, numbers, marched, patches, lights: lights.len(), medium, form }
     }

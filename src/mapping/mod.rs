@@ -168,6 +168,8 @@ pub struct Material {
     pub repeat_u: f32,
     /// Number of copies along v.
     pub repeat_v: f32,
+    /// Number of the volume among those of the scene.
+    pub volume: u32,
 }
 
 /// Jacobian J = world_from_cell at one point of a quad, in the axes e1, e2 and seen normal of the quad's

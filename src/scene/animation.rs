@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 
 use super::keyframes::{CameraPath, Interpolation, Keyframes};
 use super::names::check_names;
-use super::param::{Kind, Param};
+use super::param::{Kind, Param, split_volume_key};
 use super::read::{Source, apply_sets};
 use super::value::{Place, Raw, Value, Values};
 use super::{Limits, Record, Scene, expose};
@@ -55,7 +55,7 @@ impl Animation {
         let mut values = source.values()?;
         let record = Record::of(&source.text, &mut values);
         let folder = apply_sets(&mut values, sets, &source, limits)?;
-        record.map_or(Ok(()), |record| record.check_map(&values))?;
+        record.as_ref().map_or(Ok(()), |record| record.check_map(&values))?;
         Ok(Animation { record, ..Animation::new(&source.name, values, folder, limits)? })
     }
 
@@ -161,7 +161,7 @@ impl Animation {
         let mut values = self.values.clone();
         changes.iter().try_for_each(|(key, raw, place)| values.set(key, raw, place))?;
         let animation = Animation::new(&self.name, values, self.folder.clone(), &self.limits)?;
-        Ok(Animation { measured: self.measured, record: self.record, ..animation })
+        Ok(Animation { measured: self.measured, record: self.record.clone(), ..animation })
     }
 
     /// Replaces the automatic exposure by `stops` added to the exposure of every frame.
@@ -210,7 +210,7 @@ impl Animation {
             expose(&mut values, stops);
         }
         Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
-            .map(|scene| scene.recorded(self.record))
+            .map(|scene| scene.recorded(self.record.clone()))
             .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })
     }
 }
@@ -269,7 +269,9 @@ fn track(values: &Values, section: &str, period: Option<u32>) -> Result<(String,
     let interpolation = values.choice(&format!("{section}.interpolation"), Interpolation::from_word);
     // A whole length of the volume further, the flow shows the same picture.
     let closes = |first: &[f64], last: &[f64]| match key.as_str() {
-        "volume.flow" => (last[0] - first[0]).fract() == 0.0,
+        key if split_volume_key(key).is_some_and(|(_, own)| own == "volume.flow") => {
+            (last[0] - first[0]).fract() == 0.0
+        }
         _ => first == last,
     };
     match Keyframes::new(&frames, series, interpolation, period, closes) {

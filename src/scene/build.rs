@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
+use super::param::key_of_volume;
 use super::{Limits, MAX_LIGHTS, Place, Raw, Values};
 use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{Environment, Settings, Sky, Source};
@@ -30,71 +31,83 @@ pub(super) enum EnvironmentKind {
 
 words! { EnvironmentKind { None => "none", Sky => "sky", File => "file" } }
 
-/// Returns the recipe of the scene's water volume.
-pub(super) fn water(v: &Values) -> WaterSpec {
-    let size = [v.count("volume.nx"), v.count("volume.ny"), v.count("volume.nz")];
-    let levels = match v.count("curves.levels") {
+/// Returns the recipe of the scene's volume `name`.
+pub(super) fn water(v: &Values, name: &str) -> WaterSpec {
+    let count = |key: &str| v.count(&key_of_volume(name, key));
+    let float = |key: &str| v.float(&key_of_volume(name, key));
+    let size = [count("volume.nx"), count("volume.ny"), count("volume.nz")];
+    let levels = match count("curves.levels") {
         0 => levels_for(size[1]).min(16),
         n => n,
     };
     WaterSpec {
         size,
-        across: v.count("curves.across"),
-        deep: v.count("curves.deep"),
+        across: count("curves.across"),
+        deep: count("curves.deep"),
         shape: CurveShape {
-            h: v.float("curves.h"),
-            sigma_g_cells: v.float("curves.amplitude") * size[1] as f32,
+            h: float("curves.h"),
+            sigma_g_cells: float("curves.amplitude") * size[1] as f32,
             levels,
         },
-        structure: structure(v),
-        seed: v.int("volume.seed") as u64,
-        alpha: v.float("volume.alpha"),
-        k_d: v.float("volume.k_d"),
-        k_s: v.float("volume.k_s"),
-        k_noise: v.float("volume.k_noise"),
+        structure: structure(v, name),
+        seed: v.int(&key_of_volume(name, "volume.seed")) as u64,
+        alpha: float("volume.alpha"),
+        k_d: float("volume.k_d"),
+        k_s: float("volume.k_s"),
+        k_noise: float("volume.k_noise"),
     }
 }
 
 /// Returns the fine structure of the water. Lengths are fractions of the volume, so a look survives a change
 /// of resolution.
-fn structure(v: &Values) -> Structure {
-    let bundles = v.count("curves.bundles");
+fn structure(v: &Values, name: &str) -> Structure {
+    let count = |key: &str| v.count(&key_of_volume(name, key));
+    let float = |key: &str| v.float(&key_of_volume(name, key));
+    let bundles = count("curves.bundles");
     // Without bundles their parameters are 0, so that they do not tell equal volumes apart.
-    let of_bundles = |key: &str| if bundles > 0 { v.float(key) } else { 0.0 };
+    let of_bundles = |key: &str| if bundles > 0 { float(key) } else { 0.0 };
     Structure {
         bundles,
-        radius_cells: of_bundles("curves.radius") * v.count("volume.nx") as f32,
-        wander_cells: of_bundles("curves.wander") * v.count("volume.ny") as f32,
+        radius_cells: of_bundles("curves.radius") * count("volume.nx") as f32,
+        wander_cells: of_bundles("curves.wander") * count("volume.ny") as f32,
         breathe: of_bundles("curves.breathe"),
         loose: of_bundles("curves.loose"),
-        coherence: v.float("volume.coherence"),
-        strand_length: v.float("volume.strand_length"),
-        coverage: v.float("volume.coverage"),
-        crest: v.float("volume.crest"),
+        coherence: float("volume.coherence"),
+        strand_length: float("volume.strand_length"),
+        coverage: float("volume.coverage"),
+        crest: float("volume.crest"),
     }
 }
 
-/// Returns the resolved path of the volume's file, if the scene names one.
-pub(super) fn volume_file(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Option<PathBuf>> {
-    match v.text("volume.file") {
+/// Returns the resolved path of the file of the volume `name`, if the scene names one.
+pub(super) fn volume_file(
+    v: &Values,
+    name: &str,
+    folder: Option<&Path>,
+    limits: &Limits,
+) -> Result<Option<PathBuf>> {
+    let key = key_of_volume(name, "volume.file");
+    match v.text(&key) {
         file if file.is_empty() => Ok(None),
         file => {
-            let file = confine("volume.file", Path::new(&file), folder, &limits.allow_paths)?;
+            let file = confine(&key, Path::new(&file), folder, &limits.allow_paths)?;
             check_npz(&file)?;
             Ok(Some(file))
         }
     }
 }
 
-/// Returns the storage that the scene asks for. Coarse levels are made from all cells, so with them sparse
-/// storage is refused and automatic storage is dense.
-pub(super) fn asked_storage(v: &Values) -> Result<StorageChoice> {
+/// Returns the storage that the scene asks for, for the volume `name`. Coarse levels are made from all cells,
+/// so with them sparse storage is refused and automatic storage is dense.
+pub(super) fn asked_storage(v: &Values, name: &str) -> Result<StorageChoice> {
     let pyramid = v.choice("trace.filter", Prefilter::from_word) == Prefilter::Pyramid;
-    match v.choice("volume.storage", StorageChoice::from_word) {
+    let key = key_of_volume(name, "volume.storage");
+    match v.choice(&key, StorageChoice::from_word) {
         StorageChoice::Sparse if pyramid => Err(Error::input(
-            "volume.storage = \"sparse\" with trace.filter = \"pyramid\": \
-             coarse levels are made from all cells",
-            "set trace.filter=none, or volume.storage=dense",
+            format!(
+                "{key} = \"sparse\" with trace.filter = \"pyramid\": coarse levels are made from all cells"
+            ),
+            format!("set trace.filter=none, or {key}=dense"),
         )),
         StorageChoice::Auto if pyramid => Ok(StorageChoice::Dense),
         asked => Ok(asked),

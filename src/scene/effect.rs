@@ -3,12 +3,14 @@
 use super::Values;
 use super::build::EnvironmentKind;
 use super::names::full_key;
-use super::param::matches;
+use super::param::{key_of_volume, matches, split_volume_key};
 use super::read::split;
+use super::volumes;
 use crate::light::{LightKind, ReflectionKind, Visibility};
 use crate::trace::AttenuationKind;
 
-/// Parameters that only have an effect where another one, the switch, has a certain value.
+/// Parameters that only have an effect where another one, the switch, has a certain value. Rules on keys of
+/// the volume `water` hold for the keys of every volume.
 struct Rule {
     /// Patterns of their keys.
     keys: &'static [&'static str],
@@ -131,15 +133,23 @@ const RULES: &[Rule] = &[
 
 /// Returns the rule by which a key has no effect, with its switch, whose key is full.
 fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
-    RULES.iter().filter(|rule| rule.keys.iter().any(|pattern| matches(pattern, key))).find_map(|rule| {
+    let of_volume = split_volume_key(key);
+    let own = of_volume.map_or(key, |(_, of_water)| of_water);
+    RULES.iter().filter(|rule| rule.keys.iter().any(|pattern| matches(pattern, own))).find_map(|rule| {
         let name = key.split('.').nth(1).unwrap_or_default();
-        let switch = rule.switch.replace('*', name);
+        let switch = match of_volume {
+            Some((volume, _)) => key_of_volume(volume, rule.switch),
+            None => rule.switch.replace('*', name),
+        };
         (!(rule.works)(values, &switch)).then_some((rule, switch))
     })
 }
 
 /// Returns why the value of a key has no effect; `None` where it has one.
 pub fn without_effect(values: &Values, key: &str) -> Option<String> {
+    if let Some(why) = volumes::without_effect(values, key) {
+        return Some(why);
+    }
     let (rule, switch) = rule(values, key)?;
     let now = values.get(&switch).to_toml();
     Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
@@ -182,7 +192,7 @@ pub fn settings_without_effect(values: &Values, sets: &[String], sweeps: &[Strin
     let mut said: Vec<String> = set
         .chain(swept.clone())
         // A switch that is swept is on in other pictures.
-        .filter(|key| rule(values, key).is_some_and(|(_, switch)| !swept.contains(&switch)))
+        .filter(|key| rule(values, key).is_none_or(|(_, switch)| !swept.contains(&switch)))
         .filter_map(|key| without_effect(values, &key))
         .collect();
     said.dedup();

@@ -19,6 +19,7 @@ mod remove;
 mod slips;
 mod typed;
 mod value;
+mod volumes;
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -28,14 +29,17 @@ use glam::Vec3;
 pub use animation::Animation;
 pub use build::resolve;
 pub use effect::{settings_without_effect, settings_without_file, without_effect};
-pub use names::{NAMED, check_names, full_key, unknown_key};
-pub use param::{Cost, GROUPS, Group, Kind, PARAMS, Param, parameters_markdown};
+pub use names::{NAMED, check_names, full_key, likeliest, unknown_key};
+pub use param::{
+    Cost, GROUPS, Group, Kind, PARAMS, Param, WATER, key_of_volume, parameters_markdown, split_volume_key,
+};
 pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
-pub use read::{REFERENCES, STDIN, Source, read_stdin, set_by_hand};
+pub use read::{STDIN, Source, has_reference_by_hand, read_stdin, reference_keys};
 pub use record::{MAP_COMMENT, Record, VOLUME_COMMENT};
 pub use remove::REMOVE;
 pub use typed::{fraction, parse_value};
 pub use value::{Key, Place, Raw, Value, Values};
+pub use volumes::{MAX_VOLUMES, Recipe};
 
 use crate::light::environment::{self, Environment, EnvironmentMemo};
 use crate::light::haze::Haze;
@@ -49,11 +53,7 @@ use crate::place::{Ground, Mesh, Pool, Rock};
 use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
-use crate::util::monitor::Monitor;
-use crate::volume::{
-    PyramidSpec, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water,
-    build_water, kept_water, read_npz,
-};
+use crate::volume::{PyramidSpec, StorageChoice, VolumeTexture};
 
 /// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
 /// more lights even the smallest tile of a picture would run into the driver's timeout.
@@ -85,17 +85,11 @@ impl Deref for Scene {
 pub struct Parts {
     /// Name: the preset's, or the stem of the file.
     pub name: String,
-    /// Recipe of the volume, used where there is no `volume_file`.
-    pub water: WaterSpec,
-    /// Path of the volume's `.npz` file, resolved and inside the allowed folders.
-    pub volume_file: Option<PathBuf>,
-    /// Storage of the volume's cells.
-    pub storage: Storage,
-    /// Storage that the scene asks for.
-    pub asked_storage: StorageChoice,
-    /// Distance that the volume has moved down the flow, in lengths of the volume.
-    pub flow: f32,
-    /// Quads of the volume.
+    /// Volumes that the quads show, at least one. A quad's material has the number of its volume.
+    pub recipes: Vec<Recipe>,
+    /// Distance that the waves of pools have moved, in lengths of the volume `water`, with which they move.
+    pub wave_flow: f32,
+    /// Quads that the volumes are mapped to.
     pub quads: Vec<Quad>,
     /// Lights with an intensity above 0; the environment's sun is the last.
     pub lights: Vec<Light>,
@@ -191,7 +185,7 @@ impl Scene {
         let mut values = source.values()?;
         let record = Record::of(&source.text, &mut values);
         let folder = read::apply_sets(&mut values, sets, &source, limits)?;
-        record.map_or(Ok(()), |record| record.check_map(&values))?;
+        record.as_ref().map_or(Ok(()), |record| record.check_map(&values))?;
         Ok(Scene::from_values(&source.name, values, folder.as_deref(), limits)?.recorded(record))
     }
 
@@ -204,13 +198,7 @@ impl Scene {
     /// work needs more than [`Limits::memory`].
     pub fn from_values(name: &str, values: Values, folder: Option<&Path>, limits: &Limits) -> Result<Scene> {
         let v = &values;
-        let water = build::water(v);
-        let volume_file = build::volume_file(v, folder, limits)?;
-        let asked_storage = build::asked_storage(v)?;
-        if volume_file.is_none() {
-            // A volume that is too large by itself is refused with its own numbers.
-            build::water_storage(&water, asked_storage, limits.memory, 0)?;
-        }
+        let recipes = volumes::recipes(v, folder, limits)?;
         let image = build::image(v);
         check_image(&image, limits.memory)?;
         let origin = origin::origin(v);
@@ -220,12 +208,9 @@ impl Scene {
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
         let mut parts = Parts {
             name: name.into(),
-            water,
-            volume_file,
-            storage: Storage::Dense,
-            asked_storage,
-            flow: v.float("volume.flow"),
-            quads: quads::quads(v, origin)?,
+            quads: quads::quads(v, origin, &recipes)?,
+            recipes,
+            wave_flow: v.float("volume.flow"),
             lights: build::lights(v, origin, sun, environment_lights.len())?,
             environment_lights,
             environment,
@@ -244,10 +229,7 @@ impl Scene {
             haze: build::haze(v, origin),
             image,
         };
-        if parts.volume_file.is_none() {
-            let beside = parts.least_bytes_beside_volume();
-            parts.storage = build::water_storage(&parts.water, asked_storage, limits.memory, beside)?;
-        }
+        parts.choose_storages(limits.memory)?;
         Ok(Scene { values: Some(values), parts, record: None })
     }
 
@@ -282,58 +264,20 @@ impl Scene {
         self
     }
 
-    /// Builds the volume texture, or reads it from the scene's file, within `memory` bytes.
-    ///
-    /// # Errors
-    /// `Error::Memory` where it does not fit, `Error::Input` or `Error::Io` where the file is unusable, and
-    /// those of `monitor`.
-    pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
-        let volume = match (&self.volume_file, self.storage) {
-            (Some(path), _) => {
-                let k = [self.water.k_d, self.water.k_s];
-                read_npz(path, &ReadOptions { storage: self.asked_storage, budget: memory, k }, monitor)?
-            }
-            (None, Storage::Dense) => build_water(&self.water, monitor)?,
-            (None, Storage::Sparse) => build_sparse_water(&self.water, memory, monitor)?,
-        };
-        self.check_built(&volume)?;
-        Ok(volume)
-    }
-
-    /// Returns [`Scene::volume`], from the cache where it is stored there.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::volume`].
-    pub fn cached_volume(
-        &self,
-        cache: Option<&Cache>,
-        memory: u64,
-        monitor: &dyn Monitor,
-    ) -> Result<VolumeTexture> {
-        match cache {
-            // A sparse volume's cache file would be large enough to evict every other.
-            Some(cache) if self.volume_file.is_none() && self.storage == Storage::Dense => {
-                let volume = kept_water(&self.water, cache, monitor)?;
-                self.check_built(&volume)?;
-                Ok(volume)
-            }
-            _ => self.volume(memory, monitor),
-        }
-    }
-
     /// Returns [`Scene::mesh`], from the cache where it is stored there.
     pub fn cached_mesh(&self, cache: Option<&Cache>) -> Mesh {
         cache.map_or_else(|| self.mesh(), |cache| self.ground().cached_mesh(cache))
     }
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.
-    pub fn references(&self) -> Vec<(&'static str, PathBuf)> {
+    pub fn references(&self) -> Vec<(String, PathBuf)> {
+        let volume =
+            |recipe: &Recipe| Some((key_of_volume(&recipe.name, "volume.file"), recipe.file.clone()?));
         let map = self.environment.as_ref().and_then(|e| match &e.source {
-            environment::Source::File(path) => Some(path.clone()),
+            environment::Source::File(path) => Some(("environment.file".to_owned(), path.clone())),
             environment::Source::Sky(_) => None,
         });
-        let files = [self.volume_file.clone(), map];
-        REFERENCES.into_iter().zip(files).filter_map(|(key, file)| Some((key, file?))).collect()
+        self.recipes.iter().filter_map(volume).chain(map).collect()
     }
 
     /// Returns the lights that shine on the volume: the scene's own, then those that stand for its
@@ -342,9 +286,15 @@ impl Scene {
         self.lights.iter().chain(&self.environment_lights).copied().collect()
     }
 
-    /// Returns the specification of the volume's coarse levels.
+    /// Returns the specification of the coarse levels of the first volume.
     pub fn pyramid_spec(&self, volume: &VolumeTexture) -> PyramidSpec {
-        pyramid_spec(&self.trace, &self.quads, volume)
+        pyramid_spec(&self.trace, &self.quads, 0, volume)
+    }
+
+    /// Returns the specification of the coarse levels of each volume.
+    pub fn pyramid_specs(&self, volumes: &[VolumeTexture]) -> Vec<PyramidSpec> {
+        let spec = |(volume, number)| pyramid_spec(&self.trace, &self.quads, number, volume);
+        volumes.iter().zip(0..).map(spec).collect()
     }
 
     /// Plans the light volumes of a frame, within the budget of the scene: with cached visibility, and in
@@ -354,15 +304,19 @@ impl Scene {
     /// # Errors
     /// With cached visibility, `Error::Memory` where even the coarsest light volumes need more than the
     /// budget.
-    pub fn light_plan(&self, volume: &VolumeTexture) -> Result<Option<LightVolumes>> {
+    pub fn light_plan(
+        &self,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+    ) -> Result<Option<LightVolumes>> {
+        let volumes = volumes.as_ref();
         match self.visibility {
             Visibility::None => Ok(None),
-            Visibility::Cached => self.light_volumes(volume.size, volume.alpha, self.light_cache).map(Some),
+            Visibility::Cached => self.light_volumes(volumes, self.light_cache).map(Some),
             // Cells of a sparse volume are filled one by one, as they are walked.
-            Visibility::March if volume.is_sparse() => Ok(None),
+            Visibility::March if volumes.iter().any(VolumeTexture::is_sparse) => Ok(None),
             Visibility::March => {
                 let lights = self.volume_lights();
-                let lit = self.lit_quads(&lights, volume.size, volume.alpha);
+                let lit = self.lit_quads(&lights, volumes);
                 let Image { width, height, samples, .. } = self.image;
                 let rays = u64::from(width) * u64::from(height) * u64::from(samples);
                 Ok(LightVolumes::exact(&lit, rays, self.light_cache))
@@ -370,15 +324,19 @@ impl Scene {
         }
     }
 
-    /// Plans the light volumes of a frame with a volume of `size` cells whose density is scaled by `alpha`.
+    /// Plans the light volumes of a frame with volumes of these sizes and scales of the density.
     ///
     /// # Errors
     /// `Error::Memory` where even the coarsest light volumes need more than `budget` bytes.
-    pub fn light_volumes(&self, size: [u32; 3], alpha: f32, budget: u64) -> Result<LightVolumes> {
-        LightVolumes::new(&self.lit_quads(&self.volume_lights(), size, alpha), budget)
+    pub fn light_volumes(
+        &self,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+        budget: u64,
+    ) -> Result<LightVolumes> {
+        LightVolumes::new(&self.lit_quads(&self.volume_lights(), volumes.as_ref()), budget)
     }
 
-    fn lit_quads<'a>(&'a self, lights: &'a [Light], size: [u32; 3], alpha: f32) -> LitQuads<'a> {
+    fn lit_quads<'a>(&'a self, lights: &'a [Light], volumes: &'a [VolumeTexture]) -> LitQuads<'a> {
         LitQuads {
             quads: &self.quads,
             lights,
@@ -386,14 +344,14 @@ impl Scene {
             eye: self.camera.eye_local(),
             trace: &self.trace,
             scattering: self.scattering,
-            size,
-            alpha,
+            volumes,
         }
     }
 
-    /// Returns the media of diffuse light, one for each material in `volume`; `None` with single scattering.
-    pub fn media(&self, volume: &VolumeTexture) -> Option<Media> {
-        let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volume);
+    /// Returns the media of diffuse light, one for each material in its volume; `None` with single scattering.
+    pub fn media(&self, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Option<Media> {
+        let volumes = volumes.as_ref();
+        let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volumes);
         (self.scattering == Scattering::Multiple).then(make)
     }
 
@@ -443,17 +401,33 @@ impl Scene {
     }
 
     /// Returns notes on how the scene is rendered.
-    pub fn notes(&self, volume: &VolumeTexture) -> Vec<String> {
+    pub fn notes(&self, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Vec<String> {
         let mut notes = self.environment.iter().map(Environment::words).collect::<Vec<_>>();
-        if volume.is_sparse() && self.asked_storage == StorageChoice::Auto {
-            let [nx, ny, nz] = volume.size;
-            notes.push(format!(
-                "{} of the volume's {nx}×{ny}×{nz} cells are stored (sparse): \
-                 all of them would not fit into memory",
-                volume.cells.stored().len()
-            ));
-        }
+        let volumes = volumes.as_ref().iter().enumerate();
+        notes.extend(volumes.filter_map(|(number, volume)| self.note_on_volume(number, volume)));
         notes
+    }
+
+    /// Returns the note on the storage of volume `number`, if the user did not ask for it.
+    pub(crate) fn note_on_volume(&self, number: usize, volume: &VolumeTexture) -> Option<String> {
+        let recipe = &self.recipes[number];
+        let [nx, ny, nz] = volume.size;
+        let note = || {
+            format!(
+                "{} of {}'s {nx}×{ny}×{nz} cells are stored (sparse): all of them would not fit into memory",
+                volume.cells.stored().len(),
+                self.volume_words(recipe),
+            )
+        };
+        (volume.is_sparse() && recipe.asked_storage == StorageChoice::Auto).then(note)
+    }
+
+    /// Returns what sentences call a volume. Its name is said only where there are several.
+    fn volume_words(&self, recipe: &Recipe) -> String {
+        match self.recipes.len() {
+            1 => "the volume".into(),
+            _ => format!("the volume {}", recipe.name),
+        }
     }
 
     /// Whether the eye sees the back of a rock's patch.
@@ -464,20 +438,25 @@ impl Scene {
     }
 
     /// Returns warnings about what is valid but probably a mistake.
-    pub fn warnings(&self, volume: &VolumeTexture) -> Vec<String> {
+    pub fn warnings(&self, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Vec<String> {
+        let volumes = volumes.as_ref();
         let mut warnings = self.environment.as_ref().map_or(Vec::new(), Environment::warnings);
-        if let Some(values) = self.values.as_ref().filter(|v| v.is_set_by_user("volume.alpha"))
-            && self.volume_file.is_some()
-            && values.float("volume.alpha") != volume.alpha
-        {
-            warnings.push(format!(
-                "volume.alpha = {} has no effect: volume.file gives the density as it is; change trace.sigma \
-                 or trace.tau, or multiply rho in the file by a number",
-                values.float("volume.alpha"),
-            ));
+        for (recipe, volume) in self.recipes.iter().zip(volumes) {
+            let [alpha, file] = ["volume.alpha", "volume.file"].map(|key| key_of_volume(&recipe.name, key));
+            if let Some(values) = self.values.as_ref().filter(|v| v.is_set_by_user(&alpha))
+                && recipe.file.is_some()
+                && values.float(&alpha) != volume.alpha
+            {
+                warnings.push(format!(
+                    "{alpha} = {} has no effect: {file} gives the density as it is; change trace.sigma or \
+                     trace.tau, or multiply rho in the file by a number",
+                    values.float(&alpha),
+                ));
+            }
         }
-        warnings.extend(self.other_files(volume));
+        warnings.extend(self.other_files(volumes));
         warnings.extend(self.values.iter().flat_map(quads::unused_materials));
+        warnings.extend(self.values.iter().flat_map(volumes::unused));
         warnings.extend(self.values.iter().flat_map(bright_colours));
         if !self.rocks.is_empty() && self.rocks.iter().all(|rock| self.is_behind(rock)) {
             warnings.push(
@@ -501,10 +480,13 @@ impl Scene {
                 .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
         } else if unlit {
             warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
-        } else if !self.quads.is_empty()
-            && (volume.alpha == 0.0 || !volume.cells.stored().iter().any(|c| c.rho_code() > 0))
-        {
-            warnings.push("the volume is empty: no cell has density".into());
+        } else if !self.quads.is_empty() {
+            let is_empty = |volume: &VolumeTexture| {
+                volume.alpha == 0.0 || !volume.cells.stored().iter().any(|c| c.rho_code() > 0)
+            };
+            let empty = self.recipes.iter().zip(volumes).filter(|(_, volume)| is_empty(volume));
+            let words = |(recipe, _)| format!("{} is empty: no cell has density", self.volume_words(recipe));
+            warnings.extend(empty.map(words));
         }
         warnings.extend(origin::rounded(self));
         warnings

@@ -1,12 +1,12 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
-use super::param::{Kind, PARAMS, Param, last_part, matches};
+use super::param::{Kind, PARAMS, Param, WATER, last_part, matches, split_volume_key};
 use super::remove::{NUMBERED, REMOVE};
 use super::value::{Place, Raw, Values, check};
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
-pub const NAMED: [&str; 6] = ["lights", "materials", "pools", "rocks", "sheets", "splashes"];
+pub const NAMED: [&str; 7] = ["lights", "materials", "pools", "rocks", "sheets", "splashes", "volumes"];
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;
@@ -32,6 +32,8 @@ const OTHER_WORDS: &[(&str, &[&str])] = &[
     ("rocks.*.color", &["albedo", "base_color", "diffuse"]),
     ("volume.alpha", &["density", "opacity"]),
     ("volume.seed", &["random", "random_seed", "rng"]),
+    ("volumes.*.alpha", &["density", "opacity"]),
+    ("volumes.*.seed", &["random", "random_seed", "rng"]),
 ];
 
 /// Returns the full key that `name` stands for: `name` itself, or the one key of the scene that ends with it,
@@ -211,7 +213,8 @@ fn elsewhere(key: &str, raw: Option<&Raw>, values: &Values) -> Option<String> {
     }
     let absent = PARAMS.iter().filter_map(|param| {
         let (section, rest) = param.key.split_once(".*.")?;
-        let absent = NAMED.contains(&section) && section != "materials" && !values.has_under(section);
+        let always = ["materials", "volumes"].contains(&section);
+        let absent = NAMED.contains(&section) && !always && !values.has_under(section);
         absent.then(|| format!("{section}.NAME.{rest}"))
     });
     let mut keys: Vec<String> = values.known_keys().into_iter().chain(absent).collect();
@@ -260,7 +263,7 @@ fn keys_within(table: &str) -> Vec<&'static str> {
 }
 
 /// Returns the one of `names` that a misspelt one is most like, if it is.
-pub(super) fn likeliest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub fn likeliest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let name = name.to_lowercase();
     let alike = |other: &str| strsim::jaro_winkler(&name, &other.to_lowercase());
     names.filter(|other| alike(other) > 0.8).max_by(|a, b| alike(a).total_cmp(&alike(b)))
@@ -322,11 +325,29 @@ fn nearest(key: &str, candidates: impl IntoIterator<Item = String>) -> Option<St
         .map(|(_, candidate)| candidate)
 }
 
+/// The fault of a key in a table `volumes.water`, and the way out; `None` for another key. The keys of the
+/// volume `water` have tables of their own.
+pub(super) fn in_table_of_water(key: &str) -> Option<(String, String)> {
+    let last = key.strip_prefix("volumes.")?.strip_prefix(WATER)?;
+    let of_water = |last: &str| split_volume_key(&format!("volumes.{WATER}.{last}")).map(|(_, own)| own);
+    let fix = match last.strip_prefix('.').and_then(of_water) {
+        Some(own) => format!("write {own}: the keys of the volume {WATER} are in [curves] and [volume]"),
+        None if last.is_empty() || last.starts_with('.') => {
+            format!("the keys of the volume {WATER} are in [curves] and [volume]")
+        }
+        None => return None,
+    };
+    Some((format!("there is no table volumes.{WATER}"), fix))
+}
+
 /// Checks that the scene has the name in `key`, so that a misspelt one does not add a second light. The error
 /// is the fault and the list of the names there are.
 pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (String, String)> {
     let mut parts = key.split('.');
     let (Some(section), Some(name)) = (parts.next(), parts.next()) else { return Ok(()) };
+    if let Some(fault) = in_table_of_water(key) {
+        return Err(fault);
+    }
     if !NAMED.contains(&section) && section != "quads" {
         return Ok(());
     }

@@ -33,9 +33,9 @@ impl Scene {
         };
         // Relative paths were resolved in the folder of the scene's file, which is not known any more.
         for (key, path) in self.references() {
-            values.set(key, &Raw::Text(path.to_string_lossy().into_owned()), &Place(key.into()))?;
+            values.set(&key, &Raw::Text(path.to_string_lossy().into_owned()), &Place(key.clone()))?;
         }
         sets.iter().try_for_each(|setting| apply_set(&mut values, setting))?;
-        Ok(Scene::from_values(&self.name, values, None, &Limits::default())?.recorded(self.record))
+        Ok(Scene::from_values(&self.name, values, None, &Limits::default())?.recorded(self.record.clone()))
     }
 }

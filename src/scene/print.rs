@@ -7,9 +7,9 @@ use std::fmt::Write;
 use glam::{DVec3, Vec3};
 use serde_json::{Map, Value as Json, json};
 
-use super::param::{PARAMS, Param};
+use super::param::{PARAMS, Param, WATER};
 use super::read::VERSION;
-use super::{Scene, Values};
+use super::{Recipe, Scene, Values, build};
 use crate::light::Light;
 use crate::light::environment::{ANGULAR_RADIUS, Environment};
 use crate::mapping::Quad;
@@ -117,13 +117,16 @@ impl Scene {
 
     fn derived_json(&self) -> Json {
         let origin = self.camera.origin;
+        let water = build::water(self.written(), WATER);
+        let file = self.recipes.iter().find(|recipe| recipe.name == WATER).and_then(|r| r.file.as_ref());
         json!({
             "curves": {
-                "levels": self.water.shape.levels,
-                "sigma_g_cells": self.water.shape.sigma_g_cells,
+                "levels": water.shape.levels,
+                "sigma_g_cells": water.shape.sigma_g_cells,
             },
+            "volumes": self.recipes.iter().map(volume_json).collect::<Vec<_>>(),
             "quads": self.quads.iter().map(|quad| quad_json(quad, origin)).collect::<Vec<_>>(),
-            "volume_file": self.volume_file.as_ref().map(|p| p.display().to_string()),
+            "volume_file": file.map(|p| p.display().to_string()),
             "camera": camera_json(&self.camera, &self.image),
             "lights": lights_json(&self.lights, origin),
             "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
@@ -138,6 +141,16 @@ fn in_world(position: Vec3, origin: DVec3) -> [f64; 3] {
     [0, 1, 2].map(|c| origin[c] + decimal(position[c]))
 }
 
+fn volume_json(recipe: &Recipe) -> Json {
+    let shape = &recipe.water.shape;
+    json!({
+        "name": recipe.name,
+        "levels": shape.levels,
+        "sigma_g_cells": shape.sigma_g_cells,
+        "file": recipe.file.as_ref().map(|p| p.display().to_string()),
+    })
+}
+
 fn quad_json(quad: &Quad, origin: DVec3) -> Json {
     json!({
         "corners": quad.corners.map(|c| in_world(c, origin)),
@@ -147,6 +160,8 @@ fn quad_json(quad: &Quad, origin: DVec3) -> Json {
         "extent": [quad.material.repeat_u, quad.material.repeat_v],
         "erosion": quad.erosion,
         "mist": quad.mist,
+        // Index in the list of volumes.
+        "volume": quad.material.volume,
     })
 }
 

@@ -1,21 +1,36 @@
 //! Builders of the volume's quads: the scene's own, those of its sheets and those of its splashes.
 
-use std::collections::BTreeSet;
-
 use glam::{DVec3, Vec2, Vec3};
 
-use super::Values;
 use super::names::likeliest;
 use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
+use super::volumes::{used_materials, volume_of};
+use super::{Recipe, Values};
 use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 
-/// Returns the quads, relative to `origin`.
-pub(super) fn quads(v: &Values, origin: DVec3) -> Result<Vec<Quad>> {
+/// Materials of a scene.
+struct Materials<'a> {
+    /// Names of those with a table.
+    names: Vec<String>,
+    /// Volumes that they show.
+    recipes: &'a [Recipe],
+}
+
+impl Materials<'_> {
+    /// Returns the number of the volume `name`.
+    fn volume(&self, name: &str) -> u32 {
+        let number = self.recipes.iter().position(|recipe| recipe.name == name);
+        number.expect("a volume that a quad shows has a recipe") as u32
+    }
+}
+
+/// Returns the quads, relative to `origin`. `recipes` are those of the volumes that they show.
+pub(super) fn quads(v: &Values, origin: DVec3, recipes: &[Recipe]) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
-    let materials = v.names("materials");
+    let materials = &Materials { names: v.names("materials"), recipes };
     for i in v.names("quads") {
         let key = format!("quads.{i}.corners");
         if !v.is_set(&key) {
@@ -24,7 +39,7 @@ pub(super) fn quads(v: &Values, origin: DVec3) -> Result<Vec<Quad>> {
                 format!("give {key} four points A, B, C, D"),
             ));
         }
-        let (material, mist) = material(v, &materials, &format!("quad {i}"), &format!("quads.{i}.material"))?;
+        let (material, mist) = material(v, materials, &format!("quad {i}"), &format!("quads.{i}.material"))?;
         let quad = Quad::new(v.local_corners(&key, origin), material).map_err(|fault| {
             Error::input(
                 format!("quad {i} ({key}) {}", fault.words()),
@@ -34,10 +49,10 @@ pub(super) fn quads(v: &Values, origin: DVec3) -> Result<Vec<Quad>> {
         quads.push(Quad { mist, ..quad });
     }
     for name in v.names("sheets") {
-        sheet_quads(v, origin, &materials, &name, &mut quads)?;
+        sheet_quads(v, origin, materials, &name, &mut quads)?;
     }
     for name in v.names("splashes") {
-        splash_quads(v, origin, &materials, &name, &mut quads)?;
+        splash_quads(v, origin, materials, &name, &mut quads)?;
     }
     Ok(quads)
 }
@@ -54,10 +69,7 @@ pub(super) fn unknown_material(name: &str, materials: &[String]) -> Option<Strin
 
 /// Returns a warning about each material of the user's own that nothing has.
 pub(super) fn unused_materials(v: &Values) -> Vec<String> {
-    let users = ["quads", "sheets", "splashes"].into_iter().flat_map(|section| {
-        v.names(section).into_iter().map(move |name| v.text(&format!("{section}.{name}.material")))
-    });
-    let used: BTreeSet<String> = users.collect();
+    let used = used_materials(v);
     let names = v.names("materials").into_iter();
     let unused = names.filter(|name| {
         let path = format!("materials.{name}");
@@ -75,9 +87,9 @@ pub(super) fn unused_materials(v: &Values) -> Vec<String> {
 }
 
 /// Returns the material that `key` names, and its mist. `what` names the user of the material in messages.
-fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(Material, f32)> {
+fn material(v: &Values, materials: &Materials, what: &str, key: &str) -> Result<(Material, f32)> {
     let name = v.text(key);
-    if let Some(fix) = unknown_material(&name, materials) {
+    if let Some(fix) = unknown_material(&name, &materials.names) {
         return Err(Error::input(format!("{what} ({key}) has the unknown material {name:?}"), fix));
     }
     let float = |what: &str| v.float(&format!("materials.{name}.{what}"));
@@ -85,6 +97,7 @@ fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(
         thickness_m: float("thickness"),
         repeat_u: float("repeat_u"),
         repeat_v: float("repeat_v"),
+        volume: materials.volume(&volume_of(v, &name)),
     };
     Ok((material, float("mist")))
 }
@@ -93,7 +106,7 @@ fn material(v: &Values, materials: &[String], what: &str, key: &str) -> Result<(
 fn sheet_quads(
     v: &Values,
     origin: DVec3,
-    materials: &[String],
+    materials: &Materials,
     name: &str,
     quads: &mut Vec<Quad>,
 ) -> Result<()> {
@@ -122,7 +135,7 @@ fn sheet_quads(
 fn splash_quads(
     v: &Values,
     origin: DVec3,
-    materials: &[String],
+    materials: &Materials,
     name: &str,
     quads: &mut Vec<Quad>,
 ) -> Result<()> {
@@ -175,7 +188,7 @@ fn splash_quads(
     Ok(())
 }
 
-fn sheet(v: &Values, origin: DVec3, materials: &[String], name: &str) -> Result<Sheet> {
+fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result<Sheet> {
     let key = |what: &str| format!("sheets.{name}.{what}");
     let bad = |what: String, fix: String| Err(Error::input(format!("sheet {name}: {what}"), fix));
     let points = v.series(&key("points"));

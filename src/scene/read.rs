@@ -9,13 +9,13 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::names::NAMED;
-use super::names::{check_names, full_key, likeliest, unknown_key};
-use super::param::{Kind, PARAMS, Param};
+use super::names::{check_names, full_key, in_table_of_water, likeliest, unknown_key};
+use super::param::{Kind, PARAMS, Param, key_of_volume};
 use super::remove::{self, REMOVE};
 use super::slips::{foreign_signs_at, given_twice, not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
-use super::{Limits, build, presets, quads};
+use super::{Limits, build, presets, quads, volumes};
 use crate::output::frame::{folder_of, scene_in};
 use crate::util::error::{Error, Result};
 
@@ -357,6 +357,7 @@ impl File<'_> {
             ("pools", "corners"),
             ("sheets", "points"),
             ("splashes", ""),
+            ("materials", ""),
         ] {
             let parts: Vec<(String, usize, &Spanned<DeValue>)> = match root.get(section).map(Spanned::get_ref)
             {
@@ -380,6 +381,15 @@ impl File<'_> {
                 if !need.is_empty() && !has() {
                     return Err(without(&path, need, values, &self.place(at)));
                 }
+                let volume = part.get_ref().as_table().filter(|_| section == "materials");
+                if let Some(volume) = volume.and_then(|part| part.get("volume"))
+                    && let Some(name) = volume.get_ref().as_str()
+                    && let Some(fix) = volumes::unknown(values, name)
+                {
+                    let place = self.place(volume.span().start).0;
+                    let what = format!("{place}: {path}.volume = {name:?}: the scene has no such volume");
+                    return Err(Error::input(what, fix));
+                }
                 let material = part.get_ref().as_table().and_then(|part| part.get("material"));
                 if let Some(material) = material
                     && let Some(name) = material.get_ref().as_str()
@@ -402,9 +412,13 @@ impl File<'_> {
             "materials" => format!("{path}.thickness"),
             "sheets" => format!("{path}.points"),
             "splashes" => format!("{path}.from"),
+            "volumes" => format!("{path}.nx"),
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
+        if let Some((what, fix)) = in_table_of_water(path) {
+            return Err(Error::input(format!("{}: {what}", place.0), fix));
+        }
         // No key of this file can lie under an empty table, so what is there belongs to the base.
         if NAMED.contains(&path) && values.has_under(path) {
             return Err(Error::input(
@@ -458,13 +472,22 @@ pub fn raw(value: &DeValue) -> Raw {
     }
 }
 
-/// Keys whose values are paths.
-pub const REFERENCES: [&str; 2] = ["volume.file", "environment.file"];
+/// Returns the keys of a scene whose values are paths.
+pub fn reference_keys(values: &Values) -> Vec<String> {
+    let files = volumes::names(values).into_iter().map(|name| key_of_volume(&name, "volume.file"));
+    files.chain(["environment.file".into()]).collect()
+}
 
 /// Whether a `--set` gives this reference. Paths from the command line are trusted and relative to the
 /// current folder.
-pub fn set_by_hand(sets: &[String], reference: &str) -> bool {
-    sets.iter().any(|s| s.split('=').next().is_some_and(|key| key.trim() == reference))
+fn set_by_hand(values: &Values, sets: &[String], reference: &str) -> bool {
+    let full = |setting: &String| full_key(split(setting)?.0, values).ok();
+    sets.iter().filter_map(full).any(|key| key == reference)
+}
+
+/// Whether a `--set` gives any reference of a scene.
+pub fn has_reference_by_hand(values: &Values, sets: &[String]) -> bool {
+    reference_keys(values).iter().any(|key| set_by_hand(values, sets, key))
 }
 
 /// Applies `--set`s in order. Returns the folder in which the scene's references resolve, or `None` if all of
@@ -485,12 +508,14 @@ pub fn apply_sets(
         ));
     }
     sets.iter().try_for_each(|setting| apply_set(values, setting))?;
-    if !REFERENCES.iter().any(|key| set_by_hand(sets, key)) {
+    if !has_reference_by_hand(values, sets) {
         return Ok(Some(source.folder.clone()));
     }
-    let own = REFERENCES.iter().filter(|key| !set_by_hand(sets, key));
-    own.into_iter()
-        .try_for_each(|key| build::resolve(values, key, Some(&source.folder), &limits.allow_paths))?;
+    for key in reference_keys(values) {
+        if !set_by_hand(values, sets, &key) {
+            build::resolve(values, &key, Some(&source.folder), &limits.allow_paths)?;
+        }
+    }
     Ok(None)
 }
 

@@ -3,7 +3,8 @@
 //! refused.
 
 use super::build::{self, EnvironmentKind};
-use super::{Scene, Values};
+use super::param::key_of_volume;
+use super::{Recipe, Scene, Values, volumes};
 use crate::light::environment::Source;
 use crate::util::error::{Error, Result};
 use crate::volume::{VolumeTexture, WaterSpec};
@@ -14,14 +15,14 @@ pub const VOLUME_COMMENT: &str = "# volume texture: crc32 ";
 pub const MAP_COMMENT: &str = "# environment map: crc32 ";
 
 /// Record in a picture of the files that its scene had.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// Checksum of the volume.
-    volume: Option<u32>,
+    /// Checksums of the volumes, in the order of their numbers.
+    volumes: Vec<u32>,
     /// Checksum of the environment map's file.
     map: Option<u32>,
-    /// Recipe of a volume without a file.
-    water: WaterSpec,
+    /// Recipes of the volumes, used where they have no files.
+    waters: Vec<WaterSpec>,
 }
 
 impl Record {
@@ -30,13 +31,18 @@ impl Record {
     /// marked as such.
     pub fn of(text: &str, values: &mut Values) -> Option<Record> {
         let comments: Vec<&str> = text.lines().take_while(|line| line.starts_with('#')).collect();
-        let checksum = |start: &str| {
-            comments.iter().find_map(|line| u32::from_str_radix(line.strip_prefix(start)?.trim(), 16).ok())
+        let checksums = |start: &str| {
+            let read = |line: &&str| {
+                let words = line.strip_prefix(start)?.split_whitespace();
+                words.map(|word| u32::from_str_radix(word, 16).ok()).collect::<Option<Vec<u32>>>()
+            };
+            comments.iter().find_map(read).unwrap_or_default()
         };
-        let (volume, map) = (checksum(VOLUME_COMMENT), checksum(MAP_COMMENT));
-        (volume.is_some() || map.is_some()).then(|| {
+        let (volumes, map) = (checksums(VOLUME_COMMENT), checksums(MAP_COMMENT).first().copied());
+        (!volumes.is_empty() || map.is_some()).then(|| {
             values.come_from_base();
-            Record { volume, map, water: build::water(values) }
+            let waters = volumes::shown(values).iter().map(|name| build::water(values, name)).collect();
+            Record { volumes, map, waters }
         })
     }
 
@@ -66,37 +72,47 @@ impl Scene {
 
     /// Returns what the picture tells that the scene was read from.
     pub fn record(&self) -> Option<Record> {
-        self.record
+        self.record.clone()
     }
 
-    /// Checks that a built volume is that of the picture which the scene was read from. A scene with another
-    /// recipe has another volume.
-    pub(super) fn check_built(&self, volume: &VolumeTexture) -> Result<()> {
-        let record = self.record.filter(|record| self.volume_file.is_none() && record.water == self.water);
-        let Some(then) = record.and_then(|record| record.volume) else { return Ok(()) };
+    /// Checks that volume `number`, if it was built, is that of the picture which the scene was read from. A
+    /// scene with other recipes has other volumes.
+    pub(super) fn check_built(&self, number: usize, volume: &VolumeTexture) -> Result<()> {
+        let Recipe { name, water, file, .. } = &self.recipes[number];
+        let is_same = |record: &&Record| {
+            file.is_none()
+                && record.waters.len() == self.recipes.len()
+                && record.waters.get(number) == Some(water)
+        };
+        let record = self.record.as_ref().filter(is_same);
+        let Some(&then) = record.and_then(|record| record.volumes.get(number)) else { return Ok(()) };
         let now = volume.checksum();
         if then == now {
             return Ok(());
         }
         Err(Error::input(
             format!("the picture shows another volume (crc32 {then:08x}) than its scene builds ({now:08x})"),
-            "give the volume's file again with --set volume.file=FILE; if there was none, another version of \
-             taki built it, and `taki scene PICTURE | taki render -` renders what this one builds",
+            format!(
+                "give the volume's file again with --set {}=FILE; if there was none, another version of \
+                 taki built it, and `taki scene PICTURE | taki render -` renders what this one builds",
+                key_of_volume(name, "volume.file")
+            ),
         ))
     }
 
     /// Returns warnings about files that differ from those of the picture which the scene was read from.
-    pub(super) fn other_files(&self, volume: &VolumeTexture) -> Vec<String> {
-        let Some(record) = self.record else { return Vec::new() };
+    pub(super) fn other_files(&self, volumes: &[VolumeTexture]) -> Vec<String> {
+        let Some(record) = &self.record else { return Vec::new() };
         let map = self.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
-        let files = [
-            ("volume.file", record.volume, self.volume_file.is_some().then(|| volume.checksum())),
-            ("environment.file", record.map, map.map(|e| e.map.checksum())),
-        ];
-        let differs = |(key, then, now): (&str, Option<u32>, Option<u32>)| {
+        let of_volumes = self.recipes.iter().zip(volumes).enumerate().map(|(i, (recipe, volume))| {
+            let now = recipe.file.is_some().then(|| volume.checksum());
+            (key_of_volume(&recipe.name, "volume.file"), record.volumes.get(i).copied(), now)
+        });
+        let map = ("environment.file".to_owned(), record.map, map.map(|e| e.map.checksum()));
+        let differs = |(key, then, now): (String, Option<u32>, Option<u32>)| {
             let (then, now) = then.zip(now).filter(|(then, now)| then != now)?;
             Some(format!("{key} is not that of the picture: its crc32 was {then:08x} and is {now:08x}"))
         };
-        files.into_iter().filter_map(differs).collect()
+        of_volumes.chain([map]).filter_map(differs).collect()
     }
 }

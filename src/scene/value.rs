@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::names::unknown_key_in_file;
+use super::names::{in_table_of_water, unknown_key_in_file};
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
 use super::slips::{advice, cut, not_allowed};
 use super::typed::{fraction, hex_color};
-use crate::util::error::Result;
+use crate::util::error::{Error, Result};
 
 /// A checked value. A number is the shortest decimal of the float32 that the renderer uses.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,6 +110,9 @@ impl Values {
     /// [`Error::Input`](crate::util::error::Error::Input) where the table has no such key or does not allow
     /// the value. The message begins with `place`.
     pub fn set(&mut self, key: &str, raw: &Raw, place: &Place) -> Result<()> {
+        if let Some((what, fix)) = in_table_of_water(key) {
+            return Err(Error::input(format!("{}: {what}", place.0), fix));
+        }
         let Some(param) = Param::find(key) else {
             return Err(unknown_key_in_file(key, raw, self, place));
         };

@@ -4,11 +4,12 @@ use super::{Attenuation, Lookup, Prefilter, Trace, extinction};
 use crate::mapping::Quad;
 use crate::volume::{LevelAtlas, PyramidSpec, VolumeTexture, level_count};
 
-/// Specification of the levels from which rays through `quads` are traced.
-pub fn pyramid_spec(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> PyramidSpec {
+/// Specification of the levels of volume `number`, from which rays through those of `quads` that show it are
+/// traced.
+pub fn pyramid_spec(trace: &Trace, quads: &[Quad], number: u32, volume: &VolumeTexture) -> PyramidSpec {
     let filtered = trace.filter == Prefilter::Pyramid;
     PyramidSpec {
-        coverage_bits: filtered.then(|| coverage_bits(trace, quads, volume)),
+        coverage_bits: filtered.then(|| coverage_bits(trace, quads, number, volume)),
         interpolated: trace.lookup == Lookup::Trilinear,
     }
 }
@@ -23,15 +24,15 @@ pub fn level_atlas(trace: &Trace, size: [u32; 3]) -> LevelAtlas {
 }
 
 /// Optical depth across the depth of one cell, in bits (−log₂ T) per unit of its ρ code. The pyramid computes
-/// the coverage of its cells with it. Path-length attenuation takes the mean thickness over all quads that
-/// are not mist.
-fn coverage_bits(trace: &Trace, quads: &[Quad], volume: &VolumeTexture) -> f32 {
+/// the coverage of its cells with it. Path-length attenuation takes the mean thickness over the quads of
+/// volume `number` that are not mist.
+fn coverage_bits(trace: &Trace, quads: &[Quad], number: u32, volume: &VolumeTexture) -> f32 {
     let extinction = extinction(&trace.attenuation, volume.alpha);
     if matches!(trace.attenuation, Attenuation::PerCell { .. }) {
         return extinction;
     }
-    let strands =
-        quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| f64::from(quad.material.thickness_m));
+    let own = quads.iter().filter(|quad| quad.mist == 0.0 && quad.material.volume == number);
+    let strands = own.map(|quad| f64::from(quad.material.thickness_m));
     let (count, sum) = strands.fold((0.0, 0.0), |(count, sum), thickness| (count + 1.0, sum + thickness));
     extinction * (sum / f64::max(count, 1.0)) as f32 / volume.size[2] as f32
 }

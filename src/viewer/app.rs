@@ -65,6 +65,8 @@ pub struct Viewer {
     parameters: ParameterPanel,
     lights: Lights,
     volume_panel: VolumePanel,
+    /// Name of the volume that the inspectors show.
+    inspected_volume: String,
     curves_panel: CurvesPanel,
     gallery: Gallery,
     paths: PathDialog,
@@ -166,6 +168,7 @@ impl Viewer {
             parameters: ParameterPanel::default(),
             lights: Lights::default(),
             volume_panel: VolumePanel::default(),
+            inspected_volume: String::new(),
             curves_panel: CurvesPanel::default(),
             gallery: Gallery::default(),
             paths: PathDialog::default(),

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use crate::output::frame::scene_in;
 use crate::scene::{
-    Key, Kind, Limits, NAMED, Param, Place, REFERENCES, Raw, Record, STDIN, Scene, Source, Value, Values,
-    resolve, set_by_hand,
+    Key, Kind, Limits, NAMED, Param, Place, Raw, Record, STDIN, Scene, Source, Value, Values,
+    has_reference_by_hand, reference_keys, resolve,
 };
 use crate::util::error::{Error, Result};
 
@@ -56,7 +56,7 @@ impl Document {
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
         let is_stdin = source == Path::new(STDIN);
         let is_file = !is_preset && !is_stdin && scene_in(source).is_none();
-        let by_hand = REFERENCES.iter().any(|key| set_by_hand(sets, key));
+        let by_hand = has_reference_by_hand(plain.written(), sets);
         Ok(Document {
             name: origin.name,
             path: is_file.then(|| source.to_owned()),
@@ -175,7 +175,8 @@ impl Document {
             values.set(key, raw, &Place("viewer".into()))?;
         }
         // The other references are relative to the scene's folder, which is given up below.
-        for key in REFERENCES.iter().filter(|key| edits.iter().all(|(edited, _)| edited != *key)) {
+        let is_edited = |key: &String| edits.iter().any(|(edited, _)| edited == key);
+        for key in reference_keys(&values).iter().filter(|key| !is_edited(key)) {
             resolve(&mut values, key, self.folder.as_deref(), &self.limits.allow_paths)?;
         }
         self.folder = None;
@@ -197,7 +198,7 @@ impl Document {
 
     fn scene_of(&self, values: Values) -> Result<Scene> {
         let scene = Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)?;
-        Ok(scene.recorded(self.record))
+        Ok(scene.recorded(self.record.clone()))
     }
 
     /// Resets the values of `keys` to those of when the scene was opened or saved.
@@ -335,7 +336,7 @@ impl Document {
                 ));
             };
             let raw = Raw::Text(inside.display().to_string());
-            values.set(key, &raw, &Place("viewer".into()))?;
+            values.set(&key, &raw, &Place("viewer".into()))?;
         }
         crate::output::frame::Output::create(path)?.finish_with(values.to_toml().as_bytes())?;
         self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -414,12 +415,14 @@ impl Document {
     }
 }
 
-/// Whether the light that `key` belongs to exists; true for a key outside `lights`. A light whose values are
-/// all defaults still differs from no light.
+/// Whether the light or volume that `key` belongs to exists; true for a key outside `lights` and `volumes`. A
+/// light whose values are all defaults still differs from no light.
 fn owner_exists(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {
-        (Some("lights"), Some(name)) => values.has_under(&format!("lights.{name}")),
+        (Some(section @ ("lights" | "volumes")), Some(name)) => {
+            values.has_under(&format!("{section}.{name}"))
+        }
         _ => true,
     }
 }

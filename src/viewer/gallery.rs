@@ -111,8 +111,8 @@ fn thumbnail(preset: &str) -> Option<egui::ColorImage> {
         sets.push("light.visibility=march".into());
         scene = Scene::load(Path::new(preset), &sets, &limits).ok()?;
     }
-    let volume = scene.volume(limits.memory, &Unwatched).ok()?;
-    let frame = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).ok()?;
+    let volumes = scene.volumes(limits.memory, &Unwatched).ok()?;
+    let frame = cpu::render(&scene, &volumes, &scene.mesh(), false, &Unwatched).ok()?;
     Some(egui::ColorImage::from_rgba_unmultiplied(
         [frame.width as usize, frame.height as usize],
         bytemuck::cast_slice(&frame.picture),

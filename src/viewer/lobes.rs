@@ -61,7 +61,7 @@ pub struct Setting {
 impl Setting {
     /// Setting of the cells of `scene` without their noise, and of a light of inclination `theta_i`, radians.
     pub fn new(scene: &Scene, theta_i: f64, plane: Plane) -> Setting {
-        let (k_d, k_s) = (scene.water.k_d, scene.water.k_s);
+        let (k_d, k_s) = (scene.recipes[0].water.k_d, scene.recipes[0].water.k_s);
         Setting { reflection: scene.reflection, k_d, k_s, p: scene.p, theta_i, plane }
     }
 }

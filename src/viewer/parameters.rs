@@ -28,12 +28,13 @@ struct Group {
 }
 
 /// The groups of the panel, in order.
-const GROUPS: [Group; 9] = [
+const GROUPS: [Group; 10] = [
     group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
     group("Volume", "The volume texture: cells, density, reflection", &["volume"]),
+    group("Volumes", "Other volumes beside the water, each with its curves", &["volumes"]),
     group(
         "Mapping",
-        "How the volume is mapped onto the quads",
+        "How the volumes are mapped onto the quads",
         &["materials", "sheets", "splashes", "quads"],
     ),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),

@@ -76,5 +76,5 @@ fn trace(question: &Question) -> RayReport {
     let image = &mut scene.edit().image;
     [image.width, image.height] = *size;
     let pixel = [(x * size[0] as f32) as u32, (y * size[1] as f32) as u32];
-    inspect(&scene, &picture.volume, &picture.mesh, pixel)
+    inspect(&scene, &*picture.volumes, &picture.mesh, pixel)
 }

@@ -50,7 +50,7 @@ impl Quantity {
 /// statistics.
 #[derive(Default)]
 pub struct VolumePanel {
-    volume: Option<Arc<VolumeTexture>>,
+    volume: Option<VolumeTexture>,
     /// x, y and z of the cell in which the three planes meet.
     cell: [u32; 3],
     quantity: Quantity,
@@ -65,9 +65,9 @@ struct Counts {
 }
 
 impl VolumePanel {
-    /// Shows `volume`. A new volume (by pointer) is counted again. The planes stay where they are if its size
+    /// Shows `volume`. A new volume (by the address of its cells) is counted again. The planes stay where they are if its size
     /// is the same.
-    pub fn show(&mut self, ui: &mut egui::Ui, volume: &Arc<VolumeTexture>) {
+    pub fn show(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         self.set_volume(ui.ctx(), volume);
         self.selector(ui, volume);
         ui.add_space(2.0);
@@ -99,8 +99,9 @@ impl VolumePanel {
         self.cell
     }
 
-    fn set_volume(&mut self, ctx: &egui::Context, volume: &Arc<VolumeTexture>) {
-        if self.volume.as_ref().is_some_and(|last| Arc::ptr_eq(last, volume)) {
+    fn set_volume(&mut self, ctx: &egui::Context, volume: &VolumeTexture) {
+        let is_last = |last: &VolumeTexture| last.cells.same(&volume.cells) && last.alpha == volume.alpha;
+        if self.volume.as_ref().is_some_and(is_last) {
             return;
         }
         if self.volume.as_ref().is_none_or(|last| last.size != volume.size) {

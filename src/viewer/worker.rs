@@ -65,8 +65,8 @@ pub struct Picture {
     pub requested: Arc<Scene>,
     /// The scene with the picture's size and exposure.
     pub scene: Arc<Scene>,
-    /// The scene's volume.
-    pub volume: Arc<VolumeTexture>,
+    /// The scene's volumes.
+    pub volumes: Arc<Vec<VolumeTexture>>,
     /// The scene's opaque mesh.
     pub mesh: Mesh,
     /// The rendered frame.

@@ -70,11 +70,12 @@ impl Bricks {
     }
 
     /// Masks and bases of a range of bricks, as the shader reads them (`rgba32uint`): the low and the high
-    /// half of the mask, and the index of the first stored cell of each half.
-    pub fn texels(&self, bricks: std::ops::Range<usize>) -> Vec<[u32; 4]> {
+    /// half of the mask, and the index of the first stored cell of each half. The stored cells of this volume
+    /// begin at index `first`.
+    pub fn texels(&self, bricks: std::ops::Range<usize>, first: u32) -> Vec<[u32; 4]> {
         let texel = |(&mask, &base): (&u64, &u32)| {
             let low = mask as u32;
-            [low, (mask >> 32) as u32, base, base + low.count_ones()]
+            [low, (mask >> 32) as u32, first + base, first + base + low.count_ones()]
         };
         self.masks[bricks.clone()].par_iter().zip(&self.bases[bricks]).map(texel).collect()
     }

@@ -23,8 +23,8 @@ pub use cells::Cells;
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
 pub use pyramid::{
-    Leaps, LevelAtlas, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels, level_count,
-    level_size, levels_of, stored_levels,
+    Leaps, LevelAtlas, LevelSets, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels,
+    level_count, level_size, levels_of, stored_levels,
 };
 pub use ripple::Ripple;
 pub use spec::{Structure, WaterSpec};
@@ -42,6 +42,13 @@ pub struct VolumeTexture {
     pub alpha: f32,
     /// The nx·ny·nz cells. They are shared, so a copy with another α costs nothing.
     pub cells: Cells,
+}
+
+/// A single volume stands for all volumes of a scene.
+impl AsRef<[VolumeTexture]> for VolumeTexture {
+    fn as_ref(&self) -> &[VolumeTexture] {
+        std::slice::from_ref(self)
+    }
 }
 
 impl VolumeTexture {

@@ -32,6 +32,9 @@ use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
 /// Levels as walks read them. They are shared, as a volume's cells are.
 pub type Levels = Arc<Pyramid>;
 
+/// Levels of several volumes, by the numbers of the volumes.
+pub type LevelSets = Arc<[Levels]>;
+
 /// Levels of a volume, the volume itself first.
 pub struct Pyramid {
     levels: Vec<VolumeTexture>,
@@ -50,10 +53,10 @@ impl std::ops::Deref for Pyramid {
 /// Choice whether rays leap over empty cells. Pictures and numbers of cells do not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Leaps {
-    /// Leaps if the volume is empty enough ([`worth_leaping`]).
+    /// Leaps if all volumes are empty enough ([`worth_leaping`]).
     #[default]
     Auto,
-    /// Leaps in every volume that is stored densely.
+    /// Leaps if all volumes are stored densely.
     Always,
     /// Walks every cell.
     Never,
@@ -180,7 +183,7 @@ pub struct PyramidSpec {
 /// Computes the levels of a volume without boxes to leap over. For a few rays, boxes cost more time than they
 /// save.
 pub fn levels_of(volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
-    LevelsCache::with_leaps(Leaps::Never).get(volume, spec)
+    pyramid(volume, spec, false)
 }
 
 /// Wraps a sparse volume, which has no coarser levels, as the levels of itself.
@@ -188,27 +191,36 @@ pub fn stored_levels(volume: VolumeTexture) -> Levels {
     Arc::new(Pyramid { levels: vec![volume], leaps: false })
 }
 
+fn pyramid(volume: &VolumeTexture, spec: PyramidSpec, leaps: bool) -> Levels {
+    let mut levels = vec![volume.clone()];
+    if let Some(bits) = spec.coverage_bits {
+        levels.extend(coarse_levels(volume, bits));
+    }
+    if leaps {
+        levels = levels.iter().map(|level| with_boxes(level, spec.interpolated)).collect();
+    }
+    Arc::new(Pyramid { levels, leaps })
+}
+
 /// Cache of the levels from frame to frame.
 #[derive(Default)]
 pub struct LevelsCache {
     /// Choice whether rays leap.
     pub leaps: Leaps,
-    /// The levels of the last call.
-    last: Option<(Key, Levels)>,
+    /// The choice, the volumes and the levels of the last call.
+    last: Option<(Leaps, Vec<Key>, LevelSets)>,
 }
 
-/// Values that the levels depend on.
+/// Values that the levels of a volume depend on.
 struct Key {
     cells: Cells,
     size: [u32; 3],
     spec: PyramidSpec,
-    leaps: Leaps,
 }
 
 impl PartialEq for Key {
     fn eq(&self, other: &Self) -> bool {
-        self.cells.same(&other.cells)
-            && (self.size, self.spec, self.leaps) == (other.size, other.spec, other.leaps)
+        self.cells.same(&other.cells) && (self.size, self.spec) == (other.size, other.spec)
     }
 }
 
@@ -218,33 +230,39 @@ impl LevelsCache {
         LevelsCache { leaps, last: None }
     }
 
-    /// Returns the levels of a volume. Computes them unless they are those of the last call.
-    pub fn get(&mut self, volume: &VolumeTexture, spec: PyramidSpec) -> Levels {
-        let key = Key { cells: volume.cells.clone(), size: volume.size, spec, leaps: self.leaps };
-        if let Some((last, levels)) = &self.last
-            && *last == key
+    /// Returns the levels of each volume, by its own spec. Those of a volume of the last call are not
+    /// computed again.
+    pub fn get(&mut self, volumes: &[VolumeTexture], specs: &[PyramidSpec]) -> LevelSets {
+        let key = |(volume, spec): (&VolumeTexture, &PyramidSpec)| Key {
+            cells: volume.cells.clone(),
+            size: volume.size,
+            spec: *spec,
+        };
+        let keys: Vec<Key> = volumes.iter().zip(specs).map(key).collect();
+        if let Some((leaps, known, sets)) = &self.last
+            && (*leaps, known) == (self.leaps, &keys)
         {
-            return levels.clone();
+            return sets.clone();
         }
-        // The old levels are freed first, because the memory might not hold both.
-        self.last = None;
-        let mut levels = vec![volume.clone()];
-        if let Some(bits) = spec.coverage_bits {
-            levels.extend(coarse_levels(volume, bits));
-        }
-        let leaps = match key.leaps {
+        let leaps = match self.leaps {
             // Cells that are not stored have no room for boxes.
-            _ if volume.is_sparse() => false,
-            Leaps::Auto => worth_leaping(volume),
+            _ if volumes.iter().any(VolumeTexture::is_sparse) => false,
+            Leaps::Auto => volumes.iter().all(worth_leaping),
             Leaps::Always => true,
             Leaps::Never => false,
         };
-        if leaps {
-            levels = levels.iter().map(|level| with_boxes(level, spec.interpolated)).collect();
-        }
-        let levels = Arc::new(Pyramid { levels, leaps });
-        self.last = Some((key, levels.clone()));
-        levels
+        // Levels that do not fit are freed before others are made, because the memory might not hold both.
+        let (_, known, sets) = self.last.take().unwrap_or((self.leaps, Vec::new(), Arc::new([])));
+        let mut old: Vec<(Key, Levels)> = known.into_iter().zip(sets.iter().cloned()).collect();
+        drop(sets);
+        old.retain(|(own, levels)| keys.contains(own) && levels.leaps == leaps);
+        let levels = |(volume, key): (&VolumeTexture, &Key)| {
+            let same = old.iter().find(|(own, _)| own == key);
+            same.map_or_else(|| pyramid(volume, key.spec, leaps), |(_, levels)| levels.clone())
+        };
+        let sets: LevelSets = volumes.iter().zip(&keys).map(levels).collect();
+        self.last = Some((self.leaps, keys, sets.clone()));
+        sets
     }
 }
 

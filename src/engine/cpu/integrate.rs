@@ -32,11 +32,7 @@ use walk::{LevelResult, Lit};
 /// Everything that the rays of a frame share.
 pub struct Integrator<'a> {
     scene: &'a Scene,
-    levels: Levels,
-    /// Optical depth in bits per unit of ρ code (and per metre, unless attenuation is per cell).
-    extinction: f32,
-    /// Distance that the volume has moved down the flow, cells.
-    flow_cells: f32,
+    volumes: Vec<FrameVolume>,
     per_cell: bool,
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
@@ -55,6 +51,17 @@ pub struct Integrator<'a> {
     /// Directions of the view rays.
     rays: RayFrame,
     lanes: Lanes,
+}
+
+/// A volume in one frame.
+struct FrameVolume {
+    levels: Levels,
+    /// Number of cells along x, y and z.
+    size: [u32; 3],
+    /// Optical depth in bits per unit of ρ code (and per metre, unless attenuation is per cell).
+    extinction: f32,
+    /// Distance that the volume has moved down the flow, cells.
+    flow_cells: f32,
 }
 
 /// The result of one ray.
@@ -89,6 +96,8 @@ impl Observer for () {}
 /// The point where a ray meets a sheet, and everything that is constant along the ray behind it.
 struct SheetHit<'a> {
     quad: usize,
+    /// Number of the quad's volume.
+    volume: usize,
     map: &'a QuadMap,
     uv: Vec2,
     frame: CellFrame,
@@ -182,7 +191,7 @@ impl PixelRay {
 }
 
 impl<'a> Integrator<'a> {
-    /// Prepares a scene and its volume for many rays. With cached visibility the light volumes come from
+    /// Prepares a scene and its volumes for many rays. With cached visibility the light volumes come from
     /// `cache`, which fills them if they changed; otherwise `cache` drops the old ones.
     ///
     /// # Errors
@@ -192,16 +201,16 @@ impl<'a> Integrator<'a> {
     /// [`Error::Memory`]: crate::util::error::Error::Memory
     pub fn prepared(
         scene: &'a Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         cache: &mut LightVolumeCache,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
-        let mut integrator =
-            Integrator::with_levels(scene, volume, cache.levels.get(volume, scene.pyramid_spec(volume)));
-        match scene.light_plan(volume)? {
+        let volumes = volumes.as_ref();
+        let levels = cache.levels.get(volumes, &scene.pyramid_specs(volumes));
+        let mut integrator = Integrator::with_levels(scene, volumes, &levels);
+        match scene.light_plan(volumes)? {
             Some(plan) => {
-                integrator.filled =
-                    Some(cache.get(&plan, &integrator.levels, scene.trace.lookup, monitor)?);
+                integrator.filled = Some(cache.get(&plan, &levels, scene.trace.lookup, monitor)?);
                 integrator.visibility = Visibility::Cached;
                 integrator.light_volumes = Some(plan);
             }
@@ -210,24 +219,43 @@ impl<'a> Integrator<'a> {
         Ok(integrator)
     }
 
-    /// Prepares a scene and its volume for a few rays. With cached visibility, the values of light volumes
+    /// Prepares a scene and its volumes for a few rays. With cached visibility, the values of light volumes
     /// are walked on demand.
-    pub fn new(scene: &'a Scene, volume: &VolumeTexture) -> Self {
-        Integrator::with_levels(scene, volume, levels_of(volume, scene.pyramid_spec(volume)))
+    ///
+    /// # Panics
+    /// If the scene has another number of volumes.
+    pub fn new(scene: &'a Scene, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Self {
+        let volumes = volumes.as_ref();
+        let levels = volumes.iter().zip(scene.pyramid_specs(volumes));
+        let levels: Vec<Levels> = levels.map(|(volume, spec)| levels_of(volume, spec)).collect();
+        Integrator::with_levels(scene, volumes, &levels)
     }
 
-    /// Prepares a scene, its volume and the levels of it for a few rays, as [`Integrator::new`].
-    pub fn with_levels(scene: &'a Scene, volume: &VolumeTexture, levels: Levels) -> Self {
+    /// Prepares a scene, its volumes and the levels of each for a few rays, as [`Integrator::new`].
+    ///
+    /// # Panics
+    /// If the scene has another number of volumes.
+    pub fn with_levels(
+        scene: &'a Scene,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+        levels: &[Levels],
+    ) -> Self {
+        let volumes = volumes.as_ref();
+        let flows = scene.flows(volumes);
+        let frame_volume = |((volume, levels), flow): ((&VolumeTexture, &Levels), f32)| FrameVolume {
+            levels: levels.clone(),
+            size: volume.size,
+            extinction: extinction(&scene.trace.attenuation, volume.alpha),
+            flow_cells: flow_cells(flow, volume.size[1]),
+        };
         Integrator {
             scene,
-            extinction: extinction(&scene.trace.attenuation, volume.alpha),
-            flow_cells: flow_cells(scene.flow, volume.size[1]),
+            volumes: volumes.iter().zip(levels).zip(flows).map(frame_volume).collect(),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             footprint: footprint(&scene.camera, &scene.image),
             lights: scene.volume_lights(),
-            light_volumes: (scene.visibility == Visibility::Cached).then(|| {
-                scene.light_volumes(volume.size, volume.alpha, u64::MAX).expect("the largest budget fits")
-            }),
+            light_volumes: (scene.visibility == Visibility::Cached)
+                .then(|| scene.light_volumes(volumes, u64::MAX).expect("the largest budget fits")),
             visibility: scene.visibility,
             filled: None,
             medium: Medium::of(&scene.trace),
@@ -235,12 +263,11 @@ impl<'a> Integrator<'a> {
                 Reflection::Strand(params) => Some(StrandShading::new(params)),
                 Reflection::KajiyaKay => None,
             },
-            media: scene.media(volume),
+            media: scene.media(volumes),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
             rays: scene.camera.ray_frame(scene.image.width, scene.image.height),
             lanes: Lanes::best(),
-            levels,
         }
     }
 
@@ -352,9 +379,10 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ray = self.sheet_hit(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
-        let mut result = self.walk(&ray, &Level::new(&self.levels, level), before, observer);
+        let levels = &self.volumes[ray.volume].levels;
+        let mut result = self.walk(&ray, &Level::new(levels, level), before, observer);
         if share > 0.0 {
-            let next = self.walk(&ray, &Level::new(&self.levels, level + 1), before, observer);
+            let next = self.walk(&ray, &Level::new(levels, level + 1), before, observer);
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, cells } = result;
@@ -394,10 +422,11 @@ impl<'a> Integrator<'a> {
         self.strand.is_some() || self.media.is_some()
     }
 
-    /// Extinction in the cells of a level.
+    /// Extinction in the cells of a level of volume `volume`.
     #[inline]
-    fn extinction_in(&self, level: &Level) -> f32 {
-        if self.per_cell { self.extinction * level.depth_in_cells() } else { self.extinction }
+    fn extinction_in(&self, volume: usize, level: &Level) -> f32 {
+        let extinction = self.volumes[volume].extinction;
+        if self.per_cell { extinction * level.depth_in_cells() } else { extinction }
     }
 
     /// Maps a ray to the cells of quad number `number`, which it meets at `hit` = (u, v, metres from the
@@ -408,8 +437,8 @@ impl<'a> Integrator<'a> {
         let quad = &scene.quads[number];
         let map = &quad.map;
         let uv = Vec2::new(hit[0], hit[1]);
-        let size = self.levels[0].size;
-        let frame = CellFrame::new(map, &quad.material, size, uv);
+        let volume = quad.material.volume as usize;
+        let frame = CellFrame::new(map, &quad.material, self.volumes[volume].size, uv);
 
         let d_n = d_world.dot(map.n_world);
         let side = if d_n > 0.0 { -1.0 } else { 1.0 };
@@ -431,6 +460,7 @@ impl<'a> Integrator<'a> {
         }
         SheetHit {
             quad: number,
+            volume,
             map,
             uv,
             frame,
@@ -449,10 +479,11 @@ impl<'a> Integrator<'a> {
     /// Returns the point on the face z = 0 where the walk begins, in cells, inside the tile.
     #[inline]
     fn face_point(&self, quad: &Quad, uv: Vec2) -> Vec3 {
-        let [nx, ny, _] = self.levels[0].size.map(|n| n as f32);
+        let FrameVolume { size, flow_cells, .. } = &self.volumes[quad.material.volume as usize];
+        let [nx, ny, _] = size.map(|n| n as f32);
         let x = (uv.x * quad.material.repeat_u + quad.offset.x) * nx;
         // After the volume has moved down the flow, the ray meets a point further up in it.
-        let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - self.flow_cells;
+        let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - flow_cells;
         let copy = |at: f32, n: f32| floor_cell(at / n) as f32;
         Vec3::new(x - nx * copy(x, nx), y - ny * copy(y, ny), 0.0)
     }
@@ -466,7 +497,7 @@ impl<'a> Integrator<'a> {
         }
         let forward = self.scene.camera.forward.as_vec3();
         let level = level_at(self.footprint, forward, ray.d_world, t, &ray.frame, ray.d_cell);
-        let level = level.clamp(0.0, (self.levels.len() - 1) as f32);
+        let level = level.clamp(0.0, (self.volumes[ray.volume].levels.len() - 1) as f32);
         (level as u32, level - level.floor())
     }
 }

@@ -41,13 +41,13 @@ use crate::volume::VolumeTexture;
 /// Errors of [`render_with`].
 pub fn render(
     scene: &Scene,
-    volume: &VolumeTexture,
+    volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
     mesh: &Mesh,
     surface: bool,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
     let options = RenderOptions { surface, ..Default::default() };
-    render_with(scene, volume, mesh, &options, &mut LightVolumeCache::default(), monitor)
+    render_with(scene, volumes, mesh, &options, &mut LightVolumeCache::default(), monitor)
 }
 
 /// Pixels whose triangles are held at once.
@@ -63,7 +63,7 @@ const BAND_PIXELS: u64 = 1 << 21;
 /// [`Error::Memory`]: crate::util::error::Error::Memory
 pub fn render_with(
     scene: &Scene,
-    volume: &VolumeTexture,
+    volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
     mesh: &Mesh,
     options: &RenderOptions,
     light_volumes: &mut LightVolumeCache,
@@ -78,7 +78,7 @@ pub fn render_with(
     frame.alpha = image.alpha.then(|| vec![0.0; frame.radiance.len()]);
     let mut seconds = Seconds::default();
     let clock = Instant::now();
-    let integrator = integrate::Integrator::prepared(scene, volume, light_volumes, monitor)?;
+    let integrator = integrate::Integrator::prepared(scene, volumes, light_volumes, monitor)?;
     seconds.visibility = clock.elapsed().as_secs_f64();
     light_volumes.rasters.begin(scene, mesh);
     let total = window.pixels() * samples.len() as u64;

@@ -129,7 +129,7 @@ impl Rasters {
         };
         let Kept { pass, bands, used, .. } = &mut self.kept[i];
         *used = self.turn;
-        if pass.scene.flow != scene.flow {
+        if pass.scene.wave_flow != scene.wave_flow {
             if !scene.pools.is_empty() {
                 // No other frame holds them.
                 shade_pools(scene, mesh, sample, Arc::get_mut(bands)?);
@@ -151,12 +151,9 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
     // Every part is named, so that a new one must be placed here too.
     let Parts {
         name: _,
-        water: _,
-        volume_file: _,
-        storage: _,
-        asked_storage: _,
+        recipes: _,
         // The waves of pools are drawn anew.
-        flow: _,
+        wave_flow: _,
         quads,
         lights,
         environment,

@@ -103,7 +103,13 @@ pub struct RayStep {
 /// Traces the ray through the centre of a pixel (column, row). A pixel outside the image is clamped to its
 /// edge. Radiance, transmittance and cells equal those of [`super::render`]'s frame bit for bit if the scene
 /// has one sample per pixel, no filter and nearest lookup.
-pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 2]) -> RayReport {
+pub fn inspect(
+    scene: &Scene,
+    volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+    mesh: &Mesh,
+    pixel: [u32; 2],
+) -> RayReport {
+    let volumes = volumes.as_ref();
     let image = &scene.image;
     let pixel = [pixel[0].min(image.width - 1), pixel[1].min(image.height - 1)];
     let window = Window { x: pixel[0], y: pixel[1], width: 1, height: 1 };
@@ -119,13 +125,15 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
         depth_m,
         point: scene.camera.origin + scene.quads[quad].map.point_world(u, v).as_dvec3(),
     };
-    let faces = gbuffer.faces(0).map(face).collect();
-    let mut recorder = Recorder { alpha: volume.alpha, faces: 0, steps: Vec::new() };
+    let faces: Vec<RayFace> = gbuffer.faces(0).map(face).collect();
+    let alpha = |face: &RayFace| volumes[scene.quads[face.quad].material.volume as usize].alpha;
+    let alphas = faces.iter().map(alpha).collect();
+    let mut recorder = Recorder { alphas, faces: 0, steps: Vec::new() };
     // Without filter and interpolation, the steps are the volume's own cells.
     let mut plain = scene.clone();
     let trace = &mut plain.edit().trace;
     (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
-    let result = Integrator::new(&plain, volume).pixel(&gbuffer, pixel, CENTRE, &mut recorder);
+    let result = Integrator::new(&plain, volumes).pixel(&gbuffer, pixel, CENTRE, &mut recorder);
     RayReport {
         pixel,
         faces,
@@ -141,7 +149,8 @@ pub fn inspect(scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, pixel: [u32; 
 
 /// Records the cells of a ray.
 struct Recorder {
-    alpha: f32,
+    /// α of each face's volume.
+    alphas: Vec<f32>,
     /// Faces met so far.
     faces: usize,
     steps: Vec<RayStep>,
@@ -159,7 +168,7 @@ impl Observer for Recorder {
             cell: crossing.cell.as_uvec3().to_array(),
             enter_m: crossing.t_enter,
             exit_m: crossing.t_exit,
-            rho: rho * self.alpha,
+            rho: rho * self.alphas[self.faces - 1],
             v: cell.v(),
             k_d,
             k_s,

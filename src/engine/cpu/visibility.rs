@@ -11,16 +11,16 @@ use crate::light::visibility::{LightVolume, LightVolumes};
 use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::volume::{Leaps, Levels, LevelsCache};
+use crate::volume::{Leaps, LevelSets, LevelsCache};
 
 /// Cells of all light volumes that are filled together. Threads wait for one another once for each such lot.
 const CELLS_AT_ONCE: usize = 1 << 22;
 
-/// The light volumes of the last frame, the volume's levels, and results of the raster pass.
+/// The light volumes of the last frame, the volumes' levels, and results of the raster pass.
 pub struct LightVolumeCache {
     /// Results of the raster pass.
     pub rasters: Box<Rasters>,
-    /// Levels of the last volume.
+    /// Levels of the last volumes.
     pub levels: LevelsCache,
     last: Option<FilledCache>,
 }
@@ -38,7 +38,7 @@ impl Default for LightVolumeCache {
 
 /// Light volumes, and the inputs they were filled from.
 struct FilledCache {
-    levels: Levels,
+    levels: LevelSets,
     lookup: Lookup,
     plan: LightVolumes,
     filled: Filled,
@@ -61,7 +61,7 @@ impl LightVolumeCache {
     pub fn get(
         &mut self,
         plan: &LightVolumes,
-        levels: &Levels,
+        levels: &LevelSets,
         lookup: Lookup,
         monitor: &dyn Monitor,
     ) -> Result<Filled> {
@@ -76,11 +76,18 @@ impl LightVolumeCache {
         // The old ones are dropped first, because both might not fit.
         self.last = None;
         let mut all = Vec::with_capacity(plan.volumes.len());
-        let rows = Rows::new(levels, lookup);
-        let cells: usize = levels.iter().map(|level| level.cells.len()).sum();
+        // A volume whose sheets are all mist has no light volume.
+        let is_lit = |volume: usize| plan.volumes.iter().any(|own| own.volume as usize == volume);
+        let rows = |(volume, levels)| is_lit(volume).then(|| Rows::new(levels, lookup));
+        let rows: Vec<Option<Rows>> = levels.iter().map(|levels| &**levels).enumerate().map(rows).collect();
+        let cells = levels.iter().map(|levels| levels.iter().map(|level| level.cells.len()).sum::<usize>());
+        let cells = cells.max().unwrap_or(1);
         for volumes in plan.volumes.chunks((CELLS_AT_ONCE / cells).max(1)) {
             monitor.progress("light volumes", all.len() as u64, plan.volumes.len() as u64)?;
-            let fill = |light_volume: &LightVolume| rows.fill(light_volume, plan.medium, plan.form);
+            let fill = |light_volume: &LightVolume| {
+                let rows = rows[light_volume.volume as usize].as_ref();
+                rows.map_or(Vec::new(), |rows| rows.fill(light_volume, plan.medium, plan.form))
+            };
             all.par_extend(volumes.par_iter().map(fill));
         }
         let filled = Arc::new(all);

@@ -80,6 +80,7 @@ impl GpuBench {
         let GpuRenderer { gpu, timer, .. } = &self.renderer;
         let first = scenes[0].1;
         let window = Window::whole([first.image.width, first.image.height]);
+        let volumes = std::slice::from_ref(volume);
         let (mut resident, mut reflections) = (Resident::default(), Reflections::default());
         let mut passes: Vec<(&'static str, Pass)> = Vec::new();
         let mut layers = 1;
@@ -87,16 +88,16 @@ impl GpuBench {
         let mut failed = Vec::new();
         self.prepared = None;
         for &(name, scene) in scenes {
-            let prepared = match PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volume, mesh)
-            {
-                Ok(prepared) => Rc::new(prepared),
-                Err(e) => {
-                    failed.push((name, e));
-                    continue;
-                }
-            };
+            let prepared =
+                match PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volumes, mesh) {
+                    Ok(prepared) => Rc::new(prepared),
+                    Err(e) => {
+                        failed.push((name, e));
+                        continue;
+                    }
+                };
             layers = prepared.layers;
-            let frame = FrameUniforms::new(scene, volume, window, &(0..1), 0, layers, &prepared.depth);
+            let frame = FrameUniforms::new(scene, volumes, window, &(0..1), 0, layers, &prepared.depth);
             let lights = scene.volume_lights().len();
             let integrate = |pass| Work::Integrate(Box::new(pass), Tiler::new(None, None, lights), None);
             let mut visibility = VisibilityPass::new(gpu);
@@ -121,7 +122,7 @@ impl GpuBench {
             if is_first {
                 add("gbuffer", Work::Gbuffer, &prepared, &filled);
                 // A large volume is on the device only once.
-                let is_sparse = prepared.up.levels[0].is_sparse();
+                let is_sparse = prepared.up.is_sparse();
                 let is_large = volume.cells.bytes() > LARGE_BYTES || is_sparse;
                 let walks = [("bare walk", Leaps::Never), ("bare leaping walk", Leaps::Always)];
                 for (name, leaps) in walks.into_iter().take(if is_large { 1 } else { 2 }) {
@@ -130,7 +131,7 @@ impl GpuBench {
                     } else {
                         let mut own = Resident::default();
                         own.levels.leaps = leaps;
-                        Rc::new(PreparedScene::new(gpu, &mut own, &mut reflections, scene, volume, mesh)?)
+                        Rc::new(PreparedScene::new(gpu, &mut own, &mut reflections, scene, volumes, mesh)?)
                     };
                     let storage = [leaps == Leaps::Always, is_sparse];
                     let variant = Variant::of(scene, layers, None, storage);
@@ -192,6 +193,7 @@ impl GpuBench {
             groups: &p.groups,
             filled,
             reflection: &scene.reflection,
+            volumes: &scene.volumes,
         };
         match work {
             Work::Gbuffer => Ok((gbuffer.run(&inputs, Redraw::All, || Ok(()))?, 0)),

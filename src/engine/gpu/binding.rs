@@ -52,6 +52,7 @@ bindings! {
         BRICKS = 17
         OPAQUE_NORMAL = 18
         UNCOVERED = 19
+        VOLUMES = 20
     }
     /// `shaders/picture/resolve.wgsl`.
     resolve {

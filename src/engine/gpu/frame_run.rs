@@ -39,7 +39,7 @@ pub struct FrameRun<'a> {
     canvas: &'a Canvas,
     rasters: &'a mut Rasters,
     scene: &'a Scene,
-    volume: &'a VolumeTexture,
+    volumes: &'a [VolumeTexture],
     prepared: PreparedScene,
     filled: FilledVolumes,
     /// Part of the image that is rendered, pixels.
@@ -63,7 +63,7 @@ impl<'a> FrameRun<'a> {
     pub fn prepare(
         renderer: &'a mut GpuRenderer,
         scene: &'a Scene,
-        volume: &'a VolumeTexture,
+        volumes: &'a [VolumeTexture],
         mesh: &Mesh,
         options: &RenderOptions,
         monitor: &'a dyn Monitor,
@@ -75,7 +75,7 @@ impl<'a> FrameRun<'a> {
         renderer.resident.levels.leaps = options.leaps;
         visibility.filling = options.filling;
         let (resident, reflections) = (&mut renderer.resident, &mut renderer.reflections);
-        let prepared = PreparedScene::new(gpu, resident, reflections, scene, volume, mesh)?;
+        let prepared = PreparedScene::new(gpu, resident, reflections, scene, volumes, mesh)?;
         seconds.upload = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -114,7 +114,7 @@ impl<'a> FrameRun<'a> {
             }
             Some(plan) => {
                 let mut frame =
-                    FrameUniforms::new(scene, volume, part, &samples, samples.start, 1, &prepared.depth);
+                    FrameUniforms::new(scene, volumes, part, &samples, samples.start, 1, &prepared.depth);
                 frame.max_cells = plan.medium.max_cells;
                 let (up, lookup) = (&prepared.up, scene.trace.lookup);
                 let inputs = VisibilityInputs { gpu, timer, up, frame: &frame, plan, lookup };
@@ -124,7 +124,7 @@ impl<'a> FrameRun<'a> {
                 filled
             }
         };
-        let hint: TileHint = (variant, volume.cells.address(), whole);
+        let hint: TileHint = (variant, volumes[0].cells.address(), whole);
         let known = renderer.learned.filter(|(frame, _)| *frame == hint).map(|(_, pixels)| pixels);
         Ok(FrameRun {
             gpu,
@@ -135,7 +135,7 @@ impl<'a> FrameRun<'a> {
             canvas,
             rasters,
             scene,
-            volume,
+            volumes,
             prepared,
             filled,
             part,
@@ -157,7 +157,7 @@ impl<'a> FrameRun<'a> {
         let own = sample..sample + 1;
         let samples = if self.samples.contains(&sample) { &self.samples } else { &own };
         let PreparedScene { layers, depth, .. } = &self.prepared;
-        FrameUniforms::new(self.scene, self.volume, window, samples, sample, *layers, depth)
+        FrameUniforms::new(self.scene, self.volumes, window, samples, sample, *layers, depth)
     }
 
     /// Renders one window of the grid, as far as it lies in the rendered part, into `frame`.
@@ -228,6 +228,7 @@ impl<'a> FrameRun<'a> {
             groups,
             filled: &self.filled,
             reflection: &self.prepared.reflection,
+            volumes: &self.prepared.volumes,
         };
         let waves = Some(up.waves);
         let redraw = match kept.map(|kept| kept.waves.replace(None)) {

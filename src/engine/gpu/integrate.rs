@@ -52,6 +52,7 @@ pub struct Variant {
     leaps: bool,
     sparse: bool,
     alpha: bool,
+    several: bool,
     many: bool,
     exponent: u32,
 }
@@ -82,6 +83,7 @@ impl Variant {
             leaps,
             sparse,
             alpha: scene.image.alpha,
+            several: scene.recipes.len() > 1,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
         }
@@ -184,6 +186,7 @@ impl Integrate {
             ("LEAPS", number(variant.leaps)),
             ("SPARSE", number(variant.sparse)),
             ("ALPHA", number(variant.alpha)),
+            ("SEVERAL", number(variant.several)),
             ("EXPONENT", variant.exponent as f64),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
@@ -224,7 +227,8 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, groups, filled, reflection, .. } = *inputs;
+        let Inputs { gpu, timer, up, targets, area, frame, groups, filled, reflection, volumes, .. } =
+            *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let part = gpu.buffer(
             "part of the workgroups",
@@ -255,6 +259,7 @@ impl Integrate {
             bind_texture(at::BRICKS, &up.bricks),
             bind_texture(at::OPAQUE_NORMAL, &normal),
             bind_buffer(at::UNCOVERED, &sums.uncovered),
+            bind_buffer(at::VOLUMES, volumes),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -299,7 +304,7 @@ impl Integrate {
 }
 
 /// The layout of the bindings.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 20] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 21] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
         TextureSampleType, TextureViewDimension,
@@ -340,6 +345,7 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 20] {
         (at::BRICKS, cells(TextureFormat::Rgba32Uint)),
         (at::OPAQUE_NORMAL, floats),
         (at::UNCOVERED, sums),
+        (at::VOLUMES, uniform),
     ];
     types.map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
         binding,

@@ -10,7 +10,7 @@ use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, scatter};
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
-use crate::scene::Scene;
+use crate::scene::{MAX_VOLUMES, Scene};
 use crate::trace::{extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
@@ -145,7 +145,7 @@ pub struct Quad {
     pub offset: [f32; 2],
     pub erosion: [f32; 4],
     pub mist: f32,
-    pub pad_a: f32,
+    pub volume: u32,
     pub pad_b: f32,
     pub pad_c: f32,
 }
@@ -159,7 +159,11 @@ pub struct LightVolume {
     pub first_column: u32,
     pub offset: [i32; 3],
     pub column_count: u32,
+    pub cells: [i32; 3],
     pub bits: f32,
+    pub base: [i32; 3],
+    pub width: u32,
+    pub height: u32,
     pub pad: [u32; 3],
 }
 
@@ -246,6 +250,45 @@ pub struct Similarity {
     pub pad_2: f32,
 }
 
+/// Constants of one of several volumes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct VolumeConstants {
+    pub cells: [i32; 3],
+    pub extinction: f32,
+    pub base: [i32; 3],
+    pub flow_cells: f32,
+    pub similarity: Similarity,
+    pub levels: u32,
+    pub pad_a: u32,
+    pub pad_b: u32,
+    pub pad_c: u32,
+}
+
+/// Returns the constants of all volumes, as many as the uniform holds. `origins` are their first cells in the
+/// texture, and `waters` the constants of multiple scattering in them, if the scene asks for it.
+pub fn volume_constants(
+    scene: &Scene,
+    volumes: &[VolumeTexture],
+    origins: &[[u32; 3]],
+    waters: &[scatter::Similarity],
+) -> Vec<VolumeConstants> {
+    let flows = scene.flows(volumes);
+    let constants = |(i, volume): (usize, &VolumeTexture)| VolumeConstants {
+        cells: volume.size.map(|n| n as i32),
+        extinction: extinction(&scene.trace.attenuation, volume.alpha),
+        base: origins[i].map(|n| n as i32),
+        flow_cells: flow_cells(flows[i], volume.size[1]),
+        similarity: waters.get(i).map(Similarity::from).unwrap_or_default(),
+        levels: level_atlas(&scene.trace, volume.size).count,
+        ..VolumeConstants::default()
+    };
+    let mut all: Vec<VolumeConstants> = volumes.iter().enumerate().map(constants).collect();
+    all.resize(MAX_VOLUMES, VolumeConstants::default());
+    all
+}
+
 /// Constants of how the volume reflects and scatters light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -258,16 +301,22 @@ pub struct Reflection {
 impl Reflection {
     /// Packs the constants of the models that a scene uses; the others stay 0.
     pub fn new(strand: Option<&StrandShading>, similarity: Option<&scatter::Similarity>) -> Self {
-        let similarity = similarity.map(|s| Similarity {
+        let similarity = similarity.map(Similarity::from);
+        let strand = strand.map(Strand::from);
+        Reflection { strand: strand.unwrap_or_default(), similarity: similarity.unwrap_or_default() }
+    }
+}
+
+impl From<&scatter::Similarity> for Similarity {
+    fn from(s: &scatter::Similarity) -> Self {
+        Similarity {
             extinction: s.extinction.to_array(),
             g: s.g,
             albedo: s.albedo.to_array(),
             reduced: s.reduced.to_array(),
             isotropic: s.isotropic.to_array(),
             ..Similarity::default()
-        });
-        let strand = strand.map(Strand::from);
-        Reflection { strand: strand.unwrap_or_default(), similarity: similarity.unwrap_or_default() }
+        }
     }
 }
 
@@ -286,18 +335,19 @@ impl Tile {
 }
 
 impl FrameUniforms {
-    /// Packs the uniforms of sample `sample` of a window. The sums run over `samples`; the targets have
+    /// Packs the uniforms of sample `sample` of a window, those of the volume from the first one. The sums run over `samples`; the targets have
     /// `layers` layers, and `depth` is that of the scene.
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &[VolumeTexture],
         window: Window,
         samples: &Range<u32>,
         sample: u32,
         layers: u32,
         depth: &DepthRange,
     ) -> Self {
+        let (volume, flow) = (&volumes[0], scene.flows(volumes)[0]);
         let camera = &scene.camera;
         let image = &scene.image;
         let haze = scene.haze.seen_from(camera.eye_local());
@@ -333,7 +383,7 @@ impl FrameUniforms {
             window_y: window.y,
             window_width: window.width,
             window_height: window.height,
-            flow_cells: flow_cells(scene.flow, volume.size[1]),
+            flow_cells: flow_cells(flow, volume.size[1]),
             layers,
             haze_color: haze.color.to_array(),
             haze_far: haze.far,
@@ -408,7 +458,7 @@ impl Quad {
             offset: quad.offset.to_array(),
             erosion: quad.erosion,
             mist: quad.mist,
-            pad_a: 0.0,
+            volume: quad.material.volume,
             pad_b: 0.0,
             pad_c: 0.0,
         }

@@ -10,6 +10,7 @@ mod gbuffer;
 mod groups;
 mod integrate;
 pub mod layout;
+pub mod packing;
 mod prepared;
 mod rasters;
 mod readback;
@@ -99,4 +100,6 @@ pub struct Inputs<'a> {
     pub filled: &'a FilledVolumes,
     /// The reflection model and multiple scattering.
     pub reflection: &'a BoundReflection,
+    /// Constants of all volumes.
+    pub volumes: &'a wgpu::Buffer,
 }

@@ -2,6 +2,7 @@
 
 use super::device::Gpu;
 use super::integrate::Variant;
+use super::layout;
 use super::reflection::{BoundReflection, Reflections};
 use super::upload::{Resident, Uploaded};
 use crate::engine::overlap;
@@ -22,6 +23,8 @@ pub struct PreparedScene {
     pub light_volumes: Option<LightVolumes>,
     /// The reflection model and multiple scattering.
     pub reflection: BoundReflection,
+    /// Uniform of the constants of all volumes, `array<VolumeConstants>`.
+    pub volumes: wgpu::Buffer,
     /// The variant of the integrate pass that renders the scene.
     pub variant: Variant,
     /// Depths of the scene.
@@ -35,16 +38,19 @@ impl PreparedScene {
         resident: &mut Resident,
         reflections: &mut Reflections,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &[VolumeTexture],
         mesh: &Mesh,
     ) -> Result<Self> {
         let layers = overlap::sheets(scene);
-        let light_volumes = scene.light_plan(volume)?;
-        let up = Uploaded::new(gpu, resident, scene, volume, mesh)?;
-        let reflection = reflections.bind(gpu, scene, volume);
-        let storage = [up.levels.leaps, up.levels[0].is_sparse()];
+        let light_volumes = scene.light_plan(volumes)?;
+        let up = Uploaded::new(gpu, resident, scene, volumes, mesh)?;
+        let reflection = reflections.bind(gpu, scene, volumes);
+        let constants = layout::volume_constants(scene, volumes, &up.origins, &reflection.waters);
+        let volumes = bytemuck::cast_slice(&constants);
+        let volumes = gpu.buffer_with("volumes", volumes, wgpu::BufferUsages::UNIFORM);
+        let storage = [up.leaps(), up.is_sparse()];
         let variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
         let depth = scene.depth_range(mesh);
-        Ok(PreparedScene { up, layers, light_volumes, reflection, variant, depth })
+        Ok(PreparedScene { up, layers, light_volumes, reflection, volumes, variant, depth })
     }
 }

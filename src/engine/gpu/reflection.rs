@@ -6,7 +6,7 @@ use super::device::Gpu;
 use super::layout;
 use super::strand::StrandTexture;
 use crate::light::Reflection;
-use crate::light::scatter::Profile;
+use crate::light::scatter::{Profile, Similarity};
 use crate::light::strand::table::{StrandShading, StrandTable};
 use crate::scene::Scene;
 use crate::volume::VolumeTexture;
@@ -28,17 +28,20 @@ pub struct BoundReflection {
     pub sampler: wgpu::Sampler,
     /// `array<vec4<f32>>`: the profiles of multiple scattering one after the other.
     pub profiles: wgpu::Buffer,
+    /// Constants of multiple scattering in each volume; none with single scattering.
+    pub waters: Vec<Similarity>,
 }
 
 impl Reflections {
     /// Returns the bindings for a scene, and uploads the tables that are not on the device yet.
-    pub fn bind(&mut self, gpu: &Gpu, scene: &Scene, volume: &VolumeTexture) -> BoundReflection {
+    pub fn bind(&mut self, gpu: &Gpu, scene: &Scene, volumes: &[VolumeTexture]) -> BoundReflection {
         let strand = match &scene.reflection {
             Reflection::Strand(params) => Some(StrandShading::new(params)),
             Reflection::KajiyaKay => None,
         };
-        let media = scene.media(volume);
-        let uniform = layout::Reflection::new(strand.as_ref(), media.as_ref().map(|m| &m.water));
+        let media = scene.media(volumes);
+        let waters = media.as_ref().map_or(Vec::new(), |media| media.waters.clone());
+        let uniform = layout::Reflection::new(strand.as_ref(), waters.first());
         let table = strand.map(|strand| strand.table);
         let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,
@@ -69,6 +72,7 @@ impl Reflections {
             table: strand.view.clone(),
             sampler: strand.sampler.clone(),
             profiles: profiles.clone(),
+            waters,
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
-use crate::volume::{Levels, Storage, VolumeTexture};
+use crate::volume::{LevelSets, Storage, VolumeTexture};
 
 /// A device with its compiled passes.
 pub struct GpuRenderer {
@@ -43,7 +43,7 @@ pub struct GpuRenderer {
 }
 
 /// Key of frames whose tiles take equally long: the variant of the integrate pass, the address of the
-/// volume's cells, and the image's size.
+/// first volume's cells, and the image's size.
 pub(super) type TileHint = (Variant, usize, [u32; 2]);
 
 /// Specialised pipelines that are kept, so that a slider that moves back finds its pipeline again.
@@ -80,16 +80,17 @@ impl GpuRenderer {
             // Whether light volumes stand for walks to the lights is known with the volume.
             if scene.visibility == Visibility::None {
                 // Most volumes are too full for leaps.
-                let variant = Variant::of(scene, layers, None, [false, scene.storage == Storage::Sparse]);
+                let is_sparse = scene.recipes.iter().any(|recipe| recipe.storage == Storage::Sparse);
+                let variant = Variant::of(scene, layers, None, [false, is_sparse]);
                 let matches = |pass: &Integrate| pass.variant == variant;
                 lru_get_or_insert(integrate, KEPT_PIPELINES, matches, || Integrate::new(gpu, variant));
             }
         });
     }
 
-    /// Returns the levels of a scene's volume: those on the device, if it rendered the scene last.
-    pub fn levels(&mut self, scene: &Scene, volume: &VolumeTexture) -> Levels {
-        self.resident.levels.get(volume, scene.pyramid_spec(volume))
+    /// Returns the levels of a scene's volumes: those on the device, if it rendered the scene last.
+    pub fn levels(&mut self, scene: &Scene, volumes: &[VolumeTexture]) -> LevelSets {
+        self.resident.levels.get(volumes, &scene.pyramid_specs(volumes))
     }
 
     /// Drops the light volumes of the last frame, so that the next one fills its own.
@@ -112,12 +113,12 @@ impl GpuRenderer {
     pub fn render(
         &mut self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         mesh: &Mesh,
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
-        let (frame, cut) = self.render_marked(scene, volume, mesh, options, monitor)?;
+        let (frame, cut) = self.render_marked(scene, volumes, mesh, options, monitor)?;
         match cut.len() {
             0 => Ok(frame),
             count => Err(walks_ended(&self.gpu.name(), &format!("{count} pixels are unfinished"))),
@@ -132,14 +133,14 @@ impl GpuRenderer {
     pub fn render_marked(
         &mut self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         mesh: &Mesh,
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<(Frame, Vec<usize>)> {
         let whole = [scene.image.width, scene.image.height];
         let part = options.window.unwrap_or(Window::whole(whole));
-        let mut run = FrameRun::prepare(self, scene, volume, mesh, options, monitor)?;
+        let mut run = FrameRun::prepare(self, scene, volumes.as_ref(), mesh, options, monitor)?;
         let mut frame = Frame::new(part.width, part.height, options.surface);
         frame.alpha = scene.image.alpha.then(|| vec![0.0; frame.radiance.len()]);
         for window in options.grid.windows(whole, part) {

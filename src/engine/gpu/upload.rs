@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::bricks;
+use super::bricks::{self, UploadedBricks};
 use super::device::Gpu;
 use super::layout::{self, Quad, VertexMaterial};
+use super::packing::Packing;
 use super::rasters::hash_twice;
 use super::tiles::{self, Part};
 use crate::engine::pool_surface;
@@ -19,7 +20,7 @@ use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::volume::{
-    Bricks, Cell, Cells, LevelAtlas, Levels, LevelsCache, StorageChoice, VolumeTexture, stored_levels,
+    Bricks, Cell, Cells, LevelAtlas, LevelSets, LevelsCache, StorageChoice, VolumeTexture, stored_levels,
 };
 
 /// Bytes handed to the queue at once. The queue keeps a copy of what it is given, so a volume is uploaded in
@@ -30,9 +31,9 @@ pub(super) const SLAB_BYTES: usize = 64 << 20;
 /// They are recognised by the address of their host memory.
 #[derive(Default)]
 pub struct Resident {
-    /// Levels of the last volume, and whether they are made for leaps.
+    /// Levels of the last volumes, and whether they are made for leaps.
     pub levels: LevelsCache,
-    volume: Option<ResidentVolume>,
+    volumes: Option<ResidentVolumes>,
     mesh: Option<ResidentMesh>,
     /// The environment's map and the number of its upload.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
@@ -40,12 +41,20 @@ pub struct Resident {
     uploads: u64,
 }
 
-/// A volume on the device.
-struct ResidentVolume {
+/// Volumes on the device.
+struct ResidentVolumes {
     /// The levels that were to be uploaded.
-    asked: Levels,
+    asked: LevelSets,
+    on_device: VolumesOnDevice,
+}
+
+/// The volumes of a scene in the textures that they share.
+#[derive(Clone)]
+struct VolumesOnDevice {
     /// The levels in the storage that the device holds.
-    held: Levels,
+    held: LevelSets,
+    /// First cell of each volume.
+    origins: Vec<[u32; 3]>,
     /// Textures of cells and bricks.
     views: [wgpu::TextureView; 2],
 }
@@ -67,10 +76,12 @@ struct ResidentMesh {
 
 /// A scene on the device: everything that does not change from sample to sample.
 pub struct Uploaded {
-    /// The volume's levels, in the storage that the device holds.
-    pub levels: Levels,
-    /// The levels in one 3-D storage texture, `rg32uint`, arranged by [`LevelAtlas`]; for sparse storage the
-    /// stored cells.
+    /// The levels of each volume, in the storage that the device holds: all dense or all sparse.
+    pub levels: LevelSets,
+    /// First cell of each volume in the texture, cells.
+    pub origins: Vec<[u32; 3]>,
+    /// All volumes side by side in one 3-D storage texture, `rg32uint`, the levels of each arranged by
+    /// [`LevelAtlas`]; for sparse storage the stored cells.
     pub volume: wgpu::TextureView,
     /// Bricks of sparse storage, `rgba32uint`; one texel for dense storage.
     pub bricks: wgpu::TextureView,
@@ -109,6 +120,16 @@ pub struct UploadedEnvironment {
 }
 
 impl Uploaded {
+    /// Whether the device holds the volumes in bricks.
+    pub fn is_sparse(&self) -> bool {
+        self.levels.iter().any(|levels| levels[0].is_sparse())
+    }
+
+    /// Whether the levels are made for leaps.
+    pub fn leaps(&self) -> bool {
+        self.levels.iter().all(|levels| levels.leaps)
+    }
+
     /// Uploads the parts of a scene that are not resident yet.
     ///
     /// # Errors
@@ -117,16 +138,21 @@ impl Uploaded {
         gpu: &Gpu,
         resident: &mut Resident,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &[VolumeTexture],
         mesh: &Mesh,
     ) -> Result<Self> {
         let limits = gpu.device.limits();
         let (media, medium_of_quad) = kinds(&scene.quads);
-        let length = match scene.scattering {
-            Scattering::Multiple => profile_length(volume.size[2]),
-            Scattering::Single => 0,
-        };
-        let profile_bytes = media.len() as u64 * u64::from(length) * 16;
+        // Index at which the profile of each medium begins.
+        let (mut profiles, mut length) = (Vec::new(), 0);
+        for kind in &media {
+            profiles.push(length as u32);
+            length += match scene.scattering {
+                Scattering::Multiple => u64::from(profile_length(volumes[kind.volume as usize].size[2])),
+                Scattering::Single => 0,
+            };
+        }
+        let profile_bytes = length * 16;
         if profile_bytes > limits.max_storage_buffer_binding_size {
             return Err(Error::device(
                 format!(
@@ -139,7 +165,8 @@ impl Uploaded {
             ));
         }
         let numbered = scene.quads.iter().zip(medium_of_quad);
-        let quads: Vec<Quad> = numbered.map(|(quad, which)| Quad::new(quad, scene, which * length)).collect();
+        let quads: Vec<Quad> =
+            numbered.map(|(quad, which)| Quad::new(quad, scene, profiles[which as usize])).collect();
         let lights = layout::lights(scene);
         let (quad_bytes, light_bytes): (&[u8], &[u8]) =
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
@@ -158,9 +185,10 @@ impl Uploaded {
         let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
         pool_parts.resize_with(pools.len(), Vec::new);
-        let levels = resident.levels.get(volume, scene.pyramid_spec(volume));
-        let packs = scene.asked_storage == StorageChoice::Auto;
-        let (levels, [cells, bricks]) = resident.volume(gpu, volume, levels, packs)?;
+        let levels = resident.levels.get(volumes, &scene.pyramid_specs(volumes));
+        let packs = scene.recipes.iter().all(|recipe| recipe.asked_storage == StorageChoice::Auto);
+        let VolumesOnDevice { held: levels, origins, views: [cells, bricks] } =
+            resident.volumes(gpu, volumes, levels, packs)?;
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
@@ -175,6 +203,7 @@ impl Uploaded {
             volume: cells,
             bricks,
             levels,
+            origins,
             // A buffer without quads would be too small to bind.
             quads: gpu.buffer_with(
                 "quads",
@@ -198,38 +227,51 @@ impl Uploaded {
 }
 
 impl Resident {
-    /// Returns the levels as the device holds them, and the textures of cells and bricks, uploaded unless
-    /// they are resident. A dense volume that is too large for the device is stored sparse there if `packs`;
-    /// its cells, and so the pictures, stay the same.
-    fn volume(
+    /// Returns the volumes as the device holds them, uploaded unless they are resident. If one of them is
+    /// sparse, all are stored sparse there. So are dense volumes that are too large for the device, if
+    /// `packs`. Their cells, and so the pictures, stay the same.
+    fn volumes(
         &mut self,
         gpu: &Gpu,
-        volume: &VolumeTexture,
-        asked: Levels,
+        volumes: &[VolumeTexture],
+        asked: LevelSets,
         packs: bool,
-    ) -> Result<(Levels, [wgpu::TextureView; 2])> {
-        if let Some(old) = &self.volume
+    ) -> Result<VolumesOnDevice> {
+        if let Some(old) = &self.volumes
             && Arc::ptr_eq(&old.asked, &asked)
         {
-            return Ok((old.held.clone(), old.views.clone()));
+            return Ok(old.on_device.clone());
         }
-        // The old volume is dropped first, because two large ones might not fit.
-        self.volume = None;
-        let mut held = asked.clone();
-        let views = match (asked[0].cells.bricks(), volume.cells.dense()) {
-            (Some(stored), _) => bricks::upload(gpu, stored)?,
-            (None, dense) => match (upload_volume(gpu, &asked), dense) {
-                (Err(Error::Device { .. }), Some(cells)) if packs => {
-                    let stored = Arc::new(Bricks::of(volume.size, cells));
-                    let views = bricks::upload(gpu, &stored)?;
-                    held = stored_levels(VolumeTexture { cells: Cells::Sparse(stored), ..volume.clone() });
-                    views
+        // The old volumes are dropped first, because two sets of large ones might not fit.
+        self.volumes = None;
+        let sparse = || -> Result<VolumesOnDevice> {
+            let stored = |volume: &VolumeTexture| match &volume.cells {
+                Cells::Sparse(stored) => stored.clone(),
+                Cells::Dense(cells) => Arc::new(Bricks::of(volume.size, cells)),
+            };
+            let stored: Vec<Arc<Bricks>> = volumes.iter().map(stored).collect();
+            let UploadedBricks { views, origins } =
+                bricks::upload(gpu, &stored.iter().map(|bricks| &**bricks).collect::<Vec<_>>())?;
+            let held = asked.iter().zip(volumes).zip(stored).map(|((levels, volume), stored)| {
+                match volume.is_sparse() {
+                    true => levels.clone(),
+                    false => stored_levels(VolumeTexture { cells: Cells::Sparse(stored), ..volume.clone() }),
                 }
-                (uploaded, _) => [uploaded?, bricks::none(gpu)],
+            });
+            Ok(VolumesOnDevice { held: held.collect(), origins, views })
+        };
+        let on_device = match volumes.iter().any(VolumeTexture::is_sparse) {
+            true => sparse()?,
+            false => match upload_volumes(gpu, &asked) {
+                Err(Error::Device { .. }) if packs => sparse()?,
+                uploaded => {
+                    let (cells, origins) = uploaded?;
+                    VolumesOnDevice { held: asked.clone(), origins, views: [cells, bricks::none(gpu)] }
+                }
             },
         };
-        self.volume = Some(ResidentVolume { asked, held: held.clone(), views: views.clone() });
-        Ok((held, views))
+        self.volumes = Some(ResidentVolumes { asked, on_device: on_device.clone() });
+        Ok(on_device)
     }
 
     /// Returns the environment's map and the number of its upload, uploaded unless it is resident.
@@ -273,26 +315,38 @@ impl Resident {
     }
 }
 
-fn upload_volume(gpu: &Gpu, levels: &Levels) -> Result<wgpu::TextureView> {
-    let atlas = LevelAtlas::new(levels);
-    let [nx, ny, nz] = atlas.extent();
+/// Uploads dense volumes with their levels. Returns the texture and the first cell of each volume in it.
+fn upload_volumes(gpu: &Gpu, sets: &LevelSets) -> Result<(wgpu::TextureView, Vec<[u32; 3]>)> {
+    let atlases: Vec<LevelAtlas> = sets.iter().map(|levels| LevelAtlas::new(levels)).collect();
+    let extents: Vec<[u32; 3]> = atlases.iter().map(LevelAtlas::extent).collect();
     let most = gpu.device.limits().max_texture_dimension_3d;
-    if [nx, ny, nz].iter().any(|&n| n > most) {
+    let what = || match extents[..] {
+        [[nx, ny, nz]] => format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
+        _ => format!("{} volumes are together too large for {}", extents.len(), gpu.name()),
+    };
+    let Some(Packing { extent, origins }) = Packing::smallest(&extents, most) else {
         return Err(Error::device(
-            format!("a volume of {nx}×{ny}×{nz} cells is too large for {}", gpu.name()),
+            what(),
             format!(
                 "volume.nx, ny and nz are at most {most} there; use volume.storage=sparse or --engine cpu \
                  for more"
             ),
         ));
-    }
-    let what = || format!("a dense volume of {nx}×{ny}×{nz} cells");
-    let create = || bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, [nx, ny, nz]);
+    };
+    let [nx, ny, nz] = extent;
+    let what = || match sets.len() {
+        1 => format!("a dense volume of {nx}×{ny}×{nz} cells"),
+        n => format!("a texture of {n} dense volumes"),
+    };
+    let create = || bricks::texture(gpu, "volume", wgpu::TextureFormat::Rg32Uint, extent);
     let texture = gpu.allocate(what, create)?;
-    for (number, level) in levels.iter().enumerate() {
-        upload_level(gpu, &texture, atlas.origin(number as u32), level)?;
+    for ((levels, atlas), base) in sets.iter().zip(&atlases).zip(&origins) {
+        for (number, level) in levels.iter().enumerate() {
+            let own = atlas.origin(number as u32);
+            upload_level(gpu, &texture, [0, 1, 2].map(|axis| base[axis] + own[axis]), level)?;
+        }
     }
-    Ok(texture.create_view(&Default::default()))
+    Ok((texture.create_view(&Default::default()), origins))
 }
 
 fn upload_level(

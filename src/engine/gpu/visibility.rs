@@ -4,6 +4,7 @@
 mod atlas;
 mod host;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::binding::{bind_buffer, bind_texture, visibility as at};
@@ -17,7 +18,7 @@ use super::upload::Uploaded;
 use crate::light::visibility::{CELLS_A_WORD, Form, LightVolumes};
 use crate::trace::Lookup;
 use crate::util::error::{Error, Result};
-use crate::volume::{LevelAtlas, Levels};
+use crate::volume::{LevelAtlas, LevelSets};
 use atlas::{LightVolumeAtlas, light_places, texture};
 use host::fill_on_host;
 
@@ -65,22 +66,30 @@ struct Variant {
     pyramid: bool,
     leaps: bool,
     sparse: bool,
+    several: bool,
     /// Whether empty cells are filled too: trilinear lookup reads them.
     everywhere: bool,
 }
 
 /// Columns of [`CELLS_A_WORD`] cells that are filled.
 struct Columns {
-    levels: Levels,
+    levels: LevelSets,
     everywhere: bool,
-    /// Linear indices of the columns in the volume's texture, `array<u32>`.
+    list: ColumnList,
+}
+
+/// Columns on the device.
+#[derive(Clone)]
+struct ColumnList {
+    /// Linear indices of the columns among the levels of their volume, `array<u32>`, volume by volume.
     buffer: wgpu::Buffer,
-    count: u32,
+    /// Part of the list that belongs to each volume.
+    parts: Vec<Range<u32>>,
 }
 
 /// The last frame's light volumes, and the inputs they were filled from.
 struct FilledCache {
-    levels: Levels,
+    levels: LevelSets,
     everywhere: bool,
     plan: LightVolumes,
     filled: FilledVolumes,
@@ -160,14 +169,16 @@ impl VisibilityPass {
         }
         // The old ones are dropped first, because both might not fit.
         self.cache = None;
-        let size = plan.words(LevelAtlas::new(&up.levels).extent());
-        let atlas = LightVolumeAtlas::new(gpu, size, plan.volumes.len() as u32)?;
+        let sizes = up.levels.iter().map(|levels| plan.words(LevelAtlas::new(levels).extent()));
+        let sizes: Vec<[u32; 3]> = sizes.collect();
+        let each: Vec<[u32; 3]> = plan.volumes.iter().map(|own| sizes[own.volume as usize]).collect();
+        let atlas = LightVolumeAtlas::new(gpu, &each)?;
         let what = || format!("the texture of {} light volumes", plan.volumes.len());
         let texture = gpu.allocate(what, || texture(gpu, atlas.extent()))?;
         let filled = FilledVolumes { texture, places: light_places(gpu, plan, &atlas) };
         gpu.check()?;
         let on_host = match self.filling {
-            Filling::Auto => gpu.is_software() && !up.levels[0].is_sparse(),
+            Filling::Auto => gpu.is_software() && !up.is_sparse(),
             Filling::Device => false,
             Filling::Host => true,
         };
@@ -191,15 +202,16 @@ impl VisibilityPass {
     ) -> Result<f64> {
         let VisibilityInputs { gpu, timer, up, frame, plan, lookup } = *inputs;
         let everywhere = lookup == Lookup::Trilinear;
-        let (occupied, count) = self.columns(gpu, &up.levels, everywhere)?;
+        let ColumnList { buffer: occupied, parts } = self.columns(gpu, &up.levels, everywhere)?;
         let pipeline = self.pipeline(
             gpu,
             Variant {
                 per_cell: plan.medium.per_cell,
                 form: plan.form,
-                pyramid: up.levels.len() > 1,
-                leaps: up.levels.leaps,
-                sparse: up.levels[0].is_sparse(),
+                pyramid: up.levels.iter().any(|levels| levels.len() > 1),
+                leaps: up.leaps(),
+                sparse: up.is_sparse(),
+                several: up.levels.len() > 1,
                 everywhere,
             },
         );
@@ -217,7 +229,7 @@ impl VisibilityPass {
             bind_texture(at::LIGHT_VOLUMES, &filled.texture),
         ];
         // The pipeline's layout holds only the bindings that its specialised shader uses.
-        if up.levels[0].is_sparse() {
+        if up.is_sparse() {
             entries.push(bind_texture(at::BRICKS, &up.bricks));
         }
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -225,18 +237,25 @@ impl VisibilityPass {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        let total = u64::from(count) * plan.volumes.len() as u64;
+        let total = plan.volumes.iter().map(|own| parts[own.volume as usize].len() as u64).sum();
         let (mut seconds, mut done, mut columns) = (0.0, 0, FIRST_COLUMNS);
         for (number, light_volume) in plan.volumes.iter().enumerate() {
-            let mut first_column = 0;
-            while first_column < count {
-                let column_count = columns.min(count - first_column);
+            let volume = light_volume.volume as usize;
+            let levels = &up.levels[volume];
+            let [width, height, _] = LevelAtlas::new(levels).extent();
+            let Range { start: mut first_column, end } = parts[volume];
+            while first_column < end {
+                let column_count = columns.min(end - first_column);
                 let uniform = LightVolume {
                     direction: light_volume.direction.to_array(),
                     first_column,
                     offset: atlas.origin(number as u32),
                     column_count,
+                    cells: levels[0].size.map(|n| n as i32),
                     bits: light_volume.bits,
+                    base: up.origins[volume].map(|n| n as i32),
+                    width,
+                    height,
                     pad: [0; 3],
                 };
                 gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
@@ -260,32 +279,35 @@ impl VisibilityPass {
         Ok(seconds)
     }
 
-    /// Returns the linear indices of the columns that are filled, and their number: columns with density, or
-    /// all of them if `everywhere`.
+    /// Returns the columns that are filled: those with density, or all of them if `everywhere`.
     ///
     /// # Errors
     /// [`Error::Device`] if the device's largest buffer cannot hold the indices.
-    fn columns(&mut self, gpu: &Gpu, levels: &Levels, everywhere: bool) -> Result<(wgpu::Buffer, u32)> {
+    fn columns(&mut self, gpu: &Gpu, sets: &LevelSets, everywhere: bool) -> Result<ColumnList> {
         if let Some(known) = &self.columns
-            && Arc::ptr_eq(&known.levels, levels)
+            && Arc::ptr_eq(&known.levels, sets)
             && known.everywhere == everywhere
         {
-            return Ok((known.buffer.clone(), known.count));
+            return Ok(known.list.clone());
         }
-        let atlas = LevelAtlas::new(levels);
-        let [width, height, _] = atlas.extent();
-        let mut indices: Vec<u32> = Vec::new();
-        for (level, number) in levels.iter().zip(0..) {
-            let [nx, ny, nz] = level.size;
-            let [_, y0, z0] = atlas.origin(number);
-            let occupied = |x: u32, y: u32, z: u32| {
-                everywhere || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cell(x, y, z).rho_code() > 0)
-            };
-            for z in (0..nz).step_by(CELLS_A_WORD as usize) {
-                let column = |x, y| ((z0 + z) / CELLS_A_WORD * height + y0 + y) * width + x;
-                let row = |y| (0..nx).filter(move |&x| occupied(x, y, z)).map(move |x| column(x, y));
-                indices.extend((0..ny).flat_map(row));
+        let (mut indices, mut parts): (Vec<u32>, _) = (Vec::new(), Vec::new());
+        for levels in sets.iter() {
+            let first = indices.len() as u32;
+            let atlas = LevelAtlas::new(levels);
+            let [width, height, _] = atlas.extent();
+            for (level, number) in levels.iter().zip(0..) {
+                let [nx, ny, nz] = level.size;
+                let [_, y0, z0] = atlas.origin(number);
+                let occupied = |x: u32, y: u32, z: u32| {
+                    everywhere || (z..(z + CELLS_A_WORD).min(nz)).any(|z| level.cell(x, y, z).rho_code() > 0)
+                };
+                for z in (0..nz).step_by(CELLS_A_WORD as usize) {
+                    let column = |x, y| ((z0 + z) / CELLS_A_WORD * height + y0 + y) * width + x;
+                    let row = |y| (0..nx).filter(move |&x| occupied(x, y, z)).map(move |x| column(x, y));
+                    indices.extend((0..ny).flat_map(row));
+                }
             }
+            parts.push(first..indices.len() as u32);
         }
         let (bytes, count): (&[u8], _) = (bytemuck::cast_slice(&indices), indices.len() as u32);
         if bytes.len() as u64 > gpu.device.limits().max_storage_buffer_binding_size {
@@ -295,8 +317,9 @@ impl VisibilityPass {
             ));
         }
         let buffer = gpu.buffer_with("occupied columns", bytes, wgpu::BufferUsages::STORAGE);
-        self.columns = Some(Columns { levels: levels.clone(), everywhere, buffer: buffer.clone(), count });
-        Ok((buffer, count))
+        let list = ColumnList { buffer, parts };
+        self.columns = Some(Columns { levels: sets.clone(), everywhere, list: list.clone() });
+        Ok(list)
     }
 
     fn pipeline(&mut self, gpu: &Gpu, variant: Variant) -> wgpu::ComputePipeline {
@@ -310,6 +333,7 @@ impl VisibilityPass {
             ("PYRAMID", number(variant.pyramid)),
             ("LEAPS", number(variant.leaps)),
             ("SPARSE", number(variant.sparse)),
+            ("SEVERAL", number(variant.several)),
             ("EVERYWHERE", number(variant.everywhere)),
         ];
         let source = Source::read("visibility", &source());

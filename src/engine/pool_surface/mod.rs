@@ -141,7 +141,7 @@ impl Surface {
     /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh.
     pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool) -> Surface {
         let middle = pool.corners.iter().sum::<Vec3>() / 4.0;
-        let flow = scene.flow.rem_euclid(1.0);
+        let flow = scene.wave_flow.rem_euclid(1.0);
         let mut surface = Surface {
             color: pool.color.to_array(),
             bottom: pool.bottom.to_array(),

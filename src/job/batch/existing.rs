@@ -204,12 +204,12 @@ impl Batch {
                 None => "its scene has more parameters".into(),
             }));
         }
-        if scene.volume_file.is_some() {
+        if scene.recipes.iter().any(|recipe| recipe.file.is_some()) {
             // A built volume follows from its parameters, but a volume file may have changed.
             let memory = self.base.limits().memory;
-            let (volume, _) =
-                VolumeMemo::default().volume(scene, memory, &crate::util::monitor::Unwatched)?;
-            if line != volume_line(&volume) {
+            let (volumes, _) =
+                VolumeMemo::default().volumes(scene, memory, &crate::util::monitor::Unwatched)?;
+            if line != volume_line(&volumes) {
                 return Ok(Some("it was made with other contents of volume.file".into()));
             }
         }

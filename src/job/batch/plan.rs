@@ -30,7 +30,7 @@ impl Batch {
     /// [`Error::CannotCreate`] for outputs that cannot be written or are other pictures, [`Error::Memory`]
     /// for pictures that do not fit, or an error of the monitor.
     pub fn plan(base: Animation, mut request: Request, monitor: &dyn Monitor) -> Result<Batch> {
-        // The volume is made once more for the first picture and warns then.
+        // The volumes are made once more for the first picture, and warn then.
         let (base, measured) = exposed(base, &Unwarned(monitor))?;
         // A scene that is not valid is reported before the sweeps are read.
         base.at(request.frames.as_ref().and_then(|f| f.first().copied()).unwrap_or(0))?;

@@ -181,9 +181,9 @@ impl Work<'_> {
         let exr = &self.batch.request.exr;
         let surface = still.has_exr() && exr.layers.iter().any(|l| l.of_surface());
         let window = self.batch.window(&scene);
-        let (volume, _) = self.volumes.volume(&scene, memory, self.watcher)?;
+        let (volumes, _) = self.volumes.volumes(&scene, memory, self.watcher)?;
         if !std::mem::replace(&mut self.warned, true) {
-            scene.warnings(&volume).iter().for_each(|w| self.watcher.warn(w));
+            scene.warnings(&*volumes).iter().for_each(|w| self.watcher.warn(w));
         }
         let mesh = self.mesh(&scene);
         let memory = beside_encoders(memory, &still.formats(), window)?;
@@ -195,7 +195,7 @@ impl Work<'_> {
             still: Some(still),
             claim,
             scene: scene.clone(),
-            volume: volume.clone(),
+            volumes: volumes.clone(),
             window,
             exr: exr.clone(),
             movies: self.batch.movies_starting(number, &scene),
@@ -208,7 +208,7 @@ impl Work<'_> {
             let options = RenderOptions { surface, window: Some(part), keep_rasters, ..Default::default() };
             let rows = [part.y - window.y, part.height, window.height];
             let watch = Share { watcher: self.watcher, name: &name, rows };
-            let frame = match self.engine.render_volume(&scene, &volume, &mesh, &options, &watch) {
+            let frame = match self.engine.render_volume(&scene, &*volumes, &mesh, &options, &watch) {
                 Ok(frame) => frame,
                 Err(e) => {
                     if start.is_none() {

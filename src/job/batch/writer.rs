@@ -25,7 +25,7 @@ pub struct Start {
     pub still: Option<Still>,
     pub claim: Option<Claim>,
     pub scene: Scene,
-    pub volume: Arc<VolumeTexture>,
+    pub volumes: Arc<Vec<VolumeTexture>>,
     pub window: Window,
     pub exr: Exr,
     /// Movies whose first frame this is.
@@ -152,7 +152,7 @@ fn begin(mut start: Start, movies: &mut Vec<(PathBuf, Movie)>) -> Open {
         .map(|(path, kind, options)| Ok((path.clone(), Movie::create(&path, kind, &options)?)));
     let opened = opened.collect::<Result<Vec<_>>>();
     let writer =
-        start.still.take().map(|still| still.begin(&start.scene, &start.volume, start.window, &start.exr));
+        start.still.take().map(|still| still.begin(&start.scene, &*start.volumes, start.window, &start.exr));
     let (writer, error) = match writer {
         Some(Ok(writer)) => (Some(writer), None),
         Some(Err(e)) => (None, Some(e)),

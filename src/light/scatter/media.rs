@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{COSINES, Layers, Profile, Scattering, Similarity, VIEWS, full_depth, layer_means};
 use crate::light::Reflection;
 use crate::light::strand::table::StrandShading;
-use crate::mapping::Quad;
+use crate::mapping::{Material, Quad};
 use crate::trace::{Attenuation, MIST_OF_CELLS, MIST_RHO};
 use crate::volume::VolumeTexture;
 
@@ -19,8 +19,8 @@ const CACHED_PROFILES: usize = 16;
 
 /// Multiple scattering of a scene.
 pub struct Media {
-    /// Constants of the reduced medium of flowing water.
-    pub water: Similarity,
+    /// Constants of the reduced medium of flowing water in each volume.
+    pub waters: Vec<Similarity>,
     /// One medium for each kind of sheet, in the order in which the quads first have them.
     pub media: Vec<MultipleMedium>,
 }
@@ -40,6 +40,8 @@ pub struct Kind {
     pub thickness_m: f32,
     /// Ψ of mist, or 0 for flowing water.
     pub mist: f32,
+    /// Number of the volume.
+    pub volume: u32,
 }
 
 impl Media {
@@ -49,11 +51,12 @@ impl Media {
         attenuation: &Attenuation,
         reflection: &Reflection,
         p: f32,
-        volume: &VolumeTexture,
+        volumes: &[VolumeTexture],
     ) -> Media {
-        let water = scattering(reflection, p, volume);
+        let waters: Vec<Scattering> = volumes.iter().map(|v| scattering(reflection, p, v)).collect();
         let own = if matches!(attenuation, Attenuation::PerCell { .. }) { 0.5 } else { 0.0 };
-        let medium = |Kind { thickness_m, mist }: &Kind| {
+        let medium = |Kind { thickness_m, mist, volume }: &Kind| {
+            let (water, volume) = (waters[*volume as usize], &volumes[*volume as usize]);
             let full = full_depth(volume, attenuation, thickness_m / volume.size[2] as f32);
             let shares = layer_means(volume);
             let (layers, scattering) = match *mist > 0.0 {
@@ -70,7 +73,8 @@ impl Media {
             };
             MultipleMedium { similarity: scattering.similarity(), profile: profile(layers, scattering) }
         };
-        Media { water: water.similarity(), media: kinds(quads).0.iter().map(medium).collect() }
+        let media = kinds(quads).0.iter().map(medium).collect();
+        Media { waters: waters.iter().map(Scattering::similarity).collect(), media }
     }
 }
 
@@ -78,8 +82,9 @@ impl Media {
 pub fn kinds(quads: &[Quad]) -> (Vec<Kind>, Vec<u32>) {
     let (mut list, mut known) = (Vec::new(), HashMap::new());
     let indices = quads.iter().map(|quad| {
-        let kind = Kind { thickness_m: quad.material.thickness_m, mist: quad.mist };
-        *known.entry((kind.thickness_m.to_bits(), kind.mist.to_bits())).or_insert_with(|| {
+        let Material { thickness_m, volume, .. } = quad.material;
+        let kind = Kind { thickness_m, mist: quad.mist, volume };
+        *known.entry((kind.thickness_m.to_bits(), kind.mist.to_bits(), volume)).or_insert_with(|| {
             list.push(kind);
             list.len() as u32 - 1
         })

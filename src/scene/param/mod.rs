@@ -13,12 +13,14 @@ mod sheet;
 mod splash;
 mod trace;
 mod volume;
+mod volumes;
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use Cost::*;
 use Kind::*;
+pub use volumes::{WATER, key_of_volume, split_volume_key};
 
 /// Work that a change of a parameter causes in an interactive renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,6 +121,7 @@ const fn p(key: &'static str, symbol: &'static str, unit: &'static str, kind: Ki
 pub const GROUPS: &[Group] = &[
     volume::CURVES,
     volume::VOLUME,
+    volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,
     trace::MATERIALS_AND_QUADS,

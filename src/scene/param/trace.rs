@@ -29,6 +29,9 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
                  keeps the strands.",
             )
             .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
+        p("materials.*.volume", "", "", Text("water"), Upload)
+            .doc("Name of the volume that the material shows: `water`, or one of `volumes`.")
+            .when("Name another volume for other matter beside the water, such as grass on the bank."),
         p("quads.*.corners", "A B C D", "m", Corners, Upload)
             .doc(
                 "Corners at (u,v) = (0,0), (1,0), (1,1) and (0,1). They lie in one plane and are convex; \

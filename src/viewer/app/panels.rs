@@ -8,6 +8,7 @@ use egui::{RichText, Ui};
 use super::input::LightCommand;
 use super::{Inspector, Viewer};
 use crate::picture::{AutoExposure, Layer};
+use crate::scene::Recipe;
 use crate::util::error::human_bytes;
 use crate::viewer::parameters::lights::add_menu;
 use crate::viewer::parameters::{cost_color, name};
@@ -234,15 +235,21 @@ impl Viewer {
             return;
         }
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            let scene = match (self.inspector, &self.picture) {
+                // The volumes are those of the picture, which may lag behind the document.
+                (Inspector::Volume, Some(picture)) => picture.scene.clone(),
+                _ => self.document.scene().clone(),
+            };
+            let number = choose_volume(ui, &scene.recipes, &mut self.inspected_volume);
             match (self.inspector, &self.picture) {
-                (Inspector::Volume, Some(picture)) => self.volume_panel.show(ui, &picture.volume),
+                (Inspector::Volume, Some(picture)) => self.volume_panel.show(ui, &picture.volumes[number]),
                 (Inspector::Volume, None) => {
                     ui.label("The volume is being built.");
                 }
-                _ if self.document.scene().volume_file.is_some() => {
+                _ if scene.recipes[number].file.is_some() => {
                     ui.label("This volume comes from a file, not from curves.");
                 }
-                _ => self.curves_panel.show(ui, &self.document.scene().water),
+                _ => self.curves_panel.show(ui, &scene.recipes[number].water),
             }
         });
     }
@@ -305,6 +312,26 @@ impl Viewer {
         let cells = ui.label(format!("{} cells", counted(view + light)));
         cells.on_hover_text(format!("{view} cells walked by view rays, {light} by light rays"));
     }
+}
+
+/// Shows a choice of the volume that the inspectors show, where the scene has several. Returns its number;
+/// that of the first where the scene does not show the volume `chosen`.
+pub fn choose_volume(ui: &mut Ui, recipes: &[Recipe], chosen: &mut String) -> usize {
+    let number = recipes.iter().position(|recipe| recipe.name == *chosen).unwrap_or(0);
+    if recipes.len() > 1 {
+        ui.horizontal(|ui| {
+            ui.label("Volume");
+            let combo = egui::ComboBox::from_id_salt("inspected volume")
+                .selected_text(&recipes[number].name)
+                .show_ui(ui, |ui| {
+                    for recipe in recipes {
+                        ui.selectable_value(chosen, recipe.name.clone(), &recipe.name);
+                    }
+                });
+            name(&combo.response, "Inspected volume");
+        });
+    }
+    number
 }
 
 /// Shows a menu item with its keys. Returns whether it was clicked.

@@ -200,15 +200,15 @@ impl Renderer {
 
     /// Renders a request of the window: a preview, the full size, then sample after sample.
     fn view(&mut self, request: Request) -> Result<()> {
-        let (volume, volume_cost) = self.volume(&request)?;
+        let (volumes, volume_cost) = self.volumes(&request)?;
         let (mesh, new_mesh) = self.mesh(&request.scene);
         let cost = match volume_cost {
             Some(cost) => cost,
             None if new_mesh => Cost::Upload,
             None => Cost::Uniform,
         };
-        let look = self.exposed(&request.scene, &volume, &mesh, request.serial)?.image.look;
-        let job = Job { request: &request, volume, mesh, cost, look };
+        let look = self.exposed(&request.scene, &volumes, &mesh, request.serial)?.image.look;
+        let job = Job { request: &request, volumes, mesh, cost, look };
         let old = self.rendered.take();
         if let Some(rendered) = self.kept.exchange(old, &job, self.memory / KEPT_SHARE) {
             self.continued(&job, rendered)?;
@@ -312,7 +312,7 @@ impl Renderer {
             asked: job.request.asked,
             requested: job.request.scene.clone(),
             scene: Arc::new(scene),
-            volume: job.volume.clone(),
+            volumes: job.volumes.clone(),
             mesh: job.mesh.clone(),
             frame,
             image: Arc::new(image),
@@ -355,7 +355,7 @@ impl Renderer {
             ..Default::default()
         };
         let clock = Instant::now();
-        let mut frame = self.run_engine(&scene, &job.volume, &job.mesh, &options, &watch)?;
+        let mut frame = self.run_engine(&scene, &job.volumes, &job.mesh, &options, &watch)?;
         if scale == 1 {
             lock(&self.shared.state).samples_taken += samples.len() as u64;
         }
@@ -382,12 +382,12 @@ impl Renderer {
     fn run_engine(
         &mut self,
         scene: &Scene,
-        volume: &VolumeTexture,
+        volumes: &[VolumeTexture],
         mesh: &Mesh,
         options: &RenderOptions,
         watch: &dyn Monitor,
     ) -> Result<Frame> {
-        self.engine.get_or_insert(Engine::cpu()).render_once(scene, volume, mesh, options, watch)
+        self.engine.get_or_insert(Engine::cpu()).render_once(scene, volumes, mesh, options, watch)
     }
 
     /// Expected time of one sample at 1/`scale` of the size, seconds.
@@ -403,18 +403,18 @@ impl Renderer {
         SCALES.into_iter().find(fits).unwrap_or(SCALES[SCALES.len() - 1])
     }
 
-    /// Returns the request's volume, and its cost if it was not the last one.
-    fn volume(&mut self, request: &Request) -> Result<(Arc<VolumeTexture>, Option<Cost>)> {
+    /// Returns the request's volumes, and their cost if they were not the last ones.
+    fn volumes(&mut self, request: &Request) -> Result<(Arc<Vec<VolumeTexture>>, Option<Cost>)> {
         let scene = &request.scene;
         let clock = Instant::now();
         let watch = self.watch("curves", request.serial, BUILD_PATIENCE);
-        let (volume, cost) = self.volume.volume(scene, self.memory, &watch)?;
+        let (volumes, cost) = self.volume.volumes(scene, self.memory, &watch)?;
         if cost == Some(Cost::Volume) {
             self.volume.forget_cache();
             lock(&self.shared.state).volume_seconds = clock.elapsed().as_secs_f64();
-            scene.warnings(&volume).into_iter().for_each(|w| self.say(MessageKind::Warning, w));
+            scene.warnings(&*volumes).into_iter().for_each(|w| self.say(MessageKind::Warning, w));
         }
-        Ok((volume, cost))
+        Ok((volumes, cost))
     }
 
     /// Returns the scene's opaque mesh, and whether it is new.
@@ -433,7 +433,13 @@ impl Renderer {
     /// Returns the scene with its automatic exposure, if it has one. The exposure is measured again when
     /// something that it depends on has changed. The flow does not count, so that the picture does not
     /// flicker while the water plays.
-    fn exposed(&mut self, scene: &Scene, volume: &VolumeTexture, mesh: &Mesh, serial: u64) -> Result<Scene> {
+    fn exposed(
+        &mut self,
+        scene: &Scene,
+        volumes: &[VolumeTexture],
+        mesh: &Mesh,
+        serial: u64,
+    ) -> Result<Scene> {
         if scene.image.look.auto_exposure == AutoExposure::None {
             return Ok(scene.clone());
         }
@@ -447,7 +453,7 @@ impl Renderer {
         };
         let stops = match self.exposed.as_ref().filter(is_current) {
             Some((_, stops)) => *stops,
-            None => exposure::measure(scene, volume, mesh, &self.watch("exposure", serial, PATIENCE))?,
+            None => exposure::measure(scene, volumes, mesh, &self.watch("exposure", serial, PATIENCE))?,
         };
         self.exposed = Some((scene.written().clone(), stops));
         Ok(scene.clone().exposed(stops))
@@ -457,7 +463,7 @@ impl Renderer {
 /// Data shared by all pictures of a request.
 struct Job<'a> {
     request: &'a Request,
-    volume: Arc<VolumeTexture>,
+    volumes: Arc<Vec<VolumeTexture>>,
     mesh: Mesh,
     cost: Cost,
     /// The scene's look, including the automatic exposure.

@@ -13,7 +13,7 @@ use taki::engine::cpu::integrate::{Integrator, Lanes, RayResult};
 use taki::light::strand::StrandParams;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::{Material, Quad};
-use taki::scene::{Limits, Scene};
+use taki::scene::{Limits, Recipe, Scene};
 use taki::trace::{Attenuation, Lookup, Prefilter};
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
@@ -47,6 +47,7 @@ fn quads(rng: &mut Pcg64Mcg) -> Vec<Quad> {
         thickness_m: rng.random_range(0.05..1.0),
         repeat_u: rng.random_range(1..4) as f32,
         repeat_v: rng.random_range(1..4) as f32,
+        volume: 0,
     };
     let rectangle = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];
     let wedge = [corner(0.0, 0.0), corner(2.0, 0.0), corner(1.5, 3.0), corner(0.25, 2.5)];
@@ -79,7 +80,7 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
     (parts.quads, parts.lights) = (quads, lights);
     [parts.image.width, parts.image.height] = SIZE;
     parts.ambient = Vec3::new(0.1, 0.2, 0.3);
-    parts.flow = [0.0, 0.4][one_of(2) as usize];
+    parts.recipes[0].flow = [0.0, 0.4][one_of(2) as usize];
     parts.p = [12.0, 1.0, 7.3][one_of(3) as usize];
     parts.angles = [AngleFrame::World, AngleFrame::Texture][one_of(2) as usize];
     parts.visibility = [Visibility::None, Visibility::March, Visibility::Cached][one_of(3) as usize];
@@ -143,21 +144,43 @@ fn bits(result: &RayResult) -> ([u32; 5], [u32; 2]) {
     ([r, g, b, result.transmittance, result.uncovered].map(f32::to_bits), result.cells)
 }
 
+/// Lets the quads show random ones of `count` volumes. Returns the volumes.
+fn volumes(rng: &mut Pcg64Mcg, scene: &mut Scene, count: usize) -> Vec<VolumeTexture> {
+    let is_pyramid = scene.trace.filter != Prefilter::None;
+    let mut volume = || {
+        let is_sparse = !is_pyramid && rng.random();
+        let share = [0.0, 0.03, 0.3, 1.0][rng.random_range(0..4)];
+        VolumeTexture { alpha: rng.random_range(0.3..1.0), ..volume(rng, share, is_sparse) }
+    };
+    let volumes: Vec<VolumeTexture> = (0..count).map(|_| volume()).collect();
+    let parts = scene.edit();
+    let recipe = parts.recipes[0].clone();
+    let flow = |number: usize| recipe.flow + 0.1 * number as f32;
+    parts.recipes = (0..count).map(|number| Recipe { flow: flow(number), ..recipe.clone() }).collect();
+    for quad in &mut parts.quads {
+        quad.material.volume = rng.random_range(0..count as u32);
+    }
+    volumes
+}
+
 #[test]
 fn every_instruction_set_gives_the_bits_of_the_scalar_walk() {
     let mut walked = [0u64; 2];
     let mut bright = 0;
     for seed in 0..600 {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed);
-        let scene = scene(rng);
+        let mut scene = scene(rng);
         let is_sparse = scene.trace.filter == Prefilter::None && rng.random();
         let share = [0.0, 0.03, 0.3, 1.0][rng.random_range(0..4)];
-        let volume = volume(rng, share, is_sparse);
-        let gbuffer = hits(rng, &scene, volume.size);
+        let volumes = match seed % 3 {
+            2 => volumes(rng, &mut scene, 3),
+            _ => vec![volume(rng, share, is_sparse)],
+        };
+        let gbuffer = hits(rng, &scene, volumes[0].size);
         let pixels: Vec<[u32; 2]> = (0..SIZE[0] * SIZE[1]).map(|i| [i % SIZE[0], i / SIZE[0]]).collect();
         let mut cache = LightVolumeCache::default();
         let mut prepared =
-            || Integrator::prepared(&scene, &volume, &mut cache, &Unwatched).expect("the light volumes fit");
+            || Integrator::prepared(&scene, &volumes, &mut cache, &Unwatched).expect("the light volumes fit");
         let scalar = prepared();
         let truth: Vec<_> = pixels.iter().map(|&p| scalar.pixel(&gbuffer, p, 0, &mut ())).collect();
         for result in &truth {

@@ -45,7 +45,7 @@ impl Engine {
     /// Renders a scene, with the volume and the mesh of the last one if they are its own.
     fn render(&mut self, scene: &Scene) -> Frame {
         let volume = match self.volume.take() {
-            Some((old, volume)) if old.water == scene.water && old.storage == scene.storage => volume,
+            Some((old, volume)) if old.recipes == scene.recipes => volume,
             _ => scene.volume(1 << 30, &Unwatched).expect("a volume"),
         };
         let mesh = match self.mesh.take() {

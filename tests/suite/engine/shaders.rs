@@ -8,7 +8,7 @@ use std::path::Path;
 use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
     Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Reflection, Similarity, Strand,
-    Tile, VertexMaterial, WORKGROUP,
+    Tile, VertexMaterial, VolumeConstants, WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
@@ -166,7 +166,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v across height along profile normal
-        pad_d e f g offset erosion mist pad_a pad_b pad_c);
+        pad_d e f g offset erosion mist volume pad_b pad_c);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));
@@ -174,11 +174,15 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let similarity = fields!(Similarity: extinction g albedo pad_0 reduced pad_1 isotropic pad_2);
     assert_eq!(members(&module, "Similarity"), similarity);
     assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity));
+    let volume =
+        fields!(VolumeConstants: cells extinction base flow_cells similarity levels pad_a pad_b pad_c);
+    assert_eq!(members(&module, "VolumeConstants"), volume);
     let module = validate(&stage("resolve")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced dither));
     let module = validate(&stage("visibility")).expect("valid");
     // The host pads this struct to the size that a uniform needs.
-    let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count bits pad);
+    let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count cells
+        bits base width height pad);
     light_volume.pop();
     assert_eq!(members(&module, "LightVolume"), (light_volume, size));
     let module = validate(&stage("gbuffer")).expect("valid");
@@ -213,6 +217,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(of(&resolve, "TONE_AGX"), TONE_AGX as f64);
     assert_eq!(constant("WORKGROUP"), WORKGROUP as f64);
     assert_eq!(constant("CUT"), taki::engine::gpu::CUT as f64);
+    assert_eq!(constant("MAX_VOLUMES"), taki::scene::MAX_VOLUMES as f64);
     assert_eq!(constant("CELLS_A_WORD"), taki::light::visibility::CELLS_A_WORD as f64);
     assert_eq!(constant("COSINES"), taki::light::scatter::COSINES as f64);
     assert_eq!(constant("VIEWS"), taki::light::scatter::VIEWS as f64);
@@ -263,7 +268,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 16] = [
+const COMPARED: [&str; 17] = [
     "Develop",
     "Environment",
     "Foam",
@@ -279,6 +284,7 @@ const COMPARED: [&str; 16] = [
     "Surface",
     "Tile",
     "VertexMaterial",
+    "VolumeConstants",
     "Wave",
 ];
 

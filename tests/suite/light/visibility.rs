@@ -49,10 +49,15 @@ fn on_cpu(scene: &Scene) -> Frame {
     cpu::render(scene, &volume(scene), &scene.mesh(), false, &Unwatched).expect("a frame")
 }
 
+/// A volume whose size alone counts.
+fn hollow(size: [u32; 3]) -> VolumeTexture {
+    VolumeTexture { size, alpha: 1.0, cells: Default::default() }
+}
+
 #[test]
 fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     let size = [40; 3];
-    let of = |sets: &[&str]| scene("front", sets).light_volumes(size, 1.0, u64::MAX).expect("they fit");
+    let of = |sets: &[&str]| scene("front", sets).light_volumes(&hollow(size), u64::MAX).expect("they fit");
     let one = of(&[]);
     assert_eq!((one.volumes.len(), one.cornered(), one.patches.len()), (1, false, 1));
     // The same parallelogram again at another place; then with another thickness; then another eye on the
@@ -62,10 +67,10 @@ fn one_light_volume_serves_all_quads_that_have_the_same_jacobian_and_light() {
     moved.corners = moved.corners.map(|c| c + Vec3::new(3.0, 1.0, -2.0));
     moved.map.a_world = moved.corners[0];
     two.edit().quads.push(moved);
-    let volumes = two.light_volumes(size, 1.0, u64::MAX).expect("they fit");
+    let volumes = two.light_volumes(&hollow(size), u64::MAX).expect("they fit");
     assert_eq!((volumes.volumes.len(), volumes.patches.len()), (1, 2));
     two.edit().quads[1].material.thickness_m *= 2.0;
-    assert_eq!(two.light_volumes(size, 1.0, u64::MAX).expect("they fit").volumes.len(), 2);
+    assert_eq!(two.light_volumes(&hollow(size), u64::MAX).expect("they fit").volumes.len(), 2);
     let elsewhere = of(&["camera.eye=[0.7,1.0,2.0]", "image.exposure=3", "volume.flow=0.4"]);
     assert_eq!(elsewhere, one, "camera, exposure and flow leave light volumes as they are");
     // σ leaves light volumes of optical depths as they are, too.
@@ -83,7 +88,7 @@ fn a_point_light_near_a_quad_cuts_it_into_patches_and_a_far_one_does_not() {
     let of = |position: &str| {
         let position = format!("lights.key.position={position}");
         let scene = scene("front", &["lights.key.kind=point", &position]);
-        scene.light_volumes([40; 3], 1.0, u64::MAX).expect("they fit")
+        scene.light_volumes(&hollow([40; 3]), u64::MAX).expect("they fit")
     };
     let near = of("[0.2,0.3,0.8]");
     assert!(near.cornered() && near.volumes.len() > 16, "{:?}", near.patches);
@@ -98,9 +103,9 @@ fn a_point_light_near_a_quad_cuts_it_into_patches_and_a_far_one_does_not() {
 #[test]
 fn light_volumes_over_the_budget_are_coarser_and_then_refused_with_what_they_need() {
     let near = ["lights.key.kind=point", "lights.key.position=[0.2,0.3,0.8]", "light.visibility=cached"];
-    let of = |budget: u64| scene("front", &near).light_volumes([40; 3], 1.0, budget);
+    let of = |budget: u64| scene("front", &near).light_volumes(&hollow([40; 3]), budget);
     let whole = of(u64::MAX).expect("they fit");
-    let tight = of(whole.bytes([40; 3]) as u64 - 1).expect("coarser ones fit");
+    let tight = of(whole.bytes(&[[40; 3]]) as u64 - 1).expect("coarser ones fit");
     assert!(tight.volumes.len() < whole.volumes.len());
     let error = of(100_000).expect_err("nothing fits");
     assert_eq!(error.exit_code(), 33);
@@ -140,7 +145,7 @@ fn depths_through_a_uniform_slab_are_its_thickness_over_the_cosine() {
         [(Vec3::Z, 1.0), (Vec3::new(0.6, 0.0, 0.8), 0.8), (Vec3::new(0.0, -0.8, -0.6), 0.6)]
     {
         front.edit().lights = vec![Light::Directional { to_light: towards, intensity: Vec3::ONE }];
-        let volumes = front.light_volumes(uniform.size, 1.0, u64::MAX).expect("they fit");
+        let volumes = front.light_volumes(&hollow(uniform.size), u64::MAX).expect("they fit");
         for z in [0, 7, 39] {
             let cell = IVec3::new(3, 5, z);
             let depth = optical_depth(
@@ -334,7 +339,7 @@ fn light_volumes_hold_what_the_walk_from_every_cell_finds_to_the_bit() {
             2 => direction = Vec3::new(-1.0, 1.0, 1.0),
             _ => {}
         }
-        let light_volume = LightVolume { direction, bits: [1e-5, 1e-4][round % 2] };
+        let light_volume = LightVolume { volume: 0, direction, bits: [1e-5, 1e-4][round % 2] };
         for (per_cell, max_cells) in [(false, 512), (true, 512), (false, 5)] {
             let medium = Medium { per_cell, max_cells };
             for (form, lookup) in [(Form::Depths, Lookup::Nearest), (Form::Codes, Lookup::Trilinear)] {
@@ -375,7 +380,7 @@ fn rows_of_any_width_have_the_sums_of_the_walk_on_every_instruction_set() {
         let levels = levels_of(&volume, scene("front", &[]).pyramid_spec(&volume));
         let level = Level::new(&levels, 0);
         for direction in [Vec3::new(3.7, 0.2, 1.0), Vec3::new(-30.0, -2.0, -1.0)] {
-            let light_volume = LightVolume { direction, bits: 3e-5 };
+            let light_volume = LightVolume { volume: 0, direction, bits: 3e-5 };
             let medium = Medium { per_cell: false, max_cells: 512 };
             for form in [Form::Codes, Form::Depths] {
                 let walked: Vec<f32> = (0..nx * 15)

@@ -39,6 +39,7 @@ fn material() -> impl Strategy<Value = Material> {
         thickness_m,
         repeat_u,
         repeat_v,
+        volume: 0,
     })
 }
 

@@ -390,7 +390,8 @@ fn where_only_waves_move_the_kept_place_has_the_bits_of_one_drawn_anew() {
             [(0.0, 1.0), (0.1, 1.0), (0.2, 1.0), (0.2, 1.0), (0.3, 1.0), (0.3, 2.0), (0.0, 1.0)]
         {
             let mut scene = scene.clone();
-            scene.edit().flow = flow;
+            scene.edit().recipes[0].flow = flow;
+            scene.edit().wave_flow = flow;
             scene.edit().pools[0].height *= height;
             let kept = keeping.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
             let drawn = fresh.render(&scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");

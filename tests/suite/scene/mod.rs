@@ -162,7 +162,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),
                 "trace.filter" => scene.trace.filter.word(),
                 "trace.lookup" => scene.trace.lookup.word(),
-                "volume.storage" => scene.asked_storage.word(),
+                "volume.storage" => scene.recipes[0].asked_storage.word(),
                 other => panic!("the variant of {other} is not compared"),
             };
             assert_eq!(variant, *word, "{setting}");

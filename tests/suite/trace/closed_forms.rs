@@ -32,7 +32,7 @@ fn rectangle(material: Material) -> Scene {
 }
 
 fn material(thickness_m: f32, repeat_u: f32, repeat_v: f32) -> Material {
-    Material { thickness_m, repeat_u, repeat_v }
+    Material { thickness_m, repeat_u, repeat_v, volume: 0 }
 }
 
 /// A volume with the same cell everywhere.

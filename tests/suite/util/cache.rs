@@ -167,8 +167,8 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
         let sets = base.iter().chain(&place).chain(*sets).map(|s| s.to_string()).chain(open.clone());
         let sets: Vec<String> = sets.collect();
         let scene = Scene::load(Path::new("waterfall"), &sets, &Limits::default()).expect("valid");
-        let made = build_water(&scene.water, &Unwatched).expect("built");
-        assert!(kept_water(&scene.water, &cache, &Unwatched).expect("found") == made, "{sets:?}");
+        let made = build_water(&scene.recipes[0].water, &Unwatched).expect("built");
+        assert!(kept_water(&scene.recipes[0].water, &cache, &Unwatched).expect("found") == made, "{sets:?}");
         assert!(scene.cached_mesh(Some(&cache)) == scene.mesh(), "{sets:?}");
     }
     let files = |kind| fs::read_dir(dir.path().join(kind)).unwrap().count();
@@ -223,7 +223,7 @@ fn the_versions_of_the_builders_stand_for_what_they_make() {
         "waterfall",
         &["volume.nx=24", "volume.ny=20", "volume.nz=12", "volume.coherence=0.5", "volume.coverage=0.5"],
     );
-    let volume = build_water(&water.water, &Unwatched).unwrap();
+    let volume = build_water(&water.recipes[0].water, &Unwatched).unwrap();
     let place = scene("waterfall", &crate::engine::gpu::COARSE_PLACE);
     let vertices = crc32fast::hash(bytemuck::cast_slice(&place.mesh().vertices));
     let made = format!("{:08x} {vertices:08x}", volume.checksum());

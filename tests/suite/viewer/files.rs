@@ -567,7 +567,7 @@ fn a_scene_or_a_volume_is_opened_by_dropping_it_on_the_window() {
     let before = window.picture().frame.radiance.clone();
     drop_on(&mut window, &volume);
     window.settle();
-    assert!(window.viewer().document().scene().volume_file.is_some());
+    assert!(window.viewer().document().scene().recipes[0].file.is_some());
     let by_file = window.picture().frame.radiance.clone();
     assert_ne!(by_file, before);
     window.undo();

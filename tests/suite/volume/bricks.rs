@@ -174,7 +174,7 @@ fn many_rounds_of_curves_on_any_number_of_threads_are_the_dense_volume() {
 
 #[test]
 fn another_cell_makes_another_volume_in_either_storage() {
-    let volume = dense(&scene("front", &["volume.nx=13", "volume.ny=9", "volume.nz=6"]).water);
+    let volume = dense(&scene("front", &["volume.nx=13", "volume.ny=9", "volume.nz=6"]).recipes[0].water);
     let changed = |at: usize| {
         let mut other = packed(&volume);
         other.cells.change(|i, _, cell| if i == at as u64 { Cell { x: cell.x ^ 1, ..cell } } else { cell });
@@ -287,7 +287,8 @@ fn load(sets: &[&str], memory: u64) -> taki::Result<Scene> {
 fn auto_is_dense_where_that_fits_and_sparse_where_only_that_does() {
     const LARGE: [&str; 5] =
         ["volume.nx=128", "volume.ny=128", "volume.nz=128", "image.width=16", "image.height=16"];
-    let storage = |sets: &[&str], memory: u64| load(&[&LARGE[..], sets].concat(), memory).map(|s| s.storage);
+    let storage =
+        |sets: &[&str], memory: u64| load(&[&LARGE[..], sets].concat(), memory).map(|s| s.recipes[0].storage);
     // 24 bytes for each of 128³ cells, and what the picture takes besides: one byte more and one less.
     const DENSE: u64 = 24 << 21;
     let dense = load(&[&LARGE[..], &["volume.storage=dense"]].concat(), 1 << 32).unwrap();
@@ -339,7 +340,7 @@ fn a_sparse_volume_that_does_not_fit_is_refused_before_its_cells_are_made() {
     // Memory of the builder: 12 bytes of masks and bases per brick; 8 for each stored cell and 12 for its
     // sum.
     let need = 24u64.pow(3) * 12 + stored * (8 + 12);
-    assert_eq!(sparse_bytes(scene.water.size, stored, 12), u128::from(need));
+    assert_eq!(sparse_bytes(scene.recipes[0].water.size, stored, 12), u128::from(need));
     assert!(scene.volume(need, &Unwatched).is_ok());
     let refused = scene.volume(need - 1, &Unwatched).unwrap_err();
     assert_eq!(refused.exit_code(), 33);
@@ -348,7 +349,7 @@ fn a_sparse_volume_that_does_not_fit_is_refused_before_its_cells_are_made() {
     }
     // The estimate for a picture. The lengths of curves differ by a tenth, so 32 curves give their mean to 2
     // %. Starts are jittered, so curves meet less often than by chance.
-    let expected = expected_cells(&scene.water);
+    let expected = expected_cells(&scene.recipes[0].water);
     assert!(expected.abs_diff(stored) < stored / 20, "{expected} for {stored}");
 }
 
@@ -357,8 +358,8 @@ fn a_change_of_reflection_repacks_a_sparse_volume_and_one_of_storage_makes_it_an
     let mut memo = VolumeMemo::default();
     let mut volume = |sets: &[&str]| {
         let scene = scene("front", sets);
-        let (volume, cost) = memo.volume(&scene, MEMORY, &Unwatched).expect("a volume");
-        (volume, cost, dense(&scene.water))
+        let (volumes, cost) = memo.volumes(&scene, MEMORY, &Unwatched).expect("a volume");
+        (volumes[0].clone(), cost, dense(&scene.recipes[0].water))
     };
     let (first, cost, whole) = volume(&["volume.storage=sparse"]);
     assert_eq!(cost, Some(taki::scene::Cost::Volume));
@@ -368,7 +369,7 @@ fn a_change_of_reflection_repacks_a_sparse_volume_and_one_of_storage_makes_it_an
     assert_same(&whole, &second);
     let (third, cost, _) = volume(&["volume.storage=dense", "volume.k_d=0.2", "volume.k_noise=0.3"]);
     assert_eq!(cost, Some(taki::scene::Cost::Volume));
-    assert!(!third.is_sparse() && *third == *second);
+    assert!(!third.is_sparse() && third == second);
 }
 
 #[test]

@@ -401,7 +401,7 @@ fn levels_and_light_volumes_are_made_anew_when_what_they_depend_on_changes() {
     for step in steps {
         let scene = scene("front", &[&small[..], step].concat());
         // Copies with another α share their cells.
-        volume.alpha = scene.water.alpha;
+        volume.alpha = scene.recipes[0].water.alpha;
         let mesh = scene.mesh();
         let used = renderer.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
         let mut fresh = crate::engine::gpu::renderer("levels anew").expect("as before");

@@ -82,7 +82,8 @@ impl Integrator<'_> {
         let terms = |light: &crate::light::Light| {
             let (to_light, _) = light.at(ray.point);
             let l = self.in_plane(ray, to_light);
-            let row = Row::new(slab(ray.frame.cell_from_plane(l), l.z), self.levels[0].size[2]);
+            let layers = self.volumes[ray.volume].size[2];
+            let row = Row::new(slab(ray.frame.cell_from_plane(l), l.z), layers);
             let gain = medium.profile.gain(&row, e_n);
             RayScatter { row, gain, peak: forward_peak(medium.similarity.g, to_light.dot(ray.d_world)) }
         };
@@ -106,7 +107,7 @@ impl Integrator<'_> {
         walked: &mut u32,
     ) -> (f32, f32) {
         let matter = &ray.matter(level);
-        let extinction = self.extinction_in(level);
+        let extinction = self.extinction_in(ray.volume, level);
         let depth = match self.visibility {
             Visibility::None => 0.0,
             _ if matter.mist > 0.0 => {

@@ -66,7 +66,7 @@ impl Integrator<'_> {
         let mut lit_by = vec![Lit::default(); lights.len()];
         let matter = ray.matter(level);
         let medium = self.medium_of(ray.quad);
-        let extinction = self.extinction_in(level);
+        let extinction = self.extinction_in(ray.volume, level);
         let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
         let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
         let mut transmittance = before;
@@ -133,7 +133,7 @@ impl Integrator<'_> {
                 };
                 if let (Some(MultipleMedium { similarity, profile }), Some(scatter)) = (medium, &scatter) {
                     let RayScatter { row, gain, peak } = &scatter[i];
-                    let diffuse = profile.at(row, self.layer_in(level, crossing.cell.z));
+                    let diffuse = profile.at(row, self.layer_in(ray.volume, level, crossing.cell.z));
                     let more = multiple(similarity, peak, diffuse, depth, tau_bits, light_depth);
                     lit += gain.truncate() * more + similarity.albedo * (gain.w * weight);
                 }
@@ -146,11 +146,11 @@ impl Integrator<'_> {
         LevelResult { transmittance, lit: lit_by, cells: walked }
     }
 
-    /// Returns the volume's own layer at the middle of layer `z` of a level.
-    pub(super) fn layer_in(&self, level: &Level, z: i32) -> u32 {
+    /// Returns the own layer of volume `volume` at the middle of layer `z` of a level.
+    pub(super) fn layer_in(&self, volume: usize, level: &Level, z: i32) -> u32 {
         if level.is_whole {
             return z as u32;
         }
-        (((z as f32 + 0.5) * level.depth_in_cells()) as u32).min(self.levels[0].size[2] - 1)
+        (((z as f32 + 0.5) * level.depth_in_cells()) as u32).min(self.volumes[volume].size[2] - 1)
     }
 }

@@ -1,51 +1,44 @@
 //! The texture that holds all light volumes of a frame.
 
 use crate::engine::gpu::device::Gpu;
+use crate::engine::gpu::packing::Packing;
 use crate::light::visibility::LightVolumes;
 use crate::util::error::{Error, Result};
 
 /// Arrangement of the light volumes in their texture: as many as fit along z, then along x, then along y.
-pub struct LightVolumeAtlas {
-    /// Texels of one light volume.
-    size: [u32; 3],
-    /// Light volumes along x, y and z.
-    along: [u32; 3],
-}
+pub struct LightVolumeAtlas(Packing);
 
 impl LightVolumeAtlas {
-    /// Arranges `count` light volumes of `size` texels.
+    /// Arranges light volumes of these sizes in texels.
     ///
     /// # Errors
     /// [`Error::Device`] if they do not fit into the device's largest 3-D texture.
-    pub fn new(gpu: &Gpu, size: [u32; 3], count: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, sizes: &[[u32; 3]]) -> Result<Self> {
         let most = gpu.device.limits().max_texture_dimension_3d;
         // z comes first: it is the order of the volume's own slices.
-        let mut along = [1; 3];
-        let mut unplaced = count;
-        for axis in [2, 1, 0] {
-            along[axis] = unplaced.clamp(1, (most / size[axis]).max(1));
-            unplaced = unplaced.div_ceil(along[axis]);
-        }
-        if unplaced > 1 || size.iter().any(|&n| n > most) {
-            let [nx, ny, nz] = size;
-            return Err(Error::device(
-                format!("{count} light volumes of {nx}×{ny}×{nz} cells are too large for {}", gpu.name()),
+        Packing::along([2, 0, 1], sizes, most).map(LightVolumeAtlas).ok_or_else(|| {
+            let largest = sizes.iter().max_by_key(|size| size.iter().map(|&n| u64::from(n)).product::<u64>());
+            let [nx, ny, nz] = largest.copied().unwrap_or_default();
+            let (count, up_to) =
+                (sizes.len(), if sizes.iter().all(|s| s == &sizes[0]) { "" } else { "up to " });
+            Error::device(
+                format!(
+                    "{count} light volumes of {up_to}{nx}×{ny}×{nz} cells are too large for {}",
+                    gpu.name()
+                ),
                 "use light.visibility=march, or --engine cpu",
-            ));
-        }
-        Ok(LightVolumeAtlas { size, along })
+            )
+        })
     }
 
     /// Returns the size of the texture, texels.
     pub fn extent(&self) -> [u32; 3] {
-        [0, 1, 2].map(|axis| self.size[axis] * self.along[axis])
+        self.0.extent
     }
 
     /// Returns the origin of a light volume in the texture, texels.
     pub fn origin(&self, number: u32) -> [i32; 3] {
-        let [kx, _, kz] = self.along;
-        let steps = [number / kz % kx, number / kz / kx, number % kz];
-        [0, 1, 2].map(|axis| (steps[axis] * self.size[axis]) as i32)
+        self.0.origins[number as usize].map(|n| n as i32)
     }
 }
 

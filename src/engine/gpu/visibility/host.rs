@@ -20,14 +20,19 @@ pub fn fill_on_host(
     mut between: impl FnMut(u64, u64) -> Result<()>,
 ) -> Result<f64> {
     let VisibilityInputs { gpu, up, plan, lookup, .. } = *inputs;
-    let levels = &up.levels;
     let clock = Instant::now();
-    let (rows, level_atlas) = (Rows::new(levels, lookup), LevelAtlas::new(levels));
+    let is_lit = |volume: u32| plan.volumes.iter().any(|own| own.volume == volume);
+    let rows =
+        up.levels.iter().zip(0..).map(|(levels, volume)| is_lit(volume).then(|| Rows::new(levels, lookup)));
+    let rows: Vec<Option<Rows>> = rows.collect();
     let texture = filled.texture.texture();
     let mut staged = 0;
     for (number, light_volume) in plan.volumes.iter().enumerate() {
         between(number as u64, plan.volumes.len() as u64)?;
         let [x, y, z] = atlas.origin(number as u32).map(|c| c as u32);
+        let volume = light_volume.volume as usize;
+        let Some(rows) = &rows[volume] else { continue };
+        let (levels, level_atlas) = (&up.levels[volume], LevelAtlas::new(&up.levels[volume]));
         let filled_levels = rows.fill(light_volume, plan.medium, plan.form);
         for ((level, numbers), level_number) in levels.iter().zip(filled_levels).zip(0..) {
             let [_, y_level, z_level] = level_atlas.origin(level_number);

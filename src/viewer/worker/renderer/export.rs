@@ -41,7 +41,7 @@ impl Renderer {
             still.check_replaced()?;
         }
         let request = Request {
-            // No request is newer, so the volume of the export is never abandoned.
+            // No request is newer, so the volumes of the export are never abandoned.
             serial: u64::MAX,
             asked: Instant::now(),
             scene: Arc::new(export.scene.clone()),
@@ -49,11 +49,11 @@ impl Renderer {
             samples: export.scene.image.samples,
             layer: Layer::Rgb,
         };
-        let (volume, _) = self.volume(&request)?;
+        let (volumes, _) = self.volumes(&request)?;
         let (mesh, _) = self.mesh(&export.scene);
         let watch = self.watch("export", u64::MAX, Duration::MAX);
         let options = RenderOptions { surface: still.has_exr(), ..Default::default() };
-        let scene = &self.exposed(&export.scene, &volume, &mesh, u64::MAX)?;
+        let scene = &self.exposed(&export.scene, &volumes, &mesh, u64::MAX)?;
         let image = &scene.image;
         let window = Window::whole([image.width, image.height]);
         still.check(image, window)?;
@@ -62,9 +62,9 @@ impl Renderer {
         if still.has_developed() {
             check_bloom(scene, window, strips.len())?;
         }
-        let mut writer = still.begin(scene, &volume, window, &Exr::of(&Layer::ALL))?;
+        let mut writer = still.begin(scene, &*volumes, window, &Exr::of(&Layer::ALL))?;
         writer.fill(&strips, image.samples, &options, &watch, |options, watch| {
-            self.run_engine(scene, &volume, &mesh, options, watch)
+            self.run_engine(scene, &volumes, &mesh, options, watch)
         })?;
         watch.progress("saving", 1, 1)?;
         writer.finish().map(drop)

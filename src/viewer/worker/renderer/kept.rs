@@ -24,7 +24,7 @@ pub struct Rendered {
     pub frame: Arc<Frame>,
     /// Samples per pixel of `frame`.
     pub samples: u32,
-    pub volume: Arc<VolumeTexture>,
+    pub volumes: Arc<Vec<VolumeTexture>>,
     /// The samples taken so far, at least those of `frame` unless there are none.
     pub sums: Sums,
 }
@@ -92,7 +92,7 @@ impl Rendered {
             size: job.request.size,
             frame: Arc::new(frame),
             samples: 1,
-            volume: job.volume.clone(),
+            volumes: job.volumes.clone(),
             sums: Sums::default(),
         }
     }
@@ -106,7 +106,7 @@ impl Rendered {
         let is_of_development = |key: &String| key.starts_with("image.") || key.starts_with("animate.");
         self.size == job.request.size
             && self.samples <= job.request.samples.max(1)
-            && Arc::ptr_eq(&self.volume, &job.volume)
+            && Arc::ptr_eq(&self.volumes, &job.volumes)
             && (filter, alpha, rock_error) == (new.image.filter, new.image.alpha, new.image.rock_error)
             // A file may have changed without its name.
             && map(old) == map(new)
@@ -136,7 +136,7 @@ impl Rendered {
             size: self.size,
             frame: self.frame.clone(),
             samples: self.samples,
-            volume: self.volume.clone(),
+            volumes: self.volumes.clone(),
             sums: std::mem::take(&mut self.sums),
         })
     }

@@ -265,9 +265,9 @@ fn kept_results_of_the_raster_pass_know_the_environment() {
     for change in changes.iter().flat_map(|c| [c, c, c]) {
         let sets = [change, &["light.visibility=none", "image.samples=1"][..]].concat();
         let scene = lit_within(&sets, &limits);
-        let (volume, _) = volumes.volume(&scene, 1 << 30, &Unwatched).expect("a volume");
-        let kept = keeping.render(&scene, &volume, &mesh, &options, &Unwatched).expect("a frame");
-        let drawn = fresh.render(&scene, &volume, &mesh, &RenderOptions::default(), &Unwatched);
+        let (volumes, _) = volumes.volumes(&scene, 1 << 30, &Unwatched).expect("a volume");
+        let kept = keeping.render(&scene, &*volumes, &mesh, &options, &Unwatched).expect("a frame");
+        let drawn = fresh.render(&scene, &*volumes, &mesh, &RenderOptions::default(), &Unwatched);
         assert!(kept.radiance == drawn.expect("a frame").radiance, "{change:?}");
         spared += u32::from(kept.seconds.gbuffer == 0.0);
     }

@@ -138,7 +138,7 @@ fn the_flow_falls_with_gravity_and_loops() {
     let mut last = f64::INFINITY;
     for engine in &mut engines("falling bar") {
         for flow in [0.0f32, 0.25, 0.5, 0.75] {
-            scene.edit().flow = flow;
+            scene.edit().recipes[0].flow = flow;
             let picture = frame(engine, &scene, &volume);
             let (mut sum, mut weight) = (0.0, 0.0);
             for (i, r) in picture.radiance.iter().enumerate() {
@@ -159,7 +159,7 @@ fn the_flow_falls_with_gravity_and_loops() {
         }
         let mut at = |flow: f32| {
             let mut scene = scene.clone();
-            scene.edit().flow = flow;
+            scene.edit().recipes[0].flow = flow;
             frame(engine, &scene, &volume).radiance
         };
         assert!(at(0.25) == at(3.25));

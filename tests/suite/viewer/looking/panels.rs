@@ -322,7 +322,7 @@ fn pictures_of_the_panels_on_demand() {
             ("curves_levels", 0.9, 0.2, Some(3.0), [420.0, 640.0]),
             ("curves_narrow", 0.9, 0.05, Some(2.0), [250.0, 500.0]),
         ] {
-            let mut spec = figure.water;
+            let mut spec = figure.recipes[0].water;
             spec.shape.h = h;
             spec.shape.sigma_g_cells = amplitude * spec.size[1] as f32;
             let state = Curves { panel: CurvesPanel::default(), spec };

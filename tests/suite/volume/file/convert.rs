@@ -471,8 +471,8 @@ fn a_file_without_k_takes_the_reflection_of_the_scene() {
     // A new coefficient changes a remembered volume, but not one whose file has k.
     let mut memo = VolumeMemo::default();
     let mut remembered = |k_d: f32| {
-        let (volume, cost) = memo.volume(&scene(k_d), 1 << 30, &Unwatched).unwrap();
-        (volume.cells[0].k_codes(), cost.is_some())
+        let (volumes, cost) = memo.volumes(&scene(k_d), 1 << 30, &Unwatched).unwrap();
+        (volumes[0].cells[0].k_codes(), cost.is_some())
     };
     assert_eq!(remembered(0.6), ((153, 102), true));
     assert_eq!(remembered(0.6), ((153, 102), false));

@@ -26,9 +26,11 @@ use crate::volume::Cell;
 /// Number of lit cells after which they are lit and shaded: walks to a light start from eight at a time.
 const PENDING: u32 = 3 * LANES as u32;
 
-/// Up to eight rays in one level, of sheets that are all mist or all strands.
+/// Up to eight rays in one level of a volume, of sheets that are all mist or all strands.
 pub struct Group<'a, 'h> {
     pub integrator: &'a Integrator<'a>,
+    /// Number of the volume.
+    volume: usize,
     pub level: Level<'a>,
     pub store: Store<'a>,
     pub is_mist: bool,
@@ -108,18 +110,19 @@ impl<'a, 'h> Group<'a, 'h> {
     /// Group of rays with the sheets `hits`, and T before each of them.
     pub fn new(
         integrator: &'a Integrator<'a>,
-        level: Level<'a>,
-        store: Store<'a>,
+        volume: usize,
+        (level, store): (Level<'a>, Store<'a>),
         hits: &'h Hits,
         before: [f32; LANES],
     ) -> Self {
         Group {
             integrator,
+            volume,
             level,
             store,
             is_mist: hits.values.mist.0[0] > 0.0,
             is_between: integrator.scene.trace.lookup == Lookup::Trilinear,
-            extinction: integrator.extinction_in(&level),
+            extinction: integrator.extinction_in(volume, &level),
             exponent: Exponent::new(integrator.scene.p),
             hits,
             before: Stored(before),
@@ -357,7 +360,7 @@ impl<'a, 'h> Group<'a, 'h> {
 
     /// Layers of the whole volume, by the layers of the level before the rays leave the slab.
     fn layers(&self, left: &[i32; LANES]) -> [u32; LANES] {
-        left.map(|left| self.integrator.layer_in(&self.level, self.level.size.z - left))
+        left.map(|left| self.integrator.layer_in(self.volume, &self.level, self.level.size.z - left))
     }
 }
 

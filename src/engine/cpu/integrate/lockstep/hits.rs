@@ -7,7 +7,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::{Vec2, Vec3};
 
-use crate::engine::cpu::integrate::Integrator;
+use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
 use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
@@ -84,6 +84,21 @@ impl Hits {
         }
     }
 
+    /// A number of each quad's volume.
+    #[inline(always)]
+    fn of_volumes<S: Simd>(
+        &self,
+        simd: S,
+        integrator: &Integrator,
+        number: impl Fn(&FrameVolume) -> f32,
+    ) -> Floats<S> {
+        match &integrator.volumes[..] {
+            [only] => f32x8::splat(simd, number(only)),
+            all => self
+                .of_quads(simd, &integrator.scene.quads, |quad| number(&all[quad.material.volume as usize])),
+        }
+    }
+
     /// A vector in the plane of each quad.
     #[inline(always)]
     fn edges_of_quads<S: Simd>(
@@ -129,17 +144,19 @@ impl Hits {
         let at = &hits.values.at;
         let splat = |x: f32| f32x8::splat(simd, x);
         let (zero, one) = (splat(0.0), splat(1.0));
-        let [nx, ny, nz] = integrator.levels[0].size.map(|n| n as f32);
+        let size_of = |axis: usize| hits.of_volumes(simd, integrator, |volume| volume.size[axis] as f32);
+        let (nx, ny, nz) = (size_of(0), size_of(1), size_of(2));
         let (u, v, t) = (at.0[0].load(simd), at.0[1].load(simd), at.0[2].load(simd));
 
         let (e_x, e_y) = hits.edges_of_quads(simd, all, |quad| quad.map.e);
         let (f_x, f_y) = hits.edges_of_quads(simd, all, |quad| quad.map.f);
         let (g_x, g_y) = hits.edges_of_quads(simd, all, |quad| quad.map.g);
-        let cells_u = hits.of_quads(simd, all, |quad| quad.material.repeat_u * nx);
-        let cells_v = hits.of_quads(simd, all, |quad| quad.material.repeat_v * ny);
+        let repeat_u = hits.of_quads(simd, all, |quad| quad.material.repeat_u);
+        let repeat_v = hits.of_quads(simd, all, |quad| quad.material.repeat_v);
+        let (cells_u, cells_v) = (repeat_u * nx, repeat_v * ny);
         let (cx_x, cx_y) = ((e_x + g_x * v) / cells_u, (e_y + g_y * v) / cells_u);
         let (cy_x, cy_y) = ((f_x + g_x * u) / cells_v, (f_y + g_y * u) / cells_v);
-        let depth = hits.of_quads(simd, all, |quad| quad.material.thickness_m / nz);
+        let depth = hits.of_quads(simd, all, |quad| quad.material.thickness_m) / nz;
         let det = cx_x * cy_y - cx_y * cy_x;
 
         let d = hits.values.d_world.load(simd);
@@ -178,11 +195,9 @@ impl Hits {
             z: a.z + e1.z * p_x + e2.z * p_y,
         };
 
-        let repeat_u = hits.of_quads(simd, all, |quad| quad.material.repeat_u);
-        let repeat_v = hits.of_quads(simd, all, |quad| quad.material.repeat_v);
-        let x = (u * repeat_u + hits.of_quads(simd, all, |quad| quad.offset.x)) * splat(nx);
-        let y = (v * repeat_v + hits.of_quads(simd, all, |quad| quad.offset.y)) * splat(ny)
-            - splat(integrator.flow_cells);
+        let flow_cells = hits.of_volumes(simd, integrator, |volume| volume.flow_cells);
+        let x = (u * repeat_u + hits.of_quads(simd, all, |quad| quad.offset.x)) * nx;
+        let y = (v * repeat_v + hits.of_quads(simd, all, |quad| quad.offset.y)) * ny - flow_cells;
         let origin = Lanes3 { x: in_tile(simd, x, nx), y: in_tile(simd, y, ny), z: zero };
 
         let ea = hits.of_quads(simd, all, |quad| quad.erosion[0]);
@@ -207,7 +222,8 @@ impl Hits {
             let area = splat(integrator.footprint) * (c * c * c) * (t * t);
             let across = area / (det.abs() * depth * d_cell.dot(d_cell).sqrt());
             let exact = splat(0.5) * log2(simd, across.max(splat(1e-30)));
-            let exact = exact.max(zero).min(splat((integrator.levels.len() - 1) as f32));
+            let coarsest = hits.of_volumes(simd, integrator, |volume| (volume.levels.len() - 1) as f32);
+            let exact = exact.max(zero).min(coarsest);
             level = floor_cell(simd, exact).to_float::<f32x8<S>>();
             share = exact - level;
         }
@@ -283,9 +299,8 @@ impl<S: Simd> Frame<S> {
     }
 }
 
-/// Coordinates in cells, moved into a tile of `n` cells.
+/// Coordinates in cells, moved into tiles of `n` cells.
 #[inline(always)]
-fn in_tile<S: Simd>(simd: S, at: Floats<S>, n: f32) -> Floats<S> {
-    let n = f32x8::splat(simd, n);
+fn in_tile<S: Simd>(simd: S, at: Floats<S>, n: Floats<S>) -> Floats<S> {
     at - n * floor_cell(simd, at / n).to_float::<f32x8<S>>()
 }

@@ -9,8 +9,8 @@
 //! - **A row of steps** moves each ray by eight cells and keeps their indices. Then their cells are fetched,
 //!   T follows them, light is looked up or walked, and they are shaded. So a processor that waits for one
 //!   part of a row works on another.
-//! - **Lanes** are rays that meet sheets of one kind (strands or mist) in one level, of one stretch of a row
-//!   of pixels. They may belong to different quads.
+//! - **Lanes** are rays that meet sheets of one kind (strands or mist) in one level of one volume, of one
+//!   stretch of a row of pixels. They may belong to different quads.
 
 mod between;
 mod cells;
@@ -75,8 +75,10 @@ const STRETCH: usize = 256;
 pub struct Lockstep<'a> {
     integrator: &'a Integrator<'a>,
     simd: fearless_simd::Level,
-    /// Levels of the volume, with their cells.
-    levels: Vec<(Level<'a>, Store<'a>)>,
+    /// Levels of all volumes, with the number of their volume and with their cells.
+    levels: Vec<(usize, Level<'a>, Store<'a>)>,
+    /// Index of the first level of each volume.
+    firsts: Vec<usize>,
     // Memory that every stretch uses again.
     rays: Vec<(usize, PixelRay)>,
     met: Met,
@@ -98,7 +100,7 @@ struct Met {
     sheets: Vec<Sheet>,
     /// Eight sheets in each pack, in their order.
     packs: Vec<Hits>,
-    /// Sheets and which of their two levels is walked, by level and by strands or mist.
+    /// Sheets and which of their two levels is walked, by the index of the level and by strands or mist.
     walks: Vec<[Vec<(usize, usize)>; 2]>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
@@ -112,14 +114,17 @@ impl<'a> Lockstep<'a> {
         if integrator.visibility == Visibility::Cached && integrator.filled.is_none() {
             return None;
         }
-        let levels = (0..integrator.levels.len() as u32).map(|number| {
-            let level = Level::new(&integrator.levels, number);
-            Some((level, Store::new(&level)?))
-        });
-        let levels: Vec<_> = levels.collect::<Option<_>>()?;
+        let (mut levels, mut firsts) = (Vec::new(), Vec::new());
+        for (volume, own) in integrator.volumes.iter().enumerate() {
+            firsts.push(levels.len());
+            for number in 0..own.levels.len() as u32 {
+                let level = Level::new(&own.levels, number);
+                levels.push((volume, level, Store::new(&level)?));
+            }
+        }
         let met = Met { walks: levels.iter().map(|_| Default::default()).collect(), ..Default::default() };
         let scratch = Box::new(Scratch::new(integrator));
-        Some(Lockstep { integrator, simd, levels, rays: Vec::new(), met, scratch })
+        Some(Lockstep { integrator, simd, levels, firsts, rays: Vec::new(), met, scratch })
     }
 
     /// See [`super::Walker::pixels`].
@@ -182,13 +187,15 @@ impl<'a> Lockstep<'a> {
         walks.iter_mut().flatten().for_each(Vec::clear);
         for i in 0..sheets.len() {
             let (values, lane) = (&packs[i / LANES].values, i % LANES);
-            let (level, kind) = (values.level.0[lane] as usize, usize::from(values.mist.0[lane] > 0.0));
+            let volume = self.integrator.scene.quads[packs[i / LANES].quads[lane]].material.volume;
+            let level = self.firsts[volume as usize] + values.level.0[lane] as usize;
+            let kind = usize::from(values.mist.0[lane] > 0.0);
             walks[level][kind].push((i, 0));
             if values.share.0[lane] > 0.0 {
                 walks[level + 1][kind].push((i, 1));
             }
         }
-        for (&(level, store), kinds) in self.levels.iter().zip(&*walks) {
+        for (&(volume, level, store), kinds) in self.levels.iter().zip(&*walks) {
             for walks in kinds {
                 for walks in walks.chunks(LANES) {
                     // Missing rays are filled up with the first.
@@ -196,7 +203,7 @@ impl<'a> Lockstep<'a> {
                     let picks = std::array::from_fn(|lane| (of(lane) / LANES, of(lane) % LANES));
                     let before = std::array::from_fn(|lane| sheets[of(lane)].order.before);
                     let hits = Hits::picked(packs, picks, &mut room);
-                    let group = Group::new(self.integrator, level, store, hits, before);
+                    let group = Group::new(self.integrator, volume, (level, store), hits, before);
                     let Ends { transmittance, cells } =
                         dispatch!(self.simd, simd => group.walk(simd, &mut self.scratch));
                     for (lane, &(i, which)) in walks.iter().enumerate() {

@@ -1,0 +1,315 @@
+//! Volumes of a scene: which of them its surfaces show, the recipe of each, and how they share the memory.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::names::likeliest;
+use super::param::{WATER, key_of_volume, split_volume_key};
+use super::{Limits, Parts, Scene, Values, build};
+use crate::trace::Prefilter;
+use crate::util::cache::Cache;
+use crate::util::error::{Error, Result};
+use crate::util::monitor::Monitor;
+use crate::volume::{
+    ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water,
+    dense_bytes, expected_cells, kept_water, read_npz, sparse_bytes,
+};
+
+/// Largest number of volumes that a scene shows. The GPU engine holds their constants in one uniform buffer,
+/// for which WebGPU guarantees 64 KiB.
+pub const MAX_VOLUMES: usize = 64;
+
+/// One volume of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// Name: `water`, or that of its table in `volumes`.
+    pub name: String,
+    /// Recipe of the cells, used where there is no `file`.
+    pub water: WaterSpec,
+    /// Path of the volume's `.npz` file, resolved and inside the allowed folders.
+    pub file: Option<PathBuf>,
+    /// Storage of the cells.
+    pub storage: Storage,
+    /// Storage that the scene asks for.
+    pub asked_storage: StorageChoice,
+    /// Distance that the volume has moved down the flow, in lengths of the volume.
+    pub flow: f32,
+}
+
+impl Recipe {
+    /// Reads the recipe of the volume `name`. Its storage is not chosen yet.
+    fn new(v: &Values, name: &str, folder: Option<&Path>, limits: &Limits) -> Result<Recipe> {
+        Ok(Recipe {
+            name: name.into(),
+            water: build::water(v, name),
+            file: build::volume_file(v, name, folder, limits)?,
+            storage: Storage::Dense,
+            asked_storage: build::asked_storage(v, name)?,
+            flow: v.float(&key_of_volume(name, "volume.flow")),
+        })
+    }
+
+    /// Bytes that the cells take in a storage while a picture is rendered.
+    fn bytes_in(&self, storage: Storage, pyramid: bool) -> u128 {
+        match storage {
+            Storage::Dense => dense_bytes(self.water.size, pyramid),
+            Storage::Sparse => sparse_bytes(self.water.size, expected_cells(&self.water), 0),
+        }
+    }
+
+    /// Bytes that the volume takes while a picture is rendered, if it is built. Those of a file are counted
+    /// when it is read.
+    pub(crate) fn bytes(&self, pyramid: bool) -> u128 {
+        if self.file.is_some() { 0 } else { self.bytes_in(self.storage, pyramid) }
+    }
+}
+
+/// Returns the names of all volumes of a scene, `water` first.
+pub(super) fn names(v: &Values) -> Vec<String> {
+    std::iter::once(WATER.to_owned()).chain(v.names("volumes")).collect()
+}
+
+/// Returns the names of the materials that quads, sheets and splashes have.
+pub(super) fn used_materials(v: &Values) -> BTreeSet<String> {
+    let users = ["quads", "sheets", "splashes"].into_iter().flat_map(|section| {
+        v.names(section).into_iter().map(move |name| v.text(&format!("{section}.{name}.material")))
+    });
+    users.collect()
+}
+
+/// Returns the name of the volume that a material shows.
+pub(super) fn volume_of(v: &Values, material: &str) -> String {
+    v.text(&format!("materials.{material}.volume"))
+}
+
+/// Returns the names of the volumes that the scene's surfaces show, in the order of their numbers. A scene
+/// without surfaces has `water`.
+pub(super) fn shown(v: &Values) -> Vec<String> {
+    let used: BTreeSet<String> = used_materials(v).iter().map(|material| volume_of(v, material)).collect();
+    let mut shown = names(v);
+    shown.retain(|name| used.contains(name) || (used.is_empty() && name == WATER));
+    shown
+}
+
+/// Returns advice on the name of a volume; `None` where the scene has it.
+pub(super) fn unknown(v: &Values, name: &str) -> Option<String> {
+    let known = names(v);
+    (!known.iter().any(|own| own == name)).then(|| match likeliest(name, known.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean {near}? Otherwise add [volumes.{name}]"),
+        None => format!("add [volumes.{name}], or use one of these: {}", known.join(", ")),
+    })
+}
+
+/// Returns a warning about each volume of the user's own that nothing shows.
+pub(super) fn unused(v: &Values) -> Vec<String> {
+    let shown = shown(v);
+    let unused = v.names("volumes").into_iter().filter(|name| {
+        // A scene without water of its own uses none of the volumes of its base.
+        !shown.contains(name) && !v.has_base_under(&format!("volumes.{name}"))
+    });
+    unused.map(|name| why_unused(v, &name)).collect()
+}
+
+/// Returns why a volume that nothing shows has no effect, and what shows it.
+fn why_unused(v: &Values, name: &str) -> String {
+    match v.names("materials").iter().find(|material| volume_of(v, material) == name) {
+        Some(material) => format!("nothing has the material {material}, which shows the volume {name}"),
+        None => format!("no material shows the volume {name}: give one volume = {name:?}"),
+    }
+}
+
+/// Returns why the value of a volume's key has no effect, because nothing shows the volume; `None` where
+/// something does.
+pub(super) fn without_effect(v: &Values, key: &str) -> Option<String> {
+    let (name, of_water) = split_volume_key(key)?;
+    // The waves of pools move with `volume.flow`.
+    let is_shown = shown(v).iter().any(|other| other == name);
+    let is_waves = name == WATER && of_water == "volume.flow";
+    (!is_shown && !is_waves).then(|| format!("{key} has no effect: {}", why_unused(v, name)))
+}
+
+/// Reads the recipes of the volumes that the scene shows.
+///
+/// # Errors
+/// [`Error::Input`] where a material names a volume that the scene does not have, or a file is unusable;
+/// [`Error::Memory`] for a volume that is too large by itself.
+pub(super) fn recipes(v: &Values, folder: Option<&Path>, limits: &Limits) -> Result<Vec<Recipe>> {
+    for material in v.names("materials") {
+        let name = volume_of(v, &material);
+        if let Some(fix) = unknown(v, &name) {
+            let what = format!("materials.{material}.volume = {name:?}: the scene has no such volume");
+            return Err(Error::input(what, fix));
+        }
+    }
+    let shown = shown(v);
+    if shown.len() > MAX_VOLUMES {
+        return Err(Error::input(
+            format!("the scene shows {} volumes", shown.len()),
+            format!("at most {MAX_VOLUMES}"),
+        ));
+    }
+    let recipes = shown.iter().map(|name| {
+        let recipe = Recipe::new(v, name, folder, limits)?;
+        if recipe.file.is_none() {
+            // A volume that is too large by itself is refused with its own numbers.
+            build::water_storage(&recipe.water, recipe.asked_storage, limits.memory, 0)
+                .map_err(|e| of_volume(name, e))?;
+        }
+        Ok(recipe)
+    });
+    recipes.collect()
+}
+
+/// Puts the keys of the volume `name` into an error that names those of `water`.
+fn of_volume(name: &str, error: Error) -> Error {
+    if name == WATER {
+        return error;
+    }
+    let own = |text: String| {
+        let table = format!("volumes.{name}.");
+        text.replace("volume.", &table).replace("curves.", &table)
+    };
+    match error {
+        Error::Memory { what, need, budget, fix } => {
+            Error::Memory { what: own(what), need, budget, fix: own(fix) }
+        }
+        Error::Input { what, fix } => Error::Input { what: own(what), fix: own(fix) },
+        other => other,
+    }
+}
+
+impl Parts {
+    /// Whether rays read coarse levels too.
+    pub(crate) fn has_pyramid(&self) -> bool {
+        self.trace.filter == Prefilter::Pyramid
+    }
+
+    /// Chooses the storage of every volume within `memory` bytes, all volumes taken together. As long as they
+    /// do not fit, the largest dense one that may be sparse becomes so.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where they do not fit.
+    pub(super) fn choose_storages(&mut self, memory: u64) -> Result<()> {
+        let (beside, pyramid) = (self.least_bytes_beside_volume(), self.has_pyramid());
+        if let [recipe] = &mut self.recipes[..] {
+            if recipe.file.is_none() {
+                recipe.storage = build::water_storage(&recipe.water, recipe.asked_storage, memory, beside)
+                    .map_err(|e| of_volume(&recipe.name, e))?;
+            }
+            return Ok(());
+        }
+        for recipe in &mut self.recipes {
+            recipe.storage = match recipe.asked_storage {
+                StorageChoice::Sparse => Storage::Sparse,
+                StorageChoice::Dense | StorageChoice::Auto => Storage::Dense,
+            };
+        }
+        loop {
+            let need = self.recipes.iter().map(|recipe| recipe.bytes(pyramid)).sum::<u128>();
+            if need + u128::from(beside) <= u128::from(memory) {
+                return Ok(());
+            }
+            let saved = |recipe: &Recipe| {
+                let may = recipe.file.is_none()
+                    && recipe.asked_storage == StorageChoice::Auto
+                    && recipe.storage == Storage::Dense;
+                let [dense, sparse] = [Storage::Dense, Storage::Sparse].map(|s| recipe.bytes_in(s, pyramid));
+                if may { dense.saturating_sub(sparse) } else { 0 }
+            };
+            match self.recipes.iter_mut().max_by_key(|recipe| saved(recipe)).filter(|r| saved(r) > 0) {
+                Some(largest) => largest.storage = Storage::Sparse,
+                None => {
+                    return Err(Error::memory(
+                        format!("the picture with its {} volumes", self.recipes.len()),
+                        need + u128::from(beside),
+                        memory,
+                        "lower their nx, ny or nz, or raise --memory",
+                    ));
+                }
+            }
+        }
+    }
+}
+
+impl Scene {
+    /// Builds the volume textures, or reads them from the scene's files, within `memory` bytes. They have the
+    /// order of `recipes`, in which quads number them.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where they do not fit, [`Error::Input`] or [`Error::Io`] where a file is unusable,
+    /// and those of `monitor`.
+    pub fn volumes(&self, memory: u64, monitor: &dyn Monitor) -> Result<Vec<VolumeTexture>> {
+        self.cached_volumes(None, memory, monitor)
+    }
+
+    /// Returns [`Scene::volumes`], each from the cache where it is stored there.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::volumes`].
+    pub fn cached_volumes(
+        &self,
+        cache: Option<&Cache>,
+        memory: u64,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<VolumeTexture>> {
+        let mut volumes = Vec::with_capacity(self.recipes.len());
+        for number in 0..self.recipes.len() {
+            let memory = self.memory_for(number, &volumes, memory);
+            volumes.push(self.cached_volume(number, cache, memory, monitor)?);
+        }
+        Ok(volumes)
+    }
+
+    /// Builds or reads the first volume, which is the only one of most scenes.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::volumes`].
+    pub fn volume(&self, memory: u64, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+        self.cached_volume(0, None, memory, monitor)
+    }
+
+    /// Returns the flow of each volume, in its lengths.
+    ///
+    /// # Panics
+    /// If the scene has another number of volumes than `volumes`.
+    pub(crate) fn flows(&self, volumes: &[VolumeTexture]) -> Vec<f32> {
+        assert_eq!(volumes.len(), self.recipes.len(), "one volume for each recipe of the scene");
+        self.recipes.iter().map(|recipe| recipe.flow).collect()
+    }
+
+    /// Returns the bytes that are left for volume `number`: those before it are `made`, and those behind it
+    /// are built later.
+    pub(crate) fn memory_for(&self, number: usize, made: &[VolumeTexture], memory: u64) -> u64 {
+        let held = made.iter().map(|volume| volume.cells.bytes()).sum::<u64>();
+        let pyramid = self.has_pyramid();
+        let later = self.recipes[number + 1..].iter().map(|recipe| recipe.bytes(pyramid)).sum::<u128>();
+        memory.saturating_sub(held).saturating_sub(u64::try_from(later).unwrap_or(u64::MAX))
+    }
+
+    /// Builds or reads volume `number`, or takes it from the cache where it is stored there.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::volumes`].
+    pub(crate) fn cached_volume(
+        &self,
+        number: usize,
+        cache: Option<&Cache>,
+        memory: u64,
+        monitor: &dyn Monitor,
+    ) -> Result<VolumeTexture> {
+        let Recipe { name, water, file, storage, asked_storage, .. } = &self.recipes[number];
+        let volume = match (file, storage, cache) {
+            (Some(path), ..) => {
+                let k = [water.k_d, water.k_s];
+                read_npz(path, &ReadOptions { storage: *asked_storage, budget: memory, k }, monitor)
+            }
+            (None, Storage::Dense, Some(cache)) => kept_water(water, cache, monitor),
+            (None, Storage::Dense, None) => build_water(water, monitor),
+            // A sparse volume's cache file would be large enough to evict every other.
+            (None, Storage::Sparse, _) => build_sparse_water(water, memory, monitor),
+        };
+        let volume = volume.map_err(|e| of_volume(name, e))?;
+        self.check_built(number, &volume)?;
+        Ok(volume)
+    }
+}
