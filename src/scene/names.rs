@@ -288,6 +288,11 @@ fn misplaced(key: &str) -> Option<String> {
     if named && parts[1..].contains(&"") {
         return Some(format!("give it a name: [{}.NAME]", parts[0]));
     }
+    if let ["volumes", name, "curves" | "volume", last] = parts[..]
+        && Param::find(&format!("volumes.{name}.{last}")).is_some()
+    {
+        return Some(format!("write volumes.{name}.{last}: a volume has all its keys in one table"));
+    }
     let last = format!("{}.*.{}", parts[0], parts[parts.len() - 1]);
     if named && parts.len() > 3 && PARAMS.iter().any(|param| param.key == last) {
         let name = parts[1..parts.len() - 1].join(".");

@@ -142,8 +142,8 @@ pub(super) const ANIMATION: Group = Group {
         p("animate.speed", "", "lengths/s", Float(-1000.0, 1000.0, 0.5), Uniform)
             .slider(0.0, 4.0)
             .doc(
-                "Speed at which the volume moves down the flow. A loop rounds it to whole lengths of the \
-                 volume, but not to none.",
+                "Speed at which the volume `water` moves down the flow; others stay, unless a track moves \
+                 `volumes.*.flow`. A loop rounds it to whole lengths of the volume, but not to none.",
             )
             .when(
                 "Raise it for faster water; lower it for slow motion. A sheet falls at its natural speed \

@@ -5,7 +5,7 @@ use egui::{Align, ComboBox, DragValue, Layout, Slider, SliderClamping, Ui};
 use rand::RngExt;
 
 use super::{MARKS_WIDTH, NAME_WIDTH, VALUE_WIDTH, name};
-use crate::scene::{Kind, Param, Raw, Value};
+use crate::scene::{Kind, Param, Raw, Value, WATER, split_volume_key};
 use crate::viewer::document::Document;
 use crate::viewer::navigate;
 
@@ -104,6 +104,10 @@ impl Field<'_> {
                 }
                 self.choice(ui, materials.into_iter(), text)
             }
+            (Kind::Text(_), Value::Text(text)) if key.starts_with("materials.") => {
+                let volumes = self.document.values().names("volumes");
+                self.choice(ui, std::iter::once(WATER.to_owned()).chain(volumes), text)
+            }
             (Kind::Text(_), Value::Text(text)) => self.text(ui, text),
             (Kind::Frames | Kind::Series, list) => {
                 // Keyframes can be edited only in the scene file.
@@ -175,8 +179,9 @@ impl Field<'_> {
         let id = ui.make_persistent_id(("text", self.key));
         let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| text.to_owned());
         let width = ui.available_width() - MARKS_WIDTH;
+        let is_volume_file = split_volume_key(self.key).is_some_and(|(_, own)| own == "volume.file");
         let field = egui::TextEdit::singleline(&mut typed)
-            .hint_text(if self.key == "volume.file" { "built" } else { "" })
+            .hint_text(if is_volume_file { "built" } else { "" })
             .desired_width(width);
         let response = ui.add(field);
         name(&response, self.key);

@@ -58,10 +58,10 @@ pub const SURFACE: RenderOptions = RenderOptions {
 };
 
 pub fn both(renderer: &mut GpuRenderer, scene: &Scene) -> [Frame; 2] {
-    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
     let mesh = scene.mesh();
-    let on_gpu = renderer.render(scene, &volume, &mesh, &SURFACE, &Unwatched).expect("a frame");
-    let on_cpu = cpu::render(scene, &volume, &mesh, true, &Unwatched).expect("a frame");
+    let on_gpu = renderer.render(scene, &volumes, &mesh, &SURFACE, &Unwatched).expect("a frame");
+    let on_cpu = cpu::render(scene, &volumes, &mesh, true, &Unwatched).expect("a frame");
     [on_gpu, on_cpu]
 }
 

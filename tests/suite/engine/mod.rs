@@ -13,3 +13,4 @@ pub mod rasters;
 pub mod ray;
 pub mod shaders;
 pub mod specialise;
+pub mod volumes;

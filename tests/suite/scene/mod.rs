@@ -4,6 +4,7 @@
 pub mod animation;
 pub mod presets;
 pub mod slips;
+pub mod volumes;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,10 @@ corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 0, -1], [0, 0, -1]]
 [materials.a]
 repeat_u = 2.0
+[materials.b]
+volume = \"a\"
+[volumes.a]
+nx = 8
 [sheets.a]
 points = [[0, 1, 0], [0, 0, 1]]
 material = \"a\"
@@ -34,6 +39,9 @@ material = \"a\"
 [[quads]]
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 material = \"a\"
+[[quads]]
+corners = [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+material = \"b\"
 [[animate.tracks]]
 key = \"trace.sigma\"
 frames = [0]
@@ -91,6 +99,7 @@ fn another(param: &Param) -> String {
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),
+        Kind::Text(_) if param.key == "materials.*.volume" => "a".into(),
         // A volume file is to be there.
         Kind::Text(_) => format!("{:?}", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")),
         Kind::Corners if param.key.starts_with("pools") => {
@@ -163,6 +172,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "trace.filter" => scene.trace.filter.word(),
                 "trace.lookup" => scene.trace.lookup.word(),
                 "volume.storage" => scene.recipes[0].asked_storage.word(),
+                "volumes.*.storage" => scene.recipes[1].asked_storage.word(),
                 other => panic!("the variant of {other} is not compared"),
             };
             assert_eq!(variant, *word, "{setting}");

@@ -33,8 +33,9 @@ fn keys(window: &Window) -> Vec<(String, &'static Param)> {
     keys.into_iter().filter(shown).map(|key| (key.clone(), Param::find(&key).expect("a parameter"))).collect()
 }
 
-fn is_material(key: &str) -> bool {
-    key.ends_with(".material")
+/// Whether the value is a name that the scene has.
+fn is_name(key: &str) -> bool {
+    key.ends_with(".material") || key.starts_with("materials.") && key.ends_with(".volume")
 }
 
 /// Whether a number has a slider, not just a number field.
@@ -57,7 +58,7 @@ fn every_parameter_has_a_widget_of_its_name() {
             Kind::Float(..) | Kind::Int(..) => vec![(Role::SpinButton, key.clone())],
             Kind::Choice(_) => vec![(Role::ComboBox, key.clone())],
             Kind::Switch(_) => vec![(Role::CheckBox, key.clone())],
-            Kind::Text(_) if is_material(&key) => vec![(Role::ComboBox, key.clone())],
+            Kind::Text(_) if is_name(&key) => vec![(Role::ComboBox, key.clone())],
             Kind::Text(_) => vec![(Role::TextInput, key.clone())],
             Kind::Color(_) => vec![(Role::ColorWell, key.clone())],
             Kind::Point(_) => axes.map(|axis| (Role::SpinButton, format!("{key} {axis}"))).into(),
