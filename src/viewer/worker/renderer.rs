@@ -17,7 +17,7 @@ use crate::job::VolumeMemo;
 use crate::picture::camera::CENTRE;
 use crate::picture::{AutoExposure, Frame, Look};
 use crate::place::{Ground, Mesh};
-use crate::scene::{Cost, Scene, Values};
+use crate::scene::{Cost, Scene, Values, split_volume_key};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -446,7 +446,8 @@ impl Renderer {
         const AFFECTS_EXPOSURE: [&str; 3] = ["image.width", "image.height", "image.auto_exposure"];
         let is_irrelevant = |key: &String| {
             let of_image = key.starts_with("image.") && !AFFECTS_EXPOSURE.contains(&key.as_str());
-            of_image || key.starts_with("animate.") || key == "volume.flow"
+            let is_flow = split_volume_key(key).is_some_and(|(_, own)| own == "volume.flow");
+            of_image || key.starts_with("animate.") || is_flow
         };
         let is_current = |(measured, _): &&(Values, f32)| {
             changed_keys(measured, scene.written()).iter().all(is_irrelevant)

@@ -91,8 +91,8 @@ fn every_key_of_a_volume_acts_as_that_of_water_does() {
     };
     let same = "volume.nx=9 volume.ny=16 volume.nz=5 curves.across=7 curves.deep=4 volume.alpha=0.5 \
                 volume.k_d=0.5 volume.k_s=0.5 volume.k_noise=0.1 curves.h=1.3 curves.bundles=3 \
-                curves.radius=0.1 curves.wander=0.2 curves.breathe=0.3 curves.loose=0.25 volume.coherence=0.5 \
-                volume.strand_length=0.3 volume.coverage=0.4 volume.crest=0.2 volume.seed=5 volume.flow=0.25 \
+                curves.radius=0.1 curves.wander=0.2 curves.breathe=0.3 curves.loose=0.25 \
+                volume.coherence=0.5 volume.strand_length=0.3 volume.coverage=0.4 volume.crest=0.2 volume.seed=5 volume.flow=0.25 \
                 curves.amplitude=0.07 curves.levels=3 volume.storage=sparse";
     let twin = |set: &str| format!("volumes.fur.{}", set.split_once('.').unwrap().1);
     let (water, fur): (Vec<&str>, Vec<String>) =
@@ -226,7 +226,8 @@ fn too_many_volumes_are_refused() {
     let volumes = |count: usize| {
         let one = |i: usize| {
             format!(
-                "[volumes.v{i}]\nnx = 2\nny = 2\nnz = 2\n[materials.m{i}]\nvolume = \"v{i}\"\n[[quads]]\ncorners = \
+                "[volumes.v{i}]\nnx = 2\nny = 2\nnz = 2\n[materials.m{i}]\nvolume = \"v{i}\"\n[[quads]]\n\
+                 corners = \
                  [[0, 0, {i}], [1, 0, {i}], [1, 1, {i}], [0, 1, {i}]]\nmaterial = \"m{i}\"\n"
             )
         };
@@ -254,7 +255,8 @@ fn the_printed_scene_has_its_volumes() {
 #[test]
 fn keyframes_move_a_volume_and_the_speed_moves_water_alone() {
     let text = format!(
-        "{FUR}[animate]\nspeed = 1.0\nfps = 10.0\n[[animate.tracks]]\nkey = \"volumes.fur.alpha\"\nframes = [0, \
+        "{FUR}[animate]\nspeed = 1.0\nfps = 10.0\n[[animate.tracks]]\nkey = \"volumes.fur.alpha\"\n\
+         frames = [0, \
          10]\nvalues = [0.5, 1.0]\ninterpolation = \"linear\"\n"
     );
     let (_dir, path) = file(&text);

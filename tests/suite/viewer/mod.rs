@@ -14,6 +14,7 @@ mod overview;
 mod picture;
 mod projection;
 mod soak;
+mod volumes;
 mod widgets;
 #[cfg(target_os = "linux")]
 mod window;
