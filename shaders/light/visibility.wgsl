@@ -37,8 +37,8 @@ struct LightVolume {
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<uniform> light_volume: LightVolume;
 @group(0) @binding(2) var volume: texture_storage_3d<rg32uint, read>;
-// Linear indices, among the levels of their volume, of the columns (of four cells along z) that contain a cell
-// with density.
+// Linear indices, among the levels of their volume, of the columns (of four cells along z) that contain a
+// cell with density.
 @group(0) @binding(3) var<storage, read> columns: array<u32>;
 @group(0) @binding(4) var light_volumes: texture_storage_3d<r32uint, write>;
 // Bricks of sparse storage, see shaders/volume/cells.wgsl.
@@ -80,7 +80,10 @@ fn visibility(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0; i < CELLS_A_WORD; i++) {
         let texel = vec3<i32>(x, y, column * CELLS_A_WORD + i);
         let cell = texel - level.offset;
-        if any(cell >= level.size) || (!EVERYWHERE && (cell_words(in_texture(cell, level)).x & 0xffffu) == 0u) {
+        if any(cell >= level.size) {
+            continue;
+        }
+        if !EVERYWHERE && (cell_words(in_texture(cell, level)).x & 0xffffu) == 0u {
             continue;
         }
         let depth = optical_depth(level, whole, cell, direction, max_cells, enough).depth;

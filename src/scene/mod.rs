@@ -348,7 +348,8 @@ impl Scene {
         }
     }
 
-    /// Returns the media of diffuse light, one for each material in its volume; `None` with single scattering.
+    /// Returns the media of diffuse light, one for each material in its volume; `None` with single
+    /// scattering.
     pub fn media(&self, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Option<Media> {
         let volumes = volumes.as_ref();
         let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volumes);

@@ -335,8 +335,8 @@ impl Tile {
 }
 
 impl FrameUniforms {
-    /// Packs the uniforms of sample `sample` of a window, those of the volume from the first one. The sums run over `samples`; the targets have
-    /// `layers` layers, and `depth` is that of the scene.
+    /// Packs the uniforms of sample `sample` of a window; what belongs to a volume is that of the first. The
+    /// sums run over `samples`; the targets have `layers` layers, and `depth` is that of the scene.
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         scene: &Scene,

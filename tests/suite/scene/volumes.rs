@@ -92,7 +92,8 @@ fn every_key_of_a_volume_acts_as_that_of_water_does() {
     let same = "volume.nx=9 volume.ny=16 volume.nz=5 curves.across=7 curves.deep=4 volume.alpha=0.5 \
                 volume.k_d=0.5 volume.k_s=0.5 volume.k_noise=0.1 curves.h=1.3 curves.bundles=3 \
                 curves.radius=0.1 curves.wander=0.2 curves.breathe=0.3 curves.loose=0.25 \
-                volume.coherence=0.5 volume.strand_length=0.3 volume.coverage=0.4 volume.crest=0.2 volume.seed=5 volume.flow=0.25 \
+                volume.coherence=0.5 volume.strand_length=0.3 volume.coverage=0.4 volume.crest=0.2 \
+                volume.seed=5 volume.flow=0.25 \
                 curves.amplitude=0.07 curves.levels=3 volume.storage=sparse";
     let twin = |set: &str| format!("volumes.fur.{}", set.split_once('.').unwrap().1);
     let (water, fur): (Vec<&str>, Vec<String>) =
