@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
-use super::param::key_of_volume;
-use super::{Limits, MAX_LIGHTS, Place, Raw, Values};
+use super::param::{key_of_volume, split_volume_key};
+use super::{Limits, MAX_LIGHTS, Place, Raw, Values, volumes};
 use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
@@ -331,7 +331,8 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
     let file = values.text(key);
     let unused = key == "environment.file"
         && values.choice("environment.kind", EnvironmentKind::from_word) != EnvironmentKind::File;
-    if file.is_empty() || unused {
+    let hidden = split_volume_key(key).is_some_and(|(name, _)| !volumes::is_shown(values, name));
+    if file.is_empty() || unused || hidden {
         return Ok(());
     }
     let whole = confine(key, Path::new(&file), folder, allowed)?;

@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::names::likeliest;
-use super::param::{WATER, key_of_volume, split_volume_key};
+use super::param::{PARAMS, WATER, key_of_volume, split_volume_key};
 use super::{Limits, Parts, Scene, Values, build};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water, build_water,
-    dense_bytes, expected_cells, kept_water, read_npz, sparse_bytes,
+    Bricks, Cell, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water,
+    build_water, dense_bytes, expected_cells, kept_water, read_npz, sparse_bytes,
 };
 
 /// Largest number of volumes that a scene shows. The GPU engine holds their constants in one uniform buffer,
@@ -57,6 +57,21 @@ impl Recipe {
         }
     }
 
+    /// Bytes that the cells take once they are built, on the host, and most bytes while they are built.
+    fn bytes_to_build(&self) -> [u128; 2] {
+        let cells: u128 = self.water.size.iter().map(|&n| u128::from(n)).product();
+        let extra = size_of::<glam::Vec3>() + self.water.strand_bytes();
+        let built = match self.storage {
+            Storage::Dense => cells * size_of::<Cell>() as u128,
+            Storage::Sparse => Bricks::bytes_of(self.water.size, expected_cells(&self.water))[0],
+        };
+        let building = match self.storage {
+            Storage::Dense => built + cells * extra as u128,
+            Storage::Sparse => sparse_bytes(self.water.size, expected_cells(&self.water), extra),
+        };
+        if self.file.is_some() { [0; 2] } else { [built, building] }
+    }
+
     /// Bytes that the volume takes while a picture is rendered, if it is built. Those of a file are counted
     /// when it is read.
     pub(crate) fn bytes(&self, pyramid: bool) -> u128 {
@@ -91,6 +106,11 @@ pub(super) fn shown(v: &Values) -> Vec<String> {
     shown
 }
 
+/// Whether the scene's surfaces show the volume `name`.
+pub(super) fn is_shown(v: &Values, name: &str) -> bool {
+    shown(v).iter().any(|other| other == name)
+}
+
 /// Returns advice on the name of a volume; `None` where the scene has it.
 pub(super) fn unknown(v: &Values, name: &str) -> Option<String> {
     let known = names(v);
@@ -123,9 +143,8 @@ fn why_unused(v: &Values, name: &str) -> String {
 pub(super) fn without_effect(v: &Values, key: &str) -> Option<String> {
     let (name, of_water) = split_volume_key(key)?;
     // The waves of pools move with `volume.flow`.
-    let is_shown = shown(v).iter().any(|other| other == name);
     let is_waves = name == WATER && of_water == "volume.flow";
-    (!is_shown && !is_waves).then(|| format!("{key} has no effect: {}", why_unused(v, name)))
+    (!is_shown(v, name) && !is_waves).then(|| format!("{key} has no effect: {}", why_unused(v, name)))
 }
 
 /// Reads the recipes of the volumes that the scene shows.
@@ -165,10 +184,10 @@ fn of_volume(name: &str, error: Error) -> Error {
     if name == WATER {
         return error;
     }
-    let own = |text: String| {
-        let table = format!("volumes.{name}.");
-        text.replace("volume.", &table).replace("curves.", &table)
-    };
+    // Other words with a dot are left alone, such as the name of a file.
+    let keys = PARAMS.iter().map(|param| param.key).filter(|key| split_volume_key(key).is_some());
+    let keys: Vec<&str> = keys.filter(|key| !key.starts_with("volumes.")).collect();
+    let own = |text: String| keys.iter().fold(text, |text, key| text.replace(key, &key_of_volume(name, key)));
     match error {
         Error::Memory { what, need, budget, fix } => {
             Error::Memory { what: own(what), need, budget, fix: own(fix) }
@@ -205,8 +224,13 @@ impl Parts {
             };
         }
         loop {
-            let need = self.recipes.iter().map(|recipe| recipe.bytes(pyramid)).sum::<u128>();
-            if need + u128::from(beside) <= u128::from(memory) {
+            let drawn = self.recipes.iter().map(|recipe| recipe.bytes(pyramid)).sum::<u128>();
+            // One volume is built while the others are there.
+            let built: Vec<[u128; 2]> = self.recipes.iter().map(Recipe::bytes_to_build).collect();
+            let all = built.iter().map(|[built, _]| built).sum::<u128>();
+            let building = built.iter().map(|[built, building]| all - built + building).max().unwrap_or(0);
+            let need = (drawn + u128::from(beside)).max(building);
+            if need <= u128::from(memory) {
                 return Ok(());
             }
             let saved = |recipe: &Recipe| {
@@ -221,7 +245,7 @@ impl Parts {
                 None => {
                     return Err(Error::memory(
                         format!("the picture with its {} volumes", self.recipes.len()),
-                        need + u128::from(beside),
+                        need,
                         memory,
                         "lower their nx, ny or nz, or raise --memory",
                     ));
