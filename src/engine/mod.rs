@@ -141,9 +141,9 @@ impl Engine {
         }
     }
 
-    /// Renders a frame of a scene with its volumes, or with its only one. After a lost device or exhausted device memory, it tries once more on a new device
-    /// with smaller tiles. Where the device cannot render the scene, an engine opened by
-    /// [`EngineChoice::Auto`] becomes the CPU engine, with a warning.
+    /// Renders a frame of a scene with its volumes, or with its only one. After a lost device or exhausted
+    /// device memory, it tries once more on a new device with smaller tiles. Where the device cannot render
+    /// the scene, an engine opened by [`EngineChoice::Auto`] becomes the CPU engine, with a warning.
     ///
     /// # Errors
     /// Errors of [`cpu::render_with`] or [`GpuRenderer::render`], and those of `monitor`.

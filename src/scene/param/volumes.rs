@@ -10,10 +10,10 @@ pub const WATER: &str = "water";
 
 pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
-    about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key of \
-         `curves` and `volume` in one table; where a description names one of those keys, it means the key \
-         of the same volume. A material says with `materials.*.volume` which volume it shows. A volume that no \
-         surface shows is not built.",
+    about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
+         of `curves` and `volume` in one table; where a description names one of those keys, it means the \
+         key of the same volume. A material says with `materials.*.volume` which volume it shows. A volume \
+         that no surface shows is not built.",
     params: &PARAMS,
 };
 
