@@ -205,9 +205,17 @@ impl<'a> Integrator<'a> {
         cache: &mut LightVolumeCache,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
-        let volumes = volumes.as_ref();
+        Integrator::prepared_volumes(scene, volumes.as_ref(), cache, monitor)
+    }
+
+    fn prepared_volumes(
+        scene: &'a Scene,
+        volumes: &[VolumeTexture],
+        cache: &mut LightVolumeCache,
+        monitor: &dyn Monitor,
+    ) -> Result<Self> {
         let levels = cache.levels.get(volumes, &scene.pyramid_specs(volumes));
-        let mut integrator = Integrator::with_levels(scene, volumes, &levels);
+        let mut integrator = Integrator::of_levels(scene, volumes, &levels);
         match scene.light_plan(volumes)? {
             Some(plan) => {
                 integrator.filled = Some(cache.get(&plan, &levels, scene.trace.lookup, monitor)?);
@@ -228,7 +236,7 @@ impl<'a> Integrator<'a> {
         let volumes = volumes.as_ref();
         let levels = volumes.iter().zip(scene.pyramid_specs(volumes));
         let levels: Vec<Levels> = levels.map(|(volume, spec)| levels_of(volume, spec)).collect();
-        Integrator::with_levels(scene, volumes, &levels)
+        Integrator::of_levels(scene, volumes, &levels)
     }
 
     /// Prepares a scene, its volumes and the levels of each for a few rays, as [`Integrator::new`].
@@ -240,7 +248,10 @@ impl<'a> Integrator<'a> {
         volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
         levels: &[Levels],
     ) -> Self {
-        let volumes = volumes.as_ref();
+        Integrator::of_levels(scene, volumes.as_ref(), levels)
+    }
+
+    fn of_levels(scene: &'a Scene, volumes: &[VolumeTexture], levels: &[Levels]) -> Self {
         let flows = scene.flows(volumes);
         let frame_volume = |((volume, levels), flow): ((&VolumeTexture, &Levels), f32)| FrameVolume {
             levels: levels.clone(),

@@ -69,6 +69,18 @@ pub fn render_with(
     light_volumes: &mut LightVolumeCache,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
+    render_volumes(scene, volumes.as_ref(), mesh, options, light_volumes, monitor)
+}
+
+/// [`render_with`], compiled once for all kinds of lists of volumes.
+fn render_volumes(
+    scene: &Scene,
+    volumes: &[VolumeTexture],
+    mesh: &Mesh,
+    options: &RenderOptions,
+    light_volumes: &mut LightVolumeCache,
+    monitor: &dyn Monitor,
+) -> Result<Frame> {
     let image = &scene.image;
     let window = options.window.unwrap_or(Window::whole([image.width, image.height]));
     let samples = options.samples.clone().unwrap_or(sample_numbers(image));
