@@ -65,8 +65,8 @@ struct Counts {
 }
 
 impl VolumePanel {
-    /// Shows `volume`. A new volume (by the address of its cells) is counted again. The planes stay where they
-    /// are if its size is the same.
+    /// Shows `volume`. A new volume (by the address of its cells) is counted again. The planes stay where
+    /// they are if its size is the same.
     pub fn show(&mut self, ui: &mut egui::Ui, volume: &VolumeTexture) {
         self.set_volume(ui.ctx(), volume);
         self.selector(ui, volume);
