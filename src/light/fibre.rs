@@ -25,6 +25,9 @@ pub struct Metric {
 }
 
 impl Metric {
+    /// The identity.
+    pub const IDENTITY: Metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
+
     /// Returns vᵀ M v.
     pub fn squared(&self, v: Vec3) -> f32 {
         let [m00, m01x2, m11, m22] = self.m;

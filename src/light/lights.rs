@@ -55,6 +55,14 @@ impl Light {
         }
     }
 
+    /// Returns the distance of the light from a point, metres; infinite for a directional light.
+    pub fn distance(&self, point: Vec3) -> f32 {
+        match self {
+            Light::Directional { .. } => f32::INFINITY,
+            Light::Point { position, .. } | Light::Spot { position, .. } => position.distance(point),
+        }
+    }
+
     /// Returns the unit direction from a point to the light, and the light's intensity at the point. Twin:
     /// `light_from` of `shaders/layout.wgsl`.
     pub fn at(&self, point: Vec3) -> (Vec3, Vec3) {

@@ -13,6 +13,7 @@
 
 mod quad;
 mod sheet;
+pub mod shell;
 mod splash;
 mod view;
 

@@ -23,6 +23,7 @@ mod volumes;
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -47,6 +48,7 @@ use crate::light::scatter::media::Media;
 use crate::light::visibility::{LightVolumes, LitQuads};
 use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility};
 use crate::mapping::Quad;
+use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
 use crate::place::{Ground, Mesh, Pool, Rock};
@@ -91,6 +93,8 @@ pub struct Parts {
     pub wave_flow: f32,
     /// Quads that the volumes are mapped to.
     pub quads: Vec<Quad>,
+    /// Shells of the volume.
+    pub shells: Vec<Arc<Shell>>,
     /// Lights with an intensity above 0; the environment's sun is the last.
     pub lights: Vec<Light>,
     /// Light of the surroundings. It lights rock and is seen in place of the background.
@@ -125,6 +129,35 @@ pub struct Parts {
     pub haze: Haze,
     /// Size, samples and tone of the picture.
     pub image: Image,
+}
+
+/// What the raster pass finds under a pixel: a surface through which a ray enters a volume.
+#[derive(Clone, Copy, Debug)]
+pub enum Face<'a> {
+    /// A quad.
+    Quad(&'a Quad),
+    /// A face of the hull of a shell, and the shell's number.
+    Hull(usize, &'a HullFace),
+}
+
+impl Parts {
+    /// Returns a face by its number: quads come first, then the hulls of the shells.
+    ///
+    /// # Panics
+    /// If there is no such face.
+    pub fn face(&self, number: usize) -> Face<'_> {
+        if let Some(quad) = self.quads.get(number) {
+            return Face::Quad(quad);
+        }
+        let mut left = number - self.quads.len();
+        for (i, shell) in self.shells.iter().enumerate() {
+            match shell.hull.get(left) {
+                Some(face) => return Face::Hull(i, face),
+                None => left -= shell.hull.len(),
+            }
+        }
+        panic!("the scene has no face {number}")
+    }
 }
 
 /// Limits that the command line sets for a scene.
@@ -209,6 +242,7 @@ impl Scene {
         let mut parts = Parts {
             name: name.into(),
             quads: quads::quads(v, origin, &recipes)?,
+            shells: Vec::new(),
             recipes,
             wave_flow: v.float("volume.flow"),
             lights: build::lights(v, origin, sun, environment_lights.len())?,

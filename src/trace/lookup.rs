@@ -5,7 +5,6 @@
 use glam::{IVec3, UVec3, Vec3};
 
 use super::matter::SheetDensity;
-use crate::mapping::CellFrame;
 use crate::util::powers::log2;
 use crate::volume::{Cell, Moments, VolumeTexture};
 use crate::walk::Crossing;
@@ -130,18 +129,12 @@ pub struct CellSample {
 /// The fraction is the share of the next coarser level; the result is not clamped to the levels there are.
 ///
 /// `footprint` is the solid angle of one sample at the image centre, in sr; `forward` and `d_world` are unit
-/// vectors; `t` is the distance along the ray in metres; `d_cell` is the ray's direction in cells per metre.
+/// vectors; `t` is the distance along the ray in metres; `cell_area` is what a cell covers of a plane across
+/// the ray, m²: its volume times the number of cells per metre of the ray.
 #[inline]
-pub fn level_at(
-    footprint: f32,
-    forward: Vec3,
-    d_world: Vec3,
-    t: f32,
-    frame: &CellFrame,
-    d_cell: Vec3,
-) -> f32 {
+pub fn level_at(footprint: f32, forward: Vec3, d_world: Vec3, t: f32, cell_area: f32) -> f32 {
     let c = d_world.dot(forward);
     let area = footprint * (c * c * c) * (t * t);
-    let across = area / (frame.det.abs() * frame.depth * d_cell.length());
+    let across = area / cell_area;
     0.5 * log2(across.max(1e-30))
 }

@@ -24,7 +24,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::{Cell, Cells, VolumeTexture, with_boxes, worth_leaping};
@@ -75,6 +75,17 @@ impl Moments {
     /// Moments v·vᵀ of one direction.
     pub fn of(v: Vec3) -> Self {
         Moments { diagonal: v * v, mixed: Vec3::new(v.x * v.y, v.x * v.z, v.y * v.z) }
+    }
+
+    /// Moments J·S·Jᵀ of the directions J·v.
+    pub fn mapped(&self, j: &Mat3) -> Self {
+        let columns = [j.x_axis, j.y_axis, j.z_axis];
+        let rows = [0, 1, 2].map(|i| Vec3::from_array(columns.map(|column| column[i])));
+        let times = rows.map(|row| self.times(row));
+        Moments {
+            diagonal: Vec3::new(rows[0].dot(times[0]), rows[1].dot(times[1]), rows[2].dot(times[2])),
+            mixed: Vec3::new(rows[0].dot(times[1]), rows[0].dot(times[2]), rows[1].dot(times[2])),
+        }
     }
 
     /// Product S·v.

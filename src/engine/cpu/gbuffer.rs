@@ -9,10 +9,11 @@ mod shade;
 use std::sync::OnceLock;
 
 use fearless_simd::{Level, dispatch};
-use glam::{Vec2, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::engine::overlap;
+use crate::mapping::shell::{HullFace, Shell};
 use crate::mapping::{PlaneView, Quad};
 use crate::picture::Image;
 use crate::picture::camera::sample_offset;
@@ -38,7 +39,8 @@ pub struct Gbuffer {
     /// u, v and metres from the eye of each quad under a pixel: `layers` entries per pixel, the nearest
     /// first.
     pub surface: Vec<[f32; 3]>,
-    /// Number of each quad under a pixel plus 1; 0: none. Ordered as `surface`.
+    /// Number of each quad under a pixel plus 1; 0: none. Faces of shells' hulls are numbered after the quads.
+    /// Ordered as `surface`.
     pub quad_id: Vec<u32>,
     /// Pixels that show a pool.
     pools: Vec<PoolPixel>,
@@ -68,7 +70,7 @@ impl Gbuffer {
         self.quad_id.resize(pixels * self.layers, 0);
     }
 
-    /// Iterates over the quads under pixel `i` in order of depth: the quad's number, and u, v and metres from
+    /// Iterates over the quads and hull faces under pixel `i` in order of depth: the quad's number, and u, v and metres from
     /// the eye.
     pub fn faces(&self, i: usize) -> impl Iterator<Item = (usize, [f32; 3])> {
         (0..).map_while(move |layer| self.face(i, layer))
@@ -182,7 +184,9 @@ impl<'a> Drawing<'a> {
         let depth = scene.depth_range(mesh);
         let projection = Projection::new(scene, &depth, &grid);
         let rock = Rasteriser::new(projection.rock(mesh), &grid);
-        let water = Rasteriser::new(projection.water(), &grid);
+        let mut water = projection.water();
+        water.extend(projection.hulls());
+        let water = Rasteriser::new(water, &grid);
         Drawing { simd, grid, offsets, rock, water, shading: Shading::new(scene, mesh, &depth) }
     }
 
@@ -229,7 +233,7 @@ impl<'a> Drawing<'a> {
         let sample = Which { index: sample - first, count, offset: self.offsets[sample] };
         dispatch!(self.simd, simd => self.shading.opaque(simd, &self.rock, rock, sample, targets));
         if self.water.reaches(i) {
-            self.shading.water(water, sample, targets);
+            self.shading.water(&self.water, water, sample, targets);
         }
         targets
     }
@@ -242,4 +246,24 @@ pub fn map_quad(quad: &Quad, plane: &PlaneView, at: Vec2, length: f32) -> [f32; 
     let (hh, t) = plane.hit(at);
     let uv = quad.map.uv(hh);
     [uv.x, uv.y, t * length]
+}
+
+/// Returns where the ray from the eye in the direction of `ray` meets the face of a shell's hull: u, v and
+/// metres from the eye. A rasteriser rounds corners, so the ray may pass by the face; the point then lies in
+/// the face's plane, at a distance of its corners.
+pub fn map_hull(shell: &Shell, face: &HullFace, eye: DVec3, ray: Vec3) -> [f32; 3] {
+    let [a, b, c] = shell.corners(face).map(|p| p.as_dvec3() - eye);
+    let d = ray.as_dvec3().normalize();
+    let normal = (b - a).cross(c - a);
+    let along = [a, b, c].map(|p| p.dot(d));
+    let low = along[0].min(along[1]).min(along[2]);
+    let high = along[0].max(along[1]).max(along[2]);
+    let t = (normal.dot(a) / normal.dot(d)).max(low).min(high);
+    let p = d * t;
+    let of = |[p0, p1]: [DVec3; 2]| (p0 - p).cross(p1 - p).dot(normal).max(0.0);
+    let areas = [of([b, c]), of([c, a]), of([a, b])];
+    let sum = areas[0] + areas[1] + areas[2];
+    let shares = areas.map(|area| if sum > 0.0 { (area / sum) as f32 } else { 1.0 / 3.0 });
+    let uv: Vec2 = face.points.iter().zip(shares).map(|(&point, share)| shell.uv(face, point) * share).sum();
+    [uv.x, uv.y, t as f32]
 }

@@ -3,7 +3,11 @@
 
 mod light;
 mod lockstep;
+mod shell;
+mod shell_light;
 mod walk;
+
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
@@ -18,7 +22,7 @@ use crate::light::{AngleFrame, Light, Reflection, Visibility};
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
-use crate::scene::Scene;
+use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
 use crate::util::error::Result;
@@ -27,6 +31,9 @@ use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
 use crate::walk::{Crossing, floor_cell};
 pub use lockstep::Lanes;
 use lockstep::Lockstep;
+use shell::Hull;
+pub use shell_light::ShellLight;
+use shell_light::is_kept_in;
 use walk::{LevelResult, Lit};
 
 /// Everything that the rays of a frame share.
@@ -42,6 +49,10 @@ pub struct Integrator<'a> {
     light_volumes: Option<LightVolumes>,
     /// `None`: values of light volumes are walked on demand.
     filled: Option<Filled>,
+    /// `None`: V at the vertices of shells is walked on demand.
+    shell_light: Option<Arc<ShellLight>>,
+    /// Whether V is kept at the vertices of each shell.
+    kept_in: Vec<bool>,
     medium: Medium,
     strand: Option<StrandShading>,
     media: Option<Media>,
@@ -177,16 +188,31 @@ struct PixelRay {
     ended: bool,
 }
 
+/// What a ray meets next.
+enum Carrier<'a> {
+    /// A quad by its number, at u, v and metres from the eye.
+    Quad(usize, [f32; 3]),
+    /// A shell.
+    Hull(Hull<'a>),
+}
+
 impl PixelRay {
-    /// The quad that the ray meets next, the point where it does, and the sheet's position.
+    /// What the ray meets next, and its position.
     #[inline]
-    fn next_sheet(&self, gbuffer: &Gbuffer) -> Option<(usize, [f32; 3], SheetOrder)> {
+    fn next_sheet<'a>(&self, scene: &'a Scene, gbuffer: &Gbuffer) -> Option<(Carrier<'a>, SheetOrder)> {
         if self.ended {
             return None;
         }
-        let (quad, hit) = gbuffer.face(self.i, self.sheets)?;
+        let (number, hit) = gbuffer.face(self.i, self.sheets)?;
         let is_last = gbuffer.face(self.i, self.sheets + 1).is_none();
-        Some((quad, hit, SheetOrder { before: self.all.transmittance, is_last, behind: self.behind }))
+        let order = SheetOrder { before: self.all.transmittance, is_last, behind: self.behind };
+        let met = match scene.face(number) {
+            Face::Quad(_) => Carrier::Quad(number, hit),
+            Face::Hull(shell, face) => {
+                Carrier::Hull(Hull { shell, face, metres: hit[2], opaque: gbuffer.opaque[self.i][3] })
+            }
+        };
+        Some((met, order))
     }
 }
 
@@ -223,6 +249,9 @@ impl<'a> Integrator<'a> {
                 integrator.light_volumes = Some(plan);
             }
             None => cache.forget(),
+        }
+        if scene.visibility == Visibility::Cached && !scene.shells.is_empty() {
+            integrator.shell_light = Some(cache.shell_light(&integrator));
         }
         Ok(integrator)
     }
@@ -269,6 +298,12 @@ impl<'a> Integrator<'a> {
                 .then(|| scene.light_volumes(volumes, u64::MAX).expect("the largest budget fits")),
             visibility: scene.visibility,
             filled: None,
+            shell_light: None,
+            kept_in: scene
+                .shells
+                .iter()
+                .map(|shell| is_kept_in(shell, volumes[shell.volume as usize].size))
+                .collect(),
             medium: Medium::of(&scene.trace),
             strand: match &scene.reflection {
                 Reflection::Strand(params) => Some(StrandShading::new(params)),
@@ -305,9 +340,12 @@ impl<'a> Integrator<'a> {
             Ok(ray) => ray,
             Err(dry) => return dry,
         };
-        while let Some((quad, hit, order)) = ray.next_sheet(gbuffer) {
+        while let Some((met, order)) = ray.next_sheet(self.scene, gbuffer) {
             observer.sheet();
-            let sheet = self.sheet(quad, ray.d, hit, order, observer);
+            let sheet = match met {
+                Carrier::Quad(quad, hit) => self.sheet(quad, ray.d, hit, order, observer),
+                Carrier::Hull(hull) => self.shell(&hull, ray.d, order, observer),
+            };
             self.add(&mut ray, sheet);
         }
         self.seen(gbuffer, ray)
@@ -466,7 +504,7 @@ impl<'a> Integrator<'a> {
         };
         let mut e_v = -frame.transposed(d);
         if scene.angles == AngleFrame::Texture {
-            metric = Metric { m: [1.0, 0.0, 1.0, 1.0] };
+            metric = Metric::IDENTITY;
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
         SheetHit {
@@ -507,7 +545,9 @@ impl<'a> Integrator<'a> {
             return (0, 0.0);
         }
         let forward = self.scene.camera.forward.as_vec3();
-        let level = level_at(self.footprint, forward, ray.d_world, t, &ray.frame, ray.d_cell);
+        let CellFrame { depth, det, .. } = ray.frame;
+        let area = det.abs() * depth * ray.d_cell.length();
+        let level = level_at(self.footprint, forward, ray.d_world, t, area);
         let level = level.clamp(0.0, (self.volumes[ray.volume].levels.len() - 1) as f32);
         (level as u32, level - level.floor())
     }

@@ -155,6 +155,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         // The waves of pools are drawn anew.
         wave_flow: _,
         quads,
+        shells,
         lights,
         environment,
         environment_lights: _,
@@ -189,6 +190,8 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         && *camera == b.camera
         && trace.layers == b.trace.layers
         && *quads == b.quads
+        && shells.len() == b.shells.len()
+        && shells.iter().zip(&b.shells).all(|(a, b)| Arc::ptr_eq(a, b))
         && *lights == b.lights
         && *ambient == b.ambient
         && *background == b.background

@@ -5,13 +5,16 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::integrate::{Integrator, ShellLight};
 use super::rasters::Rasters;
+use crate::light::Light;
 use crate::light::fill::{Numbers, Rows};
 use crate::light::visibility::{LightVolume, LightVolumes};
+use crate::mapping::shell::Shell;
 use crate::trace::Lookup;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::volume::{Leaps, LevelSets, LevelsCache};
+use crate::volume::{Leaps, LevelSets, Levels, LevelsCache};
 
 /// Cells of all light volumes that are filled together. Threads wait for one another once for each such lot.
 const CELLS_AT_ONCE: usize = 1 << 22;
@@ -23,6 +26,7 @@ pub struct LightVolumeCache {
     /// Levels of the last volumes.
     pub levels: LevelsCache,
     last: Option<FilledCache>,
+    last_in_shells: Option<(ShellInputs, Arc<ShellLight>)>,
 }
 
 impl Default for LightVolumeCache {
@@ -32,6 +36,7 @@ impl Default for LightVolumeCache {
             rasters: Box::default(),
             levels: LevelsCache::with_leaps(Leaps::Never),
             last: None,
+            last_in_shells: None,
         }
     }
 }
@@ -44,6 +49,28 @@ struct FilledCache {
     filled: Filled,
 }
 
+/// Inputs of the light in shells.
+pub(super) struct ShellInputs {
+    pub levels: Vec<Levels>,
+    pub shells: Vec<Arc<Shell>>,
+    pub lights: Vec<Light>,
+    /// Cells that each volume has moved down the flow, and its extinction.
+    pub volumes: Vec<[f32; 2]>,
+    pub max_cells: u32,
+}
+
+impl ShellInputs {
+    fn is(&self, other: &ShellInputs) -> bool {
+        self.levels.len() == other.levels.len()
+            && self.levels.iter().zip(&other.levels).all(|(a, b)| Arc::ptr_eq(a, b))
+            && self.shells.len() == other.shells.len()
+            && self.shells.iter().zip(&other.shells).all(|(a, b)| Arc::ptr_eq(a, b))
+            && self.lights == other.lights
+            && self.volumes == other.volumes
+            && self.max_cells == other.max_cells
+    }
+}
+
 /// All light volumes of a plan, by their numbers. Each holds the values of every level, in the level's order
 /// of cells.
 pub type Filled = Arc<Vec<Vec<Numbers>>>;
@@ -52,6 +79,20 @@ impl LightVolumeCache {
     /// Drops the light volumes.
     pub fn forget(&mut self) {
         self.last = None;
+    }
+
+    /// Returns the light at the vertices of shells. It is walked unless it is that of the last call.
+    pub(super) fn shell_light(&mut self, integrator: &Integrator) -> Arc<ShellLight> {
+        let inputs = integrator.shell_inputs();
+        if let Some((last, kept)) = &self.last_in_shells
+            && last.is(&inputs)
+        {
+            return kept.clone();
+        }
+        self.last_in_shells = None;
+        let kept = Arc::new(integrator.shell_light());
+        self.last_in_shells = Some((inputs, kept.clone()));
+        kept
     }
 
     /// Returns the planned light volumes. They are filled unless they are those of the last call.

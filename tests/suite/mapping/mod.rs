@@ -1,6 +1,7 @@
 //! §3 The mapping between quad and volume against its definition in float64. Reference truth.
 
 pub mod sheet;
+pub mod shell;
 pub mod splash;
 
 use glam::{DMat3, DVec2, DVec3, Mat3, Quat, Vec2, Vec3};

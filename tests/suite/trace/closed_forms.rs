@@ -36,13 +36,13 @@ fn material(thickness_m: f32, repeat_u: f32, repeat_v: f32) -> Material {
 }
 
 /// A volume with the same cell everywhere.
-fn uniform(size: [u32; 3], v: Vec3, rho: f32, k_d: f32, k_s: f32) -> VolumeTexture {
+pub fn uniform(size: [u32; 3], v: Vec3, rho: f32, k_d: f32, k_s: f32) -> VolumeTexture {
     let cell = Cell::from_direction(v).with_density(rho, k_d, k_s);
     VolumeTexture { size, alpha: 1.0, cells: vec![cell; size.iter().product::<u32>() as usize].into() }
 }
 
 /// A volume of cells with and without flow, of every density and direction.
-fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
+pub fn noise(size: [u32; 3], seed: u64) -> VolumeTexture {
     use rand::{RngExt, SeedableRng};
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
     let mut cell = || {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::raster::{Grid, Piece, ScreenPoint, clip_near};
 use crate::mapping::Quad;
+use crate::mapping::shell::HullFace;
 use crate::picture::camera::{CENTRE, DepthRange, sample_offset};
 use crate::place::tiles::{self, Tile};
 use crate::place::{Mesh, Vertex};
@@ -12,6 +13,9 @@ use crate::scene::Scene;
 
 /// Corners of the largest tile.
 const GRID: usize = ((tiles::SIDE + 1) * (tiles::SIDE + 1)) as usize;
+
+/// Faces of a hull in one piece. The near plane cuts a triangle into two at most.
+const HULL_PART: usize = 256;
 
 /// The projection from the world to the pixels of a grid.
 pub struct Projection<'a> {
@@ -58,6 +62,32 @@ impl<'a> Projection<'a> {
             out
         };
         self.scene.quads.iter().map(piece).collect()
+    }
+
+    /// Returns the triangles of the hulls of shells that face the eye, in pieces. Faces are numbered after the
+    /// quads, shell by shell.
+    pub fn hulls(&self) -> Vec<Piece> {
+        let eye = self.scene.camera.eye_local();
+        let mut first = self.scene.quads.len() as u32;
+        let mut pieces = Vec::new();
+        for shell in &self.scene.shells {
+            let piece = |(part, faces): (usize, &[HullFace])| {
+                let mut out = Piece::default();
+                for (i, face) in (part * HULL_PART..).zip(faces) {
+                    let corners = shell.corners(face);
+                    let [a, b, c] = corners.map(|p| p.as_dvec3());
+                    if (b - a).cross(c - a).dot(a - eye) < 0.0 {
+                        let points = corners.map(|corner| self.point(corner, Vec2::ZERO, &mut out));
+                        self.triangle(points, &mut out);
+                        out.set_face(first + i as u32);
+                    }
+                }
+                out
+            };
+            pieces.par_extend(shell.hull.par_chunks(HULL_PART).enumerate().map(piece));
+            first += shell.hull.len() as u32;
+        }
+        pieces
     }
 
     /// Triangles between corners of a tile, three at a time.

@@ -55,11 +55,14 @@ struct ScreenTriangle {
     bands: [u16; 2],
 }
 
-/// Triangles of one tile of rock or of one quad, clipped at the near plane, in drawing order.
+/// Triangles of one tile of rock, of one quad or of a part of a shell's hull, clipped at the near plane, in
+/// drawing order.
 #[derive(Default)]
 pub struct Piece {
     points: Vec<ScreenPoint>,
     triangles: Vec<ScreenTriangle>,
+    /// Number of each triangle's face, where all are faces of their own; empty where they are one.
+    faces: Vec<u32>,
 }
 
 /// Samples that the triangles of a window are drawn for.
@@ -180,6 +183,11 @@ impl Piece {
         self.points[usize::from(point)].place
     }
 
+    /// Numbers the faces of the triangles that were added last.
+    pub fn set_face(&mut self, face: u32) {
+        self.faces.resize(self.triangles.len(), face);
+    }
+
     /// Adds the triangle between three points, in either order, if a sample of the grid may see it.
     #[inline]
     pub fn add(&mut self, points: [u16; 3], grid: &Grid) {
@@ -227,6 +235,13 @@ impl Rasteriser {
         triangle / NUMBERS
     }
 
+    /// Returns the number of the face of a triangle: that of its piece, or its own.
+    pub fn face_of(&self, triangle: u32) -> u32 {
+        let piece = triangle / NUMBERS;
+        let own = self.pieces[piece as usize].faces.get((triangle % NUMBERS) as usize);
+        own.copied().unwrap_or(piece)
+    }
+
     fn points(&self, triangle: u32) -> [&ScreenPoint; 3] {
         let piece = &self.pieces[(triangle / NUMBERS) as usize];
         let points = piece.triangles[(triangle % NUMBERS) as usize].points;
@@ -235,7 +250,7 @@ impl Rasteriser {
 
     /// Draws the triangles of band number `i` as the samples see them. `covered` holds `layers` entries per
     /// sample of each pixel of the band, the nearest first; of equal depths the first drawn comes first. Of
-    /// several triangles of one piece only the nearest stays: where snapping folds a quad that is seen
+    /// several triangles of one face only the nearest stays: where snapping folds a quad that is seen
     /// edge-on, its two triangles overlap.
     #[inline(always)]
     pub fn draw<S: Simd>(
@@ -251,7 +266,8 @@ impl Rasteriser {
         let (left, top, width) = (band.x as usize, band.y as usize, band.width as usize);
         let shift = Shift { x: f64x4::load_array(simd, samples.x), y: f64x4::load_array(simd, samples.y) };
         for &piece in &self.bands[i] {
-            let Piece { points, triangles } = &self.pieces[piece as usize];
+            let Piece { points, triangles, faces } = &self.pieces[piece as usize];
+            let is_one = faces.is_empty();
             for (number, triangle) in triangles.iter().enumerate() {
                 if usize::from(triangle.bands[0]) > i || usize::from(triangle.bands[1]) < i {
                     continue;
@@ -282,7 +298,7 @@ impl Rasteriser {
                                     *face = new;
                                 }
                             } else {
-                                insert(faces, new);
+                                insert(faces, new, is_one);
                             }
                         }
                     }
@@ -331,10 +347,10 @@ impl Rasteriser {
     }
 }
 
-/// Inserts a triangle by depth into those that cover a sample, and drops the last one. Twin:
-/// `peel_fragment`.
-fn insert(faces: &mut [Covered], new: Covered) {
-    let is_same = |face: &Covered| face.1 != 0 && (face.1 - 1) / NUMBERS == (new.1 - 1) / NUMBERS;
+/// Inserts a triangle by depth into those that cover a sample, and drops the last one. `is_one` tells whether
+/// the triangles of its piece are one face. Twin: `peel_fragment`.
+fn insert(faces: &mut [Covered], new: Covered, is_one: bool) {
+    let is_same = |face: &Covered| is_one && face.1 != 0 && (face.1 - 1) / NUMBERS == (new.1 - 1) / NUMBERS;
     let Some(index) = faces.iter().position(|face| new.0 > face.0) else { return };
     if faces[..index].iter().any(is_same) {
         return;

@@ -3,10 +3,10 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8, u32x8};
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 use super::raster::{self, Covered, Rasteriser};
-use super::{Gbuffer, map_quad};
+use super::{Gbuffer, map_hull, map_quad};
 use crate::engine::cpu::haze;
 use crate::engine::cpu::lights::background_at;
 use crate::engine::cpu::opaque::Points;
@@ -17,7 +17,7 @@ use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, DepthToPoint};
 use crate::picture::{Camera, Image};
 use crate::place::Mesh;
-use crate::scene::{Parts, Scene};
+use crate::scene::{Face, Parts, Scene};
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::util::window::Window;
 
@@ -32,6 +32,7 @@ pub struct Shading<'a> {
     rays: [Vec3; 3],
     /// Position of the eye, metres.
     eye: Vec3,
+    eye_local: DVec3,
     /// The planes of the quads.
     planes: Vec<PlaneView>,
     to_point: DepthToPoint,
@@ -94,6 +95,7 @@ impl<'a> Shading<'a> {
             haze: scene.haze.seen_from(eye),
             rays: rays.map(|v| v.as_vec3()),
             eye: eye.as_vec3(),
+            eye_local: eye,
             planes: scene.quads.iter().map(|quad| PlaneView::of_quad(&quad.map, eye, rays)).collect(),
             to_point: camera.depth_to_point(depth),
         }
@@ -276,7 +278,7 @@ impl<'a> Shading<'a> {
     }
 
     /// Maps the volume quads under each pixel of a band, `layers` per sample.
-    pub fn water(&self, covered: &[Covered], sample: Which, out: &mut Gbuffer) {
+    pub fn water(&self, water: &Rasteriser, covered: &[Covered], sample: Which, out: &mut Gbuffer) {
         let [forward, right, up] = self.rays;
         let Image { width, height, .. } = self.scene.image;
         let layers = out.layers;
@@ -289,10 +291,15 @@ impl<'a> Shading<'a> {
             let at = Camera::image_point(width, height, pixel, sample.offset);
             let length = (forward + right * at.x + up * at.y).length();
             for (k, &(_, id)) in (i * layers..).zip(faces).take_while(|(_, (_, id))| *id != 0) {
-                let quad = Rasteriser::piece_of(id - 1);
-                out.quad_id[k] = quad + 1;
-                let plane = &self.planes[quad as usize];
-                out.surface[k] = map_quad(&self.scene.quads[quad as usize], plane, at, length);
+                let number = water.face_of(id - 1);
+                out.quad_id[k] = number + 1;
+                out.surface[k] = match self.scene.face(number as usize) {
+                    Face::Quad(quad) => map_quad(quad, &self.planes[number as usize], at, length),
+                    Face::Hull(shell, face) => {
+                        let shell = &self.scene.shells[shell];
+                        map_hull(shell, face, self.eye_local, forward + right * at.x + up * at.y)
+                    }
+                };
             }
         }
     }

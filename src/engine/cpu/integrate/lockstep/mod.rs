@@ -29,7 +29,7 @@ use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
 use self::hits::Hits;
 use super::walk::Lit;
-use super::{Integrator, PixelRay, RayResult, SheetOrder};
+use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
 use crate::trace::lookup::Level;
@@ -156,8 +156,20 @@ impl<'a> Lockstep<'a> {
         let Lockstep { rays, met, .. } = self;
         met.sheets.clear();
         met.packs.clear();
-        for (ray, (_, pixel)) in rays.iter().enumerate() {
-            let Some((quad, hit, order)) = pixel.next_sheet(gbuffer) else { continue };
+        let integrator = self.integrator;
+        for (ray, (_, pixel)) in rays.iter_mut().enumerate() {
+            // Shells are walked ray by ray, up to the next quad.
+            let next = loop {
+                match pixel.next_sheet(integrator.scene, gbuffer) {
+                    Some((Carrier::Hull(hull), order)) => {
+                        let passed = integrator.shell(&hull, pixel.d, order, &mut ());
+                        integrator.add(pixel, passed);
+                    }
+                    Some((Carrier::Quad(quad, hit), order)) => break Some((quad, hit, order)),
+                    None => break None,
+                }
+            };
+            let Some((quad, hit, order)) = next else { continue };
             let lane = met.sheets.len() % LANES;
             if lane == 0 {
                 met.packs.push(Hits::default());

@@ -1,0 +1,295 @@
+//! §3 to §5 on the CPU: the way of a ray through a shell, tetrahedron by tetrahedron.
+//!
+//! Angles in a shell are measured with the fibre's direction in the world, t = J·v. A quad turns light and eye
+//! into its cells once for all cells of a ray; here J changes after a few cells, and most of them are empty.
+
+use glam::{Mat3, Vec2, Vec3};
+
+use super::{FrameVolume, Integrator, Observer, RayResult, SheetOrder};
+use crate::light::AngleFrame;
+use crate::light::fibre::{Metric, Spread, psi};
+use crate::mapping::shell::{End, HullFace, Segment, Shell, ShellPath};
+use crate::trace::lookup::{CellSample, Level, level_at};
+use crate::trace::{Lookup, Prefilter, SheetDensity};
+use crate::util::powers::exp2;
+use crate::volume::{Cell, Moments};
+use crate::walk::{Walk, floor_cell};
+
+/// A face of the hull of a shell under a pixel.
+pub struct Hull<'a> {
+    /// Number of the shell.
+    pub shell: usize,
+    pub face: &'a HullFace,
+    /// Distance of the face, and of the opaque scene (0: none), from the eye, metres.
+    pub metres: f32,
+    pub opaque: f32,
+}
+
+/// A place in a tetrahedron of a shell.
+pub(super) struct Place {
+    /// Number of the shell.
+    pub shell: usize,
+    /// Prism, and number of the tetrahedron in it.
+    pub tetrahedron: [usize; 2],
+    /// Shares of the prism's vertices, and the depth from the outer surface, 0 to 1.
+    pub shares: Vec3,
+    pub depth: f32,
+    /// The place in the world, metres.
+    pub point: Vec3,
+}
+
+/// A ray inside a shell.
+struct ShellRay<'a> {
+    number: usize,
+    shell: &'a Shell,
+    /// Origin of the path, near the face it enters through, and its distance from the eye, metres.
+    origin: Vec3,
+    metres: f32,
+    d: Vec3,
+    transmittance: f32,
+    /// Linear radiance that the cells have sent to the eye.
+    radiance: Vec3,
+    /// Cells walked by the view ray, and by its light rays.
+    cells: [u32; 2],
+}
+
+/// Directions of the fibres in a cell, in the frame where angles are measured.
+enum Fibres {
+    /// One direction, of any length.
+    One(Vec3),
+    /// Second moments of several.
+    Many(Moments),
+}
+
+/// A part of a ray in cells: where it begins, inside the tile, and its direction per metre.
+pub(super) fn in_cells(segment: &Segment, size: [u32; 3], flow_cells: f32) -> (Vec3, Vec3) {
+    let n = Vec3::from_array(size.map(|n| n as f32));
+    let [from, to] = segment.at.map(|at| at * n);
+    let length = segment.t[1] - segment.t[0];
+    let direction = if length > 0.0 { (to - from) / length } else { Vec3::Z };
+    (wrapped(from - Vec3::Y * flow_cells, n.truncate()), direction)
+}
+
+/// A point in cells, moved into a tile of `n` cells.
+pub(super) fn wrapped(at: Vec3, n: Vec2) -> Vec3 {
+    let copies = at.truncate() / n;
+    Vec3::new(at.x - n.x * floor_cell(copies.x) as f32, at.y - n.y * floor_cell(copies.y) as f32, at.z)
+}
+
+impl Integrator<'_> {
+    /// Walks through a shell until the ray leaves it or ends at the opaque scene.
+    pub(super) fn shell<O: Observer>(
+        &self,
+        hull: &Hull,
+        d: Vec3,
+        SheetOrder { before, is_last, behind }: SheetOrder,
+        observer: &mut O,
+    ) -> RayResult {
+        let scene = self.scene;
+        let shell = &*scene.shells[hull.shell];
+        let origin = (scene.camera.eye_local() + d.as_dvec3() * f64::from(hull.metres)).as_vec3();
+        let mut ray = ShellRay {
+            number: hull.shell,
+            shell,
+            origin,
+            metres: hull.metres,
+            d,
+            transmittance: before,
+            radiance: Vec3::ZERO,
+            cells: [0; 2],
+        };
+        let t_end = if hull.opaque > 0.0 { hull.opaque - hull.metres } else { f32::INFINITY };
+        for segment in ShellPath::new(shell, hull.face, origin, d) {
+            if segment.t[0] >= t_end || ray.transmittance < scene.trace.early_end {
+                break;
+            }
+            self.through(&mut ray, &segment.until(t_end), observer);
+        }
+        let ShellRay { transmittance, cells, .. } = ray;
+        let ends = is_last || transmittance < scene.trace.early_end;
+        let passed = if ends { behind * transmittance } else { Vec3::ZERO };
+        let radiance = ray.radiance + scene.ambient * (before - transmittance) + passed;
+        RayResult { radiance, transmittance, uncovered: transmittance, cells }
+    }
+
+    /// Walks through a tetrahedron.
+    fn through<O: Observer>(&self, ray: &mut ShellRay, segment: &Segment, observer: &mut O) {
+        let volume = self.volume_of(ray.shell);
+        let (origin, d_cell) = in_cells(segment, volume.size, volume.flow_cells);
+        let (mut level, mut share) = (0, 0.0);
+        if self.scene.trace.filter != Prefilter::None {
+            let Some(j) = self.jacobian(ray.shell, segment) else { return };
+            let forward = self.scene.camera.forward.as_vec3();
+            let area = j.determinant().abs() * d_cell.length();
+            let exact = level_at(self.footprint, forward, ray.d, ray.metres + segment.t[0], area);
+            let exact = exact.clamp(0.0, (volume.levels.len() - 1) as f32);
+            (level, share) = (exact as u32, exact - exact.floor());
+        }
+        let before = ray.transmittance;
+        let walk = (origin, d_cell);
+        self.in_level(ray, segment, walk, &Level::new(&volume.levels, level), 1.0 - share, observer);
+        if share > 0.0 {
+            let fine = std::mem::replace(&mut ray.transmittance, before);
+            self.in_level(ray, segment, walk, &Level::new(&volume.levels, level + 1), share, observer);
+            ray.transmittance = fine * (1.0 - share) + ray.transmittance * share;
+        }
+    }
+
+    /// Walks through the cells of one level in a tetrahedron. Their light counts by `share`.
+    fn in_level<O: Observer>(
+        &self,
+        ray: &mut ShellRay,
+        segment: &Segment,
+        (origin, d_cell): (Vec3, Vec3),
+        level: &Level,
+        share: f32,
+        observer: &mut O,
+    ) {
+        let scene = self.scene;
+        let (origin, d_cell) = (origin * level.scale, d_cell * level.scale);
+        let length = segment.t[1] - segment.t[0];
+        let mut walk = Walk::new(level.size, origin, d_cell, length);
+        let mut jacobian = None;
+        while ray.cells[0] < scene.trace.max_cells
+            && (0..level.size.z).contains(&walk.cell().z)
+            && ray.transmittance >= scene.trace.early_end
+        {
+            let cell = level.cell(walk.cell());
+            let Some(crossing) = walk.next() else { break };
+            ray.cells[0] += 1;
+            let sample = match scene.trace.lookup {
+                Lookup::Trilinear => level.sample_trilinear(&crossing, origin, d_cell, &SheetDensity::WHOLE),
+                Lookup::Nearest => level.sample_cell(cell, &SheetDensity::WHOLE),
+            };
+            observer.enter(&crossing, cell, sample.rho / 65535.0, ray.transmittance);
+            if sample.rho <= 0.0 {
+                continue;
+            }
+            // A triangle without an area in the texture shows nothing of it.
+            let Some(j) = *jacobian.get_or_insert_with(|| self.jacobian(ray.shell, segment)) else { return };
+            let tau_bits =
+                sample.rho * self.volume_of(ray.shell).extinction * (crossing.t_exit - crossing.t_enter);
+            let passed = ray.transmittance * exp2(-tau_bits);
+            let weight = (ray.transmittance - passed) * share;
+            observer.ambient(scene.ambient * weight);
+            let middle = 0.5 * (crossing.t_enter + crossing.t_exit);
+            let along = middle / length;
+            let place = Place {
+                shell: ray.number,
+                tetrahedron: [segment.prism, segment.tetrahedron],
+                shares: segment.shares[0].lerp(segment.shares[1], along),
+                depth: segment.at[0].z + (segment.at[1].z - segment.at[0].z) * along,
+                point: ray.origin + ray.d * (segment.t[0] + middle),
+            };
+            let fibres = self.fibres(level, cell, &sample, &j);
+            for i in 0..self.lights.len() {
+                let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
+                let lit = self.shell_light_of(&fibres, sample.k, &j, (&place, ray.d), i);
+                let radiance = lit * (weight * visibility);
+                observer.light(visibility, radiance);
+                ray.radiance += radiance;
+            }
+            ray.transmittance = passed;
+        }
+    }
+
+    /// The volume of a shell.
+    pub(super) fn volume_of(&self, shell: &Shell) -> &FrameVolume {
+        &self.volumes[shell.volume as usize]
+    }
+
+    /// J = world_from_cell of a tetrahedron, metres per cell. `None` where the triangle has no area in the
+    /// texture.
+    fn jacobian(&self, shell: &Shell, segment: &Segment) -> Option<Mat3> {
+        let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
+        let [x, y, z] = shell.jacobian(segment.prism, segment.tetrahedron)?;
+        Some(Mat3::from_cols(x / nx, y / ny, z / nz))
+    }
+
+    /// Directions in a cell, in the frame where angles are measured.
+    fn fibres(&self, level: &Level, cell: Cell, sample: &CellSample, j: &Mat3) -> Fibres {
+        let j = if self.scene.angles == AngleFrame::Texture { Mat3::IDENTITY } else { *j };
+        if level.is_whole && self.scene.trace.lookup == Lookup::Nearest {
+            return Fibres::One(j * cell.v_code());
+        }
+        Fibres::Many(sample.moments.unwrap_or_else(|| level.moments(cell)).mapped(&j))
+    }
+
+    /// Light of light number `i` that a cell at `place` sends against the direction `d`, without the share of
+    /// the cell and without V.
+    fn shell_light_of(
+        &self,
+        fibres: &Fibres,
+        [k_d, k_s]: [f32; 2],
+        j: &Mat3,
+        (place, d): (&Place, Vec3),
+        i: usize,
+    ) -> Vec3 {
+        let (to_light, intensity) = self.lights[i].at(place.point);
+        let frame = |v: Vec3| match self.scene.angles {
+            AngleFrame::World => v,
+            AngleFrame::Texture => (j.inverse() * v).normalize_or_zero(),
+        };
+        let (l, e) = (frame(to_light), frame(-d));
+        let l_dot_e = l.dot(e);
+        let (p, identity) = (self.scene.p, Metric::IDENTITY);
+        let grey = match (&self.strand, fibres) {
+            (None, Fibres::One(t)) => {
+                let inverse_q = 1.0 / t.length_squared().max(1e-30);
+                psi(k_d, k_s, p, t.dot(l), t.dot(e), inverse_q)
+            }
+            (None, Fibres::Many(moments)) => Spread::new(&identity, *moments, e).psi(k_d, k_s, p, l, l_dot_e),
+            (Some(strand), fibres) => {
+                let [t_dot_l, t_dot_e] = match fibres {
+                    Fibres::One(t) => {
+                        let t = t.normalize_or_zero();
+                        [t.dot(l), t.dot(e)]
+                    }
+                    Fibres::Many(moments) => Spread::new(&identity, *moments, e).of_one(l),
+                };
+                return intensity * strand.psi(k_d, k_s, t_dot_l, t_dot_e, l_dot_e);
+            }
+        };
+        intensity * (grey * (1.0 / 255.0))
+    }
+
+    /// Optical depth, Σ ρ code × metres, from a place to where the light ray along the unit vector `l` leaves
+    /// the shell, or to the light `far` metres away. Infinite where the ray leaves into opaque matter.
+    pub(super) fn shell_depth(
+        &self,
+        level: &Level,
+        place: &Place,
+        (l, far): (Vec3, f32),
+        walked: &mut u32,
+    ) -> f32 {
+        let shell = &*self.scene.shells[place.shell];
+        let Some(path) = ShellPath::inside(shell, place.tetrahedron, place.point, l) else { return 0.0 };
+        let FrameVolume { size, flow_cells, .. } = *self.volume_of(shell);
+        let n = Vec2::new(size[0] as f32, size[1] as f32);
+        let most = self.scene.trace.max_cells;
+        let (mut depth, mut count) = (0.0, 0);
+        for segment in path {
+            if segment.t[0] >= far || count >= most {
+                break;
+            }
+            let (origin, direction) = in_cells(&segment, size, flow_cells);
+            let start = (-segment.t[0]).max(0.0);
+            let end = segment.t[1].min(far) - segment.t[0] - start;
+            if end > 0.0 && shell.is_mapped(segment.prism) {
+                let origin = wrapped(origin + direction * start, n) * level.scale;
+                let mut walk = Walk::new(level.size, origin, direction * level.scale, end);
+                while count < most && (0..level.size.z).contains(&walk.cell().z) {
+                    let rho = level.cell(walk.cell()).rho_code() as f32;
+                    let Some(crossing) = walk.next() else { break };
+                    depth += rho * (crossing.t_exit - crossing.t_enter);
+                    count += 1;
+                }
+            }
+            if segment.end == End::Inner && shell.skin && segment.t[1] < far {
+                depth = f32::INFINITY;
+            }
+        }
+        *walked += count;
+        depth
+    }
+}

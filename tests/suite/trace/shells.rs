@@ -1,0 +1,344 @@
+//! Shells, pixel by pixel, against a tracer in float64 that knows no paths: it cuts every ray with all
+//! tetrahedra, sorts the intervals, and walks the cells in each.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, IVec3, Vec3};
+use taki::Unwatched;
+use taki::engine::cpu;
+use taki::light::{AngleFrame, Light, Visibility};
+use taki::mapping::shell::{Shell, Side, SurfaceMesh};
+use taki::scene::Scene;
+use taki::trace::Attenuation;
+use taki::volume::VolumeTexture;
+
+use super::closed_forms::{noise, uniform};
+use crate::mapping::shell::{interval, sphere, strip, torus};
+use crate::walk::{true_events, true_start};
+
+const SIZE: [u32; 2] = [72, 48];
+const SIGMA: f32 = 2.5;
+
+/// A scene of one shell and two lights, seen from `eye`.
+fn scene(shell: Shell, eye: [f64; 3]) -> Scene {
+    let mut scene = Scene::preset("front").expect("a preset");
+    scene = scene
+        .with(&[
+            &format!("camera.eye=[{},{},{}]", eye[0], eye[1], eye[2]),
+            "camera.target=[0,0,0]",
+            "camera.fov=45",
+            &format!("image.width={}", SIZE[0]),
+            &format!("image.height={}", SIZE[1]),
+            "image.samples=1",
+            "light.visibility=march",
+            "trace.layers=8",
+            "trace.max_cells=65536",
+            "trace.early_end=0",
+            "light.p=8",
+        ])
+        .expect("valid settings");
+    let parts = scene.edit();
+    parts.quads.clear();
+    parts.shells = vec![Arc::new(shell)];
+    parts.trace.attenuation = Attenuation::PathLength { sigma: SIGMA };
+    parts.ambient = Vec3::new(0.1, 0.2, 0.05);
+    parts.lights = vec![
+        Light::Directional {
+            to_light: Vec3::new(1.0, 2.0, 0.5).normalize(),
+            intensity: Vec3::new(0.9, 0.7, 0.5),
+        },
+        Light::Point { position: Vec3::new(-2.0, 3.0, 2.0), intensity: Vec3::new(4.0, 9.0, 8.0) },
+    ];
+    parts.background.zenith = Vec3::new(0.3, 0.0, 1.2);
+    parts.background.horizon = parts.background.zenith;
+    scene
+}
+
+/// A tetrahedron: its corners, its Jacobian (metres per copy of the volume), and the texture coordinates of
+/// its first corner.
+struct Tetrahedron {
+    corners: [DVec3; 4],
+    texture_from_world: DMat3,
+    at: DVec3,
+    /// Whether its fourth face is the inner surface.
+    is_innermost: bool,
+}
+
+fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
+    let mut out = Vec::new();
+    for (i, prism) in shell.prisms.iter().enumerate() {
+        for k in 0..3 {
+            let numbers = shell.tetrahedron(i, k);
+            let corners = numbers.map(|p| shell.points[p as usize].as_dvec3());
+            let at = numbers.map(|p| {
+                let vertex = prism.vertices.iter().position(|&v| v == p / 2).expect("a vertex of the prism");
+                prism.uv[vertex].as_dvec2().extend(f64::from(p % 2))
+            });
+            let edges = |all: [DVec3; 4]| DMat3::from_cols(all[1] - all[0], all[2] - all[0], all[3] - all[0]);
+            let texture_from_world = edges(at) * edges(corners).inverse();
+            out.push(Tetrahedron { corners, texture_from_world, at: at[0], is_innermost: k == 2 });
+        }
+    }
+    out
+}
+
+/// Intervals of a ray in the tetrahedra from t = 0 on, in order.
+fn cut<'a>(all: &'a [Tetrahedron], origin: DVec3, direction: DVec3) -> Vec<([f64; 2], &'a Tetrahedron)> {
+    let of = |tetrahedron: &'a Tetrahedron| {
+        let [from, to] = interval(tetrahedron.corners, origin, direction)?;
+        (to > 0.0).then_some(([from.max(0.0), to], tetrahedron))
+    };
+    let mut cuts: Vec<_> = all.iter().filter_map(of).collect();
+    cuts.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+    cuts
+}
+
+/// Cells of a ray in a tetrahedron, with the parameters where it enters and leaves each.
+fn cells(
+    tetrahedron: &Tetrahedron,
+    size: [u32; 3],
+    [origin, direction]: [DVec3; 2],
+    t: [f64; 2],
+) -> Vec<(IVec3, [f64; 2])> {
+    let n = DVec3::from_array(size.map(f64::from));
+    let start = origin + direction * t[0];
+    let from = (tetrahedron.at + tetrahedron.texture_from_world * (start - tetrahedron.corners[0])) * n;
+    let d = tetrahedron.texture_from_world * direction * n;
+    let length = t[1] - t[0];
+    let mut cell = true_start(from, d);
+    let mut out = Vec::new();
+    let mut last = 0.0;
+    for (next, axis) in true_events(from, d, length * (1.0 - 1e-12)).into_iter().chain([(length, 2)]) {
+        let [nx, ny, nz] = size.map(|n| n as i32);
+        let inside = IVec3::new(cell.x.rem_euclid(nx), cell.y.rem_euclid(ny), cell.z.clamp(0, nz - 1));
+        out.push((inside, [t[0] + last, t[0] + next]));
+        last = next;
+        cell[axis] += d[axis].signum() as i32;
+    }
+    out
+}
+
+/// Radiance of a ray, and whether it meets the shell.
+fn trace(scene: &Scene, volume: &VolumeTexture, all: &[Tetrahedron], ray: [DVec3; 2]) -> (DVec3, bool) {
+    let skin = scene.shells[0].skin;
+    let at = |c: IVec3| volume.cell(c.x as u32, c.y as u32, c.z as u32);
+    let density = |c: IVec3| f64::from(at(c).rho_code()) / 65535.0 * f64::from(volume.alpha * SIGMA);
+    let [origin, d] = ray;
+    let cuts = cut(all, origin, d);
+    let (mut lit, mut transmittance) = (DVec3::ZERO, 1.0);
+    for (t, tetrahedron) in &cuts {
+        let n = DVec3::from_array(volume.size.map(f64::from));
+        let world_from_cell = tetrahedron.texture_from_world.inverse() * DMat3::from_diagonal(1.0 / n);
+        for (cell, [enter, leave]) in cells(tetrahedron, volume.size, ray, *t) {
+            let passed = transmittance * (-density(cell) * (leave - enter)).exp();
+            let weight = transmittance - passed;
+            transmittance = passed;
+            if weight == 0.0 {
+                continue;
+            }
+            let (k_d, k_s) = at(cell).k_codes();
+            let v = at(cell).v_code().as_dvec3();
+            let mut sum = scene.ambient.as_dvec3();
+            let middle = origin + d * (0.5 * (enter + leave));
+            for light in &scene.lights {
+                let (l, intensity) = light.at(middle.as_vec3());
+                let far = f64::from(light.distance(middle.as_vec3()));
+                let (l, intensity) = (l.as_dvec3().normalize(), intensity.as_dvec3());
+                let (fibre, l_frame, e_frame) = match scene.angles {
+                    AngleFrame::World => (world_from_cell * v, l, -d),
+                    AngleFrame::Texture => {
+                        let inverse = world_from_cell.inverse();
+                        (v, inverse * l, inverse * -d)
+                    }
+                };
+                let (angle_l, angle_e) = (fibre.angle_between(l_frame), fibre.angle_between(e_frame));
+                let specular = (-(angle_l + angle_e).cos()).max(0.0).powf(f64::from(scene.p));
+                let psi = f64::from(k_d) / 255.0 * angle_l.sin() + f64::from(k_s) / 255.0 * specular;
+                let mut depth = 0.0;
+                let mut end = 0.0;
+                for (t, tetrahedron) in cut(all, middle, l) {
+                    // Beyond the shell, light comes from outside.
+                    if t[0] > end + 1e-6 || t[0] >= far || depth == f64::INFINITY {
+                        break;
+                    }
+                    end = t[1];
+                    for (cell, [enter, leave]) in
+                        cells(tetrahedron, volume.size, [middle, l], [t[0], t[1].min(far)])
+                    {
+                        depth += density(cell) * (leave - enter);
+                    }
+                    let [_, b, c, d] = tetrahedron.corners;
+                    let normal = (c - b).cross(d - b).normalize();
+                    let is_inside = (middle + l * t[1] - b).dot(normal).abs() > 1e-6;
+                    if skin && tetrahedron.is_innermost && !is_inside && t[1] < far {
+                        depth = f64::INFINITY;
+                    }
+                }
+                sum += intensity * ((-depth).exp() * psi);
+            }
+            lit += sum * weight;
+        }
+    }
+    (lit + scene.background.zenith.as_dvec3() * transmittance, !cuts.is_empty())
+}
+
+/// Compares all pixels of a scene. Returns the share of those that meet the shell.
+fn compare(scene: &Scene, volume: &VolumeTexture) -> f64 {
+    let [width, height] = SIZE;
+    let frame = cpu::render(scene, volume, &scene.mesh(), false, &Unwatched).expect("a frame");
+    let all = tetrahedra(&scene.shells[0]);
+    let [forward, right, up] = scene.camera.rays(width, height);
+    let (mut wrong, mut met) = (0, 0);
+    for (i, own) in frame.radiance.iter().enumerate() {
+        let pixel = [i as u32 % width, i as u32 / width];
+        let at = taki::picture::Camera::image_point(width, height, pixel, [0.5; 2]).as_dvec2();
+        let d = (forward + right * at.x + up * at.y).normalize();
+        let (truth, meets) = trace(scene, volume, &all, [scene.camera.eye_local(), d]);
+        met += u32::from(meets);
+        let own = DVec3::new(own[0].into(), own[1].into(), own[2].into());
+        let error = (own - truth).abs() / truth.max(DVec3::splat(0.05));
+        if error.max_element() > 1e-3 {
+            wrong += 1;
+            if wrong < 4 {
+                eprintln!("{pixel:?}: {own} not {truth}");
+            }
+        }
+    }
+    assert!(wrong * 1000 <= met, "{wrong} of {met} pixels");
+    f64::from(met) / f64::from(width * height)
+}
+
+fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
+    Shell::new(mesh, side).expect("a valid mesh")
+}
+
+#[test]
+fn pixels_of_shells_are_those_of_a_tracer_in_float64() {
+    let volume = noise([6, 8, 5], 4);
+    let mut torus = shell(&torus(14, 9, 0.35), Side::Outward);
+    torus.skin = true;
+    let shells = [
+        // A view from above, and one along the surface.
+        (torus, [[0.5, 4.5, 3.0], [0.2, 0.3, 4.4]]),
+        (shell(&sphere(2, 0.4), Side::Outward), [[1.0, 2.0, 2.6], [0.1, 1.45, 3.2]]),
+        (shell(&strip(9), Side::Inward), [[0.2, 1.2, 3.4], [-1.0, 0.05, 2.6]]),
+    ];
+    for (shell, eyes) in shells {
+        for (eye, angles) in eyes.into_iter().zip([AngleFrame::World, AngleFrame::Texture]) {
+            let mut scene = scene(shell.clone(), eye);
+            scene.edit().angles = angles;
+            let share = compare(&scene, &volume);
+            assert!(share > 0.1, "{share}");
+        }
+    }
+}
+
+#[test]
+fn a_uniform_hollow_sphere_lets_pass_what_its_chord_does() {
+    // The facets of the mesh stand for the sphere, so its chords are those of a polytope: finer ones come
+    // closer, in proportion to the area of the facets.
+    let errors = [3, 4].map(|levels| {
+        let mut scene = scene(shell(&sphere(levels, 0.4), Side::Outward), [0.0, 0.0, 4.0]);
+        scene.edit().lights.clear();
+        scene.edit().ambient = Vec3::ZERO;
+        let volume = uniform([4, 4, 4], Vec3::Y, 0.6, 0.5, 0.5);
+        let rho = f64::from(volume.cells[0].rho());
+        let frame = cpu::render(&scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame");
+        let [forward, right, up] = scene.camera.rays(SIZE[0], SIZE[1]);
+        let mut sum = 0.0;
+        for (i, own) in frame.radiance.iter().enumerate() {
+            let pixel = [i as u32 % SIZE[0], i as u32 / SIZE[0]];
+            let at = taki::picture::Camera::image_point(SIZE[0], SIZE[1], pixel, [0.5; 2]).as_dvec2();
+            let d = (forward + right * at.x + up * at.y).normalize();
+            let away = scene.camera.eye_local();
+            let b2 = away.length_squared() - away.dot(d).powi(2);
+            let half = |r: f64| (r * r - b2).max(0.0).sqrt();
+            let chord = 2.0 * (half(1.4) - half(1.0));
+            let want = (-f64::from(SIGMA) * rho * chord).exp();
+            sum += (f64::from(own[2]) / 1.2 - want).abs();
+        }
+        sum / frame.radiance.len() as f64
+    });
+    assert!(errors[0] < 1e-2 && errors[1] < errors[0] * 0.3, "{errors:?}");
+}
+
+#[test]
+fn turning_the_scene_turns_the_picture() {
+    let volume = noise([6, 8, 5], 9);
+    let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -1.1, 0.4);
+    let mesh = torus(14, 9, 0.35);
+    let mut turned_mesh = mesh.clone();
+    turned_mesh.positions.iter_mut().for_each(|p| *p = (turn * p.as_dvec3()).as_vec3());
+    let plain = scene(shell(&mesh, Side::Outward), [0.5, 4.5, 3.0]);
+    let mut turned = scene(shell(&turned_mesh, Side::Outward), [0.5, 4.5, 3.0]);
+    let parts = turned.edit();
+    for axis in
+        [&mut parts.camera.eye, &mut parts.camera.right, &mut parts.camera.up, &mut parts.camera.forward]
+    {
+        *axis = turn * *axis;
+    }
+    for light in &mut parts.lights {
+        match light {
+            Light::Directional { to_light: v, .. }
+            | Light::Point { position: v, .. }
+            | Light::Spot { position: v, .. } => {
+                *v = (turn * v.as_dvec3()).as_vec3();
+            }
+        }
+    }
+    let [a, b] = [&plain, &turned].map(|scene| {
+        cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame").radiance
+    });
+    let differ =
+        a.iter().zip(&b).filter(|(a, b)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-3 * a[c].max(0.05)));
+    let count = differ.count();
+    assert!(count * 200 <= a.len(), "{count}");
+}
+
+#[test]
+fn a_flat_shell_is_the_slab_where_no_border_is_near() {
+    let volume = noise([6, 8, 5], 2);
+    let (repeat_u, repeat_v, thickness) = (2.0, 3.0, 0.2);
+    let corners = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
+    let uv = [[0.0, 0.0], [repeat_u, 0.0], [repeat_u, repeat_v], [0.0, repeat_v]].map(glam::Vec2::from_array);
+    let mesh = SurfaceMesh {
+        positions: corners.to_vec(),
+        uv: uv.to_vec(),
+        thickness: vec![thickness; 4],
+        triangles: vec![[0, 2, 1], [0, 3, 2]],
+    };
+    let with_shell = {
+        let mut scene = scene(shell(&mesh, Side::Inward), [0.3, -0.2, 1.6]);
+        scene.edit().visibility = Visibility::None;
+        // The direction to a near light is that at the slab's face, but at the cell in a shell.
+        scene.edit().lights.truncate(1);
+        scene
+    };
+    let with_quad = {
+        let mut scene = with_shell.clone();
+        let material = taki::mapping::Material { thickness_m: thickness, repeat_u, repeat_v };
+        scene.edit().shells.clear();
+        scene.edit().quads = vec![taki::mapping::Quad::new(corners, material).expect("a quad")];
+        scene
+    };
+    let [a, b] = [&with_shell, &with_quad].map(|scene| {
+        cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame").radiance
+    });
+    let [forward, right, up] = with_quad.camera.rays(SIZE[0], SIZE[1]);
+    let mut compared = 0;
+    for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+        let pixel = [i as u32 % SIZE[0], i as u32 / SIZE[0]];
+        let at = taki::picture::Camera::image_point(SIZE[0], SIZE[1], pixel, [0.5; 2]).as_dvec2();
+        let d = forward + right * at.x + up * at.y;
+        let eye = with_quad.camera.eye_local();
+        let at_depth = |z: f64| eye + d * ((z - eye.z) / d.z);
+        let is_inside = |p: DVec3| p.x.abs() < 0.999 && p.y.abs() < 0.999;
+        if is_inside(at_depth(0.0)) && is_inside(at_depth(-f64::from(thickness))) {
+            compared += 1;
+            for c in 0..3 {
+                assert!((a[c] - b[c]).abs() <= 5e-4 * b[c], "{pixel:?}: {a:?} {b:?}");
+            }
+        }
+    }
+    assert!(compared > 1000, "{compared}");
+}
