@@ -41,7 +41,8 @@ pub enum Curve {
 }
 
 impl Curve {
-    fn decode(self, value: f32) -> f32 {
+    /// Returns the linear value of one that a file stores.
+    pub fn decode(self, value: f32) -> f32 {
         let power = |x: f32, gamma: f64| f64::from(x).powf(gamma) as f32;
         match self {
             Curve::Srgb if value > 0.040_45 => power((value + 0.055) / 1.055, 2.4),

@@ -1,8 +1,9 @@
 //! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk
-//! cache, unit vectors, parts of an image, colour spaces, and EXR files of any program.
+//! cache, confined paths, unit vectors, parts of an image, colour spaces, and EXR files of any program.
 
 pub mod cache;
 pub mod colour;
+pub(crate) mod confine;
 pub mod error;
 pub(crate) mod lane_powers;
 pub mod lanes;

@@ -11,6 +11,7 @@ mod farm;
 mod job;
 mod light;
 mod mapping;
+mod model;
 mod output;
 mod picture;
 mod place;

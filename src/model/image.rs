@@ -1,0 +1,69 @@
+//! Images of a model, which are decoded only when they are asked for.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::{DynamicImage, ImageReader};
+
+use super::budget::Budget;
+use super::paths::read_whole;
+use crate::util::error::{Error, Result};
+
+/// Image of a model, not yet decoded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ImageSource {
+    /// Bytes of a PNG, JPEG or WebP file.
+    Bytes {
+        /// The model's file, and the image's place in it.
+        place: String,
+        /// Content of the image's file.
+        bytes: Arc<Vec<u8>>,
+    },
+    /// Path of a file in the model's folder.
+    File(PathBuf),
+    /// An image that cannot be had. Only a scene that needs it fails.
+    Refused {
+        /// Description of the fault, with its place.
+        what: String,
+        /// Advice: how to mend it.
+        fix: String,
+    },
+}
+
+impl ImageSource {
+    /// Decodes the image. `memory` are the bytes that the file and its pixels may take.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where there is no image or it is broken, [`Error::Memory`] where it is too large.
+    pub fn decode(&self, memory: u64) -> Result<DynamicImage> {
+        match self {
+            ImageSource::Refused { what, fix } => Err(Error::input(what, fix)),
+            ImageSource::Bytes { place, bytes } => decode(place, bytes, memory),
+            ImageSource::File(path) => decode_file(path, memory),
+        }
+    }
+}
+
+fn decode_file(path: &Path, memory: u64) -> Result<DynamicImage> {
+    let bytes = read_whole(path, &mut Budget::new(memory))?;
+    decode(&path.display().to_string(), &bytes, memory.saturating_sub(bytes.len() as u64))
+}
+
+fn decode(place: &str, bytes: &[u8], memory: u64) -> Result<DynamicImage> {
+    let fault =
+        |why: String| Error::input(format!("{place}: {why}"), "export the images as PNG, JPEG or WebP files");
+    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().expect("bytes in memory");
+    let (width, height) = reader().into_dimensions().map_err(|e| fault(e.to_string()))?;
+    // Decoders hold the picture and as much again.
+    let need = u128::from(width) * u128::from(height) * 16;
+    if need > u128::from(memory) {
+        let what = format!("{place}: an image of {width}×{height}");
+        return Err(Error::memory(what, need, memory, "scale the image down, or allow more with --memory"));
+    }
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(memory);
+    let mut reader = reader();
+    reader.limits(limits);
+    reader.decode().map_err(|e| fault(e.to_string()))
+}
