@@ -43,9 +43,9 @@ struct VertexMaterial {
 struct MeshTile {
     // Index of its first vertex.
     first: u32,
-    // Vertices in a row of its grid.
+    // Vertices in a row of its grid; 0 for triangles that are no grid, three vertices each.
     pitch: u32,
-    // Squares on a side.
+    // Squares on a side, or the number of those triangles.
     side: u32,
     // 1: a hole in a picture with alpha.
     holdout: u32,
@@ -63,6 +63,8 @@ struct RockSurfaceVarying {
     // Position in the tile, in squares of its grid.
     @location(0) in_tile: vec2<f32>,
     @location(1) @interpolate(flat) tile: u32,
+    // Number of the triangle, of those that are no grid: apart, because interpolation would round it.
+    @location(2) @interpolate(flat) triangle: u32,
 }
 
 struct OpaquePoint {
@@ -88,19 +90,30 @@ fn rock_surface_vertex(
     @builtin(vertex_index) corner: u32,
     @builtin(instance_index) number: u32,
 ) -> RockSurfaceVarying {
+    let tile = tiles[number];
     let row = corner / TILE_ROW;
     let column = corner - row * TILE_ROW;
-    let vertex = tiles[number].first + row * tiles[number].pitch + column;
+    var vertex = tile.first + row * tile.pitch + column;
+    var in_tile = vec2<f32>(f32(column), f32(row));
+    var triangle = 0u;
+    if tile.pitch == 0u {
+        triangle = corner / 3u;
+        let k = corner - 3u * triangle;
+        vertex = tile.first + corner;
+        in_tile = select(vec2<f32>(0.25), vec2<f32>(0.75), vec2<u32>(k) == vec2<u32>(1u, 2u));
+    }
     var out: RockSurfaceVarying;
     out.clip = frame.clip_from_world * vec4<f32>(positions[vertex].xyz, 1.0);
-    out.in_tile = vec2<f32>(f32(column), f32(row));
+    out.in_tile = in_tile;
     out.tile = number;
+    out.triangle = triangle;
     return out;
 }
 
 @fragment
 fn rock_surface_fragment(in: RockSurfaceVarying) -> @location(0) vec4<f32> {
-    return vec4<f32>(in.in_tile, f32(in.tile), in.clip.z);
+    let in_tile = in.in_tile + vec2<f32>(f32(2u * in.triangle), 0.0);
+    return vec4<f32>(in_tile, f32(in.tile), in.clip.z);
 }
 
 // Adds a vertex's share to a point.
@@ -119,16 +132,25 @@ fn add_coat(in: OpaquePoint, number: u32, weight: f32) -> OpaquePoint {
 fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     let drawn = textureLoad(rock_surface, pixel, 0);
     let tile = tiles[u32(drawn.z)];
-    let cell = clamp(floor(drawn.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
-    let f = clamp(drawn.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
-    let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
-    let low = min(f.x, f.y);
-    let high = max(f.x, f.y);
     let at = image_point(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     var out: OpaquePoint;
     out.pixel = pixel;
     out.position_world = point_at(frame, at, drawn.w);
     out.holdout = tile.holdout != 0u;
+    if tile.pitch == 0u {
+        let triangle = clamp(floor(drawn.x * 0.5), 0.0, f32(tile.side) - 1.0);
+        let origin = vec2<f32>(2.0 * triangle + 0.25, 0.25);
+        let b = clamp((drawn.xy - origin) * 2.0, vec2<f32>(0.0), vec2<f32>(1.0));
+        let corner = tile.first + 3u * u32(triangle);
+        out = add_coat(out, corner, 1.0 - b.x - b.y);
+        out = add_coat(out, corner + 1u, b.x);
+        return add_coat(out, corner + 2u, b.y);
+    }
+    let cell = clamp(floor(drawn.xy), vec2<f32>(0.0), vec2<f32>(f32(tile.side) - 1.0));
+    let f = clamp(drawn.xy - cell, vec2<f32>(0.0), vec2<f32>(1.0));
+    let first = tile.first + u32(cell.y) * tile.pitch + u32(cell.x);
+    let low = min(f.x, f.y);
+    let high = max(f.x, f.y);
     out = add_coat(out, first, 1.0 - high);
     out = add_coat(out, first + select(tile.pitch, 1u, f.x >= f.y), high - low);
     return add_coat(out, first + tile.pitch + 1u, low);

@@ -13,18 +13,18 @@
 //!   the origin keeps its digits. A mesh of an OBJ file that lies far from the origin is moved to it, and its
 //!   node moves it back.
 //! - Texture coordinates are those of glTF: (0, 0) is the upper left corner of an image, and v runs **down**.
-//!   OBJ's v runs up, and is turned on reading: `v = 1 − v_obj`. So a mesh that Blender writes to both formats
-//!   has the same coordinates in both.
+//!   OBJ's v runs up, and is turned on reading: `v = 1 − v_obj`. So a mesh that Blender writes to both
+//!   formats has the same coordinates in both.
 //! - Seen from the front, the corners of a face run counter-clockwise. A transform with a negative
 //!   determinant turns that round.
 //! - A camera looks along −Z of its node with +Y up, and a light shines along −Z of its node.
 //!
 //! # Why the crates `gltf` and `tobj` are not used
 //!
-//! `gltf` refuses a file whose animation uses KHR_animation_pointer, knows no EXT_texture_webp, and its errors
-//! about missing values have no place in the document. `tobj` panics on a colour of two numbers, drops the
-//! name of a material that no library defines (here the name chooses what a part becomes), shifts texture
-//! coordinates where a corner has none, and its errors have no line.
+//! `gltf` 1.4 refuses a file whose animation uses KHR_animation_pointer, knows no EXT_texture_webp, and
+//! names the column of a missing value instead of its member. `tobj` 4.0 panics on a colour of two numbers,
+//! drops the name of a material that no library defines (here the name chooses what a part becomes), shifts
+//! texture coordinates where a corner has none, and its errors have no line.
 
 mod animation;
 mod budget;
@@ -149,9 +149,9 @@ impl Model {
     /// content does not. Each note of the model is also a warning to the monitor.
     ///
     /// # Errors
-    /// [`Error::Input`] where the file is broken, compressed, or leads out of its folder, with file and place;
-    /// [`Error::Memory`] where it needs more memory than `limits` allows; [`Error::Io`] where the disk fails;
-    /// any error of the monitor.
+    /// [`Error::Input`] where the file is broken, compressed, or leads out of its folder, with file and
+    /// place; [`Error::Memory`] where it needs more memory than `limits` allows; [`Error::Io`] where the disk
+    /// fails; any error of the monitor.
     pub fn read(path: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<Model> {
         let mut budget = Budget::new(limits.memory);
         let bytes = paths::read_whole(path, &mut budget)?;

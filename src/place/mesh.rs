@@ -13,12 +13,22 @@ use super::tiles::{self, Tile};
 use crate::place::Vertex;
 use crate::util::cache::{Cache, key};
 
-/// Opaque geometry: square grids of vertices, first of the rocks and then of the pools.
+/// Opaque triangles of a mesh that another program made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triangles {
+    /// Three vertices for each triangle.
+    pub vertices: Arc<Vec<Vertex>>,
+    /// Whether a picture with an alpha channel has a hole in their place.
+    pub holdout: bool,
+}
+
+/// Opaque geometry: square grids of vertices, first of the rocks and then of the pools, and triangles of
+/// other meshes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertices, row by row. They are shared, so that the owner of a copy on the GPU can recognise them.
     pub vertices: Arc<Vec<Vertex>>,
-    /// Tiles of the grids.
+    /// Tiles of the grids, and those of triangles.
     pub tiles: Arc<Vec<Tile>>,
 }
 
@@ -30,13 +40,28 @@ impl Mesh {
         Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
     }
 
+    /// Adds the triangles of other meshes.
+    pub fn with_triangles(self, soups: &[Triangles]) -> Mesh {
+        if soups.is_empty() {
+            return self;
+        }
+        let mut vertices = Arc::unwrap_or_clone(self.vertices);
+        let mut tiles = Arc::unwrap_or_clone(self.tiles);
+        for Triangles { vertices: own, holdout } in soups {
+            let first = vertices.len() as u32;
+            vertices.extend_from_slice(own);
+            tiles.extend(tiles::cut_triangles(&vertices, first, *holdout));
+        }
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
+    }
+
     /// Returns all triangles as indices of vertices, with the given step for each tile.
     pub fn triangles(&self, steps: &[u32]) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         for (i, tile) in self.tiles.iter().enumerate() {
-            let corners = tiles::triangles(tile.side, steps[i], tiles::coarser(&self.tiles, steps, i));
+            let corners = tile.triangles(steps[i], tiles::coarser(&self.tiles, steps, i));
             let (triangles, _) = corners.as_chunks::<3>();
-            out.extend(triangles.iter().map(|t| t.map(|corner| tile.vertex(tiles::grid_point(corner)))));
+            out.extend(triangles.iter().map(|t| t.map(|corner| tile.vertex_of(corner))));
         }
         out
     }

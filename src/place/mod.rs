@@ -7,7 +7,7 @@ mod show;
 pub mod tiles;
 mod vertex;
 
-pub use mesh::{BUILDER_VERSION, Ground, Mesh};
+pub use mesh::{BUILDER_VERSION, Ground, Mesh, Triangles};
 pub use pool::{MAX_POOLS, Pool};
 pub use rock::{MAX_LEVELS, Rock, wet::wet_albedo, wet::wetness};
 pub use show::Show;

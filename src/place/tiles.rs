@@ -5,6 +5,11 @@
 //! vertices: a sample finds its position on the grid, and interpolates the three nearest vertices as if all
 //! were drawn. A coarser tile therefore changes outlines and depth slightly, but no normals, albedo or
 //! shadows.
+//!
+//! The triangles of other programs' meshes are tiles too. Such a tile is a list of up to [`TRIANGLES`]
+//! triangles with three vertices each, and is always drawn whole. Its positions number the triangles: the
+//! corners of triangle t lie at (2t + ¼, ¼), (2t + ¾, ¼) and (2t + ¼, ¾), so that rounding leads into no
+//! other triangle.
 
 use std::sync::LazyLock;
 
@@ -16,17 +21,19 @@ use crate::picture::{Camera, Image};
 /// Squares on a side of a tile, if its grid has as many. With twice as many, more is drawn outside the view;
 /// with half as many, drawing the tiles one by one takes longer.
 pub const SIDE: u32 = 16;
+/// Triangles of a tile that is no grid.
+pub const TRIANGLES: u32 = 128;
 /// Number of steps: 1, 2, 4, 8 and 16.
 const STEPS: usize = 5;
 
-/// A square part of a grid of vertices.
+/// A square part of a grid of vertices, or some triangles of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// Index of the first vertex.
     pub first: u32,
-    /// Vertices in a row of the grid.
+    /// Vertices in a row of the grid; 0 for triangles.
     pub pitch: u32,
-    /// Squares on a side, [`SIDE`] or a smaller power of two.
+    /// Squares on a side, [`SIDE`] or a smaller power of two; the number of triangles that are no grid.
     pub side: u32,
     /// Number of the pool plus 1; 0 for rock.
     pub pool: u32,
@@ -85,6 +92,27 @@ pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec
     tiles
 }
 
+/// Cuts triangles without a grid into tiles. The vertices from index `first` on are theirs, three each.
+pub fn cut_triangles(vertices: &[Vertex], first: u32, holdout: bool) -> impl Iterator<Item = Tile> {
+    let per_tile = 3 * TRIANGLES as usize;
+    vertices[first as usize..].chunks(per_tile).enumerate().map(move |(i, own)| {
+        let positions = own.iter().map(|vertex| Vec3::from(vertex.position));
+        Tile {
+            first: first + (i * per_tile) as u32,
+            pitch: 0,
+            side: (own.len() / 3) as u32,
+            pool: 0,
+            holdout,
+            neighbours: [None; 4],
+            low: positions.clone().fold(Vec3::INFINITY, Vec3::min),
+            high: positions.fold(Vec3::NEG_INFINITY, Vec3::max),
+            out: Vec3::Z,
+            // No other step is ever chosen.
+            lost: [Vec2::ZERO, Vec2::INFINITY, Vec2::INFINITY, Vec2::INFINITY, Vec2::INFINITY],
+        }
+    })
+}
+
 /// Returns the step of each tile in an image.
 ///
 /// A vertex that is left out lies about `lost` from the triangle in its place. Let θ be the angle between the
@@ -118,17 +146,14 @@ pub fn coarser(tiles: &[Tile], steps: &[u32], tile: usize) -> [bool; 4] {
     tiles[tile].neighbours.map(|other| other.is_some_and(|other| steps[other as usize] > steps[tile]))
 }
 
-/// Returns a tile's triangles as numbers of corners; [`grid_point`] gives their positions. At an edge with a
-/// coarser tile, every other vertex moves to the one before it, so that both tiles have the same edges there.
-pub fn triangles(side: u32, step: u32, coarser: [bool; 4]) -> &'static [u16] {
-    list(list_number(side, step, coarser))
-}
+/// Number of lists of triangles. The last one numbers the corners of tiles that are no grids.
+pub const LISTS: usize = GRID_LISTS + 1;
 
-/// Number of lists of triangles.
-pub const LISTS: usize = STEPS * STEPS * 16;
+/// Number of lists for grids.
+const GRID_LISTS: usize = STEPS * STEPS * 16;
 
-/// Returns the number of the list that [`triangles`] returns.
-pub fn list_number(side: u32, step: u32, coarser: [bool; 4]) -> usize {
+/// Returns the number of the list for a grid's triangles.
+fn list_number(side: u32, step: u32, coarser: [bool; 4]) -> usize {
     let edges: usize = (0..4).map(|edge| usize::from(coarser[edge]) << edge).sum();
     (side.ilog2() as usize * STEPS + step.ilog2() as usize) * 16 + edges
 }
@@ -140,20 +165,15 @@ pub fn list(number: usize) -> &'static [u16] {
             let [side, step] = [number / 16 / STEPS, number / 16 % STEPS].map(|k| 1u32 << k);
             make_list(side, step, [0, 1, 2, 3].map(|edge| number >> edge & 1 == 1))
         };
-        (0..LISTS).map(made).collect()
+        (0..GRID_LISTS).map(made).chain([(0..3 * TRIANGLES as u16).collect()]).collect()
     });
     &LISTS_MADE[number]
 }
 
-/// Returns the column and row of a corner in its tile.
-pub fn grid_point(corner: u16) -> [u32; 2] {
+/// Returns the column and row of a corner of a grid.
+fn grid_point(corner: u16) -> [u32; 2] {
     let corner = u32::from(corner);
     [corner % (SIDE + 1), corner / (SIDE + 1)]
-}
-
-/// Returns [`grid_point`] as a position in squares.
-pub fn at(corner: u16) -> Vec2 {
-    Vec2::from(grid_point(corner).map(|i| i as f32))
 }
 
 fn make_list(side: u32, step: u32, coarser: [bool; 4]) -> Vec<u16> {
@@ -182,14 +202,58 @@ fn make_list(side: u32, step: u32, coarser: [bool; 4]) -> Vec<u16> {
 }
 
 impl Tile {
-    /// Returns the index of the vertex in a column and row.
+    /// Whether the tile is a part of a grid.
+    pub fn is_grid(&self) -> bool {
+        self.pitch > 0
+    }
+
+    /// Returns the number of the list of the tile's triangles, drawn with a step of its grid, and how many
+    /// entries of the list are its own. [`list`] gives the corners, three for each triangle. At an edge with
+    /// a coarser tile, every other vertex moves to the one before it, so that both tiles have the same edges
+    /// there.
+    pub fn list_number(&self, step: u32, coarser: [bool; 4]) -> (usize, usize) {
+        if !self.is_grid() {
+            return (GRID_LISTS, 3 * self.side as usize);
+        }
+        let number = list_number(self.side, step, coarser);
+        (number, list(number).len())
+    }
+
+    /// Returns the corners of the tile's triangles, three for each; see [`Tile::list_number`].
+    pub fn triangles(&self, step: u32, coarser: [bool; 4]) -> &'static [u16] {
+        let (number, count) = self.list_number(step, coarser);
+        &list(number)[..count]
+    }
+
+    /// Returns the index of the vertex in a column and row of a grid.
     pub fn vertex(&self, [x, y]: [u32; 2]) -> u32 {
         self.first + y * self.pitch + x
     }
 
-    /// Returns the three vertices around a position in the tile, in squares, with their weights. Twin:
-    /// `opaque_point` in shaders/engine/gbuffer.wgsl.
+    /// Returns the index of the vertex of a corner.
+    pub fn vertex_of(&self, corner: u16) -> u32 {
+        if self.is_grid() { self.vertex(grid_point(corner)) } else { self.first + u32::from(corner) }
+    }
+
+    /// Returns the position of a corner in the tile: in squares of a grid, or between the triangles'.
+    pub fn place_of(&self, corner: u16) -> Vec2 {
+        if self.is_grid() {
+            return Vec2::from(grid_point(corner).map(|i| i as f32));
+        }
+        let (triangle, k) = (corner / 3, corner % 3);
+        let side = |is: bool| if is { 0.75 } else { 0.25 };
+        Vec2::new(f32::from(2 * triangle) + side(k == 1), side(k == 2))
+    }
+
+    /// Returns the three vertices around a position in the tile, with their weights. Twin: `opaque_point` in
+    /// shaders/engine/gbuffer.wgsl.
     pub fn around(&self, position: Vec2) -> ([u32; 3], Vec3) {
+        if !self.is_grid() {
+            let triangle = (position.x * 0.5).floor().clamp(0.0, self.side as f32 - 1.0);
+            let b = ((position - Vec2::new(2.0 * triangle + 0.25, 0.25)) * 2.0).clamp(Vec2::ZERO, Vec2::ONE);
+            let first = self.first + 3 * triangle as u32;
+            return ([first, first + 1, first + 2], Vec3::new(1.0 - b.x - b.y, b.x, b.y));
+        }
         let cell = position.clamp(Vec2::ZERO, Vec2::splat(self.side as f32 - 1.0)).as_uvec2().as_vec2();
         let f = (position - cell).clamp(Vec2::ZERO, Vec2::ONE);
         let a = self.vertex([cell.x as u32, cell.y as u32]);

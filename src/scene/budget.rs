@@ -9,7 +9,8 @@ impl Parts {
     /// where up to `layers` quads of the volume lie under a pixel.
     pub(crate) fn bytes_beside_volume(&self, layers: u32) -> u64 {
         let vertices: u64 = self.rocks.iter().map(|rock| rock.vertex_count()).sum();
-        let vertices = vertices + (self.pools.len() * Pool::VERTICES) as u64;
+        let triangles: u64 = self.triangles.iter().map(|own| own.vertices.len() as u64).sum();
+        let vertices = vertices + triangles + (self.pools.len() * Pool::VERTICES) as u64;
         let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
         let environment = self.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
         canvas(&self.image, layers).saturating_add(rocks).saturating_add(environment)

@@ -51,7 +51,7 @@ use crate::mapping::Quad;
 use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
-use crate::place::{Ground, Mesh, Pool, Rock};
+use crate::place::{Ground, Mesh, Pool, Rock, Triangles};
 use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
@@ -107,6 +107,8 @@ pub struct Parts {
     pub rocks: Vec<Rock>,
     /// Level water, opaque too.
     pub pools: Vec<Pool>,
+    /// Opaque triangles of other programs' meshes.
+    pub triangles: Vec<Triangles>,
     /// Settings of the walk through the volume.
     pub trace: Trace,
     /// Space in which angles are measured.
@@ -251,6 +253,7 @@ impl Scene {
             ambient: v.triple("light.ambient"),
             rocks: ground::rocks(v, origin, limits.memory)?,
             pools: ground::pools(v, origin)?,
+            triangles: Vec::new(),
             trace: build::trace(v),
             angles: v.choice("light.frame", AngleFrame::from_word),
             visibility: v.choice("light.visibility", Visibility::from_word),
@@ -300,7 +303,9 @@ impl Scene {
 
     /// Returns [`Scene::mesh`], from the cache where it is stored there.
     pub fn cached_mesh(&self, cache: Option<&Cache>) -> Mesh {
-        cache.map_or_else(|| self.mesh(), |cache| self.ground().cached_mesh(cache))
+        let ground = self.ground();
+        let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.cached_mesh(cache));
+        mesh.with_triangles(&self.triangles)
     }
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.
@@ -420,7 +425,7 @@ impl Scene {
 
     /// Builds all opaque geometry as one mesh.
     pub fn mesh(&self) -> Mesh {
-        self.ground().mesh()
+        self.ground().mesh().with_triangles(&self.triangles)
     }
 
     /// Returns the index in `lights` of the light whose shadows rock casts on rock: the brightest directional

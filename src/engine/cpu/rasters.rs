@@ -160,8 +160,9 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         environment,
         environment_lights: _,
         ambient,
-        // Rocks are in the mesh.
+        // Rocks and triangles are in the mesh.
         rocks: _,
+        triangles: _,
         pools,
         trace,
         angles: _,

@@ -76,7 +76,7 @@ impl Gbuffer {
     pub fn compile(&self, gpu: &Gpu, scene: &Scene, layers: u32) {
         let variant = OpaqueVariant::new(scene.environment.is_some(), scene.lights.len());
         self.background(gpu, variant);
-        if !scene.rocks.is_empty() {
+        if !scene.rocks.is_empty() || !scene.triangles.is_empty() {
             self.rock_surface_pipeline(gpu);
             self.rock(gpu, variant);
         }

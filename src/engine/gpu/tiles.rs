@@ -46,10 +46,11 @@ pub fn packed(tiles: &[Tile]) -> Vec<MeshTile> {
 pub fn parts(tiles: &[Tile], steps: &[u32], ranges: &[Range<u32>]) -> (Vec<Part>, Vec<Vec<Part>>) {
     let (mut rock, mut pools) = (Vec::new(), Vec::<Vec<Part>>::new());
     for (i, tile) in tiles.iter().enumerate() {
-        let list = tiles::list_number(tile.side, steps[i], tiles::coarser(tiles, steps, i));
+        let (list, count) = tile.list_number(steps[i], tiles::coarser(tiles, steps, i));
+        let first = ranges[list].start;
         let part = Part {
             tile: i as u32,
-            indices: ranges[list].clone(),
+            indices: first..first + count as u32,
             low: tile.low.as_dvec3(),
             high: tile.high.as_dvec3(),
         };

@@ -36,7 +36,7 @@ fn every_index_that_leads_nowhere_is_named() {
         ),
         ("/meshes/0/primitives/0/indices", "meshes[0].primitives[0].indices", "accessors[9]"),
         ("/meshes/0/primitives/0/material", "meshes[0].primitives[0].material", "materials[9]"),
-        ("/accessors/0/bufferView", "attributes.POSITION", "bufferViews[9]"),
+        ("/accessors/0/bufferView", "meshes[0].primitives[0].attributes.POSITION", "bufferViews[9]"),
         ("/bufferViews/0/buffer", "bufferViews[0]", "buffers[9]"),
         ("/nodes/0/mesh", "nodes[0].mesh", "meshes[9]"),
         ("/nodes/0/camera", "nodes[0].camera", "cameras[9]"),
@@ -55,7 +55,7 @@ fn what_reaches_past_its_end_is_named() {
         (
             "/accessors/0/count",
             5,
-            "meshes[0].primitives[0].attributes.POSITION: accessor 0 reads past the end of bufferView 0: 60 bytes from byte 0, there are 48",
+            "POSITION: accessor 0 reads past the end of bufferView 0: 60 bytes from byte 0, there are 48",
         ),
         ("/accessors/0/byteOffset", 4, "accessor 0 reads past the end of bufferView 0"),
         (

@@ -88,7 +88,11 @@ fn interleaved_attributes_are_read_by_their_stride() {
         (0..4).flat_map(|i| [&SQUARE[3 * i..3 * i + 3], &[0.25 * i as f32, 0.5]].concat()).collect();
     let view = doc.view(&floats(&rows));
     doc.json["bufferViews"][view]["byteStride"] = json!(20);
-    let part = |kind: &str, offset: usize| json!({"bufferView": view, "byteOffset": offset, "componentType": 5126, "count": 4, "type": kind});
+    let part = |kind: &str, offset: usize| {
+        let mut accessor = json!({"bufferView": view, "byteOffset": offset, "count": 4, "type": kind});
+        accessor["componentType"] = json!(5126);
+        accessor
+    };
     let position = super::push(&mut doc.json["accessors"], part("VEC3", 0));
     let uv = super::push(&mut doc.json["accessors"], part("VEC2", 12));
     doc.primitive()["attributes"] = json!({"POSITION": position, "TEXCOORD_0": uv});
@@ -102,7 +106,8 @@ fn a_sparse_accessor_changes_its_base_and_without_a_base_zeros() {
     let mut doc = Doc::square();
     let (indices, values) = (doc.view(&shorts(&[1, 3])), doc.view(&floats(&[2.0, 0.0, 0.0, 3.0, 3.0, 0.0])));
     let sparse = json!({
-        "count": 2, "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values}
+        "count": 2, "indices": {"bufferView": indices, "componentType": 5123},
+        "values": {"bufferView": values}
     });
     doc.json["accessors"][0]["sparse"] = sparse;
     let with_base = only(&doc);
@@ -129,7 +134,8 @@ fn quantized_positions_are_integers_or_normalised_ones() {
         doc.json["bufferViews"][view]["byteStride"] = json!(8);
         doc.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
         let accessor = json!({
-            "bufferView": view, "componentType": component, "count": 4, "type": "VEC3", "normalized": normalized
+            "bufferView": view, "componentType": component, "count": 4, "type": "VEC3",
+            "normalized": normalized
         });
         let position = super::push(&mut doc.json["accessors"], accessor);
         doc.primitive()["attributes"] = json!({"POSITION": position});
@@ -353,7 +359,7 @@ fn cameras_and_lights_are_read() {
     assert_eq!((model.lights[0].color, model.lights[0].intensity), ([1.0, 0.5, 0.25], 3.0));
     assert_eq!((model.lights[1].kind, model.lights[1].range), (LightKind::Point, Some(10.0)));
     let LightKind::Spot { inner, outer } = model.lights[2].kind else { panic!("no spot") };
-    assert!(inner == 0.1 && (outer - 0.785_398).abs() < 1e-6);
+    assert!(inner == 0.1 && (outer - std::f32::consts::FRAC_PI_4).abs() < 1e-6);
     let summary = model.summary();
     assert_eq!((summary.cameras, summary.lights), (vec!["Eye".into()], vec!["Lamp".into()]));
 }

@@ -110,7 +110,8 @@ fn rich() -> Doc {
     let mut doc = Doc::square();
     let (indices, values) = (doc.view(&[1, 0, 3, 0]), doc.view(&floats(&[2.0, 0.0, 0.0, 3.0, 3.0, 0.0])));
     doc.json["accessors"][0]["sparse"] = json!({
-        "count": 2, "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values}
+        "count": 2, "indices": {"bufferView": indices, "componentType": 5123},
+        "values": {"bufferView": values}
     });
     let colors = doc.add("VEC4", 5121, 4, &[255; 16]);
     let normals = doc.add("VEC3", 5126, 4, &floats(&[0.0, 0.0, 1.0].repeat(4)));
@@ -154,7 +155,8 @@ fn mutated_gltf_files_are_read_or_refused() {
 
 #[test]
 fn mutated_obj_files_are_read_or_refused() {
-    let obj = "mtllib m.mtl\no Rock\nv 0 0 0 1 1 1\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
+    let obj = "mtllib m.mtl\no Rock\nv 0 0 0 1 1 1\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 0\n\
+               vt 0 0\nvt 1 0\nvt 1 1\n\
                vn 0 0 1\nusemtl A\nf 1/1/1 2/2/1 3/3/1 4/1/1\nf 1 2 3 \\\n4 5\nusemtl B\nf -1 -2 -3\nl 1 2\n\
                o Tree\ng part\nf 1/1 2/2 3/3\n";
     let library = "newmtl A\nKd 0.5 0.5 0.5\nNs 100\nmap_Kd -s 2 2 2 m.png\nnewmtl B\nPr 0.5\nd 0.5\n";

@@ -114,7 +114,8 @@ fn materials_keep_their_names_even_without_their_library() {
 
 #[test]
 fn a_library_gives_colour_roughness_and_texture() {
-    let library = "newmtl A\nKd 0.5 0.25 0.125\nNs 422.5\nd 0.5\nmap_Kd -o 0.25 0.125 0 -s 2 3 1 -clamp on tex a.png\n\
+    let library = "newmtl A\nKd 0.5 0.25 0.125\nNs 422.5\nd 0.5\nmap_Kd -o 0.25 0.125 0 -s 2 3 1 \
+                   -clamp on tex a.png\n\
                    newmtl B\nNs 0\nPr 0.25\nPm 1\nKd 0.5\nmap_Kd ..\\tex a.png\nmap_Bump -bm 1 x.png\n";
     let obj = format!("mtllib sub/a b.mtl\n{SQUARE}usemtl A\nf 1 2 3\nusemtl B\nf 1 3 4\n");
     let folder = Folder::new(&[

@@ -2,6 +2,7 @@
 //! engines.
 
 pub mod tiles;
+pub mod triangles;
 
 use std::f32::consts::PI;
 use std::path::Path;

@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use taki::engine::RenderOptions;
 use taki::engine::cpu::{self, gbuffer};
-use taki::place::tiles::{self, steps};
+use taki::place::tiles::steps;
 use taki::place::{Mesh, Vertex};
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
@@ -188,10 +188,10 @@ fn triangles_grow_with_distance_and_all_are_drawn_for_many_samples() {
 fn a_place_has_the_values_of_the_vertices_around_it() {
     let mesh = grid(32, 1.0, |_, _| 0.0);
     for tile in mesh.tiles.iter() {
-        for corner in tiles::triangles(tile.side, 4, [false; 4]) {
-            let (numbers, weights) = tile.around(tiles::at(*corner));
+        for corner in tile.triangles(4, [false; 4]) {
+            let (numbers, weights) = tile.around(tile.place_of(*corner));
             let whole = (0..3).find(|&i| weights[i] == 1.0).expect("one vertex alone");
-            assert_eq!(numbers[whole], tile.vertex(tiles::grid_point(*corner)));
+            assert_eq!(numbers[whole], tile.vertex_of(*corner));
         }
         let (numbers, weights) = tile.around(Vec2::new(3.75, 5.25));
         assert_eq!(numbers, [[3, 5], [4, 5], [4, 6]].map(|place| tile.vertex(place)));

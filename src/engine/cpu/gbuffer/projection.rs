@@ -11,8 +11,9 @@ use crate::place::tiles::{self, Tile};
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
 
-/// Corners of the largest tile.
-const GRID: usize = ((tiles::SIDE + 1) * (tiles::SIDE + 1)) as usize;
+/// Numbers of the corners of the largest tile.
+const POINTS: usize = 3 * tiles::TRIANGLES as usize;
+const _: () = assert!((tiles::SIDE + 1) * (tiles::SIDE + 1) <= POINTS as u32);
 
 /// Faces of a hull in one piece. The near plane cuts a triangle into two at most.
 const HULL_PART: usize = 256;
@@ -46,7 +47,7 @@ impl<'a> Projection<'a> {
             if !self.may_show(tile.low, tile.high) {
                 return Piece::default();
             }
-            let corners = tiles::triangles(tile.side, steps[i], tiles::coarser(&mesh.tiles, &steps, i));
+            let corners = tile.triangles(steps[i], tiles::coarser(&mesh.tiles, &steps, i));
             self.tile(tile, corners, &mesh.vertices)
         };
         mesh.tiles.par_iter().enumerate().map(piece).collect()
@@ -93,13 +94,13 @@ impl<'a> Projection<'a> {
     /// Triangles between corners of a tile, three at a time.
     fn tile(&self, tile: &Tile, corners: &[u16], vertices: &[Vertex]) -> Piece {
         let mut out = Piece::default();
-        // Six triangles meet in a vertex, which is projected once.
-        let mut points = [None; GRID];
+        // Six triangles meet in a vertex of a grid, which is projected once.
+        let mut points = [None; POINTS];
         for &corners in corners.as_chunks::<3>().0 {
             let points = corners.map(|corner| {
                 *points[usize::from(corner)].get_or_insert_with(|| {
-                    let vertex = &vertices[tile.vertex(tiles::grid_point(corner)) as usize];
-                    self.point(vertex.position.into(), tiles::at(corner), &mut out)
+                    let vertex = &vertices[tile.vertex_of(corner) as usize];
+                    self.point(vertex.position.into(), tile.place_of(corner), &mut out)
                 })
             });
             self.triangle(points, &mut out);
