@@ -8,6 +8,7 @@ use super::read::split;
 use super::volumes;
 use crate::light::{LightKind, ReflectionKind, Visibility};
 use crate::trace::AttenuationKind;
+use crate::volume::Run;
 
 /// Parameters that only have an effect where another one, the switch, has a certain value. Rules on keys of
 /// the volume `water` hold for the keys of every volume.
@@ -116,6 +117,12 @@ const RULES: &[Rule] = &[
         switch: "curves.bundles",
         needs: "a number above 0",
         works: |v, switch| v.int(switch) > 0,
+    },
+    Rule {
+        keys: &["curves.lean"],
+        switch: "curves.run",
+        needs: "out",
+        works: |v, switch| is(v, switch, Run::Out.word()),
     },
     Rule {
         keys: &["curves.*", "volume.nx", "volume.ny", "volume.nz", "volume.seed"],

@@ -27,7 +27,7 @@ pub use pyramid::{
     level_count, level_size, levels_of, stored_levels,
 };
 pub use ripple::Ripple;
-pub use spec::{Structure, WaterSpec};
+pub use spec::{Run, Structure, WaterSpec};
 pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
 pub use water::{
     BUILDER_VERSION, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,

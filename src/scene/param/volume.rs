@@ -3,7 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
-use crate::volume::StorageChoice;
+use crate::volume::{Run, StorageChoice};
 
 pub(super) const CURVES: Group = Group {
     title: "Curves",
@@ -39,6 +39,20 @@ pub(super) const CURVES: Group = Group {
                  ny.",
             )
             .when("Raise it for strands that wander and cross; lower it for straight, parallel ones."),
+        p("curves.run", "", "", Choice(Run::WORDS), Volume)
+            .doc(
+                "Faces between which the curves run: `along` the flow, as in the paper, or `out` of the \
+                 surface, from roots on its inner face to tips on its outer one. Then lengths that are \
+                 fractions of the flow length are fractions of the depth nz.",
+            )
+            .when("Choose `out` for fur and grass."),
+        p("curves.lean", "", "depths", Float(-10.0, 10.0, 0.0), Volume)
+            .slider(-2.0, 2.0)
+            .doc(
+                "Distance by which the tips of curves that run `out` of the surface lean down the flow, as \
+                 a fraction of the depth nz.",
+            )
+            .when("Raise it to comb the fur; lower it below 0 to comb it the other way."),
         p("curves.levels", "", "", Int(0, 16, 0), Volume)
             .doc(
                 "Depth of the recursion: a curve has 2^levels segments. 0 chooses the depth at which a \

@@ -52,6 +52,7 @@ fn spec() -> impl Strategy<Value = WaterSpec> {
                 strand_length: 0.1,
                 coverage,
                 crest,
+                ..Default::default()
             },
             seed,
             alpha: 0.9,

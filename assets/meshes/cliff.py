@@ -1,0 +1,124 @@
+"""Writes cliff.glb, the mesh of the preset `cliff`: a cliff, and the water that runs over its rim.
+
+Run: python cliff.py [FILE]   (with Blender's module: pip install bpy==5.2.3)
+
+The scene is modelled as in Blender: metres, Z up, the water falls towards −Y. The fall's texture has u across
+the water from left to right, and v = time of fall, so that the pattern stretches as the water gets faster.
+"""
+
+import math
+import sys
+
+import bpy
+from mathutils import Vector, noise
+
+WIDTH, DEPTH, HEIGHT = 22.0, 16.0, 8.0  # metres
+ACROSS, ALONG = 66, 72  # squares of the rock
+LIP_WIDTH = 3.6  # metres
+
+
+def smooth(low, high, x):
+    t = min(max((x - low) / (high - low), 0.0), 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def channel(x):
+    """Depth of the bed that the water has cut, 0 to 1."""
+    return math.exp(-((x - 0.6 * math.sin(0.35 * x)) / 2.6) ** 2)
+
+
+def profile(s):
+    """Outline of the cliff from the plateau behind to the ground in front: (y, z) for s from 0 to 1."""
+    points = [(8.0, 8.4), (2.2, 8.1), (0.7, 7.9), (0.0, 7.2), (-0.25, 5.2), (0.1, 3.4), (-0.5, 1.2), (-1.4, 0.1), (-4.0, -0.5), (-9.0, -0.8)]
+    at = s * (len(points) - 1)
+    i = min(int(at), len(points) - 2)
+    f = at - i
+    (y0, z0), (y1, z1) = points[i], points[i + 1]
+    return y0 + (y1 - y0) * f, z0 + (z1 - z0) * f
+
+
+def rock():
+    vertices, faces, uvs = [], [], []
+    for j in range(ALONG + 1):
+        for i in range(ACROSS + 1):
+            x = (i / ACROSS - 0.5) * WIDTH
+            y, z = profile(j / ALONG)
+            wall = smooth(0.2, 0.35, j / ALONG) * (1 - smooth(0.72, 0.9, j / ALONG))
+            # The cliff curves round the plunge pool.
+            y -= 0.045 * x * x * (0.35 + 0.65 * wall) - 0.4
+            at = Vector((x, y, z))
+            big = noise.fractal(at * 0.28 + Vector((3.1, 0, 0)), 1.0, 2.1, 6)
+            # Beds of rock step out and back with the height.
+            bed = noise.noise(Vector((0.25 * x, 0.25 * y, 2.3 * z + 0.8 * math.sin(0.5 * x))))
+            fine = noise.fractal(at * 1.7, 0.9, 2.2, 5)
+            cut = channel(x)
+            y -= wall * (0.9 * big + 0.55 * bed + 0.16 * fine) * (1 - 0.5 * cut)
+            z += (1 - wall) * (0.55 * big + 0.1 * fine) * (1 - 0.75 * cut) - (0.75 * cut if j / ALONG < 0.34 else 0.0)
+            if j / ALONG < 0.3:
+                z += 0.5 * (1 - cut)
+            vertices.append((x, y, z))
+            uvs.append((i / ACROSS, j / ALONG))
+    for j in range(ALONG):
+        for i in range(ACROSS):
+            a = j * (ACROSS + 1) + i
+            faces.append((a, a + ACROSS + 1, a + ACROSS + 2, a + 1))
+    return vertices, faces, uvs
+
+
+def fall():
+    """The water: along its bed to the rim, then the parabola of free fall. v is the time in seconds."""
+    path, t = [], 0.0
+    speed = 1.9
+    for k in range(10):
+        y = 5.2 - 0.5 * k
+        path.append((y, 7.62 + 0.035 * (y - 0.7), t))
+        t += 0.5 / speed
+    rim_y, rim_z, start = 0.7, 7.62, t
+    for k in range(31):
+        time = k * 0.042
+        path.append((rim_y - speed * time, rim_z - 4.905 * time * time, start + time))
+    columns = 12
+    vertices, faces, uvs = [], [], []
+    for y, z, time in path:
+        fallen = max(rim_z - z, 0.0)
+        width = LIP_WIDTH * (1 + 0.028 * fallen)
+        for i in range(columns + 1):
+            u = i / columns
+            x = (u - 0.5) * width
+            # The edges lag behind: the rim is lower in the middle.
+            lag = 0.3 * (2 * u - 1) ** 2
+            wave = 0.1 * math.sin(2.1 * x + 0.7) + 0.06 * math.sin(5.3 * x)
+            z_bed = 0.5 * (2 * u - 1) ** 2 if fallen == 0 else 0.5 * (2 * u - 1) ** 2 * math.exp(-fallen)
+            vertices.append((x, y + lag + wave * min(fallen, 1.0) - 0.4, z + z_bed))
+            uvs.append((u, time))
+    for j in range(len(path) - 1):
+        for i in range(columns):
+            a = j * (columns + 1) + i
+            faces.append((a, a + columns + 1, a + columns + 2, a + 1))
+    return vertices, faces, uvs
+
+
+def add(name, material, colour, parts):
+    vertices, faces, uvs = parts
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    layer = mesh.uv_layers.new(name="UVMap")
+    for loop in mesh.loops:
+        u, v = uvs[loop.vertex_index]
+        # Blender's v runs up, glTF's down.
+        layer.data[loop.index].uv = (u, 1 - v)
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    made = bpy.data.materials.new(material)
+    made.use_nodes = True
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Roughness"].default_value = 0.9
+    mesh.materials.append(made)
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(thing)
+
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+add("Rock", "Rock", (0.085, 0.076, 0.064), rock())
+add("Fall", "Fall", (0.8, 0.9, 1.0), fall())
+bpy.ops.export_scene.gltf(filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb", export_format="GLB")
