@@ -81,6 +81,7 @@ fn start_cell(x: f32, direction: f32) -> i32 {
 impl Walk {
     /// Walk from `origin_cell` (cells, finite, |x| < 2^23) along `direction_cell` (cells per unit of t) to
     /// the parameter `t_end`, through tiles of `size` cells.
+    #[inline]
     pub fn new(size: IVec3, origin_cell: Vec3, direction_cell: Vec3, t_end: f32) -> Self {
         let cell = IVec3::new(
             start_cell(origin_cell.x, direction_cell.x),

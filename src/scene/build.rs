@@ -40,11 +40,7 @@ pub(super) fn water(v: &Values, name: &str) -> WaterSpec {
         size,
         across: count("curves.across"),
         deep: count("curves.deep"),
-        shape: CurveShape {
-            h: float("curves.h"),
-            sigma_g_cells: 0.0,
-            levels: 0,
-        },
+        shape: CurveShape { h: float("curves.h"), sigma_g_cells: 0.0, levels: 0 },
         structure: structure(v, name),
         seed: v.int(&key_of_volume(name, "volume.seed")) as u64,
         alpha: float("volume.alpha"),

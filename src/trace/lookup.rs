@@ -45,7 +45,7 @@ impl<'a> Level<'a> {
     }
 
     /// The cell at `c`, which must lie inside the level.
-    #[inline]
+    #[inline(always)]
     pub fn cell(&self, c: IVec3) -> Cell {
         self.volume.cell(c.x as u32, c.y as u32, c.z as u32)
     }
@@ -59,6 +59,7 @@ impl<'a> Level<'a> {
     }
 
     /// Values of the cell itself; `moments` is `None`.
+    #[inline]
     pub fn sample_cell(&self, cell: Cell, matter: &SheetDensity) -> CellSample {
         let (k_d, k_s) = cell.k_codes();
         CellSample { rho: matter.rho(cell.rho_code() as f32), k: [k_d as f32, k_s as f32], moments: None }

@@ -8,8 +8,9 @@ use taki::Unwatched;
 use taki::engine::cpu;
 use taki::light::{AngleFrame, Light, Visibility};
 use taki::mapping::shell::{Shell, Side, SurfaceMesh};
+use taki::place::{Triangles, Vertex};
 use taki::scene::Scene;
-use taki::trace::Attenuation;
+use taki::trace::{Attenuation, Prefilter};
 use taki::volume::VolumeTexture;
 
 use super::closed_forms::{noise, uniform};
@@ -118,8 +119,14 @@ fn cells(
     out
 }
 
-/// Radiance of a ray, and whether it meets the shell.
-fn trace(scene: &Scene, volume: &VolumeTexture, all: &[Tetrahedron], ray: [DVec3; 2]) -> (DVec3, bool) {
+/// Radiance of a ray up to the distance `far`, behind which `behind` is seen, and whether it meets the shell.
+fn trace(
+    scene: &Scene,
+    volume: &VolumeTexture,
+    all: &[Tetrahedron],
+    ray: [DVec3; 2],
+    (far, behind): (f64, DVec3),
+) -> (DVec3, bool) {
     let skin = scene.shells[0].skin;
     let at = |c: IVec3| volume.cell(c.x as u32, c.y as u32, c.z as u32);
     let density = |c: IVec3| f64::from(at(c).rho_code()) / 65535.0 * f64::from(volume.alpha * SIGMA);
@@ -127,6 +134,10 @@ fn trace(scene: &Scene, volume: &VolumeTexture, all: &[Tetrahedron], ray: [DVec3
     let cuts = cut(all, origin, d);
     let (mut lit, mut transmittance) = (DVec3::ZERO, 1.0);
     for (t, tetrahedron) in &cuts {
+        if t[0] >= far {
+            break;
+        }
+        let t = &[t[0], t[1].min(far)];
         let n = DVec3::from_array(volume.size.map(f64::from));
         let world_from_cell = tetrahedron.texture_from_world.inverse() * DMat3::from_diagonal(1.0 / n);
         for (cell, [enter, leave]) in cells(tetrahedron, volume.size, ray, *t) {
@@ -179,11 +190,16 @@ fn trace(scene: &Scene, volume: &VolumeTexture, all: &[Tetrahedron], ray: [DVec3
             lit += sum * weight;
         }
     }
-    (lit + scene.background.zenith.as_dvec3() * transmittance, !cuts.is_empty())
+    (lit + behind * transmittance, !cuts.is_empty())
 }
 
-/// Compares all pixels of a scene. Returns the share of those that meet the shell.
-fn compare(scene: &Scene, volume: &VolumeTexture) -> f64 {
+/// Compares all pixels of a scene. `opaque` finds the distance and the radiance of what lies behind the shell
+/// on a ray. Returns the share of those that meet the shell.
+fn compare(
+    scene: &Scene,
+    volume: &VolumeTexture,
+    opaque: impl Fn(DVec3, DVec3) -> Option<(f64, DVec3)>,
+) -> f64 {
     let [width, height] = SIZE;
     let frame = cpu::render(scene, volume, &scene.mesh(), false, &Unwatched).expect("a frame");
     let all = tetrahedra(&scene.shells[0]);
@@ -193,7 +209,9 @@ fn compare(scene: &Scene, volume: &VolumeTexture) -> f64 {
         let pixel = [i as u32 % width, i as u32 / width];
         let at = taki::picture::Camera::image_point(width, height, pixel, [0.5; 2]).as_dvec2();
         let d = (forward + right * at.x + up * at.y).normalize();
-        let (truth, meets) = trace(scene, volume, &all, [scene.camera.eye_local(), d]);
+        let eye = scene.camera.eye_local();
+        let end = opaque(eye, d).unwrap_or((f64::INFINITY, scene.background.zenith.as_dvec3()));
+        let (truth, meets) = trace(scene, volume, &all, [eye, d], end);
         met += u32::from(meets);
         let own = DVec3::new(own[0].into(), own[1].into(), own[2].into());
         let error = (own - truth).abs() / truth.max(DVec3::splat(0.05));
@@ -227,7 +245,7 @@ fn pixels_of_shells_are_those_of_a_tracer_in_float64() {
         for (eye, angles) in eyes.into_iter().zip([AngleFrame::World, AngleFrame::Texture]) {
             let mut scene = scene(shell.clone(), eye);
             scene.edit().angles = angles;
-            let share = compare(&scene, &volume);
+            let share = compare(&scene, &volume, |_, _| None);
             assert!(share > 0.1, "{share}");
         }
     }
@@ -341,4 +359,76 @@ fn a_flat_shell_is_the_slab_where_no_border_is_near() {
         }
     }
     assert!(compared > 1000, "{compared}");
+}
+
+#[test]
+fn the_opaque_scene_ends_a_ray_inside_a_shell() {
+    // A wall through the middle of the sphere.
+    let corners = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]].map(|[x, y]| Vec3::new(x, y, 0.1));
+    let vertex = |k: usize| Vertex {
+        position: corners[k].to_array(),
+        normal: [0.0, 0.0, 1.0],
+        albedo: [0.5, 0.25, 0.75],
+        ..Default::default()
+    };
+    let mut scene = scene(shell(&sphere(2, 0.4), Side::Outward), [1.0, 1.2, 2.6]);
+    let parts = scene.edit();
+    parts.triangles =
+        vec![Triangles { vertices: Arc::new([0, 1, 2, 0, 2, 3].map(vertex).to_vec()), holdout: false }];
+    // Only ambient light, by which the wall's radiance is known.
+    parts.lights.clear();
+    let wall = parts.ambient.as_dvec3() * DVec3::new(0.5, 0.25, 0.75);
+    let share = compare(&scene, &noise([6, 8, 5], 4), |eye, d| {
+        let t = (f64::from(0.1f32) - eye.z) / d.z;
+        let p = eye + d * t;
+        (t > 0.0 && p.x.abs() < 3.0 && p.y.abs() < 3.0).then_some((t, wall))
+    });
+    assert!(share > 0.1, "{share}");
+}
+
+/// Root mean square of the differences between two pictures, relative to that of the second.
+fn rmse(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    let channels = |r: &[[f32; 4]]| r.iter().flat_map(|r| r[..3].to_vec()).map(f64::from).collect::<Vec<_>>();
+    let (a, b) = (channels(a), channels(b));
+    let square = |x: f64| x * x;
+    let error: f64 = a.iter().zip(&b).map(|(a, b)| square(a - b)).sum();
+    (error / b.iter().map(|b| square(*b)).sum::<f64>()).sqrt()
+}
+
+fn render(scene: &Scene, volume: &VolumeTexture) -> Vec<[f32; 4]> {
+    cpu::render(scene, volume, &scene.mesh(), false, &Unwatched).expect("a frame").radiance
+}
+
+#[test]
+fn light_kept_at_vertices_is_close_to_that_walked_from_every_cell() {
+    // Edges of about one cell, and of eight.
+    let volume = noise([12, 12, 10], 7);
+    let errors = [(36, 18), (9, 5)].map(|(n, m)| {
+        let mut torus = shell(&torus(n, m, 0.35), Side::Outward);
+        torus.skin = true;
+        let mut scene = scene(torus, [0.5, 4.5, 3.0]);
+        scene.edit().ambient = Vec3::ZERO;
+        scene.edit().background.zenith = Vec3::ZERO;
+        scene.edit().background.horizon = Vec3::ZERO;
+        let march = render(&scene, &volume);
+        scene.edit().visibility = Visibility::Cached;
+        rmse(&render(&scene, &volume), &march)
+    });
+    assert!(errors[0] < 0.06 && errors[1] < 0.25, "{errors:?}");
+    assert!(errors[0] > 0.0, "the same picture");
+}
+
+#[test]
+fn the_pyramid_spares_samples_where_cells_are_small() {
+    let volume = noise([16, 16, 16], 3);
+    let mut scene = scene(shell(&torus(28, 18, 0.35), Side::Outward), [3.0, 27.0, 18.0]);
+    scene.edit().visibility = Visibility::None;
+    let once = render(&scene, &volume);
+    scene.edit().trace.filter = Prefilter::Pyramid;
+    let filtered = render(&scene, &volume);
+    scene.edit().trace.filter = Prefilter::None;
+    scene.edit().image.samples = 64;
+    let truth = render(&scene, &volume);
+    let [plain, filtered] = [once, filtered].map(|picture| rmse(&picture, &truth));
+    assert!(filtered < 0.8 * plain, "{filtered} {plain}");
 }
