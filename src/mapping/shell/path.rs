@@ -4,11 +4,11 @@
 //! ray enters through a triangle around the origin. The fourth corner cuts that triangle's far side into
 //! three, and the signs of three cross products tell which one the ray leaves through.
 //!
-//! A cross product belongs to an edge, and every tetrahedron around the edge computes the same number. Where it
-//! is 0, the ray counts as moved by less than any number, always in the same direction. So a ray that is aimed
-//! at an edge or a vertex goes on through exactly one face, as any other does. The parameter and the texture
-//! coordinates of a face's point are means of those of its corners, so a segment begins where the last one
-//! ended, to the bit.
+//! A cross product belongs to an edge, and every tetrahedron around the edge computes the same number. Where
+//! it is 0, the ray counts as moved by less than any number, always in the same direction. So a ray that is
+//! aimed at an edge or a vertex goes on through exactly one face, as any other does. The parameter and the
+//! texture coordinates of a face's point are means of those of its corners, so a segment begins where the
+//! last one ended, to the bit.
 
 use glam::{Vec2, Vec3};
 

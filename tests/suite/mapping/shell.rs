@@ -155,8 +155,8 @@ fn a_path_passes_the_tetrahedra_that_brute_force_finds() {
             let sum = |t: f64, (from, to): (f64, f64)| t + (to - from);
             let length = exact.iter().map(|(t, _)| (t[0], t[1])).fold(0.0, sum);
             let own = path.iter().map(|s| (f64::from(s.t[0]), f64::from(s.t[1]))).fold(0.0, sum);
-            // Coordinates of 7 m have steps of 5e-7. Faces at a tenth of a degree turn them into 3e-4 along the
-            // ray.
+            // Coordinates of 7 m have steps of 5e-7. Faces at a tenth of a degree turn them into 3e-4 along
+            // the ray.
             assert!((length - own).abs() < 1e-3, "{length} {own} {origin} {direction}");
             for (t, [prism, k]) in exact.iter().filter(|(t, _)| t[1] - t[0] > 1e-3) {
                 met += 1;

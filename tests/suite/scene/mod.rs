@@ -171,6 +171,8 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),
                 "trace.filter" => scene.trace.filter.word(),
                 "trace.lookup" => scene.trace.lookup.word(),
+                "curves.run" => scene.recipes[0].water.structure.run.word(),
+                "volumes.*.run" => scene.recipes[1].water.structure.run.word(),
                 "volume.storage" => scene.recipes[0].asked_storage.word(),
                 "volumes.*.storage" => scene.recipes[1].asked_storage.word(),
                 other => panic!("the variant of {other} is not compared"),
