@@ -13,9 +13,9 @@ pub struct ModelMaterial {
     pub base_color_texture: Option<TextureRef>,
     /// Roughness, 0 to 1.
     pub roughness: f32,
-    /// Metalness, 0 to 1.
+    /// How metallic it is, 0 to 1.
     pub metallic: f32,
-    /// Texture of roughness (green) and metalness (blue), linear.
+    /// Texture of roughness (green) and of how metallic it is (blue), linear.
     pub roughness_texture: Option<TextureRef>,
     /// Texture of normals in tangent space, linear.
     pub normal_texture: Option<TextureRef>,
