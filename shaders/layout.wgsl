@@ -88,7 +88,7 @@ struct Light {
 }
 
 struct Quad {
-    // A, B, C, D in the world, metres.
+    // Corners of what is drawn, in the world, metres. A triangle repeats its last corner.
     corners: array<vec4<f32>, 4>,
     // Axes of the plane in the world: e1, e2 and the normal n.
     e1: vec3<f32>,
@@ -106,7 +106,8 @@ struct Quad {
     // Index of the first value of the material's multiple-scattering profile.
     profile: u32,
     normal: vec3<f32>,
-    pad_d: f32,
+    // Number of the quad's volume.
+    volume: u32,
     // E = B − A, F = D − A and G = A − B + C − D in the plane, metres.
     e: vec2<f32>,
     f: vec2<f32>,
@@ -115,12 +116,10 @@ struct Quad {
     offset: vec2<f32>,
     // Erosion e at A, B, C and D.
     erosion: vec4<f32>,
+    // Corner A of the map in the world, metres.
+    a: vec3<f32>,
     // Ψ of mist, which replaces that of the cells; 0 if the quad is not mist.
     mist: f32,
-    // Number of the quad's volume.
-    volume: u32,
-    pad_b: f32,
-    pad_c: f32,
 }
 
 // Rectangular part of the window, pixels.

@@ -83,7 +83,7 @@ fn plane_hit(
 // Point of a quad in the world at the texture coordinates `uv`. Twin: QuadMap::point_world.
 fn point_world(quad: Quad, uv: vec2<f32>) -> vec3<f32> {
     let p = quad.e * uv.x + quad.f * uv.y + quad.g * (uv.x * uv.y);
-    return quad.corners[0].xyz + quad.e1 * p.x + quad.e2 * p.y;
+    return quad.a + quad.e1 * p.x + quad.e2 * p.y;
 }
 
 // Point where the ray through the point `at` of the image meets a quad: u, v, and the distance in metres.

@@ -17,7 +17,7 @@ pub mod shell;
 mod splash;
 mod view;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 pub use quad::Quad;
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
@@ -118,6 +118,29 @@ impl QuadMap {
             e: pb.as_vec2(),
             f: pd.as_vec2(),
             g: (pc - pb - pd).as_vec2(),
+        })
+    }
+
+    /// Map of a parallelogram with the corner A (world, metres) and the edges AB and AD (metres). It is exactly
+    /// affine.
+    ///
+    /// # Errors
+    /// [`QuadFault::Degenerate`] for edges that span no area.
+    pub fn parallelogram(a: Vec3, ab: DVec3, ad: DVec3) -> Result<Self, QuadFault> {
+        let normal = ab.cross(ad);
+        if !normal.is_finite() || normal.length() <= 1e-7 * ab.length().max(ad.length()).powi(2) {
+            return Err(QuadFault::Degenerate);
+        }
+        let (n, e1) = (normal.normalize(), ab.normalize());
+        let e2 = n.cross(e1);
+        Ok(QuadMap {
+            a_world: a,
+            e1_world: e1.as_vec3(),
+            e2_world: e2.as_vec3(),
+            n_world: n.as_vec3(),
+            e: Vec2::new(ab.length() as f32, 0.0),
+            f: Vec2::new(ad.dot(e1) as f32, ad.dot(e2) as f32),
+            g: Vec2::ZERO,
         })
     }
 

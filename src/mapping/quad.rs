@@ -7,9 +7,9 @@ use super::{Material, QuadFault, QuadMap};
 /// Quad with its material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quad {
-    /// Corners A, B, C, D in the world, metres.
+    /// Corners of what is drawn, in the world, metres: A, B, C, D. A triangle repeats its last corner.
     pub corners: [Vec3; 4],
-    /// Map of the quad in its plane.
+    /// Map of the quad in its plane. That of a triangle is the map of a parallelogram around it.
     pub map: QuadMap,
     /// Layout of the volume's copies on the quad.
     pub material: Material,
@@ -30,5 +30,41 @@ impl Quad {
     pub fn new(corners: [Vec3; 4], material: Material) -> std::result::Result<Quad, QuadFault> {
         let map = QuadMap::new(corners)?;
         Ok(Quad { corners, map, material, offset: Vec2::ZERO, erosion: [0.0; 4], mist: 0.0 })
+    }
+
+    /// Triangle of a mesh, whose corners (world, metres) have the texture coordinates `uv`, in copies of the
+    /// volume. Its map is that of the parallelogram whose coordinates are the bounding box of `uv`; only the
+    /// triangle of it is drawn.
+    ///
+    /// # Errors
+    /// [`QuadFault::Degenerate`] where the triangle has no area in the world or in the texture.
+    pub fn triangle(
+        corners: [Vec3; 3],
+        uv: [Vec2; 3],
+        material: Material,
+    ) -> std::result::Result<Quad, QuadFault> {
+        let [a, b, c] = corners;
+        let [low, high] = [Vec2::min, Vec2::max].map(|f| f(uv[0], f(uv[1], uv[2])).as_dvec2());
+        let [ab, ac] = [b, c].map(|p| p.as_dvec3() - a.as_dvec3());
+        let uv = uv.map(|uv| uv.as_dvec2());
+        let [uv_b, uv_c] = [uv[1] - uv[0], uv[2] - uv[0]];
+        let (det, size) = (uv_b.perp_dot(uv_c), high - low);
+        if det.abs() <= 1e-6 * size.x * size.y {
+            return Err(QuadFault::Degenerate);
+        }
+        // Metres per copy along u and along v.
+        let along_u = (ab * uv_c.y - ac * uv_b.y) / det;
+        let along_v = (ac * uv_b.x - ab * uv_c.x) / det;
+        let first = a.as_dvec3() + along_u * (low.x - uv[0].x) + along_v * (low.y - uv[0].y);
+        let map = QuadMap::parallelogram(first.as_vec3(), along_u * size.x, along_v * size.y)?;
+        let material = Material { repeat_u: size.x as f32, repeat_v: size.y as f32, ..material };
+        // Whole copies are left out: they would cost digits.
+        let offset = (low - low.floor()).as_vec2();
+        Ok(Quad { corners: [a, b, c, c], map, material, offset, erosion: [0.0; 4], mist: 0.0 })
+    }
+
+    /// Whether a triangle is drawn.
+    pub fn is_triangle(&self) -> bool {
+        self.corners[2] == self.corners[3]
     }
 }

@@ -138,16 +138,14 @@ pub struct Quad {
     pub along: [f32; 3],
     pub profile: u32,
     pub normal: [f32; 3],
-    pub pad_d: f32,
+    pub volume: u32,
     pub e: [f32; 2],
     pub f: [f32; 2],
     pub g: [f32; 2],
     pub offset: [f32; 2],
     pub erosion: [f32; 4],
+    pub a: [f32; 3],
     pub mist: f32,
-    pub volume: u32,
-    pub pad_b: f32,
-    pub pad_c: f32,
 }
 
 /// Uniforms of a submission that fills columns of one light volume.
@@ -451,16 +449,14 @@ impl Quad {
             along: plane.along.to_array(),
             profile,
             normal: plane.normal.to_array(),
-            pad_d: 0.0,
+            volume: quad.material.volume,
             e: map.e.to_array(),
             f: map.f.to_array(),
             g: map.g.to_array(),
             offset: quad.offset.to_array(),
             erosion: quad.erosion,
+            a: map.a_world.to_array(),
             mist: quad.mist,
-            volume: quad.material.volume,
-            pad_b: 0.0,
-            pad_c: 0.0,
         }
     }
 }

@@ -59,7 +59,9 @@ impl<'a> Projection<'a> {
             let mut out = Piece::default();
             let [a, b, c, d] = quad.corners.map(|corner| self.point(corner, Vec2::ZERO, &mut out));
             self.triangle([a, b, c], &mut out);
-            self.triangle([a, c, d], &mut out);
+            if !quad.is_triangle() {
+                self.triangle([a, c, d], &mut out);
+            }
             out
         };
         self.scene.quads.iter().map(piece).collect()
