@@ -48,7 +48,7 @@ pub use look::{
     AlphaMode, CameraLens, LightKind, ModelCamera, ModelLight, ModelMaterial, TextureRef, TextureTransform,
     Wrap,
 };
-pub use names::find_name;
+pub use names::{find_name, folded_name};
 pub use summary::{MaterialSummary, NodeSummary, Summary};
 
 use crate::util::error::{Error, Result};
