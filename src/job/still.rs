@@ -267,7 +267,7 @@ pub(crate) fn scene_text(scene: &Scene) -> String {
     let mut values = scene.written().clone();
     for key in reference_keys(&values) {
         // A volume of which only the file is given stays a volume.
-        match key.starts_with("volumes.") {
+        match key.starts_with("volumes.") || key.starts_with("meshes.") {
             true => values.set(&key, &Raw::Text(String::new()), &Place(key.clone())).expect("a text"),
             false => values.clear_under(&key),
         }

@@ -121,8 +121,8 @@ impl QuadMap {
         })
     }
 
-    /// Map of a parallelogram with the corner A (world, metres) and the edges AB and AD (metres). It is exactly
-    /// affine.
+    /// Map of a parallelogram with the corner A (world, metres) and the edges AB and AD (metres). It is
+    /// exactly affine.
     ///
     /// # Errors
     /// [`QuadFault::Degenerate`] for edges that span no area.

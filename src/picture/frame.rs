@@ -4,7 +4,6 @@ use glam::Vec3;
 
 use super::camera::{CENTRE, sample_offset};
 use super::{Camera, Image};
-use crate::mapping::Quad;
 use crate::util::window::Window;
 
 /// Seconds per stage. On the GPU engine gbuffer, integrate and resolve are device time.
@@ -99,29 +98,26 @@ impl Surface {
 
     /// Stores pixel `i`.
     ///
-    /// `quad` is the number plus 1 of the nearest of `quads`, or 0. `hit` is (u, v, metres from the eye) on
-    /// that quad. `behind` is the depth in metres and the normal of the opaque surface, which are stored if
-    /// `quad` is 0.
+    /// `face` is the number plus 1 of the nearest face of water, or 0; `hit` is (u, v, metres from the eye)
+    /// on it, and `normal` returns its normal on the side that is seen. `behind` is the depth in metres and
+    /// the normal of the opaque surface, which are stored if `face` is 0.
     pub fn set(
         &mut self,
         i: usize,
-        (quads, eye): (&[Quad], Vec3),
-        quad: u32,
+        face: u32,
         hit: [f32; 4],
+        normal: impl FnOnce(usize, [f32; 2]) -> Vec3,
         behind: (f32, Vec3),
     ) {
-        self.quad[i] = quad;
-        if quad == 0 {
+        self.quad[i] = face;
+        if face == 0 {
             self.depth[i] = behind.0;
             self.normal[i] = behind.1.to_array();
             return;
         }
-        let map = &quads[quad as usize - 1].map;
-        let to_eye = eye - map.point_world(hit[0], hit[1]);
-        let side = if map.n_world.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         self.depth[i] = hit[2];
         self.uv[i] = [hit[0], hit[1]];
-        self.normal[i] = (map.n_world * side).to_array();
+        self.normal[i] = normal(face as usize - 1, self.uv[i]).to_array();
     }
 
     /// Fills `z` from `depth`, for the part `window` of an image.

@@ -22,6 +22,16 @@ pub struct Triangles {
     pub holdout: bool,
 }
 
+impl Triangles {
+    /// Whether two lists share the same vertices.
+    pub fn are_shared(a: &[Triangles], b: &[Triangles]) -> bool {
+        let is_same = |(a, b): (&Triangles, &Triangles)| {
+            Arc::ptr_eq(&a.vertices, &b.vertices) && a.holdout == b.holdout
+        };
+        a.len() == b.len() && a.iter().zip(b).all(is_same)
+    }
+}
+
 /// Opaque geometry: square grids of vertices, first of the rocks and then of the pools, and triangles of
 /// other meshes.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -13,7 +13,7 @@ use super::names::check_names;
 use super::param::{Kind, Param, split_volume_key};
 use super::read::{Source, apply_sets};
 use super::value::{Place, Raw, Value, Values};
-use super::{Limits, Record, Scene, expose};
+use super::{Limits, Record, Scene, expose, meshes};
 use crate::util::error::{Error, Result};
 
 /// A scene and its motion.
@@ -106,6 +106,15 @@ impl Animation {
             return Err(Error::input(
                 "animate.path and animate.turn both move the camera",
                 "remove one, or set animate.turn = 0",
+            ));
+        }
+        let from = values.text("camera.from");
+        let moves_camera =
+            |(key, _): &(String, Keyframes)| key.starts_with("camera.") && key != "camera.near";
+        if !from.is_empty() && (path.is_some() || turn != 0 || tracks.iter().any(moves_camera)) {
+            return Err(Error::input(
+                format!("camera.from = {from:?} and the animation both move the camera"),
+                "remove camera.from, or animate.path, animate.turn and tracks of the camera",
             ));
         }
         for (key, _) in &tracks {
@@ -209,7 +218,17 @@ impl Animation {
         if let Some(stops) = self.measured {
             expose(&mut values, stops);
         }
-        Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)
+        let scene = || {
+            let folder = self.folder.as_deref();
+            if !values.text("camera.from").is_empty() {
+                let meshes = meshes::read(&values, folder, &self.limits)?;
+                if let Some(seen) = meshes::with_camera(&values, &meshes, time / self.fps)? {
+                    values = seen;
+                }
+            }
+            Scene::from_values(&self.name, values, folder, &self.limits)
+        };
+        scene()
             .map(|scene| scene.recorded(self.record.clone()))
             .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })
     }

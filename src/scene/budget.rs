@@ -13,14 +13,16 @@ impl Parts {
         let vertices = vertices + triangles + (self.pools.len() * Pool::VERTICES) as u64;
         let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
         let environment = self.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
-        canvas(&self.image, layers).saturating_add(rocks).saturating_add(environment)
+        let shells = self.shells.iter().map(|shell| shell.bytes()).sum::<u64>();
+        canvas(&self.image, layers).saturating_add(rocks).saturating_add(environment).saturating_add(shells)
     }
 
     /// Returns the bytes that a picture of the whole image needs besides the volume, with every layer of an
     /// EXR and as many quads under a pixel as the scene allows. So it is the same for all frames of an
     /// animation and for all files that may be written.
     pub(super) fn least_bytes_beside_volume(&self) -> u64 {
-        let layers = self.trace.layers.clamp(1, self.quads.len().max(1) as u32);
+        let most = if self.shells.is_empty() { self.quads.len().max(1) as u32 } else { u32::MAX };
+        let layers = self.trace.layers.clamp(1, most);
         let rows = LEAST_ROWS.min(u64::from(self.image.height));
         let strip = rows.saturating_mul(row_bytes(&self.image, self.image.width, true));
         self.bytes_beside_volume(layers).saturating_add(WORK_BYTES).saturating_add(strip)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec3};
 
 use super::param::{key_of_volume, split_volume_key};
-use super::{Limits, MAX_LIGHTS, Place, Raw, Values, volumes};
+use super::{Limits, MAX_LIGHTS, Place, Raw, Values, meshes, volumes};
 use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
@@ -218,10 +218,16 @@ pub(super) fn environment(v: &Values, folder: Option<&Path>, limits: &Limits) ->
     Environment::new(source, settings, &limits.environments, limits.memory).map(Some)
 }
 
-/// Returns the scene's own lights, relative to `origin`, and the `sun` of its environment. `others` is the
-/// number of directional lights that stand for the rest of the environment; they count towards
-/// [`MAX_LIGHTS`].
-pub(super) fn lights(v: &Values, origin: DVec3, sun: Option<Light>, others: usize) -> Result<Vec<Light>> {
+/// Returns the scene's own lights, relative to `origin`, those `of_meshes`, and the `sun` of its environment.
+/// `others` is the number of directional lights that stand for the rest of the environment; they count
+/// towards [`MAX_LIGHTS`].
+pub(super) fn lights(
+    v: &Values,
+    origin: DVec3,
+    of_meshes: Vec<Light>,
+    sun: Option<Light>,
+    others: usize,
+) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     for name in v.names("lights") {
         let key = |what: &str| format!("lights.{name}.{what}");
@@ -254,6 +260,7 @@ pub(super) fn lights(v: &Values, origin: DVec3, sun: Option<Light>, others: usiz
             lights.push(light);
         }
     }
+    lights.extend(of_meshes);
     lights.extend(sun);
     if lights.len() + others > MAX_LIGHTS {
         return Err(Error::input(
@@ -339,7 +346,8 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
     let unused = key == "environment.file"
         && values.choice("environment.kind", EnvironmentKind::from_word) != EnvironmentKind::File;
     let hidden = split_volume_key(key).is_some_and(|(name, _)| !volumes::is_shown(values, name));
-    if file.is_empty() || unused || hidden {
+    let is_left_out = meshes::is_hidden(values, key);
+    if file.is_empty() || unused || hidden || is_left_out {
         return Ok(());
     }
     let whole = confine(key, Path::new(&file), folder, allowed)?;

@@ -2,11 +2,13 @@
 
 use super::Values;
 use super::build::EnvironmentKind;
+use super::meshes::{Carrier, Projection};
 use super::names::full_key;
 use super::param::{key_of_volume, matches, split_volume_key};
 use super::read::split;
 use super::volumes;
 use crate::light::{LightKind, ReflectionKind, Visibility};
+use crate::mapping::shell::Side;
 use crate::trace::AttenuationKind;
 use crate::volume::Run;
 
@@ -87,6 +89,42 @@ const RULES: &[Rule] = &[
         switch: "lights.*.kind",
         needs: "spot",
         works: |v, switch| is(v, switch, LightKind::Spot.word()),
+    },
+    Rule {
+        keys: &["camera.eye", "camera.target", "camera.up", "camera.fov"],
+        switch: "camera.from",
+        needs: "no mesh, whose camera stands in their place",
+        works: |v, switch| v.text(switch).is_empty(),
+    },
+    Rule {
+        keys: &["materials.*.side", "materials.*.thickness_from"],
+        switch: "materials.*.carrier",
+        needs: "shell",
+        works: |v, switch| is(v, switch, Carrier::Shell.word()),
+    },
+    Rule {
+        keys: &["materials.*.skin"],
+        switch: "materials.*.carrier",
+        needs: "shell",
+        works: |v, switch| is(v, switch, Carrier::Shell.word()),
+    },
+    Rule {
+        keys: &["materials.*.skin"],
+        switch: "materials.*.side",
+        needs: "outward",
+        works: |v, switch| is(v, switch, Side::Outward.word()),
+    },
+    Rule {
+        keys: &["meshes.*.projection_size"],
+        switch: "meshes.*.projection",
+        needs: "box, planar or cylinder",
+        works: |v, switch| !is(v, switch, Projection::None.word()),
+    },
+    Rule {
+        keys: &["meshes.*.uv"],
+        switch: "meshes.*.projection",
+        needs: "none, because a projection has its own coordinates",
+        works: |v, switch| is(v, switch, Projection::None.word()),
     },
     Rule {
         keys: &["haze.color", "haze.far", "haze.level", "haze.scale_height"],

@@ -6,6 +6,7 @@ mod build;
 mod effect;
 mod ground;
 mod keyframes;
+mod meshes;
 mod names;
 mod open;
 mod origin;
@@ -30,6 +31,7 @@ use glam::Vec3;
 pub use animation::Animation;
 pub use build::resolve;
 pub use effect::{settings_without_effect, settings_without_file, without_effect};
+pub use meshes::{Becomes, Loaded, ModelMemo, PartSummary, Projection, SceneMesh};
 pub use names::{NAMED, check_names, full_key, likeliest, unknown_key};
 pub use param::{
     Cost, GROUPS, Group, Kind, PARAMS, Param, WATER, key_of_volume, parameters_markdown, split_volume_key,
@@ -109,6 +111,11 @@ pub struct Parts {
     pub pools: Vec<Pool>,
     /// Opaque triangles of other programs' meshes.
     pub triangles: Vec<Triangles>,
+    /// Meshes of other programs, with what their parts became: quads, shells and triangles.
+    pub meshes: Vec<SceneMesh>,
+    /// Names of meshes with faces that carry no volume because they have no area in the texture, and the
+    /// number of those faces.
+    pub unmapped: Vec<(String, u64)>,
     /// Settings of the walk through the volume.
     pub trace: Trace,
     /// Space in which angles are measured.
@@ -160,6 +167,35 @@ impl Parts {
         }
         panic!("the scene has no face {number}")
     }
+
+    /// Returns the unit normal of a face at the coordinates `uv` on it, on the side that the eye sees.
+    ///
+    /// # Panics
+    /// If there is no such face.
+    pub fn seen_normal(&self, number: usize, uv: [f32; 2]) -> Vec3 {
+        match self.face(number) {
+            Face::Quad(Quad { map, .. }) => {
+                let to_eye = self.camera.eye_local().as_vec3() - map.point_world(uv[0], uv[1]);
+                map.n_world * if map.n_world.dot(to_eye) < 0.0 { -1.0 } else { 1.0 }
+            }
+            // Only faces that the eye sees from outside are drawn.
+            Face::Hull(shell, face) => {
+                let [a, b, c] = self.shells[shell].corners(face).map(|p| p.as_dvec3());
+                (b - a).cross(c - a).normalize_or_zero().as_vec3()
+            }
+        }
+    }
+
+    /// Returns the number of the volume that a face shows.
+    ///
+    /// # Panics
+    /// If there is no such face.
+    pub fn volume_of_face(&self, number: usize) -> usize {
+        match self.face(number) {
+            Face::Quad(quad) => quad.material.volume as usize,
+            Face::Hull(shell, _) => self.shells[shell].volume as usize,
+        }
+    }
 }
 
 /// Limits that the command line sets for a scene.
@@ -171,6 +207,8 @@ pub struct Limits {
     pub memory: u64,
     /// Environments that the scenes share.
     pub environments: EnvironmentMemo,
+    /// Files of meshes that the scenes share.
+    pub models: ModelMemo,
     /// Disk cache of volumes and meshes, shared with later processes.
     pub cache: Option<Cache>,
 }
@@ -181,6 +219,7 @@ impl Default for Limits {
             allow_paths: Vec::new(),
             memory: 4 << 30,
             environments: EnvironmentMemo::default(),
+            models: ModelMemo::default(),
             cache: None,
         }
     }
@@ -236,24 +275,31 @@ impl Scene {
         let recipes = volumes::recipes(v, folder, limits)?;
         let image = build::image(v);
         check_image(&image, limits.memory)?;
-        let origin = origin::origin(v);
-        let camera = build::camera(v, origin)?;
+        let meshes = meshes::read(v, folder, limits)?;
+        let origin = origin::origin(v, &meshes);
+        let camera = build::camera(meshes::with_camera(v, &meshes, 0.0)?.as_ref().unwrap_or(v), origin)?;
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
+        let mut quads = quads::quads(v, origin, &recipes)?;
+        let surfaces = meshes::build(v, &meshes, origin, &recipes, quads.len(), limits)?;
+        quads.extend(surfaces.quads);
+        let lights = meshes::lights(&meshes, origin)?;
         let mut parts = Parts {
             name: name.into(),
-            quads: quads::quads(v, origin, &recipes)?,
-            shells: Vec::new(),
+            quads,
+            shells: surfaces.shells,
             recipes,
             wave_flow: v.float("volume.flow"),
-            lights: build::lights(v, origin, sun, environment_lights.len())?,
+            lights: build::lights(v, origin, lights, sun, environment_lights.len())?,
             environment_lights,
             environment,
             ambient: v.triple("light.ambient"),
             rocks: ground::rocks(v, origin, limits.memory)?,
             pools: ground::pools(v, origin)?,
-            triangles: Vec::new(),
+            triangles: surfaces.triangles,
+            meshes,
+            unmapped: surfaces.unmapped,
             trace: build::trace(v),
             angles: v.choice("light.frame", AngleFrame::from_word),
             visibility: v.choice("light.visibility", Visibility::from_word),
@@ -316,7 +362,8 @@ impl Scene {
             environment::Source::File(path) => Some(("environment.file".to_owned(), path.clone())),
             environment::Source::Sky(_) => None,
         });
-        self.recipes.iter().filter_map(volume).chain(map).collect()
+        let meshes = self.meshes.iter().map(|m| (format!("meshes.{}.file", m.name), m.file.clone()));
+        self.recipes.iter().filter_map(volume).chain(map).chain(meshes).collect()
     }
 
     /// Returns the lights that shine on the volume: the scene's own, then those that stand for its
@@ -327,12 +374,12 @@ impl Scene {
 
     /// Returns the specification of the coarse levels of the first volume.
     pub fn pyramid_spec(&self, volume: &VolumeTexture) -> PyramidSpec {
-        pyramid_spec(&self.trace, &self.quads, 0, volume)
+        pyramid_spec(&self.trace, &self.quads, &self.shells, 0, volume)
     }
 
     /// Returns the specification of the coarse levels of each volume.
     pub fn pyramid_specs(&self, volumes: &[VolumeTexture]) -> Vec<PyramidSpec> {
-        let spec = |(volume, number)| pyramid_spec(&self.trace, &self.quads, number, volume);
+        let spec = |(volume, number)| pyramid_spec(&self.trace, &self.quads, &self.shells, number, volume);
         volumes.iter().zip(0..).map(spec).collect()
     }
 
@@ -420,7 +467,9 @@ impl Scene {
             let [a, b, c, d] = quad.corners;
             [a.min(b).min(c).min(d), a.max(b).max(c).max(d)]
         });
-        self.camera.depth_range(quads.chain(mesh.tiles.iter().map(|tile| [tile.low, tile.high])))
+        let shells = self.shells.iter().map(|shell| shell.bounds());
+        let tiles = mesh.tiles.iter().map(|tile| [tile.low, tile.high]);
+        self.camera.depth_range(quads.chain(shells).chain(tiles))
     }
 
     /// Builds all opaque geometry as one mesh.
@@ -515,12 +564,21 @@ impl Scene {
         warnings.extend(map.and_then(|values| without_effect(values, "environment.file")));
         let dark = self.environment.as_ref().is_none_or(|e| e.irradiance.0[0] == Vec3::ZERO);
         let unlit = self.lights.is_empty() && self.ambient == Vec3::ZERO && dark;
-        if self.quads.is_empty() && self.rocks.is_empty() && self.pools.is_empty() {
+        for mesh in &self.meshes {
+            let notes = mesh.loaded.model.notes.iter();
+            warnings.extend(notes.map(|note| format!("mesh {}: {note}", mesh.name)));
+        }
+        warnings.extend(self.unmapped.iter().map(|(name, count)| {
+            format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
+        }));
+        let has_water = !self.quads.is_empty() || !self.shells.is_empty();
+        let is_bare = self.rocks.is_empty() && self.pools.is_empty() && self.triangles.is_empty();
+        if !has_water && is_bare {
             warnings
                 .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
         } else if unlit {
             warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
-        } else if !self.quads.is_empty() {
+        } else if has_water {
             let is_empty = |volume: &VolumeTexture| {
                 volume.alpha == 0.0 || !volume.cells.stored().iter().any(|c| c.rho_code() > 0)
             };

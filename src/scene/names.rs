@@ -3,10 +3,12 @@
 use super::param::{Kind, PARAMS, Param, WATER, last_part, matches, split_volume_key};
 use super::remove::{NUMBERED, REMOVE};
 use super::value::{Place, Raw, Values, check};
+use super::volumes::used_materials;
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
-pub const NAMED: [&str; 7] = ["lights", "materials", "pools", "rocks", "sheets", "splashes", "volumes"];
+pub const NAMED: [&str; 8] =
+    ["lights", "materials", "meshes", "pools", "rocks", "sheets", "splashes", "volumes"];
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;
@@ -21,6 +23,10 @@ const OTHER_WORDS: &[(&str, &[&str])] = &[
     ("camera.eye", &["from", "location", "origin", "pos", "position"]),
     ("camera.fov", &["focal_length", "lens", "zoom"]),
     ("camera.target", &["at", "aim", "center", "centre", "interest", "look_at", "lookat", "to"]),
+    ("meshes.*.file", &["model", "path", "source"]),
+    ("meshes.*.position", &["at", "location", "origin", "pos", "translation"]),
+    ("meshes.*.scale", &["size"]),
+    ("meshes.*.turn", &["rotate", "rotation"]),
     ("environment.file", &["hdr", "hdri", "image", "map", "path", "texture"]),
     ("environment.intensity", &["brightness", "energy", "power", "strength"]),
     ("environment.turn", &["azimuth", "rotate", "rotation"]),
@@ -109,7 +115,9 @@ pub fn unknown_key_in_file(key: &str, raw: &Raw, values: &Values, place: &Place)
     let parts: Vec<&str> = key.split('.').collect();
     let named = PARAMS.iter().filter_map(|param| {
         let pattern: Vec<&str> = param.key.split('.').collect();
-        let fits = pattern.contains(&"*") && pattern.len() == parts.len();
+        // A material of a mesh may have any name, so its pattern is no evidence of what was meant.
+        let alike = pattern.last() != Some(&"*") || pattern[0] == parts[0];
+        let fits = pattern.contains(&"*") && pattern.len() == parts.len() && alike;
         let whole = || pattern.iter().zip(&parts).map(|(want, own)| if *want == "*" { own } else { want });
         fits.then(|| whole().copied().collect::<Vec<&str>>().join("."))
     });
@@ -358,9 +366,7 @@ pub fn check_names(values: &Values, key: &str) -> std::result::Result<(), (Strin
     }
     let mut names = values.names(section);
     if section == "materials" {
-        for user in ["quads", "sheets", "splashes"] {
-            names.extend(values.names(user).iter().map(|n| values.text(&format!("{user}.{n}.material"))));
-        }
+        names.extend(used_materials(values));
     }
     if names.iter().any(|n| n == name) {
         return Ok(());

@@ -9,7 +9,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::param::{PARAMS, Param, WATER};
 use super::read::VERSION;
-use super::{Recipe, Scene, Values, build};
+use super::{Recipe, Scene, SceneMesh, Values, build};
 use crate::light::Light;
 use crate::light::environment::{ANGULAR_RADIUS, Environment};
 use crate::mapping::Quad;
@@ -22,7 +22,7 @@ impl Values {
     pub fn keys(&self) -> Vec<String> {
         let mut keys = self.known_keys();
         // An absent list has no value to print.
-        keys.retain(|key| self.is_set(key) || !Param::find(key).is_some_and(Param::is_list));
+        keys.retain(|key| self.is_set(key) || !Param::find(key).is_some_and(Param::is_optional));
         keys
     }
 
@@ -37,7 +37,16 @@ impl Values {
                     if section == "materials" && !names.iter().any(|n| n == "water") {
                         names.push("water".into());
                     }
-                    keys.extend(names.iter().map(|name| format!("{section}.{name}.{rest}")));
+                    for name in names {
+                        let key = |rest: &str| format!("{section}.{name}.{rest}");
+                        match rest.strip_suffix(".*") {
+                            None => keys.push(key(rest)),
+                            Some(table) => {
+                                let own = self.names(&key(table)).into_iter();
+                                keys.extend(own.map(|own| key(&format!("{table}.{own}"))));
+                            }
+                        }
+                    }
                 }
             }
         }
@@ -66,12 +75,17 @@ impl Values {
                     Some(("animate", track)) if track.starts_with("tracks.") => {
                         writeln!(text, "\n[[animate.tracks]]")
                     }
-                    Some((section, name)) => writeln!(text, "\n[{section}.{}]", quoted(name)),
+                    Some((section, name)) => match name.strip_suffix(".materials") {
+                        Some(mesh) if section == "meshes" => {
+                            writeln!(text, "\n[{section}.{}.materials]", quoted(mesh))
+                        }
+                        _ => writeln!(text, "\n[{section}.{}]", quoted(name)),
+                    },
                     None => writeln!(text, "\n[{own_table}]"),
                 };
                 open = own_table;
             }
-            let name = key.rsplit('.').next().unwrap_or(key);
+            let name = quoted(key.rsplit('.').next().unwrap_or(key));
             let _ = writeln!(text, "{name} = {}", self.get(key).to_toml());
         }
         text
@@ -93,6 +107,11 @@ impl Scene {
     /// After [`Scene::edit`], as no scene file describes it.
     pub fn to_toml(&self) -> String {
         self.written().to_toml()
+    }
+
+    /// Lists the meshes as comments of a scene file: their nodes, and their materials with what each becomes.
+    pub fn mesh_comments(&self) -> String {
+        self.meshes.iter().map(SceneMesh::comments).collect()
     }
 
     /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed
@@ -131,6 +150,7 @@ impl Scene {
             "lights": lights_json(&self.lights, origin),
             "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
             "mesh": mesh_json(&self.mesh(), origin),
+            "meshes": self.meshes.iter().map(SceneMesh::json).collect::<Vec<_>>(),
         })
     }
 }
@@ -152,8 +172,15 @@ fn volume_json(recipe: &Recipe) -> Json {
 }
 
 fn quad_json(quad: &Quad, origin: DVec3) -> Json {
+    let [a, b, c, _] = quad.corners;
+    let corners = match quad.is_triangle() {
+        true => [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| quad.map.point_world(u, v)),
+        false => quad.corners,
+    };
     json!({
-        "corners": quad.corners.map(|c| in_world(c, origin)),
+        "corners": corners.map(|c| in_world(c, origin)),
+        // What is drawn of it, where it is a triangle.
+        "triangle": quad.is_triangle().then(|| [a, b, c].map(|c| in_world(c, origin))),
         "thickness": quad.material.thickness_m,
         // Copies of the volume before the quad's corner A, and on the quad.
         "offset": quad.offset.to_array(),

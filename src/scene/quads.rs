@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::meshes::Carrier;
 use super::names::likeliest;
 use super::param::POINT_MAX;
 use super::read::MAX_QUADS;
@@ -79,7 +80,7 @@ pub(super) fn unused_materials(v: &Values) -> Vec<String> {
     let warning = |name: String| {
         let fix = match likeliest(&name, used.iter().map(String::as_str)) {
             Some(near) => format!("did you mean {near}?"),
-            None => format!("give a sheet, splash or quad material = {name:?}"),
+            None => format!("give a sheet, splash, quad or mesh material = {name:?}"),
         };
         format!("nothing has the material {name}: {fix}")
     };
@@ -93,6 +94,15 @@ fn material(v: &Values, materials: &Materials, what: &str, key: &str) -> Result<
         return Err(Error::input(format!("{what} ({key}) has the unknown material {name:?}"), fix));
     }
     let float = |what: &str| v.float(&format!("materials.{name}.{what}"));
+    let carrier = format!("materials.{name}.carrier");
+    if v.choice(&carrier, Carrier::from_word) == Carrier::Shell {
+        return Err(Error::input(
+            format!(
+                "{what} ({key}) has the material {name}, whose carrier is a shell: a shell lies on a mesh"
+            ),
+            format!("give it another material, or set {carrier}=face"),
+        ));
+    }
     let material = Material {
         thickness_m: float("thickness"),
         repeat_u: float("repeat_u"),

@@ -15,7 +15,8 @@ use super::remove::{self, REMOVE};
 use super::slips::{foreign_signs_at, given_twice, not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
-use super::{Limits, build, presets, quads, volumes};
+use super::{Limits, build, meshes, presets, quads, volumes};
+use crate::model::folded_name;
 use crate::output::frame::{folder_of, scene_in};
 use crate::util::error::{Error, Result};
 
@@ -331,8 +332,11 @@ impl File<'_> {
                 if table.is_empty() {
                     return self.empty(path, value, values);
                 }
+                let is_of_mesh = meshes::is_materials(path);
                 table.iter().try_for_each(|(key, value)| {
-                    self.keys(&format!("{path}.{}", key.get_ref()), value, values)
+                    let key = key.get_ref();
+                    let key = if is_of_mesh { folded_name(key).into() } else { key.clone() };
+                    self.keys(&format!("{path}.{key}"), value, values)
                 })
             }
             // The scene's own tracks replace all tracks of its base, as its quads do.
@@ -357,6 +361,7 @@ impl File<'_> {
             ("pools", "corners"),
             ("sheets", "points"),
             ("splashes", ""),
+            ("meshes", "file"),
             ("materials", ""),
         ] {
             let parts: Vec<(String, usize, &Spanned<DeValue>)> = match root.get(section).map(Spanned::get_ref)
@@ -391,13 +396,26 @@ impl File<'_> {
                     return Err(Error::input(what, fix));
                 }
                 let material = part.get_ref().as_table().and_then(|part| part.get("material"));
-                if let Some(material) = material
-                    && let Some(name) = material.get_ref().as_str()
-                    && let Some(fix) = quads::unknown_material(name, &materials)
+                let mut named: Vec<_> =
+                    material.into_iter().map(|m| (format!("{path}.material"), m)).collect();
+                if section == "meshes"
+                    && let Some(own) = part.get_ref().as_table().and_then(|part| part.get("materials"))
+                    && let Some(own) = own.get_ref().as_table()
                 {
-                    let place = self.place(material.span().start).0;
-                    let what = format!("{place}: {path}.material = {name:?}: the scene has no such material");
-                    return Err(Error::input(what, fix));
+                    let key = |name: &str| format!("{path}.materials.{}", folded_name(name));
+                    named.extend(own.iter().map(|(name, material)| (key(name.get_ref()), material)));
+                }
+                for (key, material) in named {
+                    if let Some(name) = material.get_ref().as_str()
+                        && !(section == "meshes" && meshes::is_word(name))
+                        && let Some(fix) = quads::unknown_material(name, &materials)
+                    {
+                        let place = self.place(material.span().start).0;
+                        let what = format!("{place}: {key} = {name:?}: the scene has no such material");
+                        let words =
+                            if section == "meshes" { "; a part can also be opaque, or none" } else { "" };
+                        return Err(Error::input(what, fix + words));
+                    }
                 }
             }
         }
@@ -413,6 +431,7 @@ impl File<'_> {
             "sheets" => format!("{path}.points"),
             "splashes" => format!("{path}.from"),
             "volumes" => format!("{path}.nx"),
+            "meshes" => format!("{path}.file"),
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
@@ -429,6 +448,7 @@ impl File<'_> {
         match Param::find(&key).map(|param| param.kind) {
             Some(_) if values.is_set(&key) => Ok(()),
             Some(Kind::Corners) => Err(without(path, "corners", values, &place)),
+            Some(_) if section == "meshes" => Err(without(path, "file", values, &place)),
             Some(_) => {
                 let default = values.get(&key);
                 values.0.insert(Key::new(&key), default);
@@ -449,6 +469,7 @@ fn without(path: &str, need: &str, values: &Values, place: &Place) -> Error {
     let points = match section {
         "sheets" => "points along the flow, two or more",
         "pools" => "four points at one height",
+        "meshes" => "a file of glTF (.glb, .gltf) or OBJ",
         _ => "four points A, B, C, D",
     };
     let fix = match near {
@@ -475,7 +496,8 @@ pub fn raw(value: &DeValue) -> Raw {
 /// Returns the keys of a scene whose values are paths.
 pub fn reference_keys(values: &Values) -> Vec<String> {
     let files = volumes::names(values).into_iter().map(|name| key_of_volume(&name, "volume.file"));
-    files.chain(["environment.file".into()]).collect()
+    let meshes = values.names("meshes").into_iter().map(|name| format!("meshes.{name}.file"));
+    files.chain(["environment.file".into()]).chain(meshes).collect()
 }
 
 /// Whether a `--set` gives this reference. Paths from the command line are trusted and relative to the

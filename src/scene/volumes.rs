@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::names::likeliest;
 use super::param::{PARAMS, WATER, key_of_volume, split_volume_key};
-use super::{Limits, Parts, Scene, Values, build};
+use super::{Limits, Parts, Scene, Values, build, meshes};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -84,12 +84,12 @@ pub(super) fn names(v: &Values) -> Vec<String> {
     std::iter::once(WATER.to_owned()).chain(v.names("volumes")).collect()
 }
 
-/// Returns the names of the materials that quads, sheets and splashes have.
+/// Returns the names of the materials that quads, sheets, splashes and parts of meshes have.
 pub(super) fn used_materials(v: &Values) -> BTreeSet<String> {
     let users = ["quads", "sheets", "splashes"].into_iter().flat_map(|section| {
         v.names(section).into_iter().map(move |name| v.text(&format!("{section}.{name}.material")))
     });
-    users.collect()
+    users.chain(meshes::named_materials(v)).collect()
 }
 
 /// Returns the name of the volume that a material shows.

@@ -35,7 +35,7 @@ const GROUPS: [Group; 10] = [
     group(
         "Mapping",
         "How the volumes are mapped onto the quads",
-        &["materials", "sheets", "splashes", "quads"],
+        &["materials", "sheets", "splashes", "quads", "meshes"],
     ),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
     group("Lights", "", LIGHTS),

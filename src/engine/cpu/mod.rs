@@ -202,12 +202,7 @@ fn set_surface(surface: &mut Surface, scene: &Scene, gbuffer: &Gbuffer, first: u
         let nearest = i * gbuffer.layers;
         let [u, v, t] = gbuffer.surface[nearest];
         let behind = (gbuffer.opaque[i][3], gbuffer.normal[i].truncate());
-        surface.set(
-            first + i,
-            (&scene.quads, scene.camera.eye_local().as_vec3()),
-            gbuffer.quad_id[nearest],
-            [u, v, t, 0.0],
-            behind,
-        );
+        let normal = |face, uv| scene.seen_normal(face, uv);
+        surface.set(first + i, gbuffer.quad_id[nearest], [u, v, t, 0.0], normal, behind);
     }
 }

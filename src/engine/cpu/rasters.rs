@@ -163,6 +163,9 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         // Rocks and triangles are in the mesh.
         rocks: _,
         triangles: _,
+        // What became of meshes is in the quads, the shells and the mesh.
+        meshes: _,
+        unmapped: _,
         pools,
         trace,
         angles: _,

@@ -9,7 +9,7 @@ use super::integrate::{Integrator, Observer};
 use crate::picture::Camera;
 use crate::picture::camera::{CENTRE, sample_offset};
 use crate::place::Mesh;
-use crate::scene::Scene;
+use crate::scene::{Face, Scene};
 use crate::trace::{Lookup, Prefilter};
 use crate::util::window::Window;
 use crate::volume::{Cell, VolumeTexture};
@@ -63,7 +63,7 @@ impl RayReport {
 /// The point where a ray meets a quad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayFace {
-    /// Number of the quad in the scene, from 0.
+    /// Number of the quad in the scene, from 0. Faces of shells' hulls are numbered after the quads.
     pub quad: usize,
     /// Texture coordinates on the quad, 0 to 1.
     pub uv: [f32; 2],
@@ -123,10 +123,13 @@ pub fn inspect(
         quad,
         uv: [u, v],
         depth_m,
-        point: scene.camera.origin + scene.quads[quad].map.point_world(u, v).as_dvec3(),
+        point: match scene.face(quad) {
+            Face::Quad(quad) => scene.camera.origin + quad.map.point_world(u, v).as_dvec3(),
+            Face::Hull(..) => scene.camera.eye + d_world * f64::from(depth_m),
+        },
     };
     let faces: Vec<RayFace> = gbuffer.faces(0).map(face).collect();
-    let alpha = |face: &RayFace| volumes[scene.quads[face.quad].material.volume as usize].alpha;
+    let alpha = |face: &RayFace| volumes[scene.volume_of_face(face.quad)].alpha;
     let alphas = faces.iter().map(alpha).collect();
     let mut recorder = Recorder { alphas, faces: 0, steps: Vec::new() };
     // Without filter and interpolation, the steps are the volume's own cells.

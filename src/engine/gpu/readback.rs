@@ -121,13 +121,8 @@ pub fn read_surface(
             let quad: u32 = bytemuck::pod_read_unaligned(&quads[4 * i..4 * i + 4]);
             let behind = (floats(&opaque, i)[3], glam::Vec3::from_slice(&floats(&normal, i)));
             let (row, column) = (y as usize + i / band.width as usize, i % band.width as usize);
-            surface.set(
-                first + row * width + column,
-                (&scene.quads, scene.camera.eye_local().as_vec3()),
-                quad,
-                floats(&hit, i),
-                behind,
-            );
+            let normal = |face, uv| scene.seen_normal(face, uv);
+            surface.set(first + row * width + column, quad, floats(&hit, i), normal, behind);
         }
     }
     Ok(())

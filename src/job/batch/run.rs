@@ -8,7 +8,7 @@ use super::writer::{Outcomes, Start, Writer};
 use crate::engine::{Engine, RenderOptions};
 use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, beside_encoders, memory_of, spare_for_rasters};
 use crate::output::frame::remove_left_by;
-use crate::place::{Ground, Mesh};
+use crate::place::{Ground, Mesh, Triangles};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -23,7 +23,7 @@ struct Work<'a> {
     engine: &'a mut Engine,
     claims: Claims,
     volumes: VolumeMemo,
-    mesh: Option<(Ground, Mesh)>,
+    mesh: Option<(Ground, Vec<Triangles>, Mesh)>,
     watcher: &'a dyn Watcher,
     /// Whether the scene's warnings have been shown.
     warned: bool,
@@ -239,11 +239,14 @@ impl Work<'_> {
     fn mesh(&mut self, scene: &Scene) -> Mesh {
         let ground = scene.ground();
         match &self.mesh {
-            Some((known, mesh)) if *known == ground => mesh.clone(),
+            Some((known, triangles, mesh))
+                if *known == ground && Triangles::are_shared(triangles, &scene.triangles) =>
+            {
+                mesh.clone()
+            }
             _ => {
-                let cache = self.batch.base.limits().cache.as_ref();
-                let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.cached_mesh(cache));
-                self.mesh = Some((ground, mesh.clone()));
+                let mesh = scene.cached_mesh(self.batch.base.limits().cache.as_ref());
+                self.mesh = Some((ground, scene.triangles.clone(), mesh.clone()));
                 mesh
             }
         }

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 
+use crate::util::words::words;
+
 use super::{AT_SIDES, Beyond, EDGES, HullFace, MAX_PRISMS, Prism, Shell};
 
 /// The side of a mesh that a shell lies on.
@@ -15,6 +17,8 @@ pub enum Side {
     /// Against the normals: the mesh is the outer surface.
     Inward,
 }
+
+words! { Side { Outward => "outward", Inward => "inward" } }
 
 /// A mesh that a shell is built on.
 #[derive(Clone, Debug, Default)]

@@ -190,6 +190,18 @@ impl Shell {
         Some([(e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down])
     }
 
+    /// Corners of the box around the shell, metres.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        [Vec3::min, Vec3::max].map(|f| self.points.iter().copied().reduce(f).unwrap_or_default())
+    }
+
+    /// Mean distance of the two surfaces at the vertices, metres.
+    pub fn mean_thickness(&self) -> f64 {
+        let pairs = self.points.as_chunks::<2>().0;
+        let sum: f64 = pairs.iter().map(|[outer, inner]| f64::from(outer.distance(*inner))).sum();
+        sum / pairs.len().max(1) as f64
+    }
+
     /// Bytes that the shell takes in memory.
     pub fn bytes(&self) -> u64 {
         let of = |count: usize, size: usize| (count * size) as u64;

@@ -7,6 +7,7 @@
 //! of a choice stand at its enum (see `src/util/words.rs`).
 
 mod light;
+mod meshes;
 mod picture;
 mod place;
 mod sheet;
@@ -109,6 +110,8 @@ pub const POINT_MAX: f64 = 1.0e7;
 pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
+/// Parameters that no scene has of itself, besides lists.
+const OPTIONAL: [&str; 2] = [meshes::COLOR, meshes::MATERIAL];
 /// Longest line of text in docs/parameters.md, characters.
 const COLUMNS: usize = 110;
 
@@ -125,6 +128,7 @@ pub const GROUPS: &[Group] = &[
     sheet::SHEETS,
     splash::SPLASHES,
     trace::MATERIALS_AND_QUADS,
+    meshes::MESHES,
     trace::TRACE,
     light::LIGHT,
     light::STRAND,
@@ -180,7 +184,7 @@ pub(super) fn matches(pattern: &str, key: &str) -> bool {
         && parts.next().is_none()
 }
 
-/// The part of a key after its last dot. In no pattern it is `*`.
+/// The part of a key after its last dot. In one pattern alone, that of materials of meshes, it is `*`.
 pub fn last_part(key: &str) -> &str {
     key.rsplit('.').next().unwrap_or(key)
 }
@@ -213,7 +217,13 @@ impl Param {
             }
             params
         });
-        BY_LAST_PART.get(last_part(key))?.iter().find(|param| matches(param.key, key)).copied()
+        let find = |last: &str| BY_LAST_PART.get(last)?.iter().find(|param| matches(param.key, key)).copied();
+        find(last_part(key)).or_else(|| find("*"))
+    }
+
+    /// Whether the parameter has no value unless the scene gives one. A printed scene leaves it out then.
+    pub fn is_optional(&self) -> bool {
+        self.is_list() || OPTIONAL.contains(&self.key)
     }
 
     /// Formats the range for messages and tables.
@@ -239,6 +249,7 @@ impl Param {
     /// Formats the default for tables.
     pub fn default_words(&self) -> String {
         match self.kind {
+            _ if OPTIONAL.contains(&self.key) => "none".into(),
             Float(.., d) => number(d),
             Int(.., d) => d.to_string(),
             Choice(words) => words[0].into(),

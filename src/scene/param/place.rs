@@ -186,6 +186,12 @@ pub(super) const CAMERA: Group = Group {
     about: "The camera is a pinhole at `camera.eye` that looks at `camera.target`. In the viewer the mouse \
          moves it.",
     params: &[
+        p("camera.from", "", "", Text(""), Uniform)
+            .doc(
+                "Name of a mesh whose camera is taken, such as `cliff`, or `cliff/Camera` for one of \
+                 several: its place, direction and field of view. `taki batch` moves it as the file does.",
+            )
+            .when("Set it to see a scene as the other program shows it."),
         p("camera.eye", "", "m", Point([0.0, 0.0, 5.0]), Uniform)
             .doc("Position of the camera.")
             .when("Move it low and near to make a fall look high; move it away to show where the water is."),

@@ -3,6 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::scene::meshes::{Carrier, SIDES, ThicknessFrom};
 use crate::trace::{AttenuationKind, Lookup, Prefilter};
 
 pub(super) const MATERIALS_AND_QUADS: Group = Group {
@@ -32,6 +33,28 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
         p("materials.*.volume", "", "", Text("water"), Upload)
             .doc("Name of the volume that the material shows: `water`, or one of `volumes`.")
             .when("Name another volume for other matter beside the water, such as grass on the bank."),
+        p("materials.*.carrier", "", "", Choice(Carrier::WORDS), Upload)
+            .doc(
+                "What carries the volume on a mesh. `face`: each face carries it as a quad does, with copies \
+                 that go on beside and behind it. `shell`: the volume fills the space between the mesh and \
+                 its offset, and ends there.",
+            )
+            .when(
+                "Choose `shell` for fur, grass and all that needs a silhouette; keep `face` for thin water. \
+                 Quads, sheets and splashes are faces.",
+            ),
+        p("materials.*.side", "", "", Choice(SIDES), Upload)
+            .doc("Side of the mesh on which a shell lies.")
+            .when("Choose `inward` for matter that fills the mesh, such as foam or ice."),
+        p("materials.*.skin", "", "", Switch(true), Upload)
+            .doc(
+                "Whether the mesh under an outward shell is opaque: it is drawn, and no light comes through \
+                 it.",
+            )
+            .when("Turn it off for matter without a body, such as a cloud."),
+        p("materials.*.thickness_from", "", "", Choice(ThicknessFrom::WORDS), Upload)
+            .doc("What scales the thickness of a shell: nothing, or the red of the vertices' `color`.")
+            .when("Choose `color` and paint vertices darker where fur is shorter; black is bald."),
         p("quads.*.corners", "A B C D", "m", Corners, Upload)
             .doc(
                 "Corners at (u,v) = (0,0), (1,0), (1,1) and (0,1). They lie in one plane and are convex; \

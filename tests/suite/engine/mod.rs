@@ -8,6 +8,7 @@ pub mod gpu;
 pub mod layers;
 pub mod lockstep;
 pub mod long_walks;
+pub mod meshes;
 pub mod overlap;
 pub mod rasters;
 pub mod ray;

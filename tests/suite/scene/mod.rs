@@ -2,6 +2,7 @@
 //! its key, range and line, and no text makes the reader panic.
 
 pub mod animation;
+pub mod meshes;
 pub mod presets;
 pub mod slips;
 pub mod volumes;
@@ -13,8 +14,11 @@ use std::time::{Duration, Instant};
 use crate::cli::faults::{run, taki};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use serde_json::json;
 use taki::scene::{Kind, Limits, PARAMS, Param, Place, Raw, Scene, Source, Value, Values, presets};
 use tempfile::tempdir;
+
+use crate::model::Doc;
 
 const FIG5: &str = include_str!("../../../assets/scenes/fig5.toml");
 /// A scene with one of everything that a scene can name.
@@ -31,6 +35,8 @@ repeat_u = 2.0
 volume = \"a\"
 [volumes.a]
 nx = 8
+[meshes.a]
+file = \"a.glb\"
 [sheets.a]
 points = [[0, 1, 0], [0, 0, 1]]
 material = \"a\"
@@ -77,6 +83,18 @@ fn refused<T>(result: Result<T, String>, words: &[&str]) {
     words.iter().for_each(|word| assert!(error.contains(word), "no {word:?} in: {error}"));
 }
 
+/// Writes `ONE_OF_EACH` and its mesh into a folder, and returns the path of the scene.
+fn one_of_each(folder: &Path) -> PathBuf {
+    let mut mesh = Doc::square();
+    mesh.json["materials"][0]["name"] = json!("a");
+    mesh.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]);
+    mesh.json["nodes"][0]["camera"] = json!(0);
+    fs::write(folder.join("a.glb"), mesh.glb()).unwrap();
+    let file = folder.join("one.toml");
+    fs::write(&file, ONE_OF_EACH).unwrap();
+    file
+}
+
 /// Key of a parameter in `ONE_OF_EACH`.
 fn concrete(param: &Param) -> String {
     param.key.replace(
@@ -93,13 +111,19 @@ fn another(param: &Param) -> String {
         Kind::Choice(words) => words[1].into(),
         Kind::Switch(on) => (!on).to_string(),
         // Colours of pools and rocks are albedos.
-        Kind::Color(_) if param.key.starts_with("pools") || param.key == "rocks.*.color" => {
+        Kind::Color(_)
+            if param.key.starts_with("pools") || ["rocks.*.color", "meshes.*.color"].contains(&param.key) =>
+        {
             "[0.25, 0.5, 1.0]".into()
         }
         Kind::Color(_) => "[0.25, 3.0, 10000.0]".into(),
         Kind::Point(_) => "[-2.5, 3.25, 77.0]".into(),
         Kind::Text(_) if param.key.ends_with("material") => "water".into(),
-        Kind::Text(_) if param.key == "materials.*.volume" => "a".into(),
+        Kind::Text(_) if param.key == "meshes.*.materials.*" => "water".into(),
+        Kind::Text(_) if ["materials.*.volume", "camera.from"].contains(&param.key) => "a".into(),
+        Kind::Text(_) if param.key == "meshes.*.file" => {
+            format!("{:?}", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/model/trimesh.glb"))
+        }
         // A volume file is to be there.
         Kind::Text(_) => format!("{:?}", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")),
         Kind::Corners if param.key.starts_with("pools") => {
@@ -115,13 +139,17 @@ fn another(param: &Param) -> String {
 #[test]
 fn every_parameter_can_be_set_and_is_printed() {
     let dir = tempdir().unwrap();
-    let file = dir.path().join("one.toml");
-    fs::write(&file, ONE_OF_EACH).unwrap();
+    let file = one_of_each(dir.path());
     let before = Scene::load(&file, &[], &Limits::default()).unwrap();
     for param in PARAMS {
         let (key, text) = (concrete(param), another(param));
-        let scene = Scene::load(&file, &[format!("{key} = {text}")], &Limits::default())
-            .unwrap_or_else(|e| panic!("{key} = {text}: {e}"));
+        let mut sets = vec![format!("{key} = {text}")];
+        if param.key == "materials.*.carrier" {
+            // A shell lies on meshes alone.
+            sets.extend(["quads.0", "sheets.a", "splashes.a"].map(|user| format!("{user}.material = water")));
+        }
+        let scene =
+            Scene::load(&file, &sets, &Limits::default()).unwrap_or_else(|e| panic!("{key} = {text}: {e}"));
         assert!(scene.values().unwrap().is_set(&key), "{key}");
         assert_ne!(scene.values().unwrap().get(&key), before.values().unwrap().get(&key), "{key} = {text}");
         let line =
@@ -145,11 +173,19 @@ fn shown(holdout: Option<bool>) -> &'static str {
 #[test]
 fn every_word_of_a_choice_gives_the_variant_of_its_name() {
     let dir = tempdir().unwrap();
-    let file = dir.path().join("one.toml");
-    fs::write(&file, ONE_OF_EACH).unwrap();
+    let file = one_of_each(dir.path());
     for param in PARAMS {
-        // The scene's values do not tell the kind of its environment or its animation.
-        let is_kept = !["environment.kind", "animate.tracks.*.interpolation"].contains(&param.key);
+        // The scene's values do not tell the kind of its environment or its animation. Those of carriers and
+        // projections are told by the surfaces of a mesh, which the tests of meshes compare.
+        let is_kept = ![
+            "environment.kind",
+            "animate.tracks.*.interpolation",
+            "materials.*.carrier",
+            "materials.*.side",
+            "materials.*.thickness_from",
+            "meshes.*.projection",
+        ]
+        .contains(&param.key);
         let Kind::Choice(words) = param.kind else { continue };
         for word in words.iter().filter(|_| is_kept) {
             let setting = format!("{} = {word}", concrete(param));
@@ -166,6 +202,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "light.scattering" => scene.scattering.word(),
                 "light.visibility" => scene.visibility.word(),
                 "lights.*.kind" => scene.lights[0].kind().word(),
+                "meshes.*.show" => shown(scene.triangles.first().map(|own| own.holdout)),
                 "pools.*.show" => shown(scene.pools.first().map(|pool| pool.holdout)),
                 "rocks.*.show" => shown(scene.rocks.first().map(|rock| rock.holdout)),
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),

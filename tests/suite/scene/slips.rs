@@ -504,7 +504,7 @@ fn what_a_scene_has_and_does_not_use_is_told() {
     let watter = said("base = \"waterfall\"\n[materials.watter]\nthickness = 1", &[]);
     assert!(watter.contains("nothing has the material watter: did you mean water?"), "{watter}");
     let other = said("base = \"waterfall\"\n[materials.slime]\nthickness = 1", &[]);
-    assert!(other.contains("give a sheet, splash or quad material = \"slime\""), "{other}");
+    assert!(other.contains("give a sheet, splash, quad or mesh material = \"slime\""), "{other}");
     // The base's own materials may be left over, and a scene without water needs none.
     let none = "remove = [\"sheets.mist_foot\", \"sheets.mist_low\"]\n[materials.mist]\nmist = 0.1";
     assert_eq!(said(&format!("base = \"waterfall\"\n{none}"), &[]), "");

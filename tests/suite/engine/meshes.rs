@@ -1,0 +1,278 @@
+//! Meshes of other programs on both engines: faces as quads, opaque parts with the file's colours, shells.
+
+use image::{Rgb, RgbImage};
+use serde_json::json;
+use taki::engine::{Engine, EngineChoice, RenderOptions, cpu, overlap};
+use taki::output::frame::{Difference, Tolerance};
+use taki::picture::Frame;
+use taki::scene::Scene;
+use taki::util::error::Error;
+use taki::util::monitor::Unwatched;
+
+use super::gpu::{SURFACE, assert_parity, both, renderer};
+use crate::model::{Doc, SQUARE, floats, shorts};
+use crate::scene::meshes::{Folder, PLACE};
+
+fn on_cpu(scene: &Scene) -> Frame {
+    let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
+    cpu::render(scene, &volumes, &scene.mesh(), true, &Unwatched).expect("a frame")
+}
+
+fn difference(a: &Frame, b: &Frame, relative: f32) -> Difference {
+    let rgb = |frame: &Frame| frame.radiance.iter().map(|r| [r[0], r[1], r[2]]).collect::<Vec<_>>();
+    Difference::new(a.width, &rgb(a), &rgb(b), Tolerance { relative, absolute: 1e-5 })
+}
+
+/// The quad of `front` in OBJ, whose v runs up, cut by `faces`.
+fn plane(faces: &str) -> String {
+    format!(
+        "v -0.5 -0.5 0.5\nv 0.5 -0.5 0.5\nv 0.5 0.5 0.5\nv -0.5 0.5 0.5\n\
+         vt 0 1\nvt 1 1\nvt 1 0\nvt 0 0\nusemtl Water\n{faces}"
+    )
+}
+
+/// The scene of that file as faces of `water`.
+const MESH: &str = "[meshes.a]\nfile = \"a.obj\"\nmaterial = \"water\"\n";
+
+#[test]
+fn a_plane_of_one_face_is_the_quad_of_a_scene_to_the_bit() {
+    let folder = Folder::new();
+    folder.write("a.obj", plane("f 1/1 2/2 3/3 4/4\n"));
+    let own = PLACE.replace("remove = [\"quads\"]\n", "");
+    for sets in [
+        &["materials.water.repeat_u=1.7", "materials.water.repeat_v=0.6"][..],
+        &["light.visibility=cached"],
+        &["light.visibility=march", "materials.water.mist=0.4"],
+    ] {
+        let sets = [sets, &["camera.eye=[1.2,0.7,2.5]"]].concat();
+        let (quad, mesh) = (folder.scene(&own, &sets), folder.scene(&format!("{PLACE}{MESH}"), &sets));
+        assert_eq!(quad.quads, mesh.quads);
+        let [quad, mesh] = [quad, mesh].map(|scene| on_cpu(&scene));
+        assert!(quad.radiance == mesh.radiance && quad.counts == mesh.counts, "{sets:?}");
+        assert!(quad.counts.iter().map(|c| c[0]).sum::<u32>() > 1000);
+    }
+}
+
+#[test]
+fn a_plane_of_triangles_is_the_quad_but_for_rounding() {
+    let folder = Folder::new();
+    // The second begins with another corner, so that the two are no pair.
+    folder.write("a.obj", plane("f 1/1 2/2 3/3\nf 3/3 4/4 1/1\n"));
+    let own = PLACE.replace("remove = [\"quads\"]\n", "");
+    let sets = ["camera.eye=[1.2,0.7,2.5]", "materials.water.repeat_u=1.7", "light.visibility=march"];
+    let (quad, mesh) = (folder.scene(&own, &sets), folder.scene(&format!("{PLACE}{MESH}"), &sets));
+    assert_eq!(mesh.quads.len(), 2);
+    assert!(mesh.quads.iter().all(|quad| quad.is_triangle() && quad.map.is_parallelogram()));
+    assert_eq!(overlap::sheets(&mesh), 1, "they stand side by side");
+    let [quad, mesh] = [quad, mesh].map(|scene| on_cpu(&scene));
+    let far = difference(&quad, &mesh, 1e-3);
+    // A pixel on the cut may lie in neither or both of what the rasteriser snaps; none does here.
+    assert!(far.share_outside() < 2e-3, "{far:?}");
+    let other =
+        folder.scene(&format!("{PLACE}{MESH}"), &[&sets[..], &["materials.water.repeat_v=1.3"]].concat());
+    assert!(
+        difference(&quad, &on_cpu(&other), 1e-3).share_outside() > 0.05,
+        "another map is another picture"
+    );
+}
+
+/// A strip that is bent, with oblique, mirrored and curved coordinates, in triangles that are no pairs and in
+/// quads.
+fn bent(is_split: bool) -> String {
+    let (mut text, mut faces) = (String::new(), String::new());
+    for i in 0..=6 {
+        let angle = i as f32 * 0.35 - 1.0;
+        for y in [-0.6f32, 0.0, 0.6] {
+            let (x, z) = (angle.sin(), angle.cos() - 0.6);
+            text += &format!("v {x} {y} {z}\nvt {} {}\n", 1.0 - i as f32 / 6.0, y * 0.8 + 0.1 * angle + 0.5);
+        }
+    }
+    for i in 0..6 {
+        for j in 1..=2 {
+            let [a, b, c, d] =
+                [i * 3 + j, i * 3 + j + 3, i * 3 + j + 4, i * 3 + j + 1].map(|n| format!("{n}/{n}"));
+            faces += &match is_split {
+                true => format!("f {a} {b} {c}\nf {c} {d} {a}\n"),
+                false => format!("f {a} {b} {c} {d}\n"),
+            };
+        }
+    }
+    text + "usemtl Water\n" + &faces
+}
+
+#[test]
+fn faces_agree_on_both_engines() {
+    let Some(mut renderer) = renderer("faces of meshes") else { return };
+    let folder = Folder::new();
+    for is_split in [false, true] {
+        folder.write("a.obj", bent(is_split));
+        let rock = "[meshes.rock]\nfile = \"blender.glb\"\nposition = [0, -0.9, -0.5]\nscale = 0.3\n\
+                    turn = [10, 20, 30]\n[meshes.rock.materials]\nFall = \"water\"\n";
+        let text = format!("{PLACE}{MESH}{rock}");
+        for sets in [
+            &["light.visibility=march", "camera.eye=[1.5,0.9,3]"][..],
+            &["light.visibility=cached", "materials.water.repeat_v=2.5"],
+            &["lights.key.kind=point", "lights.key.position=[0.4,0.3,2]", "image.samples=3"],
+            &["materials.water.mist=0.5", "light.visibility=march"],
+        ] {
+            let scene = folder.scene(&text, &[sets, &["materials.water.thickness=0.1"]].concat());
+            let frames = both(&mut renderer, &scene);
+            assert_parity(&format!("split {is_split}, {sets:?}"), &frames);
+            assert!(frames[1].counts.iter().map(|c| c[0]).sum::<u32>() > 1000, "{sets:?}");
+        }
+    }
+}
+
+#[test]
+fn opaque_parts_have_the_colours_of_their_texture() {
+    let folder = Folder::new();
+    let mut doc = Doc::square();
+    let image = RgbImage::from_fn(4, 2, |x, y| {
+        Rgb([(50 * x + 90) as u8, (100 * y + 80) as u8, (x * 20 + y * 90 + 80) as u8])
+    });
+    let mut png = Vec::new();
+    image.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let view = doc.view(&png);
+    doc.json["images"] = json!([{"bufferView": view, "mimeType": "image/png"}]);
+    doc.json["samplers"] = json!([{"wrapS": 33648, "wrapT": 33071}]);
+    doc.json["textures"] = json!([{"source": 0, "sampler": 0}]);
+    let transform = json!({"KHR_texture_transform": {"offset": [0.3, -0.2], "scale": [1.5, 0.7]}});
+    doc.json["extensionsUsed"] = json!(["KHR_texture_transform"]);
+    doc.json["materials"][0]["pbrMetallicRoughness"] = json!({
+        "baseColorFactor": [0.5, 0.8, 1.0, 1.0],
+        "baseColorTexture": {"index": 0, "extensions": transform},
+    });
+    let colors = [0.5, 1.0, 0.25, 1.0, 1.0, 1.0, 0.1, 0.2, 0.3, 1.0, 0.0, 0.5];
+    let accessor = doc.add("VEC3", 5126, 4, &floats(&colors));
+    doc.primitive()["attributes"]["COLOR_0"] = json!(accessor);
+    folder.write("a.glb", doc.glb());
+    let text = format!("{PLACE}[meshes.a]\nfile = \"a.glb\"\n");
+    let scene = folder.scene(&text, &[]);
+    // Independent of the code: bilinear in linear light, mirrored along u, clamped along v.
+    let linear = |code: u8| {
+        let x = f64::from(code) / 255.0;
+        if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    };
+    let texel = |x: i64, y: i64, c: usize| {
+        let x = x.rem_euclid(8);
+        let x = if x < 4 { x } else { 7 - x };
+        linear(image.get_pixel(x as u32, y.clamp(0, 1) as u32).0[c])
+    };
+    let uvs = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]];
+    let mut seen = 0;
+    for vertex in scene.triangles[0].vertices.iter() {
+        let i = SQUARE.as_chunks::<3>().0.iter().position(|p| *p == vertex.position).expect("a corner");
+        let at = [(uvs[i][0] * 1.5 + 0.3) * 4.0 - 0.5, (uvs[i][1] * 0.7 - 0.2) * 2.0 - 0.5];
+        let (x, y) = (f64::floor(at[0]), f64::floor(at[1]));
+        let (fx, fy) = (at[0] - x, at[1] - y);
+        for c in 0..3 {
+            let get = |dx: i64, dy: i64| texel(x as i64 + dx, y as i64 + dy, c);
+            let low = get(0, 0) * (1.0 - fx) + get(1, 0) * fx;
+            let high = get(0, 1) * (1.0 - fx) + get(1, 1) * fx;
+            let want = (low * (1.0 - fy) + high * fy) * [0.5, 0.8, 1.0][c] * f64::from(colors[3 * i + c]);
+            assert!(
+                (f64::from(vertex.albedo[c]) - want).abs() < 1e-6,
+                "{i} {c}: {} {want}",
+                vertex.albedo[c]
+            );
+            seen += usize::from(want > 0.01);
+        }
+    }
+    assert!(seen > 9, "most are not black: {seen}");
+    let plain = folder.scene(&text, &["meshes.a.color=[0.2,0.4,0.6]"]);
+    assert!(plain.triangles[0].vertices.iter().all(|v| v.albedo == [0.2, 0.4, 0.6]));
+    // An opaque white square under light from everywhere has its albedo for radiance.
+    let sets = [
+        "meshes.a.color=[0.2,0.4,0.6]",
+        "light.ambient=[1,1,1]",
+        "lights.key.intensity=0",
+        "camera.eye=[0.5,0.5,1.5]",
+        "camera.target=[0.5,0.5,0]",
+    ];
+    let frame = on_cpu(&folder.scene(&text, &sets));
+    let middle = frame.radiance[frame.radiance.len() / 2 + frame.width as usize / 2];
+    assert!((middle[0] - 0.2).abs() < 1e-3 && (middle[2] - 0.6).abs() < 1e-3, "{middle:?}");
+}
+
+/// A sphere in glTF without coordinates.
+fn ball() -> Vec<u8> {
+    let mut doc = Doc::empty();
+    let (mut points, mut indices) = (Vec::new(), Vec::new());
+    let (columns, rows) = (24u16, 12u16);
+    for j in 0..=rows {
+        let polar = f32::from(j) / f32::from(rows) * std::f32::consts::PI;
+        for i in 0..columns {
+            let turn = f32::from(i) / f32::from(columns) * std::f32::consts::TAU;
+            points.extend([polar.sin() * turn.sin(), polar.cos(), polar.sin() * turn.cos()]);
+        }
+    }
+    for j in 0..rows {
+        for i in 0..columns {
+            let at = |di: u16, dj: u16| (j + dj) * columns + (i + di) % columns;
+            if j > 0 {
+                indices.extend([at(0, 0), at(0, 1), at(1, 0)]);
+            }
+            if j + 1 < rows {
+                indices.extend([at(1, 0), at(0, 1), at(1, 1)]);
+            }
+        }
+    }
+    let position = doc.add("VEC3", 5126, points.len() / 3, &floats(&points));
+    let accessor = doc.add("SCALAR", 5123, indices.len(), &shorts(&indices));
+    doc.json["meshes"] =
+        json!([{"primitives": [{"attributes": {"POSITION": position}, "indices": accessor}]}]);
+    doc.json["nodes"][0]["mesh"] = json!(0);
+    doc.glb()
+}
+
+#[test]
+fn a_shell_has_a_silhouette_and_is_drawn_by_the_cpu_engine() {
+    let folder = Folder::new();
+    folder.write("ball.glb", ball());
+    let text = format!(
+        "{PLACE}[materials.fur]\nthickness = 0.3\ncarrier = \"shell\"\n[meshes.ball]\nfile = \"ball.glb\"\n\
+         scale = 0.5\nmaterial = \"fur\"\nprojection = \"box\"\nprojection_size = 0.5\n"
+    );
+    let sets = [
+        "trace.sigma=20",
+        "camera.eye=[0,0,4]",
+        "camera.fov=40",
+        "image.height=48",
+        "light.visibility=march",
+    ];
+    let scene = folder.scene(&text, &sets);
+    let frame = on_cpu(&scene);
+    // Tangent of the angle to a pixel's middle, and the radii of what is seen there: the opaque ball hides
+    // what lies within 0.5, and the fur ends at 0.8.
+    let (mut inside, mut fur, mut outside) = ([0; 2], [0; 2], [0; 2]);
+    for (i, cells) in frame.counts.iter().enumerate() {
+        let [x, y] = [i % 48, i / 48].map(|k| (k as f64 + 0.5) / 24.0 - 1.0);
+        let tangent = x.hypot(y) * 20f64.to_radians().tan();
+        let closest = 4.0 * tangent / (1.0 + tangent * tangent).sqrt();
+        let seen = match closest {
+            ..0.47 => &mut inside,
+            0.53..0.74 => &mut fur,
+            0.82.. => &mut outside,
+            _ => continue,
+        };
+        seen[usize::from(cells[0] > 0)] += 1;
+    }
+    assert!(inside[0] == 0 && fur[0] == 0 && outside[1] == 0, "{inside:?} {fur:?} {outside:?}");
+    assert!(inside[1] > 150 && fur[1] > 150 && outside[0] > 500, "{inside:?} {fur:?} {outside:?}");
+    let light = |closest: std::ops::Range<usize>| {
+        frame.radiance[24 * 48..][closest].iter().map(|r| r[0]).sum::<f32>()
+    };
+    assert!(light(20..28) > 0.0);
+    let bald = on_cpu(&folder.scene(&text, &[&sets[..], &["materials.fur.skin=false"]].concat()));
+    assert!(bald.counts != frame.counts, "without a skin rays walk through the ball");
+    // On the GPU it is refused, so that `auto` takes the CPU.
+    let Some(mut renderer) = renderer("shells") else { return };
+    let volumes = scene.volumes(1 << 30, &Unwatched).unwrap();
+    let e = renderer.render(&scene, &volumes, &scene.mesh(), &SURFACE, &Unwatched).expect_err("refused");
+    assert!(matches!(&e, Error::Device { .. }) && format!("{e:?}").contains("--engine cpu"), "{e:?}");
+    let (mut engine, _) = Engine::open(EngineChoice::Auto, &Default::default()).unwrap();
+    let options = RenderOptions::default();
+    let auto = engine.render_volume(&scene, &volumes, &scene.mesh(), &options, &Unwatched).unwrap();
+    assert_eq!(engine.word(), "cpu");
+    assert!(auto.counts == frame.counts);
+}
