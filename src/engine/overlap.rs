@@ -1,7 +1,7 @@
 //! Overlap of the volume quads in the image. It bounds the sheets a ray may cross, and thus the layers that
 //! the raster pass keeps. A scene whose quads stand side by side needs one layer.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::scene::Scene;
 
@@ -95,29 +95,47 @@ fn images(scene: &Scene) -> Vec<Polygon> {
         return Vec::new();
     };
     // Corners may leave their plane by 1e-4, so a quad seen edge-on may not be convex.
-    outlines(scene).filter_map(|points| Polygon::new(hull(points))?.cut(&frame)).collect()
+    let outline = Outline::new(scene);
+    let outlines = scene.quads.iter().map(|quad| outline.of(&quad.corners));
+    outlines.filter_map(|points| Polygon::new(hull(points))?.cut(&frame)).collect()
 }
 
-/// Projects the quads' corners to pixels after clipping at the near plane. A quad behind it has no corners.
-fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
-    let camera = &scene.camera;
-    let [width, height] = [scene.image.width, scene.image.height];
-    let size = DVec2::new(width.into(), height.into());
-    let ([forward, right, up], eye) = (camera.rays(width, height), camera.eye_local());
-    let near = f64::from(camera.near);
-    scene.quads.iter().map(move |quad| {
+/// The projection of faces' corners to pixels.
+struct Outline {
+    /// Forward, right and up.
+    axes: [DVec3; 3],
+    eye: DVec3,
+    near: f64,
+    /// Size of the image, pixels.
+    size: DVec2,
+}
+
+impl Outline {
+    fn new(scene: &Scene) -> Self {
+        let [width, height] = [scene.image.width, scene.image.height];
+        Outline {
+            axes: scene.camera.rays(width, height),
+            eye: scene.camera.eye_local(),
+            near: f64::from(scene.camera.near),
+            size: DVec2::new(width.into(), height.into()),
+        }
+    }
+
+    /// Projects a face's corners after clipping at the near plane. A face behind it has none.
+    fn of(&self, corners: &[Vec3]) -> Vec<DVec2> {
+        let &Outline { axes: [forward, right, up], eye, near, size } = self;
         // x and y are in units of the image plane; z is the distance along the view axis.
-        let in_view = quad.corners.map(|corner| {
+        let in_view = |corner: Vec3| {
             let away = corner.as_dvec3() - eye;
             let along = |axis: DVec3| away.dot(axis) / axis.length_squared();
             DVec3::new(along(right), along(up), along(forward))
-        });
-        let mut points = Vec::new();
+        };
+        let mut points = Vec::with_capacity(corners.len() + 1);
         let mut add = |p: DVec3| {
             points.push((DVec2::new(p.x, -p.y) / p.z * 0.5 + 0.5) * size);
         };
-        for i in 0..4 {
-            let (p, q) = (in_view[i], in_view[(i + 1) % 4]);
+        for i in 0..corners.len() {
+            let (p, q) = (in_view(corners[i]), in_view(corners[(i + 1) % corners.len()]));
             if p.z >= near {
                 add(p);
             }
@@ -128,14 +146,14 @@ fn outlines(scene: &Scene) -> impl Iterator<Item = Vec<DVec2>> {
             }
         }
         points
-    })
+    }
 }
 
 /// Pixels by which a quad's image may exceed its outline here: samples lie within a pixel and a half of it,
 /// and float32 rounds.
 const MARGIN: f64 = 3.0;
 
-/// Marks the squares of a grid that a volume quad may appear in, row by row. The grid has `count` squares
+/// Marks the squares of a grid that a volume quad or a face of a shell's hull may appear in, row by row. The grid has `count` squares
 /// along x and y, each `side` pixels wide, and begins at pixel `corner` of the image. Every square in which a
 /// quad appears is marked; a few others may be.
 pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> Vec<bool> {
@@ -143,9 +161,16 @@ pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> V
     let corner = DVec2::new(corner[0].into(), corner[1].into());
     let side = f64::from(side);
     let mut squares = vec![false; across * down];
-    for points in outlines(scene) {
-        let points: Vec<DVec2> = points.iter().map(|p| *p - corner).collect();
-        for row in 0..down {
+    let outline = Outline::new(scene);
+    let mut mark = |corners: &[Vec3]| {
+        let mut points = outline.of(corners);
+        points.iter_mut().for_each(|p| *p -= corner);
+        let [low, high] = points
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(p.y), high.max(p.y)]);
+        let first = ((low - MARGIN) / side).floor().max(0.0) as usize;
+        let end = (((high + MARGIN) / side).floor() + 1.0).clamp(0.0, down as f64) as usize;
+        for row in first..end {
             let [top, bottom] = [row as f64 * side - MARGIN, (row + 1) as f64 * side + MARGIN];
             let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
             for (i, &p) in points.iter().enumerate() {
@@ -168,6 +193,10 @@ pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> V
                 squares[row * across..][first as usize..end as usize].fill(true);
             }
         }
+    };
+    scene.quads.iter().for_each(|quad| mark(&quad.corners));
+    for shell in &scene.shells {
+        shell.hull.iter().for_each(|face| mark(&shell.corners(face)));
     }
     squares
 }
