@@ -153,6 +153,10 @@ fn cross2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.y - a.y * b.x;
 }
 
+fn cross3(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
 // Dot product, summed from left to right as in the CPU twins. The built-in `dot` leaves the order to the
 // device.
 fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
@@ -178,6 +182,12 @@ fn light_from(light: Light, point: vec3<f32>) -> vec4<f32> {
         falloff *= s * s * (3.0 - 2.0 * s);
     }
     return vec4<f32>(to_light, falloff);
+}
+
+// Distance of a light from a point, metres. Twin: Light::distance.
+fn light_distance(light: Light, point: vec3<f32>) -> f32 {
+    let away = light.vector - point;
+    return select(1.0e30, sqrt(dot3(away, away)), light.has_position != 0u);
 }
 
 // Share of light that water reflects, after Fresnel, by Schlick's approximation (1994). `cos_angle` is the

@@ -102,3 +102,31 @@ fn quad_hit(quad: Quad, at: vec2<f32>, length: f32) -> vec3<f32> {
     let u = dot2(hh - quad.f * v, along) / dot2(along, along);
     return vec3<f32>(clamp(u, 0.0, 1.0), clamp(v, 0.0, 1.0), t);
 }
+
+// Metres from the eye to where a ray along the unit vector `d` meets the plane of a triangle, as far as its
+// corners at most. Twin: map_hull in src/engine/cpu/gbuffer.rs.
+fn face_metres(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, eye: vec3<f32>, d: vec3<f32>) -> f32 {
+    let normal = cross3(b - a, c - a);
+    let along = vec3<f32>(dot3(a - eye, d), dot3(b - eye, d), dot3(c - eye, d));
+    let fall = dot3(normal, d);
+    let t = dot3(normal, a - eye) / select(fall, -1e-30, fall == 0.0);
+    return clamp(t, min(along.x, min(along.y, along.z)), max(along.x, max(along.y, along.z)));
+}
+
+// Shares of a triangle's corners at `metres` from the eye along `d`.
+fn face_point_shares(
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>,
+    eye: vec3<f32>,
+    d: vec3<f32>,
+    metres: f32,
+) -> vec3<f32> {
+    let p = eye + d * metres;
+    let normal = cross3(b - a, c - a);
+    let areas = vec3<f32>(dot3(cross3(b - p, c - p), normal), dot3(cross3(c - p, a - p), normal),
+        dot3(cross3(a - p, b - p), normal));
+    let inside = max(areas, vec3<f32>(0.0));
+    let sum = inside.x + inside.y + inside.z;
+    return select(vec3<f32>(1.0 / 3.0), inside / sum, sum > 0.0);
+}

@@ -5,7 +5,7 @@
 // `rock_surface` writes the tile of the mesh that a sample shows and the position in it. `opaque` shades the
 // visible rock once per sample. `volume` intersects the pixel's own ray with the quad and maps the point by
 // the exact inverse bilinear map (src/mapping/mod.rs, QuadMap::uv), so the result does not depend on how a
-// quad is cut into triangles. `peel` finds the sheets behind the nearest, one layer per pass.
+// quad is cut into triangles. `hull` does so for the faces of shells that the eye sees. `peel` finds the sheets behind the nearest, one layer per pass.
 
 #import engine::opaque
 #import engine::pool
@@ -27,6 +27,7 @@
 @group(0) @binding(11) var<storage, read> coats: array<VertexMaterial>;
 // The visible rock: position in its tile in squares of the grid, number of the tile, and depth.
 @group(0) @binding(10) var rock_surface: texture_2d<f32>;
+@group(0) @binding(12) var<storage, read> hull_faces: array<HullFace>;
 
 // Material of a vertex. The normal (signed), film of water, occlusion and shadow are packed in pairs into
 // words.
@@ -204,6 +205,52 @@ fn peel_fragment(in: VolumeVarying) -> @location(0) u32 {
         discard;
     }
     return id;
+}
+
+// A face of a hull that the eye sees: its corners, metres, and their texture coordinates. In the last parts:
+// its number among the faces, u of the first corner, and v; u and v of the second and of the third corner.
+struct HullFace {
+    a: vec3<f32>,
+    number: u32,
+    b: vec3<f32>,
+    u_a: f32,
+    c: vec3<f32>,
+    v_a: f32,
+    uv_b: vec2<f32>,
+    uv_c: vec2<f32>,
+}
+
+struct HullVarying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) @interpolate(flat) quad: u32,
+    // Its position in the list.
+    @location(1) @interpolate(flat) index: u32,
+}
+
+@vertex
+fn hull_vertex(@builtin(vertex_index) vertex: u32) -> HullVarying {
+    let index = vertex / 3u;
+    let corner = vertex % 3u;
+    let face = hull_faces[index];
+    let point = select(select(face.c, face.b, corner == 1u), face.a, corner == 0u);
+    var out: HullVarying;
+    out.clip = frame.clip_from_world * vec4<f32>(point, 1.0);
+    out.quad = face.number;
+    out.index = index;
+    return out;
+}
+
+@fragment
+fn hull_fragment(in: HullVarying) -> VolumeTargets {
+    let d = view_ray(frame, frame.window_x + u32(in.clip.x), frame.window_y + u32(in.clip.y));
+    let face = hull_faces[in.index];
+    let metres = face_metres(face.a, face.b, face.c, frame.eye_world, d);
+    let shares = face_point_shares(face.a, face.b, face.c, frame.eye_world, d, metres);
+    let uv = vec2<f32>(face.u_a, face.v_a) * shares.x + face.uv_b * shares.y + face.uv_c * shares.z;
+    var out: VolumeTargets;
+    out.surface = vec4<f32>(uv, metres, 0.0);
+    out.quad_id = in.quad + 1u;
+    return out;
 }
 
 // One triangle over the whole image, at infinity.

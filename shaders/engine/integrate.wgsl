@@ -4,6 +4,7 @@
 // in the same order; they hold the reasoning.
 
 #import engine::integrate_light
+#import engine::integrate_shell
 #import layout
 #import light::fibre
 #import light::haze
@@ -11,6 +12,7 @@
 #import light::scatter
 #import light::strand
 #import mapping
+#import mapping::shell
 #import trace::levels
 #import trace::lookup
 #import trace::matter
@@ -69,6 +71,9 @@ override MIST_APART: bool = ERODED & (LIGHTS == 1u) & !MULTIPLE & !TRILINEAR;
 @group(0) @binding(19) var<storage, read_write> uncovered: array<f32>;
 // Constants of the volumes, if there are several. A single volume has those of `frame` and `reflection`.
 @group(0) @binding(20) var<uniform> volumes: array<VolumeConstants, MAX_VOLUMES>;
+// Shells: src/engine/gpu/shells.rs. V at their vertices.
+@group(0) @binding(21) var shells: texture_2d<u32>;
+@group(0) @binding(22) var shell_light: texture_2d<f32>;
 
 // Largest number of volumes. Twin: MAX_VOLUMES of src/scene/volumes.rs.
 const MAX_VOLUMES: u32 = 64u;
@@ -164,6 +169,29 @@ fn add_sample(pixel: vec2<u32>, sample: vec4<f32>, cells: vec2<u32>) {
     }
     radiance[index] = result;
     counts[index] = count;
+}
+
+// Traces the face number `number` of the raster pass: a quad, or one of a shell's hull, which needs neither
+// `quad` nor `hit`. The arguments are those of `trace`.
+fn trace_face(
+    quad: Quad,
+    number: u32,
+    pixel: vec2<u32>,
+    hit: vec3<f32>,
+    behind: vec3<f32>,
+    before: vec4<f32>,
+    is_last: bool,
+    count: ptr<function, vec2<u32>>,
+) -> vec4<f32> {
+    if SHELLS {
+        if !QUADS {
+            return trace_shell(number, pixel, behind, before, is_last, count);
+        }
+        if number >= first_hull_face() {
+            return trace_shell(number, pixel, behind, before, is_last, count);
+        }
+    }
+    return trace(quad, number, pixel, hit, behind, before, is_last, count);
 }
 
 // State of a ray that changes from cell to cell.

@@ -23,7 +23,7 @@ fn sheets(nearest: u32, pixel: vec2<u32>, behind: vec3<f32>, count: ptr<function
         if layer > 1u {
             hit = quad_hit(quad, at, length);
         }
-        result = trace(quad, quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
+        result = trace_face(quad, quad_number - 1u, pixel, hit, behind, result, next == 0u, count);
         ended = result.w < frame.early_end || (*count).x == CUT;
         if ended {
             break;

@@ -9,6 +9,7 @@ use super::layout::{FrameUniforms, Tile};
 use super::prepared::PreparedScene;
 use super::reflection::Reflections;
 use super::renderer::GpuRenderer;
+use super::shells::ShellLightPass;
 use super::targets::{TargetShape, Targets};
 use super::upload::Resident;
 use super::visibility::{FilledVolumes, VisibilityInputs, VisibilityPass};
@@ -43,6 +44,7 @@ struct Pass {
     scene: Rc<PreparedScene>,
     frame: FrameUniforms,
     filled: FilledVolumes,
+    shell_light: wgpu::TextureView,
 }
 
 enum Work {
@@ -114,10 +116,19 @@ impl GpuBench {
                     }
                 };
             }
+            let shell_light =
+                ShellLightPass::default().get((gpu, timer), scene, volumes, &prepared.up, |_, _| Ok(()));
+            let shell_light = match shell_light {
+                Ok((light, _)) => light,
+                Err(e) => {
+                    failed.push((name, e));
+                    continue;
+                }
+            };
             let is_first = passes.is_empty();
             let mut add = |name, work, scene: &Rc<PreparedScene>, filled: &FilledVolumes| {
-                let (scene, filled) = (scene.clone(), filled.clone());
-                passes.push((name, Pass { work, scene, frame, filled }));
+                let (scene, filled, shell_light) = (scene.clone(), filled.clone(), shell_light.clone());
+                passes.push((name, Pass { work, scene, frame, filled, shell_light }));
             };
             if is_first {
                 add("gbuffer", Work::Gbuffer, &prepared, &filled);
@@ -180,7 +191,7 @@ impl GpuBench {
     pub fn run(&mut self, number: usize) -> Result<(f64, u64)> {
         let GpuRenderer { gpu, timer, gbuffer, .. } = &self.renderer;
         let p = self.prepared.as_mut().expect("prepare comes first");
-        let Pass { work, scene, frame, filled } = &mut p.passes[number].1;
+        let Pass { work, scene, frame, filled, shell_light } = &mut p.passes[number].1;
         let window = p.window;
         let inputs = Inputs {
             gpu,
@@ -192,6 +203,7 @@ impl GpuBench {
             frame,
             groups: &p.groups,
             filled,
+            shell_light,
             reflection: &scene.reflection,
             volumes: &scene.volumes,
         };

@@ -29,6 +29,7 @@ bindings! {
         TILES = 9
         ROCK_SURFACE = 10
         COATS = 11
+        HULL_FACES = 12
     }
     /// `shaders/engine/integrate.wgsl`; `shaders/engine/bare.wgsl` has some of them.
     integrate {
@@ -53,6 +54,8 @@ bindings! {
         OPAQUE_NORMAL = 18
         UNCOVERED = 19
         VOLUMES = 20
+        SHELLS = 21
+        SHELL_LIGHT = 22
     }
     /// `shaders/picture/resolve.wgsl`.
     resolve {
@@ -71,6 +74,15 @@ bindings! {
         COLUMNS = 3
         LIGHT_VOLUMES = 4
         BRICKS = 5
+    }
+    /// `shaders/light/shell_light.wgsl`.
+    shell_light {
+        PART = 0
+        LIGHTS = 1
+        VOLUME = 2
+        BRICKS = 3
+        SHELLS = 4
+        SHELL_LIGHT = 5
     }
 }
 

@@ -42,6 +42,7 @@ pub struct FrameRun<'a> {
     volumes: &'a [VolumeTexture],
     prepared: PreparedScene,
     filled: FilledVolumes,
+    shell_light: wgpu::TextureView,
     /// Part of the image that is rendered, pixels.
     part: Window,
     samples: Range<u32>,
@@ -124,6 +125,10 @@ impl<'a> FrameRun<'a> {
                 filled
             }
         };
+        let progress = |done, total| monitor.progress("light in shells", done, total);
+        let up = &prepared.up;
+        let (shell_light, took) = renderer.shell_light.get((gpu, timer), scene, volumes, up, progress)?;
+        seconds.visibility += took;
         let hint: TileHint = (variant, volumes[0].cells.address(), whole);
         let known = renderer.learned.filter(|(frame, _)| *frame == hint).map(|(_, pixels)| pixels);
         Ok(FrameRun {
@@ -138,6 +143,7 @@ impl<'a> FrameRun<'a> {
             volumes,
             prepared,
             filled,
+            shell_light,
             part,
             keep_rasters: options.keep_rasters,
             look: Develop::new(&scene.image.look),
@@ -227,6 +233,7 @@ impl<'a> FrameRun<'a> {
             frame: &uniforms,
             groups,
             filled: &self.filled,
+            shell_light: &self.shell_light,
             reflection: &self.prepared.reflection,
             volumes: &self.prepared.volumes,
         };

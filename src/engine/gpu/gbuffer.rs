@@ -53,6 +53,8 @@ pub struct Gbuffer {
     pool: [OnceLock<wgpu::RenderPipeline>; 4],
     volume: OnceLock<wgpu::RenderPipeline>,
     peel: OnceLock<wgpu::RenderPipeline>,
+    hull: OnceLock<wgpu::RenderPipeline>,
+    hull_peel: OnceLock<wgpu::RenderPipeline>,
 }
 
 impl Gbuffer {
@@ -69,6 +71,8 @@ impl Gbuffer {
             pool: Default::default(),
             volume: OnceLock::new(),
             peel: OnceLock::new(),
+            hull: OnceLock::new(),
+            hull_peel: OnceLock::new(),
         }
     }
 
@@ -88,6 +92,12 @@ impl Gbuffer {
         }
         if layers > 1 {
             self.peel(gpu);
+        }
+        if !scene.shells.is_empty() {
+            self.hull(gpu);
+            if layers > 1 {
+                self.hull_peel(gpu);
+            }
         }
     }
 
@@ -146,6 +156,18 @@ impl Gbuffer {
     /// Finds the next volume quad behind those of the layers before.
     fn peel(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
         self.peel.get_or_init(|| self.water_pipeline(gpu, "peel_fragment", &[IDS]))
+    }
+
+    /// As [`Gbuffer::volume`], for the faces of hulls.
+    fn hull(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+        let shaders = ["hull_vertex", "hull_fragment"];
+        self.hull.get_or_init(|| pipeline(gpu, &self.module, shaders, &[FLOATS, IDS], NEARER))
+    }
+
+    /// As [`Gbuffer::peel`], for the faces of hulls.
+    fn hull_peel(&self, gpu: &Gpu) -> &wgpu::RenderPipeline {
+        let shaders = ["hull_vertex", "peel_fragment"];
+        self.hull_peel.get_or_init(|| pipeline(gpu, &self.module, shaders, &[IDS], NEARER))
     }
 
     fn water_pipeline(

@@ -55,6 +55,10 @@ pub struct Variant {
     several: bool,
     many: bool,
     exponent: u32,
+    quads: bool,
+    shells: bool,
+    shell_march: bool,
+    shell_kept: bool,
 }
 
 impl Variant {
@@ -86,7 +90,17 @@ impl Variant {
             several: scene.recipes.len() > 1,
             many: layers > 1,
             exponent: whole_exponent(scene.p).unwrap_or(0),
+            quads: !scene.quads.is_empty() || scene.shells.is_empty(),
+            shells: !scene.shells.is_empty(),
+            shell_march: !scene.shells.is_empty() && scene.visibility == Visibility::March,
+            shell_kept: false,
         }
+    }
+
+    /// Returns the variant of a scene with the visibility [`Visibility::Cached`] in which rays walk to the
+    /// lights in some shells (`march`), and V is kept at the vertices of some (`kept`).
+    pub fn with_shell_light(self, [march, kept]: [bool; 2]) -> Self {
+        Variant { shell_march: march, shell_kept: kept, ..self }
     }
 }
 
@@ -188,6 +202,10 @@ impl Integrate {
             ("ALPHA", number(variant.alpha)),
             ("SEVERAL", number(variant.several)),
             ("EXPONENT", variant.exponent as f64),
+            ("QUADS", number(variant.quads)),
+            ("SHELLS", number(variant.shells)),
+            ("SHELL_MARCH", number(variant.shell_march)),
+            ("SHELL_KEPT", number(variant.shell_kept)),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
     }
@@ -227,8 +245,20 @@ impl Integrate {
         tiler: &mut Tiler,
         mut between: impl FnMut(u64) -> Result<()>,
     ) -> Result<f64> {
-        let Inputs { gpu, timer, up, targets, area, frame, groups, filled, reflection, volumes, .. } =
-            *inputs;
+        let Inputs {
+            gpu,
+            timer,
+            up,
+            targets,
+            area,
+            frame,
+            groups,
+            filled,
+            shell_light,
+            reflection,
+            volumes,
+            ..
+        } = *inputs;
         let uniform = gpu.buffer_with("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let part = gpu.buffer(
             "part of the workgroups",
@@ -260,6 +290,8 @@ impl Integrate {
             bind_texture(at::OPAQUE_NORMAL, &normal),
             bind_buffer(at::UNCOVERED, &sums.uncovered),
             bind_buffer(at::VOLUMES, volumes),
+            bind_texture(at::SHELLS, &up.shells.texels),
+            bind_texture(at::SHELL_LIGHT, shell_light),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("integrate"),
@@ -304,7 +336,7 @@ impl Integrate {
 }
 
 /// The layout of the bindings.
-fn bindings() -> [wgpu::BindGroupLayoutEntry; 21] {
+fn bindings() -> [wgpu::BindGroupLayoutEntry; 23] {
     use wgpu::{
         BindingType, BufferBindingType, SamplerBindingType, StorageTextureAccess, TextureFormat,
         TextureSampleType, TextureViewDimension,
@@ -346,6 +378,8 @@ fn bindings() -> [wgpu::BindGroupLayoutEntry; 21] {
         (at::OPAQUE_NORMAL, floats),
         (at::UNCOVERED, sums),
         (at::VOLUMES, uniform),
+        (at::SHELLS, texture(TextureSampleType::Uint, TextureViewDimension::D2)),
+        (at::SHELL_LIGHT, floats),
     ];
     types.map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
         binding,

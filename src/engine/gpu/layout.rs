@@ -165,6 +165,40 @@ pub struct LightVolume {
     pub pad: [u32; 3],
 }
 
+/// A face of a hull that the eye sees. Twin: `shaders/engine/gbuffer.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct HullFace {
+    pub a: [f32; 3],
+    pub number: u32,
+    pub b: [f32; 3],
+    pub u_a: f32,
+    pub c: [f32; 3],
+    pub v_a: f32,
+    pub uv_b: [f32; 2],
+    pub uv_c: [f32; 2],
+}
+
+/// Uniforms of a submission that fills V at vertices of a shell. Twin: `shaders/light/shell_light.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct ShellLightPart {
+    pub cells: [i32; 3],
+    pub extinction: f32,
+    pub base: [i32; 3],
+    pub flow_cells: f32,
+    pub shell: u32,
+    pub light: u32,
+    pub first: u32,
+    pub count: u32,
+    pub max_cells: u32,
+    pub pad_a: u32,
+    pub pad_b: u32,
+    pub pad_c: u32,
+}
+
 /// Constants of the strand model; its table is a texture.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

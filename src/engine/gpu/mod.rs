@@ -18,6 +18,7 @@ mod reflection;
 mod renderer;
 mod resolve;
 pub mod shader;
+pub mod shells;
 mod specialise;
 mod strand;
 mod targets;
@@ -98,6 +99,8 @@ pub struct Inputs<'a> {
     pub groups: &'a GroupList,
     /// The light volumes.
     pub filled: &'a FilledVolumes,
+    /// V at the vertices of shells.
+    pub shell_light: &'a wgpu::TextureView,
     /// The reflection model and multiple scattering.
     pub reflection: &'a BoundReflection,
     /// Constants of all volumes.

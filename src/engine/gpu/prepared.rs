@@ -6,6 +6,7 @@ use super::layout;
 use super::reflection::{BoundReflection, Reflections};
 use super::upload::{Resident, Uploaded};
 use crate::engine::overlap;
+use crate::light::Visibility;
 use crate::light::visibility::LightVolumes;
 use crate::picture::camera::DepthRange;
 use crate::place::Mesh;
@@ -42,14 +43,17 @@ impl PreparedScene {
         mesh: &Mesh,
     ) -> Result<Self> {
         let layers = overlap::sheets(scene);
-        let light_volumes = scene.light_plan(volumes)?;
+        let light_volumes = scene.light_plan(volumes)?.filter(|_| !scene.quads.is_empty());
         let up = Uploaded::new(gpu, resident, scene, volumes, mesh)?;
         let reflection = reflections.bind(gpu, scene, volumes);
         let constants = layout::volume_constants(scene, volumes, &up.origins, &reflection.waters);
         let volumes = bytemuck::cast_slice(&constants);
         let volumes = gpu.buffer_with("volumes", volumes, wgpu::BufferUsages::UNIFORM);
         let storage = [up.leaps(), up.is_sparse()];
-        let variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
+        let mut variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
+        if scene.visibility == Visibility::Cached {
+            variant = variant.with_shell_light(up.shells.walks_and_keeps());
+        }
         let depth = scene.depth_range(mesh);
         Ok(PreparedScene { up, layers, light_volumes, reflection, volumes, variant, depth })
     }

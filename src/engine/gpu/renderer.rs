@@ -8,6 +8,7 @@ use super::integrate::{Integrate, Variant};
 use super::rasters::Rasters;
 use super::reflection::Reflections;
 use super::resolve::Resolve;
+use super::shells::ShellLightPass;
 use super::timing::Timer;
 use super::upload::Resident;
 use super::visibility::VisibilityPass;
@@ -34,6 +35,7 @@ pub struct GpuRenderer {
     pub(super) integrate: Vec<Integrate>,
     pub(super) resident: Resident,
     pub(super) visibility: VisibilityPass,
+    pub(super) shell_light: ShellLightPass,
     pub(super) reflections: Reflections,
     /// Most recently used first.
     pub(super) canvases: Vec<Canvas>,
@@ -64,6 +66,7 @@ impl GpuRenderer {
             integrate: Vec::new(),
             resident: Resident::default(),
             visibility,
+            shell_light: ShellLightPass::default(),
             reflections: Reflections::default(),
             canvases: Vec::new(),
             rasters: Rasters::default(),
@@ -96,6 +99,7 @@ impl GpuRenderer {
     /// Drops the light volumes of the last frame, so that the next one fills its own.
     pub fn forget_light_volumes(&mut self) {
         self.visibility.forget();
+        self.shell_light.forget();
     }
 
     /// Renders a scene, or the part of it that `options.window` names.

@@ -10,12 +10,12 @@ macro_rules! files {
 
 /// Name (without extension) and text of every file in `shaders/`.
 pub const FILES: &[(&str, &str)] = files! {
-    "layout" "mapping" "walk" "volume/cells"
+    "layout" "mapping" "mapping/shell" "walk" "volume/cells"
     "trace/levels" "trace/lookup" "trace/matter"
     "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/scatter" "light/strand"
-    "light/visibility"
-    "engine/bare" "engine/gbuffer" "engine/integrate" "engine/integrate_light" "engine/opaque" "engine/pool"
-    "engine/sheets_many" "engine/sheets_one"
+    "light/visibility" "light/shell_depth" "light/shell_light"
+    "engine/bare" "engine/gbuffer" "engine/integrate" "engine/integrate_light" "engine/integrate_shell"
+    "engine/opaque" "engine/pool" "engine/sheets_many" "engine/sheets_one"
     "picture/resolve"
 };
 

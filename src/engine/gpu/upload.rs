@@ -10,6 +10,7 @@ use super::device::Gpu;
 use super::layout::{self, Quad, VertexMaterial};
 use super::packing::Packing;
 use super::rasters::hash_twice;
+use super::shells::{ResidentShells, UploadedShells, seen_faces};
 use super::tiles::{self, Part};
 use crate::engine::pool_surface;
 use crate::light::Scattering;
@@ -34,6 +35,7 @@ pub struct Resident {
     /// Levels of the last volumes, and whether they are made for leaps.
     pub levels: LevelsCache,
     volumes: Option<ResidentVolumes>,
+    shells: ResidentShells,
     mesh: Option<ResidentMesh>,
     /// The environment's map and the number of its upload.
     map: Option<(Arc<Map>, wgpu::TextureView, u64)>,
@@ -89,6 +91,8 @@ pub struct Uploaded {
     pub quads: wgpu::Buffer,
     /// Number of quads.
     pub quad_count: u32,
+    /// Shells, and the faces of their hulls that the eye sees.
+    pub shells: UploadedShells,
     /// `array<Light>`, at least one.
     pub lights: wgpu::Buffer,
     /// Positions of the opaque mesh's vertices, metres, four floats each.
@@ -105,7 +109,7 @@ pub struct Uploaded {
     pub pools: Vec<(wgpu::Buffer, Vec<Part>)>,
     /// The scene's environment, if it has one.
     pub environment: Option<UploadedEnvironment>,
-    /// Hash of everything drawn except the pools' waves: quads, lights, mesh and environment.
+    /// Hash of everything drawn except the pools' waves: quads, faces of hulls, lights, mesh and environment.
     pub geometry: [u64; 2],
     /// Hash of the pools' surfaces.
     pub waves: [u64; 2],
@@ -189,12 +193,23 @@ impl Uploaded {
         let packs = scene.recipes.iter().all(|recipe| recipe.asked_storage == StorageChoice::Auto);
         let VolumesOnDevice { held: levels, origins, views: [cells, bricks] } =
             resident.volumes(gpu, volumes, levels, packs)?;
+        let faces = seen_faces(scene);
+        let shells = resident.shells.get(gpu, scene, volumes, &faces)?;
+        let face_bytes: &[u8] = bytemuck::cast_slice(&faces);
         let map = scene.environment.as_ref().map(|e| resident.map(gpu, &e.map)).transpose()?;
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
         let number = map.as_ref().map(|(_, number)| *number);
         Ok(Uploaded {
-            geometry: hash_twice(&(quad_bytes, light_bytes, upload, &steps, environment_bytes, number)),
+            geometry: hash_twice(&(
+                quad_bytes,
+                face_bytes,
+                light_bytes,
+                upload,
+                &steps,
+                environment_bytes,
+                number,
+            )),
             waves: hash_twice(&pool_bytes),
             environment: map.map(|(map, _)| UploadedEnvironment {
                 uniform: gpu.buffer_with("environment", environment_bytes, wgpu::BufferUsages::UNIFORM),
@@ -211,6 +226,7 @@ impl Uploaded {
                 wgpu::BufferUsages::STORAGE,
             ),
             quad_count: quads.len() as u32,
+            shells,
             lights: gpu.buffer_with("lights", light_bytes, wgpu::BufferUsages::STORAGE),
             positions,
             coats,

@@ -21,7 +21,7 @@ mod path;
 use glam::{Vec2, Vec3};
 
 pub use build::{ShellFault, Side, SurfaceMesh};
-pub use path::{End, Segment, ShellPath};
+pub use path::{End, MOST_FACES, Segment, ShellPath};
 
 /// A volume between two surfaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +72,10 @@ impl Beyond {
 
 /// Most prisms of a shell.
 pub const MAX_PRISMS: usize = 1 << 28;
+
+/// Most cells in the mean edge of a mesh whose vertices keep V. Between vertices that are farther from one
+/// another it would be too coarse, and rays walk to the light.
+const MOST_EDGE: f32 = 16.0;
 
 /// Edges of a prism, as positions of their ends among its vertices.
 pub const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
@@ -128,6 +132,17 @@ impl Shell {
     /// Number of vertices of the mesh.
     pub fn vertices(&self) -> usize {
         self.points.len() / 2
+    }
+
+    /// A prism at a vertex: four times its number, plus the vertex's position there.
+    pub fn corner_of(&self, vertex: usize) -> u32 {
+        self.corner_of[vertex]
+    }
+
+    /// Number of layers between which V is interpolated in a volume of `size` cells, two cells each. `None`
+    /// where V is not kept at the vertices, because they are too far from one another.
+    pub fn light_layers(&self, size: [u32; 3]) -> Option<u32> {
+        (self.edge_cells(size) <= MOST_EDGE).then_some(size[2].div_ceil(2))
     }
 
     /// A point that lies `depth` (0 to 1) below a vertex and a little beside it, so that it is inside a

@@ -15,8 +15,8 @@ use glam::{Vec2, Vec3};
 use super::{AT_SIDES, FACES, Face, HullFace, Prism, Shell};
 
 /// Faces that a path passes before it is given up. A path through a real shell is shorter; only one that
-/// rounding leads in a circle would be longer.
-const MOST_FACES: u32 = 1 << 16;
+/// rounding leads in a circle would be longer. Twin: `MOST_FACES` of `shaders/mapping/shell.wgsl`.
+pub const MOST_FACES: u32 = 1 << 16;
 
 /// The part of a ray inside one tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]

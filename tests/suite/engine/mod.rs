@@ -13,5 +13,6 @@ pub mod overlap;
 pub mod rasters;
 pub mod ray;
 pub mod shaders;
+pub mod shells;
 pub mod specialise;
 pub mod volumes;

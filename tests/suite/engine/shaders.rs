@@ -7,23 +7,25 @@ use std::path::Path;
 
 use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
-    Environment, FrameUniforms, Groups, Light, LightVolume, MeshTile, Quad, Reflection, Similarity, Strand,
-    Tile, VertexMaterial, VolumeConstants, WORKGROUP,
+    Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Quad, Reflection,
+    ShellLightPart, Similarity, Strand, Tile, VertexMaterial, VolumeConstants, WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
+use taki::engine::gpu::shells;
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
 use taki::engine::pool_surface::{AROUND, Foam, Surface, WAVES, Wave};
 use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
 use wgpu::naga;
 
 /// Name of each stage, and its text with all imports.
-fn stages() -> [(&'static str, String); 6] {
+fn stages() -> [(&'static str, String); 7] {
     [
         ("bare", resolve("#import engine::bare")),
         ("gbuffer", gbuffer_source()),
         ("integrate", integrate_source(true)),
         ("integrate, one sheet", integrate_source(false)),
         ("resolve", resolve("#import picture::resolve")),
+        ("shell_light", shells::source()),
         ("visibility", visibility_source()),
     ]
 }
@@ -185,6 +187,10 @@ fn host_structs_have_the_layout_the_shaders_read() {
         bits base width height pad);
     light_volume.pop();
     assert_eq!(members(&module, "LightVolume"), (light_volume, size));
+    let module = validate(&stage("shell_light")).expect("valid");
+    let part = fields!(ShellLightPart: cells extinction base flow_cells shell light first count max_cells
+        pad_a pad_b pad_c);
+    assert_eq!(members(&module, "ShellLightPart"), part);
     let module = validate(&stage("gbuffer")).expect("valid");
     let environment =
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
@@ -195,6 +201,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
     assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout));
+    assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
     assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
 }
@@ -230,6 +237,10 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("MIST_OF_CELLS"), f64::from(taki::trace::MIST_OF_CELLS));
     assert_eq!(constant("MIST_RHO"), f64::from(taki::trace::MIST_RHO));
     assert_eq!(constant("SINE_SHARE"), taki::light::strand::table::SINE_SHARE as f64);
+    assert_eq!(constant("MOST_FACES"), f64::from(taki::mapping::shell::MOST_FACES));
+    assert_eq!(1u32 << constant("SHELL_ROW") as u32, shells::SHELL_ROW);
+    let ours = [shells::SHELL_TABLE, shells::SHELL_HEADER, shells::PRISM].map(f64::from);
+    assert_eq!(["SHELL_TABLE", "SHELL_HEADER", "PRISM"].map(constant), ours);
     let gbuffer = validate(&stage("gbuffer")).expect("valid");
     let wide = |name: &str| of(&gbuffer, name) as usize;
     assert_eq!(wide("WAVES"), WAVES);
@@ -256,6 +267,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
         ("gbuffer", binding::gbuffer::ALL),
         ("integrate", binding::integrate::ALL),
         ("resolve", binding::resolve::ALL),
+        ("shell_light", binding::shell_light::ALL),
         ("visibility", binding::visibility::ALL),
     ] {
         let ours: BTreeSet<(String, u32)> = ours.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect();
@@ -268,17 +280,19 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 17] = [
+const COMPARED: [&str; 19] = [
     "Develop",
     "Environment",
     "Foam",
     "FrameUniforms",
     "Groups",
+    "HullFace",
     "Light",
     "LightVolume",
     "MeshTile",
     "Quad",
     "Reflection",
+    "ShellLightPart",
     "Similarity",
     "Strand",
     "Surface",

@@ -78,6 +78,11 @@ fn together(count: usize, sets: &[&str]) -> Scene {
     load(&[PLACE, &tables, &strips].concat(), sets)
 }
 
+/// The scene of two of them.
+pub fn two(sets: &[&str]) -> Scene {
+    together(2, sets)
+}
+
 /// The scene of one of them alone, where it is the volume `water`.
 fn alone(number: usize, sets: &[&str]) -> Scene {
     // Settings of `volumes.*` are those of the other volumes.

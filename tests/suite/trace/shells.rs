@@ -22,22 +22,26 @@ const SIGMA: f32 = 2.5;
 
 /// A scene of one shell and two lights, seen from `eye`.
 fn scene(shell: Shell, eye: [f64; 3]) -> Scene {
+    scene_with(shell, eye, &[])
+}
+
+/// The scene with more settings.
+pub fn scene_with(shell: Shell, eye: [f64; 3], sets: &[&str]) -> Scene {
     let mut scene = Scene::preset("front").expect("a preset");
-    scene = scene
-        .with(&[
-            &format!("camera.eye=[{},{},{}]", eye[0], eye[1], eye[2]),
-            "camera.target=[0,0,0]",
-            "camera.fov=45",
-            &format!("image.width={}", SIZE[0]),
-            &format!("image.height={}", SIZE[1]),
-            "image.samples=1",
-            "light.visibility=march",
-            "trace.layers=8",
-            "trace.max_cells=65536",
-            "trace.early_end=0",
-            "light.p=8",
-        ])
-        .expect("valid settings");
+    let own = [
+        &format!("camera.eye=[{},{},{}]", eye[0], eye[1], eye[2]),
+        "camera.target=[0,0,0]",
+        "camera.fov=45",
+        &format!("image.width={}", SIZE[0]),
+        &format!("image.height={}", SIZE[1]),
+        "image.samples=1",
+        "light.visibility=march",
+        "trace.layers=8",
+        "trace.max_cells=65536",
+        "trace.early_end=0",
+        "light.p=8",
+    ];
+    scene = scene.with(&[&own, sets].concat()).expect("valid settings");
     let parts = scene.edit();
     parts.quads.clear();
     parts.shells = vec![Arc::new(shell)];

@@ -13,10 +13,6 @@ use crate::mapping::shell::Shell;
 use crate::trace::lookup::Level;
 use crate::util::powers::exp2;
 
-/// Most cells in the mean edge of a mesh whose vertices keep V. Between vertices that are farther from one
-/// another it would be too coarse, and rays walk to the light.
-const MOST_EDGE: f32 = 16.0;
-
 /// V at the vertices of shells: for each shell and light, at every vertex, from the outer to the inner
 /// surface. Empty for a shell that keeps none.
 #[derive(Debug)]
@@ -24,7 +20,7 @@ pub struct ShellLight(Vec<Vec<Vec<f32>>>);
 
 /// Whether V is kept at the vertices of a shell, for a volume of `size` cells.
 pub fn is_kept_in(shell: &Shell, size: [u32; 3]) -> bool {
-    shell.edge_cells(size) <= MOST_EDGE
+    shell.light_layers(size).is_some()
 }
 
 impl Integrator<'_> {

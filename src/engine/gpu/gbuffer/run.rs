@@ -192,6 +192,13 @@ impl Run<'_> {
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..6, 0..up.quad_count);
         }
+        for (faces, count) in &up.shells.faces {
+            let pipeline = self.pass.hull(gpu);
+            let entries = [bind_buffer(at::FRAME, &self.uniform), bind_buffer(at::HULL_FACES, faces)];
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group(gpu, pipeline, &entries), &[]);
+            pass.draw(0..3 * count, 0..1);
+        }
     }
 
     /// Draws layer number `layer` of the sheets, behind those of the layers before. Sheets behind the opaque
@@ -207,7 +214,7 @@ impl Run<'_> {
             bind_texture(at::KNOWN_DEPTH, &self.depths[known]),
             bind_texture(at::KNOWN_IDS, &known_ids),
         ];
-        let group = group(gpu, pipeline, &entries);
+        let peel = group(gpu, pipeline, &entries);
         copy(encoder, &targets.depth[2], &targets.depth[own]);
         let ids = targets.layer(layer);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -219,8 +226,20 @@ impl Run<'_> {
         });
         self.set_viewport(&mut pass);
         pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(0, &peel, &[]);
         pass.draw(0..6, 0..up.quad_count);
+        for (faces, count) in &up.shells.faces {
+            let pipeline = self.pass.hull_peel(gpu);
+            let entries = [
+                bind_buffer(at::FRAME, &self.uniform),
+                bind_buffer(at::HULL_FACES, faces),
+                bind_texture(at::KNOWN_DEPTH, &self.depths[known]),
+                bind_texture(at::KNOWN_IDS, &known_ids),
+            ];
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group(gpu, pipeline, &entries), &[]);
+            pass.draw(0..3 * count, 0..1);
+        }
     }
 
     /// Binds buffers, the environment's uniform if the shader shades opaque geometry, its map if `with_map`,

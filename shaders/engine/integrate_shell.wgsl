@@ -1,0 +1,355 @@
+// §3 to §5: the way of a ray through a shell, tetrahedron by tetrahedron. shaders/engine/integrate.wgsl holds
+// the bindings. Twins: src/engine/cpu/integrate/shell.rs and shell_light.rs, which hold the reasoning.
+
+#import engine::integrate
+#import layout
+#import light::fibre
+#import light::shell_depth
+#import light::strand
+#import mapping
+#import mapping::shell
+#import trace::levels
+#import trace::lookup
+#import trace::matter
+#import volume::cells
+#import walk
+
+// Whether the scene has shells.
+override SHELLS: bool = false;
+// Whether the scene has quads.
+override QUADS: bool = true;
+// Whether rays walk to the lights in some shells, and whether V is kept at the vertices of some.
+override SHELL_MARCH: bool = false;
+override SHELL_KEPT: bool = false;
+
+// A ray inside a shell.
+struct ShellRay {
+    d: vec3<f32>,
+    transmittance: f32,
+    light: vec3<f32>,
+    cells: u32,
+    light_cells: u32,
+    // Whether the device ended a walk early.
+    cut: bool,
+}
+
+// An occupied cell of a shell.
+struct ShellCell {
+    segment: Segment,
+    // J = world_from_cell, metres per cell.
+    jacobian: ShellJacobian,
+    sample: CellSample,
+    // Second word of the cell.
+    direction: u32,
+    // Position along the segment from 0 to 1, and in the world.
+    along: f32,
+    point: vec3<f32>,
+}
+
+// Traces a shell from the face number `face` of its hull, as `trace` does a sheet.
+fn trace_shell(
+    face: u32,
+    pixel: vec2<u32>,
+    behind: vec3<f32>,
+    before: vec4<f32>,
+    is_last: bool,
+    count: ptr<function, vec2<u32>>,
+) -> vec4<f32> {
+    let shell = shell_of_face(face);
+    var own: VolumeConstants;
+    own.cells = frame.cells;
+    own.extinction = frame.extinction;
+    own.flow_cells = frame.flow_cells;
+    own.levels = frame.levels;
+    if SEVERAL {
+        own = volumes[shell.volume];
+    }
+    let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    let words = shell_texel(shell.hull + face - shell.first_face);
+    let a = shell_point(shell, words.y);
+    let metres = face_metres(a, shell_point(shell, words.z), shell_point(shell, words.w), frame.eye_world, d);
+    var path = path_through(shell, words, frame.eye_world + d * metres, d);
+    let opaque = textureLoad(opaque_radiance, pixel, 0).w;
+    let t_end = select(NEVER, opaque - metres, opaque > 0.0);
+    // The path may have moved its origin onto the face.
+    let origin = frame.eye_world + d * metres;
+
+    var ray: ShellRay;
+    ray.d = d;
+    ray.transmittance = before.w;
+    var done = path.left == 0u;
+    while !done {
+        var segment = path_next(&path);
+        done = (segment.t_in >= t_end) | (ray.transmittance < frame.early_end);
+        if !done {
+            segment = segment_until(segment, t_end);
+            through_tetrahedron(&ray, segment, shell, own, origin, metres);
+            done = path.left == 0u;
+        }
+    }
+    *count += vec2<u32>(ray.cells, ray.light_cells);
+    if ray.cut | !done {
+        *count = vec2<u32>(CUT);
+    }
+    let end = ray.transmittance;
+    let ends = is_last | (end < frame.early_end);
+    let passed = select(vec3<f32>(0.0), behind * end, ends);
+    return vec4<f32>(before.rgb + ray.light + frame.ambient * (before.w - end) + passed, end);
+}
+
+// Walks through a tetrahedron. Twin: Integrator::through.
+fn through_tetrahedron(
+    ray: ptr<function, ShellRay>,
+    segment: Segment,
+    shell: Shell,
+    own: VolumeConstants,
+    origin: vec3<f32>,
+    metres: f32,
+) {
+    let n = vec3<f32>(own.cells);
+    var jacobian = shell_jacobian(shell, segment.prism, segment.tetrahedron);
+    jacobian = ShellJacobian(jacobian.x / n.x, jacobian.y / n.y, jacobian.z / n.z);
+    let start = segment_origin(segment, own.cells, own.flow_cells);
+    let direction = segment_direction(segment, own.cells);
+    let begin = origin + (*ray).d * segment.t_in;
+    if PYRAMID {
+        let c = dot3((*ray).d, frame.forward);
+        let t = metres + segment.t_in;
+        let covered = frame.footprint * (c * c * c) * (t * t);
+        let cell = abs(dot3(cross3(jacobian.x, jacobian.y), jacobian.z)) * sqrt(dot3(direction, direction));
+        let exact = clamp(0.5 * log2(max(covered / cell, 1e-30)), 0.0, f32(own.levels - 1u));
+        let share = fract(exact);
+        let before = (*ray).transmittance;
+        var end = 0.0;
+        var walks = select(1u, 2u, share > 0.0);
+        walks = select(0u, walks, segment.is_mapped);
+        for (var i = 0u; i < walks; i++) {
+            let weight = select(share, 1.0 - share, i == 0u);
+            let level = level_new(own.cells, own.base, u32(exact) + i);
+            (*ray).transmittance = before;
+            walk_tetrahedron(ray, segment, jacobian, start, direction, level, weight, shell, own, begin);
+            end += (*ray).transmittance * weight;
+        }
+        (*ray).transmittance = select(end, before, walks == 0u);
+    } else {
+        let level = level_new(own.cells, own.base, 0u);
+        walk_tetrahedron(ray, segment, jacobian, start, direction, level, 1.0, shell, own, begin);
+    }
+}
+
+// Walks through the cells of one level in a tetrahedron. Their light counts by `share`; `begin` is the point
+// where the segment begins. Twin: Integrator::in_level.
+fn walk_tetrahedron(
+    ray: ptr<function, ShellRay>,
+    segment: Segment,
+    jacobian: ShellJacobian,
+    start: vec3<f32>,
+    direction: vec3<f32>,
+    level: Level,
+    share: f32,
+    shell: Shell,
+    own: VolumeConstants,
+    begin: vec3<f32>,
+) {
+    let whole = SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);
+    let length = segment.t_out - segment.t_in;
+    let origin = start * level.scale;
+    let d_cell = direction * level.scale;
+    var walk = walk_new(level.size, origin, d_cell);
+    var t = 0.0;
+    var done = false;
+    while !done {
+        var sample: CellSample;
+        var texel = vec2<u32>(0u);
+        var enter = 0.0;
+        var leave = 0.0;
+        // Rays of one SIMD group that have found an occupied cell wait for the others.
+        var seeking = true;
+        while seeking {
+            let z = walk.cell.z;
+            done = (t >= length) | ((*ray).cells >= frame.max_cells) | (z < 0) | (z >= level.size.z)
+                | ((*ray).transmittance < frame.early_end);
+            if !done {
+                let t_exit = walk_exit(walk);
+                enter = t;
+                leave = select(length, t_exit, t_exit < length);
+                texel = cell_words(in_texture(walk.cell, level));
+                if TRILINEAR {
+                    let along = origin + d_cell * ((enter + leave) * 0.5);
+                    sample = sample_trilinear(level, whole, walk.cell, along);
+                } else {
+                    sample.rho = f32(texel.x & 0xffffu);
+                }
+                (*ray).cells += 1u;
+                t = t_exit;
+                walk_step(&walk, true);
+            }
+            seeking = !done & (sample.rho <= 0.0);
+        }
+        // A triangle without an area in the texture shows nothing of it.
+        done |= !segment.is_mapped;
+        if !done {
+            if !TRILINEAR {
+                sample.k_d = f32((texel.x >> 16u) & 0xffu);
+                sample.k_s = f32(texel.x >> 24u);
+                if PYRAMID {
+                    sample.moments = moments_of(texel.y, level);
+                }
+            }
+            let passed = (*ray).transmittance * exp2(-(sample.rho * own.extinction * (leave - enter)));
+            let weight = ((*ray).transmittance - passed) * share;
+            let middle = 0.5 * (enter + leave);
+            let point = begin + (*ray).d * middle;
+            let cell = ShellCell(segment, jacobian, sample, texel.y, middle / length, point);
+            if LIGHTS > 0u {
+                (*ray).light += shell_lit(ray, cell, level, shell, own) * weight;
+            }
+            (*ray).transmittance = passed;
+        }
+        // The device ends these loops together.
+        (*ray).cut |= seeking;
+    }
+    (*ray).cut |= !done;
+}
+
+// Light that a cell sends to the eye, relative to its weight, of all lights.
+fn shell_lit(
+    ray: ptr<function, ShellRay>,
+    cell: ShellCell,
+    level: Level,
+    shell: Shell,
+    own: VolumeConstants,
+) -> vec3<f32> {
+    let j = cell.jacobian;
+    let is_texture = frame.texture_frame != 0u;
+    // Rows of J⁻¹ times the determinant.
+    let row_x = cross3(j.y, j.z);
+    let row_y = cross3(j.z, j.x);
+    let row_z = cross3(j.x, j.y);
+    let det = dot3(j.x, row_x);
+    let e = in_frame(row_x, row_y, row_z, det, -(*ray).d, is_texture);
+    var t = v_code(cell.direction);
+    var spread: Spread;
+    if MANY_DIRECTIONS {
+        let moments = cell.sample.moments;
+        var mapped = moments;
+        if !is_texture {
+            mapped = moments_mapped(moments, j);
+        }
+        spread = spread_new(vec4<f32>(1.0, 0.0, 1.0, 1.0), mapped, e);
+    } else if !is_texture {
+        t = j.x * t.x + j.y * t.y + j.z * t.z;
+    }
+    let inverse_q = 1.0 / max(dot3(t, t), 1e-30);
+    let t_dot_e = dot3(t, e);
+    let sin2_e = max(1.0 - t_dot_e * t_dot_e * inverse_q, 0.0);
+    let k_d = cell.sample.k_d;
+    let k_s = cell.sample.k_s;
+    let count = arrayLength(&lights);
+    var sum = vec3<f32>(0.0);
+    var i = 0u;
+    for (; i < count; i++) {
+        let light = lights[i];
+        let arrives = light_from(light, cell.point);
+        let l = in_frame(row_x, row_y, row_z, det, arrives.xyz, is_texture);
+        let l_dot_e = dot3(l, e);
+        var fibre = vec3<f32>(0.0);
+        if STRAND {
+            let root = sqrt(inverse_q);
+            var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
+            if MANY_DIRECTIONS {
+                t_dot = spread_of_one(spread, l);
+            }
+            fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
+        } else if MANY_DIRECTIONS {
+            fibre = vec3<f32>(spread_psi(spread, k_d, k_s, frame.p, l, l_dot_e) * (1.0 / 255.0));
+        } else {
+            let grey = psi(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
+            fibre = vec3<f32>(grey * (1.0 / 255.0));
+        }
+        let visible = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
+        sum += light.intensity * arrives.w * fibre * visible;
+    }
+    (*ray).cut |= i < count;
+    return sum;
+}
+
+// A unit vector in the frame where angles are measured.
+fn in_frame(
+    row_x: vec3<f32>,
+    row_y: vec3<f32>,
+    row_z: vec3<f32>,
+    det: f32,
+    v: vec3<f32>,
+    is_texture: bool,
+) -> vec3<f32> {
+    let turned = vec3<f32>(dot3(row_x, v), dot3(row_y, v), dot3(row_z, v)) / det;
+    let length = sqrt(dot3(turned, turned));
+    return select(v, select(vec3<f32>(0.0), turned / length, length > 0.0), is_texture);
+}
+
+// V of light number `i`, which lies in the direction `l`. Twin: Integrator::shell_visibility.
+fn shell_visibility(
+    ray: ptr<function, ShellRay>,
+    cell: ShellCell,
+    level: Level,
+    shell: Shell,
+    own: VolumeConstants,
+    i: u32,
+    l: vec3<f32>,
+) -> f32 {
+    let segment = cell.segment;
+    var visible = 1.0;
+    if SHELL_KEPT {
+        let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * cell.along;
+        let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * cell.along;
+        let z = clamp(depth, 0.0, 1.0) * f32(shell.layers);
+        let vertices = prism_vertices(shell, segment.prism);
+        let first = shell.light + i * shell.vertices * (shell.layers + 1u);
+        let a = vertex_visibility(ray, shell, first, vertices.x, z);
+        let b = vertex_visibility(ray, shell, first, vertices.y, z);
+        let c = vertex_visibility(ray, shell, first, vertices.z, z);
+        visible = clamp(a * shares.x + b * shares.y + c * shares.z, 0.0, 1.0);
+    }
+    if SHELL_MARCH {
+        if !SHELL_KEPT || shell.layers == 0u {
+            let place =
+                ShellPlace(segment.prism, segment.tetrahedron, cell.point, own.cells, own.flow_cells);
+            let far = light_distance(lights[i], cell.point);
+            let walked = shell_depth(level, shell, place, l, far, frame.max_cells);
+            (*ray).light_cells += walked.cells;
+            (*ray).cut |= walked.cut;
+            visible = exp2(-own.extinction * walked.depth);
+        }
+    }
+    return visible;
+}
+
+// V at the depth of `z` layers below a vertex. `first` is the first value of the shell and light.
+fn vertex_visibility(ray: ptr<function, ShellRay>, shell: Shell, first: u32, vertex: u32, z: f32) -> f32 {
+    // A shell that keeps nothing has no layers.
+    let layer = min(u32(z), max(shell.layers, 1u) - 1u);
+    let at = first + vertex * (shell.layers + 1u) + layer;
+    let near = shell_light_value(at);
+    let far = shell_light_value(at + 1u);
+    (*ray).cut |= (near < 0.0) | (far < 0.0);
+    return near + (far - near) * (z - f32(layer));
+}
+
+fn shell_light_value(index: u32) -> f32 {
+    return textureLoad(shell_light, vec2<u32>(index & ((1u << SHELL_ROW) - 1u), index >> SHELL_ROW), 0).x;
+}
+
+// Moments J·S·Jᵀ of the directions J·v. Twin: Moments::mapped.
+fn moments_mapped(moments: Moments, j: ShellJacobian) -> Moments {
+    let row_x = vec3<f32>(j.x.x, j.y.x, j.z.x);
+    let row_y = vec3<f32>(j.x.y, j.y.y, j.z.y);
+    let row_z = vec3<f32>(j.x.z, j.y.z, j.z.z);
+    let x = moments_times(moments, row_x);
+    let y = moments_times(moments, row_y);
+    let z = moments_times(moments, row_z);
+    return Moments(
+        vec3<f32>(dot3(row_x, x), dot3(row_y, y), dot3(row_z, z)),
+        vec3<f32>(dot3(row_x, y), dot3(row_x, z), dot3(row_y, z)),
+    );
+}
