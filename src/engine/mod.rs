@@ -45,7 +45,7 @@ pub enum Engine {
         told: bool,
     },
     /// The CPU engine, which uses all cores.
-    Cpu(cpu::LightVolumeCache),
+    Cpu(Box<cpu::LightVolumeCache>),
 }
 
 /// Pixels per submission after a device was lost: small enough for the shortest watchdog known.
@@ -54,7 +54,7 @@ const CAREFUL_TILE_PIXELS: u32 = 4096;
 impl Engine {
     /// Returns a CPU engine without cached light volumes.
     pub fn cpu() -> Engine {
-        Engine::Cpu(cpu::LightVolumeCache::default())
+        Engine::Cpu(Box::default())
     }
 
     /// Returns a GPU engine on an open device. What the device cannot do is an error.

@@ -155,10 +155,28 @@ impl Model {
     pub fn read(path: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<Model> {
         let mut budget = Budget::new(limits.memory);
         let bytes = paths::read_whole(path, &mut budget)?;
+        Model::parse(path, bytes, limits, &mut budget, monitor)
+    }
+
+    /// Reads the content of a file that refers to no others. `path` stands for it in errors.
+    ///
+    /// # Errors
+    /// Those of [`Model::read`].
+    pub fn from_bytes(path: &Path, bytes: &[u8], limits: &Limits, monitor: &dyn Monitor) -> Result<Model> {
+        Model::parse(path, bytes.to_vec(), limits, &mut Budget::new(limits.memory), monitor)
+    }
+
+    fn parse(
+        path: &Path,
+        bytes: Vec<u8>,
+        limits: &Limits,
+        budget: &mut Budget,
+        monitor: &dyn Monitor,
+    ) -> Result<Model> {
         let file = File { path, limits };
         let mut model = match kind(path, &bytes) {
-            Kind::Gltf => gltf::read(&file, bytes, &mut budget, monitor)?,
-            Kind::Obj => obj::read(&file, &bytes, &mut budget, monitor)?,
+            Kind::Gltf => gltf::read(&file, bytes, budget, monitor)?,
+            Kind::Obj => obj::read(&file, &bytes, budget, monitor)?,
             Kind::Other => {
                 return Err(Error::input(
                     format!("{} is neither glTF nor OBJ", path.display()),

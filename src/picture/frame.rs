@@ -120,15 +120,6 @@ impl Surface {
         self.normal[i] = normal(face as usize - 1, self.uv[i]).to_array();
     }
 
-    /// Stores pixel `i`, which shows a face of a shell's hull with these corners, counter-clockwise. `number`
-    /// is its number plus 1, and `hit` is as in [`Surface::set`].
-    pub fn set_hull(&mut self, i: usize, number: u32, [a, b, c]: [Vec3; 3], hit: [f32; 4]) {
-        self.quad[i] = number;
-        self.depth[i] = hit[2];
-        self.uv[i] = [hit[0], hit[1]];
-        self.normal[i] = (b - a).cross(c - a).normalize_or_zero().to_array();
-    }
-
     /// Fills `z` from `depth`, for the part `window` of an image.
     pub fn set_planar(&mut self, camera: &Camera, image: &Image, window: Window) {
         let offset = sample_offset(image, CENTRE);

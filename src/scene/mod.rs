@@ -362,7 +362,9 @@ impl Scene {
             environment::Source::File(path) => Some(("environment.file".to_owned(), path.clone())),
             environment::Source::Sky(_) => None,
         });
-        let meshes = self.meshes.iter().map(|m| (format!("meshes.{}.file", m.name), m.file.clone()));
+        // The program brings the presets' own meshes.
+        let own = self.meshes.iter().filter(|mesh| presets::mesh(&mesh.file).is_none());
+        let meshes = own.map(|m| (format!("meshes.{}.file", m.name), m.file.clone()));
         self.recipes.iter().filter_map(volume).chain(map).chain(meshes).collect()
     }
 

@@ -1,7 +1,20 @@
 //! Presets: the scene files in `assets/scenes/`, which the program contains.
 
+use std::path::Path;
+
 /// A preset: name, description, text of the scene file.
 type Preset = (&'static str, &'static str, &'static str);
+
+/// Meshes of the presets, by the path that a scene names them by.
+const MESHES: &[(&str, &[u8])] = &[
+    ("taki:cliff.glb", include_bytes!("../../assets/meshes/cliff.glb")),
+    ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
+];
+
+/// Returns the content of a preset's mesh.
+pub fn mesh(path: &Path) -> Option<&'static [u8]> {
+    MESHES.iter().find(|(name, _)| Path::new(name) == path).map(|(_, bytes)| *bytes)
+}
 
 /// The presets in the order of the list; the first is the default scene.
 const PRESETS: &[Preset] = &[
@@ -31,6 +44,12 @@ const PRESETS: &[Preset] = &[
         "a fall lit by lamps behind it and at its foot",
         include_str!("../../assets/scenes/night.toml"),
     ),
+    (
+        "cliff",
+        "water over a cliff that was modelled in Blender",
+        include_str!("../../assets/scenes/cliff.toml"),
+    ),
+    ("torus", "fur on a ring: fibres on a mesh", include_str!("../../assets/scenes/torus.toml")),
     (
         "fig5",
         "the paper's figure 5: a 40×40×40 volume on 8 quads",

@@ -19,7 +19,7 @@ use crate::light::Visibility;
 use crate::picture::Frame;
 use crate::place::Mesh;
 use crate::scene::Scene;
-use crate::util::error::{Error, Result};
+use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::window::Window;
 use crate::volume::{LevelSets, Storage, VolumeTexture};
@@ -142,9 +142,6 @@ impl GpuRenderer {
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<(Frame, Vec<usize>)> {
-        if !scene.shells.is_empty() {
-            return Err(Error::device("shells are drawn by the CPU engine", "add --engine cpu"));
-        }
         let whole = [scene.image.width, scene.image.height];
         let part = options.window.unwrap_or(Window::whole(whole));
         let mut run = FrameRun::prepare(self, scene, volumes.as_ref(), mesh, options, monitor)?;

@@ -10,6 +10,7 @@ use image::RgbImage;
 
 use super::build::{Built, Key};
 use crate::model::{self, Model};
+use crate::scene::presets;
 use crate::util::error::Result;
 use crate::util::monitor::Unwatched;
 
@@ -94,7 +95,10 @@ impl ModelMemo {
         // An old version of the file is of no use any more.
         memo.files.retain(|((known, ..), _)| known != path);
         let limits = model::Limits { memory, allow_paths: allow_paths.to_vec() };
-        let loaded = Arc::new(Loaded::new(Model::read(path, &limits, &Unwatched)?));
+        let loaded = Arc::new(Loaded::new(match presets::mesh(path) {
+            Some(bytes) => Model::from_bytes(path, bytes, &limits, &Unwatched)?,
+            None => Model::read(path, &limits, &Unwatched)?,
+        }));
         memo.files.insert(0, (version, loaded.clone()));
         Ok(loaded)
     }
