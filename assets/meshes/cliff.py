@@ -13,7 +13,7 @@ import bpy
 from mathutils import Vector, noise
 
 WIDTH, DEPTH, HEIGHT = 22.0, 16.0, 8.0  # metres
-ACROSS, ALONG = 66, 72  # squares of the rock
+ACROSS, ALONG = 84, 96  # squares of the rock
 LIP_WIDTH = 3.6  # metres
 
 
@@ -38,7 +38,7 @@ def profile(s):
 
 
 def rock():
-    vertices, faces, uvs = [], [], []
+    vertices, faces = [], []
     for j in range(ALONG + 1):
         for i in range(ACROSS + 1):
             x = (i / ACROSS - 0.5) * WIDTH
@@ -48,21 +48,22 @@ def rock():
             y -= 0.045 * x * x * (0.35 + 0.65 * wall) - 0.4
             at = Vector((x, y, z))
             big = noise.fractal(at * 0.28 + Vector((3.1, 0, 0)), 1.0, 2.1, 6)
-            # Beds of rock step out and back with the height.
-            bed = noise.noise(Vector((0.25 * x, 0.25 * y, 2.3 * z + 0.8 * math.sin(0.5 * x))))
-            fine = noise.fractal(at * 1.7, 0.9, 2.2, 5)
+            # Beds of rock step out and back with the height, broken into blocks.
+            bed = noise.noise(Vector((0.3 * x, 0.3 * y, 1.9 * z + 0.7 * math.sin(0.4 * x))))
+            bed = math.copysign(abs(bed) ** 0.5, bed)
+            block = noise.cell(Vector((1.1 * x + 0.6 * z, 0.0, 1.6 * z)))
+            fine = noise.fractal(at * 1.5, 0.75, 2.2, 6)
             cut = channel(x)
-            y -= wall * (0.9 * big + 0.55 * bed + 0.16 * fine) * (1 - 0.5 * cut)
-            z += (1 - wall) * (0.55 * big + 0.1 * fine) * (1 - 0.75 * cut) - (0.75 * cut if j / ALONG < 0.34 else 0.0)
-            if j / ALONG < 0.3:
-                z += 0.5 * (1 - cut)
+            y -= wall * (1.2 * big + 0.5 * bed + 0.22 * block + 0.42 * fine) * (1 - 0.55 * cut)
+            z += (1 - wall) * (0.7 * big + 0.3 * fine) * (1 - 0.75 * cut)
+            if j / ALONG < 0.34:
+                z += 1.3 * (1 - cut) - 0.75 * cut
             vertices.append((x, y, z))
-            uvs.append((i / ACROSS, j / ALONG))
     for j in range(ALONG):
         for i in range(ACROSS):
             a = j * (ACROSS + 1) + i
             faces.append((a, a + ACROSS + 1, a + ACROSS + 2, a + 1))
-    return vertices, faces, uvs
+    return vertices, faces, None, None
 
 
 def fall():
@@ -77,8 +78,8 @@ def fall():
     for k in range(31):
         time = k * 0.042
         path.append((rim_y - speed * time, rim_z - 4.905 * time * time, start + time))
-    columns = 12
-    vertices, faces, uvs = [], [], []
+    columns = 14
+    vertices, faces, uvs, share = [], [], [], []
     for y, z, time in path:
         fallen = max(rim_z - z, 0.0)
         width = LIP_WIDTH * (1 + 0.028 * fallen)
@@ -91,22 +92,31 @@ def fall():
             z_bed = 0.5 * (2 * u - 1) ** 2 if fallen == 0 else 0.5 * (2 * u - 1) ** 2 * math.exp(-fallen)
             vertices.append((x, y + lag + wave * min(fallen, 1.0) - 0.4, z + z_bed))
             uvs.append((u, time))
+            # The water thins out towards ragged edges, and where it begins.
+            edge = min(u, 1 - u) * width + 0.35 * noise.noise(Vector((9 * u, 2.6 * time, 0.0)))
+            share.append(smooth(0.0, 0.9, edge) * smooth(0.0, 1.2, time) if 0 < i < columns else 0.0)
     for j in range(len(path) - 1):
         for i in range(columns):
             a = j * (columns + 1) + i
             faces.append((a, a + columns + 1, a + columns + 2, a + 1))
-    return vertices, faces, uvs
+    return vertices, faces, uvs, share
 
 
 def add(name, material, colour, parts):
-    vertices, faces, uvs = parts
+    vertices, faces, uvs, share = parts
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices, [], faces)
-    layer = mesh.uv_layers.new(name="UVMap")
-    for loop in mesh.loops:
-        u, v = uvs[loop.vertex_index]
-        # Blender's v runs up, glTF's down.
-        layer.data[loop.index].uv = (u, 1 - v)
+    if uvs:
+        layer = mesh.uv_layers.new(name="UVMap")
+        for loop in mesh.loops:
+            u, v = uvs[loop.vertex_index]
+            # Blender's v runs up, glTF's down.
+            layer.data[loop.index].uv = (u, 1 - v)
+    if share:
+        # The red of the vertices is the share of the thickness that the water has there.
+        colours = mesh.color_attributes.new("Thickness", "FLOAT_COLOR", "POINT")
+        for i, red in enumerate(share):
+            colours.data[i].color = (red, red, red, 1)
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
     made = bpy.data.materials.new(material)
     made.use_nodes = True
@@ -119,6 +129,6 @@ def add(name, material, colour, parts):
 
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
-add("Rock", "Rock", (0.085, 0.076, 0.064), rock())
+add("Rock", "Rock", (0.075, 0.068, 0.058), rock())
 add("Fall", "Fall", (0.8, 0.9, 1.0), fall())
-bpy.ops.export_scene.gltf(filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb", export_format="GLB")
+bpy.ops.export_scene.gltf(filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb", export_format="GLB", export_vertex_color="ACTIVE", export_all_vertex_colors=True)
