@@ -36,13 +36,13 @@ struct ShellRay {
 // An occupied cell of a shell.
 struct ShellCell {
     segment: Segment,
-    // J = world_from_cell, metres per cell.
-    jacobian: ShellJacobian,
+    // Shares of the prism's vertices, and the depth from the outer surface, 0 to 1.
+    shares: vec3<f32>,
+    depth: f32,
     sample: CellSample,
     // Second word of the cell.
     direction: u32,
-    // Position along the segment from 0 to 1, and in the world.
-    along: f32,
+    // Position in the world.
     point: vec3<f32>,
 }
 
@@ -107,12 +107,12 @@ fn through_tetrahedron(
     metres: f32,
 ) {
     let n = vec3<f32>(own.cells);
-    var jacobian = shell_jacobian(shell, segment.prism, segment.tetrahedron);
-    jacobian = ShellJacobian(jacobian.x / n.x, jacobian.y / n.y, jacobian.z / n.z);
     let start = segment_origin(segment, own.cells, own.flow_cells);
     let direction = segment_direction(segment, own.cells);
     let begin = origin + (*ray).d * segment.t_in;
     if PYRAMID {
+        var jacobian = shell_jacobian(shell, segment.prism, segment.tetrahedron);
+        jacobian = ShellJacobian(jacobian.x / n.x, jacobian.y / n.y, jacobian.z / n.z);
         let c = dot3((*ray).d, frame.forward);
         let t = metres + segment.t_in;
         let covered = frame.footprint * (c * c * c) * (t * t);
@@ -127,13 +127,13 @@ fn through_tetrahedron(
             let weight = select(share, 1.0 - share, i == 0u);
             let level = level_new(own.cells, own.base, u32(exact) + i);
             (*ray).transmittance = before;
-            walk_tetrahedron(ray, segment, jacobian, start, direction, level, weight, shell, own, begin);
+            walk_tetrahedron(ray, segment, start, direction, level, weight, shell, own, begin);
             end += (*ray).transmittance * weight;
         }
         (*ray).transmittance = select(end, before, walks == 0u);
     } else {
         let level = level_new(own.cells, own.base, 0u);
-        walk_tetrahedron(ray, segment, jacobian, start, direction, level, 1.0, shell, own, begin);
+        walk_tetrahedron(ray, segment, start, direction, level, 1.0, shell, own, begin);
     }
 }
 
@@ -142,7 +142,6 @@ fn through_tetrahedron(
 fn walk_tetrahedron(
     ray: ptr<function, ShellRay>,
     segment: Segment,
-    jacobian: ShellJacobian,
     start: vec3<f32>,
     direction: vec3<f32>,
     level: Level,
@@ -200,7 +199,10 @@ fn walk_tetrahedron(
             let weight = ((*ray).transmittance - passed) * share;
             let middle = 0.5 * (enter + leave);
             let point = begin + (*ray).d * middle;
-            let cell = ShellCell(segment, jacobian, sample, texel.y, middle / length, point);
+            let along = middle / length;
+            let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * along;
+            let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * along;
+            let cell = ShellCell(segment, shares, depth, sample, texel.y, point);
             if LIGHTS > 0u {
                 (*ray).light += shell_lit(ray, cell, level, shell, own) * weight;
             }
@@ -220,7 +222,9 @@ fn shell_lit(
     shell: Shell,
     own: VolumeConstants,
 ) -> vec3<f32> {
-    let j = cell.jacobian;
+    let n = vec3<f32>(own.cells);
+    let frame_j = shell_frame(shell, cell.segment.prism, cell.shares, cell.depth);
+    let j = ShellJacobian(frame_j.x / n.x, frame_j.y / n.y, frame_j.z / n.z);
     let is_texture = frame.texture_frame != 0u;
     // Rows of J⁻¹ times the determinant.
     let row_x = cross3(j.y, j.z);
@@ -301,9 +305,8 @@ fn shell_visibility(
     let segment = cell.segment;
     var visible = 1.0;
     if SHELL_KEPT {
-        let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * cell.along;
-        let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * cell.along;
-        let z = clamp(depth, 0.0, 1.0) * f32(shell.layers);
+        let shares = cell.shares;
+        let z = clamp(cell.depth, 0.0, 1.0) * f32(shell.layers);
         let vertices = prism_vertices(shell, segment.prism);
         let first = shell.light + i * shell.vertices * (shell.layers + 1u);
         let a = vertex_visibility(ray, shell, first, vertices.x, z);

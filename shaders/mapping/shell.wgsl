@@ -178,6 +178,26 @@ fn shell_jacobian(shell: Shell, number: u32, tetrahedron: u32) -> ShellJacobian 
     return ShellJacobian((e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down);
 }
 
+// Twin: Shell::frame, for a triangle that has an area in the texture.
+fn shell_frame(shell: Shell, number: u32, shares: vec3<f32>, depth: f32) -> ShellJacobian {
+    let prism = prism_of(shell, number);
+    let outer = prism.vertices * 2u;
+    let p0 = shell_point(shell, outer.x);
+    let p1 = shell_point(shell, outer.y);
+    let p2 = shell_point(shell, outer.z);
+    let d0 = shell_point(shell, outer.x + 1u) - p0;
+    let d1 = shell_point(shell, outer.y + 1u) - p1;
+    let d2 = shell_point(shell, outer.z + 1u) - p2;
+    let first = p0 + d0 * depth;
+    let e1 = p1 + d1 * depth - first;
+    let e2 = p2 + d2 * depth - first;
+    let a = prism.uv_b - prism.uv_a;
+    let b = prism.uv_c - prism.uv_a;
+    let inverse = 1.0 / cross2(a, b);
+    let down = d0 * shares.x + d1 * shares.y + d2 * shares.z;
+    return ShellJacobian((e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down);
+}
+
 // x·y − product, where `product` is x·y as rounded. It is exact: the halves of the factors have 12 bits, so
 // their products fit float32, and so does each sum.
 fn product_error(x: f32, y: f32, product: f32) -> f32 {

@@ -185,11 +185,6 @@ impl Shell {
     /// into the depth. `None` where the triangle has no area in the texture.
     pub fn jacobian(&self, prism: usize, tetrahedron: usize) -> Option<[Vec3; 3]> {
         let Prism { vertices, uv, .. } = &self.prisms[prism];
-        let [a, b] = [uv[1] - uv[0], uv[2] - uv[0]];
-        let det = a.perp_dot(b);
-        if !is_an_area(a, b) {
-            return None;
-        }
         let point = |vertex: usize, depth: u32| self.points[(2 * vertices[vertex] + depth) as usize];
         // Each tetrahedron has one vertical edge. Before it in the order of vertices corners are outer ones,
         // behind it inner ones.
@@ -200,9 +195,7 @@ impl Shell {
             let depth = u32::from(vertex > upright);
             point(vertex, depth) - point(0, 0) - down * depth as f32
         };
-        let [e1, e2] = [flat(1), flat(2)];
-        let inverse = 1.0 / det;
-        Some([(e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down])
+        along_texture(uv, flat(1), flat(2)).map(|[x, y]| [x, y, down])
     }
 
     /// Corners of the box around the shell, metres.
@@ -217,6 +210,20 @@ impl Shell {
         sum / pairs.len().max(1) as f64
     }
 
+    /// Jacobian of a prism, as columns like those of [`Shell::jacobian`], at a place given by the shares of
+    /// the prism's vertices and the depth from 0 to 1.
+    ///
+    /// It is that of the map which goes along straight lines between the two surfaces. Light is computed with
+    /// it, because it has no steps inside a prism, and its column into the depth has none between prisms.
+    pub fn frame(&self, prism: usize, shares: Vec3, depth: f32) -> Option<[Vec3; 3]> {
+        let Prism { vertices, uv, .. } = &self.prisms[prism];
+        let [outer, inner] = [0, 1].map(|k| vertices.map(|vertex| self.points[2 * vertex as usize + k]));
+        let down = [0, 1, 2].map(|i| inner[i] - outer[i]);
+        let at = [0, 1, 2].map(|i| outer[i] + down[i] * depth);
+        let down = down[0] * shares.x + down[1] * shares.y + down[2] * shares.z;
+        along_texture(uv, at[1] - at[0], at[2] - at[0]).map(|[x, y]| [x, y, down])
+    }
+
     /// Bytes that the shell takes in memory.
     pub fn bytes(&self) -> u64 {
         let of = |count: usize, size: usize| (count * size) as u64;
@@ -225,6 +232,14 @@ impl Shell {
             + of(self.hull.len(), size_of::<HullFace>())
             + of(self.corner_of.len(), size_of::<u32>())
     }
+}
+
+/// Metres per copy of the volume along u and along v, where the edges from the first corner of a triangle to
+/// the others are e1 and e2. `None` where the triangle has no area in the texture.
+fn along_texture(uv: &[Vec2; 3], e1: Vec3, e2: Vec3) -> Option<[Vec3; 2]> {
+    let [a, b] = [uv[1] - uv[0], uv[2] - uv[0]];
+    let inverse = 1.0 / a.perp_dot(b);
+    is_an_area(a, b).then(|| [(e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse])
 }
 
 /// Whether two edges span an area. Below the limit, the rounding errors of the coordinates would decide.

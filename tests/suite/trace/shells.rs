@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3, IVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, IVec3, Vec3};
 use taki::Unwatched;
 use taki::engine::cpu;
 use taki::light::{AngleFrame, Light, Visibility};
@@ -65,6 +65,9 @@ struct Tetrahedron {
     corners: [DVec3; 4],
     texture_from_world: DMat3,
     at: DVec3,
+    /// Outer and inner points of the prism, and its texture coordinates.
+    prism: [[DVec3; 2]; 3],
+    uv: [DVec2; 3],
     /// Whether its fourth face is the inner surface.
     is_innermost: bool,
 }
@@ -81,10 +84,38 @@ fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
             });
             let edges = |all: [DVec3; 4]| DMat3::from_cols(all[1] - all[0], all[2] - all[0], all[3] - all[0]);
             let texture_from_world = edges(at) * edges(corners).inverse();
-            out.push(Tetrahedron { corners, texture_from_world, at: at[0], is_innermost: k == 2 });
+            let point = |vertex: u32, depth: u32| shell.points[(2 * vertex + depth) as usize].as_dvec3();
+            out.push(Tetrahedron {
+                corners,
+                texture_from_world,
+                at: at[0],
+                prism: prism.vertices.map(|vertex| [0, 1].map(|depth| point(vertex, depth))),
+                uv: prism.uv.map(|uv| uv.as_dvec2()),
+                is_innermost: k == 2,
+            });
         }
     }
     out
+}
+
+impl Tetrahedron {
+    /// Jacobian of the map of the prism at a point of the tetrahedron, by differences: metres per copy of the
+    /// volume. The map goes along straight lines between the two surfaces.
+    fn frame(&self, point: DVec3) -> DMat3 {
+        let at = self.at + self.texture_from_world * (point - self.corners[0]);
+        let [a, b, c] = self.uv;
+        let map = |at: DVec3| -> DVec3 {
+            let p = at.truncate();
+            let whole = (b - a).perp_dot(c - a);
+            let shares = [(b, c), (c, a), (a, b)].map(|(q, r)| (q - p).perp_dot(r - p) / whole);
+            (0..3).map(|i| self.prism[i][0].lerp(self.prism[i][1], at.z) * shares[i]).sum()
+        };
+        let h = 1e-5;
+        DMat3::from_cols_array_2d(
+            &[DVec3::X, DVec3::Y, DVec3::Z]
+                .map(|axis| ((map(at + axis * h) - map(at - axis * h)) / (2.0 * h)).to_array()),
+        )
+    }
 }
 
 /// Intervals of a ray in the tetrahedra from t = 0 on, in order.
@@ -143,7 +174,6 @@ fn trace(
         }
         let t = &[t[0], t[1].min(far)];
         let n = DVec3::from_array(volume.size.map(f64::from));
-        let world_from_cell = tetrahedron.texture_from_world.inverse() * DMat3::from_diagonal(1.0 / n);
         for (cell, [enter, leave]) in cells(tetrahedron, volume.size, ray, *t) {
             let passed = transmittance * (-density(cell) * (leave - enter)).exp();
             let weight = transmittance - passed;
@@ -155,6 +185,7 @@ fn trace(
             let v = at(cell).v_code().as_dvec3();
             let mut sum = scene.ambient.as_dvec3();
             let middle = origin + d * (0.5 * (enter + leave));
+            let world_from_cell = tetrahedron.frame(middle) * DMat3::from_diagonal(1.0 / n);
             for light in &scene.lights {
                 let (l, intensity) = light.at(middle.as_vec3());
                 let far = f64::from(light.distance(middle.as_vec3()));

@@ -1,7 +1,7 @@
 //! §3 to §5 on the CPU: the way of a ray through a shell, tetrahedron by tetrahedron.
 //!
 //! Angles in a shell are measured with the fibre's direction in the world, t = J·v. A quad turns light and eye
-//! into its cells once for all cells of a ray; here J changes after a few cells, and most of them are empty.
+//! into its cells once for all cells of a ray; here J changes from cell to cell, and most of them are empty.
 
 use glam::{Mat3, Vec2, Vec3};
 
@@ -149,7 +149,6 @@ impl Integrator<'_> {
         let (origin, d_cell) = (origin * level.scale, d_cell * level.scale);
         let length = segment.t[1] - segment.t[0];
         let mut walk = Walk::new(level.size, origin, d_cell, length);
-        let mut jacobian = None;
         while ray.cells[0] < scene.trace.max_cells
             && (0..level.size.z).contains(&walk.cell().z)
             && ray.transmittance >= scene.trace.early_end
@@ -166,7 +165,9 @@ impl Integrator<'_> {
                 continue;
             }
             // A triangle without an area in the texture shows nothing of it.
-            let Some(j) = *jacobian.get_or_insert_with(|| self.jacobian(ray.shell, segment)) else { return };
+            if !ray.shell.is_mapped(segment.prism) {
+                return;
+            }
             let tau_bits =
                 sample.rho * self.volume_of(ray.shell).extinction * (crossing.t_exit - crossing.t_enter);
             let passed = ray.transmittance * exp2(-tau_bits);
@@ -181,6 +182,7 @@ impl Integrator<'_> {
                 depth: segment.at[0].z + (segment.at[1].z - segment.at[0].z) * along,
                 point: ray.origin + ray.d * (segment.t[0] + middle),
             };
+            let j = self.frame(ray.shell, &place);
             let fibres = self.fibres(level, cell, &sample, &j);
             for i in 0..self.lights.len() {
                 let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
@@ -204,6 +206,14 @@ impl Integrator<'_> {
         let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
         let [x, y, z] = shell.jacobian(segment.prism, segment.tetrahedron)?;
         Some(Mat3::from_cols(x / nx, y / ny, z / nz))
+    }
+
+    /// J at a place in a prism that has an area in the texture; see [`Shell::frame`].
+    fn frame(&self, shell: &Shell, place: &Place) -> Mat3 {
+        let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
+        let frame = shell.frame(place.tetrahedron[0], place.shares, place.depth);
+        let [x, y, z] = frame.unwrap_or([Vec3::ZERO; 3]);
+        Mat3::from_cols(x / nx, y / ny, z / nz)
     }
 
     /// Directions in a cell, in the frame where angles are measured.
