@@ -26,7 +26,7 @@ pub struct LightVolumeCache {
     /// Levels of the last volumes.
     pub levels: LevelsCache,
     last: Option<FilledCache>,
-    last_in_shells: Option<(ShellInputs, Arc<ShellLight>)>,
+    last_in_shells: Option<Box<(ShellInputs, Arc<ShellLight>)>>,
 }
 
 impl Default for LightVolumeCache {
@@ -84,14 +84,14 @@ impl LightVolumeCache {
     /// Returns the light at the vertices of shells. It is walked unless it is that of the last call.
     pub(super) fn shell_light(&mut self, integrator: &Integrator) -> Arc<ShellLight> {
         let inputs = integrator.shell_inputs();
-        if let Some((last, kept)) = &self.last_in_shells
+        if let Some((last, kept)) = self.last_in_shells.as_deref()
             && last.is(&inputs)
         {
             return kept.clone();
         }
         self.last_in_shells = None;
         let kept = Arc::new(integrator.shell_light());
-        self.last_in_shells = Some((inputs, kept.clone()));
+        self.last_in_shells = Some(Box::new((inputs, kept.clone())));
         kept
     }
 
