@@ -111,7 +111,7 @@ fn through_tetrahedron(
     let direction = segment_direction(segment, own.cells);
     let begin = origin + (*ray).d * segment.t_in;
     if PYRAMID {
-        var jacobian = shell_jacobian(shell, segment.prism, segment.tetrahedron);
+        var jacobian = shell_jacobian(segment);
         jacobian = ShellJacobian(jacobian.x / n.x, jacobian.y / n.y, jacobian.z / n.z);
         let c = dot3((*ray).d, frame.forward);
         let t = metres + segment.t_in;
@@ -307,7 +307,7 @@ fn shell_visibility(
     if SHELL_KEPT {
         let shares = cell.shares;
         let z = clamp(cell.depth, 0.0, 1.0) * f32(shell.layers);
-        let vertices = prism_vertices(shell, segment.prism);
+        let vertices = segment.vertices;
         let first = shell.light + i * shell.vertices * (shell.layers + 1u);
         let a = vertex_visibility(ray, shell, first, vertices.x, z);
         let b = vertex_visibility(ray, shell, first, vertices.y, z);

@@ -48,6 +48,8 @@ struct Corner {
     // Position across the ray and along it, metres.
     at: vec2<f32>,
     t: f32,
+    // Position in the world, metres.
+    world: vec3<f32>,
 }
 
 struct ShellPath {
@@ -83,6 +85,15 @@ struct Segment {
     end: u32,
     // Whether the triangle has an area in the texture.
     is_mapped: bool,
+    // The prism's vertices and edges in the texture, and the corners of the tetrahedron in the world, so that
+    // nobody fetches them again: software Vulkan fetches texels lane by lane.
+    vertices: vec3<u32>,
+    uv_ab: vec2<f32>,
+    uv_ac: vec2<f32>,
+    p0: vec3<f32>,
+    p1: vec3<f32>,
+    p2: vec3<f32>,
+    p3: vec3<f32>,
 }
 
 // Corners and texture coordinates of a prism, and what stands beyond its sides.
@@ -162,18 +173,17 @@ fn is_an_area(a: vec2<f32>, b: vec2<f32>) -> bool {
 }
 
 // Twin: Shell::jacobian, for a triangle that has an area in the texture.
-fn shell_jacobian(shell: Shell, number: u32, tetrahedron: u32) -> ShellJacobian {
-    let prism = prism_of(shell, number);
-    let points = tetrahedron_points(prism.vertices, tetrahedron);
-    let p0 = shell_point(shell, points.x);
-    let p1 = shell_point(shell, points.y);
-    let p2 = shell_point(shell, points.z);
-    let p3 = shell_point(shell, points.w);
+fn shell_jacobian(segment: Segment) -> ShellJacobian {
+    let tetrahedron = segment.tetrahedron;
+    let p0 = segment.p0;
+    let p1 = segment.p1;
+    let p2 = segment.p2;
+    let p3 = segment.p3;
     let down = select(select(p3 - p2, p2 - p1, tetrahedron == 1u), p1 - p0, tetrahedron == 2u);
     let e1 = select(p1 - p0, p2 - p0 - down, tetrahedron == 2u);
     let e2 = select(p3 - p0 - down, p2 - p0, tetrahedron == 0u);
-    let a = prism.uv_b - prism.uv_a;
-    let b = prism.uv_c - prism.uv_a;
+    let a = segment.uv_ab;
+    let b = segment.uv_ac;
     let inverse = 1.0 / cross2(a, b);
     return ShellJacobian((e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down);
 }
@@ -237,9 +247,16 @@ fn face_parameter(a: Corner, b: Corner, c: Corner, shares: vec3<f32>) -> f32 {
 }
 
 fn path_corner(path: ShellPath, point: u32) -> Corner {
-    let away = shell_point(path.shell, point) - path.origin;
+    let world = shell_point(path.shell, point);
+    let away = world - path.origin;
     let at = vec2<f32>(dot3(away, path.across_x), dot3(away, path.across_y));
-    return Corner(point, at, dot3(away, path.direction));
+    return Corner(point, at, dot3(away, path.direction), world);
+}
+
+// Position of the point `point`, which is one of four corners.
+fn world_of(point: u32, a: Corner, b: Corner, c: Corner, d: Corner) -> vec3<f32> {
+    let ab = select(b.world, a.world, a.point == point);
+    return select(select(d.world, c.world, c.point == point), ab, (a.point == point) | (b.point == point));
 }
 
 fn path_at(
@@ -406,7 +423,14 @@ fn path_next(path: ptr<function, ShellPath>) -> Segment {
     var segment: Segment;
     segment.prism = (*path).prism;
     segment.tetrahedron = tetrahedron;
-    segment.is_mapped = is_an_area(prism.uv_b - prism.uv_a, prism.uv_c - prism.uv_a);
+    segment.vertices = prism.vertices;
+    segment.uv_ab = prism.uv_b - prism.uv_a;
+    segment.uv_ac = prism.uv_c - prism.uv_a;
+    segment.is_mapped = is_an_area(segment.uv_ab, segment.uv_ac);
+    segment.p0 = world_of(points.x, a, b, c, d);
+    segment.p1 = world_of(points.y, a, b, c, d);
+    segment.p2 = world_of(points.z, a, b, c, d);
+    segment.p3 = world_of(points.w, a, b, c, d);
     segment.shares_in = shares_of_vertices(prism.vertices, a, b, c, (*path).shares);
     segment.at_in = texture_of(prism, a, b, c, (*path).shares, segment.shares_in);
     // The face behind c, a or b.
