@@ -5,7 +5,8 @@
 // `rock_surface` writes the tile of the mesh that a sample shows and the position in it. `opaque` shades the
 // visible rock once per sample. `volume` intersects the pixel's own ray with the quad and maps the point by
 // the exact inverse bilinear map (src/mapping/mod.rs, QuadMap::uv), so the result does not depend on how a
-// quad is cut into triangles. `hull` does so for the faces of shells that the eye sees. `peel` finds the sheets behind the nearest, one layer per pass.
+// quad is cut into triangles. `hull` does so for the faces of shells that the eye sees. `peel` finds the
+// sheets behind the nearest, one layer per pass.
 
 #import engine::opaque
 #import engine::pool

@@ -22,9 +22,11 @@ use crate::trace::{extinction, flow_cells};
 use crate::util::error::{Error, Result};
 use crate::volume::{LevelSets, VolumeTexture};
 
-/// Texels in a row of the texture of shells. Twin: `SHELL_ROW` of `shaders/mapping/shell.wgsl`, its logarithm.
+/// Texels in a row of the texture of shells. Twin: `SHELL_ROW` of `shaders/mapping/shell.wgsl`, which is the
+/// logarithm.
 pub const SHELL_ROW: u32 = 1 << 13;
-/// Texels in front of the headers, of a header, and of a prism. Twins: constants of `shaders/mapping/shell.wgsl`.
+/// Texels in front of the headers, of a header, and of a prism. Twins: constants of
+/// `shaders/mapping/shell.wgsl`.
 pub const SHELL_TABLE: u32 = 1;
 /// See [`SHELL_TABLE`].
 pub const SHELL_HEADER: u32 = 2;
