@@ -154,8 +154,8 @@ impl Outline {
 const MARGIN: f64 = 3.0;
 
 /// Marks the squares of a grid that a volume quad or a face of a shell's hull may appear in, row by row. The
-/// grid has `count` squares along x and y, each `side` pixels wide, and begins at pixel `corner` of the image.
-/// Every square in which a face appears is marked; a few others may be.
+/// grid has `count` squares along x and y, each `side` pixels wide, and begins at pixel `corner` of the
+/// image. Every square in which a face appears is marked; a few others may be.
 pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> Vec<bool> {
     let [across, down] = count.map(|n| n as usize);
     let corner = DVec2::new(corner[0].into(), corner[1].into());
