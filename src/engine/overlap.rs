@@ -15,9 +15,9 @@ const MOST_PAIRS: usize = 1 << 21;
 const MOST_CUTS: usize = 1 << 14;
 
 /// Returns the largest number of volume quads that any ray of the scene's image meets: at least 1, at most
-/// `trace.layers`, which it is in a scene with shells. Opaque geometry in front of them is ignored, so the result may be too large. It is too
-/// small only where the overlap in the image is narrower than 1/512 pixel. Every window and sample gets the
-/// same result.
+/// `trace.layers`, which it is in a scene with shells. Opaque geometry in front of them is ignored, so the
+/// result may be too large. It is too small only where the overlap in the image is narrower than 1/512 pixel.
+/// Every window and sample gets the same result.
 pub fn sheets(scene: &Scene) -> u32 {
     let most = scene.trace.layers;
     // A shell is entered again behind each fold and hole.

@@ -39,8 +39,8 @@ pub struct Gbuffer {
     /// u, v and metres from the eye of each quad under a pixel: `layers` entries per pixel, the nearest
     /// first.
     pub surface: Vec<[f32; 3]>,
-    /// Number of each quad under a pixel plus 1; 0: none. Faces of shells' hulls are numbered after the quads.
-    /// Ordered as `surface`.
+    /// Number of each quad under a pixel plus 1; 0: none. Faces of shells' hulls are numbered after the
+    /// quads. Ordered as `surface`.
     pub quad_id: Vec<u32>,
     /// Pixels that show a pool.
     pools: Vec<PoolPixel>,
@@ -70,8 +70,8 @@ impl Gbuffer {
         self.quad_id.resize(pixels * self.layers, 0);
     }
 
-    /// Iterates over the quads and hull faces under pixel `i` in order of depth: the quad's number, and u, v and metres from
-    /// the eye.
+    /// Iterates over the quads and hull faces under pixel `i` in order of depth: the face's number, and u, v
+    /// and metres from the eye.
     pub fn faces(&self, i: usize) -> impl Iterator<Item = (usize, [f32; 3])> {
         (0..).map_while(move |layer| self.face(i, layer))
     }

@@ -23,10 +23,20 @@ fn load(preset: &str, text: &str, sets: &[&str], folder: &Path) -> Scene {
     Scene::load(&file, &sets, &Limits::default()).expect("a valid scene")
 }
 
-/// Lamps around the middle of the preset's first quad.
+/// The middle of the first quad or hull face of a scene, and the axes of its plane.
+fn first_face(scene: &Scene) -> (Vec3, [Vec3; 3]) {
+    if let Some(map) = scene.quads.first().map(|quad| quad.map) {
+        return (map.point_world(0.5, 0.5), [map.e1_world, map.e2_world, map.n_world]);
+    }
+    let shell = &scene.shells[0];
+    let [a, b, c] = shell.corners(&shell.hull[0]);
+    let (e1, n) = ((b - a).normalize(), (b - a).cross(c - a).normalize());
+    ((a + b + c) / 3.0, [e1, n.cross(e1), n])
+}
+
+/// Lamps around the middle of the preset's first face.
 fn lamps(preset: &str, folder: &Path) -> String {
-    let quad = load(preset, "", &[], folder).quads[0];
-    let middle = quad.map.point_world(0.5, 0.5);
+    let (middle, _) = first_face(&load(preset, "", &[], folder));
     let lamp = |i: usize| {
         let (turn, height) = (i as f32 * 2.4, i as f32 / LAMPS as f32 - 0.5);
         let at = middle + Vec3::new(turn.cos(), 2.0 * height, turn.sin()) * 2.0;
@@ -35,14 +45,13 @@ fn lamps(preset: &str, folder: &Path) -> String {
     (0..LAMPS).map(lamp).collect()
 }
 
-/// Moves the eye so that it looks at the middle of the first quad at one degree to its face.
+/// Moves the eye so that it looks at the middle of the first face at one degree to its plane.
 fn graze(scene: &mut Scene) {
-    let map = scene.quads[0].map;
+    let (middle, [e1, e2, n]) = first_face(scene);
     let (sin, cos) = 1f32.to_radians().sin_cos();
-    let middle = map.point_world(0.5, 0.5);
     let camera = &mut scene.edit().camera;
-    camera.forward = -(map.e1_world * cos + map.n_world * sin).as_dvec3();
-    camera.right = map.e2_world.as_dvec3();
+    camera.forward = -(e1 * cos + n * sin).as_dvec3();
+    camera.right = e2.as_dvec3();
     camera.up = camera.right.cross(camera.forward);
     camera.eye = camera.origin + middle.as_dvec3() - camera.forward * 0.7;
 }
@@ -71,7 +80,7 @@ fn every_preset_gives_a_picture_under_every_light_and_at_every_length_of_walks()
     std::fs::write(&map, [head, &texels].concat()).expect("written");
     for (preset, _) in presets() {
         let plain = load(preset, "", &[], folder.path());
-        let volume = plain.volume(1 << 30, &Unwatched).expect("a volume");
+        let volume = plain.volumes(1 << 30, &Unwatched).expect("volumes");
         let mesh = plain.mesh();
         let (march, most) = ("light.visibility=march", "trace.max_cells=65536");
         let lamps = lamps(preset, folder.path());

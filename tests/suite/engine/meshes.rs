@@ -2,14 +2,13 @@
 
 use image::{Rgb, RgbImage};
 use serde_json::json;
-use taki::engine::{Engine, EngineChoice, RenderOptions, cpu, overlap};
+use taki::engine::{cpu, overlap};
 use taki::output::frame::{Difference, Tolerance};
 use taki::picture::Frame;
 use taki::scene::Scene;
-use taki::util::error::Error;
 use taki::util::monitor::Unwatched;
 
-use super::gpu::{SURFACE, assert_parity, both, renderer};
+use super::gpu::{assert_parity, both, renderer};
 use crate::model::{Doc, SQUARE, floats, shorts};
 use crate::scene::meshes::{Folder, PLACE};
 
@@ -226,7 +225,7 @@ fn ball() -> Vec<u8> {
 }
 
 #[test]
-fn a_shell_has_a_silhouette_and_is_drawn_by_the_cpu_engine() {
+fn a_shell_has_a_silhouette_on_both_engines() {
     let folder = Folder::new();
     folder.write("ball.glb", ball());
     let text = format!(
@@ -265,14 +264,6 @@ fn a_shell_has_a_silhouette_and_is_drawn_by_the_cpu_engine() {
     assert!(light(20..28) > 0.0);
     let bald = on_cpu(&folder.scene(&text, &[&sets[..], &["materials.fur.skin=false"]].concat()));
     assert!(bald.counts != frame.counts, "without a skin rays walk through the ball");
-    // On the GPU it is refused, so that `auto` takes the CPU.
     let Some(mut renderer) = renderer("shells") else { return };
-    let volumes = scene.volumes(1 << 30, &Unwatched).unwrap();
-    let e = renderer.render(&scene, &volumes, &scene.mesh(), &SURFACE, &Unwatched).expect_err("refused");
-    assert!(matches!(&e, Error::Device { .. }) && format!("{e:?}").contains("--engine cpu"), "{e:?}");
-    let (mut engine, _) = Engine::open(EngineChoice::Auto, &Default::default()).unwrap();
-    let options = RenderOptions::default();
-    let auto = engine.render_volume(&scene, &volumes, &scene.mesh(), &options, &Unwatched).unwrap();
-    assert_eq!(engine.word(), "cpu");
-    assert!(auto.counts == frame.counts);
+    assert_parity("a shell", &both(&mut renderer, &scene));
 }

@@ -67,8 +67,8 @@ impl<'a> Projection<'a> {
         self.scene.quads.iter().map(piece).collect()
     }
 
-    /// Returns the triangles of the hulls of shells that face the eye, in pieces. Faces are numbered after the
-    /// quads, shell by shell.
+    /// Returns the triangles of the hulls of shells that face the eye, in pieces. Faces are numbered after
+    /// the quads, shell by shell.
     pub fn hulls(&self) -> Vec<Piece> {
         let eye = self.scene.camera.eye_local();
         let mut first = self.scene.quads.len() as u32;

@@ -1,7 +1,7 @@
 //! §3 to §5 on the CPU: the way of a ray through a shell, tetrahedron by tetrahedron.
 //!
-//! Angles in a shell are measured with the fibre's direction in the world, t = J·v. A quad turns light and eye
-//! into its cells once for all cells of a ray; here J changes from cell to cell, and most of them are empty.
+//! Angles in a shell are measured with the fibre's direction in the world, t = J·v. A quad turns light and
+//! eye into its cells once for all cells of a ray; here J changes from cell to cell, and most are empty.
 
 use glam::{Mat3, Vec2, Vec3};
 
