@@ -8,6 +8,7 @@ macro_rules! pages {
 
 pages! {
     tutorial "tutorial.md"
+    meshes "meshes.md"
     method "method.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"

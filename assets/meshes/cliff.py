@@ -72,9 +72,9 @@ def fall():
     speed = 1.9
     for k in range(10):
         y = 5.2 - 0.5 * k
-        path.append((y, 7.62 + 0.035 * (y - 0.7), t))
+        path.append((y, 7.16 + 0.03 * (y - 0.7), t))
         t += 0.5 / speed
-    rim_y, rim_z, start = 0.7, 7.62, t
+    rim_y, rim_z, start = 0.7, 7.16, t
     for k in range(31):
         time = k * 0.042
         path.append((rim_y - speed * time, rim_z - 4.905 * time * time, start + time))
@@ -82,14 +82,14 @@ def fall():
     vertices, faces, uvs, share = [], [], [], []
     for y, z, time in path:
         fallen = max(rim_z - z, 0.0)
-        width = LIP_WIDTH * (1 + 0.028 * fallen)
+        width = LIP_WIDTH * (1 + 0.035 * fallen)
         for i in range(columns + 1):
             u = i / columns
             x = (u - 0.5) * width
             # The edges lag behind: the rim is lower in the middle.
             lag = 0.3 * (2 * u - 1) ** 2
             wave = 0.1 * math.sin(2.1 * x + 0.7) + 0.06 * math.sin(5.3 * x)
-            z_bed = 0.5 * (2 * u - 1) ** 2 if fallen == 0 else 0.5 * (2 * u - 1) ** 2 * math.exp(-fallen)
+            z_bed = 0.28 * (2 * u - 1) ** 2 * math.exp(-fallen)
             vertices.append((x, y + lag + wave * min(fallen, 1.0) - 0.4, z + z_bed))
             uvs.append((u, time))
             # The water thins out towards ragged edges, and where it begins.

@@ -8,7 +8,7 @@ import math
 import struct
 import sys
 
-ROUND, TUBE = 96, 40  # quads around the axis and around the tube
+ROUND, TUBE = 168, 72  # quads around the axis and around the tube
 RADIUS, THIN = 1.0, 0.36  # metres
 
 
