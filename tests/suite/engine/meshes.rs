@@ -265,10 +265,10 @@ fn a_shell_has_a_silhouette_on_both_engines() {
     let bald = on_cpu(&folder.scene(&text, &[&sets[..], &["materials.fur.skin=false"]].concat()));
     assert!(bald.counts != frame.counts, "without a skin rays walk through the ball");
     let Some(mut renderer) = renderer("shells") else { return };
-    // A projection puts corners of the mesh on planes between cells, where rounding decides on a cell of no
-    // length more or less. So their numbers are not compared.
+    // A projection puts corners and edges of the mesh on planes between cells, where rounding decides on
+    // which side a ray runs. `engine::shells` compares the engines where it does not.
     let [gpu, cpu] = both(&mut renderer, &scene);
     let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).any(|c| (a[c] - b[c]).abs() > 1e-3 * b[c].max(0.1));
     let count = gpu.radiance.iter().zip(&cpu.radiance).filter(|&pair| differs(pair)).count();
-    assert!(count * 1000 <= cpu.radiance.len(), "{count}");
+    assert!(count * 200 <= cpu.radiance.len(), "{count}");
 }
