@@ -29,7 +29,8 @@ def channel(x):
 
 def profile(s):
     """Outline of the cliff from the plateau behind to the ground in front: (y, z) for s from 0 to 1."""
-    points = [(8.0, 8.4), (2.2, 8.1), (0.7, 7.9), (0.0, 7.2), (-0.25, 5.2), (0.1, 3.4), (-0.5, 1.2), (-1.4, 0.1), (-4.0, -0.5), (-9.0, -0.8)]
+    points = [(8.0, 8.4), (2.2, 8.1), (0.7, 7.9), (0.0, 7.2), (-0.25, 5.2), (0.1, 3.4), (-0.5, 1.2)]
+    points += [(-1.4, 0.1), (-4.0, -0.5), (-9.0, -0.8)]
     at = s * (len(points) - 1)
     i = min(int(at), len(points) - 2)
     f = at - i
@@ -74,8 +75,8 @@ def fall():
         y = 5.2 - 0.5 * k
         path.append((y, 7.16 + 0.03 * (y - 0.7), t))
         t += 0.5 / speed
-    rim_y, rim_z, start = 0.7, 7.16, t
-    for k in range(31):
+    rim_y, rim_z, start = 0.7, 7.16, path[-1][2]
+    for k in range(1, 31):
         time = k * 0.042
         path.append((rim_y - speed * time, rim_z - 4.905 * time * time, start + time))
     columns = 14
@@ -131,4 +132,9 @@ def add(name, material, colour, parts):
 bpy.ops.wm.read_factory_settings(use_empty=True)
 add("Rock", "Rock", (0.075, 0.068, 0.058), rock())
 add("Fall", "Fall", (0.8, 0.9, 1.0), fall())
-bpy.ops.export_scene.gltf(filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb", export_format="GLB", export_vertex_color="ACTIVE", export_all_vertex_colors=True)
+bpy.ops.export_scene.gltf(
+    filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb",
+    export_format="GLB",
+    export_vertex_color="ACTIVE",
+    export_all_vertex_colors=True,
+)
