@@ -102,10 +102,10 @@ struct VolumeConstants {
     pad_c: u32,
 }
 
-// Constants of a quad's volume.
-fn volume_of(quad: Quad) -> VolumeConstants {
+// Constants of the volume with this number.
+fn volume_of(number: u32) -> VolumeConstants {
     if SEVERAL {
-        return volumes[quad.volume];
+        return volumes[number];
     }
     var only: VolumeConstants;
     only.cells = frame.cells;
@@ -253,7 +253,7 @@ fn trace(
     is_last: bool,
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
-    let own = volume_of(quad);
+    let own = volume_of(quad.volume);
     let jacobian = cell_frame(quad, hit.xy, own.cells);
     let d_world = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let side = seen_side(quad, d_world);

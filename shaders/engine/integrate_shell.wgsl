@@ -56,14 +56,7 @@ fn trace_shell(
     count: ptr<function, vec2<u32>>,
 ) -> vec4<f32> {
     let shell = shell_of_face(face);
-    var own: VolumeConstants;
-    own.cells = frame.cells;
-    own.extinction = frame.extinction;
-    own.flow_cells = frame.flow_cells;
-    own.levels = frame.levels;
-    if SEVERAL {
-        own = volumes[shell.volume];
-    }
+    let own = volume_of(shell.volume);
     let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let words = shell_texel(shell.hull + face - shell.first_face);
     let a = shell_point(shell, words.y);

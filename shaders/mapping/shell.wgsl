@@ -17,7 +17,7 @@ const MOST_FACES: u32 = 65536u;
 // Beyond a side where the shell ends.
 const NO_PRISM: u32 = 0xffffffffu;
 
-// What lies behind a segment.
+// Space behind a segment.
 const END_SEGMENT: u32 = 0u;
 const END_OUTER: u32 = 1u;
 const END_INNER: u32 = 2u;
@@ -395,7 +395,7 @@ fn texture_of(
     return vec3<f32>(uv, min(depth, 1.0));
 }
 
-// What lies beyond the faces of the three tetrahedra, four bits for each, opposite the corner of the same
+// Spaces beyond the faces of the three tetrahedra, four bits for each, opposite the corner of the same
 // position: another tetrahedron (0 to 2), a surface (3), or 4 + 2·side + half. Twin: FACES of mod.rs.
 const FACES_OF_FIRST: u32 = 0x3186u;
 const FACES_OF_SECOND: u32 = 0x4027u;

@@ -188,7 +188,7 @@ struct PixelRay {
     ended: bool,
 }
 
-/// What a ray meets next.
+/// A quad or shell that a ray meets.
 enum Carrier<'a> {
     /// A quad by its number, at u, v and metres from the eye.
     Quad(usize, [f32; 3]),
@@ -197,7 +197,7 @@ enum Carrier<'a> {
 }
 
 impl PixelRay {
-    /// What the ray meets next, and its position.
+    /// Returns the next quad or shell that the ray meets, and its position.
     #[inline]
     fn next_sheet<'a>(&self, scene: &'a Scene, gbuffer: &Gbuffer) -> Option<(Carrier<'a>, SheetOrder)> {
         if self.ended {

@@ -14,7 +14,7 @@ use super::layout::{HullFace, ShellLightPart};
 use super::shader::resolve;
 use super::specialise::Source;
 use super::timing::Timer;
-use super::upload::{SLAB_BYTES, Uploaded};
+use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
 use crate::mapping::shell::Shell;
 use crate::scene::Scene;
@@ -258,26 +258,7 @@ fn upload(gpu: &Gpu, table: &Table) -> Result<wgpu::TextureView> {
     }
     fits(gpu, "the shells", table.texels(), "use meshes of fewer triangles")?;
     let texture = texture(gpu, "shells", table.texels(), format)?;
-    let row = SHELL_ROW as usize * size_of::<[u32; 4]>();
-    let rows = SLAB_BYTES / row;
-    for (slab, texels) in table.packed().chunks(rows * SHELL_ROW as usize).enumerate() {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: &texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            bytemuck::cast_slice(texels),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
-            wgpu::Extent3d {
-                width: SHELL_ROW,
-                height: (texels.len() / SHELL_ROW as usize) as u32,
-                depth_or_array_layers: 1,
-            },
-        );
-        gpu.run(gpu.encoder("upload shells"))?;
-    }
+    write_rows(gpu, &texture, SHELL_ROW, &table.packed(), "upload shells")?;
     Ok(texture.create_view(&Default::default()))
 }
 
@@ -290,7 +271,7 @@ pub struct ShellLightPass {
     none: Option<wgpu::TextureView>,
 }
 
-/// What V at the vertices depends on.
+/// Inputs of V at the vertices.
 struct Filled {
     table: Table,
     levels: LevelSets,
@@ -422,15 +403,8 @@ impl ShellLightPass {
                         ..ShellLightPart::default()
                     };
                     gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
-                    let took = timer.run(gpu, "light in shells", |encoder, span| {
-                        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                            label: Some("light in shells"),
-                            timestamp_writes: span.compute(),
-                        });
-                        pass.set_pipeline(&pipeline);
-                        pass.set_bind_group(0, &group, &[]);
-                        pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
-                    })?;
+                    let groups = count.div_ceil(64);
+                    let took = timer.dispatch(gpu, "light in shells", &pipeline, &group, groups)?;
                     seconds += took;
                     first += count;
                     done += u64::from(count);

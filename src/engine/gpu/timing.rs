@@ -67,6 +67,29 @@ impl Timer {
         Timer { queries }
     }
 
+    /// Runs a compute pass of `groups` workgroups. Returns the seconds that the device spent in it.
+    ///
+    /// # Errors
+    /// Errors of the device: see [`Gpu::run`].
+    pub fn dispatch(
+        &self,
+        gpu: &Gpu,
+        label: &str,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        groups: u32,
+    ) -> Result<f64> {
+        self.run(gpu, label, |encoder, span| {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(label),
+                timestamp_writes: span.compute(),
+            });
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+        })
+    }
+
     /// Records commands with `record`, submits them and waits. Returns the seconds that the device spent in
     /// the span.
     ///

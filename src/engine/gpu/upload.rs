@@ -412,6 +412,37 @@ pub(super) fn write_layers<T: bytemuck::Pod>(
     gpu.run(gpu.encoder("upload volume")).map(drop)
 }
 
+/// Writes whole rows of `width` texels into a 2-D texture, in slabs, and waits for the copies.
+pub(super) fn write_rows<T: bytemuck::Pod>(
+    gpu: &Gpu,
+    texture: &wgpu::Texture,
+    width: u32,
+    texels: &[T],
+    label: &str,
+) -> Result<()> {
+    let row = width as usize * size_of::<T>();
+    let rows = (SLAB_BYTES / row).max(1);
+    for (slab, texels) in texels.chunks(rows * width as usize).enumerate() {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
+            wgpu::Extent3d {
+                width,
+                height: (texels.len() / width as usize) as u32,
+                depth_or_array_layers: 1,
+            },
+        );
+        gpu.run(gpu.encoder(label))?;
+    }
+    Ok(())
+}
+
 fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
     let Map { width, height, .. } = *map;
     let most = gpu.device.limits().max_texture_dimension_2d;
@@ -431,25 +462,6 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let row = width as usize * 16;
-    let rows = (SLAB_BYTES / row).max(1);
-    for (slab, texels) in map.texels.chunks(rows * width as usize).enumerate() {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: &texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            bytemuck::cast_slice(texels),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
-            wgpu::Extent3d {
-                width,
-                height: (texels.len() / width as usize) as u32,
-                depth_or_array_layers: 1,
-            },
-        );
-        gpu.run(gpu.encoder("upload environment"))?;
-    }
+    write_rows(gpu, &texture, width, &map.texels, "upload environment")?;
     Ok(texture.create_view(&Default::default()))
 }

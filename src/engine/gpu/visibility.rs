@@ -259,15 +259,8 @@ impl VisibilityPass {
                     pad: [0; 3],
                 };
                 gpu.queue.write_buffer(&part, 0, bytemuck::bytes_of(&uniform));
-                let took = timer.run(gpu, "visibility", |encoder, span| {
-                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                        label: Some("visibility"),
-                        timestamp_writes: span.compute(),
-                    });
-                    pass.set_pipeline(&pipeline);
-                    pass.set_bind_group(0, &group, &[]);
-                    pass.dispatch_workgroups(column_count.div_ceil(64), 1, 1);
-                })?;
+                let groups = column_count.div_ceil(64);
+                let took = timer.dispatch(gpu, "visibility", &pipeline, &group, groups)?;
                 seconds += took;
                 first_column += column_count;
                 done += u64::from(column_count);

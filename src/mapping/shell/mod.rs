@@ -47,7 +47,7 @@ pub struct Prism {
     pub vertices: [u32; 3],
     /// Texture coordinates of the vertices, in copies of the volume.
     pub uv: [Vec2; 3],
-    /// What stands beyond the sides on [`EDGES`].
+    /// Prisms beyond the sides on [`EDGES`].
     pub beyond: [Beyond; 3],
 }
 
@@ -85,7 +85,7 @@ pub const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
 const TETRAHEDRA: [[(usize, u32); 4]; 3] =
     [[(0, 0), (1, 0), (2, 0), (2, 1)], [(0, 0), (1, 0), (1, 1), (2, 1)], [(0, 0), (0, 1), (1, 1), (2, 1)]];
 
-/// What lies beyond a face of a tetrahedron.
+/// Space beyond a face of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Face {
     /// Another tetrahedron of the prism.

@@ -32,7 +32,7 @@ pub struct Segment {
     /// Shares of the prism's vertices there: barycentric coordinates of the points of both surfaces between
     /// which the ray is.
     pub shares: [Vec3; 2],
-    /// What lies behind the segment.
+    /// Space behind the segment.
     pub end: End,
 }
 
@@ -49,7 +49,7 @@ impl Segment {
     }
 }
 
-/// What lies behind a segment.
+/// Space behind a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The next segment.

@@ -71,7 +71,7 @@ impl Integrator<'_> {
         self.volume_of(&self.scene.shells[shell]).size[2].div_ceil(2) as usize
     }
 
-    /// What V at the vertices of shells depends on.
+    /// Inputs of V at the vertices of shells.
     pub(in crate::engine::cpu) fn shell_inputs(&self) -> ShellInputs {
         ShellInputs {
             levels: self.volumes.iter().map(|volume| volume.levels.clone()).collect(),
