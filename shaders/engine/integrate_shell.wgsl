@@ -76,7 +76,10 @@ fn trace_shell(
         done = (segment.t_in >= t_end) | (ray.transmittance < frame.early_end);
         if !done {
             segment = segment_until(segment, t_end);
-            through_tetrahedron(&ray, segment, shell, own, origin, metres);
+            // A triangle without an area in the texture shows nothing of it.
+            if segment.is_mapped {
+                through_tetrahedron(&ray, segment, shell, own, origin, metres);
+            }
             done = path.left == 0u;
         }
     }
@@ -115,7 +118,6 @@ fn through_tetrahedron(
         let before = (*ray).transmittance;
         var end = 0.0;
         var walks = select(1u, 2u, share > 0.0);
-        walks = select(0u, walks, segment.is_mapped);
         for (var i = 0u; i < walks; i++) {
             let weight = select(share, 1.0 - share, i == 0u);
             let level = level_new(own.cells, own.base, u32(exact) + i);
@@ -123,7 +125,7 @@ fn through_tetrahedron(
             walk_tetrahedron(ray, segment, start, direction, level, weight, shell, own, begin);
             end += (*ray).transmittance * weight;
         }
-        (*ray).transmittance = select(end, before, walks == 0u);
+        (*ray).transmittance = end;
     } else {
         let level = level_new(own.cells, own.base, 0u);
         walk_tetrahedron(ray, segment, start, direction, level, 1.0, shell, own, begin);
@@ -178,8 +180,6 @@ fn walk_tetrahedron(
             }
             seeking = !done & (sample.rho <= 0.0);
         }
-        // A triangle without an area in the texture shows nothing of it.
-        done |= !segment.is_mapped;
         if !done {
             if !TRILINEAR {
                 sample.k_d = f32((texel.x >> 16u) & 0xffu);

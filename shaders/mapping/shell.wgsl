@@ -10,8 +10,9 @@ const SHELL_ROW: u32 = 13u;
 // Texels in front of those of the first shell's header, and texels of a header.
 const SHELL_TABLE: u32 = 1u;
 const SHELL_HEADER: u32 = 2u;
-// Texels of a prism.
-const PRISM: u32 = 3u;
+// Texels of a prism, and of the tangents at a vertex.
+const PRISM: u32 = 4u;
+const TANGENTS: u32 = 4u;
 // Faces that a path passes before it is given up. Twin: MOST_FACES of path.rs.
 const MOST_FACES: u32 = 65536u;
 // Beyond a side where the shell ends.
@@ -25,7 +26,7 @@ const END_BORDER: u32 = 3u;
 
 struct Shell {
     number: u32,
-    // First texels of its points, prisms and hull.
+    // First texels of its points, prisms and hull. The tangents follow the points.
     points: u32,
     prisms: u32,
     hull: u32,
@@ -188,24 +189,29 @@ fn shell_jacobian(segment: Segment) -> ShellJacobian {
     return ShellJacobian((e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down);
 }
 
-// Twin: Shell::frame, for a triangle that has an area in the texture.
+// Jacobian with which light is computed in a triangle that has an area in the texture. Twin: Shell::frame.
 fn shell_frame(shell: Shell, number: u32, shares: vec3<f32>, depth: f32) -> ShellJacobian {
-    let prism = prism_of(shell, number);
-    let outer = prism.vertices * 2u;
-    let p0 = shell_point(shell, outer.x);
-    let p1 = shell_point(shell, outer.y);
-    let p2 = shell_point(shell, outer.z);
-    let d0 = shell_point(shell, outer.x + 1u) - p0;
-    let d1 = shell_point(shell, outer.y + 1u) - p1;
-    let d2 = shell_point(shell, outer.z + 1u) - p2;
-    let first = p0 + d0 * depth;
-    let e1 = p1 + d1 * depth - first;
-    let e2 = p2 + d2 * depth - first;
-    let a = prism.uv_b - prism.uv_a;
-    let b = prism.uv_c - prism.uv_a;
-    let inverse = 1.0 / cross2(a, b);
-    let down = d0 * shares.x + d1 * shares.y + d2 * shares.z;
-    return ShellJacobian((e1 * b.y - e2 * a.y) * inverse, (e2 * a.x - e1 * b.x) * inverse, down);
+    let numbers = shell_texel(shell.prisms + PRISM * number + 3u);
+    let a = tangents_at(shell, numbers.x, depth);
+    let b = tangents_at(shell, numbers.y, depth);
+    let c = tangents_at(shell, numbers.z, depth);
+    return ShellJacobian(
+        a.x * shares.x + b.x * shares.y + c.x * shares.z,
+        a.y * shares.x + b.y * shares.y + c.y * shares.z,
+        a.z * shares.x + b.z * shares.y + c.z * shares.z,
+    );
+}
+
+// Tangents of the texture at a depth below a vertex, and the way from the outer to the inner surface there.
+fn tangents_at(shell: Shell, number: u32, depth: f32) -> ShellJacobian {
+    let first = shell.points + 2u * shell.vertices + TANGENTS * number;
+    let p = bitcast<vec4<f32>>(shell_texel(first));
+    let q = bitcast<vec4<f32>>(shell_texel(first + 1u));
+    let r = bitcast<vec4<f32>>(shell_texel(first + 2u));
+    let down = bitcast<vec4<f32>>(shell_texel(first + 3u)).xyz;
+    let outer_v = vec3<f32>(p.w, q.xy);
+    let inner_u = vec3<f32>(q.zw, r.x);
+    return ShellJacobian(p.xyz + (inner_u - p.xyz) * depth, outer_v + (r.yzw - outer_v) * depth, down);
 }
 
 // x·y − product, where `product` is x·y as rounded. It is exact: the halves of the factors have 12 bits, so

@@ -16,7 +16,7 @@ use super::specialise::Source;
 use super::timing::Timer;
 use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
-use crate::mapping::shell::Shell;
+use crate::mapping::shell::{Shell, Tangents};
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells};
 use crate::util::error::{Error, Result};
@@ -25,13 +25,15 @@ use crate::volume::{LevelSets, VolumeTexture};
 /// Texels in a row of the texture of shells. Twin: `SHELL_ROW` of `shaders/mapping/shell.wgsl`, which is the
 /// logarithm.
 pub const SHELL_ROW: u32 = 1 << 13;
-/// Texels in front of the headers, of a header, and of a prism. Twins: constants of
-/// `shaders/mapping/shell.wgsl`.
+/// Texels in front of the headers, of a header, of a prism, and of the tangents at a vertex. Twins: constants
+/// of `shaders/mapping/shell.wgsl`.
 pub const SHELL_TABLE: u32 = 1;
 /// See [`SHELL_TABLE`].
 pub const SHELL_HEADER: u32 = 2;
 /// See [`SHELL_TABLE`].
-pub const PRISM: u32 = 3;
+pub const PRISM: u32 = 4;
+/// See [`SHELL_TABLE`].
+pub const TANGENTS: u32 = 4;
 
 /// Bit of a header's word that tells whether a shell has a skin; the others are the volume's number.
 const SKIN: u32 = 1 << 31;
@@ -67,8 +69,8 @@ struct Table {
 /// The shells of a scene on the device.
 pub struct UploadedShells {
     table: Table,
-    /// `texture_2d<u32>`, `rgba32uint`: one word texel, the headers, then points, prisms and hull of each
-    /// shell.
+    /// `texture_2d<u32>`, `rgba32uint`: one word texel, the headers, then points, tangents, prisms and hull of
+    /// each shell.
     pub texels: wgpu::TextureView,
     /// `array<HullFace>` of the faces that the eye sees, in parts that can be bound, with their numbers.
     pub faces: Vec<(wgpu::Buffer, u32)>,
@@ -111,7 +113,8 @@ impl Table {
     /// Number of texels.
     fn texels(&self) -> u64 {
         let of = |shell: &Arc<Shell>| {
-            (shell.points.len() + shell.prisms.len() * PRISM as usize + shell.hull.len()) as u64
+            let (prisms, tangents) = (shell.prisms.len() * PRISM as usize, shell.tangents.len());
+            (shell.points.len() + tangents * TANGENTS as usize + prisms + shell.hull.len()) as u64
         };
         u64::from(SHELL_TABLE)
             + self.shells.len() as u64 * u64::from(SHELL_HEADER)
@@ -126,7 +129,8 @@ impl Table {
         let mut points = SHELL_TABLE + self.shells.len() as u32 * SHELL_HEADER;
         let mut face = self.quads;
         for (i, shell) in self.shells.iter().enumerate() {
-            let prisms = points + shell.points.len() as u32;
+            let tangents = points + shell.points.len() as u32;
+            let prisms = tangents + shell.tangents.len() as u32 * TANGENTS;
             let hull = prisms + shell.prisms.len() as u32 * PRISM;
             let volume = shell.volume | if shell.skin { SKIN } else { 0 };
             out.push([points, prisms, hull, face]);
@@ -139,6 +143,12 @@ impl Table {
                 let [x, y, z] = point.to_array().map(f32::to_bits);
                 [x, y, z, shell.corner_of(i / 2)]
             }));
+            for tangents in &shell.tangents {
+                let &Tangents { outer: [a, b], inner: [c, d], down } = tangents;
+                let all = [a, b, c, d, down].map(|v| v.to_array().map(f32::to_bits));
+                out.extend_from_slice(all.as_flattened()[..12].as_chunks::<4>().0);
+                out.push([all[4][0], all[4][1], all[4][2], 0]);
+            }
             for prism in &shell.prisms {
                 let [a, b, c] = prism.vertices;
                 let [ab, bc, ac] = prism.beyond.map(|beyond| match beyond.get() {
@@ -149,6 +159,8 @@ impl Table {
                 out.push([a, b, c, ab]);
                 out.push([uv_a[0], uv_a[1], uv_b[0], uv_b[1]]);
                 out.push([uv_c[0], uv_c[1], bc, ac]);
+                let [a, b, c] = prism.tangents;
+                out.push([a, b, c, 0]);
             }
             out.extend(shell.hull.iter().map(|face| {
                 let [a, b, c] = face.points;

@@ -2,11 +2,11 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use crate::util::words::words;
 
-use super::{AT_SIDES, Beyond, EDGES, HullFace, MAX_PRISMS, Prism, Shell};
+use super::{AT_SIDES, Beyond, EDGES, HullFace, MAX_PRISMS, Prism, Shell, tangents};
 
 /// The side of a mesh that a shell lies on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,14 +107,22 @@ impl Shell {
                 Side::Inward => [places[v], places[v] - away],
             });
         }
-        let prisms: Vec<Prism> = kept.iter().map(|&(welded, own)| prism(welded, own, uv)).collect();
+        let mut prisms: Vec<Prism> = kept.iter().map(|&(welded, own)| prism(welded, own, uv)).collect();
         let mut corner_of = vec![0; count];
         for (i, prism) in prisms.iter().enumerate() {
             for (k, &vertex) in prism.vertices.iter().enumerate() {
                 corner_of[vertex as usize] = (4 * i + k) as u32;
             }
         }
-        let mut shell = Shell { points, prisms, hull: Vec::new(), corner_of, volume: 0, skin: false };
+        let tangents = tangents::average(&points, &mut prisms);
+        let mut shell =
+            Shell { points, prisms, hull: Vec::new(), tangents, corner_of, volume: 0, skin: false };
+        for i in 0..shell.prisms.len() {
+            let volume = |k: usize| {
+                shell.jacobian(i, k).map_or(0.0, |[x, y, z]| Mat3::from_cols(x, y, z).determinant().abs())
+            };
+            shell.prisms[i].volumes = shell.jacobian(i, 0).map(|_| [0, 1, 2].map(volume));
+        }
         if !(0..shell.prisms.len()).any(|prism| shell.is_mapped(prism)) {
             return Err(ShellFault::Unmapped);
         }
@@ -217,6 +225,8 @@ fn prism(welded: [u32; 3], own: [u32; 3], uv: &[Vec2]) -> Prism {
     Prism {
         vertices: order.map(|k| welded[k]),
         uv: order.map(|k| uv[own[k] as usize]),
+        tangents: [0; 3],
+        volumes: None,
         beyond: [Beyond::NOTHING; 3],
     }
 }

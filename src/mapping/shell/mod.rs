@@ -17,11 +17,13 @@
 
 mod build;
 mod path;
+mod tangents;
 
 use glam::{Vec2, Vec3};
 
 pub use build::{ShellFault, Side, SurfaceMesh};
 pub use path::{End, MOST_FACES, Segment, ShellPath};
+pub use tangents::Tangents;
 
 /// A volume between two surfaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +34,8 @@ pub struct Shell {
     pub prisms: Vec<Prism>,
     /// Triangles that enclose the shell.
     pub hull: Vec<HullFace>,
+    /// Tangents of the texture, which the corners of prisms number.
+    pub tangents: Vec<Tangents>,
     /// A prism at each vertex of the mesh: four times its number, plus the vertex's position there.
     corner_of: Vec<u32>,
     /// Number of the volume among those of the scene.
@@ -47,6 +51,11 @@ pub struct Prism {
     pub vertices: [u32; 3],
     /// Texture coordinates of the vertices, in copies of the volume.
     pub uv: [Vec2; 3],
+    /// Numbers of the tangents at the vertices.
+    pub tangents: [u32; 3],
+    /// Determinant of the Jacobian of each tetrahedron: m³ of the world per copy of the volume. `None` where
+    /// the triangle has no area in the texture.
+    pub volumes: Option<[f32; 3]>,
     /// Prisms beyond the sides on [`EDGES`].
     pub beyond: [Beyond; 3],
 }
@@ -176,9 +185,9 @@ impl Shell {
     }
 
     /// Whether a prism's triangle has an area in the texture.
+    #[inline]
     pub fn is_mapped(&self, prism: usize) -> bool {
-        let [a, b, c] = self.prisms[prism].uv;
-        is_an_area(b - a, c - a)
+        self.prisms[prism].volumes.is_some()
     }
 
     /// Jacobian of a tetrahedron, as columns: metres of the world per copy of the volume along u, along v and
@@ -210,18 +219,20 @@ impl Shell {
         sum / pairs.len().max(1) as f64
     }
 
-    /// Jacobian of a prism, as columns like those of [`Shell::jacobian`], at a place given by the shares of
-    /// the prism's vertices and the depth from 0 to 1.
-    ///
-    /// It is that of the map which goes along straight lines between the two surfaces. Light is computed with
-    /// it, because it has no steps inside a prism, and its column into the depth has none between prisms.
-    pub fn frame(&self, prism: usize, shares: Vec3, depth: f32) -> Option<[Vec3; 3]> {
-        let Prism { vertices, uv, .. } = &self.prisms[prism];
-        let [outer, inner] = [0, 1].map(|k| vertices.map(|vertex| self.points[2 * vertex as usize + k]));
-        let down = [0, 1, 2].map(|i| inner[i] - outer[i]);
-        let at = [0, 1, 2].map(|i| outer[i] + down[i] * depth);
-        let down = down[0] * shares.x + down[1] * shares.y + down[2] * shares.z;
-        along_texture(uv, at[1] - at[0], at[2] - at[0]).map(|[x, y]| [x, y, down])
+    /// Jacobian with which light is computed at a place in a prism that has an area in the texture, as columns
+    /// like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices and the
+    /// depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so the
+    /// Jacobian has no steps between prisms.
+    #[inline]
+    pub fn frame(&self, prism: usize, shares: Vec3, depth: f32) -> [Vec3; 3] {
+        let mut out = [Vec3::ZERO; 3];
+        for (number, share) in self.prisms[prism].tangents.into_iter().zip(shares.to_array()) {
+            let Tangents { outer, inner, down } = &self.tangents[number as usize];
+            out[0] += (outer[0] + (inner[0] - outer[0]) * depth) * share;
+            out[1] += (outer[1] + (inner[1] - outer[1]) * depth) * share;
+            out[2] += *down * share;
+        }
+        out
     }
 
     /// Bytes that the shell takes in memory.
@@ -231,6 +242,7 @@ impl Shell {
             + of(self.prisms.len(), size_of::<Prism>())
             + of(self.hull.len(), size_of::<HullFace>())
             + of(self.corner_of.len(), size_of::<u32>())
+            + of(self.tangents.len(), size_of::<Tangents>())
     }
 }
 

@@ -76,6 +76,8 @@ pub struct ShellPath<'a> {
     corners: [Corner; 3],
     /// Their shares in the point where it does.
     shares: [f32; 3],
+    /// What [`ShellPath::texture`] returns there, if it is known.
+    texture: Option<(Vec3, Vec3)>,
     t: f32,
     /// Number of faces that may still be passed; 0 behind the last segment.
     left: u32,
@@ -145,6 +147,11 @@ impl<'a> ShellPath<'a> {
         Some(path)
     }
 
+    /// The shell.
+    pub fn shell(&self) -> &'a Shell {
+        self.shell
+    }
+
     /// Whether the ray passes the face that the path enters through next.
     fn is_met(&self) -> bool {
         let [a, b, c] = &self.corners;
@@ -172,6 +179,7 @@ impl<'a> ShellPath<'a> {
             tetrahedron,
             corners: [none; 3],
             shares: [0.0; 3],
+            texture: None,
             t: 0.0,
             left: MOST_FACES,
         }
@@ -234,7 +242,7 @@ impl Iterator for ShellPath<'_> {
             [_, true, false] => ([b, c, d], a),
             _ => ([c, a, d], b),
         };
-        let (from, shares_in) = self.texture(&self.corners, self.shares);
+        let (from, shares_in) = self.texture.unwrap_or_else(|| self.texture(&self.corners, self.shares));
         let (shares, t) = point_of(&face);
         let t_in = self.t;
         self.t = t.max(t_in);
@@ -248,11 +256,15 @@ impl Iterator for ShellPath<'_> {
             end: End::Segment,
         };
         (self.corners, self.shares) = (face, shares);
+        self.texture = Some((to, shares_out));
         let opposite = points.iter().position(|&point| point == dropped.point).unwrap_or(3);
         match FACES[self.tetrahedron][opposite] {
             Face::Tetrahedron(next) => self.tetrahedron = next,
             Face::Side(edge, half) => match self.shell.prisms[self.prism].beyond[edge].get() {
-                Some((prism, edge)) => (self.prism, self.tetrahedron) = (prism, AT_SIDES[edge][half]),
+                Some((prism, edge)) => {
+                    (self.prism, self.tetrahedron) = (prism, AT_SIDES[edge][half]);
+                    self.texture = None;
+                }
                 None => segment.end = End::Border,
             },
             Face::Surface if self.tetrahedron == 0 => segment.end = End::Outer,

@@ -140,9 +140,9 @@ impl Key {
     }
 }
 
-/// Bytes that a shell takes for each triangle while it is built: points, prisms, hull, and the tables by
-/// which vertices and edges find one another.
-const SHELL_BYTES: u128 = 480;
+/// Bytes that a shell takes for each triangle while it is built: points, tangents, prisms, hull, and
+/// the tables by which vertices and edges find one another.
+const SHELL_BYTES: u128 = 640;
 
 /// Builds the surfaces of all meshes, relative to `origin`. `quads` is the number of quads that the scene has
 /// besides.

@@ -350,3 +350,64 @@ fn meshes_that_carry_no_shell_are_refused() {
     assert_eq!(fault(&|mesh| mesh.uv[1].y = f32::INFINITY), ShellFault::NotFinite);
     assert_eq!(fault(&|mesh| mesh.thickness[1] = -0.1), ShellFault::NotFinite);
 }
+
+/// Largest angle between the frame's axes along the mesh and those of the smooth torus, radians.
+fn frame_error(n: u32, m: u32) -> f64 {
+    let mesh = torus(n, m, 0.3);
+    let shell = Shell::new(&mesh, Side::Outward).expect("a valid mesh");
+    let mut most = 0.0f64;
+    for (i, prism) in shell.prisms.iter().enumerate() {
+        for shares in [Vec3::splat(1.0 / 3.0), Vec3::new(0.5, 0.5, 0.0), Vec3::new(0.1, 0.2, 0.7), Vec3::X] {
+            let uv = prism.uv[0] * shares.x + prism.uv[1] * shares.y + prism.uv[2] * shares.z;
+            let [a, b] = [uv.x / 4.0, uv.y / 2.0].map(|t| f64::from(t) * std::f64::consts::TAU);
+            let along_u = DVec3::new(-a.sin(), 0.0, a.cos());
+            let along_v = DVec3::new(-b.sin() * a.cos(), b.cos(), -b.sin() * a.sin());
+            for depth in [0.0, 0.5, 1.0] {
+                let [u, v, _] = shell.frame(i, shares, depth).map(|axis| axis.as_dvec3());
+                most = most.max(u.angle_between(along_u)).max(v.angle_between(along_v));
+            }
+        }
+    }
+    most
+}
+
+#[test]
+fn frames_of_light_come_to_those_of_the_smooth_surface_with_the_square_of_the_edges() {
+    let errors = [1, 2, 4].map(|k| frame_error(16 * k, 10 * k));
+    // Those of the facets would halve.
+    assert!(errors[1] < errors[0] / 3.5 && errors[2] < errors[1] / 3.5, "{errors:?}");
+    assert!(errors[2] < 0.01, "{errors:?}");
+}
+
+#[test]
+fn frames_of_light_keep_edges_and_turned_seams() {
+    // Two squares that meet along z; the texture of the second goes on from that of the first, or is turned
+    // by 90°.
+    let corners = [[0, 0], [1, 0], [1, 1], [0, 1], [1, 0], [2, 0], [2, 1], [1, 1]];
+    let charts = [[[1, 0], [2, 0], [2, 1], [1, 1]], [[0, 0], [0, 1], [-1, 1], [-1, 0]]];
+    for (fold, chart) in [(90.0f32, 0), (0.0, 1), (1.0, 1), (90.0, 1)] {
+        let turn = Mat3::from_rotation_z(fold.to_radians());
+        let place = |i: usize| {
+            let [x, y] = corners[i].map(|c| c as f32);
+            let flat = Vec3::new(x, 0.0, -y);
+            if i < 4 { flat } else { Vec3::X + turn * (flat - Vec3::X) }
+        };
+        let uv = corners[..4].iter().chain(&charts[chart]).map(|uv| Vec2::from(uv.map(|c| c as f32)));
+        let mesh = SurfaceMesh {
+            positions: (0..8).map(place).collect(),
+            uv: uv.collect(),
+            thickness: vec![0.1; 8],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+        };
+        let shell = Shell::new(&mesh, Side::Inward).expect("a valid mesh");
+        let second = if chart == 0 { [turn * Vec3::X, Vec3::NEG_Z] } else { [Vec3::Z, turn * Vec3::X] };
+        for prism in 0..4 {
+            let want = if prism < 2 { [Vec3::X, Vec3::NEG_Z] } else { second };
+            for shares in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let [u, v, _] = shell.frame(prism, shares, 0.0);
+                let error = u.distance(want[0]) + v.distance(want[1]);
+                assert!(error < 1e-6, "fold {fold}, chart {chart}, prism {prism}: {u} {v} not {want:?}");
+            }
+        }
+    }
+}

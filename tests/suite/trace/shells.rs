@@ -65,16 +65,19 @@ struct Tetrahedron {
     corners: [DVec3; 4],
     texture_from_world: DMat3,
     at: DVec3,
-    /// Outer and inner points of the prism, and its texture coordinates.
-    prism: [[DVec3; 2]; 3],
+    /// Texture coordinates of the prism.
     uv: [DVec2; 3],
+    /// Frames of light at its outer and inner points.
+    frames: [[DMat3; 2]; 3],
     /// Whether its fourth face is the inner surface.
     is_innermost: bool,
 }
 
 fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
+    let facets: Vec<[DMat3; 2]> = (0..shell.prisms.len()).map(|i| facet_frames(shell, i)).collect();
     let mut out = Vec::new();
     for (i, prism) in shell.prisms.iter().enumerate() {
+        let frames = prism.vertices.map(|vertex| vertex_frames(shell, &facets, vertex));
         for k in 0..3 {
             let numbers = shell.tetrahedron(i, k);
             let corners = numbers.map(|p| shell.points[p as usize].as_dvec3());
@@ -84,13 +87,12 @@ fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
             });
             let edges = |all: [DVec3; 4]| DMat3::from_cols(all[1] - all[0], all[2] - all[0], all[3] - all[0]);
             let texture_from_world = edges(at) * edges(corners).inverse();
-            let point = |vertex: u32, depth: u32| shell.points[(2 * vertex + depth) as usize].as_dvec3();
             out.push(Tetrahedron {
                 corners,
                 texture_from_world,
                 at: at[0],
-                prism: prism.vertices.map(|vertex| [0, 1].map(|depth| point(vertex, depth))),
                 uv: prism.uv.map(|uv| uv.as_dvec2()),
+                frames,
                 is_innermost: k == 2,
             });
         }
@@ -98,23 +100,55 @@ fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
     out
 }
 
+/// Frames of a prism's outer and inner triangle: metres per copy of the volume, by solving for the texture's
+/// gradient. The third column is not used.
+fn facet_frames(shell: &Shell, i: usize) -> [DMat3; 2] {
+    let prism = &shell.prisms[i];
+    [0, 1].map(|depth| {
+        let [p, q, r] = prism.vertices.map(|v| shell.points[(2 * v + depth) as usize].as_dvec3());
+        let [a, b, c] = prism.uv.map(|uv| uv.as_dvec2());
+        let normal = (q - p).cross(r - p);
+        let edges = DMat3::from_cols(q - p, r - p, normal);
+        let texture = DMat3::from_cols((b - a).extend(0.0), (c - a).extend(0.0), DVec3::Z);
+        edges * texture.inverse()
+    })
+}
+
+/// Frames of light at a vertex: means over its prisms, weighted by their angles halfway between the surfaces.
+/// The meshes of these tests are smooth everywhere, so all prisms take part.
+fn vertex_frames(shell: &Shell, facets: &[[DMat3; 2]], vertex: u32) -> [DMat3; 2] {
+    let middle = |v: u32| {
+        let [outer, inner] = [0, 1].map(|k| shell.points[(2 * v + k) as usize].as_dvec3());
+        (outer + inner) * 0.5
+    };
+    let (mut sum, mut weights) = ([DMat3::ZERO; 2], 0.0);
+    for (prism, own) in shell.prisms.iter().zip(facets) {
+        let Some(k) = prism.vertices.iter().position(|&v| v == vertex) else { continue };
+        let [at, p, q] = [0, 1, 2].map(|i| middle(prism.vertices[(k + i) % 3]));
+        let angle = (p - at).normalize().dot((q - at).normalize()).acos();
+        (0..2).for_each(|i| sum[i] += own[i] * angle);
+        weights += angle;
+    }
+    let down = shell.points[(2 * vertex + 1) as usize] - shell.points[(2 * vertex) as usize];
+    sum.map(|sum| {
+        let mean = sum * (1.0 / weights);
+        DMat3::from_cols(mean.x_axis, mean.y_axis, down.as_dvec3())
+    })
+}
+
 impl Tetrahedron {
-    /// Jacobian of the map of the prism at a point of the tetrahedron, by differences: metres per copy of the
-    /// volume. The map goes along straight lines between the two surfaces.
+    /// Frame of light at a point: interpolated between the prism's vertices, and into the depth.
     fn frame(&self, point: DVec3) -> DMat3 {
         let at = self.at + self.texture_from_world * (point - self.corners[0]);
         let [a, b, c] = self.uv;
-        let map = |at: DVec3| -> DVec3 {
-            let p = at.truncate();
-            let whole = (b - a).perp_dot(c - a);
-            let shares = [(b, c), (c, a), (a, b)].map(|(q, r)| (q - p).perp_dot(r - p) / whole);
-            (0..3).map(|i| self.prism[i][0].lerp(self.prism[i][1], at.z) * shares[i]).sum()
-        };
-        let h = 1e-5;
-        DMat3::from_cols_array_2d(
-            &[DVec3::X, DVec3::Y, DVec3::Z]
-                .map(|axis| ((map(at + axis * h) - map(at - axis * h)) / (2.0 * h)).to_array()),
-        )
+        let p = at.truncate();
+        let whole = (b - a).perp_dot(c - a);
+        let mut sum = DMat3::ZERO;
+        for (i, (q, r)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
+            let share = (q - p).perp_dot(r - p) / whole;
+            sum += (self.frames[i][0] * (1.0 - at.z) + self.frames[i][1] * at.z) * share;
+        }
+        sum
     }
 }
 

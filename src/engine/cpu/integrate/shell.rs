@@ -47,8 +47,8 @@ struct ShellRay<'a> {
     metres: f32,
     d: Vec3,
     transmittance: f32,
-    /// Linear radiance that the cells have sent to the eye.
-    radiance: Vec3,
+    /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
+    radiance: [Vec3; 2],
     /// Cells walked by the view ray, and by its light rays.
     cells: [u32; 2],
 }
@@ -82,45 +82,64 @@ impl Integrator<'_> {
         &self,
         hull: &Hull,
         d: Vec3,
-        SheetOrder { before, is_last, behind }: SheetOrder,
+        order: SheetOrder,
         observer: &mut O,
     ) -> RayResult {
         let scene = self.scene;
         let shell = &*scene.shells[hull.shell];
-        let origin = (scene.camera.eye_local() + d.as_dvec3() * f64::from(hull.metres)).as_vec3();
+        let (origin, t_end) = self.shell_start(hull, d);
         let mut ray = ShellRay {
             number: hull.shell,
             shell,
             origin,
             metres: hull.metres,
             d,
-            transmittance: before,
-            radiance: Vec3::ZERO,
+            transmittance: order.before,
+            radiance: [Vec3::ZERO; 2],
             cells: [0; 2],
         };
-        let t_end = if hull.opaque > 0.0 { hull.opaque - hull.metres } else { f32::INFINITY };
         for segment in ShellPath::new(shell, hull.face, origin, d) {
             if segment.t[0] >= t_end || ray.transmittance < scene.trace.early_end {
                 break;
             }
             self.through(&mut ray, &segment.until(t_end), observer);
         }
-        let ShellRay { transmittance, cells, .. } = ray;
-        let ends = is_last || transmittance < scene.trace.early_end;
+        self.left_shell(order, ray.transmittance, ray.radiance, ray.cells)
+    }
+
+    /// Origin of the path of a ray in the direction `d` from a hull's face on, and the distance of the opaque
+    /// scene from it, metres.
+    pub(super) fn shell_start(&self, hull: &Hull, d: Vec3) -> (Vec3, f32) {
+        let origin = (self.scene.camera.eye_local() + d.as_dvec3() * f64::from(hull.metres)).as_vec3();
+        (origin, if hull.opaque > 0.0 { hull.opaque - hull.metres } else { f32::INFINITY })
+    }
+
+    /// Result of a ray behind a shell. `radiance` is what cells of the volume itself, and coarser ones, have
+    /// sent to the eye.
+    pub(super) fn left_shell(
+        &self,
+        SheetOrder { before, is_last, behind }: SheetOrder,
+        transmittance: f32,
+        radiance: [Vec3; 2],
+        cells: [u32; 2],
+    ) -> RayResult {
+        let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let radiance = ray.radiance + scene.ambient * (before - transmittance) + passed;
+        let radiance = radiance[0] + radiance[1] + self.scene.ambient * (before - transmittance) + passed;
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
 
     /// Walks through a tetrahedron.
     fn through<O: Observer>(&self, ray: &mut ShellRay, segment: &Segment, observer: &mut O) {
+        // A triangle without an area in the texture shows nothing of it.
+        let Some(volumes) = &ray.shell.prisms[segment.prism].volumes else { return };
         let volume = self.volume_of(ray.shell);
         let (origin, d_cell) = in_cells(segment, volume.size, volume.flow_cells);
         let (mut level, mut share) = (0, 0.0);
         if self.scene.trace.filter != Prefilter::None {
-            let Some(j) = self.jacobian(ray.shell, segment) else { return };
+            let [nx, ny, nz] = volume.size.map(|n| n as f32);
             let forward = self.scene.camera.forward.as_vec3();
-            let area = j.determinant().abs() * d_cell.length();
+            let area = volumes[segment.tetrahedron] / (nx * ny * nz) * d_cell.length();
             let exact = level_at(self.footprint, forward, ray.d, ray.metres + segment.t[0], area);
             let exact = exact.clamp(0.0, (volume.levels.len() - 1) as f32);
             (level, share) = (exact as u32, exact - exact.floor());
@@ -164,10 +183,6 @@ impl Integrator<'_> {
             if sample.rho <= 0.0 {
                 continue;
             }
-            // A triangle without an area in the texture shows nothing of it.
-            if !ray.shell.is_mapped(segment.prism) {
-                return;
-            }
             let tau_bits =
                 sample.rho * self.volume_of(ray.shell).extinction * (crossing.t_exit - crossing.t_enter);
             let passed = ray.transmittance * exp2(-tau_bits);
@@ -184,13 +199,15 @@ impl Integrator<'_> {
             };
             let j = self.frame(ray.shell, &place);
             let fibres = self.fibres(level, cell, &sample, &j);
+            let mut sum = Vec3::ZERO;
             for i in 0..self.lights.len() {
                 let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
                 let lit = self.shell_light_of(&fibres, sample.k, &j, (&place, ray.d), i);
                 let radiance = lit * (weight * visibility);
                 observer.light(visibility, radiance);
-                ray.radiance += radiance;
+                sum += radiance;
             }
+            ray.radiance[usize::from(!level.is_whole)] += sum;
             ray.transmittance = passed;
         }
     }
@@ -200,19 +217,10 @@ impl Integrator<'_> {
         &self.volumes[shell.volume as usize]
     }
 
-    /// J = world_from_cell of a tetrahedron, metres per cell. `None` where the triangle has no area in the
-    /// texture.
-    fn jacobian(&self, shell: &Shell, segment: &Segment) -> Option<Mat3> {
-        let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
-        let [x, y, z] = shell.jacobian(segment.prism, segment.tetrahedron)?;
-        Some(Mat3::from_cols(x / nx, y / ny, z / nz))
-    }
-
     /// J at a place in a prism that has an area in the texture; see [`Shell::frame`].
-    fn frame(&self, shell: &Shell, place: &Place) -> Mat3 {
+    pub(super) fn frame(&self, shell: &Shell, place: &Place) -> Mat3 {
         let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
-        let frame = shell.frame(place.tetrahedron[0], place.shares, place.depth);
-        let [x, y, z] = frame.unwrap_or([Vec3::ZERO; 3]);
+        let [x, y, z] = shell.frame(place.tetrahedron[0], place.shares, place.depth);
         Mat3::from_cols(x / nx, y / ny, z / nz)
     }
 

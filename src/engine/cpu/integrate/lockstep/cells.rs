@@ -68,19 +68,34 @@ impl<'a> Store<'a> {
         out
     }
 
+    /// The cell with this index. No cell is an empty one.
+    #[inline(always)]
+    pub fn cell(&self, index: i32) -> Cell {
+        match self.cells {
+            Stored::Dense(cells) => dense(cells, index),
+            Stored::Sparse(bricks) => self.sparse(bricks, index),
+        }
+    }
+
     /// Fetches the cells of some steps. No cell is an empty one.
     #[inline(always)]
     pub fn fetch(&self, index: &[[i32; LANES]], row: &mut [[Cell; LANES]]) {
         match self.cells {
-            Stored::Dense(cells) => {
-                fetch_by(index, row, |index| cells.get(index as u32 as usize).copied().unwrap_or_default())
-            }
-            Stored::Sparse(bricks) => fetch_by(index, row, |index| {
-                let [x, y, z] = self.coordinates(index);
-                if index == NO_CELL { Cell::default() } else { *bricks.at(x, y, z) }
-            }),
+            Stored::Dense(cells) => fetch_by(index, row, |index| dense(cells, index)),
+            Stored::Sparse(bricks) => fetch_by(index, row, |index| self.sparse(bricks, index)),
         }
     }
+
+    #[inline(always)]
+    fn sparse(&self, bricks: &Bricks, index: i32) -> Cell {
+        let [x, y, z] = self.coordinates(index);
+        if index == NO_CELL { Cell::default() } else { *bricks.at(x, y, z) }
+    }
+}
+
+#[inline(always)]
+fn dense(cells: &[Cell], index: i32) -> Cell {
+    cells.get(index as u32 as usize).copied().unwrap_or_default()
 }
 
 #[inline(always)]

@@ -148,6 +148,21 @@ impl<S: Simd> Moments<S> {
         }
     }
 
+    /// Moments J·S·Jᵀ of the directions J·v, by the columns of J.
+    #[inline(always)]
+    pub fn mapped(&self, [x, y, z]: &[Lanes3<S>; 3]) -> Self {
+        let rows = [
+            Lanes3 { x: x.x, y: y.x, z: z.x },
+            Lanes3 { x: x.y, y: y.y, z: z.y },
+            Lanes3 { x: x.z, y: y.z, z: z.z },
+        ];
+        let times = [self.times(rows[0]), self.times(rows[1]), self.times(rows[2])];
+        Moments {
+            diagonal: Lanes3 { x: rows[0].dot(times[0]), y: rows[1].dot(times[1]), z: rows[2].dot(times[2]) },
+            mixed: Lanes3 { x: rows[0].dot(times[1]), y: rows[0].dot(times[2]), z: rows[1].dot(times[2]) },
+        }
+    }
+
     /// Product S·v.
     #[inline(always)]
     fn times(&self, v: Lanes3<S>) -> Lanes3<S> {

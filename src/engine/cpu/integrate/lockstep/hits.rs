@@ -301,6 +301,6 @@ impl<S: Simd> Frame<S> {
 
 /// Coordinates in cells, moved into tiles of `n` cells.
 #[inline(always)]
-fn in_tile<S: Simd>(simd: S, at: Floats<S>, n: Floats<S>) -> Floats<S> {
+pub fn in_tile<S: Simd>(simd: S, at: Floats<S>, n: Floats<S>) -> Floats<S> {
     at - n * floor_cell(simd, at / n).to_float::<f32x8<S>>()
 }

@@ -10,7 +10,8 @@
 //!   T follows them, light is looked up or walked, and they are shaded. So a processor that waits for one
 //!   part of a row works on another.
 //! - **Lanes** are rays that meet sheets of one kind (strands or mist) in one level of one volume, of one
-//!   stretch of a row of pixels. They may belong to different quads.
+//!   stretch of a row of pixels. They may belong to different quads. Through shells each lane goes its own
+//!   way ([`shell`]).
 
 mod between;
 mod cells;
@@ -20,6 +21,8 @@ mod hits;
 mod light;
 mod packed;
 mod scatter;
+mod shell;
+mod shell_light;
 mod strand;
 mod walk;
 
@@ -28,6 +31,7 @@ use fearless_simd::{Simd, dispatch};
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
 use self::hits::Hits;
+use self::shell::{Ground, ShellHit, ShellLanes};
 use super::walk::Lit;
 use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
@@ -82,6 +86,11 @@ pub struct Lockstep<'a> {
     // Memory that every stretch uses again.
     rays: Vec<(usize, PixelRay)>,
     met: Met,
+    /// Faces of shells' hulls that the rays meet next.
+    shells: Vec<ShellHit<'a>>,
+    shell_lanes: Box<ShellLanes<'a>>,
+    /// Whether rays through shells go side by side.
+    shells_in_lanes: bool,
     scratch: Box<Scratch<'a>>,
 }
 
@@ -124,7 +133,18 @@ impl<'a> Lockstep<'a> {
         }
         let met = Met { walks: levels.iter().map(|_| Default::default()).collect(), ..Default::default() };
         let scratch = Box::new(Scratch::new(integrator));
-        Some(Lockstep { integrator, simd, levels, firsts, rays: Vec::new(), met, scratch })
+        Some(Lockstep {
+            integrator,
+            simd,
+            levels,
+            firsts,
+            rays: Vec::new(),
+            met,
+            shells: Vec::new(),
+            shell_lanes: Box::new(ShellLanes::new(integrator)),
+            shells_in_lanes: shell::covers(integrator),
+            scratch,
+        })
     }
 
     /// See [`super::Walker::pixels`].
@@ -146,21 +166,26 @@ impl<'a> Lockstep<'a> {
             while self.meet(gbuffer) {
                 self.walk();
                 self.compose();
+                self.walk_shells();
             }
             self.rays.drain(..).for_each(|(i, ray)| result(i, integrator.seen(gbuffer, ray)));
         }
     }
 
-    /// Finds the next sheet of every ray. Returns whether there is any.
+    /// Finds the next sheet or shell of every ray. Returns whether there is any.
     fn meet(&mut self, gbuffer: &Gbuffer) -> bool {
-        let Lockstep { rays, met, .. } = self;
+        let Lockstep { rays, met, shells, shells_in_lanes, .. } = self;
         met.sheets.clear();
         met.packs.clear();
         let integrator = self.integrator;
         for (ray, (_, pixel)) in rays.iter_mut().enumerate() {
-            // Shells are walked ray by ray, up to the next quad.
             let next = loop {
                 match pixel.next_sheet(integrator.scene, gbuffer) {
+                    Some((Carrier::Hull(hull), order)) if *shells_in_lanes => {
+                        shells.push(ShellHit::new(ray, hull, pixel.d, order));
+                        break None;
+                    }
+                    // Others are walked ray by ray, up to the next quad.
                     Some((Carrier::Hull(hull), order)) => {
                         let passed = integrator.shell(&hull, pixel.d, order, &mut ());
                         integrator.add(pixel, passed);
@@ -186,7 +211,17 @@ impl<'a> Lockstep<'a> {
             (last + 1..LANES).for_each(|lane| pack.set(lane, quad, d, at.into()));
         }
         dispatch!(self.simd, simd => map_all(simd, self.integrator, &mut met.packs));
-        !met.sheets.is_empty()
+        !(met.sheets.is_empty() && shells.is_empty())
+    }
+
+    /// Walks through the shells, and adds them to their rays.
+    fn walk_shells(&mut self) {
+        let Lockstep { integrator, simd, levels, firsts, rays, shells, shell_lanes, .. } = self;
+        let ground = Ground { integrator, levels, firsts };
+        dispatch!(*simd, simd => shell_lanes.walk(simd, &ground, shells));
+        for hit in shells.drain(..) {
+            integrator.add(&mut rays[hit.ray].1, hit.result(integrator));
+        }
     }
 
     /// Walks the levels of the sheets.

@@ -87,6 +87,37 @@ impl Units {
     pub const BITS: u32 = 11;
 }
 
+/// Units of eight rays.
+pub struct LaneUnits<S: Simd> {
+    size: [Ints<S>; 3],
+    factors: [Ints<S>; 3],
+}
+
+impl<S: Simd> LaneUnits<S> {
+    /// Units of each lane.
+    #[inline(always)]
+    pub fn new(simd: S, units: &[Units; LANES]) -> Self {
+        let of = |number: fn(&Units) -> IVec3, axis: usize| {
+            let mut out = [0; LANES];
+            for lane in 0..LANES {
+                out[lane] = number(&units[lane])[axis];
+            }
+            i32x8::load_array(simd, out)
+        };
+        LaneUnits {
+            size: [of(|u| u.size, 0), of(|u| u.size, 1), of(|u| u.size, 2)],
+            factors: [of(|u| u.factors, 0), of(|u| u.factors, 1), of(|u| u.factors, 2)],
+        }
+    }
+
+    /// The same units in all lanes.
+    #[inline(always)]
+    pub fn splat(simd: S, units: &Units) -> Self {
+        let of = |v: IVec3| [i32x8::splat(simd, v.x), i32x8::splat(simd, v.y), i32x8::splat(simd, v.z)];
+        LaneUnits { size: of(units.size), factors: of(units.factors) }
+    }
+}
+
 /// Where eight rays are.
 pub struct Walk<S: Simd> {
     simd: S,
@@ -99,7 +130,8 @@ pub struct Walk<S: Simd> {
     t_next: [Floats<S>; 3],
     /// Parameter of `boundary`, computed one step before it is needed.
     t_after: [Floats<S>; 3],
-    t: Floats<S>,
+    /// Parameter where each ray enters its cell.
+    pub t: Floats<S>,
     /// Coordinates of the cell times their factors.
     offset: [Ints<S>; 3],
     offset_step: [Ints<S>; 3],
@@ -118,6 +150,12 @@ impl<S: Simd> Walk<S> {
     /// ray starts inside the slab.
     #[inline(always)]
     pub fn new(simd: S, units: &Units, origin: Lanes3<S>, direction: Lanes3<S>) -> Self {
+        Walk::of_lanes(simd, &LaneUnits::splat(simd, units), origin, direction)
+    }
+
+    /// [`Walk::new`] with units for each lane.
+    #[inline(always)]
+    pub fn of_lanes(simd: S, units: &LaneUnits<S>, origin: Lanes3<S>, direction: Lanes3<S>) -> Self {
         let zero = f32x8::splat(simd, 0.0);
         let one = f32x8::splat(simd, 1.0);
         let none = i32x8::splat(simd, 0);
@@ -140,8 +178,7 @@ impl<S: Simd> Walk<S> {
             count: none,
         };
         for axis in 0..3 {
-            let size = i32x8::splat(simd, units.size[axis]);
-            let factor = i32x8::splat(simd, units.factors[axis]);
+            let (size, factor) = (units.size[axis], units.factors[axis]);
             let parallel = d[axis].abs().simd_lt(PARALLEL);
             let up = d[axis].simd_gt(0.0);
             let cell = start_cell(simd, o[axis], d[axis]);
@@ -206,17 +243,29 @@ impl<S: Simd> Walk<S> {
     #[inline(always)]
     fn step<const N: usize>(&mut self, passed: &mut Passed<N>, j: usize) {
         let (none, one) = (i32x8::splat(self.simd, 0), i32x8::splat(self.simd, 1));
+        self.index().store_array(&mut passed.index[j]);
+        self.layers.store_array(&mut passed.layers[j]);
+        self.count += self.inside().select(one, none);
+        let t = self.t;
+        self.advance();
+        passed.length[j].store(self.t - t);
+    }
+
+    /// Index of each ray's cell in the units of [`Units`], or [`NO_CELL`].
+    #[inline(always)]
+    pub fn index(&self) -> Ints<S> {
+        let [x, y, z] = self.offset;
+        self.inside().select(x + y + z, i32x8::splat(self.simd, NO_CELL))
+    }
+
+    /// Goes to the next cell of each ray.
+    #[inline(always)]
+    pub fn advance(&mut self) {
+        let none = i32x8::splat(self.simd, 0);
         let zero = f32x8::splat(self.simd, 0.0);
         let [tx, ty, tz] = self.t_next;
-        let [ox, oy, oz] = self.offset;
         let t_yz = ty.min(tz);
-        let t_exit = tx.min(t_yz);
-        let inside = self.inside();
-        inside.select(ox + oy + oz, i32x8::splat(self.simd, NO_CELL)).store_array(&mut passed.index[j]);
-        self.layers.store_array(&mut passed.layers[j]);
-        self.count += inside.select(one, none);
-        passed.length[j].store(t_exit - self.t);
-        self.t = t_exit;
+        self.t = tx.min(t_yz);
         // One axis steps, x before y before z if several boundaries coincide.
         let x_steps = tx.simd_le(t_yz);
         let y_first = ty.simd_le(tz);
