@@ -8,6 +8,7 @@
 #import light::strand
 #import mapping
 #import mapping::shell
+#import mapping::shell_path
 #import trace::levels
 #import trace::lookup
 #import trace::matter
@@ -312,7 +313,7 @@ fn shell_visibility(
             let place =
                 ShellPlace(segment.prism, segment.tetrahedron, cell.point, own.cells, own.flow_cells);
             let far = light_distance(lights[i], cell.point);
-            let walked = shell_depth(level, shell, place, l, far, frame.max_cells);
+            let walked = shell_depth(level, shell, place, l, far, own.extinction, frame.max_cells);
             (*ray).light_cells += walked.cells;
             (*ray).cut |= walked.cut;
             visible = exp2(-own.extinction * walked.depth);

@@ -2,12 +2,15 @@
 // Twin: shell_depth of src/engine/cpu/integrate/shell.rs.
 
 #import mapping::shell
+#import mapping::shell_path
 #import trace::levels
 #import volume::cells
 #import walk
 
 // Depth of opaque matter: no light passes it.
 const OPAQUE_DEPTH: f32 = 1e30;
+// Depth in bits behind which rays to the light go no further. Twin: ENOUGH_BITS of shell_light.rs.
+const ENOUGH_BITS: f32 = 24.0;
 
 // Walk from a place to where the light ray leaves the shell.
 struct ShellWalk {
@@ -29,13 +32,15 @@ struct ShellPlace {
     flow_cells: f32,
 }
 
-// Walks along the unit vector `l`, for `far` metres at most.
+// Walks along the unit vector `l`, for `far` metres at most, until no light is left. `extinction` is in bits
+// per unit of the depth.
 fn shell_depth(
     level: Level,
     shell: Shell,
     place: ShellPlace,
     l: vec3<f32>,
     far: f32,
+    extinction: f32,
     max_cells: u32,
 ) -> ShellWalk {
     var out: ShellWalk;
@@ -43,7 +48,7 @@ fn shell_depth(
     var done = path.left == 0u;
     while !done {
         let segment = path_next(&path);
-        done = (segment.t_in >= far) | (out.cells >= max_cells);
+        done = (segment.t_in >= far) | (out.cells >= max_cells) | (out.depth * extinction >= ENOUGH_BITS);
         if !done {
             let start = max(-segment.t_in, 0.0);
             var end = min(segment.t_out, far) - segment.t_in - start;

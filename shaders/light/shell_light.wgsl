@@ -63,7 +63,7 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
     let far = light_distance(light, point);
     let place = ShellPlace(corner >> 2u, 2u - position, point, part.cells, part.flow_cells);
     let level = level_new(part.cells, part.base, 0u);
-    let walked = shell_depth(level, shell, place, to_light, far, part.max_cells);
+    let walked = shell_depth(level, shell, place, to_light, far, part.extinction, part.max_cells);
     let value = select(exp2(-part.extinction * walked.depth), -1.0, walked.cut);
     let texel = shell.light + part.light * shell.vertices * (shell.layers + 1u) + index;
     let row = 1u << SHELL_ROW;

@@ -109,6 +109,12 @@ impl<S: Simd> Lanes3<S> {
         Lanes3 { x: f32x8::splat(simd, v.x), y: f32x8::splat(simd, v.y), z: f32x8::splat(simd, v.z) }
     }
 
+    /// This where `is` holds, or another.
+    #[inline(always)]
+    pub fn or(self, is: Mask<S>, other: Lanes3<S>) -> Lanes3<S> {
+        Lanes3 { x: is.select(self.x, other.x), y: is.select(self.y, other.y), z: is.select(self.z, other.z) }
+    }
+
     /// Scalar product.
     #[inline(always)]
     pub fn dot(self, other: Lanes3<S>) -> Floats<S> {
@@ -170,4 +176,15 @@ pub fn floor_cell<S: Simd>(simd: S, x: Floats<S>) -> Ints<S> {
     let whole = x.to_int::<i32x8<S>>();
     let above = x.simd_lt(whole.to_float::<f32x8<S>>());
     whole - above.select(i32x8::splat(simd, 1), i32x8::splat(simd, 0))
+}
+
+/// Numbers of the lanes whose bits are set.
+#[inline(always)]
+pub fn lanes_of(bits: u8) -> impl Iterator<Item = usize> {
+    let mut bits = bits;
+    std::iter::from_fn(move || {
+        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+        bits &= bits - 1;
+        Some(lane)
+    })
 }

@@ -10,7 +10,7 @@ macro_rules! files {
 
 /// Name (without extension) and text of every file in `shaders/`.
 pub const FILES: &[(&str, &str)] = files! {
-    "layout" "mapping" "mapping/shell" "walk" "volume/cells"
+    "layout" "mapping" "mapping/shell" "mapping/shell_path" "walk" "volume/cells"
     "trace/levels" "trace/lookup" "trace/matter"
     "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/scatter" "light/strand"
     "light/visibility" "light/shell_depth" "light/shell_light"

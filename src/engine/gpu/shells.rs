@@ -16,7 +16,7 @@ use super::specialise::Source;
 use super::timing::Timer;
 use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
-use crate::mapping::shell::{Shell, Tangents};
+use crate::mapping::shell::Shell;
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells};
 use crate::util::error::{Error, Result};
@@ -69,8 +69,8 @@ struct Table {
 /// The shells of a scene on the device.
 pub struct UploadedShells {
     table: Table,
-    /// `texture_2d<u32>`, `rgba32uint`: one word texel, the headers, then points, tangents, prisms and hull of
-    /// each shell.
+    /// `texture_2d<u32>`, `rgba32uint`: one word texel, the headers, then points, tangents, prisms and hull
+    /// of each shell.
     pub texels: wgpu::TextureView,
     /// `array<HullFace>` of the faces that the eye sees, in parts that can be bound, with their numbers.
     pub faces: Vec<(wgpu::Buffer, u32)>,
@@ -143,12 +143,7 @@ impl Table {
                 let [x, y, z] = point.to_array().map(f32::to_bits);
                 [x, y, z, shell.corner_of(i / 2)]
             }));
-            for tangents in &shell.tangents {
-                let &Tangents { outer: [a, b], inner: [c, d], down } = tangents;
-                let all = [a, b, c, d, down].map(|v| v.to_array().map(f32::to_bits));
-                out.extend_from_slice(all.as_flattened()[..12].as_chunks::<4>().0);
-                out.push([all[4][0], all[4][1], all[4][2], 0]);
-            }
+            out.extend_from_slice(bytemuck::cast_slice(&shell.tangents));
             for prism in &shell.prisms {
                 let [a, b, c] = prism.vertices;
                 let [ab, bc, ac] = prism.beyond.map(|beyond| match beyond.get() {

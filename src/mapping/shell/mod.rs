@@ -22,7 +22,7 @@ mod tangents;
 use glam::{Vec2, Vec3};
 
 pub use build::{ShellFault, Side, SurfaceMesh};
-pub use path::{End, MOST_FACES, Segment, ShellPath};
+pub use path::{End, LanePaths, LaneSegments, MOST_FACES, Segment, ShellPath};
 pub use tangents::Tangents;
 
 /// A volume between two surfaces.
@@ -89,11 +89,6 @@ const MOST_EDGE: f32 = 16.0;
 /// Edges of a prism, as positions of their ends among its vertices.
 pub const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
 
-/// Corners of the three tetrahedra of a prism: the vertex's position, and 0 for its outer or 1 for its inner
-/// point.
-const TETRAHEDRA: [[(usize, u32); 4]; 3] =
-    [[(0, 0), (1, 0), (2, 0), (2, 1)], [(0, 0), (1, 0), (1, 1), (2, 1)], [(0, 0), (0, 1), (1, 1), (2, 1)]];
-
 /// Space beyond a face of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Face {
@@ -105,7 +100,8 @@ enum Face {
     Surface,
 }
 
-/// Faces of the three tetrahedra, each opposite the corner of the same position in [`TETRAHEDRA`].
+/// Faces of the three tetrahedra, each opposite the corner of the same position in
+/// [`Shell::tetrahedron`].
 const FACES: [[Face; 4]; 3] = [
     [Face::Side(1, 0), Face::Side(2, 0), Face::Tetrahedron(1), Face::Surface],
     [Face::Side(1, 1), Face::Tetrahedron(2), Face::Tetrahedron(0), Face::Side(0, 0)],
@@ -133,9 +129,14 @@ impl Shell {
     }
 
     /// Numbers of the points of a tetrahedron.
+    #[inline]
     pub fn tetrahedron(&self, prism: usize, tetrahedron: usize) -> [u32; 4] {
-        let vertices = self.prisms[prism].vertices;
-        TETRAHEDRA[tetrahedron].map(|(vertex, depth)| 2 * vertices[vertex] + depth)
+        let [a, b, c] = self.prisms[prism].vertices.map(|vertex| 2 * vertex);
+        match tetrahedron {
+            0 => [a, b, c, c + 1],
+            1 => [a, b, b + 1, c + 1],
+            _ => [a, a + 1, b + 1, c + 1],
+        }
     }
 
     /// Number of vertices of the mesh.
@@ -219,20 +220,14 @@ impl Shell {
         sum / pairs.len().max(1) as f64
     }
 
-    /// Jacobian with which light is computed at a place in a prism that has an area in the texture, as columns
-    /// like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices and the
-    /// depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so the
+    /// Jacobian with which light is computed at a place in a prism that has an area in the texture, as
+    /// columns like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices and
+    /// the depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so the
     /// Jacobian has no steps between prisms.
     #[inline]
     pub fn frame(&self, prism: usize, shares: Vec3, depth: f32) -> [Vec3; 3] {
-        let mut out = [Vec3::ZERO; 3];
-        for (number, share) in self.prisms[prism].tangents.into_iter().zip(shares.to_array()) {
-            let Tangents { outer, inner, down } = &self.tangents[number as usize];
-            out[0] += (outer[0] + (inner[0] - outer[0]) * depth) * share;
-            out[1] += (outer[1] + (inner[1] - outer[1]) * depth) * share;
-            out[2] += *down * share;
-        }
-        out
+        let [a, b, c] = self.prisms[prism].tangents.map(|number| &self.tangents[number as usize]);
+        Tangents::mean([(a, shares.x), (b, shares.y), (c, shares.z)]).at(depth)
     }
 
     /// Bytes that the shell takes in memory.

@@ -10,12 +10,17 @@
 //! texture coordinates of a face's point are means of those of its corners, so a segment begins where the
 //! last one ended, to the bit.
 
+mod lanes;
+
 use glam::{Vec2, Vec3};
+
+pub use lanes::{LanePaths, LaneSegments};
 
 use super::{AT_SIDES, FACES, Face, HullFace, Prism, Shell};
 
 /// Faces that a path passes before it is given up. A path through a real shell is shorter; only one that
-/// rounding leads in a circle would be longer. Twin: `MOST_FACES` of `shaders/mapping/shell.wgsl`.
+/// rounding leads in a circle would be longer. Twin: `MOST_FACES` of
+/// `shaders/mapping/shell_path.wgsl`.
 pub const MOST_FACES: u32 = 1 << 16;
 
 /// The part of a ray inside one tetrahedron.
@@ -145,11 +150,6 @@ impl<'a> ShellPath<'a> {
         path.enter(entry?.0);
         path.t = path.t.min(0.0);
         Some(path)
-    }
-
-    /// The shell.
-    pub fn shell(&self) -> &'a Shell {
-        self.shell
     }
 
     /// Whether the ray passes the face that the path enters through next.

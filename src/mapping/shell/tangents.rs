@@ -4,19 +4,46 @@
 //! of the mesh. Their means at the vertices go on from triangle to triangle: the error falls with the square
 //! of the edges' length instead of with the length itself.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 
 use super::{Prism, is_an_area};
 
-/// Tangents at a vertex: metres of the world per copy of the volume along u and v.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tangents {
-    /// On the outer surface.
-    pub outer: [Vec3; 2],
-    /// On the inner surface.
-    pub inner: [Vec3; 2],
-    /// From the outer to the inner surface.
-    pub down: Vec3,
+/// Tangents at a vertex: metres of the world per copy of the volume along u and v, on the outer and on the
+/// inner surface, and the way from the outer to the inner surface. They are packed as the GPU reads them: one
+/// after the other, and a zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Tangents(pub [Vec4; 4]);
+
+impl Tangents {
+    fn new([outer_u, outer_v, inner_u, inner_v, down]: [Vec3; 5]) -> Self {
+        let all = [outer_u, outer_v, inner_u, inner_v, down].map(|v| v.to_array());
+        let all: &[f32] = all.as_flattened();
+        Tangents(
+            [0, 4, 8, 12].map(|i| Vec4::from_array([0, 1, 2, 3].map(|k| *all.get(i + k).unwrap_or(&0.0)))),
+        )
+    }
+
+    /// Sum of several, each times its share.
+    #[inline]
+    pub fn mean(parts: [(&Tangents, f32); 3]) -> Self {
+        let [(a, a_share), (b, b_share), (c, c_share)] = parts;
+        let mut out = [Vec4::ZERO; 4];
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = a.0[i] * a_share + b.0[i] * b_share + c.0[i] * c_share;
+        }
+        Tangents(out)
+    }
+
+    /// Jacobian at a depth from 0 to 1, as columns.
+    #[inline]
+    pub fn at(&self, depth: f32) -> [Vec3; 3] {
+        let [p, q, r, down] = self.0;
+        let outer = [p.truncate(), Vec3::new(p.w, q.x, q.y)];
+        let inner = [Vec3::new(q.z, q.w, r.x), Vec3::new(r.y, r.z, r.w)];
+        let along = |k: usize| outer[k] + (inner[k] - outer[k]) * depth;
+        [along(0), along(1), down.truncate()]
+    }
 }
 
 /// Cosine of the largest angle between tangents that are one direction on a smooth surface. A larger one is
@@ -73,7 +100,7 @@ pub fn average(points: &[Vec3], prisms: &mut [Prism]) -> Vec<Tangents> {
         let down = points[2 * vertex + 1] - points[2 * vertex];
         for Group { sum, weight, number, .. } in groups {
             let [outer_u, outer_v, inner_u, inner_v] = sum.map(|sum| (sum / *weight).as_vec3());
-            out[*number as usize] = Tangents { outer: [outer_u, outer_v], inner: [inner_u, inner_v], down };
+            out[*number as usize] = Tangents::new([outer_u, outer_v, inner_u, inner_v, down]);
         }
     }
     out

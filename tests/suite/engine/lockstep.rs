@@ -2,22 +2,28 @@
 //! the same numbers of cells, and the same radiance to the bit.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3, Vec4};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use taki::engine::cpu::LightVolumeCache;
-use taki::engine::cpu::gbuffer::Gbuffer;
+use taki::engine::cpu::gbuffer::{self, Gbuffer};
 use taki::engine::cpu::integrate::{Integrator, Lanes, RayResult};
 use taki::light::strand::StrandParams;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
+use taki::mapping::shell::{Shell, Side};
 use taki::mapping::{Material, Quad};
 use taki::scene::{Limits, Recipe, Scene};
 use taki::trace::{Attenuation, Lookup, Prefilter};
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
 use taki::volume::{Bricks, Cell, VolumeTexture};
+
+use crate::mapping::shell::{sphere, strip, torus};
+use crate::trace::closed_forms::noise;
+use crate::trace::shells::scene_with;
 
 /// Width and height of the images. The middle pixels' rays run along the axis of the camera.
 const SIZE: [u32; 2] = [13, 5];
@@ -225,4 +231,74 @@ fn results_do_not_depend_on_the_rays_beside_them() {
     let backwards: Vec<_> = pixels.iter().rev().copied().collect();
     assert!(run(&backwards).iter().rev().eq(&all));
     assert!(pixels.chunks(3).flat_map(run).eq(all));
+}
+
+#[test]
+fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
+    let (strand, pyramid) = ("light.reflection=strand", "trace.filter=pyramid");
+    let (none, cached) = ("light.visibility=none", "light.visibility=cached");
+    let variants: [&[&str]; 12] = [
+        &[],
+        &[none],
+        &[cached],
+        &[pyramid, none],
+        &[pyramid, cached, "camera.fov=80"],
+        &[pyramid, strand, none],
+        &[strand],
+        &["trace.max_cells=9"],
+        &[pyramid, "trace.max_cells=15", none],
+        &["trace.early_end=0.3", pyramid],
+        &["light.frame=texture", "light.p=7.5"],
+        &["trace.lookup=trilinear", none],
+    ];
+    let mut furred = Shell::new(&torus(14, 9, 0.35), Side::Outward).expect("a valid mesh");
+    furred.skin = true;
+    // Some triangles show nothing of the texture, and a border ends the shell.
+    let mut torn = strip(9);
+    torn.triangles.swap_remove(3);
+    torn.uv[6] = torn.uv[7];
+    torn.uv[8] = torn.uv[7];
+    let torn = Shell::new(&torn, Side::Inward).expect("a valid mesh");
+    let ball = Shell::new(&sphere(1, 0.4), Side::Outward).expect("a valid mesh");
+    let eyes = [[0.5, 4.5, 3.0], [0.2, 0.3, 4.4], [0.2, 1.2, 3.4]];
+    let volumes = [noise([6, 8, 5], 4), noise([9, 4, 7], 5)];
+    let (mut walked, mut lit) = ([0u64; 2], 0);
+    for (i, sets) in variants.into_iter().enumerate() {
+        let mut scene = scene_with(furred.clone(), eyes[i % 3], sets);
+        let parts = scene.edit();
+        [parts.image.width, parts.image.height] = [61, 40];
+        let recipe = parts.recipes[0].clone();
+        parts.recipes = vec![recipe.clone(), Recipe { flow: 0.3, ..recipe }];
+        let mut torn = torn.clone();
+        torn.volume = 1;
+        parts.shells.extend([Arc::new(torn), Arc::new(ball.clone())]);
+        // Opaque matter ends some of the rays inside the shells.
+        let mut targets = gbuffer::run(&scene, &scene.mesh(), 0);
+        for opaque in targets.opaque.iter_mut().step_by(3) {
+            *opaque = [0.2, 0.3, 0.4, 4.0];
+        }
+        let pixels: Vec<[u32; 2]> = (0..61 * 40).map(|i| [i % 61, i / 61]).collect();
+        let mut cache = LightVolumeCache::default();
+        let mut prepared =
+            || Integrator::prepared(&scene, &volumes, &mut cache, &Unwatched).expect("the light volumes fit");
+        let scalar = prepared();
+        let truth: Vec<_> = pixels.iter().map(|&p| scalar.pixel(&targets, p, 0, &mut ())).collect();
+        for result in &truth {
+            (0..2).for_each(|c| walked[c] += u64::from(result.cells[c]));
+            lit += u32::from(result.radiance.x > 0.3);
+        }
+        for (name, lanes) in Lanes::all() {
+            let integrator = prepared().with_lanes(lanes);
+            integrator.walker().pixels(&targets, &pixels, 0, |i, seen| {
+                let truth = &truth[i];
+                assert_eq!(
+                    bits(&seen),
+                    bits(truth),
+                    "{sets:?}, {name}, {:?}: {seen:?} not {truth:?}",
+                    pixels[i]
+                );
+            });
+        }
+    }
+    assert!(walked[0] > 100_000 && walked[1] > 100_000 && lit > 1000, "{walked:?}, {lit}");
 }

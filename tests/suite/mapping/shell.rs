@@ -1,9 +1,13 @@
 //! Shells: their geometry, and paths through them, against brute force in float64.
 
+use fearless_simd::{Level, dispatch};
 use glam::{DVec3, Mat3, Vec2, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg as Rng;
-use taki::mapping::shell::{Beyond, EDGES, End, Segment, Shell, ShellFault, ShellPath, Side, SurfaceMesh};
+use taki::mapping::shell::{
+    Beyond, EDGES, End, HullFace, LanePaths, LaneSegments, Segment, Shell, ShellFault, ShellPath, Side,
+    SurfaceMesh,
+};
 
 /// A torus in the plane y = 0 with `n` × `m` quads, and thickness `h`. Its texture coordinates have seams.
 pub fn torus(n: u32, m: u32, h: f32) -> SurfaceMesh {
@@ -410,4 +414,62 @@ fn frames_of_light_keep_edges_and_turned_seams() {
             }
         }
     }
+}
+
+/// A ray at an edge, a vertex or any other place of a hull's face.
+fn aimed(rng: &mut Rng, shell: &Shell) -> (HullFace, Vec3, Vec3) {
+    let face = shell.hull[rng.random_range(0..shell.hull.len())];
+    let [a, b, c] = shell.corners(&face);
+    let at = match rng.random_range(0..4) {
+        0 => a,
+        1 => a + (b - a) * 0.5,
+        _ => a + (b - a) * rng.random_range(0.0..0.5f32) + (c - a) * rng.random_range(0.0..0.5f32),
+    };
+    let direction = match rng.random_range(0..4) {
+        0 => [Vec3::X, Vec3::Y, Vec3::NEG_Z][rng.random_range(0..3)],
+        _ => ray(rng, 1.0).1,
+    };
+    (face, at - direction * rng.random_range(0.0..2.0f32), direction)
+}
+
+#[test]
+fn eight_paths_side_by_side_are_those_of_each_ray_alone() {
+    let mut rng = Rng::seed_from_u64(8);
+    let shells = [shell(&sphere(1, 0.3)), shell(&torus(14, 9, 0.35)), shell(&strip(9))];
+    let mut compared = 0;
+    for _ in 0..4000 {
+        let rays: [_; 8] = std::array::from_fn(|_| {
+            let shell = &shells[rng.random_range(0..shells.len())];
+            let (face, origin, direction) = aimed(&mut rng, shell);
+            ShellPath::new(shell, &face, origin, direction)
+        });
+        let mut paths = LanePaths::default();
+        let mut bits = 0u8;
+        for (lane, path) in rays.iter().enumerate() {
+            bits |= u8::from(paths.start(lane, path)) << lane;
+        }
+        let mut alone = rays.clone();
+        let mut side_by_side = LaneSegments::default();
+        while bits != 0 {
+            let goes_on = dispatch!(Level::new(), simd => paths.next(simd, bits, &mut side_by_side));
+            for lane in (0..8).filter(|lane| bits >> lane & 1 == 1) {
+                let own = alone[lane].next().expect("a segment");
+                let LaneSegments { prism, tetrahedron, t, at, shares } = &side_by_side;
+                let seen = Segment {
+                    prism: prism[lane],
+                    tetrahedron: tetrahedron[lane],
+                    t: [t[0].0[lane], t[1].0[lane]],
+                    at: [at[0].get(lane), at[1].get(lane)],
+                    shares: [shares[0].get(lane), shares[1].get(lane)],
+                    end: own.end,
+                };
+                assert_eq!(seen, own);
+                assert_eq!(goes_on >> lane & 1 == 1, own.end == End::Segment);
+                compared += 1;
+            }
+            bits = goes_on;
+        }
+        assert!(alone.iter_mut().all(|path| path.next().is_none()));
+    }
+    assert!(compared > 100_000, "{compared}");
 }

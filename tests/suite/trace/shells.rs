@@ -1,6 +1,7 @@
 //! Shells, pixel by pixel, against a tracer in float64 that knows no paths: it cuts every ray with all
 //! tetrahedra, sorts the intervals, and walks the cells in each.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3, IVec3, Vec3};
@@ -77,7 +78,7 @@ fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
     let facets: Vec<[DMat3; 2]> = (0..shell.prisms.len()).map(|i| facet_frames(shell, i)).collect();
     let mut out = Vec::new();
     for (i, prism) in shell.prisms.iter().enumerate() {
-        let frames = prism.vertices.map(|vertex| vertex_frames(shell, &facets, vertex));
+        let frames = prism.vertices.map(|vertex| vertex_frames(shell, &facets, i, vertex));
         for k in 0..3 {
             let numbers = shell.tetrahedron(i, k);
             let corners = numbers.map(|p| shell.points[p as usize].as_dvec3());
@@ -114,19 +115,37 @@ fn facet_frames(shell: &Shell, i: usize) -> [DMat3; 2] {
     })
 }
 
-/// Frames of light at a vertex: means over its prisms, weighted by their angles halfway between the surfaces.
-/// The meshes of these tests are smooth everywhere, so all prisms take part.
-fn vertex_frames(shell: &Shell, facets: &[[DMat3; 2]], vertex: u32) -> [DMat3; 2] {
+/// Frames of light at a vertex of prism number `own`: means over the prisms there whose axes along the surface
+/// are near its own, weighted by their angles halfway between the surfaces. A group of such prisms has the
+/// axes of its first one.
+fn vertex_frames(shell: &Shell, facets: &[[DMat3; 2]], own: usize, vertex: u32) -> [DMat3; 2] {
     let middle = |v: u32| {
         let [outer, inner] = [0, 1].map(|k| shell.points[(2 * v + k) as usize].as_dvec3());
         (outer + inner) * 0.5
     };
+    let around: Vec<(usize, usize)> = (shell.prisms.iter().enumerate())
+        .filter_map(|(i, prism)| Some((i, prism.vertices.iter().position(|&v| v == vertex)?)))
+        .collect();
+    let axes = |i: usize| facets[i][0] + facets[i][1];
+    let is_near = |i: usize, j: usize| {
+        let [a, b] = [axes(i), axes(j)];
+        a.x_axis.angle_between(b.x_axis) < PI / 3.0 && a.y_axis.angle_between(b.y_axis) < PI / 3.0
+    };
+    let mut firsts: Vec<usize> = Vec::new();
+    let mut group_of = |i: usize| match firsts.iter().find(|&&first| is_near(first, i)) {
+        Some(&first) => first,
+        None => {
+            firsts.push(i);
+            i
+        }
+    };
+    let groups: Vec<usize> = around.iter().map(|&(i, _)| group_of(i)).collect();
+    let own = groups[around.iter().position(|&(i, _)| i == own).expect("a prism at its vertex")];
     let (mut sum, mut weights) = ([DMat3::ZERO; 2], 0.0);
-    for (prism, own) in shell.prisms.iter().zip(facets) {
-        let Some(k) = prism.vertices.iter().position(|&v| v == vertex) else { continue };
-        let [at, p, q] = [0, 1, 2].map(|i| middle(prism.vertices[(k + i) % 3]));
+    for (&(i, k), _) in around.iter().zip(&groups).filter(|(_, group)| **group == own) {
+        let [at, p, q] = [0, 1, 2].map(|n| middle(shell.prisms[i].vertices[(k + n) % 3]));
         let angle = (p - at).normalize().dot((q - at).normalize()).acos();
-        (0..2).for_each(|i| sum[i] += own[i] * angle);
+        (0..2).for_each(|k| sum[k] += facets[i][k] * angle);
         weights += angle;
     }
     let down = shell.points[(2 * vertex + 1) as usize] - shell.points[(2 * vertex) as usize];

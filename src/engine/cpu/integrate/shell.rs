@@ -260,8 +260,8 @@ impl Integrator<'_> {
             (Some(strand), fibres) => {
                 let [t_dot_l, t_dot_e] = match fibres {
                     Fibres::One(t) => {
-                        let t = t.normalize_or_zero();
-                        [t.dot(l), t.dot(e)]
+                        let root = (1.0 / t.length_squared().max(1e-30)).sqrt();
+                        [t.dot(l) * root, t.dot(e) * root]
                     }
                     Fibres::Many(moments) => Spread::new(&identity, *moments, e).of_one(l),
                 };
@@ -272,12 +272,14 @@ impl Integrator<'_> {
     }
 
     /// Optical depth, Σ ρ code × metres, from a place to where the light ray along the unit vector `l` leaves
-    /// the shell, or to the light `far` metres away. Infinite where the ray leaves into opaque matter.
+    /// the shell, or to the light `far` metres away. Infinite where the ray leaves into opaque matter. The ray
+    /// ends in the tetrahedron where the depth reaches `enough`.
     pub(super) fn shell_depth(
         &self,
         level: &Level,
         place: &Place,
         (l, far): (Vec3, f32),
+        enough: f32,
         walked: &mut u32,
     ) -> f32 {
         let shell = &*self.scene.shells[place.shell];
@@ -287,7 +289,7 @@ impl Integrator<'_> {
         let most = self.scene.trace.max_cells;
         let (mut depth, mut count) = (0.0, 0);
         for segment in path {
-            if segment.t[0] >= far || count >= most {
+            if segment.t[0] >= far || count >= most || depth >= enough {
                 break;
             }
             let (origin, direction) = in_cells(&segment, size, flow_cells);

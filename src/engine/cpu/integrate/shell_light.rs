@@ -13,6 +13,10 @@ use crate::mapping::shell::Shell;
 use crate::trace::lookup::Level;
 use crate::util::powers::exp2;
 
+/// Depth in bits behind which rays to the light go no further: V is less than 1e-7 there. Twin: `ENOUGH_BITS`
+/// of `shaders/light/shell_depth.wgsl`.
+const ENOUGH_BITS: f32 = 24.0;
+
 /// V at the vertices of shells: for each shell and light, at every vertex, from the outer to the inner
 /// surface. Empty for a shell that keeps none.
 #[derive(Debug)]
@@ -23,18 +27,77 @@ pub fn is_kept_in(shell: &Shell, size: [u32; 3]) -> bool {
     shell.light_layers(size).is_some()
 }
 
+/// Where V is kept around a place: below three vertices.
+struct KeptPlace {
+    /// Number of the value above the place.
+    first: [usize; 3],
+    /// Shares of the vertices, and of the value below the place.
+    shares: Vec3,
+    share: f32,
+}
+
+impl KeptPlace {
+    /// Mean of values, which `of` finds by their numbers.
+    #[inline]
+    fn mean(&self, of: impl Fn(usize, usize) -> [f32; 2]) -> f32 {
+        let seen = self.first.map(|at| {
+            let [near, far] = of(at, at + 1);
+            near + (far - near) * self.share
+        });
+        Vec3::from_array(seen).dot(self.shares).clamp(0.0, 1.0)
+    }
+}
+
 impl Integrator<'_> {
     /// V of light number `i` at a place in a shell.
     pub(super) fn shell_visibility(&self, level: &Level, place: &Place, i: usize, walked: &mut u32) -> f32 {
         match self.scene.visibility {
             Visibility::None => 1.0,
             Visibility::Cached if self.kept_in[place.shell] => {
-                let vertices = self.scene.shells[place.shell].prisms[place.tetrahedron[0]].vertices;
-                let z = place.depth.clamp(0.0, 1.0) * self.layers(place.shell) as f32;
-                let seen = vertices.map(|vertex| self.vertex_visibility(place.shell, vertex as usize, z, i));
-                Vec3::from_array(seen).dot(place.shares).clamp(0.0, 1.0)
+                self.kept_place(place).mean(|at, next| match &self.shell_light {
+                    Some(kept) => {
+                        let values = &kept.0[place.shell][i];
+                        [values[at], values[next]]
+                    }
+                    None => [at, next].map(|k| self.visibility_below(place.shell, k, i)),
+                })
             }
             Visibility::Cached | Visibility::March => self.walked_visibility(level, place, i, walked),
+        }
+    }
+
+    /// V of all lights at a place in a shell.
+    #[inline]
+    pub(super) fn shell_visibilities(
+        &self,
+        level: &Level,
+        place: &Place,
+        walked: &mut u32,
+        mut visible: impl FnMut(usize, f32),
+    ) {
+        match &self.shell_light {
+            Some(kept) if self.kept_in[place.shell] => {
+                let at = self.kept_place(place);
+                for (i, values) in kept.0[place.shell].iter().enumerate() {
+                    visible(i, at.mean(|at, next| [values[at], values[next]]));
+                }
+            }
+            _ => (0..self.lights.len())
+                .for_each(|i| visible(i, self.shell_visibility(level, place, i, walked))),
+        }
+    }
+
+    /// Where V is kept around a place in a shell.
+    #[inline]
+    fn kept_place(&self, place: &Place) -> KeptPlace {
+        let layers = self.layers(place.shell);
+        let z = place.depth.clamp(0.0, 1.0) * layers as f32;
+        let layer = (z as usize).min(layers - 1);
+        let vertices = self.scene.shells[place.shell].prisms[place.tetrahedron[0]].vertices;
+        KeptPlace {
+            first: vertices.map(|vertex| vertex as usize * (layers + 1) + layer),
+            shares: place.shares,
+            share: z - layer as f32,
         }
     }
 
@@ -42,24 +105,15 @@ impl Integrator<'_> {
         let light = &self.lights[i];
         let to_light = (light.at(place.point).0, light.distance(place.point));
         let extinction = self.volume_of(&self.scene.shells[place.shell]).extinction;
-        exp2(-extinction * self.shell_depth(level, place, to_light, walked))
+        let enough = ENOUGH_BITS / extinction;
+        exp2(-extinction * self.shell_depth(level, place, to_light, enough, walked))
     }
 
-    /// V below a vertex at the depth of `z` layers, interpolated between the two around it.
-    fn vertex_visibility(&self, shell: usize, vertex: usize, z: f32, i: usize) -> f32 {
+    /// Value number `k` of V of light number `i`: at one of the layers below a vertex.
+    fn visibility_below(&self, shell: usize, k: usize, i: usize) -> f32 {
         let layers = self.layers(shell);
-        let layer = (z as usize).min(layers - 1);
-        let at = |layer: usize| match &self.shell_light {
-            Some(kept) => kept.0[shell][i][vertex * (layers + 1) + layer],
-            None => self.visibility_below(shell, vertex, layer, i),
-        };
-        let (near, far) = (at(layer), at(layer + 1));
-        near + (far - near) * (z - layer as f32)
-    }
-
-    /// V of light number `i` at one of the layers below a vertex.
-    fn visibility_below(&self, shell: usize, vertex: usize, layer: usize, i: usize) -> f32 {
-        let depth = layer as f32 / self.layers(shell) as f32;
+        let (vertex, layer) = (k / (layers + 1), k % (layers + 1));
+        let depth = layer as f32 / layers as f32;
         let (point, tetrahedron) = self.scene.shells[shell].below_vertex(vertex, depth);
         let place = Place { shell, tetrahedron, shares: Vec3::ZERO, depth, point };
         let level = Level::new(&self.volume_of(&self.scene.shells[shell]).levels, 0);
@@ -87,10 +141,8 @@ impl Integrator<'_> {
         let kept = |(number, shell): (usize, &Arc<Shell>)| {
             let layers = self.layers(number);
             let count = if self.kept_in[number] { shell.vertices() * (layers + 1) } else { 0 };
-            let of = |i: usize| {
-                let at = |k: usize| self.visibility_below(number, k / (layers + 1), k % (layers + 1), i);
-                (0..count).into_par_iter().map(at).collect()
-            };
+            let of =
+                |i: usize| (0..count).into_par_iter().map(|k| self.visibility_below(number, k, i)).collect();
             (0..self.lights.len()).map(of).collect()
         };
         ShellLight(self.scene.shells.iter().enumerate().map(kept).collect())

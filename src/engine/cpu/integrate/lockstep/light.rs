@@ -13,7 +13,7 @@ use crate::light::fill::Numbers;
 use crate::light::visibility::{Form, TRANSMITTANCE_OF_CODE};
 use crate::light::{AngleFrame, Visibility};
 use crate::util::lane_powers::{exp2, log2};
-use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, lanes_of};
 
 /// Terms of one light for eight rays, and what it has sent along them.
 pub struct LaneLight<'a> {
@@ -393,17 +393,6 @@ impl Group<'_, '_> {
         }
         (depth, *walk.count)
     }
-}
-
-/// Numbers of the lanes whose bits are set.
-#[inline(always)]
-pub fn lanes_of(bits: u8) -> impl Iterator<Item = usize> {
-    let mut bits = bits;
-    std::iter::from_fn(move || {
-        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-        bits &= bits - 1;
-        Some(lane)
-    })
 }
 
 /// Interpolates from a to b.

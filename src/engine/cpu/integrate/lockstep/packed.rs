@@ -9,9 +9,9 @@ use fearless_simd::u8x32;
 use super::cells::{k_codes, words};
 use super::fibre::Metric;
 use super::group::{Group, Light, Steps};
-use super::light::{LaneLight, lanes_of};
+use super::light::LaneLight;
 use crate::light::visibility::Form;
-use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, lanes_of};
 use crate::volume::Cell;
 
 /// Lit cells of a step, in the mean, from which steps are shaded as they are.

@@ -10,17 +10,16 @@ use fearless_simd::{f32x8, i32x8};
 
 use super::cells::{Store, rho_codes, words};
 use super::hits::in_tile;
-use super::light::lanes_of;
 use super::shell_light::{LitCell, Pending};
 use super::walk::{LaneUnits, Units, Walk};
 use crate::engine::cpu::integrate::shell::{Hull, Place};
 use crate::engine::cpu::integrate::{Integrator, RayResult, SheetOrder};
 use crate::light::AngleFrame;
-use crate::mapping::shell::{Segment, ShellPath};
+use crate::mapping::shell::{LanePaths, LaneSegments, ShellPath};
 use crate::trace::lookup::Level;
 use crate::trace::{Lookup, Prefilter};
 use crate::util::lane_powers::{exp2, log2};
-use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, floor_cell};
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, floor_cell, lanes_of};
 use crate::volume::Cell;
 
 use glam::Vec3;
@@ -66,24 +65,15 @@ pub fn covers(integrator: &Integrator) -> bool {
     scene.trace.lookup == Lookup::Nearest && scene.angles == AngleFrame::World
 }
 
-/// The ray of a lane.
-struct OnWay<'a> {
-    /// Number of its hit.
-    hit: usize,
-    path: ShellPath<'a>,
-    /// Distance of the opaque scene from the path's origin, metres.
-    t_end: f32,
-    /// Prism and tetrahedron.
-    tetrahedron: [usize; 2],
-}
-
-/// Numbers of the lanes' rays and of their tetrahedra.
+/// Numbers of the lanes' rays.
 #[derive(Default)]
-struct Values {
+struct Rays {
     d: Stored3,
     /// Origin of the path, and its distance from the eye, metres.
     origin: Stored3,
     metres: Stored,
+    /// Distance of the opaque scene from the path's origin, metres.
+    t_end: Stored,
     transmittance: Stored,
     /// Cells walked.
     cells: [i32; LANES],
@@ -93,11 +83,7 @@ struct Values {
     extinction: Stored,
     /// Number of the coarsest level.
     coarsest: Stored,
-    /// Of the segment: see [`Segment`].
-    t: [Stored; 2],
-    at: [Stored3; 2],
-    shares: [Stored3; 2],
-    /// Volume of a cell, m³.
+    /// Volume of a cell of the tetrahedron, m³.
     cell: Stored,
 }
 
@@ -116,8 +102,11 @@ struct Way<S: Simd> {
 
 /// Eight rays on their way through shells.
 pub struct ShellLanes<'a> {
-    on_way: [Option<OnWay<'a>>; LANES],
-    values: Values,
+    /// Numbers of the rays' hits.
+    hits: [usize; LANES],
+    paths: LanePaths<'a>,
+    segments: LaneSegments,
+    rays: Rays,
     pending: [Pending; 2],
 }
 
@@ -134,95 +123,118 @@ impl<'a> ShellLanes<'a> {
     /// Lanes without rays.
     pub fn new(integrator: &Integrator) -> Self {
         let pending = || Pending::new(integrator.lights.len());
-        ShellLanes { on_way: Default::default(), values: Values::default(), pending: [pending(), pending()] }
+        ShellLanes {
+            hits: [0; LANES],
+            paths: LanePaths::default(),
+            segments: LaneSegments::default(),
+            rays: Rays::default(),
+            pending: [pending(), pending()],
+        }
     }
 
     /// Walks all rays through their shells.
     #[inline(always)]
     pub fn walk<S: Simd>(&mut self, simd: S, ground: &Ground<'_, 'a>, hits: &mut [ShellHit<'a>]) {
-        let mut next = 0;
+        let (mut next, mut on_way) = (0, 0u8);
         loop {
-            let mut bits = 0;
-            for lane in 0..LANES {
-                let goes_on = self.advance(ground.integrator, lane, hits, &mut next);
-                bits |= u32::from(goes_on) << lane;
+            for lane in lanes_of(!on_way) {
+                on_way |= u8::from(self.start(ground.integrator, lane, hits, &mut next)) << lane;
             }
-            if bits == 0 {
+            if on_way == 0 {
                 break;
             }
-            self.through(simd, ground, bits, hits);
+            let goes_on = self.paths.next(simd, on_way, &mut self.segments);
+            let (enters, walks) = self.enter(ground.integrator, on_way, hits);
+            if walks != 0 {
+                self.segments.end_at(simd, self.rays.t_end.load(simd));
+                self.through(simd, ground, walks, hits);
+            }
+            for lane in lanes_of(on_way & !(goes_on & enters)) {
+                let hit = &mut hits[self.hits[lane]];
+                hit.transmittance = self.rays.transmittance.0[lane];
+                hit.cells[0] = self.rays.cells[lane] as u32;
+            }
+            on_way &= goes_on & enters;
         }
         for (kind, pending) in self.pending.iter_mut().enumerate() {
             pending.shade(simd, ground.integrator, kind, hits);
         }
     }
 
-    /// Leads a lane into the next tetrahedron: of its ray, or of the ray number `next`. Returns whether there
-    /// is any.
-    #[inline(always)]
-    fn advance(
+    /// Gives a lane the ray number `next`, or a later one that has a way through its shell. Returns whether
+    /// there is any.
+    fn start(
         &mut self,
         integrator: &'a Integrator<'a>,
         lane: usize,
-        hits: &mut [ShellHit<'a>],
+        hits: &[ShellHit<'a>],
         next: &mut usize,
     ) -> bool {
-        let scene = integrator.scene;
-        loop {
-            if let Some(OnWay { hit, path, t_end, tetrahedron }) = &mut self.on_way[lane] {
-                let hit = &mut hits[*hit];
-                let shell = &*scene.shells[hit.hull.shell];
-                let transmittance = self.values.transmittance.0[lane];
-                while let Some(segment) = path.next() {
-                    if segment.t[0] >= *t_end || transmittance < scene.trace.early_end {
-                        break;
-                    }
-                    let segment = segment.until(*t_end);
-                    let Some(volumes) = &shell.prisms[segment.prism].volumes else { continue };
-                    if segment.t[1] > segment.t[0] {
-                        *tetrahedron = [segment.prism, segment.tetrahedron];
-                        self.values.set(lane, &segment, volumes[segment.tetrahedron]);
-                        return true;
-                    }
-                }
-                hit.transmittance = transmittance;
-                hit.cells[0] = self.values.cells[lane] as u32;
-                self.on_way[lane] = None;
-            }
-            let Some(hit) = hits.get(*next) else { return false };
-            let shell = &*scene.shells[hit.hull.shell];
+        while let Some(hit) = hits.get(*next) {
+            let shell = &*integrator.scene.shells[hit.hull.shell];
             let (origin, t_end) = integrator.shell_start(&hit.hull, hit.d);
             let path = ShellPath::new(shell, hit.hull.face, origin, hit.d);
-            self.on_way[lane] = Some(OnWay { hit: *next, path, t_end, tetrahedron: [0; 2] });
+            self.hits[lane] = *next;
             *next += 1;
+            if !self.paths.start(lane, &path) {
+                continue;
+            }
             let volume = integrator.volume_of(shell);
-            let values = &mut self.values;
-            values.d.set(lane, hit.d);
-            values.origin.set(lane, origin);
-            values.metres.0[lane] = hit.hull.metres;
-            values.transmittance.0[lane] = hit.order.before;
-            values.cells[lane] = 0;
-            values.n.set(lane, Vec3::from_array(volume.size.map(|n| n as f32)));
-            values.flow_cells.0[lane] = volume.flow_cells;
-            values.extinction.0[lane] = volume.extinction;
-            values.coarsest.0[lane] = (volume.levels.len() - 1) as f32;
+            let rays = &mut self.rays;
+            rays.d.set(lane, hit.d);
+            rays.origin.set(lane, origin);
+            rays.metres.0[lane] = hit.hull.metres;
+            rays.t_end.0[lane] = t_end;
+            rays.transmittance.0[lane] = hit.order.before;
+            rays.cells[lane] = 0;
+            rays.n.set(lane, Vec3::from_array(volume.size.map(|n| n as f32)));
+            rays.flow_cells.0[lane] = volume.flow_cells;
+            rays.extinction.0[lane] = volume.extinction;
+            rays.coarsest.0[lane] = (volume.levels.len() - 1) as f32;
+            return true;
         }
+        false
+    }
+
+    /// Looks which of the lanes `bits` have not ended before their tetrahedron, and which of these have cells
+    /// there.
+    #[inline(always)]
+    fn enter(&mut self, integrator: &Integrator, bits: u8, hits: &[ShellHit<'a>]) -> (u8, u8) {
+        let scene = integrator.scene;
+        let LaneSegments { prism, tetrahedron, t: [t_in, t_out], .. } = &self.segments;
+        let (mut enters, mut walks) = (0, 0);
+        for lane in lanes_of(bits) {
+            let is_dark = self.rays.transmittance.0[lane] < scene.trace.early_end;
+            if t_in.0[lane] >= self.rays.t_end.0[lane] || is_dark {
+                continue;
+            }
+            enters |= 1 << lane;
+            let shell = &scene.shells[hits[self.hits[lane]].hull.shell];
+            if let Some(volumes) = &shell.prisms[prism[lane]].volumes
+                && t_out.0[lane] > t_in.0[lane]
+            {
+                walks |= 1 << lane;
+                let n = self.rays.n.get(lane);
+                self.rays.cell.0[lane] = volumes[tetrahedron[lane]] / (n.x * n.y * n.z);
+            }
+        }
+        (enters, walks)
     }
 
     /// Walks through a tetrahedron in each of the lanes `bits`.
     #[inline(always)]
-    fn through<S: Simd>(&mut self, simd: S, ground: &Ground<'_, 'a>, bits: u32, hits: &mut [ShellHit<'a>]) {
-        let way = self.values.way(simd, ground.integrator);
+    fn through<S: Simd>(&mut self, simd: S, ground: &Ground<'_, 'a>, bits: u8, hits: &mut [ShellHit<'a>]) {
+        let way = self.rays.way(simd, &self.segments, ground.integrator);
         let one = f32x8::splat(simd, 1.0);
-        let before = self.values.transmittance.load(simd);
+        let before = self.rays.transmittance.load(simd);
         let all = Mask::from_bitmask(simd, bits.into());
         let fine = self.in_level(simd, ground, (&way, 0), all, one - way.share, hits);
         let shared = all & way.share.simd_gt(0.0);
         if shared.any_true() {
-            self.values.transmittance.store(before);
+            self.rays.transmittance.store(before);
             let coarse = self.in_level(simd, ground, (&way, 1), shared, way.share, hits);
             let mixed = fine * (one - way.share) + coarse * way.share;
-            self.values.transmittance.store(shared.select(mixed, fine));
+            self.rays.transmittance.store(shared.select(mixed, fine));
         }
     }
 
@@ -240,13 +252,13 @@ impl<'a> ShellLanes<'a> {
     ) -> Floats<S> {
         let (none, one) = (i32x8::splat(simd, 0), i32x8::splat(simd, 1));
         let trace = &ground.integrator.scene.trace;
-        let numbers = self.levels_of(ground, way, which, active.to_bitmask() as u32);
+        let numbers = self.levels_of(ground, way, which, active.to_bitmask() as u8, hits);
         let own = Levels::new(simd, ground.levels, &numbers);
         let mut walk = Walk::of_lanes(simd, &own.units, way.start.by(own.scale), way.direction.by(own.scale));
-        let mut transmittance = self.values.transmittance.load(simd);
-        let mut count = i32x8::load_array_ref(simd, &self.values.cells);
+        let mut transmittance = self.rays.transmittance.load(simd);
+        let mut count = i32x8::load_array_ref(simd, &self.rays.cells);
         let most = i32x8::splat(simd, trace.max_cells.min(i32::MAX as u32) as i32);
-        let extinction = self.values.extinction.load(simd);
+        let extinction = self.rays.extinction.load(simd);
         loop {
             let goes_on = walk.inside() & walk.t.simd_lt(way.length);
             active &= goes_on & transmittance.simd_ge(trace.early_end) & count.simd_lt(most);
@@ -278,19 +290,20 @@ impl<'a> ShellLanes<'a> {
             self.light(simd, ground, &numbers, way, &found, hits);
             transmittance = lit.select(passed, transmittance);
         }
-        count.store_array(&mut self.values.cells);
-        self.values.transmittance.store(transmittance);
+        count.store_array(&mut self.rays.cells);
+        self.rays.transmittance.store(transmittance);
         transmittance
     }
 
-    /// Numbers of the levels that the lanes `bits` walk through. Other lanes have that of one of these.
+    /// Numbers of the levels that the lanes `bits` walk through. Others have any number.
     #[inline(always)]
     fn levels_of<S: Simd>(
         &self,
         ground: &Ground<'_, 'a>,
         way: &Way<S>,
         which: usize,
-        bits: u32,
+        bits: u8,
+        hits: &[ShellHit<'a>],
     ) -> [usize; LANES] {
         if let [_] = ground.firsts
             && way.level == [way.level[0]; LANES]
@@ -298,15 +311,10 @@ impl<'a> ShellLanes<'a> {
         {
             return [way.level[0] as usize + which; LANES];
         }
-        let mut numbers = [0; LANES];
-        let mut last = 0;
-        for lane in 0..LANES {
-            if bits >> lane & 1 == 1
-                && let Some(OnWay { hit: _, path, .. }) = &self.on_way[lane]
-            {
-                last = ground.firsts[path.shell().volume as usize] + way.level[lane] as usize + which;
-            }
-            numbers[lane] = last;
+        let mut numbers = [ground.firsts[0]; LANES];
+        for lane in lanes_of(bits) {
+            let shell = &ground.integrator.scene.shells[hits[self.hits[lane]].hull.shell];
+            numbers[lane] = ground.firsts[shell.volume as usize] + way.level[lane] as usize + which;
         }
         numbers
     }
@@ -322,33 +330,34 @@ impl<'a> ShellLanes<'a> {
         found: &Found<S>,
         hits: &mut [ShellHit<'a>],
     ) {
-        let values = &self.values;
+        let (rays, segments) = (&self.rays, &self.segments);
         let along = found.middle / way.length;
-        let [from, to] = [&values.shares[0], &values.shares[1]].map(|shares| shares.load(simd));
+        let before = f32x8::splat(simd, 1.0) - along;
+        let [from, to] = [segments.shares[0].load(simd), segments.shares[1].load(simd)];
         let mut shares = Stored3::default();
-        shares.store(from.plus(to.minus(from).times(along)));
-        let [from, to] = [&values.at[0].0[2], &values.at[1].0[2]].map(|depth| depth.load(simd));
+        shares.store(from.times(before).plus(to.times(along)));
+        let [from, to] = [segments.at[0].0[2].load(simd), segments.at[1].0[2].load(simd)];
         let mut depth = Stored::default();
         depth.store(from + (to - from) * along);
-        let t = values.t[0].load(simd) + found.middle;
+        let t = segments.t[0].load(simd) + found.middle;
         let mut point = Stored3::default();
-        point.store(values.origin.load(simd).plus(values.d.load(simd).times(t)));
+        point.store(rays.origin.load(simd).plus(rays.d.load(simd).times(t)));
         let mut weight = Stored::default();
         weight.store(found.weight);
         for lane in lanes_of(found.bits) {
-            let Some(OnWay { hit, tetrahedron, .. }) = &self.on_way[lane] else { continue };
+            let hit = self.hits[lane];
             let level = &ground.levels[numbers[lane]].1;
             let place = Place {
-                shell: hits[*hit].hull.shell,
-                tetrahedron: *tetrahedron,
+                shell: hits[hit].hull.shell,
+                tetrahedron: [segments.prism[lane], segments.tetrahedron[lane]],
                 shares: shares.get(lane),
                 depth: depth.0[lane],
                 point: point.get(lane),
             };
-            let lit = LitCell { hit: *hit, cell: found.cells[lane], weight: weight.0[lane], place };
+            let lit = LitCell { hit, cell: found.cells[lane], weight: weight.0[lane], place };
             let kind = usize::from(!level.is_whole);
             let pending = &mut self.pending[kind];
-            pending.push(ground.integrator, level, &lit, &mut hits[*hit]);
+            pending.push(ground.integrator, level, &lit, &mut hits[hit]);
             if pending.is_full() {
                 pending.shade(simd, ground.integrator, kind, hits);
             }
@@ -366,26 +375,14 @@ struct Found<'c, S: Simd> {
     middle: Floats<S>,
 }
 
-impl Values {
-    /// Puts a lane into a tetrahedron with the given determinant of its Jacobian.
-    #[inline(always)]
-    fn set(&mut self, lane: usize, segment: &Segment, determinant: f32) {
-        for k in 0..2 {
-            self.t[k].0[lane] = segment.t[k];
-            self.at[k].set(lane, segment.at[k]);
-            self.shares[k].set(lane, segment.shares[k]);
-        }
-        let n = self.n.get(lane);
-        self.cell.0[lane] = determinant / (n.x * n.y * n.z);
-    }
-
+impl Rays {
     /// Maps the segments to cells.
     #[inline(always)]
-    fn way<S: Simd>(&self, simd: S, integrator: &Integrator) -> Way<S> {
+    fn way<S: Simd>(&self, simd: S, segments: &LaneSegments, integrator: &Integrator) -> Way<S> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let n = self.n.load(simd);
-        let [from, to] = [self.at[0].load(simd).by(n), self.at[1].load(simd).by(n)];
-        let [t_in, t_out] = [self.t[0].load(simd), self.t[1].load(simd)];
+        let [from, to] = [segments.at[0].load(simd).by(n), segments.at[1].load(simd).by(n)];
+        let [t_in, t_out] = [segments.t[0].load(simd), segments.t[1].load(simd)];
         let length = t_out - t_in;
         let direction = to.minus(from).over(length);
         let start = Lanes3 {

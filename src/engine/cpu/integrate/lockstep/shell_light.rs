@@ -73,9 +73,8 @@ impl Pending {
         self.frame[0].set(i, frame.x_axis);
         self.frame[1].set(i, frame.y_axis);
         self.frame[2].set(i, frame.z_axis);
-        for (light, visible) in self.visible.iter_mut().enumerate() {
-            visible.0[i] = integrator.shell_visibility(level, place, light, &mut hit.cells[1]);
-        }
+        let visible = &mut self.visible;
+        integrator.shell_visibilities(level, place, &mut hit.cells[1], |light, v| visible[light].0[i] = v);
         self.count += 1;
     }
 
