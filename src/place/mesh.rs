@@ -1,4 +1,5 @@
-//! Opaque geometry as triangles: rocks and pools, with the light that they block from one another.
+//! Opaque geometry as triangles: rocks, pools and meshes of other programs, with the light that they block
+//! from one another.
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -10,26 +11,19 @@ use rayon::prelude::*;
 use super::pool::Pool;
 use super::rock::{Rock, shade, wet};
 use super::tiles::{self, Tile};
+use super::triangles::{MeshShade, ShadeMemo, WaterFaces, kinds};
 use crate::place::Vertex;
 use crate::util::cache::{Cache, key};
 
 /// Opaque triangles of a mesh that another program made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub struct Triangles {
     /// Three vertices for each triangle.
     pub vertices: Arc<Vec<Vertex>>,
     /// Whether a picture with an alpha channel has a hole in their place.
     pub holdout: bool,
-}
-
-impl Triangles {
-    /// Whether two lists share the same vertices.
-    pub fn are_shared(a: &[Triangles], b: &[Triangles]) -> bool {
-        let is_same = |(a, b): (&Triangles, &Triangles)| {
-            Arc::ptr_eq(&a.vertices, &b.vertices) && a.holdout == b.holdout
-        };
-        a.len() == b.len() && a.iter().zip(b).all(is_same)
-    }
+    /// Strengths of their shade and wetness.
+    pub shade: MeshShade,
 }
 
 /// Opaque geometry: square grids of vertices, first of the rocks and then of the pools, and triangles of
@@ -57,7 +51,7 @@ impl Mesh {
         }
         let mut vertices = Arc::unwrap_or_clone(self.vertices);
         let mut tiles = Arc::unwrap_or_clone(self.tiles);
-        for Triangles { vertices: own, holdout } in soups {
+        for Triangles { vertices: own, holdout, .. } in soups {
             let first = vertices.len() as u32;
             vertices.extend_from_slice(own);
             tiles.extend(tiles::cut_triangles(&vertices, first, *holdout));
@@ -88,26 +82,53 @@ pub struct Ground {
     pub rocks: Vec<Rock>,
     /// Pools; their vertices follow those of the rocks.
     pub pools: Vec<Pool>,
-    /// Corners of the quads that wet rock and fall into pools, metres; empty where nothing can be wet.
+    /// Corners of the quads that wet rocks and meshes and fall into pools, metres; empty where nothing can be wet.
     pub water: Vec<[Vec3; 4]>,
-    /// Unit vector to the light that makes rock cast shadows on rock; `None` where no rock is shaded.
+    /// Triangles of other programs' meshes; their vertices follow those of the pools.
+    pub triangles: Vec<Triangles>,
+    /// Triangles around shells of water; empty where nothing can be wet.
+    pub water_faces: WaterFaces,
+    /// Unit vector to the light that makes rocks and meshes cast shadows; `None` where none is shaded.
     pub sun: Option<Vec3>,
     /// The place in the world from which positions are measured, metres. Beds of rock are fixed to the world.
     pub origin: DVec3,
 }
 
 impl Ground {
-    /// Builds the mesh.
-    pub fn mesh(&self) -> Mesh {
-        Mesh::new(self.vertices(), self.grids())
+    /// Builds the mesh. `memo` holds parts of what was built last.
+    pub fn mesh(&self, memo: &ShadeMemo) -> Mesh {
+        self.with_meshes(Mesh::new(self.vertices(memo), self.grids()), memo, None)
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
-    pub fn cached_mesh(&self, cache: &Cache) -> Mesh {
+    pub fn cached_mesh(&self, memo: &ShadeMemo, cache: &Cache) -> Mesh {
         let count = self.rock_vertices() as usize + self.pools.len() * Pool::VERTICES;
-        let make = || Ok::<_, Infallible>(self.vertices());
-        let Ok(vertices) = cache.get("meshes", &key("mesh", BUILDER_VERSION, self), count, make);
-        Mesh::new(vertices, self.grids())
+        let make = || Ok::<_, Infallible>(self.vertices(memo));
+        let key = key("mesh", BUILDER_VERSION, &self.of_grids());
+        let Ok(vertices) = cache.get("meshes", &key, count, make);
+        self.with_meshes(Mesh::new(vertices, self.grids()), memo, Some(cache))
+    }
+
+    /// Everything that determines the vertices of rocks and pools.
+    fn of_grids(&self) -> Ground {
+        let [blocks_sky, blocks_sun] = self.meshes_that_shade();
+        let mut own = self.clone();
+        if !blocks_sky && !blocks_sun {
+            own.triangles.clear();
+        }
+        if !self.rocks.iter().any(|rock| rock.wet > 0.0) {
+            own.water_faces = WaterFaces::default();
+        }
+        own
+    }
+
+    /// Whether meshes block light that rocks and pools would get: that of the surroundings, and the sun's.
+    fn meshes_that_shade(&self) -> [bool; 2] {
+        let of = |rock: fn(&Rock) -> f32, mesh: fn(&MeshShade) -> f32| {
+            let takes = !self.pools.is_empty() || self.rocks.iter().any(|own| rock(own) > 0.0);
+            takes && self.triangles.iter().any(|own| mesh(&own.shade) > 0.0)
+        };
+        [of(|rock| rock.occlusion, |mesh| mesh.occlusion), of(|rock| rock.shadow, |mesh| mesh.shadow)]
     }
 
     /// Returns the number of squares on a side of each grid, and whether it is a holdout.
@@ -116,7 +137,7 @@ impl Ground {
         self.rocks.iter().map(|rock| (1 << rock.levels, rock.holdout)).chain(pools)
     }
 
-    fn vertices(&self) -> Vec<Vertex> {
+    fn vertices(&self, memo: &ShadeMemo) -> Vec<Vertex> {
         let of_rocks: Vec<Vec<Vertex>> =
             self.rocks.par_iter().map(|rock| rock.vertices(self.origin)).collect();
         let vertices = &mut of_rocks.concat();
@@ -130,16 +151,28 @@ impl Ground {
             pool.fill(&mut vertices[own.clone()], &ground, &self.water);
             pools.push(own);
         }
-        let shaded = |amount: fn(&Rock) -> f32| {
-            let rocks = rocks.iter().map(|(rock, own)| (amount(rock), own.clone()));
-            let most = self.rocks.iter().map(amount).fold(0.0, f32::max);
-            rocks.chain(pools.iter().map(|own| (most, own.clone()))).collect::<Vec<_>>()
+        let shaded = |of_rock: fn(&Rock) -> f32, of_mesh: fn(&MeshShade) -> f32| {
+            let own = rocks.iter().map(|(rock, own)| (of_rock(rock), own.clone()));
+            let amounts = self.rocks.iter().map(of_rock);
+            let most =
+                amounts.chain(self.triangles.iter().map(|own| of_mesh(&own.shade))).fold(0.0, f32::max);
+            own.chain(pools.iter().map(|own| (most, own.clone()))).collect::<Vec<_>>()
         };
-        shade::occlude(&rocks, &shaded(|rock| rock.occlusion), vertices);
+        let [blocks_sky, blocks_sun] = self.meshes_that_shade();
+        let casters = (blocks_sky || blocks_sun).then(|| self.casters(memo, vertices));
+        let blockers = |kinds: u8, is_asked: bool| {
+            let bvh = casters.as_deref().filter(|_| is_asked)?;
+            Some(move |from: Vec3, direction: Vec3| bvh.is_hit(from, direction, kinds))
+        };
+        let of_sky = blockers(kinds::MESH_OCCLUSION, blocks_sky);
+        let sky = shaded(|rock| rock.occlusion, |mesh| mesh.occlusion);
+        shade::occlude(&rocks, &sky, vertices, of_sky.as_ref());
         if let Some(to_sun) = self.sun {
-            shade::shadow(&rocks, &shaded(|rock| rock.shadow), vertices, to_sun);
+            let of_sun = blockers(kinds::MESH_SHADOW, blocks_sun);
+            let sun = shaded(|rock| rock.shadow, |mesh| mesh.shadow);
+            shade::shadow(&rocks, &sun, vertices, to_sun, of_sun.as_ref());
         }
-        wet::wet(&rocks, vertices, &self.water, &self.pools);
+        wet::wet(&rocks, vertices, &self.water, &self.water_faces, &self.pools);
         std::mem::take(vertices)
     }
 
@@ -148,7 +181,7 @@ impl Ground {
     }
 
     /// Returns the range of each rock's vertices.
-    fn ranges(&self) -> Vec<Range<usize>> {
+    pub(super) fn ranges(&self) -> Vec<Range<usize>> {
         let mut first = 0;
         let range = |rock: &Rock| {
             let start = first;

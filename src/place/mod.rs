@@ -1,14 +1,17 @@
-//! Surroundings of the water: rock, pools, and the mesh of both.
+//! Surroundings of the water: rock, pools, meshes of other programs, and one mesh of all.
 
+mod bvh;
 mod mesh;
 mod pool;
 mod rock;
 mod show;
 pub mod tiles;
+mod triangles;
 mod vertex;
 
 pub use mesh::{BUILDER_VERSION, Ground, Mesh, Triangles};
 pub use pool::{MAX_POOLS, Pool};
 pub use rock::{MAX_LEVELS, Rock, wet::wet_albedo, wet::wetness};
 pub use show::Show;
+pub use triangles::{MAX_ADDED, MeshShade, SHADE_BYTES, SHADE_VERSION, ShadeMemo, WaterFaces};
 pub use vertex::Vertex;

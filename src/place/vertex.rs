@@ -1,5 +1,7 @@
 //! A vertex of opaque geometry.
 
+use glam::Vec3;
+
 /// A vertex of opaque geometry, as the raster pass reads it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -22,6 +24,21 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// The vertex in the middle between two.
+    pub(super) fn between(a: &Vertex, b: &Vertex) -> Vertex {
+        let middle = |a: [f32; 3], b: [f32; 3]| (Vec3::from(a) + Vec3::from(b)) * 0.5;
+        // Every field is named, so that none is forgotten.
+        Vertex {
+            position: middle(a.position, b.position).to_array(),
+            normal: middle(a.normal, b.normal).normalize_or(a.normal.into()).to_array(),
+            albedo: middle(a.albedo, b.albedo).to_array(),
+            occlusion: 0.5 * (a.occlusion + b.occlusion),
+            shadow: 0.5 * (a.shadow + b.shadow),
+            wet: 0.5 * (a.wet + b.wet),
+            pool: a.pool,
+        }
+    }
+
     /// Numbers that are interpolated over a triangle: normal, albedo, occlusion and shadow; and the film of
     /// water.
     #[inline]

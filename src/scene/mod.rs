@@ -53,11 +53,11 @@ use crate::mapping::Quad;
 use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
-use crate::place::{Ground, Mesh, Pool, Rock, Triangles};
+use crate::place::{Ground, Mesh, Pool, Rock, ShadeMemo, Triangles, WaterFaces};
 use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
-use crate::volume::{PyramidSpec, StorageChoice, VolumeTexture};
+use crate::volume::{PyramidSpec, Run, StorageChoice, VolumeTexture};
 
 /// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
 /// more lights even the smallest tile of a picture would run into the driver's timeout.
@@ -111,6 +111,8 @@ pub struct Parts {
     pub pools: Vec<Pool>,
     /// Opaque triangles of other programs' meshes.
     pub triangles: Vec<Triangles>,
+    /// What the shade of the triangles was made of; scenes of one run share it.
+    pub shades: ShadeMemo,
     /// Meshes of other programs, with what their parts became: quads, shells and triangles.
     pub meshes: Vec<SceneMesh>,
     /// Names of meshes with faces that carry no volume because they have no area in the texture, and the
@@ -298,6 +300,7 @@ impl Scene {
             rocks: ground::rocks(v, origin, limits.memory)?,
             pools: ground::pools(v, origin)?,
             triangles: surfaces.triangles,
+            shades: limits.models.shades.clone(),
             meshes,
             unmapped: surfaces.unmapped,
             trace: build::trace(v),
@@ -350,8 +353,10 @@ impl Scene {
     /// Returns [`Scene::mesh`], from the cache where it is stored there.
     pub fn cached_mesh(&self, cache: Option<&Cache>) -> Mesh {
         let ground = self.ground();
-        let mesh = cache.map_or_else(|| ground.mesh(), |cache| ground.cached_mesh(cache));
-        mesh.with_triangles(&self.triangles)
+        match cache {
+            Some(cache) => ground.cached_mesh(&self.shades, cache),
+            None => ground.mesh(&self.shades),
+        }
     }
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.
@@ -446,13 +451,17 @@ impl Scene {
 
     /// Returns everything that determines the opaque mesh.
     pub fn ground(&self) -> Ground {
-        let wet = !self.pools.is_empty() || self.rocks.iter().any(|rock| rock.wet > 0.0);
-        let shaded = self.rocks.iter().any(|rock| rock.shadow > 0.0);
+        let shades = || self.triangles.iter().map(|own| own.shade);
+        let wet = self.rocks.iter().any(|rock| rock.wet > 0.0) || shades().any(|shade| shade.wet > 0.0);
+        let shaded =
+            self.rocks.iter().any(|rock| rock.shadow > 0.0) || shades().any(|shade| shade.shadow > 0.0);
         let sun = self.shadow_light().filter(|_| shaded).map(|i| self.lights[i].at(Vec3::ZERO).0);
         Ground {
             rocks: self.rocks.clone(),
             pools: self.pools.clone(),
-            water: if wet { self.falls() } else { Vec::new() },
+            triangles: self.triangles.clone(),
+            water: if wet || !self.pools.is_empty() { self.falls() } else { Vec::new() },
+            water_faces: if wet { self.water_faces() } else { WaterFaces::default() },
             sun,
             origin: self.camera.origin,
         }
@@ -461,6 +470,14 @@ impl Scene {
     /// Returns the corners of the quads that are not mist, metres.
     pub fn falls(&self) -> Vec<[Vec3; 4]> {
         self.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| quad.corners).collect()
+    }
+
+    /// Returns the triangles around the shells that hold water. Fibres that stand out of a surface are none.
+    fn water_faces(&self) -> WaterFaces {
+        let is_water =
+            |shell: &&Arc<Shell>| self.recipes[shell.volume as usize].water.structure.run == Run::Along;
+        let shells = self.shells.iter().filter(is_water);
+        WaterFaces(shells.flat_map(|shell| shell.hull.iter().map(|face| shell.corners(face))).collect())
     }
 
     /// Returns the depths of the scene, whose opaque mesh is `mesh`.
@@ -476,11 +493,11 @@ impl Scene {
 
     /// Builds all opaque geometry as one mesh.
     pub fn mesh(&self) -> Mesh {
-        self.ground().mesh().with_triangles(&self.triangles)
+        self.ground().mesh(&self.shades)
     }
 
-    /// Returns the index in `lights` of the light whose shadows rock casts on rock: the brightest directional
-    /// one.
+    /// Returns the index in `lights` of the light whose shadows rocks and meshes cast on one another: the
+    /// brightest directional one.
     pub fn shadow_light(&self) -> Option<usize> {
         let bright = |light: &Light| match light {
             Light::Directional { intensity, .. } => Some(intensity.element_sum()),

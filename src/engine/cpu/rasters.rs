@@ -178,6 +178,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         background,
         haze,
         image,
+        shades: _,
     } = &**a;
     let Image { width, height, samples, filter: _, alpha, rock_error, gamut: _, look: _ } = *image;
     let of_image = (width, height, samples, alpha, rock_error, sample_offset(image, sample));

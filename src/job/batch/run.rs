@@ -8,7 +8,7 @@ use super::writer::{Outcomes, Start, Writer};
 use crate::engine::{Engine, RenderOptions};
 use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, beside_encoders, memory_of, spare_for_rasters};
 use crate::output::frame::remove_left_by;
-use crate::place::{Ground, Mesh, Triangles};
+use crate::place::{Ground, Mesh};
 use crate::scene::Scene;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -23,7 +23,7 @@ struct Work<'a> {
     engine: &'a mut Engine,
     claims: Claims,
     volumes: VolumeMemo,
-    mesh: Option<(Ground, Vec<Triangles>, Mesh)>,
+    mesh: Option<(Ground, Mesh)>,
     watcher: &'a dyn Watcher,
     /// Whether the scene's warnings have been shown.
     warned: bool,
@@ -239,14 +239,10 @@ impl Work<'_> {
     fn mesh(&mut self, scene: &Scene) -> Mesh {
         let ground = scene.ground();
         match &self.mesh {
-            Some((known, triangles, mesh))
-                if *known == ground && Triangles::are_shared(triangles, &scene.triangles) =>
-            {
-                mesh.clone()
-            }
+            Some((known, mesh)) if *known == ground => mesh.clone(),
             _ => {
                 let mesh = scene.cached_mesh(self.batch.base.limits().cache.as_ref());
-                self.mesh = Some((ground, scene.triangles.clone(), mesh.clone()));
+                self.mesh = Some((ground, mesh.clone()));
                 mesh
             }
         }

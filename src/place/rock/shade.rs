@@ -36,10 +36,16 @@ struct DepthMap {
 /// A range of vertices that are shaded, and the share of the light that they lose where no light arrives.
 pub type ShadedRange = (f32, Range<usize>);
 
-/// Sets the vertices' occlusion. The rocks whose `occlusion` is above 0 block the surroundings' light.
-pub fn occlude(rocks: &[(&Rock, Range<usize>)], shaded: &[ShadedRange], vertices: &mut [Vertex]) {
+/// Sets the vertices' occlusion. The rocks whose `occlusion` is above 0 block the surroundings' light, and so
+/// does what else `blocked` meets, from a point along a direction.
+pub fn occlude(
+    rocks: &[(&Rock, Range<usize>)],
+    shaded: &[ShadedRange],
+    vertices: &mut [Vertex],
+    blocked: Option<&(impl Fn(Vec3, Vec3) -> bool + Sync)>,
+) {
     let casters = triangles(rocks, |rock| rock.occlusion, 4);
-    if casters.is_empty() {
+    if casters.is_empty() && blocked.is_none() {
         return;
     }
     let maps: Vec<DepthMap> = (0..DIRECTIONS)
@@ -57,7 +63,10 @@ pub fn occlude(rocks: &[(&Rock, Range<usize>)], shaded: &[ShadedRange], vertices
                 let cos = n.dot(map.to_light);
                 if cos > 0.0 {
                     all += cos;
-                    seen += cos * map.lit(point, n);
+                    let lit = if casters.is_empty() { 1.0 } else { map.lit(point, n) };
+                    if lit > 0.0 && !blocked.is_some_and(|blocked| blocked(point, map.to_light)) {
+                        seen += cos * lit;
+                    }
                 }
             }
             vertex.occlusion = amount * (1.0 - seen / f32::max(all, 1e-6));
@@ -65,23 +74,52 @@ pub fn occlude(rocks: &[(&Rock, Range<usize>)], shaded: &[ShadedRange], vertices
     }
 }
 
-/// Sets the vertices' shadow from a light at infinity. The rocks whose `shadow` is above 0 cast it.
+/// Points around a vertex from which rays go to the sun past what is no rock.
+const SUN_RAYS: u32 = 8;
+
+/// Sets the vertices' shadow from a light at infinity. The rocks whose `shadow` is above 0 cast it, and so
+/// does what else `blocked` meets, from a point along a direction.
 pub fn shadow(
     rocks: &[(&Rock, Range<usize>)],
     shaded: &[ShadedRange],
     vertices: &mut [Vertex],
     to_light: Vec3,
+    blocked: Option<&(impl Fn(Vec3, Vec3) -> bool + Sync)>,
 ) {
     let casters = triangles(rocks, |rock| rock.shadow, 1);
-    if casters.is_empty() {
+    if casters.is_empty() && blocked.is_none() {
         return;
     }
     let map = DepthMap::new(&casters, vertices, to_light, SUN_SIDE);
     for (amount, own) in shaded {
+        let spacing = spacing(&vertices[own.clone()]);
         vertices[own.clone()].par_iter_mut().for_each(|vertex| {
-            vertex.shadow = amount * (1.0 - map.lit(vertex.position.into(), vertex.normal.into()));
+            let (point, n) = (Vec3::from(vertex.position), Vec3::from(vertex.normal));
+            let mut lit = if casters.is_empty() { 1.0 } else { map.lit(point, n) };
+            if let Some(blocked) = blocked.filter(|_| *amount > 0.0 && lit > 0.0) {
+                let open =
+                    (0..SUN_RAYS).filter(|i| !blocked(beside(point, n, *i, spacing), to_light)).count();
+                lit *= open as f32 / SUN_RAYS as f32;
+            }
+            vertex.shadow = amount * (1.0 - lit);
         });
     }
+}
+
+/// Returns the distance between neighbours on a square grid, metres.
+fn spacing(vertices: &[Vertex]) -> f32 {
+    let squares = vertices.len().isqrt() - 1;
+    let [first, last] = [0, squares].map(|i| Vec3::from(vertices[i].position));
+    first.distance(last) / squares as f32
+}
+
+/// Returns the `i`-th of [`SUN_RAYS`] points around one on a surface with normal `n`, within a disc as large as
+/// a square of the grid, on a spiral (Vogel 1979).
+fn beside(point: Vec3, n: Vec3, i: u32, spacing: f32) -> Vec3 {
+    let (x, y) = n.any_orthonormal_pair();
+    let (sin, cos) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();
+    let r = spacing * ((i as f32 + 0.5) / (SUN_RAYS as f32 * PI)).sqrt();
+    point + (x * cos + y * sin) * r
 }
 
 /// Returns the greatest height of the rocks at the column of each vertex in `own`, metres; −∞ where there is

@@ -1,4 +1,4 @@
-//! Wet rock: near falling water, below it, and in pools.
+//! Wet rock: near falling water, below it, and in pools. Meshes of other programs are wet alike.
 
 use std::ops::Range;
 
@@ -6,7 +6,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::Rock;
-use crate::place::{Pool, Vertex};
+use crate::place::bvh::Bvh;
+use crate::place::triangles::water_tree;
+use crate::place::{Pool, Vertex, WaterFaces};
 
 /// Ratio of the distance that water runs down to the distance that it spreads sideways.
 const RUN: f32 = 4.0;
@@ -39,8 +41,18 @@ struct WettingQuad {
 /// Height to which a pool wets rock, as a share of the reach of falling water.
 const SPLASH: f32 = 0.5;
 
-/// Wets the vertices of rocks near the quads `water`, and in and above pools.
-pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[Vec3; 4]], pools: &[Pool]) {
+/// Wets the vertices of rocks near the quads `water` and the shells inside `faces`, and in and above pools.
+pub fn wet(
+    rocks: &[(&Rock, Range<usize>)],
+    vertices: &mut [Vertex],
+    water: &[[Vec3; 4]],
+    faces: &WaterFaces,
+    pools: &[Pool],
+) {
+    if rocks.iter().all(|(rock, _)| rock.wet == 0.0) {
+        return;
+    }
+    let shells = water_tree(faces.0.iter().copied());
     let sources: Vec<WettingQuad> = water
         .iter()
         .map(|&corners| {
@@ -50,21 +62,44 @@ pub fn wet(rocks: &[(&Rock, Range<usize>)], vertices: &mut [Vertex], water: &[[V
         })
         .collect();
     for (rock, own) in rocks {
-        if rock.wet == 0.0 || (sources.is_empty() && pools.is_empty()) {
+        if rock.wet == 0.0 || (sources.is_empty() && shells.is_empty() && pools.is_empty()) {
             continue;
         }
         vertices[own.clone()].par_iter_mut().for_each(|vertex| {
             let (point, reach) = (Vec3::from(vertex.position), rock.wet_reach);
-            let over = pools.iter().filter(|pool| pool.holds(point));
-            let above = over.map(|pool| (point.y - pool.level()).max(0.0) / SPLASH).fold(reach, f32::min);
-            let wet = rock.wet * wetness(distance(&sources, point, above), reach);
-            if wet > 0.0 {
-                let dry = Vec3::from_array(vertex.albedo);
-                vertex.albedo = dry.lerp(wet_albedo(dry), wet).to_array();
-                vertex.wet = wet;
-            }
+            let near = distance(&sources, point, above(pools, point, reach));
+            wet_vertex(vertex, rock.wet * wetness(shells.nearest(point, near, away_from_water), reach));
         });
     }
+}
+
+/// Returns the wetness of a point of a surface with the strength `wet`, near the triangles of `water`, and in
+/// and above pools.
+pub fn wetness_at(point: Vec3, wet: f32, reach: f32, water: &Bvh, pools: &[Pool]) -> f32 {
+    wet * wetness(water.nearest(point, above(pools, point, reach), away_from_water), reach)
+}
+
+/// Puts a film of water on a dry vertex.
+pub fn wet_vertex(vertex: &mut Vertex, wet: f32) {
+    if wet > 0.0 {
+        let dry = Vec3::from_array(vertex.albedo);
+        vertex.albedo = dry.lerp(wet_albedo(dry), wet).to_array();
+        vertex.wet = wet;
+    }
+}
+
+/// Returns the distance that stands for the height above a pool, metres, but at most `reach`.
+fn above(pools: &[Pool], point: Vec3, reach: f32) -> f32 {
+    let over = pools.iter().filter(|pool| pool.holds(point));
+    over.map(|pool| (point.y - pool.level()).max(0.0) / SPLASH).fold(reach, f32::min)
+}
+
+/// Returns the length of a vector from water to a point, metres. Its part downwards counts 1/[`RUN`].
+fn away_from_water(mut away: Vec3) -> f32 {
+    if away.y < 0.0 {
+        away.y /= RUN;
+    }
+    away.length()
 }
 
 /// Returns the distance to the nearest source, metres, but at most `reach`. Downward parts of the distance
@@ -80,11 +115,7 @@ fn distance(sources: &[WettingQuad], point: Vec3, reach: f32) -> f32 {
         }
         let [a, b, c, d] = source.corners;
         for corners in [[a, b, c], [a, c, d]] {
-            let mut away = point - nearest_on_triangle(point, corners);
-            if away.y < 0.0 {
-                away.y /= RUN;
-            }
-            best = best.min(away.length());
+            best = best.min(away_from_water(point - nearest_on_triangle(point, corners)));
         }
     }
     best

@@ -10,7 +10,7 @@ use crate::light::Scattering;
 use crate::mapping::shell::{Shell, Side};
 use crate::mapping::{Material, Quad};
 use crate::model::Primitive;
-use crate::place::{Triangles, Vertex};
+use crate::place::{MAX_ADDED, SHADE_BYTES, Triangles, Vertex};
 use crate::scene::read::MAX_QUADS;
 use crate::scene::{Limits, Recipe, Values};
 use crate::trace::AttenuationKind;
@@ -176,14 +176,29 @@ pub(in crate::scene) fn build(
                 ..faces::quads(key)?
             })
         })?;
-        all.triangles.extend(built.triangles.clone());
+        let shaded = |own: &Triangles| Triangles { shade: mesh.shade, ..own.clone() };
+        all.triangles.extend(built.triangles.as_ref().map(shaded));
         all.quads.extend_from_slice(&built.quads);
         all.shells.extend(built.shells.iter().cloned());
         if built.unmapped > 0 {
             all.unmapped.push((mesh.name.clone(), built.unmapped));
         }
     }
+    share_added(&mut all.triangles, u128::from(limits.memory).saturating_sub(taken));
     Ok(all)
+}
+
+/// Bytes of an opaque triangle: its vertices stand in the mesh, in what was made of the file, and on the
+/// device.
+const OPAQUE_BYTES: u64 = 3 * (3 * size_of::<Vertex>() as u64 + 24);
+
+/// Shares the triangles that shade may add among the meshes that have shade. They take half of `memory` bytes
+/// at most.
+fn share_added(all: &mut [Triangles], memory: u128) {
+    let fit = memory / 2 / u128::from(OPAQUE_BYTES + SHADE_BYTES);
+    let most = fit.min(MAX_ADDED.into()) as u32;
+    let count = all.iter().filter(|own| own.shade.is_wanted()).count().max(1) as u32;
+    all.iter_mut().for_each(|own| own.shade.most_added = most / count);
 }
 
 impl SceneMesh {
@@ -269,9 +284,8 @@ impl Key {
         if quads as u128 + faces.div_ceil(2) > MAX_QUADS as u128 {
             return Err(too_many_faces(name, faces));
         }
-        // Vertices stand in the mesh, in what was made of the file, and on the device.
-        let vertices = 3 * opaque * (3 * size_of::<Vertex>() as u128 + 24);
-        let need = taken + vertices + shelled * SHELL_BYTES;
+        let shade = if self.mesh.shade.is_wanted() { SHADE_BYTES } else { 0 };
+        let need = taken + opaque * u128::from(OPAQUE_BYTES + shade) + shelled * SHELL_BYTES;
         // Numbers of vertices and of points have 32 bits.
         if need > u128::from(memory) || opaque > 1 << 28 {
             return Err(Error::memory(

@@ -10,6 +10,7 @@ use image::RgbImage;
 
 use super::build::{Built, Key};
 use crate::model::{self, Model};
+use crate::place::ShadeMemo;
 use crate::scene::presets;
 use crate::util::error::Result;
 use crate::util::monitor::Unwatched;
@@ -70,7 +71,11 @@ struct Memo {
 
 /// Cache of models. All clones share it, and with them the scenes of one run.
 #[derive(Clone, Debug, Default)]
-pub struct ModelMemo(Arc<Mutex<Memo>>);
+pub struct ModelMemo {
+    memo: Arc<Mutex<Memo>>,
+    /// What the shade of the meshes was made of.
+    pub(in crate::scene) shades: ShadeMemo,
+}
 
 /// Entries of a kind that are kept besides those of the last scene: an edit and its undo alternate.
 const SPARE: usize = 2;
@@ -86,7 +91,7 @@ impl ModelMemo {
         let version = (path.to_owned(), changed, meta.map_or(0, |m| m.len()));
         // The lock is held while a file is read, so that other threads wait for it instead of reading it
         // again.
-        let mut memo = lock(&self.0);
+        let mut memo = lock(&self.memo);
         if let Some(i) = memo.files.iter().position(|(known, _)| *known == version) {
             let hit = memo.files.remove(i);
             memo.files.insert(0, hit);
@@ -105,7 +110,7 @@ impl ModelMemo {
 
     /// Returns what was built for `key`, or makes it.
     pub(super) fn built(&self, key: Key, make: impl FnOnce(&Key) -> Result<Built>) -> Result<Arc<Built>> {
-        let mut memo = lock(&self.0);
+        let mut memo = lock(&self.memo);
         if let Some(i) = memo.built.iter().position(|(known, _)| *known == key) {
             let hit = memo.built.remove(i);
             memo.built.insert(0, hit);
@@ -118,7 +123,7 @@ impl ModelMemo {
 
     /// Forgets all but the most recent entries, of which a scene with `meshes` meshes has just used some.
     pub(super) fn forget_others(&self, meshes: usize) {
-        let mut memo = lock(&self.0);
+        let mut memo = lock(&self.memo);
         memo.files.truncate(meshes + SPARE);
         memo.built.truncate(meshes + SPARE);
     }

@@ -25,7 +25,7 @@ use super::quads::unknown_material;
 use super::{Limits, Values};
 use crate::mapping::shell::Side;
 use crate::model::{Model, Primitive, find_name, folded_name};
-use crate::place::Show;
+use crate::place::{MeshShade, Show};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 
@@ -155,6 +155,8 @@ pub struct SceneMesh {
     pub color: Option<Vec3>,
     /// Whether the file's lights shine.
     pub lights: bool,
+    /// Shade and wetness of its opaque parts.
+    pub shade: MeshShade,
 }
 
 impl SceneMesh {
@@ -202,6 +204,13 @@ impl SceneMesh {
             ),
             color,
             lights: v.is_on(&key("lights")),
+            shade: MeshShade {
+                occlusion: v.float(&key("occlusion")),
+                shadow: v.float(&key("shadow")),
+                wet: v.float(&key("wet")),
+                wet_reach: v.float(&key("wet_reach")),
+                most_added: 0,
+            },
         })
     }
 

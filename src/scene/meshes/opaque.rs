@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::build::{Key, Part};
 use crate::model::{ModelMaterial, Primitive, TextureRef, Wrap};
-use crate::place::{Triangles, Vertex};
+use crate::place::{MeshShade, Triangles, Vertex};
 use crate::util::error::Result;
 
 /// Triangles that one thread makes at a time.
@@ -34,7 +34,8 @@ pub(super) fn triangles(key: &Key, memory: u64) -> Result<Option<Triangles>> {
         vertices.par_extend(made);
     }
     let holdout = key.mesh.holdout;
-    Ok((!vertices.is_empty()).then(|| Triangles { vertices: Arc::new(vertices), holdout }))
+    let shade = MeshShade::default();
+    Ok((!vertices.is_empty()).then(|| Triangles { vertices: Arc::new(vertices), holdout, shade }))
 }
 
 /// Returns the vertices of a triangle.

@@ -67,6 +67,32 @@ pub(super) const MESHES: Group = Group {
         p(COLOR, "", "", Color([0.5, 0.5, 0.5]), Upload)
             .doc("Albedo of all opaque parts in place of the file's colours, linear RGB.")
             .when("Give one to a mesh without colours, or to look at its shape alone."),
+        p("meshes.*.wet", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Strength of the film of water on the opaque parts near quads that are not mist and near \
+                 shells of water, below them, and at pools.",
+            )
+            .when("Raise it to 1 for rock that water runs over or splashes; leave it at 0 for dry things."),
+        p("meshes.*.wet_reach", "", "m", Float(1e-3, 1e4, 1.0), Upload)
+            .slider(0.05, 5.0)
+            .doc(
+                "Distance from falling water at which the opaque parts are dry. Below the water it is four \
+                 times as far.",
+            )
+            .when("Raise it for a broad wet margin; lower it in small scenes."),
+        p("meshes.*.occlusion", "", "", Float(0.0, 1.0, 1.0), Upload)
+            .doc(
+                "Share of the surroundings' light that the opaque parts lose where meshes or rocks hide them. \
+                 Only meshes and rocks with a value above 0 hide them.",
+            )
+            .when("Lower it when corners are too dark; set 0 while you move a large mesh, to see it sooner."),
+        p("meshes.*.shadow", "", "", Float(0.0, 1.0, 1.0), Upload)
+            .doc(
+                "Share of the light of the brightest directional light, the sky's sun included, that the \
+                 opaque parts lose in the shadow of meshes and rocks. Only those with a value above 0 cast \
+                 it.",
+            )
+            .when("Lower it when shadows are too hard; set 0 for a backdrop that should cast none."),
         p("meshes.*.lights", "", "", Switch(false), Uniform)
             .doc(
                 "Whether the lights of the file (KHR_lights_punctual) shine. 683 lx or cd become an \

@@ -16,7 +16,7 @@ use crate::engine::{Engine, EngineChoice, RenderOptions, exposure};
 use crate::job::VolumeMemo;
 use crate::picture::camera::CENTRE;
 use crate::picture::{AutoExposure, Frame, Look};
-use crate::place::{Ground, Mesh, Triangles};
+use crate::place::{Ground, Mesh};
 use crate::scene::{Cost, Scene, Values, split_volume_key};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
@@ -72,7 +72,7 @@ pub struct Renderer {
     volume: VolumeMemo,
     /// Disk cache for the mesh of the first scene. `None` once that is made.
     cache: Option<Cache>,
-    mesh: Option<(Ground, Vec<Triangles>, Mesh)>,
+    mesh: Option<(Ground, Mesh)>,
     /// The full-size picture in the window.
     rendered: Option<Rendered>,
     /// Other pictures that are still valid.
@@ -420,14 +420,13 @@ impl Renderer {
     /// Returns the scene's opaque mesh, and whether it is new.
     fn mesh(&mut self, scene: &Scene) -> (Mesh, bool) {
         let ground = scene.ground();
-        if let Some((known, triangles, mesh)) = &self.mesh
+        if let Some((known, mesh)) = &self.mesh
             && *known == ground
-            && Triangles::are_shared(triangles, &scene.triangles)
         {
             return (mesh.clone(), false);
         }
         let mesh = scene.cached_mesh(self.cache.take().as_ref());
-        self.mesh = Some((ground, scene.triangles.clone(), mesh.clone()));
+        self.mesh = Some((ground, mesh.clone()));
         (mesh, true)
     }
 

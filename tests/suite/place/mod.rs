@@ -1,6 +1,7 @@
 //! Rock and pools: closed forms (float64) of their shading, wetness and reflection, and parity of the
 //! engines.
 
+pub mod mesh_shade;
 pub mod tiles;
 pub mod triangles;
 

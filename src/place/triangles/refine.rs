@@ -1,0 +1,114 @@
+//! Finer triangles where a mesh is too coarse for what its vertices are to hold.
+//!
+//! An edge that is longer than a limit is split in its middle, again and again. The two positions of an edge
+//! decide alone, so both triangles of an edge split it alike: no crack opens, and no vertex lies on the edge
+//! of a neighbour.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::place::Vertex;
+
+/// Longest edge, as a share of the diagonal of the mesh's box. Half of it takes four times the memory; with
+/// twice as much, the shadow of a post on a floor is a blot.
+const LONGEST: f32 = 1.0 / 200.0;
+/// Factor by which the limit grows until the triangles are few enough.
+const STEP: f32 = 1.19;
+/// Triangles that one thread splits at a time.
+const AT_ONCE: usize = 1024;
+
+/// Returns the vertices with at most `most_added` more triangles. A mesh that is fine enough stays as it is.
+pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Arc<Vec<Vertex>> {
+    let positions = || vertices.par_iter().map(|vertex| Vec3::from(vertex.position));
+    let low = positions().reduce(|| Vec3::INFINITY, Vec3::min);
+    let high = positions().reduce(|| Vec3::NEG_INFINITY, Vec3::max);
+    let mut limit = LONGEST * low.distance(high);
+    if !limit.is_finite() || limit <= 0.0 {
+        return vertices.clone();
+    }
+    let (triangles, _) = vertices.as_chunks::<3>();
+    let most = triangles.len() + most_added;
+    // A guess first: a count takes as long as the triangles are many.
+    while guess(triangles, limit) > 2.0 * most as f64 {
+        limit *= STEP;
+    }
+    let mut count = pieces(triangles, limit);
+    while count > most {
+        limit *= STEP;
+        count = pieces(triangles, limit);
+    }
+    if count == triangles.len() {
+        return vertices.clone();
+    }
+    let made = triangles.par_chunks(AT_ONCE).flat_map_iter(|own| {
+        let mut out: Vec<Vertex> = Vec::with_capacity(3 * own.len());
+        let position = |vertex: &Vertex| Vec3::from(vertex.position);
+        for corners in own {
+            split(*corners, limit, &position, &Vertex::between, &mut |corners| out.extend(corners));
+        }
+        out
+    });
+    Arc::new(made.collect())
+}
+
+/// Number of triangles that the limit makes.
+fn pieces(triangles: &[[Vertex; 3]], limit: f32) -> usize {
+    let of = |corners: &[Vertex; 3]| {
+        let mut count = 0;
+        let between = |a: &Vec3, b: &Vec3| (*a + *b) * 0.5;
+        let corners = corners.map(|vertex| Vec3::from(vertex.position));
+        split(corners, limit, &|p: &Vec3| *p, &between, &mut |_| count += 1);
+        count
+    };
+    triangles.par_iter().map(of).sum()
+}
+
+/// Rough number of triangles that the limit makes, by area and length.
+fn guess(triangles: &[[Vertex; 3]], limit: f32) -> f64 {
+    let of = |corners: &[Vertex; 3]| {
+        let [a, b, c] = corners.map(|vertex| Vec3::from(vertex.position) / limit);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        f64::from(1.0 + (b - a).cross(c - a).length() + longest)
+    };
+    triangles.par_iter().map(of).sum()
+}
+
+/// Splits a triangle until no edge is longer than `limit`, and hands the parts to `out`.
+fn split<C: Copy>(
+    corners: [C; 3],
+    limit: f32,
+    position: &impl Fn(&C) -> Vec3,
+    between: &impl Fn(&C, &C) -> C,
+    out: &mut impl FnMut([C; 3]),
+) {
+    let is_long = |a: &C, b: &C| position(a).distance_squared(position(b)) > limit * limit;
+    let long = [0, 1, 2].map(|i| is_long(&corners[i], &corners[(i + 1) % 3]));
+    let mut each = |parts: &[[C; 3]]| parts.iter().for_each(|own| split(*own, limit, position, between, out));
+    match long.iter().filter(|long| **long).count() {
+        0 => out(corners),
+        1 => {
+            let first = long.iter().position(|long| *long).unwrap_or(0);
+            let [a, b, c] = [0, 1, 2].map(|i| corners[(first + i) % 3]);
+            let middle = between(&a, &b);
+            each(&[[a, middle, c], [middle, b, c]]);
+        }
+        2 => {
+            let short = long.iter().position(|long| !*long).unwrap_or(0);
+            let [a, b, c] = [1, 2, 3].map(|i| corners[(short + i) % 3]);
+            let [ab, bc] = [between(&a, &b), between(&b, &c)];
+            each(&[[ab, b, bc]]);
+            let length = |p: &C, q: &C| position(p).distance_squared(position(q));
+            match length(&a, &bc) < length(&ab, &c) {
+                true => each(&[[a, ab, bc], [a, bc, c]]),
+                false => each(&[[a, ab, c], [ab, bc, c]]),
+            }
+        }
+        _ => {
+            let [a, b, c] = corners;
+            let [ab, bc, ca] = [between(&a, &b), between(&b, &c), between(&c, &a)];
+            each(&[[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+    }
+}
