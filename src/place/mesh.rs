@@ -82,7 +82,8 @@ pub struct Ground {
     pub rocks: Vec<Rock>,
     /// Pools; their vertices follow those of the rocks.
     pub pools: Vec<Pool>,
-    /// Corners of the quads that wet rocks and meshes and fall into pools, metres; empty where nothing can be wet.
+    /// Corners of the quads that wet rocks and meshes and fall into pools, metres; empty where nothing can be
+    /// wet.
     pub water: Vec<[Vec3; 4]>,
     /// Triangles of other programs' meshes; their vertices follow those of the pools.
     pub triangles: Vec<Triangles>,

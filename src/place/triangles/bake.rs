@@ -1,7 +1,7 @@
 //! Shade at the vertices of a mesh, by rays from its triangles.
 //!
-//! A vertex holds the mean over the triangles around it, weighted by its own share in their interpolation
-//! (Kavan, Bargteil and Sloan 2011, without their solve). So a shadow's edge becomes a slope as wide as the
+//! A vertex holds the mean over the triangles around it; for the shadow, each ray weighs by the share of the
+//! vertex at its start (Kavan, Bargteil and Sloan 2011, without their solve). So a shadow's edge becomes a slope as wide as the
 //! triangles, and not a row of teeth; and a vertex inside other matter keeps its darkness to itself.
 
 use std::collections::HashMap;
@@ -11,6 +11,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::refine::lift;
 use crate::place::Vertex;
 use crate::place::bvh::Bvh;
 
@@ -20,9 +21,9 @@ const RAYS: u32 = 32;
 /// Rays of a triangle for its shadow.
 const SUN_RAYS: u32 = 8;
 /// Triangles from which on each has fewer rays, so that their sum stays: they are as small as the grain.
-const MANY: usize = 1 << 18;
-/// Share of [`RAYS`] or [`SUN_RAYS`] that a triangle keeps at least.
-const LEAST: u32 = 4;
+const MANY: usize = 1 << 17;
+/// Part of [`RAYS`] or [`SUN_RAYS`] that a triangle keeps at least, as a divisor.
+const LEAST: u32 = 8;
 
 /// Vertices of triangles, with the equal ones known.
 pub struct Welded {
@@ -52,12 +53,12 @@ impl Welded {
 
     /// Sums what `of` makes of each triangle: an amount and a weight for each corner. Returns the mean amount
     /// of each vertex, and 0 where there is no weight.
-    fn means(&self, vertices: &[Vertex], of: impl Fn(&Facet) -> [[f32; 2]; 3] + Sync) -> Vec<f32> {
+    fn means(&self, vertices: &[Vertex], of: impl Fn(usize, &Facet) -> [[f32; 2]; 3] + Sync) -> Vec<f32> {
         let (triangles, _) = vertices.as_chunks::<3>();
-        let made: Vec<[[f32; 2]; 3]> = triangles
-            .par_iter()
-            .map(|corners| Facet::new(corners).map_or_else(Default::default, |f| of(&f)))
-            .collect();
+        let made = triangles.par_iter().enumerate().map(|(number, corners)| {
+            Facet::new(corners).map_or_else(Default::default, |facet| of(number, &facet))
+        });
+        let made: Vec<[[f32; 2]; 3]> = made.collect();
         // One order of the sums, whatever the number of threads.
         let mut sums = vec![[0.0f32; 2]; self.corners.len()];
         for (number, [amount, weight]) in self.numbers.iter().zip(made.as_flattened()) {
@@ -141,29 +142,28 @@ fn rays_of(triangles: usize, rays: u32) -> u32 {
 /// about its normal. `triangles` are those of all meshes together.
 pub fn occlusion(vertices: &[Vertex], welded: &Welded, bvh: &Bvh, kinds: u8, triangles: usize) -> Vec<f32> {
     let (margin, rays) = (bvh.margin(), rays_of(triangles, RAYS));
-    welded.means(vertices, |facet| {
-        let mut sums = [[0.0; 2]; 3];
+    welded.means(vertices, |_, facet| {
+        let (mut hits, mut all) = (0u32, 0u32);
         for i in 0..rays {
-            let Sample { shares, position, normal } = facet.sample(i);
+            let Sample { position, normal, .. } = facet.sample(i);
             let direction = facet.direction(i, rays, normal);
             // Such a ray leaves a smooth surface, and only its flat stand-in is in the way.
-            if direction.dot(facet.out) <= 0.0 {
-                continue;
-            }
-            let is_hit = bvh.is_hit(position + facet.out * margin, direction, kinds);
-            for (sum, share) in sums.iter_mut().zip(shares) {
-                let weight = share * facet.area;
-                *sum = [sum[0] + if is_hit { weight } else { 0.0 }, sum[1] + weight];
+            if direction.dot(facet.out) > 0.0 {
+                all += 1;
+                hits += u32::from(bvh.is_hit(position + facet.out * margin, direction, kinds));
             }
         }
-        sums
+        // One mean for the three corners: a weight for each ray would undo the even spread of the spiral.
+        [[hits as f32 / all.max(1) as f32 * facet.area, facet.area]; 3]
     })
 }
 
 /// Returns the share of the light along the unit vector `to_sun` that each vertex loses. A vertex that faces
 /// away from the sun has the shadow on the back of its surface, which is what a thin sheet shows there.
+/// `lifts` lead from the vertices to the curved surface; they may be empty.
 pub fn shadow(
     vertices: &[Vertex],
+    lifts: &[Vec3],
     welded: &Welded,
     bvh: &Bvh,
     kinds: u8,
@@ -171,17 +171,20 @@ pub fn shadow(
     triangles: usize,
 ) -> Vec<f32> {
     let (margin, rays) = (bvh.margin(), rays_of(triangles, SUN_RAYS));
-    welded.means(vertices, |facet| {
+    let (lifts, _) = lifts.as_chunks::<3>();
+    welded.means(vertices, |number, facet| {
         let mut sums = [[0.0; 2]; 3];
         let is_lit = facet.normals.map(|normal| normal.dot(to_sun) > 0.0);
+        let lifts = lifts.get(number).copied().unwrap_or_default();
         for i in 0..rays {
             let Sample { shares, position, normal } = facet.sample(i);
             let cos = normal.dot(to_sun);
-            // Where the smooth surface is lit and its flat stand-in is not, a ray would meet the stand-in.
-            if cos * facet.out.dot(to_sun) <= 0.0 {
-                continue;
-            }
-            let start = position + facet.out * margin.copysign(cos);
+            let start = if cos > 0.0 {
+                let up = |k: usize| lifts[k] + lift(position, facet.positions[k], facet.normals[k]);
+                position + (0..3).map(|k| up(k) * shares[k]).sum::<Vec3>() + facet.out * margin
+            } else {
+                position - facet.out * margin
+            };
             let is_hit = bvh.is_hit(start, to_sun, kinds);
             for k in (0..3).filter(|k| is_lit[*k] == (cos > 0.0)) {
                 let weight = shares[k] * facet.area * cos.abs();

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::bake::Welded;
 use crate::place::bvh::Bvh;
@@ -24,6 +24,8 @@ pub struct Key {
 pub struct Kept {
     /// Meshes with triangles fine enough for shade.
     pub refined: Vec<Triangles>,
+    /// Ways from their vertices to the curved surface, metres; empty for a mesh that was fine enough.
+    pub lifts: Vec<Vec<Vec3>>,
     welded: Slot<Vec<Welded>>,
     casters: Slot<Bvh>,
     occlusion: Slot<Vec<Vec<f32>>>,
@@ -72,15 +74,20 @@ pub struct ShadeMemo(Arc<Mutex<Option<(Key, Arc<Kept>)>>>);
 
 impl ShadeMemo {
     /// Returns what is kept for `key`. What was kept for another one is forgotten.
-    pub fn kept(&self, key: Key, refine: impl FnOnce(&Key) -> Vec<Triangles>) -> Arc<Kept> {
+    pub fn kept(&self, key: Key, refine: impl FnOnce(&Key) -> (Vec<Triangles>, Vec<Vec<Vec3>>)) -> Arc<Kept> {
         if let Some((known, kept)) = &*lock(&self.0)
             && *known == key
         {
             return kept.clone();
         }
-        let refined = refine(&key);
-        let kept =
-            Kept { refined, welded: Slot::default(), casters: Slot::default(), occlusion: Slot::default() };
+        let (refined, lifts) = refine(&key);
+        let kept = Kept {
+            refined,
+            lifts,
+            welded: Slot::default(),
+            casters: Slot::default(),
+            occlusion: Slot::default(),
+        };
         lock(&self.0).insert((key, Arc::new(kept))).1.clone()
     }
 }

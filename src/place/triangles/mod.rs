@@ -17,7 +17,7 @@ use super::{Ground, Mesh, Rock, Triangles, Vertex};
 use crate::util::cache::{Cache, key};
 pub use memo::ShadeMemo;
 use memo::{Kept, Key};
-use refine::refined;
+use refine::{Refined, refined};
 
 /// Version of the shade of meshes, a part of its cache key. Raise it with every change to the values at the
 /// vertices; a test compares their checksum.
@@ -25,8 +25,8 @@ pub const SHADE_VERSION: u32 = 1;
 
 /// Triangles that all meshes of a scene get at most for their shade.
 pub const MAX_ADDED: u32 = 400_000;
-/// Bytes that a triangle with shade takes while it is made, besides its vertices: in the tree of boxes, and in
-/// the tables that find equal vertices.
+/// Bytes that a triangle with shade takes while it is made, besides its vertices: in the tree of boxes, and
+/// in the tables that find equal vertices.
 pub const SHADE_BYTES: u64 = 320;
 
 /// Squares on a side of the grid that blocks light in a rock's place. The rock itself has as many or more.
@@ -137,13 +137,14 @@ impl Ground {
             rocks: self.rocks.iter().filter(casts).cloned().collect(),
             origin: self.origin,
         };
-        let refine = |own: &Triangles| match own.shade.is_wanted() {
-            true => {
-                Triangles { vertices: refined(&own.vertices, own.shade.most_added as usize), ..own.clone() }
+        let refine = |own: &Triangles| {
+            if !own.shade.is_wanted() {
+                return (own.clone(), Vec::new());
             }
-            false => own.clone(),
+            let Refined { vertices, lifts } = refined(&own.vertices, own.shade.most_added as usize);
+            (Triangles { vertices, ..own.clone() }, lifts)
         };
-        memo.kept(key, |key| key.triangles.iter().map(refine).collect())
+        memo.kept(key, |key| key.triangles.iter().map(refine).unzip())
     }
 
     /// Everything that blocks light. `grids` are the vertices of the rocks.
@@ -197,7 +198,7 @@ impl Ground {
             let shadow = match self.sun {
                 Some(to_sun) if shade.shadow > 0.0 => {
                     let kinds = kinds::MESH_SHADOW | kinds::ROCK_SHADOW;
-                    bake::shadow(&own.vertices, welded, &casters, kinds, to_sun, count)
+                    bake::shadow(&own.vertices, &kept.lifts[mesh], welded, &casters, kinds, to_sun, count)
                 }
                 _ => Vec::new(),
             };

@@ -3,6 +3,10 @@
 //! An edge that is longer than a limit is split in its middle, again and again. The two positions of an edge
 //! decide alone, so both triangles of an edge split it alike: no crack opens, and no vertex lies on the edge
 //! of a neighbour.
+//!
+//! Smooth normals tell of a curved surface over flat triangles. Rays to the sun start from it, or the triangles
+//! would show their own shadow where the light grazes (Hanika 2021). So a vertex that is added also gets its
+//! place on the curve.
 
 use std::sync::Arc;
 
@@ -19,14 +23,45 @@ const STEP: f32 = 1.19;
 /// Triangles that one thread splits at a time.
 const AT_ONCE: usize = 1024;
 
+/// Vertices of triangles that are fine enough.
+pub struct Refined {
+    /// Three for each triangle.
+    pub vertices: Arc<Vec<Vertex>>,
+    /// Distance of the curved surface above each vertex, metres; empty if no triangle was split.
+    pub lifts: Vec<Vec3>,
+}
+
+/// A vertex, and its place on the curved surface.
+#[derive(Clone, Copy)]
+struct Corner {
+    vertex: Vertex,
+    curved: Vec3,
+}
+
+impl Corner {
+    fn between(a: &Corner, b: &Corner) -> Corner {
+        let middle = (a.curved + b.curved) * 0.5;
+        let normals = [a, b].map(|own| Vec3::from(own.vertex.normal));
+        let lift = (lift(middle, a.curved, normals[0]) + lift(middle, b.curved, normals[1])) * 0.5;
+        Corner { vertex: Vertex::between(&a.vertex, &b.vertex), curved: middle + lift }
+    }
+}
+
+/// The way from a point up to the plane through a vertex with normal `n`; none if the point lies above it
+/// (Boubekeur and Alexa 2008, only where the surface is convex).
+pub fn lift(point: Vec3, vertex: Vec3, n: Vec3) -> Vec3 {
+    n * -(point - vertex).dot(n).min(0.0)
+}
+
 /// Returns the vertices with at most `most_added` more triangles. A mesh that is fine enough stays as it is.
-pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Arc<Vec<Vertex>> {
+pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Refined {
+    let as_it_is = || Refined { vertices: vertices.clone(), lifts: Vec::new() };
     let positions = || vertices.par_iter().map(|vertex| Vec3::from(vertex.position));
     let low = positions().reduce(|| Vec3::INFINITY, Vec3::min);
     let high = positions().reduce(|| Vec3::NEG_INFINITY, Vec3::max);
     let mut limit = LONGEST * low.distance(high);
     if !limit.is_finite() || limit <= 0.0 {
-        return vertices.clone();
+        return as_it_is();
     }
     let (triangles, _) = vertices.as_chunks::<3>();
     let most = triangles.len() + most_added;
@@ -40,17 +75,22 @@ pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Arc<Vec<Vertex
         count = pieces(triangles, limit);
     }
     if count == triangles.len() {
-        return vertices.clone();
+        return as_it_is();
     }
     let made = triangles.par_chunks(AT_ONCE).flat_map_iter(|own| {
-        let mut out: Vec<Vertex> = Vec::with_capacity(3 * own.len());
-        let position = |vertex: &Vertex| Vec3::from(vertex.position);
+        let mut out: Vec<(Vertex, Vec3)> = Vec::with_capacity(3 * own.len());
+        let position = |corner: &Corner| Vec3::from(corner.vertex.position);
+        let mut add = |corner: Corner| out.push((corner.vertex, corner.curved - position(&corner)));
         for corners in own {
-            split(*corners, limit, &position, &Vertex::between, &mut |corners| out.extend(corners));
+            let corners = corners.map(|vertex| Corner { vertex, curved: vertex.position.into() });
+            split(corners, limit, &position, &Corner::between, &mut |corners| {
+                corners.into_iter().for_each(&mut add)
+            });
         }
         out
     });
-    Arc::new(made.collect())
+    let (vertices, lifts): (Vec<Vertex>, Vec<Vec3>) = made.unzip();
+    Refined { vertices: Arc::new(vertices), lifts }
 }
 
 /// Number of triangles that the limit makes.

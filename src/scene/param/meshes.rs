@@ -82,8 +82,8 @@ pub(super) const MESHES: Group = Group {
             .when("Raise it for a broad wet margin; lower it in small scenes."),
         p("meshes.*.occlusion", "", "", Float(0.0, 1.0, 1.0), Upload)
             .doc(
-                "Share of the surroundings' light that the opaque parts lose where meshes or rocks hide them. \
-                 Only meshes and rocks with a value above 0 hide them.",
+                "Share of the surroundings' light that the opaque parts lose where meshes or rocks hide \
+                 them. Only meshes and rocks with a value above 0 hide them.",
             )
             .when("Lower it when corners are too dark; set 0 while you move a large mesh, to see it sooner."),
         p("meshes.*.shadow", "", "", Float(0.0, 1.0, 1.0), Upload)

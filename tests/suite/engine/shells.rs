@@ -8,7 +8,7 @@ use taki::engine::gpu::GpuRenderer;
 use taki::light::{AngleFrame, Light};
 use taki::mapping::shell::{Shell, Side, SurfaceMesh};
 use taki::picture::Frame;
-use taki::place::{Triangles, Vertex};
+use taki::place::{MeshShade, Triangles, Vertex};
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
 use taki::volume::VolumeTexture;
@@ -177,7 +177,8 @@ fn the_engines_agree_where_opaque_triangles_cut_a_shell() {
             }
         };
         let vertices = [[-1.0, -1.0], [1.0, -1.0], [0.2, 1.0]].map(corner).to_vec();
-        scene.edit().triangles = vec![Triangles { vertices: Arc::new(vertices), holdout: false }];
+        scene.edit().triangles =
+            vec![Triangles { vertices: Arc::new(vertices), holdout: false, shade: MeshShade::default() }];
         agree(&mut renderer, &format!("a wall, from {eye:?}"), &scene, &volumes);
     }
 }

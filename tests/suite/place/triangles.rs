@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use taki::Unwatched;
 use taki::engine::cpu;
 use taki::picture::Camera;
-use taki::place::{Triangles, Vertex};
+use taki::place::{MeshShade, Triangles, Vertex};
 use taki::scene::Scene;
 use taki::volume::VolumeTexture;
 
@@ -47,7 +47,8 @@ fn scene(vertices: Vec<Vertex>) -> Scene {
     parts.ambient = Vec3::new(0.5, 0.8, 1.0);
     parts.background.zenith = Vec3::new(0.0, 0.0, 2.0);
     parts.background.horizon = parts.background.zenith;
-    parts.triangles = vec![Triangles { vertices: Arc::new(vertices), holdout: false }];
+    parts.triangles =
+        vec![Triangles { vertices: Arc::new(vertices), holdout: false, shade: MeshShade::default() }];
     scene
 }
 

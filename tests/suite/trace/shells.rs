@@ -9,7 +9,7 @@ use taki::Unwatched;
 use taki::engine::cpu;
 use taki::light::{AngleFrame, Light, Visibility};
 use taki::mapping::shell::{Shell, Side, SurfaceMesh};
-use taki::place::{Triangles, Vertex};
+use taki::place::{MeshShade, Triangles, Vertex};
 use taki::scene::Scene;
 use taki::trace::{Attenuation, Prefilter};
 use taki::volume::VolumeTexture;
@@ -461,8 +461,11 @@ fn the_opaque_scene_ends_a_ray_inside_a_shell() {
     };
     let mut scene = scene(shell(&sphere(2, 0.4), Side::Outward), [1.0, 1.2, 2.6]);
     let parts = scene.edit();
-    parts.triangles =
-        vec![Triangles { vertices: Arc::new([0, 1, 2, 0, 2, 3].map(vertex).to_vec()), holdout: false }];
+    parts.triangles = vec![Triangles {
+        vertices: Arc::new([0, 1, 2, 0, 2, 3].map(vertex).to_vec()),
+        holdout: false,
+        shade: MeshShade::default(),
+    }];
     // Only ambient light, by which the wall's radiance is known.
     parts.lights.clear();
     let wall = parts.ambient.as_dvec3() * DVec3::new(0.5, 0.25, 0.75);
