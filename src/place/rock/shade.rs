@@ -113,8 +113,8 @@ fn spacing(vertices: &[Vertex]) -> f32 {
     first.distance(last) / squares as f32
 }
 
-/// Returns the `i`-th of [`SUN_RAYS`] points around one on a surface with normal `n`, within a disc as large as
-/// a square of the grid, on a spiral (Vogel 1979).
+/// Returns the `i`-th of [`SUN_RAYS`] points around one on a surface with normal `n`, within a disc as large
+/// as a square of the grid, on a spiral (Vogel 1979).
 fn beside(point: Vec3, n: Vec3, i: u32, spacing: f32) -> Vec3 {
     let (x, y) = n.any_orthonormal_pair();
     let (sin, cos) = (i as f32 * PI * (3.0 - 5f32.sqrt())).sin_cos();

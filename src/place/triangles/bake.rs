@@ -1,8 +1,8 @@
 //! Shade at the vertices of a mesh, by rays from its triangles.
 //!
 //! A vertex holds the mean over the triangles around it; for the shadow, each ray weighs by the share of the
-//! vertex at its start (Kavan, Bargteil and Sloan 2011, without their solve). So a shadow's edge becomes a slope as wide as the
-//! triangles, and not a row of teeth; and a vertex inside other matter keeps its darkness to itself.
+//! vertex at its start (Kavan, Bargteil and Sloan 2011, without their solve). So a shadow's edge becomes a
+//! slope as wide as the triangles, and not a row of teeth.
 
 use std::collections::HashMap;
 use std::f32::consts::TAU;

@@ -4,9 +4,9 @@
 //! decide alone, so both triangles of an edge split it alike: no crack opens, and no vertex lies on the edge
 //! of a neighbour.
 //!
-//! Smooth normals tell of a curved surface over flat triangles. Rays to the sun start from it, or the triangles
-//! would show their own shadow where the light grazes (Hanika 2021). So a vertex that is added also gets its
-//! place on the curve.
+//! Smooth normals tell of a curved surface over flat triangles. Rays to the sun start from it, or the
+//! triangles would show their own shadow where the light grazes (Hanika 2021). So a vertex that is added also
+//! gets its place on the curve.
 
 use std::sync::Arc;
 
