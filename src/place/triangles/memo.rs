@@ -70,7 +70,10 @@ impl Kept {
 
 /// Memory of the shade of meshes. All clones share it, and with them the scenes of one run.
 #[derive(Clone, Default)]
-pub struct ShadeMemo(Arc<Mutex<Option<(Key, Arc<Kept>)>>>);
+pub struct ShadeMemo(Arc<Mutex<Option<Entry>>>);
+
+/// A key, and what is kept for it.
+type Entry = (Key, Arc<Kept>);
 
 impl ShadeMemo {
     /// Returns what is kept for `key`. What was kept for another one is forgotten.
