@@ -105,7 +105,7 @@ fn a_ball_on_a_floor_hides_of_the_sky_what_its_form_factor_says() {
         for vertex in &floor {
             let [x, _, z] = vertex.position.map(f64::from);
             let away = x.hypot(z);
-            if away < 0.06 || away > 1.8 {
+            if !(0.06..=1.8).contains(&away) {
                 continue;
             }
             let d2 = away * away + h * h;
