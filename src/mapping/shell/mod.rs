@@ -221,9 +221,9 @@ impl Shell {
     }
 
     /// Jacobian with which light is computed at a place in a prism that has an area in the texture, as
-    /// columns like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices and
-    /// the depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so the
-    /// Jacobian has no steps between prisms.
+    /// columns like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices
+    /// and the depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so
+    /// the Jacobian has no steps between prisms.
     #[inline]
     pub fn frame(&self, prism: usize, shares: Vec3, depth: f32) -> [Vec3; 3] {
         let [a, b, c] = self.prisms[prism].tangents.map(|number| &self.tangents[number as usize]);

@@ -115,9 +115,9 @@ fn facet_frames(shell: &Shell, i: usize) -> [DMat3; 2] {
     })
 }
 
-/// Frames of light at a vertex of prism number `own`: means over the prisms there whose axes along the surface
-/// are near its own, weighted by their angles halfway between the surfaces. A group of such prisms has the
-/// axes of its first one.
+/// Frames of light at a vertex of prism number `own`: means over the prisms there whose axes along the
+/// surface are near its own, weighted by their angles halfway between the surfaces. A group of such prisms
+/// has the axes of its first one.
 fn vertex_frames(shell: &Shell, facets: &[[DMat3; 2]], own: usize, vertex: u32) -> [DMat3; 2] {
     let middle = |v: u32| {
         let [outer, inner] = [0, 1].map(|k| shell.points[(2 * v + k) as usize].as_dvec3());

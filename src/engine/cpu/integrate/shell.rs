@@ -272,8 +272,8 @@ impl Integrator<'_> {
     }
 
     /// Optical depth, Σ ρ code × metres, from a place to where the light ray along the unit vector `l` leaves
-    /// the shell, or to the light `far` metres away. Infinite where the ray leaves into opaque matter. The ray
-    /// ends in the tetrahedron where the depth reaches `enough`.
+    /// the shell, or to the light `far` metres away. Infinite where the ray leaves into opaque matter. The
+    /// ray ends in the tetrahedron where the depth reaches `enough`.
     pub(super) fn shell_depth(
         &self,
         level: &Level,
