@@ -31,7 +31,9 @@ use glam::Vec3;
 pub use animation::Animation;
 pub use build::resolve;
 pub use effect::{settings_without_effect, settings_without_file, without_effect};
-pub use meshes::{Becomes, Loaded, ModelMemo, PartSummary, Projection, SceneMesh};
+pub use meshes::{
+    Becomes, Loaded, ModelMemo, PartSummary, Projection, SceneMesh, box_corners, mesh_place, turn_of,
+};
 pub use names::{NAMED, check_names, full_key, likeliest, unknown_key};
 pub use param::{
     Cost, GROUPS, Group, Kind, PARAMS, Param, WATER, key_of_volume, parameters_markdown, split_volume_key,

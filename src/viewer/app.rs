@@ -15,17 +15,18 @@ use eframe::egui;
 use egui::Ui;
 
 use super::curves_panel::CurvesPanel;
-use super::document::Document;
+use super::document::{Document, camera_in};
 use super::drive::Drive;
 use super::gallery::Gallery;
 use super::layer_image::show_legend;
 use super::lights::Lights;
+use super::meshes::Meshes;
 use super::navigate::Pose;
 use super::parameters::{Costs, ParameterPanel};
 use super::probe::{Aim, Probe};
 use super::settings::{Settings, Theme};
 use super::transfer::{ExportDialog, PathDialog};
-use super::viewport::{self, Content, Tool};
+use super::viewport::{self, Content, Selection, Tool};
 use super::volume_panel::VolumePanel;
 use super::worker::{Busy, Message, MessageKind, Picture, Worker};
 use super::{Handover, Loss, Options, metrics};
@@ -46,6 +47,10 @@ pub enum Inspector {
     Curves,
 }
 
+/// Gestures that drag the handle of a light and that of a mesh.
+const LIGHT: &str = "light";
+const MESH: &str = "mesh";
+
 /// An action that would lose unsaved changes, so that the user is asked first.
 #[derive(Clone, Debug, PartialEq)]
 enum Leaving {
@@ -64,6 +69,9 @@ pub struct Viewer {
 
     parameters: ParameterPanel,
     lights: Lights,
+    meshes: Meshes,
+    /// The light that was selected in the last frame.
+    last_light: Option<String>,
     volume_panel: VolumePanel,
     /// Name of the volume that the inspectors show.
     inspected_volume: String,
@@ -156,7 +164,7 @@ impl Viewer {
         ctx.set_zoom_factor(settings.zoom);
         // egui's own weak text is too faint to read.
         ctx.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.8);
-        let first_pose = Pose::of(document.values());
+        let first_pose = document.pose();
         let mut viewer = Viewer {
             drive: options.measure.then(Drive::new),
             options,
@@ -167,6 +175,8 @@ impl Viewer {
             loss,
             parameters: ParameterPanel::default(),
             lights: Lights::default(),
+            meshes: Meshes::default(),
+            last_light: None,
             volume_panel: VolumePanel::default(),
             inspected_volume: String::new(),
             curves_panel: CurvesPanel::default(),
@@ -304,9 +314,11 @@ impl Viewer {
         self.shortcuts(&ctx);
         let dropped: Vec<PathBuf> =
             ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
-        dropped.iter().for_each(|path| self.drop_file(path));
+        self.drop_files(&dropped);
         self.play(&ctx);
         self.lights.follow(self.document.values());
+        self.meshes.follow(self.document.values());
+        self.select_one();
 
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui));
         egui::Panel::top("toolbar").show(ui, |ui| self.toolbar(ui));
@@ -315,7 +327,8 @@ impl Viewer {
             let costs = Costs { volume_seconds: self.worker.state().volume_seconds };
             egui::Panel::left("parameters").default_size(340.0).size_range(280.0..=560.0).show(ui, |ui| {
                 ui.add_space(4.0);
-                self.parameters.show(ui, &mut self.document, &mut self.lights, costs);
+                let selection = Selection { lights: &mut self.lights, meshes: &mut self.meshes };
+                self.parameters.show(ui, &mut self.document, selection, costs);
             });
         }
         if self.settings.inspectors {
@@ -361,8 +374,11 @@ impl Viewer {
             aspect: image.width as f32 / image.height as f32,
             marked: self.marked.filter(|_| self.settings.inspectors && self.inspector == Inspector::Pixel),
             tool: self.tool,
+            pose: self.document.pose(),
+            meshes: &self.document.scene().meshes,
         };
-        let (rect, actions) = viewport::show(ui, &content, self.document.values(), &mut self.lights);
+        let selection = Selection { lights: &mut self.lights, meshes: &mut self.meshes };
+        let (rect, actions) = viewport::show(ui, &content, self.document.values(), selection);
         if let Some(picture) = &self.picture
             && picture.layer != Layer::Rgb
         {
@@ -377,11 +393,21 @@ impl Viewer {
         if let Some(pose) = actions.pose {
             self.move_camera(pose, Some("camera"));
         }
-        if !actions.lights.is_empty() {
-            let edits: Vec<(&str, Raw)> =
-                actions.lights.iter().map(|(k, v)| (k.as_str(), v.clone())).collect();
-            let set = self.document.set_all(&edits, Some("light"));
-            self.report(set);
+        for (edits, gesture) in [(actions.lights, LIGHT), (actions.meshes, MESH)] {
+            let mut edits: Vec<(&str, Raw)> = edits.iter().map(|(k, v)| (k.as_str(), v.clone())).collect();
+            // A camera that moved with the mesh would take the pointer's place on it along.
+            let mesh = self.meshes.selected().filter(|_| gesture == MESH && !edits.is_empty());
+            if mesh.is_some_and(|mesh| camera_in(self.document.values(), mesh).is_some()) {
+                edits.extend(self.document.camera_edits(&self.document.pose()));
+            }
+            if !edits.is_empty() {
+                let set = self.document.set_all(&edits, Some(gesture));
+                self.report(set);
+            }
+        }
+        if actions.deselect {
+            self.lights.select(None);
+            self.meshes.select(None);
         }
         if let Some(position) = actions.inspect {
             if self.tool == Tool::Inspect {

@@ -1,15 +1,21 @@
 //! The scene being edited: its values, its file, and its undo history.
 
+mod files;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::navigate::Pose;
 use crate::output::frame::scene_in;
 use crate::scene::{
     Key, Kind, Limits, NAMED, Param, Place, Raw, Record, STDIN, Scene, Source, Value, Values,
-    has_reference_by_hand, reference_keys, resolve,
+    has_reference_by_hand,
 };
 use crate::util::error::{Error, Result};
+
+/// Key of the mesh whose file has the camera.
+const FROM: &str = "camera.from";
 
 /// Most steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -85,6 +91,28 @@ impl Document {
         &self.values
     }
 
+    /// Pose of the camera, which `camera.from` may take from a mesh's file.
+    pub fn pose(&self) -> Pose {
+        let pose = Pose::of(&self.values);
+        let mesh = self.scene.meshes.iter().find(|mesh| camera_in(&self.values, &mesh.name).is_some());
+        // Of other values than those of the scene, nothing is known.
+        match mesh.filter(|_| self.scene.written().text(FROM) == self.values.text(FROM)) {
+            Some(mesh) => pose.with_camera(&self.scene.camera, mesh),
+            None => pose,
+        }
+    }
+
+    /// Keys and values that give the camera a pose. A camera that came from a mesh's file is the scene's own
+    /// from then on.
+    pub fn camera_edits(&self, pose: &Pose) -> Vec<(&'static str, Raw)> {
+        let mut edits = pose.edits().to_vec();
+        if !self.values.text(FROM).is_empty() {
+            edits.extend(pose.lens_edits());
+            edits.push((FROM, Raw::Text(String::new())));
+        }
+        edits
+    }
+
     /// The memory budget and the folders that references may point into.
     pub fn limits(&self) -> &Limits {
         &self.limits
@@ -108,7 +136,7 @@ impl Document {
     }
 
     /// Whether the value of `key` differs from when the scene was opened or saved. Always false for a key of
-    /// a light that was added since.
+    /// a light or mesh that was added since.
     pub fn differs(&self, key: &str) -> bool {
         owner_exists(&self.saved, key) && self.values.get(key) != self.saved.get(key)
     }
@@ -149,38 +177,6 @@ impl Document {
         self.values.set(key, raw, &Place("viewer".into()))?;
         self.quiet.insert(key.to_owned());
         self.check();
-        Ok(())
-    }
-
-    /// Takes the volume from a file that the user gave by hand. It may lie in any folder.
-    ///
-    /// # Errors
-    /// If another reference of the scene cannot be resolved.
-    pub fn use_volume_file(&mut self, path: &Path) -> Result<()> {
-        self.use_files(&[("volume.file", Raw::Text(path.display().to_string()))])
-    }
-
-    /// Takes the environment from a file that the user gave by hand. It may lie in any folder.
-    ///
-    /// # Errors
-    /// If another reference of the scene cannot be resolved.
-    pub fn use_environment_file(&mut self, path: &Path) -> Result<()> {
-        let file = Raw::Text(path.display().to_string());
-        self.use_files(&[("environment.file", file), ("environment.kind", Raw::Text("file".into()))])
-    }
-
-    fn use_files(&mut self, edits: &[(&str, Raw)]) -> Result<()> {
-        let mut values = self.values.clone();
-        for (key, raw) in edits {
-            values.set(key, raw, &Place("viewer".into()))?;
-        }
-        // The other references are relative to the scene's folder, which is given up below.
-        let is_edited = |key: &String| edits.iter().any(|(edited, _)| edited == key);
-        for key in reference_keys(&values).iter().filter(|key| !is_edited(key)) {
-            resolve(&mut values, key, self.folder.as_deref(), &self.limits.allow_paths)?;
-        }
-        self.folder = None;
-        self.replace(values, None);
         Ok(())
     }
 
@@ -280,6 +276,14 @@ impl Document {
         !self.redo.is_empty()
     }
 
+    /// Takes the gesture in progress back, if it is `gesture`. It cannot be redone.
+    pub fn cancel(&mut self, gesture: &str) {
+        if self.gesture.as_deref() == Some(gesture) {
+            self.undo();
+            self.redo.clear();
+        }
+    }
+
     /// Undoes the last step.
     pub fn undo(&mut self) {
         if let Some(values) = self.undo.pop() {
@@ -298,56 +302,6 @@ impl Document {
         }
     }
 
-    /// Says why saving to `path` loses something, if it does: another file, or comments, a base or changes
-    /// from outside in the scene's own.
-    pub fn lost_by_saving(&self, path: &Path) -> Option<&'static str> {
-        let text = std::fs::read(path).ok()?;
-        match self.path.as_deref() == Some(path) {
-            true if text == self.saved.to_toml().as_bytes() => None,
-            true => Some("holds comments, a base or changes from outside, which saving leaves out"),
-            false => Some("exists already"),
-        }
-    }
-
-    /// Writes the scene to a file, completely or not at all.
-    ///
-    /// # Errors
-    /// If the values are not a valid scene, if a file that the scene uses lies outside the new folder, or if
-    /// the file cannot be written.
-    pub fn save(&mut self, path: &Path) -> Result<()> {
-        if let Some(fault) = &self.fault {
-            return Err(Error::input(
-                format!("the scene is not valid: {fault}"),
-                "undo the last change first",
-            ));
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
-        // References are relative to the scene's folder: in another folder they must lead to the same files.
-        let mut values = self.scene.written().clone();
-        let moved = self.folder.as_ref() != Some(&folder);
-        for (key, file) in self.scene.references().into_iter().filter(|_| moved) {
-            let absolute = file.canonicalize().map_err(|e| Error::read(&file, e))?;
-            let inside =
-                folder.canonicalize().ok().and_then(|f| absolute.strip_prefix(f).ok().map(Path::to_owned));
-            let Some(inside) = inside else {
-                return Err(Error::input(
-                    format!("the scene uses {}, which is not in {}", absolute.display(), folder.display()),
-                    format!("save the scene beside the {} file", key.trim_end_matches(".file")),
-                ));
-            };
-            let raw = Raw::Text(inside.display().to_string());
-            values.set(&key, &raw, &Place("viewer".into()))?;
-        }
-        crate::output::frame::Output::create(path)?.finish_with(values.to_toml().as_bytes())?;
-        self.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        (self.path, self.source) = (Some(path.to_owned()), Some(path.to_owned()));
-        self.folder = Some(folder);
-        self.values = values;
-        self.saved = self.values.clone();
-        self.check();
-        Ok(())
-    }
-
     /// Returns the command that renders this picture: the file or preset, one `--remove` per part that is
     /// gone, and one `--set` per change.
     ///
@@ -364,6 +318,9 @@ impl Document {
         };
         let scene = source.display().to_string();
         let mut words = vec!["taki".to_owned(), "render".into(), scene];
+        for folder in self.folders_to_allow() {
+            words.extend(["--allow-path".to_owned(), folder.display().to_string()]);
+        }
         words.extend(removed.iter().flat_map(|name| ["--remove".to_owned(), name.clone()]));
         let mut left = self.saved.clone();
         removed.iter().for_each(|name| left.clear_under(name));
@@ -415,16 +372,24 @@ impl Document {
     }
 }
 
-/// Whether the light or volume that `key` belongs to exists; true for a key outside `lights` and `volumes`. A
-/// light whose values are all defaults still differs from no light.
+/// Whether the light, mesh or volume that `key` belongs to exists; true for other keys. A light whose values
+/// are all defaults still differs from no light.
 fn owner_exists(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {
-        (Some(section @ ("lights" | "volumes")), Some(name)) => {
+        (Some(section @ ("lights" | "meshes" | "volumes")), Some(name)) => {
             values.has_under(&format!("{section}.{name}"))
         }
         _ => true,
     }
+}
+
+/// Which camera of the file of the mesh `name` the scene's camera is, with a slash before it; empty for the
+/// first. `None` if the camera does not come from that file.
+pub fn camera_in(values: &Values, name: &str) -> Option<String> {
+    let from = values.text(FROM);
+    let camera = from.strip_prefix(name)?;
+    (camera.is_empty() || camera.starts_with('/')).then(|| camera.to_owned())
 }
 
 /// Returns the keys whose values differ between `a` and `b`.

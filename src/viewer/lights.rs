@@ -11,10 +11,10 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-pub use handles::{Drawn, show as show_handles};
+pub use handles::show as show_handles;
 
 use super::document::Document;
-use super::navigate::Pose;
+use super::named::Renaming;
 use crate::scene::{Raw, Values};
 use crate::util::error::Result;
 
@@ -33,17 +33,6 @@ pub struct Lights {
     grip: Option<handles::Grip>,
     /// Distance from the selected spot light to the point at which it is aimed, metres.
     aim_distance: Option<f64>,
-}
-
-/// A light being renamed.
-pub(super) struct Renaming {
-    pub light: String,
-    /// The name as typed so far.
-    pub text: String,
-    /// Why the typed name was refused.
-    pub fault: Option<String>,
-    /// Whether the text field has been given the keyboard.
-    pub focused: bool,
 }
 
 /// Whether a light has an intensity above 0 and a colour other than black.
@@ -74,7 +63,7 @@ impl Lights {
         if self.selected.as_deref().is_some_and(gone) {
             self.select(None);
         }
-        if self.renaming.as_ref().is_some_and(|renaming| gone(&renaming.light)) {
+        if self.renaming.as_ref().is_some_and(|renaming| gone(&renaming.name)) {
             self.renaming = None;
         }
         for name in values.names("lights") {
@@ -90,7 +79,7 @@ impl Lights {
     /// # Errors
     /// If there is no such kind, or the position is out of range.
     pub fn add(&mut self, document: &mut Document, kind: &str) -> Result<()> {
-        let (values, name) = edit::add(document.values(), kind, &Pose::of(document.values()))?;
+        let (values, name) = edit::add(document.values(), kind, &document.pose())?;
         document.edit(values);
         self.show(&name);
         Ok(())
@@ -132,9 +121,14 @@ impl Lights {
         Ok(())
     }
 
+    /// Whether a handle is being dragged.
+    pub(super) fn is_dragging(&self) -> bool {
+        self.grip.is_some()
+    }
+
     /// Starts renaming a light in the list.
     pub fn begin_renaming(&mut self, name: &str) {
-        self.renaming = Some(Renaming { light: name.into(), text: name.into(), fault: None, focused: false });
+        self.renaming = Some(Renaming::new(name));
     }
 
     /// Switches a light off, or on again with its last intensity.

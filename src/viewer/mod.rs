@@ -4,6 +4,7 @@
 //! The window's thread never renders. The render thread ([`worker`]) does, and hands over finished pictures.
 
 mod app;
+mod canvas;
 pub mod curves_panel;
 pub mod document;
 mod drive;
@@ -11,7 +12,9 @@ mod gallery;
 pub mod layer_image;
 pub mod lights;
 pub mod lobes;
+pub mod meshes;
 pub mod metrics;
+mod named;
 pub mod navigate;
 pub mod parameters;
 mod probe;

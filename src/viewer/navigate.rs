@@ -2,10 +2,13 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::scene::{Raw, Scene, Values};
+use crate::picture::Camera;
+use crate::scene::{Raw, Scene, SceneMesh, Values};
 
 /// Steepest elevation of the camera, radians from the horizon. Straight up, left and right are undefined.
 const STEEPEST: f64 = 1.553;
+/// Least distance of the eye from the middle of what is framed, metres.
+const NEAREST_M: f64 = 1e-3;
 
 /// Position, target and field of view of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +38,25 @@ impl Pose {
     /// Keys and values of the camera parameters for this pose.
     pub fn edits(&self) -> [(&'static str, Raw); 2] {
         [("camera.eye", raw(self.eye)), ("camera.target", raw(self.target))]
+    }
+
+    /// Keys and values of the camera parameters that [`Pose::edits`] leaves as they are.
+    pub fn lens_edits(&self) -> [(&'static str, Raw); 2] {
+        let degrees = (2.0 * self.tan_half_fov.atan()).to_degrees();
+        [("camera.up", raw(self.up)), ("camera.fov", Raw::Float(degrees))]
+    }
+
+    /// Pose of a camera that came from the file of a mesh, with its target at the distance of the mesh.
+    pub fn with_camera(mut self, camera: &Camera, mesh: &SceneMesh) -> Pose {
+        let middle = mesh.corners().map(|corners| corners.iter().sum::<DVec3>() / 8.0);
+        let ahead = middle.map(|middle| (middle - camera.eye).dot(camera.forward));
+        let distance = ahead.filter(|ahead| *ahead > NEAREST_M).unwrap_or(1.0);
+        self.eye = camera.eye;
+        self.target = camera.eye + camera.forward * distance;
+        // A camera that does not lean orbits about the upright axis.
+        self.up = if camera.right.y.abs() < 1e-4 && camera.up.y > 0.0 { DVec3::Y } else { camera.up };
+        self.tan_half_fov = f64::from(camera.tan_half_fov);
+        self
     }
 
     fn right(&self) -> DVec3 {
@@ -89,12 +111,19 @@ impl Pose {
     }
 
     /// Moves the camera so that it sees the whole scene from the same direction, in a picture of this aspect.
-    pub fn frame_all(mut self, scene: &Scene, aspect: f64) -> Pose {
+    pub fn frame_all(self, scene: &Scene, aspect: f64) -> Pose {
         let corners =
             scene.quads.iter().flat_map(|q| q.corners).chain(scene.rocks.iter().flat_map(|r| r.corners));
-        let corners: Vec<DVec3> = corners.map(|c| scene.camera.origin + c.as_dvec3()).collect();
+        let mut points: Vec<DVec3> = corners.map(|c| scene.camera.origin + c.as_dvec3()).collect();
+        points.extend(scene.meshes.iter().filter_map(SceneMesh::corners).flatten());
+        self.frame(&points, aspect)
+    }
+
+    /// Moves the camera so that it sees all `points`, metres, from the same direction, in a picture of this
+    /// aspect. Without points it stays.
+    pub fn frame(mut self, points: &[DVec3], aspect: f64) -> Pose {
         let (Some(low), Some(high)) =
-            (corners.iter().copied().reduce(DVec3::min), corners.iter().copied().reduce(DVec3::max))
+            (points.iter().copied().reduce(DVec3::min), points.iter().copied().reduce(DVec3::max))
         else {
             return self;
         };
@@ -103,13 +132,13 @@ impl Pose {
         let forward = -away;
         let right = forward.cross(self.up).normalize_or(DVec3::X);
         let up = right.cross(forward);
-        // At this distance the outermost corner touches the image's edge.
-        let distance = corners.iter().map(|corner| {
-            let d = *corner - centre;
+        // At this distance the outermost point touches the image's edge.
+        let distance = points.iter().map(|point| {
+            let d = *point - centre;
             let wide = (d.dot(right).abs() / aspect.max(1e-3)).max(d.dot(up).abs());
             wide / self.tan_half_fov - d.dot(forward)
         });
-        let distance = distance.fold(0.1, f64::max) * 1.05;
+        let distance = distance.fold(NEAREST_M, f64::max) * 1.05;
         self.target = centre;
         self.eye = centre + away * distance;
         self

@@ -1,7 +1,9 @@
 //! The parameter panel, which shows a widget for each parameter of the scene.
 
 pub mod lights;
+mod list;
 mod lobes;
+mod meshes;
 mod overview;
 mod widget;
 
@@ -13,7 +15,9 @@ use egui::{Align, Color32, Layout, Response, RichText, Ui};
 
 use super::document::Document;
 use super::lights::Lights;
-use crate::scene::{Cost, Kind, Param, Raw, Value};
+use super::meshes::Meshes;
+use super::viewport::Selection;
+use crate::scene::{Cost, Kind, Param, Raw, Scene, Value, WATER, split_volume_key};
 use lobes::LobesPlot;
 use overview::Overview;
 use widget::{Field, direction_angles, list, triple};
@@ -28,15 +32,16 @@ struct Group {
 }
 
 /// The groups of the panel, in order.
-const GROUPS: [Group; 10] = [
+const GROUPS: [Group; 11] = [
     group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
     group("Volume", "The volume texture: cells, density, reflection", &["volume"]),
     group("Volumes", "Other volumes beside the water, each with its curves", &["volumes"]),
     group(
         "Mapping",
         "How the volumes are mapped onto the quads",
-        &["materials", "sheets", "splashes", "quads", "meshes"],
+        &["materials", "sheets", "splashes", "quads"],
     ),
+    group("Meshes", "", MESHES),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
     group("Lights", "", LIGHTS),
     group(
@@ -53,8 +58,9 @@ const fn group(title: &'static str, about: &'static str, sections: &'static [&'s
     Group { title, about, sections }
 }
 
-/// Sections of the group that is shown as a list of lights.
+/// Sections of the groups that are shown as lists of lights and of meshes.
 const LIGHTS: &[&str] = &["lights"];
+const MESHES: &[&str] = &["meshes"];
 
 /// Width of the names, points.
 const NAME_WIDTH: f32 = 104.0;
@@ -86,6 +92,7 @@ pub struct Costs {
 struct Context<'a> {
     document: &'a mut Document,
     lights: &'a mut Lights,
+    meshes: &'a mut Meshes,
     costs: Costs,
     /// The search text, trimmed and in lower case.
     search: String,
@@ -99,7 +106,7 @@ impl Context<'_> {
 
 impl ParameterPanel {
     /// Shows the panel and applies the user's edits.
-    pub fn show(&mut self, ui: &mut Ui, document: &mut Document, lights: &mut Lights, costs: Costs) {
+    pub fn show(&mut self, ui: &mut Ui, document: &mut Document, selection: Selection, costs: Costs) {
         ui.horizontal(|ui| {
             let hint = egui::TextEdit::singleline(&mut self.search).hint_text("Search parameters");
             let field = ui.add(hint.desired_width(ui.available_width() - 44.0));
@@ -114,20 +121,27 @@ impl ParameterPanel {
         }
         let keys = document.scene().keys();
         let search = self.search.trim().to_lowercase();
-        let mut context = Context { document, lights, costs, search };
+        let order = order(document.scene());
+        let Selection { lights, meshes } = selection;
+        let mut context = Context { document, lights, meshes, costs, search };
         let mut shown = 0;
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             // The scroll bar is drawn over the contents, and must not hide the marks.
             ui.set_max_width(ui.available_width() - 8.0);
-            for group in &GROUPS {
+            for group in order {
                 if group.sections == LIGHTS {
                     shown += self.lights(ui, &mut context);
+                    continue;
+                }
+                if group.sections == MESHES {
+                    shown += self.meshes(ui, &mut context);
                     continue;
                 }
                 let in_group = |key: &&String| group.sections.contains(&key.split('.').next().unwrap_or(""));
                 let matching = keys.iter().filter(in_group).filter(|key| matches(key, &context.search));
                 let mut keys: Vec<&String> = matching.collect();
                 sort_by_parent(&mut keys);
+                keys.sort_by_key(|key| !has_shown_volume(context.document.scene(), key));
                 shown += keys.len();
                 if !keys.is_empty() {
                     self.group(ui, &mut context, group, &keys);
@@ -143,8 +157,14 @@ impl ParameterPanel {
         let title = group.title;
         let changed: Vec<String> =
             keys.iter().filter(|key| context.document.differs(key)).map(|key| key.to_string()).collect();
-        let id = ui.make_persistent_id(("group", title));
-        let open_at_first = matches!(title, "Curves" | "Volume" | "Light");
+        // A group of a volume that no surface shows is another one, and folded at first.
+        let is_shown = keys.iter().any(|key| has_shown_volume(context.document.scene(), key));
+        let id = ui.make_persistent_id(("group", title, is_shown));
+        let open_at_first = match title {
+            "Curves" | "Volume" => is_shown,
+            "Volumes" => is_shown && !shows_water(context.document.scene()),
+            title => title == "Light",
+        };
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, open_at_first);
         if context.is_searching() {
             state.set_open(true);
@@ -260,6 +280,26 @@ impl ParameterPanel {
             self.apply(document, key, Some(raw));
         }
     }
+}
+
+/// The groups in their order, with those of the water last where no surface shows it.
+fn order(scene: &Scene) -> Vec<&'static Group> {
+    let of_water = |group: &&Group| ["curves", "volume"].contains(&group.sections[0]);
+    let (water, others): (Vec<&Group>, Vec<&Group>) = GROUPS.iter().partition(of_water);
+    match shows_water(scene) {
+        true => GROUPS.iter().collect(),
+        false => others.into_iter().chain(water).collect(),
+    }
+}
+
+/// Whether a surface shows the volume `water`.
+fn shows_water(scene: &Scene) -> bool {
+    scene.recipes.iter().any(|recipe| recipe.name == WATER)
+}
+
+/// Whether a surface shows the volume that a key belongs to; true for other keys.
+fn has_shown_volume(scene: &Scene, key: &str) -> bool {
+    split_volume_key(key).is_none_or(|(name, _)| scene.recipes.iter().any(|recipe| recipe.name == name))
 }
 
 /// The name of a parameter, with a tooltip and a context menu.

@@ -4,9 +4,10 @@ use eframe::egui;
 use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Sense, Stroke, Ui, Vec2, pos2, vec2};
 
 use super::lights::{self, Lights};
+use super::meshes::{self, Meshes};
 use super::navigate::{self, Pose};
 use super::parameters::name;
-use crate::scene::{Raw, Values};
+use crate::scene::{Raw, SceneMesh, Values};
 
 /// Tool that a drag in the picture uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,6 +50,10 @@ pub struct Actions {
     pub pose: Option<Pose>,
     /// Lights that were turned or moved: keys and new values.
     pub lights: Vec<(String, Raw)>,
+    /// Meshes that were moved, turned or sized: keys and new values.
+    pub meshes: Vec<(String, Raw)>,
+    /// Whether a click beside all handles deselects what is selected.
+    pub deselect: bool,
     /// Position in the image (0 to 1) whose ray is to be inspected.
     pub inspect: Option<[f32; 2]>,
     /// Position in the image (0 to 1) on which the camera is to focus.
@@ -65,6 +70,18 @@ pub struct Content<'a> {
     pub marked: Option<[f32; 2]>,
     /// The selected tool.
     pub tool: Tool,
+    /// Pose of the camera.
+    pub pose: Pose,
+    /// The scene's meshes that are not hidden.
+    pub meshes: &'a [SceneMesh],
+}
+
+/// What is selected, and has handles.
+pub struct Selection<'a> {
+    /// The lights.
+    pub lights: &'a mut Lights,
+    /// The meshes.
+    pub meshes: &'a mut Meshes,
 }
 
 /// Largest rectangle of an aspect inside `outer`, on whole pixels.
@@ -78,7 +95,8 @@ pub fn fit(outer: Rect, aspect: f32, pixels_per_point: f32) -> Rect {
 }
 
 /// Shows the picture. Returns its rectangle and the user's actions in it.
-pub fn show(ui: &mut Ui, content: &Content, values: &Values, lights: &mut Lights) -> (Rect, Actions) {
+pub fn show(ui: &mut Ui, content: &Content, values: &Values, selection: Selection) -> (Rect, Actions) {
+    let Selection { lights, meshes } = selection;
     let outer = ui.available_rect_before_wrap();
     let image = fit(outer, content.aspect, ui.ctx().pixels_per_point());
     let response = ui.allocate_rect(outer, Sense::click_and_drag());
@@ -87,14 +105,17 @@ pub fn show(ui: &mut Ui, content: &Content, values: &Values, lights: &mut Lights
 
     let mut actions = Actions::default();
     let (modifiers, scroll, pinch) = ui.input(|i| (i.modifiers, i.smooth_scroll_delta().y, i.zoom_delta()));
-    let pose = Pose::of(values);
+    let pose = content.pose;
     if response.dragged() && response.drag_delta() != Vec2::ZERO {
-        drag(&response, image, modifiers, content.tool, (values, lights), &mut actions);
+        drag(&response, image, modifiers, content, (values, lights), &mut actions);
     }
     let turning = modifiers.command && response.dragged();
-    let handles = lights::show_handles(ui, image, values, lights, (content.tool == Tool::Light, turning));
-    actions.lights.extend(handles.edits);
-    if response.hovered() || handles.hovered {
+    let view = (values, pose);
+    let of_lights = lights::show_handles(ui, image, view, lights, (content.tool == Tool::Light, turning));
+    actions.lights.extend(of_lights.edits);
+    let of_mesh = meshes::show_handles(ui, image, view, content.meshes, meshes);
+    actions.meshes = of_mesh.edits;
+    if response.hovered() || of_lights.hovered || of_mesh.hovered {
         let factor = f64::from(scroll * -0.002).exp() / f64::from(pinch);
         if (factor - 1.0).abs() > 1e-6 {
             actions.pose = Some(actions.pose.unwrap_or(pose).zoom(factor));
@@ -108,6 +129,7 @@ pub fn show(ui: &mut Ui, content: &Content, values: &Values, lights: &mut Lights
         };
         ui.ctx().set_cursor_icon(cursor);
     }
+    actions.deselect = response.clicked();
     if let Some(at) = response.interact_pointer_pos().and_then(|at| position_in(image, at)) {
         if response.double_clicked() {
             actions.focus = Some(at);
@@ -145,7 +167,7 @@ fn drag(
     response: &Response,
     image: Rect,
     modifiers: egui::Modifiers,
-    tool: Tool,
+    content: &Content,
     (values, lights): (&Values, &Lights),
     actions: &mut Actions,
 ) {
@@ -154,9 +176,9 @@ fn drag(
     let tool = match () {
         _ if !primary || modifiers.shift => Tool::Pan,
         _ if modifiers.command => Tool::Light,
-        _ => tool,
+        _ => content.tool,
     };
-    let pose = Pose::of(values);
+    let pose = content.pose;
     let height = f64::from(image.height().max(1.0));
     // A drag over the image's height makes half a turn.
     let turn = std::f64::consts::PI / height;

@@ -30,23 +30,23 @@ pub struct PartSummary {
 impl SceneMesh {
     /// Lists the materials of the file that are shown.
     pub fn parts(&self) -> Vec<PartSummary> {
-        let materials = self.loaded.model.summary().materials.into_iter();
+        let materials = self.loaded.summary().materials.iter();
         let last = self.becomes.len() - 1;
         materials
             .map(|own| PartSummary {
                 key: (own.material.is_some() && !own.name.is_empty())
                     .then(|| format!("meshes.{}.materials.{}", self.name, folded_name(&own.name))),
                 triangles: own.triangles,
-                uvs: own.uvs,
+                uvs: own.uvs.clone(),
                 becomes: self.becomes[own.material.unwrap_or(last)].word().into(),
-                material: own.name,
+                material: own.name.clone(),
             })
             .collect()
     }
 
     /// Lists the mesh in comments of a scene file.
     pub(in crate::scene) fn comments(&self) -> String {
-        let summary = self.loaded.model.summary();
+        let summary = self.loaded.summary();
         let mut text = String::new();
         // Writing to a String cannot fail.
         let _ = write!(
@@ -93,7 +93,7 @@ impl SceneMesh {
 
     /// Lists the mesh in JSON.
     pub(in crate::scene) fn json(&self) -> Json {
-        let summary = self.loaded.model.summary();
+        let summary = self.loaded.summary();
         let range = |[low, high]: &[Vec2; 2]| json!({"u": [low.x, high.x], "v": [low.y, high.y]});
         json!({
             "name": self.name,

@@ -9,7 +9,7 @@ use glam::DVec3;
 use image::RgbImage;
 
 use super::build::{Built, Key};
-use crate::model::{self, Model};
+use crate::model::{self, Model, Summary};
 use crate::place::ShadeMemo;
 use crate::scene::presets;
 use crate::util::error::Result;
@@ -22,7 +22,7 @@ pub struct Loaded {
     pub model: Model,
     /// Bytes that the content takes, without decoded images.
     pub bytes: u64,
-    bounds: OnceLock<Option<[DVec3; 2]>>,
+    summary: OnceLock<Summary>,
     /// Decoded images of the base colours.
     images: Vec<OnceLock<Arc<RgbImage>>>,
 }
@@ -37,12 +37,17 @@ impl Loaded {
         });
         let bytes = bytes.sum::<usize>() as u64;
         let images = model.images.iter().map(|_| OnceLock::new()).collect();
-        Loaded { model, bytes, bounds: OnceLock::new(), images }
+        Loaded { model, bytes, summary: OnceLock::new(), images }
     }
 
     /// Box around the nodes' meshes in the file's world, metres.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        *self.bounds.get_or_init(|| self.model.summary().bounds)
+        self.summary().bounds
+    }
+
+    /// What the file holds, in numbers. They are counted once.
+    pub fn summary(&self) -> &Summary {
+        self.summary.get_or_init(|| self.model.summary())
     }
 
     /// Returns an image of the file. It is decoded once, within `memory` bytes.

@@ -177,11 +177,6 @@ impl SceneMesh {
         }
         let file = confine(&key("file"), Path::new(&file), folder, &limits.allow_paths)?;
         let loaded = limits.models.read(&file, memory, &limits.allow_paths)?;
-        let scale = v.coordinate(&key("scale"));
-        let turn = v.point(&key("turn")).to_array().map(f64::to_radians);
-        let turn = DQuat::from_euler(EulerRot::ZYX, turn[2], turn[1], turn[0]);
-        let place =
-            DAffine3::from_scale_rotation_translation(DVec3::splat(scale), turn, v.point(&key("position")));
         let color = v.is_set(&key("color")).then(|| v.triple(&key("color")));
         if let Some(color) = color.filter(|color| color.max_element() > 1.0) {
             return Err(Error::input(
@@ -194,8 +189,8 @@ impl SceneMesh {
             becomes: becomes(v, name, &file, &loaded.model)?,
             file,
             loaded,
-            place,
-            scale,
+            place: mesh_place(v, name),
+            scale: v.coordinate(&key("scale")),
             holdout: v.choice(&key("show"), Show::from_word) == Show::Holdout,
             uv: v.count(&key("uv")) as usize,
             projection: (
@@ -219,11 +214,38 @@ impl SceneMesh {
         &self.becomes[primitive.material.unwrap_or(self.becomes.len() - 1)]
     }
 
+    /// Corners of the box around the mesh, in the world, metres. It has the axes of the file. `None` where no
+    /// node shows anything.
+    pub fn corners(&self) -> Option<[DVec3; 8]> {
+        let corners = box_corners(self.loaded.bounds()?);
+        Some(corners.map(|corner| self.place.transform_point3(corner)))
+    }
+
     /// Middle of the mesh in the world, metres. `None` where no node shows anything.
     pub(super) fn middle(&self) -> Option<DVec3> {
         let [low, high] = self.loaded.bounds()?;
         Some(self.place.transform_point3((low + high) / 2.0))
     }
+}
+
+/// Corners of a box: corner `i` has the greater x where bit 0 of `i` is set, y for bit 1, z for bit 2.
+pub fn box_corners(bounds: [DVec3; 2]) -> [DVec3; 8] {
+    let pick = |i: usize, axis: usize| bounds[i >> axis & 1][axis];
+    std::array::from_fn(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2)))
+}
+
+/// Transform from the world of a mesh's file to the scene's.
+pub fn mesh_place(v: &Values, name: &str) -> DAffine3 {
+    let key = |what: &str| format!("meshes.{name}.{what}");
+    let turn = turn_of(v.point(&key("turn")));
+    let scale = DVec3::splat(v.coordinate(&key("scale")));
+    DAffine3::from_scale_rotation_translation(scale, turn, v.point(&key("position")))
+}
+
+/// Rotation by angles about the x, then the y, then the z axis, degrees.
+pub fn turn_of(degrees: DVec3) -> DQuat {
+    let [x, y, z] = degrees.to_array().map(f64::to_radians);
+    DQuat::from_euler(EulerRot::ZYX, z, y, x)
 }
 
 /// Returns what the materials of a file become, and last the parts without a material.

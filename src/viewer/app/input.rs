@@ -1,4 +1,4 @@
-//! Keyboard shortcuts, and the actions on lights, camera and water.
+//! Keyboard shortcuts, and the actions on lights, meshes, camera and water.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-use super::{Viewer, preference};
+use super::{LIGHT, MESH, Viewer, preference};
 use crate::picture::Layer;
 use crate::scene::Raw;
 use crate::viewer::navigate::Pose;
@@ -14,20 +14,20 @@ use crate::viewer::settings::Theme;
 use crate::viewer::transfer::Purpose;
 use crate::viewer::viewport::Tool;
 
-/// Commands of the Edit menu and of keys for the selected light.
+/// Commands of the Edit menu and of keys for the selected light or mesh.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum LightCommand {
+pub(super) enum PartCommand {
     Rename,
     Duplicate,
     Remove,
 }
 
-impl LightCommand {
-    /// All commands, with their menu texts and keys.
-    pub(super) const ALL: [(LightCommand, &'static str, &'static str); 3] = [
-        (LightCommand::Rename, "Rename the light", "F2"),
-        (LightCommand::Duplicate, "Duplicate the light", "Ctrl+D"),
-        (LightCommand::Remove, "Remove the light", "Delete"),
+impl PartCommand {
+    /// All commands, with their verbs in the menu and their keys.
+    pub(super) const ALL: [(PartCommand, &'static str, &'static str); 3] = [
+        (PartCommand::Rename, "Rename", "F2"),
+        (PartCommand::Duplicate, "Duplicate", "Ctrl+D"),
+        (PartCommand::Remove, "Remove", "Delete"),
     ];
 }
 
@@ -37,18 +37,41 @@ impl Viewer {
         self.report(added);
     }
 
-    /// Applies a command to the selected light, if there is one.
-    pub(super) fn apply_to_light(&mut self, command: LightCommand) {
-        let Some(light) = self.lights.selected().map(str::to_owned) else { return };
+    /// Deselects the light or the mesh that was selected before the other: keys and handles are for one thing.
+    pub(super) fn select_one(&mut self) {
+        let light = self.lights.selected().map(str::to_owned);
+        if light.is_some() && self.meshes.selected().is_some() {
+            match light == self.last_light {
+                true => self.lights.select(None),
+                false => self.meshes.select(None),
+            }
+        }
+        self.last_light = light;
+    }
+
+    /// Applies a command to the selected light or mesh, if there is one.
+    pub(super) fn apply_to_selected(&mut self, command: PartCommand) {
+        self.select_one();
+        let (light, mesh) = (self.lights.selected(), self.meshes.selected());
+        let Some(name) = light.or(mesh).map(str::to_owned) else { return };
+        let (is_light, document) = (light.is_some(), &mut self.document);
         match command {
-            LightCommand::Rename => {
-                // The name is edited in the list of lights, so that must be visible.
+            PartCommand::Rename => {
+                // The name is edited in its list, so that must be visible.
                 self.settings.parameters = true;
                 self.parameters.search.clear();
-                self.lights.begin_renaming(&light);
+                match is_light {
+                    true => self.lights.begin_renaming(&name),
+                    false => self.meshes.begin_renaming(&name),
+                }
             }
-            LightCommand::Duplicate => self.lights.duplicate(&mut self.document, &light),
-            LightCommand::Remove => self.lights.remove(&mut self.document, &light),
+            PartCommand::Duplicate if is_light => self.lights.duplicate(document, &name),
+            PartCommand::Duplicate => self.meshes.duplicate(document, &name),
+            PartCommand::Remove if is_light => self.lights.remove(document, &name),
+            PartCommand::Remove => {
+                let removed = self.meshes.remove(document, &name);
+                self.report(removed);
+            }
         }
     }
 
@@ -82,7 +105,7 @@ impl Viewer {
         } else if hit(Key::Z, CTRL) {
             self.document.undo();
         } else if hit(Key::D, CTRL) {
-            self.apply_to_light(LightCommand::Duplicate);
+            self.apply_to_selected(PartCommand::Duplicate);
         } else if hit(Key::C, ctrl_shift) {
             self.copy_command(ctx);
         } else if hit(Key::O, CTRL) {
@@ -129,14 +152,14 @@ impl Viewer {
         }
     }
 
-    /// Plain keys that act on lights, camera, water and renderer.
+    /// Plain keys that act on lights, meshes, camera, water and renderer.
     fn action_keys(&mut self, ctx: &egui::Context) {
         let plain = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         if plain(Key::F2) {
-            self.apply_to_light(LightCommand::Rename);
+            self.apply_to_selected(PartCommand::Rename);
         }
         if plain(Key::Delete) {
-            self.apply_to_light(LightCommand::Remove);
+            self.apply_to_selected(PartCommand::Remove);
         }
         if plain(Key::Home) {
             self.move_camera(self.first_pose, None);
@@ -148,7 +171,12 @@ impl Viewer {
             self.playing = !self.playing;
         }
         if plain(Key::Escape) {
-            self.worker.stop();
+            match (self.lights.is_dragging(), self.meshes.is_dragging()) {
+                // egui ends the drag by itself.
+                (true, _) => self.document.cancel(LIGHT),
+                (_, true) => self.document.cancel(MESH),
+                _ => self.worker.stop(),
+            }
         }
     }
 
@@ -159,7 +187,7 @@ impl Viewer {
 
     /// Moves the camera. Moves of the same `gesture` are one step of undo.
     pub(super) fn move_camera(&mut self, pose: Pose, gesture: Option<&str>) {
-        let set = self.document.set_all(&pose.edits(), gesture);
+        let set = self.document.set_all(&self.document.camera_edits(&pose), gesture);
         self.report(set);
     }
 
@@ -167,7 +195,7 @@ impl Viewer {
     pub(super) fn frame_all(&mut self) {
         let scene = self.document.scene();
         let aspect = f64::from(scene.image.width) / f64::from(scene.image.height);
-        let pose = Pose::of(self.document.values()).frame_all(scene, aspect);
+        let pose = self.document.pose().frame_all(scene, aspect);
         self.move_camera(pose, None);
     }
 

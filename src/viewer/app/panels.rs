@@ -5,7 +5,7 @@ use std::path::Path;
 use eframe::egui;
 use egui::{RichText, Ui};
 
-use super::input::LightCommand;
+use super::input::PartCommand;
 use super::{Inspector, Viewer};
 use crate::picture::{AutoExposure, Layer};
 use crate::scene::Recipe;
@@ -96,10 +96,12 @@ impl Viewer {
                 self.add_light(kind);
             }
         });
-        for (command, text, keys) in LightCommand::ALL {
-            let button = egui::Button::new(text).shortcut_text(keys);
-            if ui.add_enabled(self.lights.selected().is_some(), button).clicked() {
-                self.apply_to_light(command);
+        let (light, mesh) = (self.lights.selected().is_some(), self.meshes.selected().is_some());
+        let noun = if mesh { "mesh" } else { "light" };
+        for (command, verb, keys) in PartCommand::ALL {
+            let button = egui::Button::new(format!("{verb} the {noun}")).shortcut_text(keys);
+            if ui.add_enabled(light || mesh, button).clicked() {
+                self.apply_to_selected(command);
             }
         }
     }

@@ -7,7 +7,6 @@ use eframe::egui;
 
 use super::{Inspector, Viewer};
 use crate::picture::Layer;
-use crate::viewer::navigate::Pose;
 use crate::viewer::probe::Aim;
 use crate::viewer::worker::Request;
 
@@ -101,7 +100,7 @@ impl Viewer {
             Some((Aim::Inspect, ray)) => self.ray = Some(ray),
             Some((Aim::Focus, ray)) => {
                 if let Some(point) = ray.surface_point() {
-                    let pose = Pose::of(self.document.values()).focus(point);
+                    let pose = self.document.pose().focus(point);
                     self.move_camera(pose, None);
                 }
             }

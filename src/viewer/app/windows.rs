@@ -107,7 +107,7 @@ impl Viewer {
             chosen
         });
         match opening {
-            Some((Purpose::Open, path)) => self.open(&path),
+            Some((Purpose::Open, path)) => self.open_named(&path),
             Some((Purpose::Save, path)) => self.save_as(&path),
             None => {}
         }
@@ -156,16 +156,17 @@ const HELP: &[(&str, &str)] = &[
     ("Shift+drag, right drag", "pan"),
     ("Ctrl+drag", "turn the selected light, or the first directional one"),
     ("drag a light's handle", "move it parallel to the image, with Shift in depth"),
+    ("drag a mesh's handle", "move it, turn it (with Shift in steps of 15°) or size it"),
     ("wheel, pinch", "zoom"),
-    ("click", "inspect the ray of a pixel"),
+    ("click", "inspect the ray of a pixel, and deselect"),
     ("double click", "focus on the point under the pointer"),
     ("O  P  L  I", "select a tool: orbit, pan, light, inspect"),
     ("1 … 7", "show a layer: rgb, depth, uv, quad, transmittance, cells, normal"),
-    ("F2  Ctrl+D  Del", "rename, duplicate, remove the selected light"),
+    ("F2  Ctrl+D  Del", "rename, duplicate, remove the selected light or mesh"),
     ("Space", "play or pause the water"),
     ("F", "frame everything"),
     ("Home", "reset the camera"),
-    ("Esc", "stop rendering"),
+    ("Esc", "take back the drag of a handle, or stop rendering"),
     ("Tab", "show or hide the parameters"),
     ("V", "show or hide the inspectors"),
     ("G", "open the gallery of scenes"),

@@ -4,7 +4,11 @@ use glam::DVec3;
 
 use crate::scene::{Kind, Param, Place, Raw, Values};
 use crate::util::error::Result;
+use crate::viewer::named;
 use crate::viewer::navigate::{Pose, raw};
+
+/// Section of scene files that holds the lights.
+const SECTION: &str = "lights";
 
 /// The kinds of light, as spelt in scene files.
 pub fn kinds() -> &'static [&'static str] {
@@ -27,20 +31,7 @@ pub fn takes(kind: &str, what: &str) -> bool {
 /// Returns a name that no light has: `wanted`, or the first free one of wanted-2, wanted-3, …. A number at
 /// the end of `wanted` is replaced, so that `sun-2` gives `sun-3`, not `sun-2-2`.
 pub fn free_name(values: &Values, wanted: &str) -> String {
-    if !is_taken(values, wanted) {
-        return wanted.into();
-    }
-    let is_number = |tail: &str| !tail.is_empty() && tail.bytes().all(|b| b.is_ascii_digit());
-    let stem = match wanted.rsplit_once('-') {
-        Some((stem, tail)) if !stem.is_empty() && is_number(tail) => stem,
-        _ => wanted,
-    };
-    let numbered = (2..).map(|n| format!("{stem}-{n}")).find(|name| !is_taken(values, name));
-    numbered.unwrap_or_default()
-}
-
-fn is_taken(values: &Values, name: &str) -> bool {
-    values.has_under(&format!("lights.{name}"))
+    named::free_name(values, SECTION, wanted)
 }
 
 /// Adds a light at a position where the camera sees its effect: in front of the target, above it and to the
@@ -73,18 +64,12 @@ pub fn add(values: &Values, kind: &str, pose: &Pose) -> Result<(Values, String)>
 
 /// Removes a light and the animation tracks that move it.
 pub fn remove(values: &Values, name: &str) -> Values {
-    let mut remaining = values.clone();
-    remaining.clear_under(&format!("lights.{name}"));
-    tracks(values, name).iter().for_each(|(track, _)| remaining.clear_under(track));
-    remaining
+    named::remove(values, SECTION, name)
 }
 
 /// Duplicates a light without the animation tracks that move it. Returns the new values and the copy's name.
 pub fn duplicate(values: &Values, name: &str) -> (Values, String) {
-    let copy = free_name(values, name);
-    let mut extended = values.clone();
-    extended.copy_under(values, &format!("lights.{name}"), &format!("lights.{copy}"));
-    (extended, copy)
+    named::duplicate(values, SECTION, name)
 }
 
 /// Renames a light, also in the animation tracks that move it.
@@ -92,38 +77,7 @@ pub fn duplicate(values: &Values, name: &str) -> (Values, String) {
 /// # Errors
 /// Why the light cannot have this name, as a sentence for the user.
 pub fn rename(values: &Values, name: &str, new: &str) -> std::result::Result<Values, String> {
-    if new.is_empty() {
-        return Err("a light needs a name".into());
-    }
-    if new.contains('.') || new.chars().any(char::is_control) {
-        return Err("a name cannot contain dots or line breaks".into());
-    }
-    if new == name {
-        return Ok(values.clone());
-    }
-    if is_taken(values, new) {
-        return Err(format!("another light is named {new}"));
-    }
-    let mut renamed = values.clone();
-    renamed.clear_under(&format!("lights.{name}"));
-    renamed.copy_under(values, &format!("lights.{name}"), &format!("lights.{new}"));
-    for (track, what) in tracks(values, name) {
-        let key = Raw::Text(format!("lights.{new}.{what}"));
-        let set = renamed.set(&format!("{track}.key"), &key, &Place("viewer".into()));
-        set.map_err(|e| e.to_string())?;
-    }
-    Ok(renamed)
-}
-
-/// The animation tracks that move a light, each with the part of its key after the light's name.
-fn tracks(values: &Values, name: &str) -> Vec<(String, String)> {
-    let tracks = values.names("animate.tracks").into_iter().map(|i| format!("animate.tracks.{i}"));
-    let of_light = tracks.filter_map(|track| {
-        let key = values.text(&format!("{track}.key"));
-        let what = key.strip_prefix("lights.")?.strip_prefix(name)?.strip_prefix('.')?;
-        Some((track, what.to_owned()))
-    });
-    of_light.collect()
+    named::rename(values, SECTION, "light", name, new)
 }
 
 /// Rounds a vector to multiples of `step`.
@@ -132,7 +86,7 @@ fn round(v: DVec3, step: f64) -> Raw {
 }
 
 /// Rounds to two significant digits.
-fn two_digits(x: f64) -> f64 {
+pub(in crate::viewer) fn two_digits(x: f64) -> f64 {
     let step = 10f64.powf(x.max(1e-30).log10().floor() - 1.0);
     (x / step).round() * step
 }

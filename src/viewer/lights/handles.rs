@@ -1,62 +1,26 @@
 //! Handles over the picture, with which lights are moved and turned.
 
 use eframe::egui;
-use egui::{Align2, Color32, FontId, Pos2, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, vec2};
 use glam::{DVec2, DVec3};
 
-use super::projection::View;
 use super::{Lights, edit, shines, turned};
-use crate::scene::{Raw, Values};
+use crate::scene::Values;
+use crate::viewer::canvas::{self, Canvas, Drawn};
 use crate::viewer::navigate::{Pose, angles, direction, raw};
 use crate::viewer::parameters::name as label;
 
-/// Half the side of the square in which the pointer grabs a handle, points.
-const GRAB_RADIUS: f32 = 11.0;
 /// Radius of the dial in a large picture, points.
 const DIAL_RADIUS: f32 = 46.0;
-/// Exponent of the change in depth: a drag over the image's height multiplies the depth by e to this power.
-const DEPTH_EXPONENT: f64 = 3.0;
-/// Depths to which a light can be moved, metres along the view axis.
-const DEPTHS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
-
-/// Result of showing the handles for one frame.
-#[derive(Debug, Default)]
-pub struct Drawn {
-    /// New values of lights, with their keys.
-    pub edits: Vec<(String, Raw)>,
-    /// Whether the pointer is over a handle.
-    pub hovered: bool,
-}
-
-/// A handle being dragged.
-pub(super) struct Grip {
-    light: String,
-    part: Part,
-    /// Position of the handle, points of the window.
-    at: DVec2,
-    /// Offset of the handle from the pointer when it was grabbed, points.
-    offset: DVec2,
-    /// Depth of the handle along the view axis, metres.
-    depth: f64,
-}
+/// A handle being dragged: the light and its part.
+pub(super) type Grip = canvas::Grip<(String, Part)>;
 
 #[derive(Clone, Copy, PartialEq)]
-enum Part {
+pub(super) enum Part {
     /// The light itself.
     Light,
     /// The point at which a spot light is aimed.
     Aim,
-}
-
-/// The picture that the handles are drawn over, and the result so far.
-struct Canvas<'a> {
-    ui: &'a Ui,
-    painter: egui::Painter,
-    image: Rect,
-    view: View,
-    values: &'a Values,
-    pose: Pose,
-    done: Drawn,
 }
 
 /// Shows the handles of the selected light. With `tool`, the Light tool, shows those of all lights. With
@@ -64,14 +28,11 @@ struct Canvas<'a> {
 pub fn show(
     ui: &Ui,
     image: Rect,
-    values: &Values,
+    (values, pose): (&Values, Pose),
     lights: &mut Lights,
     (tool, turning): (bool, bool),
 ) -> Drawn {
-    let pose = Pose::of(values);
-    let view = View::new(&pose, point(image.min), point(pos2(image.width(), image.height())));
-    let painter = ui.painter_at(image);
-    let mut canvas = Canvas { ui, painter, image, view, values, pose, done: Drawn::default() };
+    let mut canvas = Canvas::new(ui, image, values, pose);
     for light in values.names("lights") {
         let selected = lights.selected() == Some(light.as_str());
         let kind = values.text(&format!("lights.{light}.kind"));
@@ -102,20 +63,16 @@ impl Canvas<'_> {
         if response.clicked() || response.drag_started() {
             lights.select(Some(light));
         }
-        if let Some(moved) = self.drag(lights, &response, (light, Part::Light), position) {
+        if let Some(moved) = self.drag(&mut lights.grip, &response, (light.into(), Part::Light), position) {
             self.done.edits.push((key, raw(moved)));
         }
         let color = color_of(self.values, light);
         let alpha = if selected || response.hovered() { 1.0 } else { 0.7 };
         bulb(&self.painter, at, color.map(|c| c.gamma_multiply(alpha)), selected);
         if !visible {
-            // An arrow points to where the light lies.
-            let out = (at - self.image.center()).normalized();
-            let side = out.rot90() * 4.0;
-            let tip = vec![at + out * 13.0, at + out * 9.0 + side, at + out * 9.0 - side];
-            self.painter.add(egui::Shape::convex_polygon(tip, Color32::WHITE, Stroke::NONE));
+            self.arrow_out(at);
         }
-        let held = lights.grip.as_ref().is_some_and(|grip| grip.light == light && grip.part == Part::Light);
+        let held = lights.grip.as_ref().is_some_and(|grip| grip.part == (light.to_owned(), Part::Light));
         if held || response.hovered() {
             let deep = self.view.project(position).1;
             let [x, y, z] = position.to_array();
@@ -137,7 +94,7 @@ impl Canvas<'_> {
         let color = color_of(self.values, light).unwrap_or(Color32::GRAY);
         self.cone(position, to_light, distance, light, color);
         let response = self.handle(at, &format!("Aim of {light}"));
-        if let Some(moved) = self.drag(lights, &response, (light, Part::Aim), aim) {
+        if let Some(moved) = self.drag(&mut lights.grip, &response, (light.into(), Part::Aim), aim) {
             let away = position - moved;
             // A spot light aimed at its own position keeps its direction.
             if away.length() > 1e-6 {
@@ -165,10 +122,7 @@ impl Canvas<'_> {
             position - to_light * distance + (u * cos + v * sin) * radius
         };
         let line = |a: DVec3, b: DVec3, faint: f32| {
-            if let (Some(a), Some(b)) = (self.view.project(a).0, self.view.project(b).0) {
-                let stroke = Stroke::new(1.0, color.gamma_multiply(faint));
-                self.painter.line_segment([at_point(a), at_point(b)], stroke);
-            }
+            self.line(a, b, Stroke::new(1.0, color.gamma_multiply(faint)));
         };
         let edge = radius(number("angle"));
         let full = radius(number("angle") * (1.0 - number("softness")));
@@ -239,71 +193,6 @@ impl Canvas<'_> {
         let below = centre + vec2(0.0, radius + 4.0);
         painter.text(below, Align2::CENTER_TOP, text, FontId::proportional(12.0), Color32::WHITE);
     }
-
-    /// Whether a point of the world is visible in the picture, and the position of its handle. The handle of
-    /// a point outside the picture is at the border.
-    fn handle_position(&self, point: DVec3) -> (bool, Pos2) {
-        let projected = self.view.project(point).0;
-        let at = projected.unwrap_or_else(|| self.view.border_towards(point));
-        (projected.is_some_and(|at| self.view.contains(at)), at_point(self.view.nearest(at, 14.0)))
-    }
-
-    fn handle(&mut self, at: Pos2, name: &str) -> Response {
-        let rect = Rect::from_center_size(at, vec2(GRAB_RADIUS, GRAB_RADIUS) * 2.0);
-        let response = self.ui.interact(rect, self.ui.scope_id().with(name), Sense::click_and_drag());
-        label(&response, name);
-        self.done.hovered |= response.hovered();
-        response.on_hover_and_drag_cursor(egui::CursorIcon::Move)
-    }
-
-    /// Continues a drag of the handle of a point. Returns where the point is moved to.
-    fn drag(
-        &self,
-        lights: &mut Lights,
-        response: &Response,
-        (light, part): (&str, Part),
-        now: DVec3,
-    ) -> Option<DVec3> {
-        if response.drag_stopped() {
-            lights.grip = None;
-        }
-        if !response.dragged_by(egui::PointerButton::Primary) {
-            return None;
-        }
-        let pointer = point(response.interact_pointer_pos()?);
-        if response.drag_started() {
-            let (projected, depth) = self.view.project(now);
-            let pressed = self.ui.input(|i| i.pointer.press_origin()).map_or(pointer, point);
-            // The handle of a point outside the picture jumps to the pointer. A point behind the eye gets the
-            // depth of the camera's target.
-            let visible = projected.filter(|at| self.view.contains(*at));
-            let offset = visible.map_or(DVec2::ZERO, |at| at - pressed);
-            let depth = if depth > 0.0 { depth } else { self.view.project(self.pose.target).1 };
-            lights.grip = Some(Grip { light: light.into(), part, at: pressed + offset, offset, depth });
-        }
-        let grip = lights.grip.as_mut().filter(|grip| grip.light == light && grip.part == part)?;
-        if self.ui.input(|i| i.modifiers.shift) {
-            let up = f64::from(-response.drag_delta().y) / f64::from(self.image.height().max(1.0));
-            grip.depth = (grip.depth * (up * DEPTH_EXPONENT).exp()).clamp(*DEPTHS.start(), *DEPTHS.end());
-            grip.offset = grip.at - pointer;
-        } else {
-            grip.at = pointer + grip.offset;
-        }
-        Some(self.view.unproject(grip.at, grip.depth))
-    }
-
-    /// Writes text beside a handle, inside the picture.
-    fn caption(&self, at: Pos2, text: &str) {
-        let font = FontId::proportional(12.0);
-        let galley = self.painter.layout_no_wrap(text.to_owned(), font, Color32::WHITE);
-        let size = galley.size();
-        let right = at + vec2(14.0, -size.y * 0.5);
-        let most = self.image.right_bottom() - size - vec2(4.0, 4.0);
-        let corner = right.min(most).max(self.image.left_top() + vec2(4.0, 4.0));
-        let ground = Rect::from_min_size(corner, size).expand2(vec2(4.0, 1.0));
-        self.painter.rect_filled(ground, 3.0, Color32::from_black_alpha(130));
-        self.painter.galley(corner, galley, Color32::WHITE);
-    }
 }
 
 /// A light's colour at full brightness. `None` if the light does not shine.
@@ -328,12 +217,4 @@ fn bulb(painter: &egui::Painter, at: Pos2, color: Option<Color32>, selected: boo
         Some(color) => painter.circle(at, 5.0, color, Stroke::new(1.5, dark)),
         None => painter.circle(at, 5.0, Color32::from_black_alpha(90), Stroke::new(1.5, Color32::GRAY)),
     };
-}
-
-fn point(at: Pos2) -> DVec2 {
-    DVec2::new(f64::from(at.x), f64::from(at.y))
-}
-
-fn at_point(at: DVec2) -> Pos2 {
-    pos2(at.x as f32, at.y as f32)
 }

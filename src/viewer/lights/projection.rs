@@ -84,8 +84,18 @@ impl View {
         ((right * across.x + up * across.y) * sin - forward * cos).normalize()
     }
 
+    /// Direction from the eye to what is seen at a position in the window, not of unit length.
+    pub fn towards(&self, at: DVec2) -> DVec3 {
+        self.unproject(at, 1.0) - self.eye
+    }
+
+    /// Position of the eye, metres.
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
     /// Metres that one point of the window covers at a depth of 1 m.
-    fn metres_per_point(&self) -> f64 {
+    pub fn metres_per_point(&self) -> f64 {
         2.0 * self.tan_half_fov / self.size.y
     }
 }

@@ -2,28 +2,20 @@
 
 use eframe::egui;
 use egui::collapsing_header::CollapsingState;
-use egui::{Align, Button, Layout, Rect, Response, Ui};
+use egui::{Align, Layout, Ui};
 
+use super::list::{self, Line};
 use super::widget::color_button;
 use super::{Context, ParameterPanel, matches, name};
 use crate::scene::{PARAMS, Raw};
 use crate::viewer::document::Document;
-use crate::viewer::lights::{Lights, Renaming, edit};
-
-/// In a longer list, folded entries that are scrolled out of sight are skipped. Otherwise each frame would
-/// lay out thousands of buttons.
-const MAX_LAID_OUT: usize = 200;
+use crate::viewer::lights::{Lights, edit};
 
 /// The user's command in the entry of one light.
 enum Command {
-    Select,
     Switch,
     Color(Raw),
-    BeginRenaming,
-    Rename(String),
-    KeepName,
-    Duplicate,
-    Remove,
+    InList(list::Command),
 }
 
 impl ParameterPanel {
@@ -66,7 +58,7 @@ impl ParameterPanel {
             }
             for (light, keys) in &entries {
                 let to_unfold = context.lights.unfold.as_ref() == Some(light);
-                if entries.len() > MAX_LAID_OUT && !to_unfold && is_out_of_sight(ui, light) {
+                if !to_unfold && list::is_out_of_sight(ui, entries.len(), fold_id(ui, light)) {
                     ui.add_space(ui.spacing().interact_size.y);
                     continue;
                 }
@@ -117,35 +109,23 @@ impl ParameterPanel {
 fn apply(ui: &Ui, context: &mut Context, light: &str, command: Command, is_open: bool) -> Option<String> {
     let (document, lights) = (&mut *context.document, &mut *context.lights);
     match command {
-        Command::Select => {
-            let selected = lights.selected() == Some(light);
-            lights.select((!selected).then_some(light));
-        }
         Command::Switch => return lights.switch(document, light).err().map(|e| e.to_string()),
         Command::Color(raw) => {
             let key = format!("lights.{light}.color");
             return document.set(&key, &raw, Some(&key)).err().map(|e| e.to_string());
         }
-        Command::BeginRenaming => lights.begin_renaming(light),
-        Command::Rename(new) => match lights.rename(document, light, &new) {
-            Ok(()) => {
-                lights.renaming = None;
-                let id = fold_id(ui, &new);
-                let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, is_open);
-                state.set_open(is_open);
-                state.store(ui.ctx());
-            }
-            Err(fault) => match lights.renaming.as_mut().filter(|renaming| !renaming.focused) {
-                Some(renaming) => renaming.fault = Some(fault),
-                None => {
-                    lights.renaming = None;
-                    return Some(fault);
-                }
-            },
-        },
-        Command::KeepName => lights.renaming = None,
-        Command::Duplicate => lights.duplicate(document, light),
-        Command::Remove => lights.remove(document, light),
+        Command::InList(list::Command::Select) => {
+            let selected = lights.selected() == Some(light);
+            lights.select((!selected).then_some(light));
+        }
+        Command::InList(list::Command::BeginRenaming) => lights.begin_renaming(light),
+        Command::InList(list::Command::Rename(new)) => {
+            let result = lights.rename(document, light, &new);
+            return list::renamed(ui, &mut lights.renaming, result, (fold_id(ui, &new), is_open));
+        }
+        Command::InList(list::Command::KeepName) => lights.renaming = None,
+        Command::InList(list::Command::Duplicate) => lights.duplicate(document, light),
+        Command::InList(list::Command::Remove) => lights.remove(document, light),
     }
     None
 }
@@ -171,82 +151,19 @@ pub fn add_menu(ui: &mut Ui) -> Option<&'static str> {
 
 /// The line of one light: its switch, colour, name, and buttons. Returns the user's command.
 fn entry(ui: &mut Ui, document: &Document, lights: &mut Lights, light: &str) -> Option<Command> {
-    let mut command = None;
-    let clicked = |response: Response, label: String| {
-        name(&response, &label);
-        response.on_hover_text(label).clicked()
-    };
     let key = |what: &str| format!("lights.{light}.{what}");
     let on = document.values().float(&key("intensity")) > 0.0;
-    let eye = ui.add(Button::selectable(on, "👁").small());
-    if clicked(eye, format!("Switch {light} {}", if on { "off" } else { "on" })) {
-        command = Some(Command::Switch);
-    }
+    let switched = list::eye(ui, on, format!("Switch {light} {}", if on { "off" } else { "on" }));
     let color = document.values().triple(&key("color")).to_array().map(f64::from);
     let picked = color_button(ui, &format!("Colour of {light}"), color);
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        for (sign, verb, action) in [
-            ("🗑", "Remove", Command::Remove),
-            ("🗐", "Duplicate", Command::Duplicate),
-            ("✏", "Rename", Command::BeginRenaming),
-        ] {
-            if clicked(ui.small_button(sign), format!("{verb} {light}")) {
-                command = Some(action);
-            }
-        }
-        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-            let renaming = lights.renaming.as_mut().filter(|renaming| renaming.light == light);
-            let from_name = match renaming {
-                Some(renaming) => name_field(ui, renaming),
-                None => name_button(ui, lights.selected() == Some(light), light),
-            };
-            if from_name.is_some() {
-                command = from_name;
-            }
-        });
-    });
-    command.or(picked.map(Command::Color))
-}
-
-/// The name of a light as a button that selects the light.
-fn name_button(ui: &mut Ui, selected: bool, light: &str) -> Option<Command> {
-    let button = ui.add(Button::selectable(selected, light).truncate());
-    let command = if button.double_clicked() {
-        Some(Command::BeginRenaming)
-    } else {
-        button.clicked().then_some(Command::Select)
+    let line = Line {
+        noun: "Light",
+        name: light,
+        tip: "Click to select it, then move or turn it in the picture; double click to rename it",
+        selected: lights.selected() == Some(light),
     };
-    name(&button, &format!("Light {light}"));
-    button
-        .on_hover_text("Click to select it, then move or turn it in the picture; double click to rename it");
-    command
-}
-
-/// The text field for the name of a light that is being renamed.
-fn name_field(ui: &mut Ui, renaming: &mut Renaming) -> Option<Command> {
-    let field = egui::TextEdit::singleline(&mut renaming.text);
-    let mut field = ui.add(field.desired_width(ui.available_width()));
-    name(&field, &format!("Name of {}", renaming.light));
-    if !renaming.focused {
-        renaming.focused = true;
-        field.request_focus();
-    }
-    if let Some(fault) = &renaming.fault {
-        field = field.highlight();
-        field.show_tooltip_text(fault);
-    }
-    if field.changed() {
-        renaming.fault = None;
-    }
-    if !field.lost_focus() {
-        return None;
-    }
-    let pressed = |key| ui.input(|i| i.key_pressed(key));
-    // After Enter, a refused name stays in the field, which gets the focus again. After a click elsewhere it
-    // does not.
-    renaming.focused = !pressed(egui::Key::Enter);
-    let new = renaming.text.trim().to_owned();
-    Some(if pressed(egui::Key::Escape) { Command::KeepName } else { Command::Rename(new) })
+    let in_list = line.show(ui, &mut lights.renaming).map(Command::InList);
+    in_list.or(switched.then_some(Command::Switch)).or(picked.map(Command::Color))
 }
 
 /// The keys that a light of its kind has and that match the search.
@@ -255,13 +172,6 @@ fn keys(document: &Document, light: &str, search: &str) -> Vec<String> {
     let parts = PARAMS.iter().filter_map(|param| param.key.strip_prefix("lights.*."));
     let keys = parts.filter(|what| edit::takes(&kind, what)).map(|what| format!("lights.{light}.{what}"));
     keys.filter(|key| matches(key, search)).collect()
-}
-
-/// Whether the next row, the folded entry of `light`, is scrolled out of sight.
-fn is_out_of_sight(ui: &Ui, light: &str) -> bool {
-    let row = Rect::from_min_size(ui.cursor().min, ui.spacing().interact_size);
-    let open = CollapsingState::load(ui.ctx(), fold_id(ui, light)).is_some_and(|state| state.is_open());
-    !open && !ui.is_rect_visible(row)
 }
 
 /// Id under which egui keeps whether the entry of a light is folded.

@@ -7,6 +7,7 @@ use rand::RngExt;
 use super::{MARKS_WIDTH, NAME_WIDTH, VALUE_WIDTH, name};
 use crate::scene::{Kind, Param, Raw, Value, WATER, split_volume_key};
 use crate::viewer::document::Document;
+use crate::viewer::meshes::choices;
 use crate::viewer::navigate;
 
 /// A vector as a value of a scene file.
@@ -96,6 +97,11 @@ impl Field<'_> {
                 let mut new = *t;
                 let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
                 triple(ui, key, &mut new, (length * 0.005).max(0.005)).then(|| list(new))
+            }
+            (Kind::Text(_), Value::Text(text))
+                if key.starts_with("meshes.") && key.ends_with(".material") =>
+            {
+                self.choice(ui, choices(self.document.values()).into_iter(), text)
             }
             (Kind::Text(_), Value::Text(text)) if key.ends_with(".material") => {
                 let mut materials = self.document.values().names("materials");

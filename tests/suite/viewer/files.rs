@@ -12,7 +12,7 @@ fn wide() -> Setup {
     Setup { size: [760.0, 480.0], ..Setup::bare() }
 }
 
-fn taki(arguments: &[&str]) -> Vec<u8> {
+pub fn taki(arguments: &[&str]) -> Vec<u8> {
     let out = Command::new(env!("CARGO_BIN_EXE_taki"))
         .args(arguments)
         .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
@@ -32,7 +32,7 @@ fn open(window: &mut Window, path: &Path) {
     window.press("Open");
 }
 
-fn save_as(window: &mut Window, path: &Path) {
+pub fn save_as(window: &mut Window, path: &Path) {
     window.chord(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
     window.enter("Path", &text(path));
     window.press("Save");
@@ -517,8 +517,13 @@ impl egui::DroppedFile for Dropped {
     }
 }
 
-fn drop_on(window: &mut Window, path: &Path) {
-    window.harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(path.to_owned())));
+/// A file as a window gives it to egui.
+pub fn dropped(path: &Path) -> std::sync::Arc<dyn egui::DroppedFile> {
+    std::sync::Arc::new(Dropped(path.to_owned()))
+}
+
+pub fn drop_on(window: &mut Window, path: &Path) {
+    window.harness.input_mut().dropped_files.push(dropped(path));
     window.harness.run_steps(2);
 }
 

@@ -10,6 +10,8 @@ mod lights;
 mod lobes;
 mod look;
 mod looking;
+mod mesh_handles;
+mod meshes;
 mod overview;
 mod picture;
 mod projection;
