@@ -4,7 +4,9 @@ mod files;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::navigate::Pose;
 use crate::output::frame::scene_in;
@@ -16,6 +18,9 @@ use crate::util::error::{Error, Result};
 
 /// Key of the mesh whose file has the camera.
 const FROM: &str = "camera.from";
+
+/// Threads that build scenes. The renderer keeps all others busy, and the window would wait for them.
+static BUILDERS: LazyLock<Option<ThreadPool>> = LazyLock::new(|| ThreadPoolBuilder::new().build().ok());
 
 /// Most steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -193,7 +198,11 @@ impl Document {
     }
 
     fn scene_of(&self, values: Values) -> Result<Scene> {
-        let scene = Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits)?;
+        let build = || Scene::from_values(&self.name, values, self.folder.as_deref(), &self.limits);
+        let scene = match &*BUILDERS {
+            Some(threads) => threads.install(build),
+            None => build(),
+        }?;
         Ok(scene.recorded(self.record.clone()))
     }
 

@@ -141,7 +141,7 @@ impl ParameterPanel {
                 let matching = keys.iter().filter(in_group).filter(|key| matches(key, &context.search));
                 let mut keys: Vec<&String> = matching.collect();
                 sort_by_parent(&mut keys);
-                keys.sort_by_key(|key| !has_shown_volume(context.document.scene(), key));
+                keys.sort_by_cached_key(|key| !has_shown_volume(context.document.scene(), key));
                 shown += keys.len();
                 if !keys.is_empty() {
                     self.group(ui, &mut context, group, &keys);

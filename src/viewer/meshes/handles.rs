@@ -32,6 +32,8 @@ const PIECES: usize = 96;
 const EDGE_ON: f64 = 0.2;
 /// Shortest arrow that can be dragged, points. A shorter one points at the eye.
 const SHORTEST: f64 = 14.0;
+/// Room that a mark on the near side of a ring may have less than one on the far side, points.
+const FAR_SIDE: f64 = 24.0;
 /// Steps of a turn with Shift, degrees.
 const STEP_DEG: f64 = 15.0;
 /// Smallest and largest `meshes.*.scale`.
@@ -80,7 +82,9 @@ struct Gizmo {
     local: DVec3,
     /// Middle of the mesh in the world, metres.
     middle: DVec3,
-    /// Radius of the rings, metres.
+    /// Radius of the rings, points of the window.
+    points: f64,
+    /// The same at the middle of the mesh, metres.
     radius: f64,
 }
 
@@ -99,6 +103,7 @@ impl Gizmo {
             scale: values.coordinate(&key("scale")),
             local,
             middle,
+            points,
             radius: points * depth * canvas.view.metres_per_point(),
         })
     }
@@ -160,7 +165,8 @@ pub fn show(
     let held = meshes.grip.as_ref().filter(|grip| grip.mesh == mesh.name).map(|grip| grip.part);
     match held.or(hovered) {
         Some(part) => canvas.numbers(mesh, &gizmo, part),
-        None => canvas.caption(at + vec2(4.0, 0.0), &mesh.name),
+        // Below the arrows and rings.
+        None => canvas.caption(at + vec2(-26.0, (gizmo.points * TIP) as f32 + 18.0), &mesh.name),
     }
     canvas.done
 }
@@ -308,8 +314,7 @@ impl Canvas<'_> {
         middle: Pos2,
         hovered: &mut Option<Part>,
     ) {
-        let side = f64::from(self.image.width().min(self.image.height()));
-        let away = (RING.min(side * MOST) * SIZE_AT) as f32;
+        let away = (gizmo.points * SIZE_AT) as f32;
         let mut at = middle + vec2(away, -away);
         if let Some(grip) = meshes.grip.as_ref().filter(|grip| grip.part == Part::Size) {
             at = middle + (at - middle) * (gizmo.scale / grip.start.scale) as f32;
@@ -423,20 +428,22 @@ impl Canvas<'_> {
         Some(angle + along)
     }
 
-    /// Position of the point that marks ring `i`: halfway between the two others, towards the eye.
+    /// Position of the point that marks ring `i`: halfway between the two others, where it is farthest from the
+    /// arrows' tips, and rather on the near side.
     fn knob(&self, gizmo: &Gizmo, i: usize) -> Option<DVec2> {
         let [_, u, v] = gizmo.axes(i);
-        let middle = self.view.project(gizmo.middle).0?;
+        let (middle, deep) = self.view.project(gizmo.middle);
+        let tips = DVec3::AXES.map(|axis| self.view.project(gizmo.middle + axis * (gizmo.radius * TIP)).0);
+        let others: Vec<DVec2> = tips.into_iter().chain([middle]).flatten().collect();
         let signs = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
-        let points = signs.map(|[a, b]| {
+        let points = signs.into_iter().filter_map(|[a, b]| {
             let (at, depth) =
                 self.view.project(gizmo.middle + (u * a + v * b) * (gizmo.radius * FRAC_1_SQRT_2));
-            at.map(|at| (at, depth))
+            let at = at?;
+            let room = others.iter().map(|other| other.distance(at)).fold(f64::INFINITY, f64::min);
+            Some((at, room - if depth > deep { FAR_SIDE } else { 0.0 }))
         });
-        let mut front: Vec<(DVec2, f64)> = points.into_iter().flatten().collect();
-        front.sort_by(|a, b| a.1.total_cmp(&b.1));
-        front.truncate(2);
-        front.into_iter().map(|(at, _)| at).max_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle)))
+        points.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| at)
     }
 
     /// Draws a ring, its far half faint.

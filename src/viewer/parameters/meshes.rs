@@ -95,7 +95,8 @@ impl ParameterPanel {
             ui.add_space(4.0);
         });
         if unfolded {
-            header.response.scroll_to_me(None);
+            // With its parts below it.
+            header.response.scroll_to_me(Some(Align::TOP));
         }
         if let Some(command) = command {
             let is_open = CollapsingState::load_with_default_open(ui.ctx(), id, only_one).is_open();

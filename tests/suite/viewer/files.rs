@@ -518,7 +518,7 @@ impl egui::DroppedFile for Dropped {
 }
 
 /// A file as a window gives it to egui.
-pub fn dropped(path: &Path) -> std::sync::Arc<dyn egui::DroppedFile> {
+pub fn dropped(path: &Path) -> egui::DroppedFileHandle {
     std::sync::Arc::new(Dropped(path.to_owned()))
 }
 

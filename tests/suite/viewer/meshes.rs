@@ -32,7 +32,8 @@ fn names(window: &Window) -> Vec<String> {
 /// Puts a file that Blender exported into a folder.
 fn exported(folder: &Path) -> PathBuf {
     let file = folder.join("blender.glb");
-    fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/model/blender.glb"), &file).expect("a copy");
+    fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/model/blender.glb"), &file)
+        .expect("a copy");
     file
 }
 
@@ -391,7 +392,9 @@ fn what_no_surface_shows_comes_last_in_the_panel() {
         window.harness.query_all_by_label(label).map(|node| node.rect().top()).fold(f32::INFINITY, f32::min)
     };
     let window = with_list();
-    assert!(top(&window, "Curves") < top(&window, "Mapping") && top(&window, "Volume") < top(&window, "Mapping"));
+    assert!(
+        top(&window, "Curves") < top(&window, "Mapping") && top(&window, "Volume") < top(&window, "Mapping")
+    );
     window.widget(Role::Slider, "curves.h");
     let scene = "version = 1\nbase = \"torus\"\n[image]\nwidth = 64\nheight = 36\nsamples = 1\n";
     let setup = Setup { scene: scene.into(), size: [760.0, 900.0], ..Setup::default() };
