@@ -15,24 +15,23 @@ use eframe::egui;
 use egui::Ui;
 
 use super::curves_panel::CurvesPanel;
-use super::document::{Document, camera_in};
+use super::document::Document;
 use super::drive::Drive;
 use super::gallery::Gallery;
-use super::layer_image::show_legend;
 use super::lights::Lights;
 use super::meshes::Meshes;
 use super::navigate::Pose;
 use super::parameters::{Costs, ParameterPanel};
-use super::probe::{Aim, Probe};
+use super::probe::Probe;
 use super::settings::{Settings, Theme};
 use super::transfer::{ExportDialog, PathDialog};
-use super::viewport::{self, Content, Selection, Tool};
+use super::viewport::{Selection, Tool};
 use super::volume_panel::VolumePanel;
 use super::worker::{Busy, Message, MessageKind, Picture, Worker};
 use super::{Handover, Loss, Options, metrics};
 use crate::engine::cpu::ray::RayReport;
 use crate::picture::Layer;
-use crate::scene::{Raw, Scene};
+use crate::scene::Scene;
 use crate::util::error::Result;
 
 /// The inspectors.
@@ -365,65 +364,6 @@ impl Viewer {
         if self.closing {
             ctx.request_repaint();
         }
-    }
-
-    fn viewport(&mut self, ui: &mut Ui) {
-        let image = &self.document.scene().image;
-        let content = Content {
-            texture: self.texture.as_ref(),
-            aspect: image.width as f32 / image.height as f32,
-            marked: self.marked.filter(|_| self.settings.inspectors && self.inspector == Inspector::Pixel),
-            tool: self.tool,
-            pose: self.document.pose(),
-            meshes: &self.document.scene().meshes,
-        };
-        let selection = Selection { lights: &mut self.lights, meshes: &mut self.meshes };
-        let (rect, actions) = viewport::show(ui, &content, self.document.values(), selection);
-        if let Some(picture) = &self.picture
-            && picture.layer != Layer::Rgb
-        {
-            let at = rect.left_bottom() + egui::vec2(10.0, -10.0);
-            egui::Area::new(egui::Id::unique("legend"))
-                .pivot(egui::Align2::LEFT_BOTTOM)
-                .fixed_pos(at)
-                .order(egui::Order::Middle)
-                .interactable(false)
-                .show(ui.ctx(), |ui| show_legend(ui, picture.layer, &picture.legend));
-        }
-        if let Some(pose) = actions.pose {
-            self.move_camera(pose, Some("camera"));
-        }
-        for (edits, gesture) in [(actions.lights, LIGHT), (actions.meshes, MESH)] {
-            let mut edits: Vec<(&str, Raw)> = edits.iter().map(|(k, v)| (k.as_str(), v.clone())).collect();
-            // A camera that moved with the mesh would take the pointer's place on it along.
-            let mesh = self.meshes.selected().filter(|_| gesture == MESH && !edits.is_empty());
-            if mesh.is_some_and(|mesh| camera_in(self.document.values(), mesh).is_some()) {
-                edits.extend(self.document.camera_edits(&self.document.pose()));
-            }
-            if !edits.is_empty() {
-                let set = self.document.set_all(&edits, Some(gesture));
-                self.report(set);
-            }
-        }
-        if actions.deselect {
-            self.lights.select(None);
-            self.meshes.select(None);
-        }
-        if let Some(position) = actions.inspect {
-            if self.tool == Tool::Inspect {
-                self.settings.inspectors = true;
-                self.inspector = Inspector::Pixel;
-            }
-            self.marked = Some(position);
-            self.inspect_again();
-        }
-        if let Some(position) = actions.focus {
-            self.ask(Aim::Focus, position);
-        }
-        // After this frame's clicks, so that their rays are traced before the next frame.
-        self.receive_rays(ui.ctx());
-        let pixels = rect.size() * ui.ctx().pixels_per_point();
-        self.request([pixels.x.round() as u32, pixels.y.round() as u32]);
     }
 }
 

@@ -3,6 +3,7 @@
 //!
 //! Each change is one step of undo.
 
+mod gizmo;
 mod handles;
 
 use std::collections::HashMap;

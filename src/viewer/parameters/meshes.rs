@@ -158,7 +158,9 @@ fn part_row(ui: &mut Ui, document: &Document, mesh: &str, part: &PartSummary, i:
                 choice = Some(Choice::NewShell);
             }
         });
-        name(&combo.response, &key);
+        // The whole mesh has a row of its own, further down.
+        let label = if part.key.is_some() { key } else { format!("Parts of {mesh} without a material") };
+        name(&combo.response, &label);
         let count =
             if part.triangles == 1 { "1 triangle".into() } else { format!("{} triangles", part.triangles) };
         ui.weak(count);

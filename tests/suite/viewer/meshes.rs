@@ -297,9 +297,11 @@ fn a_part_without_texture_coordinates_says_what_to_do_and_can_be_undone() {
     drop_on(&mut window, &file);
     assert!(window.reads("without a material"));
     let before = toml(&window);
-    let combos = window.names(Role::ComboBox).into_iter().filter(|name| name == "meshes.bare.material");
-    assert_eq!(combos.count(), 1, "a part without a name has the key of the whole mesh, which is one row");
-    window.choose("meshes.bare.material", "new shell…");
+    window.widget(Role::ComboBox, "meshes.bare.material");
+    window.choose("Parts of bare without a material", "none");
+    assert_eq!(text(&window, "meshes.bare.material"), "none");
+    window.undo();
+    window.choose("Parts of bare without a material", "new shell…");
     assert!(window.reads("projection"), "the way out");
     window.press("Undo");
     assert!(window.viewer().document().fault().is_none() && toml(&window) == before);
