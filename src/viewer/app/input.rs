@@ -37,7 +37,8 @@ impl Viewer {
         self.report(added);
     }
 
-    /// Deselects the light or the mesh that was selected before the other: keys and handles are for one thing.
+    /// Deselects the light or the mesh that was selected before the other: keys and handles are for one
+    /// thing.
     pub(super) fn select_one(&mut self) {
         let light = self.lights.selected().map(str::to_owned);
         if light.is_some() && self.meshes.selected().is_some() {

@@ -112,8 +112,8 @@ impl Viewer {
         self.say(MessageKind::Warning, text);
     }
 
-    /// Uses files that were dropped on the window. Files that come with a mesh, such as its textures, are read
-    /// when it is.
+    /// Uses files that were dropped on the window. Files that come with a mesh, such as its textures, are
+    /// read when it is.
     pub(super) fn drop_files(&mut self, paths: &[PathBuf]) {
         let with_mesh = paths.iter().any(|path| is_mesh(path));
         for path in paths.iter().filter(|path| !(with_mesh && comes_with_mesh(path))) {

@@ -116,8 +116,8 @@ impl Document {
     /// Writes the scene to a file, completely or not at all.
     ///
     /// # Errors
-    /// If the values are not a valid scene, if a file that the scene uses lies outside the new folder and is no
-    /// mesh, or if the file cannot be written.
+    /// If the values are not a valid scene, if a file that the scene uses lies outside the new folder and is
+    /// no mesh, or if the file cannot be written.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         if let Some(fault) = &self.fault {
             return Err(Error::input(

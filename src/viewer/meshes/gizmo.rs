@@ -130,8 +130,8 @@ impl Canvas<'_> {
         Some(angle + along)
     }
 
-    /// Position of the point that marks ring `i`: halfway between the two others, where it is farthest from the
-    /// arrows' tips, and rather on the near side.
+    /// Position of the point that marks ring `i`: halfway between the two others, where it is farthest from
+    /// the arrows' tips, and rather on the near side.
     pub(super) fn knob(&self, gizmo: &Gizmo, i: usize) -> Option<DVec2> {
         let [_, u, v] = gizmo.axes(i);
         let (middle, deep) = self.view.project(gizmo.middle);
