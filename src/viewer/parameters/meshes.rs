@@ -163,7 +163,8 @@ fn part_row(ui: &mut Ui, document: &Document, mesh: &str, part: &PartSummary, i:
         name(&combo.response, &label);
         let count =
             if part.triangles == 1 { "1 triangle".into() } else { format!("{} triangles", part.triangles) };
-        ui.weak(count);
+        // A longer line would push the marks of all rows under the scroll bar.
+        ui.add(egui::Label::new(egui::RichText::new(&count).weak().small()).truncate()).on_hover_text(count);
     });
     choice
 }
