@@ -123,7 +123,7 @@ def add(name, material, colour, parts):
     made.use_nodes = True
     shader = made.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*colour, 1)
-    shader.inputs["Roughness"].default_value = 0.9
+    shader.inputs["Roughness"].default_value = 1.0
     mesh.materials.append(made)
     thing = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(thing)

@@ -16,7 +16,9 @@ bpy.ops.wm.read_factory_settings(use_empty=True)
 def material(name, colour):
     made = bpy.data.materials.new(name)
     made.use_nodes = True
-    made.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*colour, 1)
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Roughness"].default_value = 1.0
     return made
 
 

@@ -51,6 +51,10 @@ struct MeshTile {
     side: u32,
     // 1: a hole in a picture with alpha.
     holdout: u32,
+    // Number of its paint plus 1; 0: it is shaded as rock is.
+    paint: u32,
+    // Number of the first texture coordinates of its triangles.
+    coordinates: u32,
 }
 
 // Vertices in a row of the largest tile.

@@ -43,6 +43,22 @@ impl ImageSource {
             ImageSource::File(path) => decode_file(path, memory),
         }
     }
+
+    /// Returns the width and height of the image, texels. `memory` are the bytes that the file may take.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where there is no image or it is broken, [`Error::Memory`] where the file is too
+    /// large.
+    pub fn size(&self, memory: u64) -> Result<[u32; 2]> {
+        let (width, height) = match self {
+            ImageSource::Refused { what, fix } => return Err(Error::input(what, fix)),
+            ImageSource::Bytes { place, bytes } => size(place, bytes)?,
+            ImageSource::File(path) => {
+                size(&path.display().to_string(), &read_whole(path, &mut Budget::new(memory))?)?
+            }
+        };
+        Ok([width, height])
+    }
 }
 
 fn decode_file(path: &Path, memory: u64) -> Result<DynamicImage> {
@@ -50,11 +66,25 @@ fn decode_file(path: &Path, memory: u64) -> Result<DynamicImage> {
     decode(&path.display().to_string(), &bytes, memory.saturating_sub(bytes.len() as u64))
 }
 
+fn fault(place: &str, why: String) -> Error {
+    Error::input(format!("{place}: {why}"), "export the images as PNG, JPEG or WebP files")
+}
+
+fn reader(bytes: &[u8]) -> ImageReader<Cursor<&[u8]>> {
+    ImageReader::new(Cursor::new(bytes)).with_guessed_format().expect("bytes in memory")
+}
+
+/// Width and height of an image.
+fn size(place: &str, bytes: &[u8]) -> Result<(u32, u32)> {
+    let (width, height) = reader(bytes).into_dimensions().map_err(|e| fault(place, e.to_string()))?;
+    if width == 0 || height == 0 {
+        return Err(fault(place, format!("an image of {width}×{height}")));
+    }
+    Ok((width, height))
+}
+
 fn decode(place: &str, bytes: &[u8], memory: u64) -> Result<DynamicImage> {
-    let fault =
-        |why: String| Error::input(format!("{place}: {why}"), "export the images as PNG, JPEG or WebP files");
-    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().expect("bytes in memory");
-    let (width, height) = reader().into_dimensions().map_err(|e| fault(e.to_string()))?;
+    let (width, height) = size(place, bytes)?;
     // Decoders hold the picture and as much again.
     let need = u128::from(width) * u128::from(height) * 16;
     if need > u128::from(memory) {
@@ -63,7 +93,7 @@ fn decode(place: &str, bytes: &[u8], memory: u64) -> Result<DynamicImage> {
     }
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(memory);
-    let mut reader = reader();
+    let mut reader = reader(bytes);
     reader.limits(limits);
-    reader.decode().map_err(|e| fault(e.to_string()))
+    reader.decode().map_err(|e| fault(place, e.to_string()))
 }

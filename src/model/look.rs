@@ -15,6 +15,9 @@ pub struct ModelMaterial {
     pub roughness: f32,
     /// How metallic it is, 0 to 1.
     pub metallic: f32,
+    /// Whether the file says anything of the two. A file that does not leaves glTF's rough metal, which few
+    /// authors mean.
+    pub says_roughness: bool,
     /// Texture of roughness (green) and of how metallic it is (blue), linear.
     pub roughness_texture: Option<TextureRef>,
     /// Texture of normals in tangent space, linear.
@@ -36,6 +39,7 @@ impl Default for ModelMaterial {
             base_color_texture: None,
             roughness: 1.0,
             metallic: 1.0,
+            says_roughness: false,
             roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,

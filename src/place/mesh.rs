@@ -8,6 +8,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::paint::{Painting, Paints, texture};
 use super::pool::Pool;
 use super::rock::{Rock, shade, wet};
 use super::tiles::{self, Tile};
@@ -24,6 +25,8 @@ pub struct Triangles {
     pub holdout: bool,
     /// Strengths of their shade and wetness.
     pub shade: MeshShade,
+    /// Their textures and roughness; without it they are shaded as rock is.
+    pub painting: Option<Arc<Painting>>,
 }
 
 /// Opaque geometry: square grids of vertices, first of the rocks and then of the pools, and triangles of
@@ -34,6 +37,8 @@ pub struct Mesh {
     pub vertices: Arc<Vec<Vertex>>,
     /// Tiles of the grids, and those of triangles.
     pub tiles: Arc<Vec<Tile>>,
+    /// Paints of tiles.
+    pub paints: Arc<Paints>,
 }
 
 impl Mesh {
@@ -41,7 +46,7 @@ impl Mesh {
     /// whether it is a holdout.
     pub fn new(vertices: Vec<Vertex>, grids: impl IntoIterator<Item = (u32, bool)>) -> Mesh {
         let tiles = tiles::cut(&vertices, grids.into_iter());
-        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), paints: Arc::default() }
     }
 
     /// Adds the triangles of other meshes.
@@ -51,12 +56,39 @@ impl Mesh {
         }
         let mut vertices = Arc::unwrap_or_clone(self.vertices);
         let mut tiles = Arc::unwrap_or_clone(self.tiles);
-        for Triangles { vertices: own, holdout, .. } in soups {
-            let first = vertices.len() as u32;
+        let paintings = soups.iter().filter_map(|own| own.painting.as_deref());
+        let (paints, firsts) = Paints::join(paintings, texture::MOST_BYTES);
+        let mut firsts = firsts.into_iter();
+        for Triangles { vertices: own, holdout, painting, .. } in soups {
+            let first = vertices.len();
             vertices.extend_from_slice(own);
-            tiles.extend(tiles::cut_triangles(&vertices, first, *holdout));
+            let Some(painting) = painting else {
+                tiles.extend(tiles::cut_triangles(&vertices, first as u32, *holdout));
+                continue;
+            };
+            let [paint, coordinate] = firsts.next().expect("one for each painting");
+            for (triangles, start, finish) in painting.parts() {
+                let [first, end] = [triangles.start, triangles.end].map(|t| first + 3 * t);
+                let slots = finish.map_or(0, |finish| painting.finishes[finish].slots);
+                let cut = tiles::cut_triangles(&vertices[..end], first as u32, *holdout);
+                tiles.extend(cut.map(|mut tile| {
+                    tile.paint = finish.map_or(0, |finish| (paint + finish) as u32 + 1);
+                    tile.coordinates = (coordinate + start) as u32 + (tile.first - first as u32) * slots;
+                    tile
+                }));
+            }
         }
-        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles) }
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), paints: Arc::new(paints) }
+    }
+
+    /// Returns the first vertex of each tile of triangles, in order, and the mean colour of its texture.
+    pub fn tints(&self) -> Vec<(u32, Vec3)> {
+        let is_grid = self.tiles.partition_point(Tile::is_grid);
+        let tint = |tile: &Tile| {
+            let paint = tile.paint.checked_sub(1).map(|paint| &self.paints.all[paint as usize]);
+            (tile.first, paint.map_or(Vec3::ONE, |paint| self.paints.tint(paint)))
+        };
+        self.tiles[is_grid..].iter().map(tint).collect()
     }
 
     /// Returns all triangles as indices of vertices, with the given step for each tile.

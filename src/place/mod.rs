@@ -2,6 +2,7 @@
 
 mod bvh;
 mod mesh;
+pub mod paint;
 mod pool;
 mod rock;
 mod show;

@@ -39,6 +39,10 @@ pub struct Tile {
     pub pool: u32,
     /// Whether a picture with an alpha channel has a hole in its place.
     pub holdout: bool,
+    /// Number of the paint plus 1; 0 for what is shaded as rock is.
+    pub paint: u32,
+    /// Number of the first texture coordinates of its triangles.
+    pub coordinates: u32,
     /// Neighbours in the same grid at the edges y = 0, x = side, y = side and x = 0.
     pub neighbours: [Option<u32>; 4],
     /// Lower corner of the bounding box, metres.
@@ -72,6 +76,8 @@ pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec
                     side,
                     pool: vertices[first as usize].pool,
                     holdout,
+                    paint: 0,
+                    coordinates: 0,
                     neighbours: [
                         (y > 0).then(|| own - across),
                         (x + 1 < across).then_some(own + 1),
@@ -103,6 +109,8 @@ pub fn cut_triangles(vertices: &[Vertex], first: u32, holdout: bool) -> impl Ite
             side: (own.len() / 3) as u32,
             pool: 0,
             holdout,
+            paint: 0,
+            coordinates: 0,
             neighbours: [None; 4],
             low: positions.clone().fold(Vec3::INFINITY, Vec3::min),
             high: positions.fold(Vec3::NEG_INFINITY, Vec3::max),

@@ -13,8 +13,11 @@ impl Parts {
         let vertices = vertices + triangles + (self.pools.len() * Pool::VERTICES) as u64;
         let rocks = vertices.saturating_mul(2 * (size_of::<Vertex>() as u64 + 24));
         let environment = self.environment.as_ref().map_or(0, |e| e.map.bytes().saturating_mul(2));
+        let paintings = self.triangles.iter().filter_map(|own| own.painting.as_ref());
+        let painted = paintings.map(|painting| 2 * painting.bytes()).sum::<u64>();
         let shells = self.shells.iter().map(|shell| shell.bytes()).sum::<u64>();
-        canvas(&self.image, layers).saturating_add(rocks).saturating_add(environment).saturating_add(shells)
+        let all = [rocks, environment, shells, painted];
+        all.into_iter().fold(canvas(&self.image, layers), u64::saturating_add)
     }
 
     /// Returns the bytes that a picture of the whole image needs besides the volume, with every layer of an

@@ -55,6 +55,8 @@ use crate::mapping::Quad;
 use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
+use crate::place::paint::coarsened;
+use crate::place::paint::texture::MOST_BYTES;
 use crate::place::{Ground, Mesh, Pool, Rock, ShadeMemo, Triangles, WaterFaces};
 use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
@@ -592,6 +594,15 @@ impl Scene {
         warnings.extend(self.unmapped.iter().map(|(name, count)| {
             format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
         }));
+        let paintings = self.triangles.iter().filter_map(|own| own.painting.as_deref());
+        if let (textures @ 1.., levels) = coarsened(paintings, MOST_BYTES) {
+            warnings.push(format!(
+                "the meshes' textures would take more than {} MiB: {textures} of them are shown up to {} \
+                 times coarser",
+                MOST_BYTES >> 20,
+                1u64 << levels.min(32),
+            ));
+        }
         let has_water = !self.quads.is_empty() || !self.shells.is_empty();
         let is_bare = self.rocks.is_empty() && self.pools.is_empty() && self.triangles.is_empty();
         if !has_water && is_bare {

@@ -2,6 +2,7 @@
 //! engine of machines without a GPU.
 
 pub mod gbuffer;
+pub mod gloss;
 mod haze;
 pub mod integrate;
 mod lights;

@@ -26,6 +26,17 @@ pub struct Points<S: Simd> {
     pub wet: Floats<S>,
 }
 
+/// How the eye sees eight points.
+#[derive(Clone, Copy)]
+pub struct View<S: Simd> {
+    /// Unit normal on the eye's side.
+    pub n: Lanes3<S>,
+    /// Unit direction to the eye.
+    pub e: Lanes3<S>,
+    /// Metres from the eye.
+    pub distance: Floats<S>,
+}
+
 impl<S: Simd> Points<S> {
     /// Interpolates the vertices around a place in each lane's tile, in squares of its grid. `position` are
     /// the points in the world. Twin: `opaque_point`.
@@ -68,32 +79,26 @@ impl<S: Simd> Points<S> {
         }
     }
 
-    /// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance, metres
-    /// from the eye, and the unit normal. `shadow_light` is [`Scene::shadow_light`].
+    /// Returns how the eye sees the points.
     #[inline(always)]
-    pub fn shade(
-        &self,
-        simd: S,
-        scene: &Scene,
-        shadow_light: Option<usize>,
-    ) -> (Lanes3<S>, Floats<S>, Lanes3<S>) {
+    pub fn view(&self, simd: S, scene: &Scene) -> View<S> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let (zero, one) = (splat(0.0), splat(1.0));
         let to_eye = Lanes3::splat(simd, scene.camera.eye_local().as_vec3()).minus(self.position);
         let distance = to_eye.dot(to_eye).sqrt();
         let n = self.normal.over(self.normal.dot(self.normal).max(splat(1e-30)).sqrt());
         let n = n.times(n.dot(to_eye).simd_lt(zero).select(splat(-1.0), one));
-        let e = to_eye.over(distance.max(splat(1e-6)));
-        let mirrored = n.times(splat(2.0) * n.dot(e)).minus(e);
-        let ambient = Lanes3::splat(simd, scene.ambient);
-        let (ambient, sky) = match &scene.environment {
-            None => (ambient, background_at(simd, &scene.background, mirrored)),
-            // A film on rough rock reflects the light from all around the mirrored view.
-            Some(environment) => {
-                let irradiance = &environment.irradiance;
-                (ambient.plus(irradiance_at(simd, irradiance, n)), irradiance_at(simd, irradiance, mirrored))
-            }
-        };
+        View { n, e: to_eye.over(distance.max(splat(1e-6))), distance }
+    }
+
+    /// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance.
+    /// `shadow_light` is [`Scene::shadow_light`].
+    #[inline(always)]
+    pub fn lambert(&self, simd: S, scene: &Scene, shadow_light: Option<usize>, view: &View<S>) -> Lanes3<S> {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let (zero, one) = (splat(0.0), splat(1.0));
+        let View { n, e, .. } = *view;
+        let (ambient, sky) = view.surroundings(simd, scene);
         let open = one - self.occlusion;
         let is_wet = self.wet.simd_gt(zero);
         let mut irradiance = ambient.times(open);
@@ -110,10 +115,28 @@ impl<S: Simd> Points<S> {
         }
         let dry = self.albedo.by(irradiance);
         if !is_wet.any_true() {
-            return (dry, distance, n);
+            return dry;
         }
         let mirror = sky.times(open * fresnel(simd, n.dot(e)));
-        (dry.plus(gloss.plus(mirror).times(self.wet)), distance, n)
+        dry.plus(gloss.plus(mirror).times(self.wet))
+    }
+}
+
+impl<S: Simd> View<S> {
+    /// Returns the light from all around, and the radiance of the surroundings along the mirrored view.
+    #[inline(always)]
+    pub fn surroundings(&self, simd: S, scene: &Scene) -> (Lanes3<S>, Lanes3<S>) {
+        let View { n, e, .. } = *self;
+        let mirrored = n.times(f32x8::splat(simd, 2.0) * n.dot(e)).minus(e);
+        let ambient = Lanes3::splat(simd, scene.ambient);
+        match &scene.environment {
+            None => (ambient, background_at(simd, &scene.background, mirrored)),
+            // A film on rough rock reflects the light from all around the mirrored view.
+            Some(environment) => {
+                let irradiance = &environment.irradiance;
+                (ambient.plus(irradiance_at(simd, irradiance, n)), irradiance_at(simd, irradiance, mirrored))
+            }
+        }
     }
 }
 

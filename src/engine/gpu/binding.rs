@@ -30,6 +30,9 @@ bindings! {
         ROCK_SURFACE = 10
         COATS = 11
         HULL_FACES = 12
+        PAINTS = 13
+        CORNER_UVS = 14
+        TEXELS = 15
     }
     /// `shaders/engine/integrate.wgsl`; `shaders/engine/bare.wgsl` has some of them.
     integrate {

@@ -30,7 +30,7 @@ pub fn gbuffer_source() -> String {
         "fn waves(p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {{\n    \
          var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
     );
-    resolve(&format!("#import engine::gbuffer\n#import engine::pool\n{sum}"))
+    resolve(&format!("#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n{sum}"))
 }
 
 /// The part of the targets that has to be drawn.
@@ -50,6 +50,7 @@ pub struct Gbuffer {
     rock_surface: OnceLock<wgpu::RenderPipeline>,
     // Index: environment + 2 · one light.
     rock: [OnceLock<wgpu::RenderPipeline>; 4],
+    painted: [OnceLock<wgpu::RenderPipeline>; 4],
     pool: [OnceLock<wgpu::RenderPipeline>; 4],
     volume: OnceLock<wgpu::RenderPipeline>,
     peel: OnceLock<wgpu::RenderPipeline>,
@@ -68,6 +69,7 @@ impl Gbuffer {
             background: Default::default(),
             rock_surface: OnceLock::new(),
             rock: Default::default(),
+            painted: Default::default(),
             pool: Default::default(),
             volume: OnceLock::new(),
             peel: OnceLock::new(),
@@ -82,7 +84,8 @@ impl Gbuffer {
         self.background(gpu, variant);
         if !scene.rocks.is_empty() || !scene.triangles.is_empty() {
             self.rock_surface_pipeline(gpu);
-            self.rock(gpu, variant);
+            let is_painted = scene.triangles.iter().any(|own| own.painting.is_some());
+            self.rock(gpu, variant, is_painted);
         }
         if !scene.pools.is_empty() {
             self.pool(gpu, variant);
@@ -119,9 +122,10 @@ impl Gbuffer {
         })
     }
 
-    /// Shades the rock where it is visible.
-    fn rock(&self, gpu: &Gpu, variant: OpaqueVariant) -> &wgpu::RenderPipeline {
-        self.opaque_pipeline(gpu, &self.rock, variant, "opaque", wgpu::CompareFunction::Less)
+    /// Shades the rock where it is visible, or rock and triangles with paints.
+    fn rock(&self, gpu: &Gpu, variant: OpaqueVariant, is_painted: bool) -> &wgpu::RenderPipeline {
+        let (pipelines, name) = if is_painted { (&self.painted, "painted") } else { (&self.rock, "opaque") };
+        self.opaque_pipeline(gpu, pipelines, variant, name, wgpu::CompareFunction::Less)
     }
 
     /// Draws pools. Equal depths pass, so that a pool can be redrawn with other waves.

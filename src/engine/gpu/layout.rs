@@ -106,6 +106,8 @@ pub struct MeshTile {
     pub pitch: u32,
     pub side: u32,
     pub holdout: u32,
+    pub paint: u32,
+    pub coordinates: u32,
 }
 
 /// One light.

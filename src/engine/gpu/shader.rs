@@ -14,8 +14,9 @@ pub const FILES: &[(&str, &str)] = files! {
     "trace/levels" "trace/lookup" "trace/matter"
     "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/scatter" "light/strand"
     "light/visibility" "light/shell_depth" "light/shell_light"
-    "engine/bare" "engine/gbuffer" "engine/integrate" "engine/integrate_light" "engine/integrate_shell"
-    "engine/opaque" "engine/pool" "engine/sheets_many" "engine/sheets_one"
+    "engine/bare" "engine/gbuffer" "engine/gloss" "engine/integrate" "engine/integrate_light"
+    "engine/integrate_shell" "engine/opaque" "engine/paint" "engine/pool" "engine/sheets_many"
+    "engine/sheets_one"
     "picture/resolve"
 };
 

@@ -36,8 +36,14 @@ pub fn lists() -> (Vec<u32>, Vec<Range<u32>>) {
 
 /// Returns the tiles as shaders read them.
 pub fn packed(tiles: &[Tile]) -> Vec<MeshTile> {
-    let packed =
-        |t: &Tile| MeshTile { first: t.first, pitch: t.pitch, side: t.side, holdout: u32::from(t.holdout) };
+    let packed = |t: &Tile| MeshTile {
+        first: t.first,
+        pitch: t.pitch,
+        side: t.side,
+        holdout: u32::from(t.holdout),
+        paint: t.paint,
+        coordinates: t.coordinates,
+    };
     tiles.iter().map(packed).collect()
 }
 

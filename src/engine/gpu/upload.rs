@@ -16,6 +16,7 @@ use crate::engine::pool_surface;
 use crate::light::Scattering;
 use crate::light::environment::Map;
 use crate::light::scatter::media::{kinds, profile_length};
+use crate::place::paint::Paints;
 use crate::place::tiles::steps;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
@@ -68,6 +69,7 @@ struct ResidentMesh {
     positions: wgpu::Buffer,
     coats: wgpu::Buffer,
     tiles: wgpu::Buffer,
+    paints: Option<UploadedPaints>,
     /// Indices of all lists of triangles.
     indices: wgpu::Buffer,
     /// Range of each list in `indices`.
@@ -101,6 +103,8 @@ pub struct Uploaded {
     pub coats: wgpu::Buffer,
     /// Tiles of the opaque mesh, `array<MeshTile>`.
     pub tiles: wgpu::Buffer,
+    /// Paints of the tiles, if any tile has one.
+    pub paints: Option<UploadedPaints>,
     /// Indices of the lists of triangles.
     pub indices: wgpu::Buffer,
     /// Parts of the rock to draw.
@@ -113,6 +117,29 @@ pub struct Uploaded {
     pub geometry: [u64; 2],
     /// Hash of the pools' surfaces.
     pub waves: [u64; 2],
+}
+
+/// Paints of the opaque mesh on the device.
+#[derive(Clone)]
+pub struct UploadedPaints {
+    /// `array<Paint>`.
+    pub paints: wgpu::Buffer,
+    /// Texture coordinates of corners.
+    pub corner_uvs: wgpu::Buffer,
+    /// Textures.
+    pub texels: wgpu::Buffer,
+}
+
+impl UploadedPaints {
+    /// Uploads paints, if there are any.
+    fn new(gpu: &Gpu, paints: &Paints) -> Option<UploadedPaints> {
+        let buffer = |name, bytes| gpu.buffer_with(name, bytes, wgpu::BufferUsages::STORAGE);
+        (!paints.all.is_empty()).then(|| UploadedPaints {
+            paints: buffer("paints", bytemuck::cast_slice(&paints.all)),
+            corner_uvs: buffer("corner uvs", bytemuck::cast_slice(&paints.coordinates)),
+            texels: buffer("texels", bytemuck::cast_slice(&paints.words)),
+        })
+    }
 }
 
 /// An environment on the device.
@@ -176,15 +203,19 @@ impl Uploaded {
             (bytemuck::cast_slice(&quads), bytemuck::cast_slice(&lights));
         let pools = pool_surface::surfaces(scene, mesh);
         let pool_bytes: &[u8] = bytemuck::cast_slice(&pools);
-        let largest =
-            [quad_bytes.len(), light_bytes.len(), mesh.vertices.len() * size_of::<VertexMaterial>()];
+        let largest = [
+            quad_bytes.len(),
+            light_bytes.len(),
+            mesh.vertices.len() * size_of::<VertexMaterial>(),
+            8 * mesh.paints.coordinates.len(),
+        ];
         if largest.iter().any(|&b| b as u64 > limits.max_storage_buffer_binding_size) {
             return Err(Error::device(
                 format!("the scene's quads, lights or rocks are too large for {}", gpu.name()),
                 "lower their number or use --engine cpu",
             ));
         }
-        let ResidentMesh { positions, coats, tiles, indices, lists, upload, .. } =
+        let ResidentMesh { positions, coats, tiles, paints, indices, lists, upload, .. } =
             resident.mesh(gpu, mesh).clone();
         let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
@@ -231,6 +262,7 @@ impl Uploaded {
             positions,
             coats,
             tiles,
+            paints,
             indices,
             rock,
             pools: pools
@@ -323,6 +355,7 @@ impl Resident {
                 positions: buffer("positions", bytemuck::cast_slice(&positions), storage),
                 coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
                 tiles: buffer("tiles", bytemuck::cast_slice(&tiles::packed(&mesh.tiles)), storage),
+                paints: UploadedPaints::new(gpu, &mesh.paints),
                 indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
                 lists: Arc::new(lists),
                 upload: *uploads,

@@ -35,11 +35,11 @@ fn cell(d: Vec3) -> Option<usize> {
 pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROUND[0] * AROUND[1]]) {
     const CELLS: usize = AROUND[0] * AROUND[1];
     let sampled = || {
-        let rock = mesh.vertices.iter().filter(|v| v.pool == 0).step_by(STRIDE);
-        rock.filter_map(|vertex| {
+        let rock = (0..).zip(mesh.vertices.iter()).filter(|(_, v)| v.pool == 0).step_by(STRIDE);
+        rock.filter_map(|(number, vertex)| {
             let away = Vec3::from(vertex.position) - middle;
             let distance = away.length();
-            Some((vertex, distance, cell(away / distance.max(1e-6))?))
+            Some(((number, vertex), distance, cell(away / distance.max(1e-6))?))
         })
     };
     let mut nearest = [f32::INFINITY; CELLS];
@@ -48,9 +48,12 @@ pub fn around(scene: &Scene, mesh: &Mesh, middle: Vec3) -> (f32, [[f32; 4]; AROU
     }
     let mut sums = [Vec3::ZERO; CELLS];
     let mut counts = [0.0f32; CELLS];
-    for (vertex, distance, cell) in sampled() {
+    let tints = mesh.tints();
+    for ((number, vertex), distance, cell) in sampled() {
         if distance < BEHIND * nearest[cell] {
-            sums[cell] += radiance(scene, vertex);
+            let tile = tints.partition_point(|(first, _)| *first <= number);
+            let tint = tile.checked_sub(1).map_or(Vec3::ONE, |tile| tints[tile].1);
+            sums[cell] += radiance(scene, vertex) * tint;
             counts[cell] += 1.0;
         }
     }

@@ -58,6 +58,9 @@ impl Gltf<'_> {
             base_color_texture: texture(&pbr.base_color_texture, format!("{own}.baseColorTexture"))?,
             roughness: pbr.roughness_factor.unwrap_or(1.0).clamp(0.0, 1.0),
             metallic: pbr.metallic_factor.unwrap_or(1.0).clamp(0.0, 1.0),
+            says_roughness: pbr.roughness_factor.is_some()
+                || pbr.metallic_factor.is_some()
+                || pbr.metallic_roughness_texture.is_some(),
             roughness_texture: texture(
                 &pbr.metallic_roughness_texture,
                 format!("{own}.metallicRoughnessTexture"),

@@ -86,13 +86,18 @@ impl Reader<'_> {
                 "Tr" => self.model.materials[material].base_color[3] = 1.0 - number()?.clamp(0.0, 1.0),
                 "Pr" => {
                     is_rough = true;
-                    self.model.materials[material].roughness = number()?.clamp(0.0, 1.0);
+                    let own = &mut self.model.materials[material];
+                    (own.roughness, own.says_roughness) = (number()?.clamp(0.0, 1.0), true);
                 }
-                "Pm" => self.model.materials[material].metallic = number()?.clamp(0.0, 1.0),
+                "Pm" => {
+                    let own = &mut self.model.materials[material];
+                    (own.metallic, own.says_roughness) = (number()?.clamp(0.0, 1.0), true);
+                }
                 // As Blender reads and writes it: an exponent of 1000 is a mirror.
                 "Ns" if !is_rough => {
                     let exponent = number()?.clamp(0.0, 1000.0);
-                    self.model.materials[material].roughness = 1.0 - (exponent / 1000.0).sqrt();
+                    let own = &mut self.model.materials[material];
+                    (own.roughness, own.says_roughness) = (1.0 - (exponent / 1000.0).sqrt(), true);
                 }
                 "map_Kd" => {
                     let texture = self.texture(&library, line, &folder, rest)?;

@@ -83,7 +83,8 @@ impl fmt::Debug for WaterFaces {
 
 impl fmt::Debug for Triangles {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Triangles { vertices, holdout, shade } = self;
+        // Shade does not depend on the textures.
+        let Triangles { vertices, holdout, shade, .. } = self;
         write!(f, "Triangles({} {:032x} {holdout} {shade:?})", vertices.len(), digest(vertices))
     }
 }
@@ -91,7 +92,11 @@ impl fmt::Debug for Triangles {
 impl PartialEq for Triangles {
     fn eq(&self, other: &Triangles) -> bool {
         let is_same = || Arc::ptr_eq(&self.vertices, &other.vertices) || self.vertices == other.vertices;
-        (self.holdout, self.shade) == (other.holdout, other.shade) && is_same()
+        let has_same_painting = || match (&self.painting, &other.painting) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other) || own == other,
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        (self.holdout, self.shade) == (other.holdout, other.shade) && has_same_painting() && is_same()
     }
 }
 
@@ -114,11 +119,22 @@ impl Ground {
         };
         let Ok(coats) = made;
         let mut mesh = grids.with_triangles(&kept.refined);
-        let own = &mut Arc::make_mut(&mut mesh.vertices)[first..];
-        own.par_iter_mut().zip(coats).for_each(|(vertex, [occlusion, shadow, wet])| {
-            (vertex.occlusion, vertex.shadow) = (occlusion, shadow);
-            wet::wet_vertex(vertex, wet);
-        });
+        let Mesh { vertices, tiles, paints } = &mut mesh;
+        let vertices = Arc::make_mut(vertices);
+        for tile in tiles.iter().filter(|tile| !tile.is_grid()) {
+            // The raster pass darkens a texture under the film pixel by pixel.
+            let paint = tile.paint.checked_sub(1).map(|paint| &paints.all[paint as usize]);
+            let is_textured = paint.is_some_and(|paint| paint.color.levels > 0);
+            let own = tile.first as usize..tile.first as usize + 3 * tile.side as usize;
+            for (vertex, [occlusion, shadow, wet]) in
+                vertices[own.clone()].iter_mut().zip(&coats[own.start - first..])
+            {
+                (vertex.occlusion, vertex.shadow, vertex.wet) = (*occlusion, *shadow, *wet);
+                if !is_textured {
+                    wet::wet_vertex(vertex, *wet);
+                }
+            }
+        }
         mesh
     }
 
@@ -141,8 +157,14 @@ impl Ground {
             if !own.shade.is_wanted() {
                 return (own.clone(), Vec::new());
             }
-            let Refined { vertices, lifts } = refined(&own.vertices, own.shade.most_added as usize);
-            (Triangles { vertices, ..own.clone() }, lifts)
+            let Refined { vertices, lifts, pieces } = refined(&own.vertices, own.shade.most_added as usize);
+            let painting = match &own.painting {
+                Some(painting) if !pieces.is_empty() => {
+                    Some(Arc::new(painting.split(&own.vertices, &vertices, &pieces)))
+                }
+                other => other.clone(),
+            };
+            (Triangles { vertices, painting, ..own.clone() }, lifts)
         };
         memo.kept(key, |key| key.triangles.iter().map(refine).unzip())
     }

@@ -29,6 +29,8 @@ pub struct Refined {
     pub vertices: Arc<Vec<Vertex>>,
     /// Distance of the curved surface above each vertex, metres; empty if no triangle was split.
     pub lifts: Vec<Vec3>,
+    /// Number of parts of each triangle; empty if none was split.
+    pub pieces: Vec<u32>,
 }
 
 /// A vertex, and its place on the curved surface.
@@ -55,7 +57,7 @@ pub fn lift(point: Vec3, vertex: Vec3, n: Vec3) -> Vec3 {
 
 /// Returns the vertices with at most `most_added` more triangles. A mesh that is fine enough stays as it is.
 pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Refined {
-    let as_it_is = || Refined { vertices: vertices.clone(), lifts: Vec::new() };
+    let as_it_is = || Refined { vertices: vertices.clone(), lifts: Vec::new(), pieces: Vec::new() };
     let positions = || vertices.par_iter().map(|vertex| Vec3::from(vertex.position));
     let low = positions().reduce(|| Vec3::INFINITY, Vec3::min);
     let high = positions().reduce(|| Vec3::NEG_INFINITY, Vec3::max);
@@ -69,12 +71,13 @@ pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Refined {
     while guess(triangles, limit) > 2.0 * most as f64 {
         limit *= STEP;
     }
-    let mut count = pieces(triangles, limit);
-    while count > most {
+    let count = |pieces: &[u32]| pieces.iter().map(|&own| own as usize).sum::<usize>();
+    let mut own = pieces(triangles, limit);
+    while count(&own) > most {
         limit *= STEP;
-        count = pieces(triangles, limit);
+        own = pieces(triangles, limit);
     }
-    if count == triangles.len() {
+    if count(&own) == triangles.len() {
         return as_it_is();
     }
     let made = triangles.par_chunks(AT_ONCE).flat_map_iter(|own| {
@@ -90,11 +93,11 @@ pub fn refined(vertices: &Arc<Vec<Vertex>>, most_added: usize) -> Refined {
         out
     });
     let (vertices, lifts): (Vec<Vertex>, Vec<Vec3>) = made.unzip();
-    Refined { vertices: Arc::new(vertices), lifts }
+    Refined { vertices: Arc::new(vertices), lifts, pieces: own }
 }
 
-/// Number of triangles that the limit makes.
-fn pieces(triangles: &[[Vertex; 3]], limit: f32) -> usize {
+/// Number of parts that the limit makes of each triangle.
+fn pieces(triangles: &[[Vertex; 3]], limit: f32) -> Vec<u32> {
     let of = |corners: &[Vertex; 3]| {
         let mut count = 0;
         let between = |a: &Vec3, b: &Vec3| (*a + *b) * 0.5;
@@ -102,7 +105,7 @@ fn pieces(triangles: &[[Vertex; 3]], limit: f32) -> usize {
         split(corners, limit, &|p: &Vec3| *p, &between, &mut |_| count += 1);
         count
     };
-    triangles.par_iter().map(of).sum()
+    triangles.par_iter().map(of).collect()
 }
 
 /// Rough number of triangles that the limit makes, by area and length.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
+use super::paint::Plan;
 use super::{Becomes, Carrier, Projection, SceneMesh, ThicknessFrom, faces, opaque, shells};
 use crate::light::Scattering;
 use crate::mapping::shell::{Shell, Side};
@@ -285,7 +286,8 @@ impl Key {
             return Err(too_many_faces(name, faces));
         }
         let shade = if self.mesh.shade.is_wanted() { SHADE_BYTES } else { 0 };
-        let need = taken + opaque * u128::from(OPAQUE_BYTES + shade) + shelled * SHELL_BYTES;
+        let painting = Plan::new(self).bytes(self, memory)?;
+        let need = taken + opaque * u128::from(OPAQUE_BYTES + shade) + painting + shelled * SHELL_BYTES;
         // Numbers of vertices and of points have 32 bits.
         if need > u128::from(memory) || opaque > 1 << 28 {
             return Err(Error::memory(

@@ -1,16 +1,17 @@
 //! Files of meshes that were read, and what was built of them, so that the next frame or edit finds them
 //! again.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::time::SystemTime;
 
 use glam::DVec3;
-use image::RgbImage;
 
 use super::build::{Built, Key};
 use crate::model::{self, Model, Summary};
 use crate::place::ShadeMemo;
+use crate::place::paint::texture::Texture;
 use crate::scene::presets;
 use crate::util::error::Result;
 use crate::util::monitor::Unwatched;
@@ -23,8 +24,10 @@ pub struct Loaded {
     /// Bytes that the content takes, without decoded images.
     pub bytes: u64,
     summary: OnceLock<Summary>,
-    /// Decoded images of the base colours.
-    images: Vec<OnceLock<Arc<RgbImage>>>,
+    /// Width and height of each image.
+    image_sizes: Vec<OnceLock<[u32; 2]>>,
+    /// Textures by the number of their image, whether it is sRGB, and the levels that they drop.
+    textures: Mutex<HashMap<(usize, bool, u32), Arc<Texture>>>,
 }
 
 impl Loaded {
@@ -36,8 +39,8 @@ impl Loaded {
             p.positions.len() * (12 + normals + colors + 8 * p.uvs.len()) + 12 * p.triangles.len()
         });
         let bytes = bytes.sum::<usize>() as u64;
-        let images = model.images.iter().map(|_| OnceLock::new()).collect();
-        Loaded { model, bytes, summary: OnceLock::new(), images }
+        let image_sizes = model.images.iter().map(|_| OnceLock::new()).collect();
+        Loaded { model, bytes, summary: OnceLock::new(), image_sizes, textures: Mutex::default() }
     }
 
     /// Box around the nodes' meshes in the file's world, metres.
@@ -50,16 +53,38 @@ impl Loaded {
         self.summary.get_or_init(|| self.model.summary())
     }
 
-    /// Returns an image of the file. It is decoded once, within `memory` bytes.
+    /// Returns the width and height of an image of the file.
+    ///
+    /// # Errors
+    /// Those of [`model::ImageSource::size`].
+    pub(super) fn image_size(&self, number: usize, memory: u64) -> Result<[u32; 2]> {
+        if let Some(size) = self.image_sizes[number].get() {
+            return Ok(*size);
+        }
+        let size = self.model.images[number].size(memory)?;
+        Ok(*self.image_sizes[number].get_or_init(|| size))
+    }
+
+    /// Returns a texture of the file without its `dropped` finest levels. It is made once, within `memory`
+    /// bytes.
     ///
     /// # Errors
     /// Those of [`model::ImageSource::decode`].
-    pub(super) fn image(&self, number: usize, memory: u64) -> Result<Arc<RgbImage>> {
-        if let Some(image) = self.images[number].get() {
-            return Ok(image.clone());
+    pub(super) fn texture(
+        &self,
+        image: usize,
+        is_srgb: bool,
+        dropped: u32,
+        memory: u64,
+    ) -> Result<Arc<Texture>> {
+        let mut textures = lock(&self.textures);
+        if let Some(known) = textures.get(&(image, is_srgb, dropped)) {
+            return Ok(known.clone());
         }
-        let image = Arc::new(self.model.images[number].decode(memory)?.to_rgb8());
-        Ok(self.images[number].get_or_init(|| image).clone())
+        let decoded = self.model.images[image].decode(memory)?.to_rgb8();
+        let texture = Arc::new(Texture::new(&decoded, is_srgb, dropped));
+        textures.insert((image, is_srgb, dropped), texture.clone());
+        Ok(texture)
     }
 }
 

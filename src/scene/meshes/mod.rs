@@ -7,6 +7,7 @@ mod faces;
 mod listing;
 mod memo;
 mod opaque;
+mod paint;
 mod shells;
 
 use std::path::{Path, PathBuf};

@@ -65,7 +65,10 @@ pub(super) const MESHES: Group = Group {
             .doc("Width and height of a copy of the volume in a projection.")
             .when("Raise it for coarser matter; lower it for finer."),
         p(COLOR, "", "", Color([0.5, 0.5, 0.5]), Upload)
-            .doc("Albedo of all opaque parts in place of the file's colours, linear RGB.")
+            .doc(
+                "Albedo of all opaque parts in place of the file's colours, textures and roughness, linear \
+                 RGB.",
+            )
             .when("Give one to a mesh without colours, or to look at its shape alone."),
         p("meshes.*.wet", "", "", Float(0.0, 1.0, 0.0), Upload)
             .doc(

@@ -10,6 +10,7 @@ pub mod lockstep;
 pub mod long_walks;
 pub mod meshes;
 pub mod overlap;
+pub mod paint;
 pub mod rasters;
 pub mod ray;
 pub mod shaders;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::mem::offset_of;
 use std::path::Path;
 
+use taki::engine::cpu::gloss;
 use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
     Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Quad, Reflection,
@@ -15,6 +16,7 @@ use taki::engine::gpu::shells;
 use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
 use taki::engine::pool_surface::{AROUND, Foam, Surface, WAVES, Wave};
 use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
+use taki::place::paint::{self, Paint, TextureUse};
 use wgpu::naga;
 
 /// Name of each stage, and its text with all imports.
@@ -200,7 +202,10 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Surface"), surface);
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
-    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout));
+    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout paint coordinates));
+    assert_eq!(members(&module, "TextureUse"), fields!(TextureUse: first size levels rule));
+    let paint = fields!(Paint: color surface relief relief_scale roughness metallic has_gloss slots);
+    assert_eq!(members(&module, "Paint"), paint);
     assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
     assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
@@ -244,6 +249,12 @@ fn constants_are_the_same_on_both_sides() {
     let gbuffer = validate(&stage("gbuffer")).expect("valid");
     let wide = |name: &str| of(&gbuffer, name) as usize;
     assert_eq!(wide("WAVES"), WAVES);
+    assert_eq!(of(&gbuffer, "MOST_STRETCH"), f64::from(paint::MOST_STRETCH));
+    assert_eq!(of(&gbuffer, "MOST_TAPS"), f64::from(paint::MOST_TAPS));
+    assert_eq!(of(&gbuffer, "MIRROR"), f64::from(paint::MIRROR));
+    assert_eq!(of(&gbuffer, "CLAMP"), f64::from(paint::CLAMP));
+    assert_eq!(of(&gbuffer, "DIELECTRIC"), f64::from(gloss::DIELECTRIC));
+    assert_eq!(of(&gbuffer, "LEAST_ALPHA"), f64::from(gloss::LEAST_ALPHA));
     assert_eq!(wide("TILE_ROW"), taki::place::tiles::SIDE as usize + 1);
     assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
@@ -280,7 +291,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 19] = [
+const COMPARED: [&str; 21] = [
     "Develop",
     "Environment",
     "Foam",
@@ -290,12 +301,14 @@ const COMPARED: [&str; 19] = [
     "Light",
     "LightVolume",
     "MeshTile",
+    "Paint",
     "Quad",
     "Reflection",
     "ShellLightPart",
     "Similarity",
     "Strand",
     "Surface",
+    "TextureUse",
     "Tile",
     "VertexMaterial",
     "VolumeConstants",

@@ -177,8 +177,12 @@ fn the_engines_agree_where_opaque_triangles_cut_a_shell() {
             }
         };
         let vertices = [[-1.0, -1.0], [1.0, -1.0], [0.2, 1.0]].map(corner).to_vec();
-        scene.edit().triangles =
-            vec![Triangles { vertices: Arc::new(vertices), holdout: false, shade: MeshShade::default() }];
+        scene.edit().triangles = vec![Triangles {
+            vertices: Arc::new(vertices),
+            holdout: false,
+            shade: MeshShade::default(),
+            painting: None,
+        }];
         agree(&mut renderer, &format!("a wall, from {eye:?}"), &scene, &volumes);
     }
 }

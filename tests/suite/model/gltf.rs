@@ -303,6 +303,7 @@ fn a_material_and_its_textures_are_read() {
     check(&model);
     let a = &model.materials[0];
     assert_eq!((a.base_color, a.roughness, a.metallic), ([0.5, 0.25, 0.125, 1.0], 0.75, 0.5));
+    assert!(a.says_roughness && !model.materials[1].says_roughness);
     assert_eq!((a.double_sided, a.alpha, a.normal_scale), (true, AlphaMode::Mask { cutoff: 0.5 }, 0.5));
     let texture = a.base_color_texture.as_ref().expect("a texture");
     assert_eq!((texture.image, texture.set, texture.nearest), (0, 1, true));

@@ -129,6 +129,7 @@ fn a_library_gives_colour_roughness_and_texture() {
     let [a, b] = &model.materials[..] else { panic!("two materials") };
     assert_eq!((a.base_color, a.metallic), ([0.5, 0.25, 0.125, 0.5], 0.0));
     assert!((a.roughness - 0.35).abs() < 1e-6, "{}", a.roughness);
+    assert!(a.says_roughness && b.says_roughness);
     assert_eq!((b.base_color, b.roughness, b.metallic), ([0.5, 0.5, 0.5, 1.0], 0.25, 1.0));
     let texture = a.base_color_texture.as_ref().expect("a texture");
     assert_eq!(texture.wrap, [Wrap::Clamp; 2]);

@@ -2,6 +2,7 @@
 //! engines.
 
 pub mod mesh_shade;
+pub mod paint;
 pub mod tiles;
 pub mod triangles;
 

@@ -47,8 +47,12 @@ fn scene(vertices: Vec<Vertex>) -> Scene {
     parts.ambient = Vec3::new(0.5, 0.8, 1.0);
     parts.background.zenith = Vec3::new(0.0, 0.0, 2.0);
     parts.background.horizon = parts.background.zenith;
-    parts.triangles =
-        vec![Triangles { vertices: Arc::new(vertices), holdout: false, shade: MeshShade::default() }];
+    parts.triangles = vec![Triangles {
+        vertices: Arc::new(vertices),
+        holdout: false,
+        shade: MeshShade::default(),
+        painting: None,
+    }];
     scene
 }
 

@@ -465,6 +465,7 @@ fn the_opaque_scene_ends_a_ray_inside_a_shell() {
         vertices: Arc::new([0, 1, 2, 0, 2, 3].map(vertex).to_vec()),
         holdout: false,
         shade: MeshShade::default(),
+        painting: None,
     }];
     // Only ambient light, by which the wall's radiance is known.
     parts.lights.clear();

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3, Vec4};
 
 use super::raster::{self, Covered, Rasteriser};
 use super::{Gbuffer, map_hull, map_quad};
+use crate::engine::cpu::gloss::{Looks, Samples};
 use crate::engine::cpu::haze;
 use crate::engine::cpu::lights::background_at;
 use crate::engine::cpu::opaque::Points;
@@ -14,7 +15,7 @@ use crate::engine::cpu::pool;
 use crate::engine::pool_surface::{self, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
-use crate::picture::camera::{DepthRange, DepthToPoint};
+use crate::picture::camera::{DepthRange, DepthToPoint, footprint};
 use crate::picture::{Camera, Image};
 use crate::place::Mesh;
 use crate::scene::{Face, Parts, Scene};
@@ -36,6 +37,8 @@ pub struct Shading<'a> {
     /// The planes of the quads.
     planes: Vec<PlaneView>,
     to_point: DepthToPoint,
+    /// Size of a sample on the image plane at distance 1.
+    sample_angle: f32,
 }
 
 /// One of the samples that a band's triangles are drawn for.
@@ -98,6 +101,7 @@ impl<'a> Shading<'a> {
             eye_local: eye,
             planes: scene.quads.iter().map(|quad| PlaneView::of_quad(&quad.map, eye, rays)).collect(),
             to_point: camera.depth_to_point(depth),
+            sample_angle: footprint(camera, image).sqrt(),
         }
     }
 
@@ -232,7 +236,17 @@ impl<'a> Shading<'a> {
             holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
         }
         let points = Points::at(simd, &self.mesh.vertices, tiles, &spots.places, position);
-        let (mut radiance, mut distance, mut normal) = points.shade(simd, scene, self.shadow_light);
+        let view = points.view(simd, scene);
+        let mut distance = view.distance;
+        let (mut radiance, mut normal) = if tiles.iter().any(|tile| tile.paint > 0) {
+            let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));
+            let rays = forward.plus(right.times(at[0])).plus(up.times(at[1]));
+            let samples = Samples { eye: self.eye, rays, angle: self.sample_angle };
+            let looks = Looks::at(self.mesh, tiles, &spots.places, &points, view.n, &samples);
+            looks.shade(simd, scene, self.shadow_light, &points, view)
+        } else {
+            (points.lambert(simd, scene, self.shadow_light, &view), view.n)
+        };
         let mut of_pools = [0u32; LANES];
         for number in 0..self.pools.len() as u32 {
             for lane in 0..LANES {

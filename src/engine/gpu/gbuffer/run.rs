@@ -106,14 +106,22 @@ impl Run<'_> {
             pass.set_bind_group(0, &self.bind(pipeline, &[(at::FRAME, &self.uniform)], true, None), &[]);
             pass.draw(0..3, 0..1);
             if rock {
-                let pipeline = self.pass.rock(gpu, variant);
+                let pipeline = self.pass.rock(gpu, variant, up.paints.is_some());
                 pass.set_pipeline(pipeline);
-                let buffers = [
+                let mut buffers = vec![
                     (at::FRAME, &self.uniform),
                     (at::LIGHTS, &up.lights),
                     (at::TILES, &up.tiles),
                     (at::COATS, &up.coats),
                 ];
+                if let Some(paints) = &up.paints {
+                    buffers.extend([
+                        (at::POSITIONS, &up.positions),
+                        (at::PAINTS, &paints.paints),
+                        (at::CORNER_UVS, &paints.corner_uvs),
+                        (at::TEXELS, &paints.texels),
+                    ]);
+                }
                 pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, Some(&surface)), &[]);
                 pass.draw(0..3, 0..1);
             }
