@@ -154,7 +154,7 @@ fn a_corner_of_high_walls_leaves_a_quarter_of_the_sky_and_half_the_strength_half
         assert_eq!(half.occlusion, 0.5 * whole.occlusion);
     }
     let mean = whole.iter().map(|v| v.occlusion).sum::<f32>() / whole.len() as f32;
-    // Walls of 60 m leave open what endless ones would not: 0.7452 is the mean of the exact loss on the floor.
+    // Walls of 60 m leave open what endless ones would not: 0.7452 is the exact mean on the floor.
     assert!((mean - 0.7452).abs() < 0.003, "{mean}");
     assert!(none.iter().chain(&alone).all(|vertex| vertex.occlusion == 0.0));
 }
