@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use taki::engine::cpu;
 use taki::model::Wrap;
 use taki::picture::{Camera, Frame};
+use taki::place::{MeshShade, Vertex};
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
 
@@ -363,8 +364,10 @@ fn a_film_of_water_darkens_the_texture_itself() {
     let dark = ["background.zenith=[0,0,0]", "background.horizon=[0,0,0]"];
     let mut scene = folder.scene(&format!("{PLACE}{SCENE}"), &[&FACE_ON[..], &dark].concat());
     let own = &mut scene.edit().triangles[0];
-    let wet = own.vertices.iter().map(|vertex| taki::place::Vertex { wet: 0.75, ..*vertex });
+    let wet = own.vertices.iter().map(|vertex| Vertex { wet: 0.75, ..*vertex });
     own.vertices = std::sync::Arc::new(wet.collect());
+    // The vertices keep what they have.
+    own.shade = MeshShade::default();
     let truth = |p: DVec3, _| {
         let dry = bilinear(&image, [p.x, 1.0 - p.y], [Wrap::Repeat; 2], false);
         // Ångström 1925: what the film reflects back to the ground is 0.474.
