@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::bricks::{self, UploadedBricks};
@@ -346,15 +347,17 @@ impl Resident {
             let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
             let positions: Vec<[f32; 4]> = mesh.vertices.iter().map(position).collect();
             let mut coats: Vec<VertexMaterial> = mesh.vertices.iter().map(VertexMaterial::from).collect();
-            // The buffer is bound even for a scene without a mesh.
+            let mut packed = tiles::packed(&mesh.tiles);
+            // The buffers are bound even for a scene without a mesh.
             coats.resize(coats.len().max(1), VertexMaterial::from(&Vertex::default()));
+            packed.resize(packed.len().max(1), Zeroable::zeroed());
             let (indices, lists) = tiles::lists();
             let storage = wgpu::BufferUsages::STORAGE;
             ResidentMesh {
                 mesh: mesh.clone(),
                 positions: buffer("positions", bytemuck::cast_slice(&positions), storage),
                 coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
-                tiles: buffer("tiles", bytemuck::cast_slice(&tiles::packed(&mesh.tiles)), storage),
+                tiles: buffer("tiles", bytemuck::cast_slice(&packed), storage),
                 paints: UploadedPaints::new(gpu, &mesh.paints),
                 indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
                 lists: Arc::new(lists),

@@ -55,9 +55,10 @@ impl Segment {
 }
 
 /// Space behind a segment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum End {
     /// The next segment.
+    #[default]
     Segment,
     /// The outside of the outer surface.
     Outer,

@@ -287,6 +287,12 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
             (0..2).for_each(|c| walked[c] += u64::from(result.cells[c]));
             lit += u32::from(result.radiance.x > 0.3);
         }
+        // Here each ray walks to the lights for what eight lanes have kept at the vertices.
+        let on_demand = Integrator::new(&scene, &volumes);
+        for (pixel, truth) in pixels.iter().zip(&truth).step_by(5) {
+            let alone = on_demand.pixel(&targets, *pixel, 0, &mut ());
+            assert_eq!(bits(&alone), bits(truth), "{sets:?}, on demand, {pixel:?}: {alone:?} not {truth:?}");
+        }
         for (name, lanes) in Lanes::all() {
             let integrator = prepared().with_lanes(lanes);
             integrator.walker().pixels(&targets, &pixels, 0, |i, seen| {

@@ -454,14 +454,14 @@ fn eight_paths_side_by_side_are_those_of_each_ray_alone() {
             let goes_on = dispatch!(Level::new(), simd => paths.next(simd, bits, &mut side_by_side));
             for lane in (0..8).filter(|lane| bits >> lane & 1 == 1) {
                 let own = alone[lane].next().expect("a segment");
-                let LaneSegments { prism, tetrahedron, t, at, shares } = &side_by_side;
+                let LaneSegments { prism, tetrahedron, t, at, shares, end } = &side_by_side;
                 let seen = Segment {
                     prism: prism[lane],
                     tetrahedron: tetrahedron[lane],
                     t: [t[0].0[lane], t[1].0[lane]],
                     at: [at[0].get(lane), at[1].get(lane)],
                     shares: [shares[0].get(lane), shares[1].get(lane)],
-                    end: own.end,
+                    end: end[lane],
                 };
                 assert_eq!(seen, own);
                 assert_eq!(goes_on >> lane & 1 == 1, own.end == End::Segment);

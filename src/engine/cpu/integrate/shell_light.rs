@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Integrator;
+use super::lockstep::Fill;
 use super::shell::Place;
+use super::{Integrator, Lanes};
 use crate::engine::cpu::visibility::ShellInputs;
 use crate::light::Visibility;
 use crate::mapping::shell::Shell;
@@ -15,7 +17,10 @@ use crate::util::powers::exp2;
 
 /// Depth in bits behind which rays to the light go no further: V is less than 1e-7 there. Twin: `ENOUGH_BITS`
 /// of `shaders/light/shell_depth.wgsl`.
-const ENOUGH_BITS: f32 = 24.0;
+pub const ENOUGH_BITS: f32 = 24.0;
+
+/// Values of V that a thread fills at a time.
+const AT_ONCE: usize = 1 << 12;
 
 /// V at the vertices of shells: for each shell and light, at every vertex, from the outer to the inner
 /// surface. Empty for a shell that keeps none.
@@ -141,8 +146,18 @@ impl Integrator<'_> {
         let kept = |(number, shell): (usize, &Arc<Shell>)| {
             let layers = self.layers(number);
             let count = if self.kept_in[number] { shell.vertices() * (layers + 1) } else { 0 };
-            let of =
-                |i: usize| (0..count).into_par_iter().map(|k| self.visibility_below(number, k, i)).collect();
+            let of = |i: usize| match (self.lanes, Fill::new(self, number, i, layers)) {
+                (Lanes::Lockstep(simd), Some(fill)) => {
+                    let part = |k: usize| {
+                        let numbers = k * AT_ONCE..count.min((k + 1) * AT_ONCE);
+                        dispatch!(simd, simd => fill.values(simd, numbers.clone()))
+                    };
+                    let parts: Vec<Vec<f32>> =
+                        (0..count.div_ceil(AT_ONCE)).into_par_iter().map(part).collect();
+                    parts.concat()
+                }
+                _ => (0..count).into_par_iter().map(|k| self.visibility_below(number, k, i)).collect(),
+            };
             (0..self.lights.len()).map(of).collect()
         };
         ShellLight(self.scene.shells.iter().enumerate().map(kept).collect())

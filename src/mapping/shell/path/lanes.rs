@@ -5,7 +5,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use fearless_simd::u32x8;
 
-use super::{Corner, ShellPath};
+use super::{Corner, End, ShellPath};
 use crate::mapping::shell::{AT_SIDES, FACES, Face, Shell};
 use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words, lanes_of};
 
@@ -50,6 +50,8 @@ pub struct LaneSegments {
     pub at: [Stored3; 2],
     /// Shares of the prism's vertices there.
     pub shares: [Stored3; 2],
+    /// Spaces behind the segments.
+    pub end: [End; LANES],
 }
 
 impl LaneSegments {
@@ -168,23 +170,21 @@ impl<'a> LanePaths<'a> {
             } else {
                 3
             };
-            let ends = match FACES[self.tetrahedron[lane]][opposite] {
-                Face::Tetrahedron(next) => {
-                    self.tetrahedron[lane] = next;
-                    false
-                }
+            out.end[lane] = End::Segment;
+            match FACES[self.tetrahedron[lane]][opposite] {
+                Face::Tetrahedron(next) => self.tetrahedron[lane] = next,
                 Face::Side(edge, half) => match shell.prisms[self.prism[lane]].beyond[edge].get() {
                     Some((prism, edge)) => {
                         self.tetrahedron[lane] = AT_SIDES[edge][half];
                         self.enter(lane, shell, prism);
-                        false
                     }
-                    None => true,
+                    None => out.end[lane] = End::Border,
                 },
-                Face::Surface => true,
-            };
+                Face::Surface if self.tetrahedron[lane] == 0 => out.end[lane] = End::Outer,
+                Face::Surface => out.end[lane] = End::Inner,
+            }
             self.left[lane] -= 1;
-            goes_on |= u8::from(!ends && self.left[lane] > 0) << lane;
+            goes_on |= u8::from(out.end[lane] == End::Segment && self.left[lane] > 0) << lane;
         }
         goes_on
     }
