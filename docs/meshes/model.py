@@ -14,17 +14,21 @@ from mathutils import Vector, noise
 bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-def material(name, colour, image=None):
+def material(name, colour, picture=None, relief=None):
     made = bpy.data.materials.new(name)
     if not made.node_tree:
         made.use_nodes = True
     shader = made.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = 1.0
-    if image:
-        texture = made.node_tree.nodes.new("ShaderNodeTexImage")
-        texture.image = image
-        made.node_tree.links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    if picture:
+        new, join = made.node_tree.nodes.new, made.node_tree.links.new
+        texture, bent = new("ShaderNodeTexImage"), new("ShaderNodeTexImage")
+        normal = new("ShaderNodeNormalMap")
+        texture.image, bent.image = picture, relief
+        join(texture.outputs["Color"], shader.inputs["Base Color"])
+        join(bent.outputs["Color"], normal.inputs["Color"])
+        join(normal.outputs["Normal"], shader.inputs["Normal"])
     return made
 
 
@@ -50,10 +54,10 @@ def add(name, made, rows, uvs, shares=None):
     bpy.context.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-# 2. The rock: an outline (y, z) made rough. It comes up from below, so that the rock is closed behind, and goes
-# along the stream bed to the rim, under the overhang, and down to below the pool, which lies at z = 0.
-OUTLINE = [(11, 0), (8, 2.9), (4, 3.1), (0.5, 2.95), (0, 2.7), (0.2, 2.35), (0.9, 2.0), (0.8, 1.3), (0.4, 0.5),
-           (-0.4, -0.1), (-2, -0.5), (-3, -1.2)]
+# 2. The rock: an outline (y, z) made rough. It comes up from below, so that the rock is closed behind, and
+# goes along the stream bed to the rim, under the overhang, and down to below the pool, which lies at z = 0.
+OUTLINE = [(11, 0), (8, 2.9), (4, 3.1), (0.5, 2.95), (0, 2.7), (0.2, 2.35), (0.9, 2.0), (0.8, 1.3),
+           (0.4, 0.5), (-0.4, -0.1), (-2, -0.5), (-3, -1.2)]
 RIM = 4  # number of the outline's point where the water leaves the rock
 
 
@@ -75,8 +79,17 @@ def rock(x, s):
     return p
 
 
+def image(name, channels, data=False):
+    """Makes a picture of three channels of 0 to 1. Colours are in sRGB; data are taken as they are."""
+    pixels = numpy.stack([*channels, numpy.ones_like(channels[0])], -1).clip(0, 1)
+    made = bpy.data.images.new(name, *pixels.shape[:2], is_data=data)
+    made.pixels = pixels.ravel()
+    made.pack()
+    return made
+
+
 def paint(size=512):
-    """Paints stains, grain and cracks. The sums of waves repeat without a seam."""
+    """Paints stains, grain and cracks, and their relief. Sums of waves repeat without a seam."""
     chance = numpy.random.default_rng(3)
     run = numpy.fft.fftfreq(size, 1 / size)
     frequency = numpy.maximum(numpy.hypot(run, run[:, None]), 1)
@@ -85,12 +98,13 @@ def paint(size=512):
         made = numpy.fft.ifft2(numpy.fft.fft2(chance.normal(size=(size, size))) / frequency**smoothness).real
         return (made - made.mean()) / made.std()
 
-    grey = 0.37 + 0.05 * cloud(1.6) + 0.05 * cloud(0.7) - 0.17 * numpy.exp(-((cloud(1.4) / 0.06) ** 2))
-    colour = [grey * 1.04, grey, grey * (0.88 + 0.03 * cloud(1.6)), numpy.ones_like(grey)]
-    image = bpy.data.images.new("Rock", size, size)
-    image.pixels = numpy.stack(colour, -1).clip(0, 1).ravel()
-    image.pack()
-    return image
+    crack, grain = numpy.exp(-((cloud(1.4) / 0.06) ** 2)), cloud(1.1)
+    grey = 0.37 + 0.05 * cloud(1.6) + 0.06 * grain - 0.17 * crack
+    height = 4 * cloud(1.8) - crack  # in pixels
+    x, y = (numpy.roll(height, 1, axis) - height for axis in (1, 0))
+    normal = numpy.stack([x, y, numpy.ones_like(x)]) / numpy.sqrt(x * x + y * y + 1)
+    return (image("Rock", [grey * 1.04, grey, grey * (0.88 + 0.03 * cloud(1.6))]),
+            image("Relief", 0.5 + 0.5 * normal, data=True))
 
 
 xs = [16 * i / 192 - 8 for i in range(193)]
@@ -98,9 +112,9 @@ rows = []
 for k, ((y0, z0), (y1, z1)) in enumerate(zip(OUTLINE, OUTLINE[1:])):
     count = math.ceil(math.hypot(y1 - y0, z1 - z0) / 0.1)
     rows += [[rock(x, k + j / count) for x in xs] for j in range(count)]
-# A copy of the picture every 4 m. y + z falls both along the bed and down the wall.
+# The texture is 4 m wide. y + z falls both along the bed and down the wall.
 uvs = [[(p.x / 4, -(p.y + p.z) / 4) for p in row] for row in rows]
-add("Rock", material("Rock", (1, 1, 1), paint()), rows, uvs)
+add("Rock", material("Rock", (1, 1, 1), *paint()), rows, uvs)
 
 # 3. The water: along the bed to the rim, then the parabola of free fall. Each row knows its time t.
 SPEED, DEPTH, WIDTH, COLUMNS = 1.6, 0.15, 3.2, 24
@@ -132,7 +146,7 @@ add("Fall", material("Fall", (0.8, 0.9, 1.0)), rows, uvs, [[share(u, t) for u in
 # 4. A camera.
 camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
 camera.location = (2.6, -12.5, 3.0)
-camera.rotation_euler = (math.radians(84.5), 0, math.radians(12))
+camera.rotation_euler = (math.radians(84), 0, math.radians(12))
 bpy.context.collection.objects.link(camera)
 
 # 5. The file, with the colours of the vertices. Blender turns its z into glTF's y.
