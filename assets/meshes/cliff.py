@@ -10,10 +10,11 @@ import math
 import sys
 
 import bpy
+import numpy
 from mathutils import Vector, noise
 
 WIDTH, DEPTH, HEIGHT = 22.0, 16.0, 8.0  # metres
-ACROSS, ALONG = 84, 96  # squares of the rock
+ACROSS, ALONG = 126, 162  # squares of the rock
 LIP_WIDTH = 3.6  # metres
 
 
@@ -24,13 +25,13 @@ def smooth(low, high, x):
 
 def channel(x):
     """Depth of the bed that the water has cut, 0 to 1."""
-    return math.exp(-((x - 0.6 * math.sin(0.35 * x)) / 2.6) ** 2)
+    return math.exp(-(((x - 0.6 * math.sin(0.35 * x)) / 2.0) ** 4))
 
 
 def profile(s):
     """Outline of the cliff from the plateau behind to the ground in front: (y, z) for s from 0 to 1."""
     points = [(8.0, 8.4), (2.2, 8.1), (0.7, 7.9), (0.0, 7.2), (-0.25, 5.2), (0.1, 3.4), (-0.5, 1.2)]
-    points += [(-1.4, 0.1), (-4.0, -0.5), (-9.0, -0.8)]
+    points += [(-0.9, -0.4), (-2.5, -1.0), (-9.0, -1.6)]
     at = s * (len(points) - 1)
     i = min(int(at), len(points) - 2)
     f = at - i
@@ -51,20 +52,20 @@ def rock():
             big = noise.fractal(at * 0.28 + Vector((3.1, 0, 0)), 1.0, 2.1, 6)
             # Beds of rock step out and back with the height, broken into blocks.
             bed = noise.noise(Vector((0.3 * x, 0.3 * y, 1.9 * z + 0.7 * math.sin(0.4 * x))))
-            bed = math.copysign(abs(bed) ** 0.5, bed)
+            bed = math.copysign(abs(bed) ** 0.35, bed)
             block = noise.cell(Vector((1.1 * x + 0.6 * z, 0.0, 1.6 * z)))
             fine = noise.fractal(at * 1.5, 0.75, 2.2, 6)
             cut = channel(x)
-            y -= wall * (1.2 * big + 0.5 * bed + 0.22 * block + 0.42 * fine) * (1 - 0.55 * cut)
-            z += (1 - wall) * (0.7 * big + 0.3 * fine) * (1 - 0.75 * cut)
+            y -= wall * (1.2 * big + 0.5 * bed + 0.22 * block + 0.42 * fine) * (1 - 0.85 * cut)
+            z += (1 - wall) * (0.7 * big + 0.3 * fine) * (1 - 0.95 * cut)
             if j / ALONG < 0.34:
-                z += 1.3 * (1 - cut) - 0.75 * cut
+                z += 1.3 * (1 - cut) - 1.15 * cut
             vertices.append((x, y, z))
     for j in range(ALONG):
         for i in range(ACROSS):
             a = j * (ACROSS + 1) + i
             faces.append((a, a + ACROSS + 1, a + ACROSS + 2, a + 1))
-    return vertices, faces, None, None
+    return vertices, faces, [(x / 4, -(y + z) / 4) for x, y, z in vertices], None
 
 
 def fall():
@@ -103,6 +104,34 @@ def fall():
     return vertices, faces, uvs, share
 
 
+def image(name, channels, data=False):
+    """Makes a picture of three channels of 0 to 1. Colours are in sRGB; data are taken as they are."""
+    pixels = numpy.stack([*channels, numpy.ones_like(channels[0])], -1).clip(0, 1)
+    made = bpy.data.images.new(name, *pixels.shape[:2], is_data=data)
+    made.pixels = pixels.ravel()
+    made.pack()
+    return made
+
+
+def paint(size=256):
+    """Paints stains, grain and cracks, and their relief. Sums of waves repeat without a seam."""
+    chance = numpy.random.default_rng(3)
+    run = numpy.fft.fftfreq(size, 1 / size)
+    frequency = numpy.maximum(numpy.hypot(run, run[:, None]), 1)
+
+    def cloud(smoothness):
+        made = numpy.fft.ifft2(numpy.fft.fft2(chance.normal(size=(size, size))) / frequency**smoothness).real
+        return (made - made.mean()) / made.std()
+
+    crack, grain = numpy.exp(-((cloud(1.4) / 0.06) ** 2)), cloud(1.1)
+    grey = 0.33 + 0.05 * cloud(1.6) + 0.06 * grain - 0.17 * crack
+    height = 2 * cloud(1.8) - 0.5 * crack  # in pixels
+    x, y = (numpy.roll(height, 1, axis) - height for axis in (1, 0))
+    normal = numpy.stack([x, y, numpy.ones_like(x)]) / numpy.sqrt(x * x + y * y + 1)
+    return (image("Rock", [grey * 1.04, grey, grey * (0.88 + 0.03 * cloud(1.6))]),
+            image("Relief", 0.5 + 0.5 * normal, data=True))
+
+
 def add(name, material, colour, parts):
     vertices, faces, uvs, share = parts
     mesh = bpy.data.meshes.new(name)
@@ -124,13 +153,22 @@ def add(name, material, colour, parts):
     shader = made.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = 1.0
+    if name == "Rock":
+        picture, relief = paint()
+        new, join = made.node_tree.nodes.new, made.node_tree.links.new
+        texture, bent = new("ShaderNodeTexImage"), new("ShaderNodeTexImage")
+        normal = new("ShaderNodeNormalMap")
+        texture.image, bent.image = picture, relief
+        join(texture.outputs["Color"], shader.inputs["Base Color"])
+        join(bent.outputs["Color"], normal.inputs["Color"])
+        join(normal.outputs["Normal"], shader.inputs["Normal"])
     mesh.materials.append(made)
     thing = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(thing)
 
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
-add("Rock", "Rock", (0.075, 0.068, 0.058), rock())
+add("Rock", "Rock", (1, 1, 1), rock())
 add("Fall", "Fall", (0.8, 0.9, 1.0), fall())
 bpy.ops.export_scene.gltf(
     filepath=sys.argv[1] if len(sys.argv) > 1 else "cliff.glb",

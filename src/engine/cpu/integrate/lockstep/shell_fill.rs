@@ -1,5 +1,5 @@
-//! V at the vertices of a shell, eight values side by side. Twin of `Integrator::visibility_below`: every value
-//! has the bits that it gets alone.
+//! V at the vertices of a shell, eight values side by side. Twin of `Integrator::visibility_below`: every
+//! value has the bits that it gets alone.
 
 use std::ops::Range;
 
@@ -14,6 +14,7 @@ use crate::engine::cpu::integrate::shell_light::ENOUGH_BITS;
 use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::Light;
 use crate::mapping::shell::{End, LanePaths, LaneSegments, Shell, ShellPath};
+use crate::trace::lookup::Level;
 use crate::util::lanes::{LANES, Lanes3, Mask, Stored, lanes_of};
 use crate::util::powers::exp2;
 use crate::volume::Cell;
@@ -48,7 +49,7 @@ impl<'a> Fill<'a> {
     pub fn new(integrator: &'a Integrator, number: usize, i: usize, layers: usize) -> Option<Self> {
         let shell = &*integrator.scene.shells[number];
         let volume = integrator.volume_of(shell);
-        let store = Store::new(&crate::trace::lookup::Level::new(&volume.levels, 0))?;
+        let store = Store::new(&Level::new(&volume.levels, 0))?;
         let light = &integrator.lights[i];
         Some(Fill { shell, volume, store, light, layers, max_cells: integrator.scene.trace.max_cells })
     }
@@ -81,7 +82,8 @@ impl<'a> Fill<'a> {
         }
     }
 
-    /// Gives a lane the ray of the next value, or of a later one that has a way. Returns whether there is any.
+    /// Gives a lane the ray of the next value, or of a later one that has a way. Returns whether there is
+    /// any.
     fn start(
         &self,
         lane: usize,
