@@ -219,9 +219,9 @@ impl Integrator<'_> {
 
     /// J at a place in a prism that has an area in the texture; see [`Shell::frame`].
     pub(super) fn frame(&self, shell: &Shell, place: &Place) -> Mat3 {
-        let [nx, ny, nz] = self.volume_of(shell).size.map(|n| n as f32);
+        let [nx, ny, nz] = self.volume_of(shell).size.map(|n| 1.0 / n as f32);
         let [x, y, z] = shell.frame(place.tetrahedron[0], place.shares, place.depth);
-        Mat3::from_cols(x / nx, y / ny, z / nz)
+        Mat3::from_cols(x * nx, y * ny, z * nz)
     }
 
     /// Directions in a cell, in the frame where angles are measured.
