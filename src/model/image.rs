@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use image::{DynamicImage, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::budget::Budget;
 use super::paths::read_whole;
@@ -32,7 +32,8 @@ pub enum ImageSource {
 }
 
 impl ImageSource {
-    /// Decodes the image. `memory` are the bytes that the file and its pixels may take.
+    /// Decodes the image. `memory` are the bytes that the file, its pixels and the coarser levels that are
+    /// made of them may take.
     ///
     /// # Errors
     /// [`Error::Input`] where there is no image or it is broken, [`Error::Memory`] where it is too large.
@@ -76,6 +77,9 @@ fn reader(bytes: &[u8]) -> ImageReader<Cursor<&[u8]>> {
 
 /// Width and height of an image.
 fn size(place: &str, bytes: &[u8]) -> Result<(u32, u32)> {
+    if bytes.is_empty() {
+        return Err(fault(place, "the image is empty".into()));
+    }
     let (width, height) = reader(bytes).into_dimensions().map_err(|e| fault(place, e.to_string()))?;
     if width == 0 || height == 0 {
         return Err(fault(place, format!("an image of {width}×{height}")));
@@ -83,10 +87,32 @@ fn size(place: &str, bytes: &[u8]) -> Result<(u32, u32)> {
     Ok((width, height))
 }
 
+/// Bytes that a decoder takes by itself: the window of inflate, and buffers of rows.
+const DECODER_BYTES: u128 = 128 << 10;
+
+/// Bytes for each texel that a decoder takes besides the picture, unless it goes row by row: the coefficients
+/// of a progressive JPEG, or the planes of a WebP.
+const PLANES_BYTES: u128 = 8;
+
+/// Bytes for each texel while an image becomes a texture. Red, green and blue are one each; the first coarser
+/// level has twelve for each of a quarter of the texels, and the next one is made beside it.
+const TEXTURE_BYTES: u128 = 3 + 3 + 1;
+
+/// Most bytes that an image takes at a time, until its texture is made. `texel` is the size of a texel as
+/// decoded.
+fn need(texels: u128, texel: u128, format: Option<ImageFormat>, is_rgb: bool) -> u128 {
+    let decoder = if format == Some(ImageFormat::Png) { 0 } else { PLANES_BYTES };
+    let other = if is_rgb { 0 } else { 3 };
+    texels * (texel + decoder).max(texel + other).max(TEXTURE_BYTES) + DECODER_BYTES
+}
+
 fn decode(place: &str, bytes: &[u8], memory: u64) -> Result<DynamicImage> {
     let (width, height) = size(place, bytes)?;
-    // Decoders hold the picture and as much again.
-    let need = u128::from(width) * u128::from(height) * 16;
+    let format = reader(bytes).format();
+    let decoder = reader(bytes).into_decoder().map_err(|e| fault(place, e.to_string()))?;
+    let color = decoder.color_type();
+    let texels = u128::from(width) * u128::from(height);
+    let need = need(texels, color.bytes_per_pixel().into(), format, color == ColorType::Rgb8);
     if need > u128::from(memory) {
         let what = format!("{place}: an image of {width}×{height}");
         return Err(Error::memory(what, need, memory, "scale the image down, or allow more with --memory"));

@@ -37,9 +37,10 @@ mod obj;
 mod paths;
 mod summary;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 pub use animation::{Channel, Interpolation, ModelAnimation, Pose, Target};
 pub use faces::Face;
@@ -184,16 +185,47 @@ impl Model {
                 ));
             }
         };
-        if model.degenerate > 0 {
-            model.note(format!("{} triangles without area are left out", model.degenerate));
-        }
-        if model.meshes.iter().flat_map(|mesh| &mesh.primitives).all(|p| p.triangles.is_empty()) {
-            model.note("the file has no triangles".into());
-        }
+        model.note_what_has_no_area();
         for note in &model.notes {
             monitor.warn(&format!("{}: {note}", path.display()));
         }
         Ok(model)
+    }
+
+    /// Notes triangles without area, and nodes that take the area of theirs away. Each fault has one note.
+    fn note_what_has_no_area(&mut self) {
+        let shown = |node: &&ModelNode| {
+            node.mesh.is_some_and(|mesh| self.meshes[mesh].primitives.iter().any(|p| !p.triangles.is_empty()))
+        };
+        let flat = |node: &&ModelNode| node.instances.iter().all(is_collapsed);
+        let collapsed: Vec<String> =
+            self.nodes.iter().filter(shown).filter(flat).map(|node| self.name_of(node)).collect();
+        let is_empty = self.meshes.iter().flat_map(|mesh| &mesh.primitives).all(|p| p.triangles.is_empty());
+        match self.degenerate {
+            0 if is_empty => self.note("the file has no triangles".into()),
+            0 => {}
+            n if is_empty => self.note(format!(
+                "none of its {n} triangles has an area, so nothing of it is shown; look at the mesh in the \
+                 program that made it"
+            )),
+            n => self.note(format!("{n} triangles without area are left out")),
+        }
+        match &collapsed[..] {
+            [] => {}
+            [one] => self.note(format!("the scale of the node {one} is 0, so nothing of it is shown")),
+            [first, ..] => self.note(format!(
+                "the scale of {} nodes is 0, so nothing of them is shown; the first is {first}",
+                collapsed.len()
+            )),
+        }
+    }
+
+    /// Name of a node, or of its mesh where it has none.
+    fn name_of(&self, node: &ModelNode) -> String {
+        match node.mesh {
+            Some(mesh) if node.name.is_empty() => self.meshes[mesh].name.clone(),
+            _ => node.name.clone(),
+        }
     }
 
     /// Adds a note, unless there are too many already.
@@ -204,6 +236,12 @@ impl Model {
             _ => {}
         }
     }
+}
+
+/// Tells whether a transform takes all area away: what it makes of space is a line or a point.
+pub(crate) fn is_collapsed(transform: &DAffine3) -> bool {
+    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis];
+    [x.cross(y), y.cross(z), z.cross(x)] == [DVec3::ZERO; 3]
 }
 
 /// Most notes of a model, but for one that says so.
@@ -228,6 +266,17 @@ impl File<'_> {
     fn fault(&self, place: &str, why: impl std::fmt::Display) -> Error {
         self.fault_with(place, why, EXPORT_AGAIN)
     }
+}
+
+/// Tells whether a file is one from which meshes are read, by its extension or its first bytes.
+pub fn is_model(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let starts = || {
+        let mut start = [0; 4];
+        std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok()
+            && start == *b"glTF"
+    };
+    ["glb", "gltf", "obj"].iter().any(|known| extension == *known) || (path.is_file() && starts())
 }
 
 enum Kind {

@@ -71,7 +71,7 @@ impl Model {
                 corners.flat_map(|p| own.instances.iter().map(move |world| world.transform_point3(p)));
             nodes.push(NodeSummary {
                 node,
-                name: if own.name.is_empty() { &self.meshes[mesh].name } else { &own.name }.clone(),
+                name: self.name_of(own),
                 triangles: self.meshes[mesh].primitives.iter().map(|p| p.triangles.len() as u64).sum(),
                 instances: own.instances.len() as u64,
                 bounds: bounds(corners),
@@ -133,6 +133,8 @@ fn around(primitives: &[Primitive]) -> Option<[DVec3; 2]> {
 }
 
 fn bounds(points: impl Iterator<Item = DVec3>) -> Option<[DVec3; 2]> {
+    // What overflows makes the box infinite; min and max alone would lose it.
+    let points = points.map(|p| if p.is_finite() { p } else { DVec3::INFINITY });
     points.fold(None, |found: Option<[DVec3; 2]>, p| {
         let [low, high] = found.unwrap_or([p; 2]);
         Some([low.min(p), high.max(p)])

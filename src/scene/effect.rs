@@ -2,7 +2,7 @@
 
 use super::Values;
 use super::build::EnvironmentKind;
-use super::meshes::{Carrier, Projection};
+use super::meshes::{self, Carrier, Projection};
 use super::names::full_key;
 use super::param::{key_of_volume, matches, split_volume_key};
 use super::read::split;
@@ -127,6 +127,18 @@ const RULES: &[Rule] = &[
         works: |v, switch| is(v, switch, Projection::None.word()),
     },
     Rule {
+        keys: &["meshes.*.wet_reach"],
+        switch: "meshes.*.wet",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["rocks.*.wet_reach"],
+        switch: "rocks.*.wet",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
         keys: &["haze.color", "haze.far", "haze.level", "haze.scale_height"],
         switch: "haze.density",
         needs: "a number above 0",
@@ -195,9 +207,46 @@ pub fn without_effect(values: &Values, key: &str) -> Option<String> {
     if let Some(why) = volumes::without_effect(values, key) {
         return Some(why);
     }
+    if let Some(why) = without_volume(values, key).or_else(|| without_water(values, key)) {
+        return Some(why);
+    }
     let (rule, switch) = rule(values, key)?;
     let now = values.get(&switch).to_toml();
     Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
+}
+
+/// Keys of meshes that place the volume.
+const OF_COVERS: [&str; 3] = ["meshes.*.projection", "meshes.*.projection_size", "meshes.*.uv"];
+
+/// Returns why a key that places the volume on a mesh has no effect: no part of the mesh carries one.
+fn without_volume(values: &Values, key: &str) -> Option<String> {
+    let name = key.split('.').nth(1).filter(|_| OF_COVERS.iter().any(|pattern| matches(pattern, key)))?;
+    let is_bare = meshes::materials_of(values, name).is_empty();
+    is_bare.then(|| format!("{key} has no effect: no part of the mesh has a material of the scene"))
+}
+
+/// Keys of the film of water on rocks and meshes.
+const OF_FILMS: [&str; 4] = ["meshes.*.wet", "meshes.*.wet_reach", "rocks.*.wet", "rocks.*.wet_reach"];
+
+/// Returns why a key of the film of water has no effect: the scene has nothing that wets.
+fn without_water(values: &Values, key: &str) -> Option<String> {
+    let wets = |material: &String| {
+        let own = |what: &str| format!("materials.{material}.{what}");
+        let volume = volumes::volume_of(values, material);
+        let run = || values.choice(&key_of_volume(&volume, "curves.run"), Run::from_word);
+        match values.choice(&own("carrier"), Carrier::from_word) {
+            Carrier::Face => values.float(&own("mist")) == 0.0,
+            // Fibres that stand out of a surface are no water. A volume that the scene lacks is refused.
+            Carrier::Shell => run() == Run::Along,
+        }
+    };
+    let is_dry = || values.names("pools").is_empty() && !volumes::used_materials(values).iter().any(wets);
+    (OF_FILMS.iter().any(|pattern| matches(pattern, key)) && is_dry()).then(|| {
+        format!(
+            "{key} has no effect: the scene has no water that wets, which is a quad, sheet or splash without \
+             mist, a shell of water, or a pool"
+        )
+    })
 }
 
 /// Parameters of the picture as shown, which EXR files do not hold.

@@ -123,6 +123,8 @@ pub struct Parts {
     /// Names of meshes with faces that carry no volume because they have no area in the texture, and the
     /// number of those faces.
     pub unmapped: Vec<(String, u64)>,
+    /// Sentences about textures whose coordinates a mesh lacks.
+    pub untextured: Vec<String>,
     /// Settings of the walk through the volume.
     pub trace: Trace,
     /// Space in which angles are measured.
@@ -262,10 +264,17 @@ impl Scene {
     /// `Error::Usage` where a `--set` has no value. `Error::Io` where a file cannot be read. Otherwise those
     /// of [`Scene::from_values`].
     pub fn load(scene: &Path, sets: &[String], limits: &Limits) -> Result<Scene> {
-        let source = Source::find(scene)?;
+        Scene::of_source(&Source::find(scene)?, sets, limits)
+    }
+
+    /// Makes a scene of its text, as [`Scene::load`] does.
+    ///
+    /// # Errors
+    /// Those of [`Scene::load`].
+    pub fn of_source(source: &Source, sets: &[String], limits: &Limits) -> Result<Scene> {
         let mut values = source.values()?;
         let record = Record::of(&source.text, &mut values);
-        let folder = read::apply_sets(&mut values, sets, &source, limits)?;
+        let folder = read::apply_sets(&mut values, sets, source, limits)?;
         record.as_ref().map_or(Ok(()), |record| record.check_map(&values))?;
         Ok(Scene::from_values(&source.name, values, folder.as_deref(), limits)?.recorded(record))
     }
@@ -308,6 +317,7 @@ impl Scene {
             shades: limits.models.shades.clone(),
             meshes,
             unmapped: surfaces.unmapped,
+            untextured: surfaces.untextured,
             trace: build::trace(v),
             angles: v.choice("light.frame", AngleFrame::from_word),
             visibility: v.choice("light.visibility", Visibility::from_word),
@@ -609,6 +619,7 @@ impl Scene {
         warnings.extend(self.unmapped.iter().map(|(name, count)| {
             format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
         }));
+        warnings.extend(self.untextured.iter().cloned());
         let paintings = self.triangles.iter().filter_map(|own| own.painting.as_deref());
         if let (textures @ 1.., levels) = coarsened(paintings, MOST_BYTES) {
             warnings.push(format!(
@@ -621,8 +632,7 @@ impl Scene {
         let has_water = !self.quads.is_empty() || !self.shells.is_empty();
         let is_bare = self.rocks.is_empty() && self.pools.is_empty() && self.triangles.is_empty();
         if !has_water && is_bare {
-            warnings
-                .push("the scene is empty: add [[quads]] or a rock to see more than the background".into());
+            warnings.extend(self.why_empty().map(str::to_owned));
         } else if unlit {
             warnings.push("the scene has no light: add [lights.NAME] or light.ambient".into());
         } else if has_water {
@@ -635,6 +645,23 @@ impl Scene {
         }
         warnings.extend(origin::rounded(self));
         warnings
+    }
+}
+
+impl Scene {
+    /// Returns why a scene without any surface is empty; `None` where notes of its meshes say so already.
+    fn why_empty(&self) -> Option<&'static str> {
+        let is_silent = |mesh: &SceneMesh| mesh.loaded.model.notes.is_empty();
+        match &self.meshes[..] {
+            [] => Some("the scene is empty: add [[quads]] or a rock to see more than the background"),
+            all if all.iter().any(SceneMesh::has_triangles) => {
+                Some("the meshes show nothing: all their parts are none")
+            }
+            all if all.iter().all(is_silent) => {
+                Some("the meshes show nothing: no node of their files places a mesh")
+            }
+            _ => None,
+        }
     }
 }
 

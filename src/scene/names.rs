@@ -1,5 +1,6 @@
 //! Keys as users write them: in full, by their last part alone, or misspelt.
 
+use super::meshes;
 use super::param::{Kind, PARAMS, Param, WATER, last_part, matches, split_volume_key};
 use super::remove::{NUMBERED, REMOVE};
 use super::value::{Place, Raw, Values, check};
@@ -105,6 +106,9 @@ pub(super) const AT_THE_TOP: [&str; 3] = ["version", "base", REMOVE];
 /// suggests the nearest key that the scene has so far, or one that has the misspelt key's own name. `raw` is
 /// the value of the key.
 pub fn unknown_key_in_file(key: &str, raw: &Raw, values: &Values, place: &Place) -> Error {
+    if let Some(advice) = meshes::dotted(key) {
+        return Error::input(format!("{}: unknown key {key}", place.0), advice);
+    }
     if let Some(top) = AT_THE_TOP.iter().find(|top| last_part(key) == **top) {
         let what = format!("{}: unknown key {key}", place.0);
         return Error::input(what, format!("write the line {top} = … above the first table"));
@@ -291,6 +295,9 @@ fn misplaced(key: &str) -> Option<String> {
     let parts: Vec<&str> = key.split('.').collect();
     if NAMED.contains(&key) || NUMBERED.contains(&key) {
         return Some(own_header(key));
+    }
+    if let Some(advice) = meshes::dotted(key) {
+        return Some(advice);
     }
     let named = NAMED.contains(&parts[0]);
     if named && parts[1..].contains(&"") {

@@ -9,7 +9,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::param::{PARAMS, Param, WATER};
 use super::read::VERSION;
-use super::{Recipe, Scene, SceneMesh, Values, build};
+use super::{Recipe, Scene, SceneMesh, Values, build, meshes};
 use crate::light::Light;
 use crate::light::environment::{ANGULAR_RADIUS, Environment};
 use crate::mapping::Quad;
@@ -85,7 +85,7 @@ impl Values {
                 };
                 open = own_table;
             }
-            let name = quoted(key.rsplit('.').next().unwrap_or(key));
+            let name = quoted(&meshes::written(key));
             let _ = writeln!(text, "{name} = {}", self.get(key).to_toml());
         }
         text
@@ -125,7 +125,7 @@ impl Scene {
         root.insert("version".into(), json!(VERSION));
         root.insert("name".into(), json!(self.name));
         for key in self.keys() {
-            insert(&mut root, &key, self.written().get(&key).to_json());
+            insert(&mut root, &key, &meshes::written(&key), self.written().get(&key).to_json());
         }
         if let Some(Json::Object(quads)) = root.remove("quads") {
             root.insert("quads".into(), numbered_list(quads));
@@ -270,7 +270,7 @@ fn numbered_list(object: Map<String, Json>) -> Json {
 
 /// Returns a name as a TOML key: bare where TOML allows that, otherwise a JSON string. TOML has the escapes
 /// of JSON but also requires one for U+007F.
-fn quoted(name: &str) -> String {
+pub(super) fn quoted(name: &str) -> String {
     if name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
         name.into()
     } else {
@@ -278,16 +278,16 @@ fn quoted(name: &str) -> String {
     }
 }
 
-/// Sets a dotted key, and makes the objects on its way.
-fn insert(map: &mut Map<String, Json>, key: &str, value: Json) {
+/// Sets a dotted key, whose last part is called `last`, and makes the objects on its way.
+fn insert(map: &mut Map<String, Json>, key: &str, last: &str, value: Json) {
     match key.split_once('.') {
         None => {
-            map.insert(key.into(), value);
+            map.insert(last.into(), value);
         }
         Some((first, rest)) => {
             let slot = map.entry(first).or_insert_with(|| Json::Object(Map::new()));
             if let Json::Object(inner) = slot {
-                insert(inner, rest, value);
+                insert(inner, rest, last, value);
             }
         }
     }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::meshes::Carrier;
 use super::names::likeliest;
-use super::param::POINT_MAX;
+use super::param::{POINT_MAX, WATER};
 use super::read::MAX_QUADS;
 use super::volumes::{used_materials, volume_of};
 use super::{Recipe, Values};
@@ -74,8 +74,10 @@ pub(super) fn unused_materials(v: &Values) -> Vec<String> {
     let names = v.names("materials").into_iter();
     let unused = names.filter(|name| {
         let path = format!("materials.{name}");
-        // A scene without water of its own uses none of the materials of its base.
-        !used.is_empty() && !used.contains(name) && !v.has_base_under(&path)
+        // A scene without water of its own uses none of the materials of its base, and a printed scene has
+        // the water that every scene has.
+        let is_every_scenes = name == WATER && is_default(v, &path);
+        !used.is_empty() && !is_every_scenes && !used.contains(name) && !v.has_base_under(&path)
     });
     let warning = |name: String| {
         let fix = match likeliest(&name, used.iter().map(String::as_str)) {
@@ -85,6 +87,13 @@ pub(super) fn unused_materials(v: &Values) -> Vec<String> {
         format!("nothing has the material {name}: {fix}")
     };
     unused.map(warning).collect()
+}
+
+/// Whether all keys of the table `path` have their defaults.
+fn is_default(v: &Values, path: &str) -> bool {
+    let plain = Values::default();
+    let is_own = |key: &String| key.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
+    v.keys().iter().filter(|key| is_own(key)).all(|key| v.get(key) == plain.get(key))
 }
 
 /// Returns the material that `key` names, and its mist. `what` names the user of the material in messages.

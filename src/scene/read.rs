@@ -11,12 +11,13 @@ use toml::de::{DeTable, DeValue};
 use super::names::NAMED;
 use super::names::{check_names, full_key, in_table_of_water, likeliest, unknown_key};
 use super::param::{Kind, PARAMS, Param, key_of_volume};
+use super::print::quoted;
 use super::remove::{self, REMOVE};
 use super::slips::{foreign_signs_at, given_twice, not_allowed, slip_at};
 use super::typed::{parse_for, parse_value};
 use super::value::{Key, Place, Raw, Values};
 use super::{Limits, build, meshes, presets, quads, volumes};
-use crate::model::folded_name;
+use crate::model::{folded_name, is_model};
 use crate::output::frame::{folder_of, scene_in};
 use crate::util::error::{Error, Result};
 
@@ -26,6 +27,16 @@ const MAX_BYTES: u64 = 16 << 20;
 pub const MAX_QUADS: usize = 65_536;
 /// Version of the scene format that this program reads and writes.
 pub const VERSION: i64 = 1;
+
+/// A scene to which a mesh is added.
+const AROUND_MESH: &str = "version = 1
+[environment]
+kind = \"sky\"
+[image]
+width = 960
+height = 540
+samples = 4
+";
 
 /// Name that stands for a scene on stdin.
 pub const STDIN: &str = "-";
@@ -82,6 +93,22 @@ impl Source {
                 "give a scene file or a preset",
             ));
         }
+        if is_model(scene) {
+            let file = scene.display();
+            return Err(Error::input(
+                format!("{file} is a mesh, not a scene"),
+                format!(
+                    "a scene shows it with the lines [meshes.NAME] and file = {:?}, a path from the scene's \
+                     folder; {}drop it on the viewer",
+                    scene.file_name().unwrap_or_default().to_string_lossy(),
+                    if cfg!(feature = "viewer") {
+                        format!("or open it with taki view {file}, or ")
+                    } else {
+                        "or ".into()
+                    }
+                ),
+            ));
+        }
         if let Some(text) = scene_in(scene) {
             return Source::picture(scene, text);
         }
@@ -94,6 +121,18 @@ impl Source {
         let bytes = std::fs::read(scene).map_err(|e| Error::read(scene, e))?;
         let text = utf8(bytes, &scene.display().to_string())?;
         Ok(Source::file(scene, text))
+    }
+
+    /// Makes a scene around the mesh of a file: its text shows the mesh under a clear sky.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file's name is not UTF-8.
+    pub fn around_mesh(path: &Path, name: &str) -> Result<Source> {
+        let Some(file) = path.file_name().and_then(|name| name.to_str()) else {
+            return Err(Error::input(format!("{} is not UTF-8", path.display()), "rename the file"));
+        };
+        let mesh = format!("[meshes.{}]\nfile = {}\n", quoted(name), serde_json::json!(file));
+        Ok(Source::file(path, AROUND_MESH.to_owned() + &mesh))
     }
 
     fn file(path: &Path, text: String) -> Source {
@@ -332,11 +371,12 @@ impl File<'_> {
                 if table.is_empty() {
                     return self.empty(path, value, values);
                 }
-                let is_of_mesh = meshes::is_materials(path);
-                table.iter().try_for_each(|(key, value)| {
-                    let key = key.get_ref();
-                    let key = if is_of_mesh { folded_name(key).into() } else { key.clone() };
-                    self.keys(&format!("{path}.{key}"), value, values)
+                if meshes::is_materials(path) {
+                    return self.materials_of_mesh(path, table, values);
+                }
+                let mut keys = table.iter();
+                keys.try_for_each(|(key, value)| {
+                    self.keys(&format!("{path}.{}", key.get_ref()), value, values)
                 })
             }
             // The scene's own tracks replace all tracks of its base, as its quads do.
@@ -349,6 +389,16 @@ impl File<'_> {
             }
             leaf => values.set(path, &raw(leaf), &self.place(value.span().start)),
         }
+    }
+
+    /// Reads what the materials of a mesh's file become. Names that have underscores in place of blanks and
+    /// dots go first, as they take the place of the others.
+    fn materials_of_mesh(&self, path: &str, table: &DeTable, values: &mut Values) -> Result<()> {
+        let mut names: Vec<_> = table.iter().map(|(key, value)| (key.get_ref(), value)).collect();
+        names.sort_by_key(|(name, _)| folded_name(name) != **name);
+        names.into_iter().try_for_each(|(name, value)| {
+            self.keys(&format!("{path}.{}", meshes::in_key(name)), value, values)
+        })
     }
 
     /// Checks that the parts of this file have the corners or points that they need, and a material that
@@ -402,7 +452,7 @@ impl File<'_> {
                     && let Some(own) = part.get_ref().as_table().and_then(|part| part.get("materials"))
                     && let Some(own) = own.get_ref().as_table()
                 {
-                    let key = |name: &str| format!("{path}.materials.{}", folded_name(name));
+                    let key = |name: &str| format!("{path}.materials.{name}");
                     named.extend(own.iter().map(|(name, material)| (key(name.get_ref()), material)));
                 }
                 for (key, material) in named {
@@ -553,6 +603,7 @@ pub fn apply_set(values: &mut Values, setting: &str) -> Result<()> {
     let Some((key, text)) = split(setting) else {
         return Err(Error::Usage(format!("--set {setting} has no value; write --set KEY=VALUE")));
     };
+    let key = &meshes::unquoted(key);
     if key == REMOVE {
         let place = Place(format!("--{REMOVE}"));
         let texts = remove::texts(&parse_value(text)).ok_or_else(|| {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::meshes;
 use super::names::{in_table_of_water, unknown_key_in_file};
 use super::param::{COLOR_MAX, Kind, MAX_FRAME, MAX_KEYFRAMES, POINT_MAX, Param};
 use super::slips::{advice, cut, not_allowed};
@@ -118,6 +119,9 @@ impl Values {
         };
         let value =
             check(param, raw).map_err(|got| not_allowed(place, key, &got, param, advice(param, raw)))?;
+        for other in meshes::other_spellings(self, key) {
+            self.0.remove(&Key::new(&other));
+        }
         let key = Key::new(key);
         self.1.remove(&key);
         self.0.insert(key, value);

@@ -10,6 +10,7 @@ use std::sync::{Arc, LazyLock};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::navigate::Pose;
+use crate::model::is_model;
 use crate::output::frame::scene_in;
 use crate::scene::{
     Key, Kind, Limits, Param, Place, Raw, Record, STDIN, Scene, Source, Value, Values, has_reference_by_hand,
@@ -38,7 +39,7 @@ pub struct Document {
     limits: Limits,
     /// Record of the picture that the scene was read from.
     record: Option<Record>,
-    /// The name of the scene for a command line. `None` if it came from stdin.
+    /// The name of the scene for a command line. `None` if it has no file.
     source: Option<PathBuf>,
     values: Values,
     /// The values when the scene was last opened or saved.
@@ -56,17 +57,18 @@ pub struct Document {
 }
 
 impl Document {
-    /// Opens a preset or a file. The `--set` arguments in `sets` count as edits.
+    /// Opens a preset or a file; a mesh stands in a new scene. The `--set` arguments in `sets` count as edits.
     ///
     /// # Errors
     /// If the file cannot be read, or the scene is not valid.
     pub fn open(source: &Path, sets: &[String], limits: &Limits) -> Result<Document> {
-        let origin = Source::find(source)?;
-        let plain = Scene::load(source, &[], limits)?;
-        let scene = if sets.is_empty() { plain.clone() } else { Scene::load(source, sets, limits)? };
         let is_preset = crate::scene::presets().any(|(name, _)| Path::new(name) == source);
         let is_stdin = source == Path::new(STDIN);
-        let is_file = !is_preset && !is_stdin && scene_in(source).is_none();
+        let is_mesh = !is_preset && !is_stdin && source.is_file() && is_model(source);
+        let origin = if is_mesh { files::around_mesh(source, limits)? } else { Source::find(source)? };
+        let plain = Scene::of_source(&origin, &[], limits)?;
+        let scene = if sets.is_empty() { plain.clone() } else { Scene::of_source(&origin, sets, limits)? };
+        let is_file = !is_preset && !is_stdin && !is_mesh && scene_in(source).is_none();
         let by_hand = has_reference_by_hand(plain.written(), sets);
         Ok(Document {
             name: origin.name,
@@ -74,7 +76,7 @@ impl Document {
             folder: (!by_hand).then_some(origin.folder),
             limits: limits.clone(),
             record: scene.record(),
-            source: (!is_stdin).then(|| source.to_owned()),
+            source: (!is_stdin && !is_mesh).then(|| source.to_owned()),
             values: scene.written().clone(),
             saved: plain.written().clone(),
             undo: Vec::new(),

@@ -166,6 +166,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         // What became of meshes is in the quads, the shells and the mesh.
         meshes: _,
         unmapped: _,
+        untextured: _,
         pools,
         trace,
         angles: _,

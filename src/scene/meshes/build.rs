@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::paint::Plan;
+use super::paint::{Plan, untextured};
 use super::{Becomes, Carrier, Projection, SceneMesh, ThicknessFrom, faces, opaque, shells};
 use crate::light::Scattering;
 use crate::mapping::shell::{Shell, Side};
 use crate::mapping::{Material, Quad};
-use crate::model::Primitive;
+use crate::model::{Primitive, is_collapsed};
 use crate::place::{MAX_ADDED, SHADE_BYTES, Triangles, Vertex};
 use crate::scene::read::MAX_QUADS;
 use crate::scene::{Limits, Recipe, Values};
@@ -59,6 +59,8 @@ pub(super) struct Built {
     pub shells: Vec<Arc<Shell>>,
     /// Faces that carry no volume, because their texture coordinates span no area.
     pub unmapped: u64,
+    /// Sentences about textures whose coordinates the mesh lacks.
+    pub untextured: Vec<String>,
 }
 
 /// Surfaces of all meshes of a scene.
@@ -69,6 +71,8 @@ pub(in crate::scene) struct Surfaces {
     pub shells: Vec<Arc<Shell>>,
     /// Faces without an area in the texture, and the name of their mesh.
     pub unmapped: Vec<(String, u64)>,
+    /// Sentences about textures whose coordinates a mesh lacks.
+    pub untextured: Vec<String>,
 }
 
 /// A primitive at one of its places.
@@ -102,7 +106,8 @@ impl Key {
         let scaled = DAffine3::from_scale(DVec3::splat(self.mesh.scale));
         let shown = model.nodes.iter().filter_map(|node| Some((node.mesh?, &node.instances)));
         shown.flat_map(move |(mesh, instances)| {
-            instances.iter().flat_map(move |world| {
+            // What has no area is left out; a note of the file tells of it.
+            instances.iter().filter(|world| !is_collapsed(world)).flat_map(move |world| {
                 let local = place * *world;
                 let flipped = local.matrix3.determinant() < 0.0;
                 let own = scaled * *world;
@@ -174,6 +179,7 @@ pub(in crate::scene) fn build(
             Ok(Built {
                 triangles: opaque::triangles(key, limits.memory)?,
                 shells: shells::shells(key)?,
+                untextured: untextured(key),
                 ..faces::quads(key)?
             })
         })?;
@@ -181,6 +187,7 @@ pub(in crate::scene) fn build(
         all.triangles.extend(built.triangles.as_ref().map(shaded));
         all.quads.extend_from_slice(&built.quads);
         all.shells.extend(built.shells.iter().cloned());
+        all.untextured.extend(built.untextured.iter().cloned());
         if built.unmapped > 0 {
             all.unmapped.push((mesh.name.clone(), built.unmapped));
         }
@@ -203,10 +210,15 @@ fn share_added(all: &mut [Triangles], memory: u128) {
 }
 
 impl SceneMesh {
+    /// Whether its file shows any triangle.
+    pub(in crate::scene) fn has_triangles(&self) -> bool {
+        !self.used().is_empty()
+    }
+
     /// What the parts that are shown become.
     pub(super) fn used(&self) -> BTreeSet<&Becomes> {
         let model = &self.loaded.model;
-        let shown = model.nodes.iter().filter(|node| !node.instances.is_empty());
+        let shown = model.nodes.iter().filter(|node| !node.instances.iter().all(is_collapsed));
         let primitives = shown.filter_map(|node| node.mesh).flat_map(|mesh| &model.meshes[mesh].primitives);
         primitives.filter(|primitive| !primitive.triangles.is_empty()).map(|p| self.becomes(p)).collect()
     }

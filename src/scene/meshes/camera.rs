@@ -6,6 +6,7 @@ use super::{SceneMesh, listed, named};
 use crate::light::{Cone, Light};
 use crate::model::{CameraLens, LightKind, find_name};
 use crate::scene::Values;
+use crate::scene::param::POINT_MAX;
 use crate::scene::value::{Place, Raw};
 use crate::util::error::{Error, Result};
 
@@ -106,6 +107,13 @@ pub(in crate::scene) fn lights(meshes: &[SceneMesh], origin: DVec3) -> Result<Ve
             }
             if intensity == Vec3::ZERO {
                 continue;
+            }
+            let far = !(world.translation.abs().max_element() <= POINT_MAX);
+            if far && !matches!(light.kind, LightKind::Directional) {
+                return Err(Error::input(
+                    format!("mesh {}: the light {} is too far from the scene's origin", mesh.name, node.name),
+                    format!("move it to within ±{POINT_MAX:e} m in the program that made it"),
+                ));
             }
             let position = (world.translation - origin).as_vec3();
             lights.push(match light.kind {

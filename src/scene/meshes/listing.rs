@@ -6,7 +6,8 @@ use glam::Vec2;
 use serde_json::{Value as Json, json};
 
 use super::SceneMesh;
-use crate::model::folded_name;
+use super::names::{shown, written};
+use crate::scene::print::quoted;
 
 /// Most nodes and materials that a listing names.
 const MOST: usize = 64;
@@ -34,8 +35,7 @@ impl SceneMesh {
         let last = self.becomes.len() - 1;
         materials
             .map(|own| PartSummary {
-                key: (own.material.is_some() && !own.name.is_empty())
-                    .then(|| format!("meshes.{}.materials.{}", self.name, folded_name(&own.name))),
+                key: own.material.and_then(|i| self.keys[i].clone()),
                 triangles: own.triangles,
                 uvs: own.uvs.clone(),
                 becomes: self.becomes[own.material.unwrap_or(last)].word().into(),
@@ -72,7 +72,11 @@ impl SceneMesh {
         }
         for part in self.parts().iter().take(MOST) {
             let name = match &part.key {
-                Some(_) => format!("material {}", folded_name(&plain(&part.material))),
+                Some(key) => {
+                    let (name, key) = (plain(&part.material), quoted(&written(key)));
+                    let key = if key == name { String::new() } else { format!(" (key {key})") };
+                    format!("material {name}{key}")
+                }
                 None => "without a material".into(),
             };
             let _ = write!(text, "#   {name}: {} triangles, {}", part.triangles, part.becomes);
@@ -104,7 +108,7 @@ impl SceneMesh {
             })).collect::<Vec<_>>(),
             "materials": self.parts().iter().map(|part| json!({
                 "name": part.material,
-                "key": part.key,
+                "key": part.key.as_deref().map(shown),
                 "triangles": part.triangles as u64,
                 "becomes": part.becomes,
                 "uvs": part.uvs.iter().map(range).collect::<Vec<_>>(),

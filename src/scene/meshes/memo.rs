@@ -81,7 +81,7 @@ impl Loaded {
         if let Some(known) = textures.get(&(image, is_srgb, dropped)) {
             return Ok(known.clone());
         }
-        let decoded = self.model.images[image].decode(memory)?.to_rgb8();
+        let decoded = self.model.images[image].decode(memory)?.into_rgb8();
         let texture = Arc::new(Texture::new(&decoded, is_srgb, dropped));
         textures.insert((image, is_srgb, dropped), texture.clone());
         Ok(texture)

@@ -6,6 +6,7 @@ mod coordinates;
 mod faces;
 mod listing;
 mod memo;
+mod names;
 mod opaque;
 mod paint;
 mod shells;
@@ -19,13 +20,15 @@ pub(super) use build::build;
 pub(super) use camera::{lights, with_camera};
 pub use listing::PartSummary;
 pub use memo::{Loaded, ModelMemo};
+use names::{Named, listed};
+pub(super) use names::{dotted, in_key, other_spellings, unquoted, written};
 
 use super::build::confine;
 use super::names::likeliest;
-use super::quads::unknown_material;
+use super::param::POINT_MAX;
 use super::{Limits, Values};
 use crate::mapping::shell::Side;
-use crate::model::{Model, Primitive, find_name, folded_name};
+use crate::model::Primitive;
 use crate::place::{MeshShade, Show};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
@@ -92,12 +95,14 @@ pub(super) fn is_hidden(v: &Values, key: &str) -> bool {
 
 /// Returns the names of the scene's materials that parts of meshes have.
 pub(super) fn named_materials(v: &Values) -> Vec<String> {
-    let of_mesh = |name: String| {
-        let own = v.names(&format!("meshes.{name}.materials")).into_iter();
-        let keys = own.map(|own| format!("meshes.{name}.materials.{own}")).collect::<Vec<_>>();
-        keys.into_iter().chain([format!("meshes.{name}.material")])
-    };
-    let keys = v.names("meshes").into_iter().flat_map(of_mesh);
+    v.names("meshes").into_iter().flat_map(|name| materials_of(v, &name)).collect()
+}
+
+/// Returns the names of the scene's materials that parts of the mesh `name` have.
+pub(super) fn materials_of(v: &Values, name: &str) -> Vec<String> {
+    let own = v.names(&format!("meshes.{name}.materials")).into_iter();
+    let keys = own.map(|own| format!("meshes.{name}.materials.{own}"));
+    let keys = keys.chain([format!("meshes.{name}.material")]);
     keys.map(|key| v.text(&key)).filter(|name| !is_word(name)).collect()
 }
 
@@ -148,6 +153,8 @@ pub struct SceneMesh {
     pub holdout: bool,
     /// What the parts with each material of the file become, and last those without a material.
     pub becomes: Vec<Becomes>,
+    /// Keys of what the materials of the file become; `None` for one without a name.
+    keys: Vec<Option<String>>,
     /// Set of texture coordinates.
     pub uv: usize,
     /// Texture coordinates in place of the file's, and the size of a copy of the volume in them, metres.
@@ -185,9 +192,11 @@ impl SceneMesh {
                 "an albedo is at most 1 in each component; write \"#rrggbb\" for numbers up to 255",
             ));
         }
-        Ok(SceneMesh {
+        let Named { becomes, keys } = Named::new(v, name, &file, &loaded.model)?;
+        let mesh = SceneMesh {
             name: name.into(),
-            becomes: becomes(v, name, &file, &loaded.model)?,
+            becomes,
+            keys,
             file,
             loaded,
             place: mesh_place(v, name),
@@ -207,7 +216,34 @@ impl SceneMesh {
                 wet_reach: v.float(&key("wet_reach")),
                 most_added: 0,
             },
-        })
+        };
+        mesh.check_place()?;
+        Ok(mesh)
+    }
+
+    /// Checks that all of the mesh lies where a scene's points may.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the node that lies outside.
+    fn check_place(&self) -> Result<()> {
+        let farthest = |bounds| {
+            let corners = box_corners(bounds).map(|corner| self.place.transform_point3(corner).abs());
+            let far = corners.map(|p| if p.is_finite() { p.max_element() } else { f64::INFINITY });
+            far.into_iter().fold(0.0, f64::max)
+        };
+        for node in &self.loaded.summary().nodes {
+            let Some(far) = node.bounds.map(farthest).filter(|far| *far > POINT_MAX) else { continue };
+            let at = if far.is_finite() { format!("{far:.3e} m") } else { "infinitely far".into() };
+            let (mesh, file) = (&self.name, self.file.display());
+            return Err(Error::input(
+                format!("mesh {mesh}: the node {} of {file} reaches {at} from the scene's origin", node.name),
+                format!(
+                    "a scene's points lie within ±{POINT_MAX:e} m: move or scale the node in the program \
+                     that made it, or lower meshes.{mesh}.scale"
+                ),
+            ));
+        }
+        Ok(())
     }
 
     /// What a primitive becomes.
@@ -247,50 +283,6 @@ pub fn mesh_place(v: &Values, name: &str) -> DAffine3 {
 pub fn turn_of(degrees: DVec3) -> DQuat {
     let [x, y, z] = degrees.to_array().map(f64::to_radians);
     DQuat::from_euler(EulerRot::ZYX, z, y, x)
-}
-
-/// Returns what the materials of a file become, and last the parts without a material.
-fn becomes(v: &Values, name: &str, file: &Path, model: &Model) -> Result<Vec<Becomes>> {
-    let (table, default) = (format!("meshes.{name}.materials"), format!("meshes.{name}.material"));
-    let own = |key: &str| -> Result<Becomes> {
-        let word = v.text(key);
-        match unknown_material(&word, &v.names("materials")).filter(|_| !is_word(&word)) {
-            None => Ok(Becomes::new(word)),
-            Some(fix) => Err(Error::input(
-                format!("{key} = {word:?}: the scene has no such material"),
-                format!("{fix}; a part can also be {OPAQUE}, or {NONE}"),
-            )),
-        }
-    };
-    let mut all = vec![own(&default)?; model.materials.len() + 1];
-    let names = || model.materials.iter().map(|material| material.name.as_str());
-    for wanted in v.names(&table) {
-        let key = format!("{table}.{wanted}");
-        let becomes = own(&key)?;
-        if let Err(near) = find_name(&wanted, names()) {
-            let near = near.map_or(String::new(), |near| format!("did you mean {}? ", folded_name(near)));
-            return Err(Error::input(
-                format!("{key}: {} has no material {wanted}", file.display()),
-                format!("{near}It has {}", listed(names())),
-            ));
-        }
-        for (i, own) in names().enumerate() {
-            if folded_name(own) == folded_name(&wanted) {
-                all[i] = becomes.clone();
-            }
-        }
-    }
-    Ok(all)
-}
-
-/// Joins at most 16 names of a file.
-fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let names: Vec<String> = names.map(folded_name).collect();
-    match names.len() {
-        0 => "none".into(),
-        1..=16 => names.join(", "),
-        n => format!("{} and {} more", names[..16].join(", "), n - 16),
-    }
 }
 
 /// Reads the meshes of a scene that are not hidden.

@@ -1,6 +1,6 @@
 //! Textures and roughness of the opaque parts of a mesh.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -143,6 +143,43 @@ impl Plan {
         }
         Ok(Some(Arc::new(Painting { textures, finishes: self.finishes, stretches, coordinates })))
     }
+}
+
+/// Most sentences about textures without coordinates.
+const MOST_SENTENCES: usize = 8;
+
+/// Returns a sentence about each material of the opaque parts of a mesh with a texture whose coordinates the
+/// mesh does not have. Such a texture is left out.
+pub(super) fn untextured(key: &Key) -> Vec<String> {
+    if key.mesh.color.is_some() {
+        return Vec::new();
+    }
+    let materials = &key.mesh.loaded.model.materials;
+    let mut lacking: BTreeMap<(usize, u32), usize> = BTreeMap::new();
+    for part in key.parts().filter(|part| key.is_opaque(part)) {
+        let Some(number) = part.primitive.material else { continue };
+        let (material, has) = (&materials[number], part.primitive.uvs.len());
+        let textures = [&material.base_color_texture, &material.roughness_texture, &material.normal_texture];
+        for set in
+            textures.into_iter().flatten().map(|texture| texture.set).filter(|set| *set as usize >= has)
+        {
+            let least = lacking.entry((number, set)).or_insert(has);
+            *least = has.min(*least);
+        }
+    }
+    let more = lacking.len().saturating_sub(MOST_SENTENCES);
+    let sentence = |(&(number, set), has): (&(usize, u32), &usize)| {
+        format!(
+            "mesh {}, material {}: its texture uses set {set} of texture coordinates; the mesh has {has}, \
+             and is plain there",
+            key.mesh.name, materials[number].name
+        )
+    };
+    let mut all: Vec<String> = lacking.iter().take(MOST_SENTENCES).map(sentence).collect();
+    if more > 0 {
+        all.push(format!("mesh {}: {more} more textures have no coordinates", key.mesh.name));
+    }
+    all
 }
 
 /// Returns the number of an item in a list, which is added unless it is there.

@@ -9,7 +9,7 @@ use crate::scene::meshes::Projection;
 /// Key of the albedo that replaces that of the file.
 pub(super) const COLOR: &str = "meshes.*.color";
 /// Key of what one of the file's materials becomes.
-pub(super) const MATERIAL: &str = "meshes.*.materials.*";
+pub(in crate::scene) const MATERIAL: &str = "meshes.*.materials.*";
 
 pub(super) const MESHES: Group = Group {
     title: "Meshes",

@@ -21,6 +21,7 @@ use std::sync::LazyLock;
 
 use Cost::*;
 use Kind::*;
+pub(super) use meshes::MATERIAL as MESH_MATERIAL;
 pub use volumes::{WATER, key_of_volume, split_volume_key};
 
 /// Work that a change of a parameter causes in an interactive renderer.

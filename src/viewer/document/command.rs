@@ -9,13 +9,13 @@ impl Document {
     /// gone, and one `--set` per change.
     ///
     /// # Errors
-    /// If lights or other parts were added or renamed, because no option does that, or the scene came from
-    /// stdin.
+    /// If lights or other parts were added or renamed, because no option does that, or the scene has no
+    /// file, as one from stdin or around a mesh.
     pub fn command_line(&self) -> Result<String> {
         let removed = self.removed()?;
         let Some(source) = &self.source else {
             return Err(Error::input(
-                "a command line cannot name a scene that came from stdin",
+                "a command line cannot name a scene that has no file",
                 "save the scene, then copy the command line",
             ));
         };

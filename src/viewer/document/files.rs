@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::Document;
-use crate::scene::{Limits, Place, Raw, Values, box_corners, reference_keys, resolve};
+use crate::scene::{
+    Limits, Place, Raw, Scene, SceneMesh, Source, Values, box_corners, reference_keys, resolve,
+};
 use crate::util::error::{Error, Result};
 use crate::viewer::named;
+use crate::viewer::navigate::Pose;
 
 /// Name of a mesh whose file has no usable one.
 const MESH: &str = "mesh";
@@ -81,13 +84,9 @@ impl Document {
                 for (key, raw) in self.camera_edits(&pose) {
                     set(&mut values, key, raw)?;
                 }
-                let forward = (pose.target - pose.eye).normalize_or(DVec3::NEG_Z);
-                let nearest = corners.map(|corner| (corner - pose.eye).dot(forward)).into_iter();
-                let near = nearest.fold(f64::INFINITY, f64::min) * 0.5;
-                if near < values.coordinate("camera.near") {
-                    set(&mut values, "camera.near", Raw::Float(near.max(1e-4)))?;
-                }
+                see_nearest(&mut values, &pose, corners)?;
             }
+            None if !notes.is_empty() => {}
             None => notes.push(format!("{} shows nothing: its nodes have no triangles", path.display())),
         }
         let before = std::mem::replace(&mut self.limits, limits);
@@ -185,6 +184,35 @@ impl Document {
             outside.filter_map(|(_, file)| file.parent().map(Path::to_owned)).collect();
         folders.into_iter().collect()
     }
+}
+
+/// Returns a new scene around the mesh of a file, which the camera looks at.
+pub(super) fn around_mesh(path: &Path, limits: &Limits) -> Result<Source> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut source = Source::around_mesh(path, &named::key_part(&stem, MESH))?;
+    let scene = Scene::of_source(&source, &[], limits)?;
+    let mut values = scene.written().clone();
+    if let Some(corners) = scene.meshes.first().and_then(SceneMesh::corners) {
+        let aspect = f64::from(scene.image.width) / f64::from(scene.image.height);
+        let pose = Pose::of(&values).frame(&corners, aspect);
+        for (key, raw) in pose.edits() {
+            set(&mut values, key, raw)?;
+        }
+        see_nearest(&mut values, &pose, corners)?;
+    }
+    source.text = values.to_toml();
+    Ok(source)
+}
+
+/// Brings the nearest depth of the camera before all corners of a box.
+fn see_nearest(values: &mut Values, pose: &Pose, corners: [DVec3; 8]) -> Result<()> {
+    let forward = (pose.target - pose.eye).normalize_or(DVec3::NEG_Z);
+    let nearest = corners.map(|corner| (corner - pose.eye).dot(forward)).into_iter();
+    let near = nearest.fold(f64::INFINITY, f64::min) * 0.5;
+    if near < values.coordinate("camera.near") {
+        set(values, "camera.near", Raw::Float(near.max(1e-4)))?;
+    }
+    Ok(())
 }
 
 fn set(values: &mut Values, key: &str, raw: Raw) -> Result<()> {

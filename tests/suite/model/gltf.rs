@@ -336,6 +336,19 @@ fn an_image_is_decoded_within_its_memory() {
 }
 
 #[test]
+fn an_image_asks_for_what_its_decoding_takes() {
+    // 3 bytes a texel as decoded; 3 in the first coarser level and less than 1 in the next.
+    let mut png = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbImage::from_pixel(1024, 1024, image::Rgb([1, 2, 3]));
+    picture.write_to(&mut png, image::ImageFormat::Png).expect("a picture");
+    let bytes = std::sync::Arc::new(png.into_inner());
+    let source = ImageSource::Bytes { place: "a.png".into(), bytes };
+    assert_eq!(source.decode((7 << 20) + (1 << 17)).expect("a picture").to_rgb8(), picture);
+    let error = source.decode(6 << 20).expect_err("too little");
+    assert_eq!(error.exit_code(), 33, "{error}");
+}
+
+#[test]
 fn cameras_and_lights_are_read() {
     let mut doc = Doc::square();
     doc.json["extensionsRequired"] = json!(["KHR_lights_punctual"]);

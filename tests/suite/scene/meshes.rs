@@ -122,7 +122,7 @@ fn a_printed_scene_with_meshes_is_the_same_scene() {
     let scene = folder.scene(&text, &[]);
     let printed = scene.to_toml();
     assert!(
-        printed.contains("[meshes.cliff.materials]\nFall = \"water\"\nWet_stone = \"none\"\n"),
+        printed.contains("[meshes.cliff.materials]\nFall = \"water\"\n\"Wet stone\" = \"none\"\n"),
         "{printed}"
     );
     let again = folder.scene(&printed, &[]);
@@ -424,7 +424,7 @@ fn what_a_scene_lists_of_its_meshes_is_a_comment_or_json() {
         "blender.glb, 2 nodes with a mesh, 68 triangles",
         "#   node Cliff: 32 triangles",
         "#   material Fall: 16 triangles, water; uv 0: u 0.25 to 0.75, v 0 to 1",
-        "#   material Wet_stone: 16 triangles, opaque",
+        "#   material Wet stone (key Wet_stone): 16 triangles, opaque",
         "#   camera Camera",
         "#   light Spot",
     ] {

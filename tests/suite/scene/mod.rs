@@ -2,6 +2,7 @@
 //! its key, range and line, and no text makes the reader panic.
 
 pub mod animation;
+mod mesh_faults;
 pub mod meshes;
 pub mod presets;
 pub mod slips;

@@ -605,3 +605,33 @@ fn the_command_line_is_copied_to_the_clipboard() {
     assert_eq!(copied, window.viewer().document().command_line().expect("a line"));
     assert!(copied.starts_with("taki render ") && copied.contains("trace.sigma=3.5"), "{copied}");
 }
+
+#[test]
+fn a_mesh_opens_in_a_new_scene_that_frames_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("old cliff.glb");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/model/blender.glb");
+    std::fs::copy(data, &file).expect("a copy");
+    let limits = Limits::default();
+    let mut document = Document::open(&file, &[], &limits).expect("a scene");
+    assert!(!document.is_changed() && document.path.is_none());
+    let [mesh] = &document.scene().meshes[..] else { panic!("one mesh") };
+    // Every corner of the mesh is in the picture, whose height the nearest of them nearly fills.
+    let camera = &document.scene().camera;
+    let most = mesh.corners().expect("triangles").map(|corner| {
+        let d = corner - camera.eye;
+        let depth = d.dot(camera.forward) * f64::from(camera.tan_half_fov);
+        assert!(depth > 0.0);
+        let across = d.dot(camera.right) / (depth * 960.0 / 540.0);
+        across.abs().max((d.dot(camera.up) / depth).abs())
+    });
+    let most = most.into_iter().fold(0.0, f64::max);
+    assert!((0.5..1.0).contains(&most), "{most}");
+    assert!(document.command_line().expect_err("no file").to_string().contains("no file"));
+    let saved = folder.path().join("saved.toml");
+    document.save(&saved).expect("saved");
+    let again = Document::open(&saved, &[], &limits).expect("a scene");
+    assert_eq!(again.scene().triangles.len(), 1);
+    let sets = ["camera.fov=20".to_owned()];
+    assert!(Document::open(&file, &sets, &limits).expect("a scene").is_changed());
+}
