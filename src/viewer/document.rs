@@ -57,7 +57,8 @@ pub struct Document {
 }
 
 impl Document {
-    /// Opens a preset or a file; a mesh stands in a new scene. The `--set` arguments in `sets` count as edits.
+    /// Opens a preset or a file; a mesh stands in a new scene. The `--set` arguments in `sets` count as
+    /// edits.
     ///
     /// # Errors
     /// If the file cannot be read, or the scene is not valid.

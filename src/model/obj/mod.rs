@@ -128,13 +128,6 @@ impl<'a> Reader<'a> {
     fn position(&mut self, line: usize, text: &str) -> Result<()> {
         let count = text.split_ascii_whitespace().take(7).count();
         let [x, y, z, r, g, b] = self.numbers::<6>(line, "v", text, 3)?;
-        if let Some(far) = [x, y, z].into_iter().find(|x| !(*x as f32).is_finite()) {
-            return Err(self.file.fault_with(
-                &self.place(line),
-                format!("v: {far:e} is too far from the origin"),
-                "move the mesh to the origin in the program that made it, or scale it down",
-            ));
-        }
         if count >= 6 {
             let missing = self.vertices.positions.len();
             let colors = self.vertices.colors.get_or_insert_default();
