@@ -1,6 +1,6 @@
 //! Names of a file's materials in the keys of a scene, and what the parts with each become.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 use super::{Becomes, NONE, OPAQUE, is_word};
@@ -91,8 +91,11 @@ impl Named {
     pub fn new(v: &Values, mesh: &str, file: &Path, model: &Model) -> Result<Named> {
         let (table, default) = (format!("meshes.{mesh}.materials"), format!("meshes.{mesh}.material"));
         let names = || model.materials.iter().map(|material| material.name.as_str());
-        let alike =
-            |folded: &str| -> BTreeSet<&str> { names().filter(|n| folded_name(n) == folded).collect() };
+        // A file may have very many materials.
+        let mut alike: HashMap<String, BTreeSet<&str>> = HashMap::new();
+        names().for_each(|name| {
+            alike.entry(folded_name(name)).or_default().insert(name);
+        });
         let mut becomes = vec![becomes(v, &default)?; model.materials.len() + 1];
         let mut keys: Vec<Option<String>> = vec![None; model.materials.len()];
         let (mut folded_keys, mut exact_keys) = (Vec::new(), Vec::new());
@@ -107,12 +110,13 @@ impl Named {
             }
             let wanted = from_key(&part);
             let folded = folded_name(&wanted);
-            let meant = alike(&folded);
-            match meant.len() {
+            let meant = alike.get(&folded);
+            match meant.map_or(0, BTreeSet::len) {
                 0 => return Err(unknown(&shown(&key), &wanted, file, &default, names())),
                 1 => folded_keys.push((key, own, places(names(), |name| folded_name(name) == folded))),
                 _ => {
-                    let listed: Vec<String> = meant.iter().take(8).map(|name| format!("{name:?}")).collect();
+                    let listed: Vec<String> =
+                        meant.into_iter().flatten().take(8).map(|name| format!("{name:?}")).collect();
                     return Err(Error::input(
                         format!("{}: {} has several materials of this name", shown(&key), file.display()),
                         format!("put the name in quotes: {}", listed.join(" or ")),
@@ -129,7 +133,7 @@ impl Named {
         }
         for (key, name) in keys.iter_mut().zip(names()).filter(|(_, name)| !name.is_empty()) {
             let folded = folded_name(name);
-            let part = if alike(&folded).len() == 1 { folded } else { in_key(name) };
+            let part = if alike[&folded].len() == 1 { folded } else { in_key(name) };
             key.get_or_insert_with(|| format!("{table}.{part}"));
         }
         Ok(Named { becomes, keys })
