@@ -108,7 +108,8 @@ pub(in crate::scene) fn lights(meshes: &[SceneMesh], origin: DVec3) -> Result<Ve
             if intensity == Vec3::ZERO {
                 continue;
             }
-            let far = !(world.translation.abs().max_element() <= POINT_MAX);
+            let at = world.translation;
+            let far = !at.is_finite() || at.abs().max_element() > POINT_MAX;
             if far && !matches!(light.kind, LightKind::Directional) {
                 return Err(Error::input(
                     format!("mesh {}: the light {} is too far from the scene's origin", mesh.name, node.name),
