@@ -22,6 +22,8 @@ override QUADS: bool = true;
 // Whether rays walk to the lights in some shells, and whether V is kept at the vertices of some.
 override SHELL_MARCH: bool = false;
 override SHELL_KEPT: bool = false;
+// Whether opaque matter casts shadows on shells.
+override SHELL_SHADOWS: bool = false;
 
 // A ray inside a shell.
 struct ShellRay {
@@ -319,7 +321,20 @@ fn shell_visibility(
             visible = exp2(-own.extinction * walked.depth);
         }
     }
+    if SHELL_SHADOWS {
+        visible *= shell_shadow(shell, i, segment.vertices, cell.shares, cell.depth);
+    }
     return visible;
+}
+
+// Share of light number `i` that opaque matter lets through. Twin: ShellShadows::at.
+fn shell_shadow(shell: Shell, i: u32, vertices: vec3<u32>, shares: vec3<f32>, depth: f32) -> f32 {
+    let first = vec3<u32>(shell.shadows) + 2u * (vertices + i * shell.vertices);
+    let outer = vec3<f32>(shell_light_value(first.x), shell_light_value(first.y), shell_light_value(first.z));
+    let next = first + 1u;
+    let inner = vec3<f32>(shell_light_value(next.x), shell_light_value(next.y), shell_light_value(next.z));
+    let seen = outer + (inner - outer) * depth;
+    return clamp(seen.x * shares.x + seen.y * shares.y + seen.z * shares.z, 0.0, 1.0);
 }
 
 // V at the depth of `z` layers below a vertex. `first` is the first value of the shell and light.

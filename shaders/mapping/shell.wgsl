@@ -7,7 +7,7 @@
 const SHELL_ROW: u32 = 13u;
 // Texels in front of those of the first shell's header, and texels of a header.
 const SHELL_TABLE: u32 = 1u;
-const SHELL_HEADER: u32 = 2u;
+const SHELL_HEADER: u32 = 3u;
 // Texels of a prism, and of the tangents at a vertex.
 const PRISM: u32 = 4u;
 const TANGENTS: u32 = 4u;
@@ -31,6 +31,8 @@ struct Shell {
     light: u32,
     layers: u32,
     vertices: u32,
+    // First of the shares of light that opaque matter lets through.
+    shadows: u32,
 }
 
 // Corners and texture coordinates of a prism, and what stands beyond its sides.
@@ -63,7 +65,8 @@ fn shell_new(number: u32) -> Shell {
     let header = SHELL_TABLE + SHELL_HEADER * number;
     let a = shell_texel(header);
     let b = shell_texel(header + 1u);
-    return Shell(number, a.x, a.y, a.z, a.w, b.x & 0x7fffffffu, (b.x >> 31u) != 0u, b.y, b.z, b.w);
+    let shadows = shell_texel(header + 2u).x;
+    return Shell(number, a.x, a.y, a.z, a.w, b.x & 0x7fffffffu, (b.x >> 31u) != 0u, b.y, b.z, b.w, shadows);
 }
 
 // The shell of a face, given by its number.

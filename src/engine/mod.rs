@@ -202,7 +202,8 @@ impl Engine {
         let (mut frame, cut) = renderer.render_marked(scene, volumes, mesh, options, monitor)?;
         if !cut.is_empty() {
             let levels = renderer.levels(scene, volumes.as_ref());
-            let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels);
+            let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels)
+                .with_shadows_of(mesh, monitor)?;
             cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
             // Strips and frames would repeat it.
             if !std::mem::replace(told, true) {

@@ -55,6 +55,15 @@ impl Light {
         }
     }
 
+    /// Returns the light with another intensity.
+    pub fn with_intensity(self, intensity: Vec3) -> Light {
+        match self {
+            Light::Directional { to_light, .. } => Light::Directional { to_light, intensity },
+            Light::Point { position, .. } => Light::Point { position, intensity },
+            Light::Spot { position, cone, .. } => Light::Spot { position, intensity, cone },
+        }
+    }
+
     /// Returns the distance of the light from a point, metres; infinite for a directional light.
     pub fn distance(&self, point: Vec3) -> f32 {
         match self {

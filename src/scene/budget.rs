@@ -1,8 +1,9 @@
 //! Memory that a scene's picture takes besides its volume.
 
 use super::Parts;
+use crate::light::Visibility;
 use crate::picture::{LEAST_ROWS, WORK_BYTES, canvas, row_bytes};
-use crate::place::{Pool, Vertex};
+use crate::place::{CASTER_BYTES, Pool, Vertex};
 
 impl Parts {
     /// Returns the bytes that rocks, pools, the environment and the raster window take on host and device,
@@ -16,8 +17,22 @@ impl Parts {
         let paintings = self.triangles.iter().filter_map(|own| own.painting.as_ref());
         let painted = paintings.map(|painting| 2 * painting.bytes()).sum::<u64>();
         let shells = self.shells.iter().map(|shell| shell.bytes()).sum::<u64>();
-        let all = [rocks, environment, shells, painted];
+        let all = [rocks, environment, shells, painted, self.bytes_of_shadows_on_shells()];
         all.into_iter().fold(canvas(&self.image, layers), u64::saturating_add)
+    }
+
+    /// Returns the bytes of the shadows that opaque matter casts on shells: what casts them, and their shares
+    /// of each light at the vertices, on host and device.
+    fn bytes_of_shadows_on_shells(&self) -> u64 {
+        if self.visibility == Visibility::None {
+            return 0;
+        }
+        let skins = self.shells.iter().filter(|shell| shell.skin).map(|shell| shell.prisms.len() as u64);
+        let triangles = self.triangles.iter().map(|own| own.vertices.len() as u64 / 3);
+        let casters: u64 = skins.chain(triangles).sum();
+        let vertices: u64 = self.shells.iter().map(|shell| shell.vertices() as u64).sum();
+        let lights = (self.lights.len() + self.environment_lights.len()) as u64;
+        if vertices == 0 { 0 } else { casters * CASTER_BYTES + 16 * lights * vertices }
     }
 
     /// Returns the bytes that a picture of the whole image needs besides the volume, with every layer of an

@@ -57,10 +57,11 @@ use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
 use crate::place::paint::coarsened;
 use crate::place::paint::texture::MOST_BYTES;
-use crate::place::{Ground, Mesh, Pool, Rock, ShadeMemo, Triangles, WaterFaces};
+use crate::place::{Ground, Mesh, Pool, Rock, ShadeMemo, ShellShadows, Triangles, WaterFaces};
 use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
+use crate::util::monitor::Monitor;
 use crate::volume::{PyramidSpec, Run, StorageChoice, VolumeTexture};
 
 /// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
@@ -115,7 +116,7 @@ pub struct Parts {
     pub pools: Vec<Pool>,
     /// Opaque triangles of other programs' meshes.
     pub triangles: Vec<Triangles>,
-    /// What the shade of the triangles was made of; scenes of one run share it.
+    /// What the shade of the triangles and the shadows on shells were made of; scenes of one run share it.
     pub shades: ShadeMemo,
     /// Meshes of other programs, with what their parts became: quads, shells and triangles.
     pub meshes: Vec<SceneMesh>,
@@ -503,6 +504,20 @@ impl Scene {
         let shells = self.shells.iter().map(|shell| shell.bounds());
         let tiles = mesh.tiles.iter().map(|tile| [tile.low, tile.high]);
         self.camera.depth_range(quads.chain(shells).chain(tiles))
+    }
+
+    /// Returns the shadows that the scene's opaque `mesh` and the skins of shells cast on shells. They are
+    /// kept until the mesh, the shells or the lights change. `None` without shadows: nothing hides a light,
+    /// or `light.visibility` is `none`.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
+    pub fn shadows_on_shells(&self, mesh: &Mesh, monitor: &dyn Monitor) -> Result<Option<Arc<ShellShadows>>> {
+        let lights = self.volume_lights();
+        if self.shells.is_empty() || self.visibility == Visibility::None || lights.is_empty() {
+            return Ok(None);
+        }
+        self.shades.shadows_on_shells(mesh, &self.shells, &lights, monitor)
     }
 
     /// Builds all opaque geometry as one mesh.

@@ -22,6 +22,7 @@ use crate::light::{AngleFrame, Light, Reflection, Visibility};
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
+use crate::place::{Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
@@ -51,6 +52,8 @@ pub struct Integrator<'a> {
     filled: Option<Filled>,
     /// `None`: V at the vertices of shells is walked on demand.
     shell_light: Option<Arc<ShellLight>>,
+    /// Shadows of opaque matter on shells, if there are any.
+    shell_shadows: Option<Arc<ShellShadows>>,
     /// Whether V is kept at the vertices of each shell.
     kept_in: Vec<bool>,
     medium: Medium,
@@ -217,8 +220,8 @@ impl PixelRay {
 }
 
 impl<'a> Integrator<'a> {
-    /// Prepares a scene and its volumes for many rays. With cached visibility the light volumes come from
-    /// `cache`, which fills them if they changed; otherwise `cache` drops the old ones.
+    /// Prepares a scene, its volumes and its opaque mesh for many rays. With cached visibility the light
+    /// volumes come from `cache`, which fills them if they changed; otherwise `cache` drops the old ones.
     ///
     /// # Errors
     /// Errors of `monitor`. With cached visibility, [`Error::Memory`] if the light volumes do not fit into
@@ -228,15 +231,17 @@ impl<'a> Integrator<'a> {
     pub fn prepared(
         scene: &'a Scene,
         volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+        mesh: &Mesh,
         cache: &mut LightVolumeCache,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
-        Integrator::prepared_volumes(scene, volumes.as_ref(), cache, monitor)
+        Integrator::prepared_volumes(scene, volumes.as_ref(), mesh, cache, monitor)
     }
 
     fn prepared_volumes(
         scene: &'a Scene,
         volumes: &[VolumeTexture],
+        mesh: &Mesh,
         cache: &mut LightVolumeCache,
         monitor: &dyn Monitor,
     ) -> Result<Self> {
@@ -253,7 +258,17 @@ impl<'a> Integrator<'a> {
         if scene.visibility == Visibility::Cached && !scene.shells.is_empty() {
             integrator.shell_light = Some(cache.shell_light(&integrator));
         }
-        Ok(integrator)
+        integrator.with_shadows_of(mesh, monitor)
+    }
+
+    /// Returns the integrator with the shadows that the scene's opaque `mesh` and the skins of shells cast on
+    /// shells. Only [`Integrator::prepared`] has them already.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
+    pub fn with_shadows_of(self, mesh: &Mesh, monitor: &dyn Monitor) -> Result<Self> {
+        let shell_shadows = self.scene.shadows_on_shells(mesh, monitor)?;
+        Ok(Integrator { shell_shadows, ..self })
     }
 
     /// Prepares a scene and its volumes for a few rays. With cached visibility, the values of light volumes
@@ -299,6 +314,7 @@ impl<'a> Integrator<'a> {
             visibility: scene.visibility,
             filled: None,
             shell_light: None,
+            shell_shadows: None,
             kept_in: scene
                 .shells
                 .iter()

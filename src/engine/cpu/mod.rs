@@ -91,7 +91,7 @@ fn render_volumes(
     frame.alpha = image.alpha.then(|| vec![0.0; frame.radiance.len()]);
     let mut seconds = Seconds::default();
     let clock = Instant::now();
-    let integrator = integrate::Integrator::prepared(scene, volumes, light_volumes, monitor)?;
+    let integrator = integrate::Integrator::prepared(scene, volumes, mesh, light_volumes, monitor)?;
     seconds.visibility = clock.elapsed().as_secs_f64();
     light_volumes.rasters.begin(scene, mesh);
     let total = window.pixels() * samples.len() as u64;

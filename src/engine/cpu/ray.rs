@@ -11,6 +11,7 @@ use crate::picture::camera::{CENTRE, sample_offset};
 use crate::place::Mesh;
 use crate::scene::{Face, Scene};
 use crate::trace::{Lookup, Prefilter};
+use crate::util::monitor::Unwatched;
 use crate::util::window::Window;
 use crate::volume::{Cell, VolumeTexture};
 use crate::walk::Crossing;
@@ -136,7 +137,12 @@ pub fn inspect(
     let mut plain = scene.clone();
     let trace = &mut plain.edit().trace;
     (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
-    let result = Integrator::new(&plain, volumes).pixel(&gbuffer, pixel, CENTRE, &mut recorder);
+    let mut integrator = Integrator::new(&plain, volumes);
+    if faces.iter().any(|face| matches!(scene.face(face.quad), Face::Hull(..))) {
+        let shaded = integrator.with_shadows_of(mesh, &Unwatched);
+        integrator = shaded.expect("nobody stops the work");
+    }
+    let result = integrator.pixel(&gbuffer, pixel, CENTRE, &mut recorder);
     RayReport {
         pixel,
         faces,

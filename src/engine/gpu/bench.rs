@@ -18,6 +18,7 @@ use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::trace::Lookup;
 use crate::util::error::{Error, Result};
+use crate::util::monitor::Unwatched;
 use crate::util::window::Window;
 use crate::volume::{Leaps, VolumeTexture};
 
@@ -90,14 +91,20 @@ impl GpuBench {
         let mut failed = Vec::new();
         self.prepared = None;
         for &(name, scene) in scenes {
-            let prepared =
-                match PreparedScene::new(gpu, &mut resident, &mut reflections, scene, volumes, mesh) {
-                    Ok(prepared) => Rc::new(prepared),
-                    Err(e) => {
-                        failed.push((name, e));
-                        continue;
-                    }
-                };
+            let prepared = match PreparedScene::new(
+                gpu,
+                (&mut resident, &mut reflections),
+                scene,
+                volumes,
+                mesh,
+                &Unwatched,
+            ) {
+                Ok(prepared) => Rc::new(prepared),
+                Err(e) => {
+                    failed.push((name, e));
+                    continue;
+                }
+            };
             layers = prepared.layers;
             let frame = FrameUniforms::new(scene, volumes, window, &(0..1), 0, layers, &prepared.depth);
             let lights = scene.volume_lights().len();
@@ -116,8 +123,9 @@ impl GpuBench {
                     }
                 };
             }
+            let inputs = (&prepared.up, &prepared.shell_shadows);
             let shell_light =
-                ShellLightPass::default().get((gpu, timer), scene, volumes, &prepared.up, |_, _| Ok(()));
+                ShellLightPass::default().get((gpu, timer), scene, volumes, inputs, |_, _| Ok(()));
             let shell_light = match shell_light {
                 Ok((light, _)) => light,
                 Err(e) => {
@@ -142,7 +150,8 @@ impl GpuBench {
                     } else {
                         let mut own = Resident::default();
                         own.levels.leaps = leaps;
-                        Rc::new(PreparedScene::new(gpu, &mut own, &mut reflections, scene, volumes, mesh)?)
+                        let kept = (&mut own, &mut reflections);
+                        Rc::new(PreparedScene::new(gpu, kept, scene, volumes, mesh, &Unwatched)?)
                     };
                     let storage = [leaps == Leaps::Always, is_sparse];
                     let variant = Variant::of(scene, layers, None, storage);

@@ -75,8 +75,8 @@ impl<'a> FrameRun<'a> {
         let clock = Instant::now();
         renderer.resident.levels.leaps = options.leaps;
         visibility.filling = options.filling;
-        let (resident, reflections) = (&mut renderer.resident, &mut renderer.reflections);
-        let prepared = PreparedScene::new(gpu, resident, reflections, scene, volumes, mesh)?;
+        let kept = (&mut renderer.resident, &mut renderer.reflections);
+        let prepared = PreparedScene::new(gpu, kept, scene, volumes, mesh, monitor)?;
         seconds.upload = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -126,8 +126,8 @@ impl<'a> FrameRun<'a> {
             }
         };
         let progress = |done, total| monitor.progress("light in shells", done, total);
-        let up = &prepared.up;
-        let (shell_light, took) = renderer.shell_light.get((gpu, timer), scene, volumes, up, progress)?;
+        let inputs = (&prepared.up, &prepared.shell_shadows);
+        let (shell_light, took) = renderer.shell_light.get((gpu, timer), scene, volumes, inputs, progress)?;
         seconds.visibility += took;
         let hint: TileHint = (variant, volumes[0].cells.address(), whole);
         let known = renderer.learned.filter(|(frame, _)| *frame == hint).map(|(_, pixels)| pixels);

@@ -59,6 +59,7 @@ pub struct Variant {
     shells: bool,
     shell_march: bool,
     shell_kept: bool,
+    shell_shadows: bool,
 }
 
 impl Variant {
@@ -94,7 +95,13 @@ impl Variant {
             shells: !scene.shells.is_empty(),
             shell_march: !scene.shells.is_empty() && scene.visibility == Visibility::March,
             shell_kept: false,
+            shell_shadows: false,
         }
+    }
+
+    /// Returns the variant of a scene in which opaque matter casts shadows on shells, or none.
+    pub fn with_shell_shadows(self, shell_shadows: bool) -> Self {
+        Variant { shell_shadows, ..self }
     }
 
     /// Returns the variant of a scene with the visibility [`Visibility::Cached`] in which rays walk to the
@@ -206,6 +213,7 @@ impl Integrate {
             ("SHELLS", number(variant.shells)),
             ("SHELL_MARCH", number(variant.shell_march)),
             ("SHELL_KEPT", number(variant.shell_kept)),
+            ("SHELL_SHADOWS", number(variant.shell_shadows)),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
     }

@@ -1,5 +1,7 @@
 //! A scene made ready for the passes, as renderer and benchmark share it.
 
+use std::sync::Arc;
+
 use super::device::Gpu;
 use super::integrate::Variant;
 use super::layout;
@@ -9,9 +11,10 @@ use crate::engine::overlap;
 use crate::light::Visibility;
 use crate::light::visibility::LightVolumes;
 use crate::picture::camera::DepthRange;
-use crate::place::Mesh;
+use crate::place::{Mesh, ShellShadows};
 use crate::scene::Scene;
 use crate::util::error::Result;
+use crate::util::monitor::Monitor;
 use crate::volume::VolumeTexture;
 
 /// A scene on the device, with the plan of its light volumes.
@@ -22,6 +25,8 @@ pub struct PreparedScene {
     pub layers: u32,
     /// The light volumes to fill, if there are any: see [`Scene::light_plan`].
     pub light_volumes: Option<LightVolumes>,
+    /// Shadows of opaque matter on shells, if there are any.
+    pub shell_shadows: Option<Arc<ShellShadows>>,
     /// The reflection model and multiple scattering.
     pub reflection: BoundReflection,
     /// Uniform of the constants of all volumes, `array<VolumeConstants>`.
@@ -33,15 +38,16 @@ pub struct PreparedScene {
 }
 
 impl PreparedScene {
-    /// Plans the light volumes and uploads what is not resident yet.
+    /// Plans the light volumes, makes the shadows on shells and uploads what is not resident yet.
     pub fn new(
         gpu: &Gpu,
-        resident: &mut Resident,
-        reflections: &mut Reflections,
+        (resident, reflections): (&mut Resident, &mut Reflections),
         scene: &Scene,
         volumes: &[VolumeTexture],
         mesh: &Mesh,
+        monitor: &dyn Monitor,
     ) -> Result<Self> {
+        let shell_shadows = scene.shadows_on_shells(mesh, monitor)?;
         let layers = overlap::sheets(scene);
         let light_volumes = scene.light_plan(volumes)?.filter(|_| !scene.quads.is_empty());
         let up = Uploaded::new(gpu, resident, scene, volumes, mesh)?;
@@ -50,11 +56,12 @@ impl PreparedScene {
         let volumes = bytemuck::cast_slice(&constants);
         let volumes = gpu.buffer_with("volumes", volumes, wgpu::BufferUsages::UNIFORM);
         let storage = [up.leaps(), up.is_sparse()];
-        let mut variant = Variant::of(scene, layers, light_volumes.as_ref(), storage);
+        let mut variant = Variant::of(scene, layers, light_volumes.as_ref(), storage)
+            .with_shell_shadows(shell_shadows.is_some());
         if scene.visibility == Visibility::Cached {
             variant = variant.with_shell_light(up.shells.walks_and_keeps());
         }
         let depth = scene.depth_range(mesh);
-        Ok(PreparedScene { up, layers, light_volumes, reflection, volumes, variant, depth })
+        Ok(PreparedScene { up, layers, light_volumes, shell_shadows, reflection, volumes, variant, depth })
     }
 }

@@ -1,5 +1,6 @@
 //! Shells on the device: their points, prisms and hulls in one texture, the faces of hulls that the eye sees,
-//! and V at their vertices, which a compute pass fills and which is kept from frame to frame. CPU twins:
+//! and V at their vertices, which a compute pass fills and which is kept from frame to frame. Shadows of
+//! opaque matter come from the host, into rows behind V. CPU twins:
 //! `Projection::hulls` and `src/engine/cpu/integrate/shell_light.rs`.
 
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use super::timing::Timer;
 use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
 use crate::mapping::shell::Shell;
+use crate::place::ShellShadows;
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells};
 use crate::util::error::{Error, Result};
@@ -29,7 +31,7 @@ pub const SHELL_ROW: u32 = 1 << 13;
 /// of `shaders/mapping/shell.wgsl`.
 pub const SHELL_TABLE: u32 = 1;
 /// See [`SHELL_TABLE`].
-pub const SHELL_HEADER: u32 = 2;
+pub const SHELL_HEADER: u32 = 3;
 /// See [`SHELL_TABLE`].
 pub const PRISM: u32 = 4;
 /// See [`SHELL_TABLE`].
@@ -64,6 +66,9 @@ struct Table {
     layers: Vec<u32>,
     /// First value of V of each shell, and behind the last the number of all values.
     firsts: Vec<u32>,
+    /// First share of light of each shell, if opaque matter hides any, and behind the last the end of all.
+    /// They begin in the row behind V.
+    shadows: Vec<u32>,
 }
 
 /// The shells of a scene on the device.
@@ -101,13 +106,19 @@ impl Table {
             firsts.push(next as u32);
         }
         fits(gpu, "the light at the vertices of the shells", next, "use light.visibility=march")?;
-        Ok(Table { shells: scene.shells.clone(), quads: scene.quads.len() as u32, layers, firsts })
+        let mut shadows = vec![next.next_multiple_of(SHELL_ROW.into()) as u32];
+        for shell in &scene.shells {
+            let own = 2 * lights * shell.vertices() as u64;
+            shadows.push(shadows[shadows.len() - 1].saturating_add(own.try_into().unwrap_or(u32::MAX)));
+        }
+        Ok(Table { shells: scene.shells.clone(), quads: scene.quads.len() as u32, layers, firsts, shadows })
     }
 
     fn is(&self, other: &Table) -> bool {
         self.shells.len() == other.shells.len()
             && self.shells.iter().zip(&other.shells).all(|(a, b)| Arc::ptr_eq(a, b))
-            && (self.quads, &self.layers, &self.firsts) == (other.quads, &other.layers, &other.firsts)
+            && (self.quads, &self.layers) == (other.quads, &other.layers)
+            && (&self.firsts, &self.shadows) == (&other.firsts, &other.shadows)
     }
 
     /// Number of texels.
@@ -135,6 +146,7 @@ impl Table {
             let volume = shell.volume | if shell.skin { SKIN } else { 0 };
             out.push([points, prisms, hull, face]);
             out.push([volume, self.firsts[i], self.layers[i], shell.vertices() as u32]);
+            out.push([self.shadows[i], 0, 0, 0]);
             face += shell.hull.len() as u32;
             points = hull + shell.hull.len() as u32;
         }
@@ -238,7 +250,7 @@ fn texture(gpu: &Gpu, name: &str, texels: u64, format: wgpu::TextureFormat) -> R
     // Scenes without shells bind one texel.
     let width = if texels == 0 { 1 } else { SHELL_ROW };
     let usage = match format {
-        wgpu::TextureFormat::R32Float => wgpu::TextureUsages::STORAGE_BINDING,
+        wgpu::TextureFormat::R32Float => wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
         _ => wgpu::TextureUsages::COPY_DST,
     };
     gpu.allocate(
@@ -265,7 +277,7 @@ fn upload(gpu: &Gpu, table: &Table) -> Result<wgpu::TextureView> {
     }
     fits(gpu, "the shells", table.texels(), "use meshes of fewer triangles")?;
     let texture = texture(gpu, "shells", table.texels(), format)?;
-    write_rows(gpu, &texture, SHELL_ROW, &table.packed(), "upload shells")?;
+    write_rows(gpu, &texture, [SHELL_ROW, 0], &table.packed(), "upload shells")?;
     Ok(texture.create_view(&Default::default()))
 }
 
@@ -286,6 +298,8 @@ struct Filled {
     /// Cells that each volume has moved down the flow, and its extinction.
     volumes: Vec<[f32; 2]>,
     max_cells: u32,
+    /// Shadows of opaque matter, if there are any.
+    shadows: Option<Arc<ShellShadows>>,
 }
 
 impl Filled {
@@ -295,6 +309,7 @@ impl Filled {
             && self.lights == other.lights
             && self.volumes == other.volumes
             && self.max_cells == other.max_cells
+            && self.shadows.as_ref().map(Arc::as_ptr) == other.shadows.as_ref().map(Arc::as_ptr)
     }
 }
 
@@ -304,9 +319,9 @@ impl ShellLightPass {
         self.last = None;
     }
 
-    /// Returns V at the vertices of a scene's shells, `r32float`, and the seconds it took to fill: 0 if it is
-    /// that of the last call. Calls `between` after each submission with the values done so far and in total;
-    /// its error stops the work.
+    /// Returns V at the vertices of a scene's shells and `shadows` behind it, `r32float`, and the seconds it
+    /// took to fill V: 0 if it is that of the last call. Calls `between` after each submission with the
+    /// values done so far and in total; its error stops the work.
     ///
     /// # Errors
     /// Errors of `between` and of the device: see [`Gpu::run`].
@@ -315,12 +330,16 @@ impl ShellLightPass {
         (gpu, timer): (&Gpu, &Timer),
         scene: &Scene,
         volumes: &[VolumeTexture],
-        up: &Uploaded,
+        (up, shadows): (&Uploaded, &Option<Arc<ShellShadows>>),
         between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<(wgpu::TextureView, f64)> {
         let format = wgpu::TextureFormat::R32Float;
         let table = &up.shells.table;
-        let count = table.firsts.last().copied().unwrap_or(0);
+        let kept = table.firsts.last().copied().unwrap_or(0);
+        let count = match shadows {
+            Some(_) => table.shadows.last().copied().unwrap_or(0),
+            None => kept,
+        };
         if count == 0 {
             self.last = None;
             if self.none.is_none() {
@@ -339,6 +358,7 @@ impl ShellLightPass {
             lights: scene.volume_lights(),
             volumes: constants.collect(),
             max_cells: scene.trace.max_cells,
+            shadows: shadows.clone(),
         };
         if let Some((last, view)) = &self.last
             && last.is(&filled)
@@ -347,9 +367,19 @@ impl ShellLightPass {
         }
         // The old values are dropped first, because both might not fit.
         self.last = None;
+        fits(gpu, "the light and shadows at the vertices of the shells", count.into(), "use fewer lights")?;
         let texture = texture(gpu, "light in shells", u64::from(count), format)?;
         let view = texture.create_view(&Default::default());
-        let seconds = self.fill((gpu, timer), volumes, up, &filled, &view, between)?;
+        if let Some(shadows) = shadows {
+            let mut values: Vec<f32> = shadows.values().collect();
+            values.resize(values.len().next_multiple_of(SHELL_ROW as usize), 1.0);
+            let rows = [SHELL_ROW, table.shadows[0] / SHELL_ROW];
+            write_rows(gpu, &texture, rows, &values, "upload shadows on shells")?;
+        }
+        let seconds = match kept {
+            0 => 0.0,
+            _ => self.fill((gpu, timer), volumes, up, &filled, &view, between)?,
+        };
         self.last = Some((filled, view.clone()));
         Ok((view, seconds))
     }

@@ -448,11 +448,12 @@ pub(super) fn write_layers<T: bytemuck::Pod>(
     gpu.run(gpu.encoder("upload volume")).map(drop)
 }
 
-/// Writes whole rows of `width` texels into a 2-D texture, in slabs, and waits for the copies.
+/// Writes whole rows of `width` texels into a 2-D texture from row `first` on, in slabs, and waits for the
+/// copies.
 pub(super) fn write_rows<T: bytemuck::Pod>(
     gpu: &Gpu,
     texture: &wgpu::Texture,
-    width: u32,
+    [width, first]: [u32; 2],
     texels: &[T],
     label: &str,
 ) -> Result<()> {
@@ -463,7 +464,7 @@ pub(super) fn write_rows<T: bytemuck::Pod>(
             wgpu::TexelCopyTextureInfo {
                 texture,
                 mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: (slab * rows) as u32, z: 0 },
+                origin: wgpu::Origin3d { x: 0, y: first + (slab * rows) as u32, z: 0 },
                 aspect: wgpu::TextureAspect::All,
             },
             bytemuck::cast_slice(texels),
@@ -498,6 +499,6 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    write_rows(gpu, &texture, width, &map.texels, "upload environment")?;
+    write_rows(gpu, &texture, [width, 0], &map.texels, "upload environment")?;
     Ok(texture.create_view(&Default::default()))
 }

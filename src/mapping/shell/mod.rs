@@ -170,6 +170,23 @@ impl Shell {
         (at[position].lerp(middle, 0.003), [prism, 2 - position])
     }
 
+    /// A point in a prism, and the tetrahedron that holds it. `shares` are those of the prism's vertices, and
+    /// `depth` (0 to 1) is that from the outer surface.
+    pub fn below_triangle(&self, prism: usize, shares: Vec3, depth: f32) -> (Vec3, [usize; 2]) {
+        let Vec3 { x: a, y: b, z: c } = shares;
+        // The inner corners' shares add up to the depth. A tetrahedron has them in the order c, b, a.
+        let (tetrahedron, of_corners) = if depth <= c {
+            (0, [a, b, c - depth, depth])
+        } else if depth <= b + c {
+            (1, [a, b + c - depth, depth - c, c])
+        } else {
+            (2, [1.0 - depth, depth - b - c, b, c])
+        };
+        let corners = self.tetrahedron(prism, tetrahedron).map(|point| self.points[point as usize]);
+        let point = corners.into_iter().zip(of_corners).map(|(corner, share)| corner * share).sum();
+        (point, [prism, tetrahedron])
+    }
+
     /// Mean length of the mesh's edges in the texture, cells of a volume of `size`.
     pub fn edge_cells(&self, size: [u32; 3]) -> f32 {
         let n = Vec2::new(size[0] as f32, size[1] as f32);

@@ -62,6 +62,11 @@ impl Bvh {
     /// Whether a ray from `from` along the unit vector `direction` meets a triangle that has one of the bits
     /// `kinds`.
     pub fn is_hit(&self, from: Vec3, direction: Vec3, kinds: u8) -> bool {
+        self.is_hit_before(from, direction, f32::INFINITY, kinds)
+    }
+
+    /// [`Bvh::is_hit`], nearer than `end` metres.
+    pub fn is_hit_before(&self, from: Vec3, direction: Vec3, end: f32, kinds: u8) -> bool {
         // A component of 0 would make 0·∞ in a box whose face holds the origin.
         let inverse =
             direction.to_array().map(|d| 1.0 / if d.abs() < 1e-20 { 1e-20f32.copysign(d) } else { d });
@@ -71,7 +76,7 @@ impl Bvh {
         while waiting > 0 {
             waiting -= 1;
             let node = &self.nodes[stack[waiting] as usize];
-            let (mut near, mut far) = (Vec4::ZERO, Vec4::INFINITY);
+            let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(end));
             for (axis, (from, inverse)) in axes.iter().enumerate() {
                 let [a, b] = [node.low[axis], node.high[axis]].map(|bound| (bound - *from) * *inverse);
                 near = near.max(a.min(b));
@@ -90,7 +95,7 @@ impl Bvh {
                     continue;
                 }
                 let own = &self.faces[first as usize..(first + count) as usize];
-                if own.iter().any(|face| face.kinds & kinds != 0 && face.is_hit(from, direction)) {
+                if own.iter().any(|face| face.kinds & kinds != 0 && face.is_hit(from, direction, end)) {
                     return true;
                 }
             }
@@ -146,9 +151,9 @@ impl Bvh {
 }
 
 impl Face {
-    /// Whether a ray meets the triangle (Möller and Trumbore 1997).
+    /// Whether a ray meets the triangle before `end` (Möller and Trumbore 1997).
     #[inline]
-    fn is_hit(&self, from: Vec3, direction: Vec3) -> bool {
+    fn is_hit(&self, from: Vec3, direction: Vec3, end: f32) -> bool {
         let [b, c] = self.edges;
         let p = direction.cross(c);
         let inverse = 1.0 / b.dot(p);
@@ -158,6 +163,6 @@ impl Face {
         let v = direction.dot(q) * inverse;
         let t = c.dot(q) * inverse;
         // Comparisons with NaN, of a triangle seen from its edge, are false.
-        u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < f32::INFINITY
+        u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < end
     }
 }

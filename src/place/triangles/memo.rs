@@ -1,4 +1,5 @@
-//! What the shade of meshes needs again when only the sun, the water or a strength has changed.
+//! What the shade of meshes needs again when only the sun, the water or a strength has changed, and what the
+//! shadows on shells need again when only the camera or the lights have.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -6,8 +7,13 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use glam::{DVec3, Vec3};
 
 use super::bake::Welded;
+use crate::light::Light;
+use crate::mapping::shell::Shell;
 use crate::place::bvh::Bvh;
-use crate::place::{Rock, Triangles};
+use crate::place::shell_shadows::{ShellShadows, casters};
+use crate::place::{Mesh, Rock, Triangles, Vertex};
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
 
 /// All that shade depends on besides the sun.
 #[derive(PartialEq)]
@@ -68,9 +74,16 @@ impl Kept {
     }
 }
 
-/// Memory of the shade of meshes. All clones share it, and with them the scenes of one run.
+/// Memory of the shade of meshes and of the shadows on shells. All clones share it, and with them the scenes
+/// of one run.
 #[derive(Clone, Default)]
-pub struct ShadeMemo(Arc<Mutex<Option<Entry>>>);
+pub struct ShadeMemo(Arc<Memories>);
+
+#[derive(Default)]
+struct Memories {
+    of_meshes: Mutex<Option<Entry>>,
+    on_shells: Mutex<Option<OnShells>>,
+}
 
 /// A key, and what is kept for it.
 type Entry = (Key, Arc<Kept>);
@@ -78,7 +91,7 @@ type Entry = (Key, Arc<Kept>);
 impl ShadeMemo {
     /// Returns what is kept for `key`. What was kept for another one is forgotten.
     pub fn kept(&self, key: Key, refine: impl FnOnce(&Key) -> (Vec<Triangles>, Vec<Vec<Vec3>>)) -> Arc<Kept> {
-        if let Some((known, kept)) = &*lock(&self.0)
+        if let Some((known, kept)) = &*lock(&self.0.of_meshes)
             && *known == key
         {
             return kept.clone();
@@ -91,7 +104,57 @@ impl ShadeMemo {
             casters: Slot::default(),
             occlusion: Slot::default(),
         };
-        lock(&self.0).insert((key, Arc::new(kept))).1.clone()
+        lock(&self.0.of_meshes).insert((key, Arc::new(kept))).1.clone()
+    }
+
+    /// Returns the shadows on shells. They are made unless mesh, shells and lights are those of the last
+    /// call, whatever the lights' intensities. `None` where nothing hides any light.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
+    pub fn shadows_on_shells(
+        &self,
+        mesh: &Mesh,
+        shells: &[Arc<Shell>],
+        lights: &[Light],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Arc<ShellShadows>>> {
+        let lights: Vec<Light> = lights.iter().map(|light| light.with_intensity(Vec3::ONE)).collect();
+        let known = match &*lock(&self.0.on_shells) {
+            Some(known) if known.is_of(mesh, shells) && known.lights == lights => {
+                return Ok(known.shadows.clone());
+            }
+            Some(known) if known.is_of(mesh, shells) => Some(known.casters.clone()),
+            _ => None,
+        };
+        let casters = known.unwrap_or_else(|| Arc::new(casters(mesh, shells)));
+        let shadows = ShellShadows::new(&casters, shells, &lights, monitor)?.map(Arc::new);
+        *lock(&self.0.on_shells) = Some(OnShells {
+            vertices: mesh.vertices.clone(),
+            shells: shells.to_vec(),
+            casters,
+            lights,
+            shadows: shadows.clone(),
+        });
+        Ok(shadows)
+    }
+}
+
+/// Shadows on shells, and what they were made of.
+struct OnShells {
+    vertices: Arc<Vec<Vertex>>,
+    shells: Vec<Arc<Shell>>,
+    casters: Arc<Bvh>,
+    lights: Vec<Light>,
+    shadows: Option<Arc<ShellShadows>>,
+}
+
+impl OnShells {
+    /// Whether the casters and shells are these.
+    fn is_of(&self, mesh: &Mesh, shells: &[Arc<Shell>]) -> bool {
+        Arc::ptr_eq(&self.vertices, &mesh.vertices)
+            && self.shells.len() == shells.len()
+            && self.shells.iter().zip(shells).all(|(a, b)| Arc::ptr_eq(a, b))
     }
 }
 

@@ -30,7 +30,7 @@ pub const MAX_ADDED: u32 = 400_000;
 pub const SHADE_BYTES: u64 = 320;
 
 /// Squares on a side of the grid that blocks light in a rock's place. The rock itself has as many or more.
-const ROCK_SQUARES: u32 = 256;
+pub(super) const ROCK_SQUARES: u32 = 256;
 
 /// What blocks a ray: bits of [`Caster::kinds`].
 pub(super) mod kinds {

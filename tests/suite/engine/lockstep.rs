@@ -15,6 +15,7 @@ use taki::light::strand::StrandParams;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::shell::{Shell, Side};
 use taki::mapping::{Material, Quad};
+use taki::place::Mesh;
 use taki::scene::{Limits, Recipe, Scene};
 use taki::trace::{Attenuation, Lookup, Prefilter};
 use taki::util::monitor::Unwatched;
@@ -23,6 +24,7 @@ use taki::volume::{Bricks, Cell, VolumeTexture};
 
 use crate::mapping::shell::{sphere, strip, torus};
 use crate::trace::closed_forms::noise;
+use crate::trace::shell_shadows::walls;
 use crate::trace::shells::scene_with;
 
 /// Width and height of the images. The middle pixels' rays run along the axis of the camera.
@@ -185,8 +187,9 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk() {
         let gbuffer = hits(rng, &scene, volumes[0].size);
         let pixels: Vec<[u32; 2]> = (0..SIZE[0] * SIZE[1]).map(|i| [i % SIZE[0], i / SIZE[0]]).collect();
         let mut cache = LightVolumeCache::default();
+        let mesh = Mesh::default();
         let mut prepared =
-            || Integrator::prepared(&scene, &volumes, &mut cache, &Unwatched).expect("the light volumes fit");
+            || Integrator::prepared(&scene, &volumes, &mesh, &mut cache, &Unwatched).expect("a valid scene");
         let scalar = prepared();
         let truth: Vec<_> = pixels.iter().map(|&p| scalar.pixel(&gbuffer, p, 0, &mut ())).collect();
         for result in &truth {
@@ -219,8 +222,9 @@ fn results_do_not_depend_on_the_rays_beside_them() {
     scene.edit().trace.early_end = 0.001;
     let volume = volume(rng, 0.4, false);
     let gbuffer = hits(rng, &scene, volume.size);
-    let integrator = Integrator::prepared(&scene, &volume, &mut LightVolumeCache::default(), &Unwatched)
-        .expect("the light volumes fit");
+    let integrator =
+        Integrator::prepared(&scene, &volume, &Mesh::default(), &mut LightVolumeCache::default(), &Unwatched)
+            .expect("the light volumes fit");
     let pixels: Vec<[u32; 2]> = (0..SIZE[0] * SIZE[1]).map(|i| [i % SIZE[0], i / SIZE[0]]).collect();
     let run = |pixels: &[[u32; 2]]| {
         let mut out = vec![None; pixels.len()];
@@ -272,15 +276,21 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
         let mut torn = torn.clone();
         torn.volume = 1;
         parts.shells.extend([Arc::new(torn), Arc::new(ball.clone())]);
-        // Opaque matter ends some of the rays inside the shells.
-        let mut targets = gbuffer::run(&scene, &scene.mesh(), 0);
+        // Opaque matter casts shadows on the shells, and ends some of the rays inside them.
+        let corner = |x: f32, z: f32| Vec3::new(x, 2.5, z);
+        parts.triangles =
+            vec![walls(&[[corner(0.0, -9.0), corner(9.0, -9.0), corner(9.0, 9.0), corner(0.0, 9.0)]])];
+        let mesh = scene.mesh();
+        let shadows = scene.shadows_on_shells(&mesh, &Unwatched).expect("nobody stops it");
+        assert_eq!(shadows.is_some(), scene.visibility != Visibility::None);
+        let mut targets = gbuffer::run(&scene, &mesh, 0);
         for opaque in targets.opaque.iter_mut().step_by(3) {
             *opaque = [0.2, 0.3, 0.4, 4.0];
         }
         let pixels: Vec<[u32; 2]> = (0..61 * 40).map(|i| [i % 61, i / 61]).collect();
         let mut cache = LightVolumeCache::default();
         let mut prepared =
-            || Integrator::prepared(&scene, &volumes, &mut cache, &Unwatched).expect("the light volumes fit");
+            || Integrator::prepared(&scene, &volumes, &mesh, &mut cache, &Unwatched).expect("a valid scene");
         let scalar = prepared();
         let truth: Vec<_> = pixels.iter().map(|&p| scalar.pixel(&targets, p, 0, &mut ())).collect();
         for result in &truth {
@@ -288,7 +298,8 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
             lit += u32::from(result.radiance.x > 0.3);
         }
         // Here each ray walks to the lights for what eight lanes have kept at the vertices.
-        let on_demand = Integrator::new(&scene, &volumes);
+        let on_demand =
+            Integrator::new(&scene, &volumes).with_shadows_of(&mesh, &Unwatched).expect("nobody stops it");
         for (pixel, truth) in pixels.iter().zip(&truth).step_by(5) {
             let alone = on_demand.pixel(&targets, *pixel, 0, &mut ());
             assert_eq!(bits(&alone), bits(truth), "{sets:?}, on demand, {pixel:?}: {alone:?} not {truth:?}");

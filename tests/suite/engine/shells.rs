@@ -16,6 +16,7 @@ use taki::volume::VolumeTexture;
 use super::gpu::{COARSE_PLACE, SURFACE, assert_parity, renderer, scene as preset};
 use crate::mapping::shell::{sphere, strip, torus};
 use crate::trace::closed_forms::noise;
+use crate::trace::shell_shadows::walls;
 use crate::trace::shells::scene_with;
 
 /// The shell of a mesh. Its texture is moved, so that no edge lies between cells: there rounding decides
@@ -218,5 +219,46 @@ fn rays_at_edges_and_vertices_go_on_as_on_the_cpu() {
         let wrong: Vec<_> = wrong.map(|i| (i, gpu[i], cpu[i])).collect();
         assert!(wrong.len() <= 1, "{} of 98 rays from {eye:?}: {wrong:?}", wrong.len());
         assert!(cpu.iter().filter(|t| **t < 0.99).count() > 40, "{cpu:?}");
+    }
+}
+
+#[test]
+fn the_engines_agree_on_shadows_of_opaque_matter_on_shells() {
+    let Some(mut renderer) = renderer("shadows on shells") else { return };
+    let volumes = [noise([12, 16, 10], 4)];
+    let (pyramid, cached) = ("trace.filter=pyramid", "light.visibility=cached");
+    let variants: [&[&str]; 6] = [
+        &[],
+        &[cached],
+        &[pyramid],
+        &[pyramid, cached, "camera.fov=80"],
+        &["light.reflection=strand", cached],
+        &["trace.lookup=trilinear", "light.frame=texture"],
+    ];
+    // Half of each shell is hidden from the sun, and a part from the lamp.
+    let wall = |at: Vec3| {
+        let (u, v) = at.any_orthonormal_pair();
+        [at - v * 6.0, at + (u - v) * 6.0, at + (u + v) * 6.0, at + v * 6.0]
+    };
+    let walls = walls(&[wall(Vec3::new(2.6, 5.2, 1.3)), wall(Vec3::new(-1.6, 2.6, 1.8)).map(|p| p * 0.9)]);
+    for (i, sets) in variants.into_iter().enumerate() {
+        let mut scene = scene_with(furred(), EYES[i % 2], sets);
+        let mut strip = strip(9);
+        strip.positions.iter_mut().for_each(|p| *p += Vec3::new(0.4, 0.8, 0.2));
+        scene.edit().shells.push(Arc::new(shell(&strip, Side::Inward)));
+        let [_, open] = both(&mut renderer, &scene, &volumes);
+        scene.edit().triangles = vec![walls.clone()];
+        agree(&mut renderer, &format!("{sets:?}"), &scene, &volumes);
+        // The light at the vertices is kept, and the shadows with it.
+        agree(&mut renderer, &format!("{sets:?} again"), &scene, &volumes);
+        let [shaded, _] = both(&mut renderer, &scene, &volumes);
+        let darker = shaded.radiance.iter().zip(&open.radiance).filter(|(a, b)| a[0] < 0.9 * b[0]).count();
+        assert!(darker > 50, "{sets:?}: {darker} pixels are darker");
+        // Without the walls the device has other values, and without skins none.
+        scene.edit().triangles.clear();
+        agree(&mut renderer, &format!("{sets:?} without walls"), &scene, &volumes);
+        let parts = scene.edit();
+        parts.shells.iter_mut().for_each(|shell| Arc::make_mut(shell).skin = false);
+        agree(&mut renderer, &format!("{sets:?} without casters"), &scene, &volumes);
     }
 }

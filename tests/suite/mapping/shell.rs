@@ -473,3 +473,28 @@ fn eight_paths_side_by_side_are_those_of_each_ray_alone() {
     }
     assert!(compared > 100_000, "{compared}");
 }
+
+#[test]
+fn a_point_below_a_triangle_lies_in_its_tetrahedron_at_its_shares_and_depth() {
+    let shell = shell(&torus(14, 9, 0.35));
+    let rng = &mut Rng::seed_from_u64(8);
+    for _ in 0..2000 {
+        let prism = rng.random_range(0..shell.prisms.len());
+        let [s, t]: [f32; 2] = [rng.random(), rng.random()];
+        let [s, t] = if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] };
+        let shares = Vec3::new(1.0 - s - t, s, t);
+        let depth = rng.random_range(0.01..0.99);
+        let (point, [own, tetrahedron]) = shell.below_triangle(prism, shares, depth);
+        assert_eq!(own, prism);
+        // The path through the point passes it with these shares.
+        let direction = ray(rng, 1.0).1;
+        let path = ShellPath::inside(&shell, [prism, tetrahedron], point, direction).expect("a path");
+        let segment = { path }.next().expect("a segment");
+        assert!(segment.t[0] <= 0.0 && segment.t[1] >= -1e-4, "{segment:?}");
+        let along = -segment.t[0] / (segment.t[1] - segment.t[0]).max(1e-9);
+        let near = |a: f32, b: f32| (a - b).abs() < 2e-3;
+        let seen = segment.shares[0].lerp(segment.shares[1], along);
+        assert!((0..3).all(|k| near(seen[k], shares[k])), "{seen} not {shares}");
+        assert!(near(segment.at[0].lerp(segment.at[1], along).z, depth), "{segment:?} {depth}");
+    }
+}

@@ -3,4 +3,5 @@
 pub mod closed_forms;
 pub mod flow;
 pub mod limits;
+pub mod shell_shadows;
 pub mod shells;

@@ -9,7 +9,7 @@ use taki::Unwatched;
 use taki::engine::cpu;
 use taki::light::{AngleFrame, Light, Visibility};
 use taki::mapping::shell::{Shell, Side, SurfaceMesh};
-use taki::place::{MeshShade, Triangles, Vertex};
+use taki::place::{MeshShade, ShellShadows, Triangles, Vertex};
 use taki::scene::Scene;
 use taki::trace::{Attenuation, Prefilter};
 use taki::volume::VolumeTexture;
@@ -22,7 +22,7 @@ const SIZE: [u32; 2] = [72, 48];
 const SIGMA: f32 = 2.5;
 
 /// A scene of one shell and two lights, seen from `eye`.
-fn scene(shell: Shell, eye: [f64; 3]) -> Scene {
+pub fn scene(shell: Shell, eye: [f64; 3]) -> Scene {
     scene_with(shell, eye, &[])
 }
 
@@ -72,6 +72,8 @@ struct Tetrahedron {
     frames: [[DMat3; 2]; 3],
     /// Whether its fourth face is the inner surface.
     is_innermost: bool,
+    /// Vertices of the prism.
+    vertices: [u32; 3],
 }
 
 fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
@@ -95,6 +97,7 @@ fn tetrahedra(shell: &Shell) -> Vec<Tetrahedron> {
                 uv: prism.uv.map(|uv| uv.as_dvec2()),
                 frames,
                 is_innermost: k == 2,
+                vertices: prism.vertices,
             });
         }
     }
@@ -156,18 +159,34 @@ fn vertex_frames(shell: &Shell, facets: &[[DMat3; 2]], own: usize, vertex: u32) 
 }
 
 impl Tetrahedron {
-    /// Frame of light at a point: interpolated between the prism's vertices, and into the depth.
-    fn frame(&self, point: DVec3) -> DMat3 {
+    /// Shares of the prism's vertices at a point, and the depth.
+    fn shares(&self, point: DVec3) -> ([f64; 3], f64) {
         let at = self.at + self.texture_from_world * (point - self.corners[0]);
         let [a, b, c] = self.uv;
         let p = at.truncate();
         let whole = (b - a).perp_dot(c - a);
+        ([(b, c), (c, a), (a, b)].map(|(q, r)| (q - p).perp_dot(r - p) / whole), at.z)
+    }
+
+    /// Frame of light at a point: interpolated between the prism's vertices, and into the depth.
+    fn frame(&self, point: DVec3) -> DMat3 {
+        let (shares, z) = self.shares(point);
         let mut sum = DMat3::ZERO;
-        for (i, (q, r)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
-            let share = (q - p).perp_dot(r - p) / whole;
-            sum += (self.frames[i][0] * (1.0 - at.z) + self.frames[i][1] * at.z) * share;
+        for (frames, share) in self.frames.iter().zip(shares) {
+            sum += (frames[0] * (1.0 - z) + frames[1] * z) * share;
         }
         sum
+    }
+
+    /// Share of a light that opaque matter lets through to a point, where `at_vertices` is that at the
+    /// vertices of the shell.
+    fn past_opaque_matter(&self, point: DVec3, at_vertices: &[[f32; 2]]) -> f64 {
+        let (shares, z) = self.shares(point);
+        let of_vertex = |(&vertex, share): (&u32, f64)| {
+            let [outer, inner] = at_vertices[vertex as usize].map(f64::from);
+            (outer * (1.0 - z) + inner * z) * share
+        };
+        self.vertices.iter().zip(shares).map(of_vertex).sum()
     }
 }
 
@@ -211,7 +230,7 @@ fn cells(
 fn trace(
     scene: &Scene,
     volume: &VolumeTexture,
-    all: &[Tetrahedron],
+    (all, shadows): (&[Tetrahedron], Option<&ShellShadows>),
     ray: [DVec3; 2],
     (far, behind): (f64, DVec3),
 ) -> (DVec3, bool) {
@@ -239,7 +258,7 @@ fn trace(
             let mut sum = scene.ambient.as_dvec3();
             let middle = origin + d * (0.5 * (enter + leave));
             let world_from_cell = tetrahedron.frame(middle) * DMat3::from_diagonal(1.0 / n);
-            for light in &scene.lights {
+            for (i, light) in scene.lights.iter().enumerate() {
                 let (l, intensity) = light.at(middle.as_vec3());
                 let far = f64::from(light.distance(middle.as_vec3()));
                 let (l, intensity) = (l.as_dvec3().normalize(), intensity.as_dvec3());
@@ -273,7 +292,8 @@ fn trace(
                         depth = f64::INFINITY;
                     }
                 }
-                sum += intensity * ((-depth).exp() * psi);
+                let open = shadows.map_or(1.0, |own| tetrahedron.past_opaque_matter(middle, own.of(0, i)));
+                sum += intensity * ((-depth).exp() * psi * open);
             }
             lit += sum * weight;
         }
@@ -283,14 +303,17 @@ fn trace(
 
 /// Compares all pixels of a scene. `opaque` finds the distance and the radiance of what lies behind the shell
 /// on a ray. Returns the share of those that meet the shell.
-fn compare(
+pub fn compare(
     scene: &Scene,
     volume: &VolumeTexture,
     opaque: impl Fn(DVec3, DVec3) -> Option<(f64, DVec3)>,
 ) -> f64 {
     let [width, height] = SIZE;
-    let frame = cpu::render(scene, volume, &scene.mesh(), false, &Unwatched).expect("a frame");
+    let mesh = scene.mesh();
+    let frame = cpu::render(scene, volume, &mesh, false, &Unwatched).expect("a frame");
     let all = tetrahedra(&scene.shells[0]);
+    // Their values are tested beside brute force in `shell_shadows.rs`.
+    let shadows = scene.shadows_on_shells(&mesh, &Unwatched).expect("nobody stops it");
     let [forward, right, up] = scene.camera.rays(width, height);
     let (mut wrong, mut met) = (0, 0);
     for (i, own) in frame.radiance.iter().enumerate() {
@@ -299,7 +322,7 @@ fn compare(
         let d = (forward + right * at.x + up * at.y).normalize();
         let eye = scene.camera.eye_local();
         let end = opaque(eye, d).unwrap_or((f64::INFINITY, scene.background.zenith.as_dvec3()));
-        let (truth, meets) = trace(scene, volume, &all, [eye, d], end);
+        let (truth, meets) = trace(scene, volume, (&all, shadows.as_deref()), [eye, d], end);
         met += u32::from(meets);
         let own = DVec3::new(own[0].into(), own[1].into(), own[2].into());
         let error = (own - truth).abs() / truth.max(DVec3::splat(0.05));
@@ -314,7 +337,7 @@ fn compare(
     f64::from(met) / f64::from(width * height)
 }
 
-fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
+pub fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
     Shell::new(mesh, side).expect("a valid mesh")
 }
 
@@ -487,7 +510,7 @@ fn rmse(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
     (error / b.iter().map(|b| square(*b)).sum::<f64>()).sqrt()
 }
 
-fn render(scene: &Scene, volume: &VolumeTexture) -> Vec<[f32; 4]> {
+pub fn render(scene: &Scene, volume: &VolumeTexture) -> Vec<[f32; 4]> {
     cpu::render(scene, volume, &scene.mesh(), false, &Unwatched).expect("a frame").radiance
 }
 

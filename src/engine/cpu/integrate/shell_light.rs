@@ -1,4 +1,5 @@
-//! §5 V_i(k) in shells: walked from every cell, or kept at the vertices of the mesh and interpolated.
+//! §5 V_i(k) in shells: walked from every cell, or kept at the vertices of the mesh and interpolated. It is
+//! multiplied by the share of light that opaque matter lets through.
 
 use std::sync::Arc;
 
@@ -56,7 +57,7 @@ impl KeptPlace {
 impl Integrator<'_> {
     /// V of light number `i` at a place in a shell.
     pub(super) fn shell_visibility(&self, level: &Level, place: &Place, i: usize, walked: &mut u32) -> f32 {
-        match self.scene.visibility {
+        let through_shell = match self.scene.visibility {
             Visibility::None => 1.0,
             Visibility::Cached if self.kept_in[place.shell] => {
                 self.kept_place(place).mean(|at, next| match &self.shell_light {
@@ -68,7 +69,16 @@ impl Integrator<'_> {
                 })
             }
             Visibility::Cached | Visibility::March => self.walked_visibility(level, place, i, walked),
-        }
+        };
+        through_shell * self.past_opaque_matter(place, i)
+    }
+
+    /// Share of light number `i` that opaque matter lets through to a place in a shell.
+    #[inline]
+    fn past_opaque_matter(&self, place: &Place, i: usize) -> f32 {
+        let Some(shadows) = &self.shell_shadows else { return 1.0 };
+        let vertices = self.scene.shells[place.shell].prisms[place.tetrahedron[0]].vertices;
+        shadows.at(place.shell, i, vertices, place.shares, place.depth)
     }
 
     /// V of all lights at a place in a shell.
@@ -84,7 +94,8 @@ impl Integrator<'_> {
             Some(kept) if self.kept_in[place.shell] => {
                 let at = self.kept_place(place);
                 for (i, values) in kept.0[place.shell].iter().enumerate() {
-                    visible(i, at.mean(|at, next| [values[at], values[next]]));
+                    let through_shell = at.mean(|at, next| [values[at], values[next]]);
+                    visible(i, through_shell * self.past_opaque_matter(place, i));
                 }
             }
             _ => (0..self.lights.len())
