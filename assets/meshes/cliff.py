@@ -1,6 +1,6 @@
 """Writes cliff.glb, the mesh of the preset `cliff`: a cliff, and the water that runs over its rim.
 
-Run: python cliff.py [FILE]   (with Blender's module: pip install bpy==5.2.3)
+Run: python cliff.py [FILE]   (with Blender's module: pip install bpy==5.3.0)
 
 The scene is modelled as in Blender: metres, Z up, the water falls towards −Y. The fall's texture has u across
 the water from left to right, and v = time of fall, so that the pattern stretches as the water gets faster.

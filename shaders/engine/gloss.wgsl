@@ -73,7 +73,7 @@ fn reflects(g: Glossy, l: vec3<f32>, cos_light: f32) -> vec3<f32> {
 
 struct GlossyLit {
     radiance: vec3<f32>,
-    // That of a film of water.
+    // Gloss of a film of water.
     film: vec3<f32>,
 }
 
@@ -126,7 +126,7 @@ fn shade_glossy(
     return opaque_targets(radiance, g.n, to_eye, in.holdout);
 }
 
-// What the paint of the tile under a pixel says about its point; a point without a paint stays as it is.
+// Applies the paint of the tile under a pixel to its point; a point without a paint stays as it is.
 fn painted_point(in: OpaquePoint, tile: MeshTile, n: vec3<f32>) -> Painted {
     let drawn = textureLoad(rock_surface, in.pixel, 0);
     let triangle = u32(clamp(floor(drawn.x * 0.5), 0.0, f32(tile.side) - 1.0));

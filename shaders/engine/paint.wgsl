@@ -26,7 +26,7 @@ struct TextureUse {
     rule: u32,
 }
 
-// What the triangles of one material look like: Paint of src/place/paint/mod.rs.
+// Look of the triangles of one material: Paint of src/place/paint/mod.rs.
 struct Paint {
     // Factor of the albedo.
     color: TextureUse,
@@ -72,7 +72,7 @@ struct Footprint {
     along: vec2<f32>,
 }
 
-// What the textures say about a point.
+// Values of the textures at a point.
 struct Painted {
     color: vec3<f32>,
     roughness: f32,
@@ -223,7 +223,7 @@ fn bent(paint: Paint, s: Sight, m: vec3<f32>) -> vec3<f32> {
     return select(n, sum / max(length_sum, 1e-6), length_sum > 1e-6);
 }
 
-// What the textures of a paint say about a point. Twin: Paints::at.
+// Reads the textures of a paint at a point. Twin: Paints::at.
 fn painted_at(paint: Paint, s: Sight) -> Painted {
     var out = Painted(vec3<f32>(1.0), paint.roughness, paint.metallic, s.normal);
     if paint.slots == 0u {
