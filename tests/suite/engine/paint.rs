@@ -3,13 +3,13 @@
 use std::f64::consts::PI;
 use std::io::Cursor;
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DVec2, DVec3, Vec3};
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::{Value, json};
 use taki::engine::cpu;
 use taki::model::Wrap;
 use taki::picture::{Camera, Frame};
-use taki::place::{MeshShade, Vertex};
+use taki::place::{MeshShade, Vertex, wet_albedo};
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
 
@@ -376,6 +376,29 @@ fn a_film_of_water_darkens_the_texture_itself() {
     for frame in frames("film", &scene) {
         let (share, count) = wrong(&frame, &scene, 1e-3, truth);
         assert!(share < 1e-3 && count > 1000, "{share} of {count}");
+    }
+}
+
+#[test]
+fn a_vertex_under_a_film_keeps_its_factor_where_a_texture_is_darkened_in_its_place() {
+    let folder = Folder::new();
+    for is_textured in [true, false] {
+        let mut doc = Doc::square();
+        doc.json["materials"][0]["pbrMetallicRoughness"] = json!({"baseColorFactor": [0.4, 0.4, 0.4, 1.0]});
+        if is_textured {
+            add_textures(&mut doc, &[&noise(6, 5)], json!({}));
+            doc.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+        }
+        folder.write("a.glb", doc.glb());
+        let water = "[[quads]]\ncorners = [[0,1,0.3],[1,1,0.3],[1,0,0.3],[0,0,0.3]]\n";
+        let scene = folder.scene(&format!("{PLACE}{SCENE}{water}"), &["meshes.a.wet=0.8"]);
+        let mesh = scene.mesh();
+        assert!(mesh.vertices.len() > 1000 && mesh.vertices.iter().all(|vertex| vertex.wet > 0.3));
+        for Vertex { albedo: [red, ..], wet, .. } in mesh.vertices.iter() {
+            let darkened = 0.4 + (wet_albedo(Vec3::splat(0.4)).x - 0.4) * wet;
+            let truth = if is_textured { 0.4 } else { darkened };
+            assert!((red - truth).abs() < 1e-5, "{is_textured} {red} {truth} {wet}");
+        }
     }
 }
 
