@@ -151,4 +151,4 @@ bpy.context.collection.objects.link(camera)
 
 # 5. The file, with the colours of the vertices. Blender turns its z into glTF's y.
 bpy.ops.export_scene.gltf(filepath=os.path.abspath("ledge.glb"), export_format="GLB", export_cameras=True,
-                          export_vertex_color="ACTIVE", export_all_vertex_colors=True)
+                          export_vertex_color="ACTIVE")

@@ -77,6 +77,9 @@ struct OpaquePoint {
     pixel: vec2<u32>,
     position_world: vec3<f32>,
     normal_world: vec3<f32>,
+    // Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its vertices'
+    // normals; 0 in a grid.
+    plane: vec3<f32>,
     albedo: vec3<f32>,
     // Occlusion, shadow and film of water, 0 to 1 each.
     shade: vec3<f32>,
@@ -148,6 +151,8 @@ fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
         let origin = vec2<f32>(2.0 * triangle + 0.25, 0.25);
         let b = clamp((drawn.xy - origin) * 2.0, vec2<f32>(0.0), vec2<f32>(1.0));
         let corner = tile.first + 3u * u32(triangle);
+        let a = positions[corner].xyz;
+        out.plane = cross3(positions[corner + 1u].xyz - a, positions[corner + 2u].xyz - a);
         out = add_coat(out, corner, 1.0 - b.x - b.y);
         out = add_coat(out, corner + 1u, b.x);
         return add_coat(out, corner + 2u, b.y);

@@ -5,11 +5,17 @@
 #import light::environment
 #import light::haze
 
-// Unit normal of a point, turned towards the eye.
+// Unit normal of a point on the side that the eye sees. Twin: Points::view, which explains it.
 fn seen_normal(in: OpaquePoint) -> vec3<f32> {
     let to_eye = frame.eye_world - in.position_world;
     let n = in.normal_world / sqrt(max(dot3(in.normal_world, in.normal_world), 1e-30));
-    return select(n, -n, dot3(n, to_eye) < 0.0);
+    let by_plane = dot3(in.plane, to_eye);
+    let side = select(by_plane, dot3(n, to_eye), by_plane == 0.0);
+    let seen = select(n, -n, side < 0.0);
+    let e = to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);
+    let across = seen - e * dot3(seen, e);
+    let leans = dot3(seen, to_eye) < 0.0;
+    return select(seen, across / sqrt(max(dot3(across, across), 1e-30)), leans);
 }
 
 struct Lit {

@@ -44,6 +44,9 @@ struct ShellPath {
     left: u32,
 }
 
+// Share of the way to a tetrahedron's middle by which the origin of a line is moved that passes it by.
+const INWARDS: f32 = 1e-3;
+
 // The part of a ray inside one tetrahedron: Segment of path.rs.
 struct Segment {
     prism: u32,
@@ -217,8 +220,8 @@ fn path_consider(
     }
 }
 
-// Path of a ray whose origin lies in a tetrahedron. Without segments if rounding lets the line miss it. Twin:
-// ShellPath::inside.
+// Path of a ray whose origin lies in a tetrahedron. Without segments if the tetrahedron has no volume. Twin:
+// ShellPath::inside, which explains the second try.
 fn path_inside(
     shell: Shell,
     prism: u32,
@@ -226,26 +229,35 @@ fn path_inside(
     origin: vec3<f32>,
     direction: vec3<f32>,
 ) -> ShellPath {
-    var path = path_at(shell, prism, tetrahedron, origin, direction);
     let points = tetrahedron_points(prism_vertices(shell, prism), tetrahedron);
-    let a = path_corner(path, points.x);
-    let b = path_corner(path, points.y);
-    let c = path_corner(path, points.z);
-    let d = path_corner(path, points.w);
-    // An edge that is seen the other way has the ray on its other side.
-    let ab = is_left(a, b);
-    let ac = is_left(a, c);
-    let ad = is_left(a, d);
-    let bc = is_left(b, c);
-    let bd = is_left(b, d);
-    let cd = is_left(c, d);
-    var least = NEVER;
-    path_consider(&path, &least, vec3<bool>(bc, cd, !bd), b, c, d);
-    path_consider(&path, &least, vec3<bool>(ac, cd, !ad), a, c, d);
-    path_consider(&path, &least, vec3<bool>(ab, bd, !ad), a, b, d);
-    path_consider(&path, &least, vec3<bool>(ab, bc, !ac), a, b, c);
-    path.t = min(path.t, 0.0);
-    path.left = select(MOST_FACES, 0u, least == NEVER);
+    var from_point = origin;
+    var path: ShellPath;
+    for (var attempt = 0u; attempt < 2u; attempt++) {
+        path = path_at(shell, prism, tetrahedron, from_point, direction);
+        let a = path_corner(path, points.x);
+        let b = path_corner(path, points.y);
+        let c = path_corner(path, points.z);
+        let d = path_corner(path, points.w);
+        // An edge that is seen the other way has the ray on its other side.
+        let ab = is_left(a, b);
+        let ac = is_left(a, c);
+        let ad = is_left(a, d);
+        let bc = is_left(b, c);
+        let bd = is_left(b, d);
+        let cd = is_left(c, d);
+        var least = NEVER;
+        path_consider(&path, &least, vec3<bool>(bc, cd, !bd), b, c, d);
+        path_consider(&path, &least, vec3<bool>(ac, cd, !ad), a, c, d);
+        path_consider(&path, &least, vec3<bool>(ab, bd, !ad), a, b, d);
+        path_consider(&path, &least, vec3<bool>(ab, bc, !ac), a, b, c);
+        if least != NEVER {
+            path.t = min(path.t, 0.0);
+            return path;
+        }
+        let middle = (a.world + b.world + c.world + d.world) * 0.25;
+        from_point = origin + (middle - origin) * INWARDS;
+    }
+    path.left = 0u;
     return path;
 }
 

@@ -19,7 +19,7 @@ use crate::util::cache::{Cache, key};
 /// Opaque triangles of a mesh that another program made.
 #[derive(Clone)]
 pub struct Triangles {
-    /// Three vertices for each triangle.
+    /// Three vertices for each triangle, counter-clockwise as seen from the side that their normals are on.
     pub vertices: Arc<Vec<Vertex>>,
     /// Whether a picture with an alpha channel has a hole in their place.
     pub holdout: bool,

@@ -8,7 +8,7 @@ use super::lights::{background_at, irradiance_at, light_at};
 use crate::place::Vertex;
 use crate::place::tiles::Tile;
 use crate::scene::Scene;
-use crate::util::lanes::{Floats, LANES, Lanes3, Stored};
+use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 
 /// Points of the opaque mesh, one a lane, with values interpolated between its vertices.
 pub struct Points<S: Simd> {
@@ -16,6 +16,9 @@ pub struct Points<S: Simd> {
     pub position: Lanes3<S>,
     /// Normal, not normalised.
     pub normal: Lanes3<S>,
+    /// Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its vertices'
+    /// normals; 0 in a grid.
+    pub plane: Lanes3<S>,
     /// Linear albedo. A pool has its depth (metres) and the density of its foam (0 to 1) here.
     pub albedo: Lanes3<S>,
     /// Share of the surroundings' light that is blocked, 0 to 1.
@@ -50,9 +53,13 @@ impl<S: Simd> Points<S> {
     ) -> Self {
         // Eight of the numbers lie side by side; the ninth is apart.
         let mut rows = [[0.0; LANES]; LANES];
-        let mut wet = Stored::default();
+        let (mut wet, mut planes) = (Stored::default(), Stored3::default());
         for lane in 0..LANES {
             let (numbers, weights) = tiles[lane].around(Vec2::new(places[0][lane], places[1][lane]));
+            if !tiles[lane].is_grid() {
+                let [a, b, c] = numbers.map(|number| Vec3::from(vertices[number as usize].position));
+                planes.set(lane, (b - a).cross(c - a));
+            }
             let coats = numbers.map(|number| vertices[number as usize].coat());
             let mut row = f32x8::splat(simd, 0.0);
             for c in 0..3 {
@@ -72,6 +79,7 @@ impl<S: Simd> Points<S> {
         Points {
             position,
             normal: Lanes3 { x: nx.load(simd), y: ny.load(simd), z: nz.load(simd) },
+            plane: planes.load(simd),
             albedo: Lanes3 { x: red.load(simd), y: green.load(simd), z: blue.load(simd) },
             occlusion: occlusion.load(simd),
             shadow: shadow.load(simd),
@@ -80,15 +88,25 @@ impl<S: Simd> Points<S> {
     }
 
     /// Returns how the eye sees the points.
+    ///
+    /// Both sides of a surface are seen. Which side it is, the plane of a triangle says: near the outline of a
+    /// smooth mesh, normals that were interpolated lean away from the eye. There the normal is taken that is
+    /// nearest to them among those that the eye sees.
     #[inline(always)]
     pub fn view(&self, simd: S, scene: &Scene) -> View<S> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let (zero, one) = (splat(0.0), splat(1.0));
         let to_eye = Lanes3::splat(simd, scene.camera.eye_local().as_vec3()).minus(self.position);
         let distance = to_eye.dot(to_eye).sqrt();
+        let e = to_eye.over(distance.max(splat(1e-6)));
         let n = self.normal.over(self.normal.dot(self.normal).max(splat(1e-30)).sqrt());
-        let n = n.times(n.dot(to_eye).simd_lt(zero).select(splat(-1.0), one));
-        View { n, e: to_eye.over(distance.max(splat(1e-6))), distance }
+        let by_plane = self.plane.dot(to_eye);
+        let side = by_plane.simd_eq(zero).select(n.dot(to_eye), by_plane);
+        let n = n.times(side.simd_lt(zero).select(splat(-1.0), one));
+        let leans = n.dot(to_eye).simd_lt(zero);
+        let across = n.minus(e.times(n.dot(e)));
+        let across = across.over(across.dot(across).max(splat(1e-30)).sqrt());
+        View { n: across.or(leans, n), e, distance }
     }
 
     /// Shades rock: two-sided Lambert, with the gloss of a film of water. Returns the linear radiance.

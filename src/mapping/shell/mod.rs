@@ -22,7 +22,7 @@ mod tangents;
 use glam::{Vec2, Vec3};
 
 pub use build::{ShellFault, Side, SurfaceMesh};
-pub use path::{End, LanePaths, LaneSegments, MOST_FACES, Segment, ShellPath};
+pub use path::{End, INWARDS, LanePaths, LaneSegments, MOST_FACES, Segment, ShellPath};
 pub use tangents::Tangents;
 
 /// A volume between two surfaces.

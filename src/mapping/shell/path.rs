@@ -23,6 +23,10 @@ use super::{AT_SIDES, FACES, Face, HullFace, Prism, Shell};
 /// `shaders/mapping/shell_path.wgsl`.
 pub const MOST_FACES: u32 = 1 << 16;
 
+/// Share of the way to a tetrahedron's middle by which the origin of a line is moved that passes the
+/// tetrahedron by. Twin: `INWARDS` of `shaders/mapping/shell_path.wgsl`.
+pub const INWARDS: f32 = 1e-3;
+
 /// The part of a ray inside one tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
@@ -124,8 +128,21 @@ impl<'a> ShellPath<'a> {
     }
 
     /// Path of a ray whose origin lies in a tetrahedron. It begins where the line of the ray enters the
-    /// tetrahedron, with a parameter that is not above 0. `None` if rounding lets the line miss it.
-    pub fn inside(
+    /// tetrahedron, with a parameter that is not above 0.
+    ///
+    /// A line in the plane of a face, or one that rounding moves, may pass the tetrahedron by. The origin is
+    /// then moved a little to the middle of the tetrahedron. `None` if the line misses it even so, because the
+    /// tetrahedron has no volume.
+    pub fn inside(shell: &'a Shell, place: [usize; 2], origin: Vec3, direction: Vec3) -> Option<Self> {
+        ShellPath::along_line(shell, place, origin, direction).or_else(|| {
+            let corners = shell.tetrahedron(place[0], place[1]).map(|point| shell.points[point as usize]);
+            let middle = (corners[0] + corners[1] + corners[2] + corners[3]) * 0.25;
+            ShellPath::along_line(shell, place, origin + (middle - origin) * INWARDS, direction)
+        })
+    }
+
+    /// [`ShellPath::inside`], but `None` if the line misses the tetrahedron.
+    fn along_line(
         shell: &'a Shell,
         [prism, tetrahedron]: [usize; 2],
         origin: Vec3,

@@ -143,6 +143,11 @@ impl Gltf<'_> {
             }
             out.colors = Some(colors);
         }
+        if attributes.contains_key("COLOR_1") {
+            model.note(format!(
+                "{place} has several sets of colours: COLOR_0 is used; in Blender, export the active colours alone"
+            ));
+        }
         Ok(out)
     }
 

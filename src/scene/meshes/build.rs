@@ -96,6 +96,17 @@ impl Part<'_> {
     pub fn vertex(&self, vertex: u32) -> DVec3 {
         Vec3::from(self.primitive.positions[vertex as usize]).as_dvec3()
     }
+
+    /// Corners of a triangle, counter-clockwise in the world as seen from the side that the file's normals are
+    /// on. Files wind triangles one way or the other.
+    pub fn facing(&self, [a, b, c]: [u32; 3]) -> [u32; 3] {
+        let turned = self.primitive.normals.as_ref().is_some_and(|normals| {
+            let [p, q, r] = [a, b, c].map(|i| self.vertex(i));
+            let sum: Vec3 = [a, b, c].iter().map(|&i| Vec3::from(normals[i as usize])).sum();
+            (q - p).cross(r - p).dot(sum.as_dvec3()) < 0.0
+        });
+        if self.flipped != turned { [a, c, b] } else { [a, b, c] }
+    }
 }
 
 impl Key {

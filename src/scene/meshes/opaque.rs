@@ -41,10 +41,8 @@ pub(super) fn triangles(key: &Key, memory: u64) -> Result<Option<Triangles>> {
 }
 
 /// Returns the vertices of a triangle.
-fn triangle(part: &Part, mut corners: [u32; 3], normals: &DMat3, albedos: &[Vec3]) -> [Vertex; 3] {
-    if part.flipped {
-        corners.swap(1, 2);
-    }
+fn triangle(part: &Part, corners: [u32; 3], normals: &DMat3, albedos: &[Vec3]) -> [Vertex; 3] {
+    let corners = part.facing(corners);
     let positions = corners.map(|i| part.position(i));
     let [a, b, c] = positions.map(|p| p.as_dvec3());
     let face = (b - a).cross(c - a).normalize_or(DVec3::Y);

@@ -202,8 +202,7 @@ fn gloss(material: &ModelMaterial) -> Option<[f32; 2]> {
 fn add_coordinates(part: &Part, slots: &[Slot], out: &mut Vec<[f32; 2]>) {
     let count = slots.len();
     let own = |&corners: &[u32; 3]| {
-        let [a, b, c] = corners;
-        let corners = if part.flipped { [a, c, b] } else { corners };
+        let corners = part.facing(corners);
         let mut all = [[0.0; 2]; 3 * MOST_SLOTS as usize];
         for (s, slot) in slots.iter().enumerate() {
             let uvs = corners.map(|i| slot.transform.apply(part.primitive.uvs[slot.set][i as usize]));

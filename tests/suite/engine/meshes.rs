@@ -185,6 +185,63 @@ fn ball() -> Vec<u8> {
     doc.glb()
 }
 
+/// A coarse sphere in OBJ with the normals of a smooth one, its faces wound one way or the other.
+fn smooth_ball(turned: bool) -> String {
+    let (columns, rows) = (8, 6);
+    let (mut points, mut normals, mut faces) = (String::new(), String::new(), String::new());
+    for j in 0..=rows {
+        let polar = j as f32 / rows as f32 * std::f32::consts::PI;
+        for i in 0..columns {
+            let turn = i as f32 / columns as f32 * std::f32::consts::TAU;
+            let [x, y, z] = [polar.sin() * turn.sin(), polar.cos(), polar.sin() * turn.cos()];
+            points += &format!("v {x} {y} {z}\n");
+            normals += &format!("vn {x} {y} {z}\n");
+        }
+    }
+    for j in 0..rows {
+        for i in 0..columns {
+            let at = |di: usize, dj: usize| (j + dj) * columns + (i + di) % columns + 1;
+            let [a, b, c, d] = [at(0, 0), at(0, 1), at(1, 1), at(1, 0)].map(|n| format!("{n}//{n}"));
+            faces += &if turned { format!("f {d} {c} {b} {a}\n") } else { format!("f {a} {b} {c} {d}\n") };
+        }
+    }
+    points + &normals + &faces
+}
+
+#[test]
+fn normals_of_a_smooth_mesh_stay_on_their_side_at_its_outline() {
+    let mut renderer = renderer("normals at outlines");
+    let folder = Folder::new();
+    let text = format!("{PLACE}[meshes.ball]\nfile = \"ball.obj\"\nmaterial = \"opaque\"\n");
+    let sets = ["camera.eye=[0,0,4]", "camera.target=[0,0,0]", "camera.fov=32", "image.height=48"];
+    for turned in [false, true] {
+        folder.write("ball.obj", smooth_ball(turned));
+        let scene = folder.scene(&text, &sets);
+        let frames = match &mut renderer {
+            Some(renderer) => both(renderer, &scene).to_vec(),
+            None => vec![on_cpu(&scene)],
+        };
+        for frame in frames {
+            let surface = frame.surface.as_ref().expect("layers");
+            let (mut covered, mut leaning) = (0, 0);
+            for (i, n) in surface.normal.iter().map(|n| glam::Vec3::from(*n)).enumerate() {
+                if n == glam::Vec3::ZERO {
+                    continue;
+                }
+                let (x, y) = (i % frame.width as usize, i / frame.width as usize);
+                let out = glam::vec2(x as f32 - 23.5, 23.5 - y as f32);
+                covered += 1;
+                leaning += usize::from(n.z < 0.4);
+                assert!((n.length() - 1.0).abs() < 1e-3, "{n}");
+                // The middle of the ball is seen from the front; around it, normals lean outwards.
+                let outwards = n.truncate().dot(out.normalize_or_zero());
+                assert!(out.length() < 12.0 || outwards > 0.3, "turned {turned}, {x} {y}: {n}");
+            }
+            assert!(covered > 500 && leaning > 20, "{covered} {leaning}");
+        }
+    }
+}
+
 #[test]
 fn a_shell_has_a_silhouette_on_both_engines() {
     let folder = Folder::new();

@@ -15,7 +15,7 @@ use taki::volume::VolumeTexture;
 
 use super::gpu::{COARSE_PLACE, SURFACE, assert_parity, renderer, scene as preset};
 use crate::mapping::shell::{sphere, strip, torus};
-use crate::trace::closed_forms::noise;
+use crate::trace::closed_forms::{noise, uniform};
 use crate::trace::shell_shadows::walls;
 use crate::trace::shells::scene_with;
 
@@ -69,6 +69,45 @@ fn the_engines_agree_on_shells_from_above_and_along_their_surface() {
             let mut scene = scene_with(shell.clone(), eye, &[]);
             scene.edit().angles = angles;
             agree(&mut renderer, &format!("shell {i} from {eye:?}"), &scene, std::slice::from_ref(&volume));
+        }
+    }
+}
+
+#[test]
+fn no_light_leaks_past_a_skin_where_rays_run_in_the_plane_of_a_face() {
+    // View rays of the middle column and the light lie in the plane that parts the two prisms.
+    let mesh = SurfaceMesh {
+        positions: [[0, -1], [1, 0], [0, 1], [-1, 0]].map(|[x, y]| Vec3::new(x as f32, y as f32, 0.0)).into(),
+        uv: [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| Vec2::new(u as f32, v as f32)).into(),
+        thickness: vec![0.3; 4],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let volume = uniform([8, 8, 6], Vec3::new(0.6, 0.8, 0.0), 0.5, 0.5, 0.2);
+    let mut renderer = renderer("skins");
+    for (behind, skin) in [(-1.0, true), (-1.0, false), (1.0, true)] {
+        let mut shell = Shell::new(&mesh, Side::Outward).expect("a valid mesh");
+        shell.skin = skin;
+        let mut scene = scene_with(shell, [0.0, 0.0, 4.0], &["image.width=81", "image.height=81"]);
+        let parts = scene.edit();
+        parts.ambient = Vec3::ZERO;
+        parts.background.zenith = Vec3::ZERO;
+        parts.background.horizon = Vec3::ZERO;
+        parts.lights = vec![Light::Directional { to_light: Vec3::Z * behind, intensity: Vec3::ONE }];
+        let frames = match &mut renderer {
+            Some(renderer) => both(renderer, &scene, std::slice::from_ref(&volume)).to_vec(),
+            None => vec![cpu::render(&scene, &volume, &scene.mesh(), true, &Unwatched).expect("a frame")],
+        };
+        for frame in frames {
+            let lit = !(skin && behind < 0.0);
+            for y in 20..60 {
+                let [left, middle, right] = [39, 40, 41].map(|x| frame.radiance[y * 81 + x][0]);
+                assert_eq!(left > 0.0, lit, "{behind} {skin}, row {y}: {left}");
+                let near = 0.5 * (left + right);
+                assert!(
+                    (middle - near).abs() <= 0.02 * near,
+                    "{behind} {skin}, row {y}: {middle}, beside {near}"
+                );
+            }
         }
     }
 }

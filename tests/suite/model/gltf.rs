@@ -71,6 +71,18 @@ fn strips_fans_and_lists_without_indices_are_triangles_of_one_winding() {
 }
 
 #[test]
+fn of_several_sets_of_colours_the_first_is_used_with_a_note() {
+    let mut doc = Doc::square();
+    for (name, red) in [("COLOR_0", 0.25), ("COLOR_1", 1.0)] {
+        let colors = doc.add("VEC3", 5126, 4, &floats(&[red, 0.5, 0.5].repeat(4)));
+        doc.primitive()["attributes"][name] = json!(colors);
+    }
+    assert_eq!(only(&doc).colors.expect("colours")[0][0], 0.25);
+    let notes = doc.model().notes;
+    assert!(notes.len() == 1 && notes[0].contains("COLOR_0 is used"), "{notes:?}");
+}
+
+#[test]
 fn points_and_lines_are_left_out_with_a_note() {
     let mut doc = Doc::square();
     let mut points = doc.primitive().clone();

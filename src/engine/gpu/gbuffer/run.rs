@@ -111,12 +111,12 @@ impl Run<'_> {
                 let mut buffers = vec![
                     (at::FRAME, &self.uniform),
                     (at::LIGHTS, &up.lights),
+                    (at::POSITIONS, &up.positions),
                     (at::TILES, &up.tiles),
                     (at::COATS, &up.coats),
                 ];
                 if let Some(paints) = &up.paints {
                     buffers.extend([
-                        (at::POSITIONS, &up.positions),
                         (at::PAINTS, &paints.paints),
                         (at::CORNER_UVS, &paints.corner_uvs),
                         (at::TEXELS, &paints.texels),

@@ -77,6 +77,23 @@ impl<'a> Store<'a> {
         }
     }
 
+    /// Fetches the cells of one lane, one in each row of indices, and shows them in turn.
+    #[inline(always)]
+    pub fn lane(&self, rows: &[[i32; LANES]], lane: usize, mut show: impl FnMut(usize, Cell)) {
+        match self.cells {
+            Stored::Dense(cells) => {
+                for (row, index) in rows.iter().enumerate() {
+                    show(row, dense(cells, index[lane]));
+                }
+            }
+            Stored::Sparse(bricks) => {
+                for (row, index) in rows.iter().enumerate() {
+                    show(row, self.sparse(bricks, index[lane]));
+                }
+            }
+        }
+    }
+
     /// Fetches the cells of some steps. No cell is an empty one.
     #[inline(always)]
     pub fn fetch(&self, index: &[[i32; LANES]], row: &mut [[Cell; LANES]]) {

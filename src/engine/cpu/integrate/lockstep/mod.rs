@@ -20,6 +20,7 @@ mod group;
 mod hits;
 mod light;
 mod packed;
+mod rows;
 mod scatter;
 mod shell;
 mod shell_fill;

@@ -7,8 +7,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 use glam::Vec3;
 
-use super::cells::{Store, rho_codes, words};
+use super::cells::Store;
 use super::hits::in_tile;
+use super::rows::Rows;
 use super::walk::Walk;
 use crate::engine::cpu::integrate::shell_light::ENOUGH_BITS;
 use crate::engine::cpu::integrate::{FrameVolume, Integrator};
@@ -17,7 +18,6 @@ use crate::mapping::shell::{End, LanePaths, LaneSegments, Shell, ShellPath};
 use crate::trace::lookup::Level;
 use crate::util::lanes::{LANES, Lanes3, Mask, Stored, lanes_of};
 use crate::util::powers::exp2;
-use crate::volume::Cell;
 
 /// Values of V of one light in one shell.
 pub struct Fill<'a> {
@@ -42,6 +42,9 @@ struct Rays {
     depth: Stored,
     /// Cells walked.
     cells: [i32; LANES],
+    /// Parameters where the rays leave their tetrahedra, and the cells that they pass there.
+    end: Stored,
+    rows: Rows,
 }
 
 impl<'a> Fill<'a> {
@@ -111,10 +114,10 @@ impl<'a> Fill<'a> {
     /// Walks through a tetrahedron in each of the lanes `bits`. Returns those that had not ended before it.
     #[inline(always)]
     fn through<S: Simd>(&self, simd: S, bits: u8, segments: &LaneSegments, rays: &mut Rays) -> u8 {
-        let (zero, none, one) = (f32x8::splat(simd, 0.0), i32x8::splat(simd, 0), i32x8::splat(simd, 1));
+        let zero = f32x8::splat(simd, 0.0);
         let far = rays.far.load(simd);
-        let mut depth = rays.depth.load(simd);
-        let mut count = i32x8::load_array_ref(simd, &rays.cells);
+        let depth = rays.depth.load(simd);
+        let count = i32x8::load_array_ref(simd, &rays.cells);
         let most = i32x8::splat(simd, self.max_cells.min(i32::MAX as u32) as i32);
         let [t_in, t_out] = [segments.t[0].load(simd), segments.t[1].load(simd)];
         let enough = f32x8::splat(simd, ENOUGH_BITS / self.volume.extinction);
@@ -140,26 +143,22 @@ impl<'a> Fill<'a> {
             Lanes3 { x: in_tile(simd, x, nx), y: in_tile(simd, y, ny), z: from.z + direction.z * before };
         let mut walk = Walk::new(simd, &self.store.units, origin, direction);
         let mut active = Mask::from_bitmask(simd, mapped.into());
-        loop {
-            active &= walk.inside() & walk.t.simd_lt(t_end) & count.simd_lt(most);
+        rays.end.store(t_end);
+        while active.any_true() {
             let bits = active.to_bitmask() as u8;
-            if bits == 0 {
-                break;
-            }
-            count += active.select(one, none);
-            let index: [i32; LANES] = walk.index().to_array();
-            let mut cells = [Cell::default(); LANES];
+            let counted = i32x8::load_array_ref(simd, &rays.cells);
+            active = rays.rows.walk(simd, &mut walk, active, t_end, most - counted);
             for lane in lanes_of(bits) {
-                cells[lane] = self.store.cell(index[lane]);
+                let Rays { rows, depth, end, cells, .. } = &mut *rays;
+                let (end, mut own) = (end.0[lane], depth.0[lane]);
+                rows.cells(lane, &self.store, |row, cell| {
+                    let [enter, leave] = rows.crossing(lane, row, end);
+                    own += cell.rho_code() as f32 * (leave - enter);
+                });
+                depth.0[lane] = own;
+                cells[lane] += rows.count[lane];
             }
-            let enter = walk.t;
-            walk.advance();
-            let leave = walk.t.simd_lt(t_end).select(walk.t, t_end);
-            let passed = rho_codes(words(simd, &cells)[0]) * (leave - enter);
-            depth += active.select(passed, zero);
         }
-        rays.depth.store(depth);
-        count.store_array(&mut rays.cells);
         enters.to_bitmask() as u8
     }
 }
