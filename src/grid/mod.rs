@@ -14,13 +14,18 @@
 //!   a.
 //! - Numbers are float32. Other types are rounded to it on reading.
 
+mod codec;
+mod openvdb;
+mod order;
+mod source;
 mod tree;
 
+use std::io::Read;
 use std::path::Path;
 
-pub use tree::{Block, BlockData, Builder, Grid, Misplaced, Reader};
-
 use glam::DAffine3;
+
+pub use tree::{Block, BlockData, Builder, Grid, Misplaced, Reader};
 
 use crate::util::error::{Error, Result};
 
@@ -108,8 +113,9 @@ pub fn is_grid(path: &Path) -> bool {
 /// [`Error::Input`] where there is no such file or it is broken, [`Error::Memory`] where the budget does not
 /// suffice, [`Error::Io`] where the disk fails.
 pub fn list(path: &Path, budget: u64) -> Result<Vec<Summary>> {
-    let _ = budget;
-    Err(unknown(path))
+    match format(path)? {
+        Format::OpenVdb => openvdb::list(path),
+    }
 }
 
 /// Reads one grid by its name. The file and the grid together take at most `budget` bytes.
@@ -117,13 +123,50 @@ pub fn list(path: &Path, budget: u64) -> Result<Vec<Summary>> {
 /// # Errors
 /// Those of [`list`], and [`Error::Input`] where there is no such grid or it is of a kind that is not read.
 pub fn read(path: &Path, name: &str, budget: u64) -> Result<Grid> {
-    let _ = (name, budget);
-    Err(unknown(path))
+    match format(path)? {
+        Format::OpenVdb => openvdb::read(path, name, budget),
+    }
 }
 
-fn unknown(path: &Path) -> Error {
-    Error::input(
+enum Format {
+    OpenVdb,
+}
+
+/// Format of a file by its first bytes.
+fn format(path: &Path) -> Result<Format> {
+    let mut start = Vec::new();
+    source::open(path)?.take(8).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
+    if start == openvdb::MAGIC {
+        return Ok(Format::OpenVdb);
+    }
+    Err(Error::input(
         format!("{} is neither OpenVDB, NanoVDB nor .npz", path.display()),
         "export the simulation as .vdb, or save arrays with numpy.savez(file, density=density)",
-    )
+    ))
+}
+
+/// Number of the grid `wanted` among the names of a file.
+fn find<'a>(path: &Path, wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
+    if let Some(found) = names.clone().position(|name| name == wanted) {
+        return Ok(found);
+    }
+    let listed: Vec<String> =
+        names.clone().take(8).map(|name| name.chars().take(32).collect::<String>()).collect();
+    let more = if names.count() > 8 { " and others" } else { "" };
+    let fix = match listed.is_empty() {
+        true => "the file has no grid".into(),
+        false => format!("it has {}{more}", listed.join(", ")),
+    };
+    Err(Error::input(format!("{}: there is no grid {wanted:?}", path.display()), fix))
+}
+
+/// Refuses a transform that is not finite or takes a dimension away.
+fn checked(transform: DAffine3) -> std::result::Result<DAffine3, (String, String)> {
+    match transform.is_finite() && transform.matrix3.inverse().is_finite() {
+        true => Ok(transform),
+        false => Err((
+            "its transform has no inverse".into(),
+            "give its voxels a size other than 0 in the program that made it".into(),
+        )),
+    }
 }
