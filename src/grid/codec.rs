@@ -27,6 +27,22 @@ impl Decoder {
         inflate(&mut self.zlib, data, out)
     }
 
+    /// Decompresses the start of zlib data, as much as `out` takes. Returns how many bytes that are.
+    ///
+    /// # Errors
+    /// What is wrong with the data.
+    pub fn zlib_start(&mut self, data: &[u8], out: &mut [u8]) -> Result<usize, String> {
+        self.zlib.reset(true);
+        let status = self.zlib.decompress(data, out, FlushDecompress::None);
+        status.map_err(|e| format!("its zlib data is broken ({e})"))?;
+        Ok(self.zlib.total_out() as usize)
+    }
+
+    /// Length of what a container of blosc holds, as its header says.
+    pub fn blosc_length(data: &[u8]) -> Option<u64> {
+        data.first_chunk::<HEADER>().map(|head| u32::from_le_bytes([4, 5, 6, 7].map(|i| head[i])).into())
+    }
+
     /// Decompresses a container of blosc that must fill `out`. Blocks may be LZ4 or zlib, with or without the
     /// shuffle of bytes.
     ///

@@ -15,8 +15,11 @@
 //! - Numbers are float32. Other types are rounded to it on reading.
 
 mod codec;
+mod nanovdb;
+mod npz;
 mod openvdb;
 mod order;
+mod save;
 mod source;
 mod tree;
 
@@ -25,6 +28,8 @@ use std::path::Path;
 
 use glam::DAffine3;
 
+pub use openvdb::encode_vdb;
+pub use save::write_vdb;
 pub use tree::{Block, BlockData, Builder, Grid, Misplaced, Reader};
 
 use crate::util::error::{Error, Result};
@@ -100,10 +105,15 @@ pub struct Summary {
     pub refusal: Option<String>,
 }
 
-/// Tells whether a file is one from which grids are read, by its extension. An .npz may be a volume instead.
+/// Tells whether a file is one from which grids are read: a .vdb or an .nvdb by its extension, an .npz by its
+/// arrays, because it may hold a [volume texture](crate::volume) instead.
 pub fn is_grid(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    ["vdb", "nvdb"].iter().any(|known| extension == *known)
+    match extension.to_str() {
+        Some("vdb" | "nvdb") => true,
+        Some("npz") => npz::has_grids(path),
+        _ => false,
+    }
 }
 
 /// Lists the grids of a file (.vdb, .nvdb, .npz) without reading their voxels. The content decides which
@@ -115,6 +125,8 @@ pub fn is_grid(path: &Path) -> bool {
 pub fn list(path: &Path, budget: u64) -> Result<Vec<Summary>> {
     match format(path)? {
         Format::OpenVdb => openvdb::list(path),
+        Format::NanoVdb => nanovdb::list(path, budget),
+        Format::Npz => npz::list(path),
     }
 }
 
@@ -125,11 +137,15 @@ pub fn list(path: &Path, budget: u64) -> Result<Vec<Summary>> {
 pub fn read(path: &Path, name: &str, budget: u64) -> Result<Grid> {
     match format(path)? {
         Format::OpenVdb => openvdb::read(path, name, budget),
+        Format::NanoVdb => nanovdb::read(path, name, budget),
+        Format::Npz => npz::read(path, name, budget),
     }
 }
 
 enum Format {
     OpenVdb,
+    NanoVdb,
+    Npz,
 }
 
 /// Format of a file by its first bytes.
@@ -139,10 +155,21 @@ fn format(path: &Path) -> Result<Format> {
     if start == openvdb::MAGIC {
         return Ok(Format::OpenVdb);
     }
+    if nanovdb::is_magic(&start) {
+        return Ok(Format::NanoVdb);
+    }
+    if start.starts_with(npz::MAGIC) {
+        return Ok(Format::Npz);
+    }
     Err(Error::input(
         format!("{} is neither OpenVDB, NanoVDB nor .npz", path.display()),
         "export the simulation as .vdb, or save arrays with numpy.savez(file, density=density)",
     ))
+}
+
+/// Name of a grid, also of one without.
+fn named(name: String) -> String {
+    if name.is_empty() { "grid".into() } else { name }
 }
 
 /// Number of the grid `wanted` among the names of a file.

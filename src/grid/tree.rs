@@ -167,6 +167,8 @@ impl Grid {
         }
         let first = origin.map(|x| x >> 3);
         let last = end.map(|end| ((end - 1) >> 3) as i32);
+        let blocks = (0..3).map(|a| (last[a] - first[a] + 1) as usize).product();
+        builder.reserve(blocks);
         let mut leaf = vec![0.0; LEAF_SAMPLES * channels];
         for bz in first[2]..=last[2] {
             for by in first[1]..=last[1] {
@@ -429,6 +431,9 @@ impl Builder {
 
     /// Ends the grid.
     pub fn finish(mut self, name: impl Into<String>, class: Class, to_world: DAffine3) -> Grid {
+        self.store.origins.shrink_to_fit();
+        self.store.masks.shrink_to_fit();
+        self.store.values.shrink_to_fit();
         self.store.tiles.shrink_to_fit();
         let mut grid = Grid {
             name: name.into(),

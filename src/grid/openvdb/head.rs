@@ -103,13 +103,11 @@ pub(super) fn read_descriptors(source: &mut Source) -> Result<Vec<Descriptor>> {
         let kind = source.text()?;
         let parent = source.text()?;
         let at = source.at();
-        let [start, leaves, end] = [source.i64()?, source.i64()?, source.i64()?];
-        let is_order = source.at() as i64 <= start && start <= leaves && leaves <= end;
-        if !is_order || end as u64 > source.end() {
-            let why = format!(
-                "the grid ends at byte {end} and its leaves start at {leaves}, but the file has {} bytes",
-                source.end()
-            );
+        // One that shares a tree has no leaves, and no position of them.
+        let [start, _, end] = [source.i64()?, source.i64()?, source.i64()?];
+        if !(source.at() as i64 <= start && start <= end) || end as u64 > source.end() {
+            let why =
+                format!("the grid lies at bytes {start} to {end}, but the file has {} bytes", source.end());
             return Err(source.fault(at, why));
         }
         let (tree, is_half) = match kind.strip_suffix(HALF) {
@@ -117,8 +115,8 @@ pub(super) fn read_descriptors(source: &mut Source) -> Result<Vec<Descriptor>> {
             None => (kind, false),
         };
         let name = match unique.split_once(SEPARATOR) {
-            Some((name, number)) => format!("{name}[{number}]"),
-            None => unique.clone(),
+            Some((name, number)) => format!("{}[{number}]", super::super::named(name.into())),
+            None => super::super::named(unique.clone()),
         };
         found.push(Descriptor { name, unique, tree, is_half, parent, start: start as u64 });
         source.seek(end as u64)?;

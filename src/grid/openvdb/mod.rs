@@ -8,6 +8,7 @@ mod head;
 mod node;
 mod transform;
 mod values;
+mod write;
 
 use std::path::Path;
 
@@ -16,6 +17,7 @@ use super::{Bounds, Grid, Summary};
 use crate::util::error::{Error, Result};
 use head::{Descriptor, GridHead, read_descriptors, read_grid_head};
 use values::{Kind, compression_words};
+pub use write::encode_vdb;
 
 /// First bytes of a file.
 pub(super) const MAGIC: [u8; 8] = [0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0];
