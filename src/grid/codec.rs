@@ -43,29 +43,98 @@ impl Decoder {
         data.first_chunk::<HEADER>().map(|head| u32::from_le_bytes([4, 5, 6, 7].map(|i| head[i])).into())
     }
 
-    /// Decompresses a container of blosc that must fill `out`. Blocks may be LZ4 or zlib, with or without the
-    /// shuffle of bytes.
+    /// Decompresses a container of blosc, or as much of its start as `out` takes. Blocks may be LZ4 or zlib,
+    /// with or without the shuffle of bytes.
     ///
     /// # Errors
     /// What is wrong with the data, or which codec it has.
     pub fn blosc(&mut self, data: &[u8], out: &mut [u8]) -> Result<(), String> {
-        let broken = || "its blosc data is broken".to_owned();
         let head = data.first_chunk::<HEADER>().ok_or_else(broken)?;
         let number = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| head[at + i])) as usize;
-        let (flags, type_size) = (head[2], usize::from(head[3]).max(1));
-        let [length, block, compressed] = [number(4), number(8), number(12)];
-        let data = data.get(..compressed).ok_or_else(broken)?;
-        if length != out.len() {
+        let flags = head[2];
+        let [length, block] = [number(4), number(8)];
+        if out.len() > length {
             return Err(format!("its blosc data holds {length} bytes, not {}", out.len()));
         }
         if flags & 0x02 != 0 {
-            let raw = data.get(HEADER..HEADER + length).ok_or_else(broken)?;
+            let raw = data.get(HEADER..HEADER + out.len()).ok_or_else(broken)?;
             out.copy_from_slice(raw);
             return Ok(());
         }
-        if length == 0 {
-            return Ok(());
+        let streams = Streams::of(flags, usize::from(head[3]).max(1))?;
+        if block == 0 || block > length {
+            return if length == 0 { Ok(()) } else { Err(broken()) };
         }
+        for (i, part) in out.chunks_mut(block).enumerate() {
+            let start = data.get(HEADER + 4 * i..).and_then(|rest| rest.first_chunk()).ok_or_else(broken)?;
+            let stored = data.get(u32::from_le_bytes(*start) as usize..).ok_or_else(broken)?;
+            // The last block is shorter.
+            let own = block.min(length - block * i);
+            if part.len() == own && !streams.is_shuffled {
+                self.block(&streams, block, stored, part)?;
+                continue;
+            }
+            let mut whole = std::mem::take(&mut self.shuffled);
+            whole.resize(own, 0);
+            self.block(&streams, block, stored, &mut whole)?;
+            match streams.is_shuffled {
+                true => unshuffle(&whole, streams.type_size, part),
+                false => part.copy_from_slice(&whole[..part.len()]),
+            }
+            self.shuffled = whole;
+        }
+        Ok(())
+    }
+
+    /// Decompresses the streams of one block, whose full length is `block`, to `out`.
+    fn block(
+        &mut self,
+        streams: &Streams,
+        block: usize,
+        mut rest: &[u8],
+        out: &mut [u8],
+    ) -> Result<(), String> {
+        let is_split = streams.may_split && block / streams.type_size >= LEAST_SPLIT && out.len() == block;
+        let splits = if is_split { streams.type_size } else { 1 };
+        if out.len() % splits != 0 {
+            return Err(broken());
+        }
+        let length = (out.len() / splits).max(1);
+        for piece in out.chunks_mut(length) {
+            let (size, after) = rest.split_first_chunk::<4>().ok_or_else(broken)?;
+            let size = u32::from_le_bytes(*size) as usize;
+            let stream = after.get(..size).ok_or_else(broken)?;
+            rest = &after[size..];
+            match streams.codec {
+                _ if size == piece.len() => piece.copy_from_slice(stream),
+                Codec::Lz4 => {
+                    let done = lz4_flex::block::decompress_into(stream, piece);
+                    if done.map_err(|e| format!("its LZ4 data is broken ({e})"))? != piece.len() {
+                        return Err(broken());
+                    }
+                }
+                Codec::Zlib => inflate(&mut self.zlib, stream, piece)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+fn broken() -> String {
+    "its blosc data is broken".into()
+}
+
+/// How a container of blosc is compressed.
+struct Streams {
+    codec: Codec,
+    type_size: usize,
+    is_shuffled: bool,
+    /// Whether the bytes of a type have streams of their own in blocks that are long enough.
+    may_split: bool,
+}
+
+impl Streams {
+    fn of(flags: u8, type_size: usize) -> Result<Streams, String> {
         let codec = match flags >> 5 {
             1 => Codec::Lz4,
             3 => Codec::Zlib,
@@ -78,55 +147,10 @@ impl Decoder {
         if flags & 0x04 != 0 {
             return Err("it is compressed by blosc with the shuffle of bits, which is not read".into());
         }
-        if block == 0 || block > length {
-            return Err(broken());
-        }
-        for (i, part) in out.chunks_mut(block).enumerate() {
-            let start = data.get(HEADER + 4 * i..).and_then(|rest| rest.first_chunk()).ok_or_else(broken)?;
-            let start = u32::from_le_bytes(*start) as usize;
-            let mut rest = data.get(start..).ok_or_else(broken)?;
-            let is_split = flags & 0x10 == 0
-                && type_size <= MOST_SPLITS
-                && block / type_size >= LEAST_SPLIT
-                && part.len() == block;
-            let splits = if is_split { type_size } else { 1 };
-            if part.len() % splits != 0 {
-                return Err(broken());
-            }
-            let is_shuffled = flags & 0x01 != 0 && type_size > 1;
-            let target = if is_shuffled {
-                self.shuffled.resize(part.len(), 0);
-                &mut self.shuffled[..part.len()]
-            } else {
-                &mut *part
-            };
-            for piece in target.chunks_mut(part_length(block, splits)) {
-                let (size, after) = rest.split_first_chunk::<4>().ok_or_else(broken)?;
-                let size = u32::from_le_bytes(*size) as usize;
-                let stream = after.get(..size).ok_or_else(broken)?;
-                rest = &after[size..];
-                match codec {
-                    _ if size == piece.len() => piece.copy_from_slice(stream),
-                    Codec::Lz4 => {
-                        let done = lz4_flex::block::decompress_into(stream, piece);
-                        if done.map_err(|e| format!("its LZ4 data is broken ({e})"))? != piece.len() {
-                            return Err(broken());
-                        }
-                    }
-                    Codec::Zlib => inflate(&mut self.zlib, stream, piece)?,
-                }
-            }
-            if is_shuffled {
-                unshuffle(&self.shuffled[..part.len()], type_size, part);
-            }
-        }
-        Ok(())
+        let is_shuffled = flags & 0x01 != 0 && type_size > 1;
+        let may_split = flags & 0x10 == 0 && type_size <= MOST_SPLITS;
+        Ok(Streams { codec, type_size, is_shuffled, may_split })
     }
-}
-
-/// Length of each stream of a block that has `splits` of them. The last block may be shorter.
-fn part_length(block: usize, splits: usize) -> usize {
-    (block / splits).max(1)
 }
 
 enum Codec {
@@ -145,14 +169,17 @@ fn inflate(zlib: &mut Decompress, data: &[u8], out: &mut [u8]) -> Result<(), Str
 }
 
 /// Puts byte b of element i, which stands at b · elements + i, beside the other bytes of the element. Bytes
-/// after the last element stand as they are.
+/// after the last element stand as they are. `out` may be shorter.
 fn unshuffle(shuffled: &[u8], type_size: usize, out: &mut [u8]) {
-    let elements = out.len() / type_size;
+    let elements = shuffled.len() / type_size;
     let whole = elements * type_size;
+    let (whole_out, rest) = out.split_at_mut(whole.min(out.len()));
     for (b, plane) in shuffled[..whole].chunks_exact(elements.max(1)).enumerate() {
-        for (element, byte) in out[..whole].chunks_exact_mut(type_size).zip(plane) {
-            element[b] = *byte;
+        for (element, byte) in whole_out.chunks_mut(type_size).zip(plane) {
+            if let Some(own) = element.get_mut(b) {
+                *own = *byte;
+            }
         }
     }
-    out[whole..].copy_from_slice(&shuffled[whole..]);
+    rest.copy_from_slice(&shuffled[whole..whole + rest.len()]);
 }

@@ -14,6 +14,7 @@
 //!   a.
 //! - Numbers are float32. Other types are rounded to it on reading.
 
+mod builder;
 mod codec;
 mod nanovdb;
 mod npz;
@@ -28,9 +29,10 @@ use std::path::Path;
 
 use glam::DAffine3;
 
+pub use builder::{Builder, Misplaced};
 pub use openvdb::encode_vdb;
 pub use save::write_vdb;
-pub use tree::{Block, BlockData, Builder, Grid, Misplaced, Reader};
+pub use tree::{Block, BlockData, Grid, Reader};
 
 use crate::util::error::{Error, Result};
 

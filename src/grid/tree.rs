@@ -7,21 +7,21 @@ use std::collections::HashMap;
 
 use glam::DAffine3;
 
-use super::{Bounds, Class};
+use super::{Bounds, Builder, Class};
 
 /// Samples of a leaf along an axis.
 pub(super) const LEAF: u32 = 8;
 /// Samples of a leaf.
 pub(super) const LEAF_SAMPLES: usize = 512;
 /// log₂ of the samples of a region along an axis.
-const REGION_BITS: u32 = 7;
+pub(super) const REGION_BITS: u32 = 7;
 /// Blocks of a region.
-const REGION_BLOCKS: usize = 4096;
+pub(super) const REGION_BLOCKS: usize = 4096;
 
 /// Slot of a region that holds nothing.
-const EMPTY: u32 = u32::MAX;
+pub(super) const EMPTY: u32 = u32::MAX;
 /// Bit of a slot that holds a tile.
-const TILE: u32 = 1 << 31;
+pub(super) const TILE: u32 = 1 << 31;
 
 /// Values on a regular grid with an affine transform. Sparse: see the [module](super).
 #[derive(Clone, Debug)]
@@ -34,31 +34,31 @@ pub struct Grid {
     pub to_world: DAffine3,
     /// Value where no block is. A scalar stands in the first component, and the others are 0.
     pub background: [f32; 3],
-    channels: usize,
-    bounds: Option<Bounds>,
-    active: u64,
-    store: Store,
+    pub(super) channels: usize,
+    pub(super) bounds: Option<Bounds>,
+    pub(super) active: u64,
+    pub(super) store: Store,
 }
 
 /// Blocks and their tables.
 #[derive(Clone, Debug, Default)]
-struct Store {
-    origins: Vec<[i32; 3]>,
-    masks: Vec<[u64; 8]>,
+pub(super) struct Store {
+    pub(super) origins: Vec<[i32; 3]>,
+    pub(super) masks: Vec<[u64; 8]>,
     /// Samples of all leaves, each x fastest and with its channels side by side.
-    values: Vec<f32>,
-    tiles: Vec<Tile>,
-    regions: HashMap<[i32; 3], Box<[u32]>>,
+    pub(super) values: Vec<f32>,
+    pub(super) tiles: Vec<Tile>,
+    pub(super) regions: HashMap<[i32; 3], Box<[u32]>>,
     /// log₂ of the side, and the tiles of that size.
-    large: Vec<(u32, HashMap<[i32; 3], u32>)>,
+    pub(super) large: Vec<(u32, HashMap<[i32; 3], u32>)>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Tile {
-    origin: [i32; 3],
-    side: u32,
-    value: [f32; 3],
-    is_active: bool,
+pub(super) struct Tile {
+    pub(super) origin: [i32; 3],
+    pub(super) side: u32,
+    pub(super) value: [f32; 3],
+    pub(super) is_active: bool,
 }
 
 /// A part of a grid that its storage holds.
@@ -129,7 +129,7 @@ fn leaf_bounds(mask: &[u64; 8]) -> Option<[[i32; 3]; 2]> {
 }
 
 /// Position of a block in the list of its region.
-fn slot(index: [i32; 3]) -> usize {
+pub(super) fn slot(index: [i32; 3]) -> usize {
     let [x, y, z] = index.map(|x| (x >> 3 & 15) as usize);
     x + 16 * y + 256 * z
 }
@@ -266,12 +266,12 @@ impl Grid {
     }
 }
 
-fn same_bits((a, b): (&f32, &f32)) -> bool {
+pub(super) fn same_bits((a, b): (&f32, &f32)) -> bool {
     a.to_bits() == b.to_bits()
 }
 
 /// One or three numbers as three.
-fn padded(value: &[f32]) -> [f32; 3] {
+pub(super) fn padded(value: &[f32]) -> [f32; 3] {
     std::array::from_fn(|a| value.get(a).copied().unwrap_or(0.0))
 }
 
@@ -316,137 +316,4 @@ pub(super) const TILE_BYTES: u64 = 3 * (size_of::<Tile>() + LARGE_ENTRY) as u64;
 /// Memory of a leaf with `channels` numbers a sample, bytes.
 pub(super) const fn leaf_bytes(channels: usize) -> u64 {
     (LEAF_SAMPLES * channels * 4 + size_of::<[i32; 3]>() + size_of::<[u64; 8]>()) as u64
-}
-
-/// A block does not lie at a multiple of its side, overlaps another one, or there are too many blocks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the block lies askew or on another one")]
-pub struct Misplaced;
-
-/// Makes a grid of blocks.
-#[derive(Debug)]
-pub struct Builder {
-    channels: usize,
-    background: [f32; 3],
-    store: Store,
-}
-
-impl Builder {
-    /// An empty grid with 1 or 3 numbers a sample.
-    ///
-    /// # Panics
-    /// Panics at any other number.
-    pub fn new(channels: usize, background: [f32; 3]) -> Builder {
-        assert!(channels == 1 || channels == 3, "{channels} channels");
-        Builder { channels, background, store: Store::default() }
-    }
-
-    /// Makes room for this many leaves, so that adding them takes no more memory.
-    pub(super) fn reserve(&mut self, leaves: usize) {
-        self.store.origins.reserve_exact(leaves);
-        self.store.masks.reserve_exact(leaves);
-        self.store.values.reserve_exact(leaves * LEAF_SAMPLES * self.channels);
-    }
-
-    /// Adds a leaf with its active samples. `fill` writes its values over the background, in the order of
-    /// [`BlockData::Leaf`].
-    ///
-    /// # Errors
-    /// [`Misplaced`] where `origin` is no multiple of 8 or another block lies there.
-    pub fn leaf(
-        &mut self,
-        origin: [i32; 3],
-        active: [u64; 8],
-        fill: impl FnOnce(&mut [f32]),
-    ) -> Result<(), Misplaced> {
-        let number = self.store.origins.len();
-        if origin.iter().any(|x| x & 7 != 0) || number >= TILE as usize {
-            return Err(Misplaced);
-        }
-        self.take(origin, number as u32)?;
-        self.store.origins.push(origin);
-        self.store.masks.push(active);
-        let start = self.store.values.len();
-        let value = &self.background[..self.channels];
-        self.store.values.extend(value.iter().copied().cycle().take(LEAF_SAMPLES * self.channels));
-        fill(&mut self.store.values[start..]);
-        Ok(())
-    }
-
-    /// Adds a tile: a cube whose side is 8 or a larger power of two. One that is not active and has the
-    /// background as its value is left out.
-    ///
-    /// # Errors
-    /// [`Misplaced`] where `origin` is no multiple of `side` or another block of the same size or smaller
-    /// lies there.
-    pub fn tile(
-        &mut self,
-        origin: [i32; 3],
-        side: u32,
-        value: [f32; 3],
-        is_active: bool,
-    ) -> Result<(), Misplaced> {
-        let number = self.store.tiles.len();
-        let is_aligned = origin.iter().all(|x| i64::from(*x) % i64::from(side.max(1)) == 0);
-        let is_side = side.is_power_of_two() && (LEAF..1 << 31).contains(&side);
-        if !is_side || !is_aligned || number >= (TILE - 1) as usize {
-            return Err(Misplaced);
-        }
-        let same = value.iter().zip(&self.background).take(self.channels).all(same_bits);
-        if !is_active && same {
-            return Ok(());
-        }
-        let bits = side.trailing_zeros();
-        if bits < REGION_BITS {
-            let blocks = (side / LEAF) as i32;
-            for i in 0..blocks * blocks * blocks {
-                let local = [i % blocks, i / blocks % blocks, i / blocks / blocks];
-                self.take(std::array::from_fn(|a| origin[a] + 8 * local[a]), TILE | number as u32)?;
-            }
-        } else {
-            let large = &mut self.store.large;
-            let level = large.iter().position(|(own, _)| *own >= bits).unwrap_or(large.len());
-            if large.get(level).is_none_or(|(own, _)| *own != bits) {
-                large.insert(level, (bits, HashMap::new()));
-            }
-            if large[level].1.insert(origin.map(|x| x >> bits), number as u32).is_some() {
-                return Err(Misplaced);
-            }
-        }
-        self.store.tiles.push(Tile { origin, side, value: padded(&value[..self.channels]), is_active });
-        Ok(())
-    }
-
-    /// Enters a block of 8³ samples into its region.
-    fn take(&mut self, origin: [i32; 3], entry: u32) -> Result<(), Misplaced> {
-        let region = self.store.regions.entry(origin.map(|x| x >> REGION_BITS));
-        let slots = region.or_insert_with(|| vec![EMPTY; REGION_BLOCKS].into());
-        let slot = &mut slots[slot(origin)];
-        match *slot {
-            EMPTY => *slot = entry,
-            _ => return Err(Misplaced),
-        }
-        Ok(())
-    }
-
-    /// Ends the grid.
-    pub fn finish(mut self, name: impl Into<String>, class: Class, to_world: DAffine3) -> Grid {
-        self.store.origins.shrink_to_fit();
-        self.store.masks.shrink_to_fit();
-        self.store.values.shrink_to_fit();
-        self.store.tiles.shrink_to_fit();
-        let mut grid = Grid {
-            name: name.into(),
-            class,
-            to_world,
-            background: self.background,
-            channels: self.channels,
-            bounds: None,
-            active: 0,
-            store: self.store,
-        };
-        grid.active = grid.blocks().fold(0, |sum, block| sum.saturating_add(block.active_count()));
-        grid.bounds = grid.blocks().filter_map(|block| block.bounds()).reduce(Bounds::union);
-        grid
-    }
 }

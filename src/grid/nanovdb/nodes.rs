@@ -123,29 +123,39 @@ impl Nodes<'_> {
         self.enter(at, before + entry * count)?;
         let memory = self.memory;
         let mask = count / 8;
+        let background = builder.background();
         let active = memory.bytes(at + 32, mask).ok_or_else(outside)?;
         let children = memory.bytes(at + 32 + mask, mask).ok_or_else(outside)?;
         let child_bits = if log == UPPER { LOWER + LEAF } else { LEAF };
         if log == LOWER {
             self.take(REGION_BYTES)?;
         }
-        for i in 0..count {
-            let local = [i >> (2 * log), i >> log, i].map(|x| (x & ((1 << log) - 1)) as i32);
-            let place = std::array::from_fn(|a| origin[a].wrapping_add(local[a] << child_bits));
-            let item = at + before + entry * i;
+        let table = memory.bytes(at + before, entry * count).ok_or_else(outside)?;
+        let channels = self.values.channels();
+        for (i, own) in table.chunks_exact(entry).enumerate() {
             let bit = |mask: &[u8]| mask[i / 8] >> (i % 8) & 1 != 0;
+            let place = || {
+                let local = [i >> (2 * log), i >> log, i].map(|x| (x & ((1 << log) - 1)) as i32);
+                std::array::from_fn(|a| origin[a].wrapping_add(local[a] << child_bits))
+            };
+            let item = at + before + entry * i;
             if !bit(children) {
+                let numbers: &[[u8; 4]] = own.as_chunks().0;
+                let same = |(bytes, x): (&[u8; 4], &f32)| f32::from_le_bytes(*bytes) == *x;
+                if !bit(active) && numbers.iter().zip(&background[..channels]).all(same) {
+                    continue;
+                }
                 let value = self.value(item)?;
-                self.take(if bit(active) { TILE_BYTES } else { 0 })?;
-                let placed = builder.tile(place, 1 << child_bits, value, bit(active));
+                self.take(TILE_BYTES)?;
+                let placed = builder.tile(place(), 1 << child_bits, value, bit(active));
                 placed.map_err(|e| Fault::Broken(at, e.to_string()))?;
                 continue;
             }
             let offset = memory.u64(item).ok_or_else(outside)?;
             let child = self.child(at, offset)?;
             match log {
-                UPPER => self.read_node(builder, LOWER, child, place)?,
-                _ => self.read_leaf(builder, child, place)?,
+                UPPER => self.read_node(builder, LOWER, child, place())?,
+                _ => self.read_leaf(builder, child, place())?,
             }
         }
         Ok(())

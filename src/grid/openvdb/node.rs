@@ -102,14 +102,14 @@ impl Tree<'_> {
             let local = [i >> (2 * log), i >> log, i].map(|x| (x & ((1 << log) - 1)) as i32);
             std::array::from_fn(|a| origin[a] + (local[a] << child_bits))
         };
+        let background = self.values.background;
         for i in (0..count).filter(|&i| !bit(&children, i)) {
-            let value: [f32; 3] = std::array::from_fn(|a| {
-                self.values.values[channels * i..][..channels].get(a).copied().unwrap_or(0.0)
-            });
+            let own = &self.values.values[channels * i..][..channels];
             let is_active = bit(&active, i);
-            if !is_active && value == self.values.background {
+            if !is_active && *own == background[..channels] {
                 continue;
             }
+            let value: [f32; 3] = std::array::from_fn(|a| own.get(a).copied().unwrap_or(0.0));
             if value.iter().any(|x| !x.is_finite()) {
                 return Err(self.not_finite(at, place(i)));
             }

@@ -187,6 +187,10 @@ impl ValueReader {
             std::mem::swap(&mut self.values, &mut self.packed);
             return Ok(());
         }
+        if stored == 0 && !is_selected {
+            self.values.extend(off[..channels].iter().copied().cycle().take(count * channels));
+            return Ok(());
+        }
         let mut packed = self.packed.chunks_exact(channels);
         for i in 0..count {
             match bit(mask, i) {
@@ -230,6 +234,9 @@ impl ValueReader {
                 raw.resize(length, 0);
                 let done = match self.flags & BLOSC {
                     0 => self.decoder.zlib(&self.stored, &mut raw),
+                    _ if Decoder::blosc_length(&self.stored) != Some(length as u64) => {
+                        Err(format!("its blosc data does not hold {length} bytes"))
+                    }
                     _ => self.decoder.blosc(&self.stored, &mut raw),
                 };
                 done.map_err(|why| source.fault_with(at, why, REWRITE))?;

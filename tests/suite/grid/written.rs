@@ -48,7 +48,8 @@ pub fn rich(name: &str, channels: usize, background: f32, to_world: DAffine3) ->
         };
         builder.leaf(origin, active, fill).expect("placed");
     }
-    for (side, is_active) in [(8u32, true), (16, false), (64, true), (128, true), (512, false), (4096, true)] {
+    for (side, is_active) in [(8u32, true), (16, false), (64, true), (128, true), (512, false), (4096, true)]
+    {
         builder
             .tile([8192, 4096 * side.trailing_zeros() as i32, 0], side, [side as f32; 3], is_active)
             .expect("placed");
