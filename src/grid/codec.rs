@@ -2,6 +2,8 @@
 
 use flate2::{Decompress, FlushDecompress, Status};
 
+use super::blosclz;
+
 /// Bytes of a blosc header.
 const HEADER: usize = 16;
 /// Most streams that a block is split into, and least bytes of each.
@@ -43,8 +45,8 @@ impl Decoder {
         data.first_chunk::<HEADER>().map(|head| u32::from_le_bytes([4, 5, 6, 7].map(|i| head[i])).into())
     }
 
-    /// Decompresses a container of blosc, or as much of its start as `out` takes. Blocks may be LZ4 or zlib,
-    /// with or without the shuffle of bytes.
+    /// Decompresses a container of blosc, or as much of its start as `out` takes. Blocks may be LZ4, zlib
+    /// or BloscLZ, with or without the shuffle of bytes.
     ///
     /// # Errors
     /// What is wrong with the data, or which codec it has.
@@ -113,6 +115,7 @@ impl Decoder {
                         return Err(broken());
                     }
                 }
+                Codec::BloscLz => blosclz::decompress(stream, piece).ok_or_else(broken)?,
                 Codec::Zlib => inflate(&mut self.zlib, stream, piece)?,
             }
         }
@@ -136,12 +139,15 @@ struct Streams {
 impl Streams {
     fn of(flags: u8, type_size: usize) -> Result<Streams, String> {
         let codec = match flags >> 5 {
+            0 => Codec::BloscLz,
             1 => Codec::Lz4,
             3 => Codec::Zlib,
             other => {
-                let names = ["blosclz", "LZ4", "snappy", "zlib", "zstd"];
+                let names = ["BloscLZ", "LZ4", "snappy", "zlib", "zstd"];
                 let name = names.get(usize::from(other)).unwrap_or(&"an unknown codec");
-                return Err(format!("it is compressed by blosc with {name}, where LZ4 and zlib are read"));
+                return Err(format!(
+                    "it is compressed by blosc with {name}, where LZ4, zlib and BloscLZ are read"
+                ));
             }
         };
         if flags & 0x04 != 0 {
@@ -154,6 +160,7 @@ impl Streams {
 }
 
 enum Codec {
+    BloscLz,
     Lz4,
     Zlib,
 }

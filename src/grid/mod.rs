@@ -14,6 +14,7 @@
 //!   a.
 //! - Numbers are float32. Other types are rounded to it on reading.
 
+mod blosclz;
 mod builder;
 mod codec;
 mod nanovdb;
@@ -22,6 +23,7 @@ mod openvdb;
 mod order;
 mod save;
 mod source;
+mod statistics;
 mod tree;
 
 use std::io::Read;
@@ -32,6 +34,7 @@ use glam::DAffine3;
 pub use builder::{Builder, Misplaced};
 pub use openvdb::encode_vdb;
 pub use save::write_vdb;
+pub use statistics::Statistics;
 pub use tree::{Block, BlockData, Grid, Reader};
 
 use crate::util::error::{Error, Result};

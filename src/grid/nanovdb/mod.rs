@@ -174,7 +174,7 @@ fn read_grid(source: &mut Source, record: &Record, wanted: u64, bytes: u64) -> R
                 decoder.blosc(&stored, &mut data[start..])
             }
         };
-        done.map_err(|why| source.fault(at, why))?;
+        done.map_err(|why| source.fault_with(at, why, "copy the file again, or write it with zip or none"))?;
         if data.len() == start {
             return Err(source.fault(at, "a compressed block holds nothing"));
         }

@@ -47,8 +47,10 @@ impl Descriptor {
             ["Tree", kind, "5", "4", "3"] => kind,
             _ => &self.tree,
         };
+        // Blender marks its integers and points, too.
+        let is_half = self.is_half && !["int32", "int64", "bool", "ptdataidx32"].contains(&kind);
         let kind: String = kind.chars().take(48).collect();
-        if self.is_half { format!("{kind} as half") } else { kind }
+        if is_half { format!("{kind} as half") } else { kind }
     }
 
     /// Type of the values and shape of the tree.

@@ -3,7 +3,7 @@
     python3 make.py old FOLDER     Debian 12: python3-openvdb and vdb_tool of libopenvdb-tools, OpenVDB 10.0.1
     python  make.py new FOLDER     bpy 5.3.0 (pip install bpy), OpenVDB 13.0.0
     python3 make.py cc FOLDER      compresses what make.cc, a program with OpenVDB 10.0.1, wrote to the folder
-    python  make.py warp FOLDER    warp-lang 1.19.0 (pip install warp-lang), NanoVDB 32.3.3
+    python  make.py warp FOLDER    warp-lang 1.19.0 (pip install warp-lang blosc), NanoVDB 32.3.3
 
 The formulas of the values stand once more in the tests. The files are compressed by gzip, because the tree of
 a .vdb begins with ten thousand bytes of zeros.
@@ -140,7 +140,7 @@ def main():
         for x, y, z in cells((0, 0, 0), dense.shape):
             dense[x, y, z] = code(x, y, z) / 64
         volume = wp.Volume.load_from_numpy(dense, min_world=(1, 2, 3), voxel_size=0.5, bg_value=0.25, device="cpu")
-        for codec in ["none", "zip"]:
+        for codec in ["none", "zip", "blosc"]:
             volume.save_to_nvdb(str(folder / f"warp_{codec}.nvdb"), codec)
     else:
         if kind == "new":

@@ -1,6 +1,7 @@
 //! Grids of simulations. Reference truth: every sample against the formula that made it.
 
 mod broken;
+mod info;
 mod mutations;
 mod npz;
 mod samples;

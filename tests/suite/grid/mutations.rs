@@ -143,14 +143,15 @@ fn read_mutations(seed: u64, name: &str, count: usize) -> usize {
 }
 
 /// Samples, how many mutations of each are read, and how many of these may still be grids.
-const FILES: [(&str, usize, [usize; 2]); 8] = [
+const FILES: [(&str, usize, [usize; 2]); 9] = [
     ("old_off_two.vdb", 4000, [100, 3900]),
     ("cc_zip_mask.vdb", 4000, [100, 3900]),
     ("tool_active_16.vdb", 4000, [100, 3900]),
     ("old_vector.vdb", 4000, [100, 3900]),
     ("cc_other_tree.vdb", 4000, [100, 3900]),
     ("tool_zip.nvdb", 5000, [50, 4900]),
-    ("tool_blosc.nvdb", 5000, [50, 4900]),
+    ("tool_blosc.nvdb", 3000, [30, 2900]),
+    ("warp_blosc.nvdb", 2000, [20, 1950]),
     ("warp_none.nvdb", 10_000, [100, 9900]),
 ];
 

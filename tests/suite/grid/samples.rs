@@ -320,7 +320,7 @@ fn quantised_nanovdb_lies_within_its_steps() {
 
 #[test]
 fn names_and_counts_are_found_in_grids_of_warp() {
-    for codec in ["none", "zip"] {
+    for codec in ["none", "zip", "blosc"] {
         let folder = Folder::sample(&format!("warp_{codec}.nvdb"));
         let summary = &list(&folder.path(), MEMORY).expect("a list")[0];
         // Warp fills whole leaves.
