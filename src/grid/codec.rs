@@ -98,7 +98,7 @@ impl Decoder {
     ) -> Result<(), String> {
         let is_split = streams.may_split && block / streams.type_size >= LEAST_SPLIT && out.len() == block;
         let splits = if is_split { streams.type_size } else { 1 };
-        if out.len() % splits != 0 {
+        if !out.len().is_multiple_of(splits) {
             return Err(broken());
         }
         let length = (out.len() / splits).max(1);

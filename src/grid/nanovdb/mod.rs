@@ -7,6 +7,7 @@ mod layout;
 mod nodes;
 mod segment;
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::codec::Decoder;
@@ -48,11 +49,16 @@ pub(super) fn list(path: &Path, bytes: u64) -> Result<Vec<Summary>> {
 
 /// Adds a number to each name that several grids have.
 fn number_twins(summaries: &mut [Summary]) {
-    let names: Vec<String> = summaries.iter().map(|summary| summary.name.clone()).collect();
-    for (i, name) in names.iter().enumerate() {
-        if names.iter().filter(|other| *other == name).count() > 1 {
-            let number = names[..i].iter().filter(|other| *other == name).count();
-            summaries[i].name = format!("{name}[{number}]");
+    let mut counts: HashMap<String, [usize; 2]> = HashMap::new();
+    for summary in summaries.iter() {
+        counts.entry(summary.name.clone()).or_default()[0] += 1;
+    }
+    for summary in summaries {
+        if let Some([count, number]) = counts.get_mut(&summary.name)
+            && *count > 1
+        {
+            summary.name = format!("{}[{number}]", summary.name);
+            *number += 1;
         }
     }
 }

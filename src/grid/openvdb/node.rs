@@ -149,7 +149,8 @@ impl Tree<'_> {
             self.source.bytes(1 << (3 * log - 3), &mut mask)?;
             self.values.read(self.source, &mask)?;
             if let Some(i) = self.values.values.iter().position(|x| !x.is_finite()) {
-                let local = [i / channels >> (2 * log), i / channels >> log, i / channels];
+                let i = i / channels;
+                let local = [i >> (2 * log), i >> log, i];
                 let local = local.map(|x| (x & ((1 << log) - 1)) as i32);
                 return Err(self.not_finite(at, std::array::from_fn(|a| origin[a] + local[a])));
             }

@@ -25,7 +25,7 @@ pub(super) fn read_transform(source: &mut Source) -> Result<std::result::Result<
         "AffineMap" | "UnitaryMap" => {
             let numbers: [f64; 16] = source.f64s()?;
             let row = |i: usize| DVec3::from_slice(&numbers[4 * i..]);
-            DAffine3 { matrix3: DMat3::from_cols(row(0), row(1), row(2)).into(), translation: row(3).into() }
+            DAffine3 { matrix3: DMat3::from_cols(row(0), row(1), row(2)), translation: row(3) }
         }
         "NonlinearFrustumMap" => {
             let fix = "resample it to a grid with equal voxels in the program that made it";

@@ -200,7 +200,7 @@ impl<'a> Tree<'a> {
         }
         match slot {
             Slot::Node(lower) => lower,
-            Slot::Tile(..) => unreachable!("a node was put there"),
+            Slot::Tile(..) => unreachable!("a node stands there now"),
         }
     }
 

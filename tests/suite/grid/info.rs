@@ -13,22 +13,22 @@ fn info(folder: &Folder, options: &[&str]) -> Run {
 #[test]
 fn grids_are_printed_with_their_statistics_and_the_reason_why_one_is_not_read() {
     let found = info(&Folder::sample("old_several.vdb"), &[]);
-    assert_eq!(found.code, Some(0), "{}", found.err);
+    found.done();
     let one = "one[0]: float, class unknown, compression blosc + active mask\n  \
                active     1 samples in 1 × 1 × 1 from [-1, -2, -3] to [-1, -2, -3]\n  \
                voxel      2 × 2 × 2, turned; index (0, 0, 0) lies at (10, 20, 30)\n  \
                values     0.75 to 0.75, mean 0.75\n";
-    assert!(found.out.contains(one), "{}", found.out);
+    assert!(found.stdout().contains(one), "{}", found.stdout());
     let flags = "  not read   its type is bool, which is not read; convert it to a float or a vec3s grid";
-    assert!(found.out.contains(flags), "{}", found.out);
-    assert!(found.out.contains("empty: float"), "{}", found.out);
+    assert!(found.stdout().contains(flags), "{}", found.stdout());
+    assert!(found.stdout().contains("empty: float"), "{}", found.stdout());
 }
 
 #[test]
 fn the_same_is_one_object_of_json() {
     let found = info(&Folder::sample("tool_vector_32.nvdb"), &["--json"]);
-    assert_eq!(found.code, Some(0), "{}", found.err);
-    let object: Value = serde_json::from_str(&found.out).expect("JSON");
+    found.done();
+    let object: Value = serde_json::from_str(found.stdout()).expect("JSON");
     let grids = object["grids"].as_array().expect("a list");
     assert_eq!(grids.len(), 2);
     for grid in grids {
@@ -51,10 +51,12 @@ fn a_broken_grid_is_told_after_the_list() {
     let end = bytes.len();
     bytes[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
     let found = info(&Folder::new("broken.vdb", &bytes), &[]);
-    assert_eq!(found.code, Some(65), "{}", found.err);
-    assert!(found.out.contains("density: float") && found.out.contains("  not read   "), "{}", found.out);
-    assert!(found.err.contains("the sample [15, 15, 15] is not a finite number"), "{}", found.err);
+    found.refused(65, &["the sample [15, 15, 15] is not a finite number"]);
+    assert!(
+        found.stdout().contains("density: float") && found.stdout().contains("  not read   "),
+        "{}",
+        found.stdout()
+    );
     let found = info(&Folder::sample("old_float.vdb"), &["--memory", "64KiB"]);
-    assert_eq!(found.code, Some(33), "{}", found.err);
-    assert!(found.err.contains("old_float.vdb: grid \"density\" needs"), "{}", found.err);
+    found.refused(33, &["old_float.vdb: grid \"density\" needs"]);
 }

@@ -7,7 +7,7 @@ use taki::grid::{Bounds, Class, Grid, list};
 use super::{Folder, MEMORY};
 
 /// Code of a sample, as the script has it.
-pub fn code(index: [i32; 3]) -> i32 {
+fn code(index: [i32; 3]) -> i32 {
     (index[0] * 7 + index[1] * 13 + index[2] * 29).rem_euclid(64)
 }
 
@@ -20,7 +20,7 @@ fn contains(bounds: &Bounds, index: [i32; 3]) -> bool {
 
 /// Compares the samples around `filled` with the script: `on` of the code where it is no multiple of 3, `off`
 /// of it elsewhere, and the background outside.
-pub fn check(grid: &Grid, filled: &Bounds, on: impl Fn(i32) -> [f32; 3], off: impl Fn(i32) -> [f32; 3]) {
+fn check(grid: &Grid, filled: &Bounds, on: impl Fn(i32) -> [f32; 3], off: impl Fn(i32) -> [f32; 3]) {
     let mut reader = grid.reader();
     let mut active = 0;
     for x in filled.min[0] - 20..filled.max[0] + 20 {
@@ -62,17 +62,17 @@ fn scalar(x: f32) -> [f32; 3] {
     [x, 0.0, 0.0]
 }
 
-pub fn on(h: i32) -> [f32; 3] {
+fn on(h: i32) -> [f32; 3] {
     scalar(h as f32 / 64.0)
 }
 
-pub fn vector(h: i32) -> [f32; 3] {
+fn vector(h: i32) -> [f32; 3] {
     let h = h as f32;
     [h / 64.0, -h / 32.0, h / 16.0 - 1.0]
 }
 
 /// A value for an even code and another for an odd one.
-pub fn either(even: f32, odd: f32) -> impl Fn(i32) -> [f32; 3] {
+fn either(even: f32, odd: f32) -> impl Fn(i32) -> [f32; 3] {
     move |h| scalar(if h % 2 == 0 { even } else { odd })
 }
 
@@ -188,7 +188,7 @@ fn grids_are_listed_and_read_beside_one_that_is_not() {
 }
 
 /// Checks the grid of tiles of the script.
-pub fn check_tiles(grid: &Grid) {
+fn check_tiles(grid: &Grid) {
     assert_eq!(grid.active_count(), 4096u64.pow(3) + 128u64.pow(3) + 512 + 6);
     assert_eq!(grid.bounds(), Some(Bounds { min: [0; 3], max: [4352, 4095, 4095] }));
     let at = |x, y, z| grid.at([x, y, z])[0];
@@ -210,7 +210,7 @@ fn tiles_of_all_levels_stay_tiles() {
 
 /// Checks the sphere of the script to `error`: distances within three voxels of the surface, and their limit
 /// elsewhere.
-pub fn check_sphere(grid: &Grid, error: f64) {
+fn check_sphere(grid: &Grid, error: f64) {
     assert_eq!(grid.class, Class::LevelSet);
     let scale = DMat3::from_diagonal(DVec3::splat(0.5));
     assert_eq!(grid.to_world, DAffine3::from_mat3_translation(scale, DVec3::new(1.5, 0.0, -2.0)));

@@ -24,7 +24,7 @@ fn words(grid: &Grid) -> Vec<String> {
 }
 
 /// A grid with leaves and tiles of all sizes, on both sides of the origin.
-pub fn rich(name: &str, channels: usize, background: f32, to_world: DAffine3) -> Grid {
+fn rich(name: &str, channels: usize, background: f32, to_world: DAffine3) -> Grid {
     let mut background = [background; 3];
     if channels == 1 {
         background[1..].fill(0.0);
