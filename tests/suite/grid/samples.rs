@@ -88,7 +88,8 @@ fn a_fog_volume_is_read_with_its_class_and_transform() {
 
 #[test]
 fn values_that_are_not_active_are_found_in_every_coding() {
-    let all: [(&str, &dyn Fn(i32) -> [f32; 3]); 6] = [
+    type Of<'a> = &'a dyn Fn(i32) -> [f32; 3];
+    let all: [(&str, Of); 6] = [
         ("minus", &either(-0.5, -0.5)),
         ("one", &either(3.0, 3.0)),
         ("plus_minus", &either(0.5, -0.5)),

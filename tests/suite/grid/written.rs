@@ -1,4 +1,4 @@
-//! Files that taki writes, read again to the bit. `tests/data/grid/read_back.py` reads them with other programs.
+//! Files that taki writes, read again to the bit. docs/grids.md tells which other programs read them.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use taki::grid::{BlockData, Builder, Class, Grid, encode_vdb, list, read, write_vdb};
