@@ -82,7 +82,7 @@ impl Entry {
         }
         if let Some(to_world) = summary.to_world {
             let axes = [to_world.matrix3.x_axis, to_world.matrix3.y_axis, to_world.matrix3.z_axis];
-            let [x, y, z] = axes.map(|axis| axis.length());
+            let [x, y, z] = axes.map(|axis| axis.length() as f32);
             let turned = if is_straight(&axes) { "" } else { ", turned" };
             let zero = components(&to_world.translation.to_array());
             lines.push(format!("  voxel      {x} × {y} × {z}{turned}; index (0, 0, 0) lies at {zero}"));
@@ -110,7 +110,7 @@ impl Entry {
             "bounds": summary.bounds.map(box_of),
             // Three rows of four numbers.
             "to_world": summary.to_world.map(|t| {
-                let [x, y, z] = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis].map(|axis| axis.to_array());
+                let [x, y, z] = t.matrix3.to_cols_array_2d();
                 let row = |a: usize| [x[a], y[a], z[a], t.translation.to_array()[a]];
                 [row(0), row(1), row(2)]
             }),
