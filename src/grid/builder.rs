@@ -45,7 +45,7 @@ impl Builder {
     }
 
     /// Adds a leaf with its active samples. `fill` writes its values over the background, in the order of
-    /// [`BlockData::Leaf`].
+    /// [`BlockData::Leaf`](super::BlockData::Leaf).
     ///
     /// # Errors
     /// [`Misplaced`] where `origin` is no multiple of 8 or another block lies there.
