@@ -9,6 +9,7 @@ macro_rules! pages {
 pages! {
     tutorial "tutorial.md"
     meshes "meshes.md"
+    grids "grids.md"
     method "method.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"

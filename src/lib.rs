@@ -21,7 +21,7 @@
 //!
 //! 1. [`curve`] makes spatial fractal curves (§1 of the [method](guide::method)), and [`walk`] finds the
 //!    cells that a segment passes.
-//!    [`model`], beside them, reads geometry of other programs.
+//!    [`model`] and [`grid`], beside them, read geometry and simulations of other programs.
 //! 2. [`volume`] gives each cell a density ρ, a flow direction v and reflection coefficients k, packed to 64
 //!    bits (§2).
 //! 3. [`mapping`] is the one-to-one map between a quad and the face of the volume (§3). Sheets and splashes
@@ -50,6 +50,8 @@ pub mod util;
 
 pub mod curve;
 pub mod walk;
+
+pub mod grid;
 
 pub mod model;
 

@@ -6,6 +6,7 @@ mod choice;
 mod compare;
 mod devices;
 mod farm;
+mod grids;
 mod new;
 mod options;
 mod parse;

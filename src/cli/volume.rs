@@ -7,7 +7,8 @@ use clap::{Args, Subcommand};
 
 use super::parse::memory;
 use super::terminal::{Terminal, say};
-use super::{SceneOptions, default_output};
+use super::{SceneOptions, default_output, grids};
+use crate::grid::is_grid;
 use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
 use crate::scene::{Scene, likeliest};
@@ -37,9 +38,9 @@ enum VolumeCommand {
         #[arg(long)]
         overwrite: bool,
     },
-    /// Prints statistics of a volume file.
+    /// Prints statistics of a volume file, or the grids of a simulation.
     Info {
-        /// The .npz file to read.
+        /// The file to read: an .npz with a volume or with grids, a .vdb or an .nvdb.
         file: PathBuf,
         /// Prints the statistics as one JSON object.
         #[arg(long)]
@@ -90,6 +91,9 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         }
         VolumeCommand::Info { file, json, memory } => {
             terminal.watch();
+            if is_grid(file) {
+                return grids::info(file, *json, *memory, terminal);
+            }
             let options = ReadOptions { budget: *memory, ..Default::default() };
             let notes = Notes { terminal, texts: Mutex::default() };
             let statistics = read_npz(file, &options, &notes)?.statistics();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::budget::Budget;
+use super::budget::{Budget, SMALLER};
 use super::paths::read_whole;
 use crate::util::error::{Error, Result};
 
@@ -55,7 +55,7 @@ impl ImageSource {
             ImageSource::Refused { what, fix } => return Err(Error::input(what, fix)),
             ImageSource::Bytes { place, bytes } => size(place, bytes)?,
             ImageSource::File(path) => {
-                size(&path.display().to_string(), &read_whole(path, &mut Budget::new(memory))?)?
+                size(&path.display().to_string(), &read_whole(path, &mut Budget::new(memory, SMALLER))?)?
             }
         };
         Ok([width, height])
@@ -63,7 +63,7 @@ impl ImageSource {
 }
 
 fn decode_file(path: &Path, memory: u64) -> Result<DynamicImage> {
-    let bytes = read_whole(path, &mut Budget::new(memory))?;
+    let bytes = read_whole(path, &mut Budget::new(memory, SMALLER))?;
     decode(&path.display().to_string(), &bytes, memory.saturating_sub(bytes.len() as u64))
 }
 

@@ -54,7 +54,7 @@ pub use summary::{MaterialSummary, NodeSummary, Summary};
 
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
-use budget::Budget;
+use budget::{Budget, SMALLER};
 
 /// Limits of the reading of a file.
 #[derive(Clone, Debug)]
@@ -154,7 +154,7 @@ impl Model {
     /// place; [`Error::Memory`] where it needs more memory than `limits` allows; [`Error::Io`] where the disk
     /// fails; any error of the monitor.
     pub fn read(path: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<Model> {
-        let mut budget = Budget::new(limits.memory);
+        let mut budget = Budget::new(limits.memory, SMALLER);
         let bytes = paths::read_whole(path, &mut budget)?;
         Model::parse(path, bytes, limits, &mut budget, monitor)
     }
@@ -164,7 +164,7 @@ impl Model {
     /// # Errors
     /// Those of [`Model::read`].
     pub fn from_bytes(path: &Path, bytes: &[u8], limits: &Limits, monitor: &dyn Monitor) -> Result<Model> {
-        Model::parse(path, bytes.to_vec(), limits, &mut Budget::new(limits.memory), monitor)
+        Model::parse(path, bytes.to_vec(), limits, &mut Budget::new(limits.memory, SMALLER), monitor)
     }
 
     fn parse(

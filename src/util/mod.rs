@@ -1,6 +1,7 @@
 //! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk
 //! cache, confined paths, unit vectors, parts of an image, colour spaces, and EXR files of any program.
 
+pub(crate) mod budget;
 pub mod cache;
 pub mod colour;
 pub(crate) mod confine;
@@ -8,6 +9,7 @@ pub mod error;
 pub(crate) mod lane_powers;
 pub mod lanes;
 pub mod monitor;
+pub(crate) mod npy;
 pub mod open_exr;
 pub mod powers;
 pub mod random;

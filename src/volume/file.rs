@@ -9,8 +9,6 @@
 //! while they are read, with a note. An array in C order is read once. An array in Fortran order
 //! is read several times if memory is short: each time the numbers of one range of cells are kept.
 
-mod array;
-
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -19,12 +17,12 @@ use glam::Vec3;
 use npyz::WriterBuilder;
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-use self::array::{Number, Numbers, open_array};
 use super::bricks::{BRICK, Bricks, Packer};
 use super::storage::{Storage, StorageChoice, check_stored, file_storage};
 use super::{Cell, Cells, VolumeTexture};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
+use crate::util::npy::{Number, Numbers, open_array};
 
 /// Largest distance of |v| from 1 at which v counts as a unit vector: float32 rounding, with room for files
 /// that other programs wrote in lower precision.

@@ -8,6 +8,7 @@ mod curve;
 mod docs;
 mod engine;
 mod farm;
+mod grid;
 mod job;
 mod light;
 mod mapping;

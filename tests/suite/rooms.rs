@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, from the ground up. Rooms on one line must not import each other.
 const FLOORS: &[&[&str]] = &[
     &["util"],
-    &["curve", "walk", "model"],
+    &["curve", "walk", "model", "grid"],
     &["volume"],
     &["mapping"],
     &["trace"],

@@ -9,7 +9,7 @@ use npyz::{DType, Endianness, NpyHeader, TypeChar};
 const MAX_HEADER_BYTES: u64 = 512;
 
 /// Opens an array. Its header is parsed only if it has a sane length.
-pub(super) fn open_array<R: Read>(mut entry: R) -> Result<(NpyHeader, impl Read)> {
+pub(crate) fn open_array<R: Read>(mut entry: R) -> Result<(NpyHeader, impl Read)> {
     let mut prefix = [0u8; 12];
     entry.read_exact(&mut prefix)?;
     let header_bytes = match prefix[6] {
@@ -25,7 +25,7 @@ pub(super) fn open_array<R: Read>(mut entry: R) -> Result<(NpyHeader, impl Read)
 
 /// Type of the numbers in an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Number {
+pub(crate) struct Number {
     kind: Kind,
     bytes: usize,
     big_endian: bool,
@@ -41,16 +41,16 @@ enum Kind {
 
 impl Number {
     /// Whether a value is a byte with a sign.
-    pub(super) fn is_signed_byte(self) -> bool {
+    pub(crate) fn is_signed_byte(self) -> bool {
         self.kind == Kind::Signed && self.bytes == 1
     }
 
     /// The type in which volume files are written.
-    pub(super) const FLOAT32: Number = Number { kind: Kind::Float, bytes: 4, big_endian: false };
+    pub(crate) const FLOAT32: Number = Number { kind: Kind::Float, bytes: 4, big_endian: false };
 
     /// Returns the type that NumPy's `dtype` names; `None` if its values are not real numbers of at most 64
     /// bits.
-    pub(super) fn of(dtype: &DType) -> Option<Number> {
+    pub(crate) fn of(dtype: &DType) -> Option<Number> {
         let DType::Plain(name) = dtype else { return None };
         let (kind, sizes): (Kind, &[u64]) = match name.type_char() {
             TypeChar::Bool => (Kind::Bool, &[1]),
@@ -64,12 +64,12 @@ impl Number {
     }
 
     /// Whether this is uint8.
-    pub(super) fn is_uint8(self) -> bool {
+    pub(crate) fn is_uint8(self) -> bool {
         self.kind == Kind::Unsigned && self.bytes == 1
     }
 
     /// NumPy's name of the type, after its byte order where that is unusual.
-    pub(super) fn words(self) -> String {
+    pub(crate) fn words(self) -> String {
         let kind = match self.kind {
             Kind::Bool => return "bool".into(),
             Kind::Signed => "int",
@@ -82,7 +82,7 @@ impl Number {
 
     /// Largest error that rounding to this type makes in a number near `x` between 0 and 1. `codes`: the
     /// number is stored as one of 256 codes.
-    pub(super) fn rounding(self, x: f32, codes: bool) -> f32 {
+    pub(crate) fn rounding(self, x: f32, codes: bool) -> f32 {
         match (codes, self.kind, self.bytes) {
             (true, ..) => 0.5 / 255.0,
             // Half a step of normal numbers, and of those below 2⁻¹⁴.
@@ -112,14 +112,14 @@ impl Number {
 }
 
 /// Decodes a float16: 1 bit of sign, 5 of exponent, 10 of fraction. Every float16 is a float32.
-fn float16(bits: u16) -> f32 {
-    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f32::from(bits & 0x3ff));
-    sign * match (exponent, bits & 0x3ff) {
-        (0, _) => fraction * 2f32.powi(-24),
-        (31, 0) => f32::INFINITY,
-        (31, _) => f32::NAN,
-        _ => (1024.0 + fraction) * 2f32.powi(exponent - 25),
+#[inline]
+pub(crate) fn float16(bits: u16) -> f32 {
+    let (sign, rest) = (u32::from(bits & 0x8000) << 16, u32::from(bits & 0x7fff));
+    match rest >> 10 {
+        // A multiple of 2⁻²⁴.
+        0 => f32::from_bits((rest as f32 * 2f32.powi(-24)).to_bits() | sign),
+        31 => f32::from_bits(sign | 0x7f80_0000 | (rest & 0x3ff) << 13),
+        _ => f32::from_bits(sign | ((rest << 13) + (112 << 23))),
     }
 }
 
@@ -127,7 +127,7 @@ fn float16(bits: u16) -> f32 {
 const BLOCK: u64 = 4096;
 
 /// Numbers of one array, in the order of the file.
-pub(super) struct Numbers<R> {
+pub(crate) struct Numbers<R> {
     bytes: R,
     number: Number,
     /// Number that is read as 1.
@@ -141,14 +141,14 @@ pub(super) struct Numbers<R> {
 
 impl<R: Read> Numbers<R> {
     /// The `count` numbers of `bytes`. With `codes` 255 is read as 1.
-    pub(super) fn new(bytes: R, number: Number, codes: bool, count: u64) -> Self {
+    pub(crate) fn new(bytes: R, number: Number, codes: bool, count: u64) -> Self {
         let one = if codes { 255.0 } else { 1.0 };
         Numbers { bytes, number, one, count, decoded: 0, raw: Vec::new(), block: Vec::new().into_iter() }
     }
 
     /// Reads the next number.
     #[inline]
-    pub(super) fn next(&mut self) -> Result<f32> {
+    pub(crate) fn next(&mut self) -> Result<f32> {
         if let Some(number) = self.block.next() {
             return Ok(number);
         }
@@ -177,7 +177,7 @@ impl<R: Read> Numbers<R> {
 
     /// Checks that the array has no more numbers. The archive compares an entry's checksum only when the
     /// entry is read to its end.
-    pub(super) fn finish(mut self) -> Result<()> {
+    pub(crate) fn finish(mut self) -> Result<()> {
         match self.bytes.read(&mut [0])? {
             0 => Ok(()),
             _ => Err(Error::other(format!("has more than {} numbers", self.count))),
