@@ -460,7 +460,7 @@ fn visit_mist(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
 // Sample between cells, half way along the ray through the current cell.
 fn sample_on_ray(walk: Walk, ray: Ray, view: View) -> CellSample {
     let middle = view.origin + view.d_cell * ((ray.t + walk_exit(walk)) * 0.5);
-    return sample_trilinear(view.level, view.matter, walk.cell, middle);
+    return sample_trilinear(view.level, view.matter, walk.cell, middle, false);
 }
 
 // Adds the light of one cell and steps to the next. After the end of the walk, nothing changes.

@@ -62,13 +62,22 @@ fn trace_shell(
     let own = volume_of(shell.volume);
     let d = view_ray(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
     let words = shell_texel(shell.hull + face - shell.first_face);
-    let a = shell_point(shell, words.y);
-    let metres = face_metres(a, shell_point(shell, words.z), shell_point(shell, words.w), frame.eye_world, d);
-    var path = path_through(shell, words, frame.eye_world + d * metres, d);
+    var metres = 0.0;
+    var origin = bitcast<vec3<f32>>(words.yzw);
+    var begin = 0.0;
+    var path: ShellPath;
+    if (words.x & 3u) == EYE_FACE {
+        path = path_inside(shell, words.x >> 4u, (words.x >> 2u) & 3u, origin, d);
+    } else {
+        let a = shell_point(shell, words.y);
+        metres = face_metres(a, shell_point(shell, words.z), shell_point(shell, words.w), frame.eye_world, d);
+        // The path may move its origin onto the face.
+        origin = frame.eye_world + d * metres;
+        begin = -NEVER;
+        path = path_through(shell, words, origin, d);
+    }
     let opaque = textureLoad(opaque_radiance, pixel, 0).w;
     let t_end = select(NEVER, opaque - metres, opaque > 0.0);
-    // The path may have moved its origin onto the face.
-    let origin = frame.eye_world + d * metres;
 
     var ray: ShellRay;
     ray.d = d;
@@ -78,7 +87,7 @@ fn trace_shell(
         var segment = path_next(&path);
         done = (segment.t_in >= t_end) | (ray.transmittance < frame.early_end);
         if !done {
-            segment = segment_until(segment, t_end);
+            segment = segment_until(segment_from(segment, begin), t_end);
             // A triangle without an area in the texture shows nothing of it.
             if segment.is_mapped {
                 through_tetrahedron(&ray, segment, shell, own, origin, metres);
@@ -173,7 +182,7 @@ fn walk_tetrahedron(
                 texel = cell_words(in_texture(walk.cell, level));
                 if TRILINEAR {
                     let along = origin + d_cell * ((enter + leave) * 0.5);
-                    sample = sample_trilinear(level, whole, walk.cell, along);
+                    sample = sample_trilinear(level, whole, walk.cell, along, shell.is_single);
                 } else {
                     sample.rho = f32(texel.x & 0xffffu);
                 }

@@ -13,6 +13,9 @@ const PRISM: u32 = 4u;
 const TANGENTS: u32 = 4u;
 // Beyond a side where the shell ends.
 const NO_PRISM: u32 = 0xffffffffu;
+// In place of a tetrahedron's number: the face of an eye inside a box. Its words are four times the number of
+// the tetrahedron around the eye among all plus this, and the eye's place.
+const EYE_FACE: u32 = 3u;
 
 struct Shell {
     number: u32,
@@ -24,8 +27,9 @@ struct Shell {
     first_face: u32,
     // Number of its volume.
     volume: u32,
-    // Whether opaque matter lies behind the inner surface.
+    // Whether opaque matter lies behind the inner surface, and whether it shows its volume once.
     skin: bool,
+    is_single: bool,
     // First value of V at its vertices, and the number of layers between which V is interpolated; without
     // layers rays walk to the light.
     light: u32,
@@ -66,7 +70,10 @@ fn shell_new(number: u32) -> Shell {
     let a = shell_texel(header);
     let b = shell_texel(header + 1u);
     let shadows = shell_texel(header + 2u).x;
-    return Shell(number, a.x, a.y, a.z, a.w, b.x & 0x7fffffffu, (b.x >> 31u) != 0u, b.y, b.z, b.w, shadows);
+    let skin = (b.x >> 31u) != 0u;
+    let is_single = (b.x & 0x40000000u) != 0u;
+    let volume = b.x & 0x3fffffffu;
+    return Shell(number, a.x, a.y, a.z, a.w, volume, skin, is_single, b.y, b.z, b.w, shadows);
 }
 
 // The shell of a face, given by its number.

@@ -373,6 +373,18 @@ fn path_next(path: ptr<function, ShellPath>) -> Segment {
     return segment;
 }
 
+// The part of a segment behind the parameter `t`, if it lies inside the segment. Twin: Segment::from.
+fn segment_from(segment: Segment, t: f32) -> Segment {
+    var out = segment;
+    if (t > segment.t_in) & (t <= segment.t_out) {
+        let share = clamp((t - segment.t_in) / (segment.t_out - segment.t_in), 0.0, 1.0);
+        out.t_in = t;
+        out.at_in = segment.at_in + (segment.at_out - segment.at_in) * share;
+        out.shares_in = segment.shares_in + (segment.shares_out - segment.shares_in) * share;
+    }
+    return out;
+}
+
 // The part of a segment before the parameter `t`. Twin: Segment::until.
 fn segment_until(segment: Segment, t: f32) -> Segment {
     var out = segment;

@@ -64,6 +64,7 @@ fn sample_trilinear(
     matter: SheetDensity,
     cell: vec3<i32>,
     middle: vec3<f32>,
+    is_single: bool,
 ) -> CellSample {
     let inside = middle - floor(middle) - 0.5;
     let side = select(vec3<i32>(1), vec3<i32>(-1), inside < vec3<f32>(0.0));
@@ -75,9 +76,11 @@ fn sample_trilinear(
         let away = vec3<i32>(corner & 1, (corner >> 1u) & 1, corner >> 2u);
         let shares = select(far, 1.0 - far, away == vec3<i32>(0));
         var index = cell + side * away;
+        let inside = clamp(index, vec3<i32>(0), level.size - 1);
         index = select(index, level.size - 1, index < vec3<i32>(0));
         index = select(index, vec3<i32>(0), index >= level.size);
-        index.z = clamp(cell.z + side.z * away.z, 0, level.size.z - 1);
+        index.z = inside.z;
+        index = select(index, inside, is_single);
         let texel = cell_words(in_texture(index, level));
         let weight = shares.x * shares.y * shares.z * f32(texel.x & 0xffffu);
         rho += weight;

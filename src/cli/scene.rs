@@ -29,5 +29,5 @@ pub fn run(args: &SceneArgs, terminal: &Terminal) -> Result<()> {
         Some(frame) => animation.at(frame)?,
         None => args.scene.load(&[])?,
     };
-    say(&if args.json { scene.to_json().to_string() } else { scene.to_toml() + &scene.mesh_comments() })
+    say(&if args.json { scene.to_json().to_string() } else { scene.to_toml() + &scene.comments() })
 }

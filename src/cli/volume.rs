@@ -11,7 +11,7 @@ use super::{SceneOptions, default_output, grids};
 use crate::grid::is_grid;
 use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
-use crate::scene::{Scene, likeliest};
+use crate::scene::{Scene, key_of_volume, likeliest};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::{ReadOptions, Statistics, read_npz, write_npz};
@@ -77,6 +77,13 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             }
             let mut out = Output::create(&path)?;
             let volume = scene.cached_volume(number, None, options.limits().memory, terminal)?;
+            if volume.alpha > 1.0 {
+                let scale = key_of_volume(&scene.recipes[number].name, "volume.rho_scale");
+                return Err(Error::input(
+                    format!("ρ reaches {}, and a volume file holds at most 1", volume.alpha),
+                    format!("divide {scale} by that number, and multiply trace.sigma by it"),
+                ));
+            }
             let notes = scene.environment.iter().map(|environment| environment.words());
             let notes = notes.chain(scene.note_on_volume(number, &volume));
             notes.for_each(|n| terminal.note(&format!("taki: {n}")));

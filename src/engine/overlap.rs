@@ -196,7 +196,11 @@ pub fn covered(scene: &Scene, corner: [u32; 2], count: [u32; 2], side: u32) -> V
     };
     scene.quads.iter().for_each(|quad| mark(&quad.corners));
     for shell in &scene.shells {
-        shell.hull.iter().for_each(|face| mark(&shell.corners(face)));
+        let own = shell.hull.iter().filter(|face| !face.is_eye());
+        own.for_each(|face| mark(&shell.corners(face)));
+        if scene.eye_inside(shell).is_some() {
+            mark(&scene.eye_face());
+        }
     }
     squares
 }

@@ -9,7 +9,8 @@ use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection, set_density_and_reflection,
+    MeasuredSpec, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection,
+    set_density_and_reflection,
 };
 
 /// Keeps the volume textures of the last scene.
@@ -34,6 +35,8 @@ enum Source {
     Water(WaterSpec, Storage),
     File {
         path: PathBuf,
+        /// Recipe of a measured volume.
+        measured: Option<MeasuredSpec>,
         storage: StorageChoice,
         /// Modification time and size in bytes, to notice changes.
         modified: Option<SystemTime>,
@@ -112,17 +115,18 @@ impl VolumeMemo {
 impl Source {
     /// The input of a scene's volume.
     fn of(recipe: &Recipe) -> Source {
-        let Recipe { water, file, storage, asked_storage, .. } = recipe;
+        let Recipe { water, measured, file, storage, asked_storage, .. } = recipe;
         match file {
             None => Source::Water(*water, *storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();
                 Source::File {
                     path: path.clone(),
+                    measured: measured.clone(),
                     storage: *asked_storage,
                     modified: meta.as_ref().and_then(|m| m.modified().ok()),
                     bytes: meta.map_or(0, |m| m.len()),
-                    k: (!has_reflection(path)).then_some([water.k_d, water.k_s]),
+                    k: (measured.is_none() && !has_reflection(path)).then_some([water.k_d, water.k_s]),
                 }
             }
         }

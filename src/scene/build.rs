@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec3};
 
 use super::param::{key_of_volume, split_volume_key};
-use super::{Limits, MAX_LIGHTS, Place, Raw, Values, meshes, presets, volumes};
+use super::{Limits, MAX_LIGHTS, Place, Raw, Values, measured, meshes, presets, volumes};
 use crate::curve::{CurveShape, levels_for};
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
@@ -95,7 +95,7 @@ pub(super) fn volume_file(
 ) -> Result<Option<PathBuf>> {
     let key = key_of_volume(name, "volume.file");
     match v.text(&key) {
-        file if file.is_empty() => Ok(None),
+        file if file.is_empty() || measured::is_measured(v, name) => Ok(None),
         file => {
             let file = confine(&key, Path::new(&file), folder, &limits.allow_paths)?;
             check_npz(&file)?;
@@ -343,11 +343,14 @@ pub(super) fn scattering(v: &Values) -> Result<Scattering> {
 /// path that is not UTF-8.
 pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<()> {
     let file = values.text(key);
+    let is_source = split_volume_key(key).map(|(name, own)| (name, own == "volume.source"));
+    let is_other =
+        is_source.is_some_and(|(name, is_source)| is_source != measured::is_measured(values, name));
     let unused = key == "environment.file"
         && values.choice("environment.kind", EnvironmentKind::from_word) != EnvironmentKind::File;
     let hidden = split_volume_key(key).is_some_and(|(name, _)| !volumes::is_shown(values, name));
     let is_left_out = meshes::is_hidden(values, key);
-    if file.is_empty() || unused || hidden || is_left_out {
+    if file.is_empty() || unused || is_other || hidden || is_left_out {
         return Ok(());
     }
     let whole = confine(key, Path::new(&file), folder, allowed)?;

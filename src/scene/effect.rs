@@ -2,6 +2,7 @@
 
 use super::Values;
 use super::build::EnvironmentKind;
+use super::measured::Builder;
 use super::meshes::{self, Carrier, Projection};
 use super::names::full_key;
 use super::param::{key_of_volume, matches, split_volume_key};
@@ -10,7 +11,7 @@ use super::volumes;
 use crate::light::{LightKind, ReflectionKind, Visibility};
 use crate::mapping::shell::Side;
 use crate::trace::AttenuationKind;
-use crate::volume::Run;
+use crate::volume::{ReflectBy, Run};
 
 /// Parameters that only have an effect where another one, the switch, has a certain value. Rules on keys of
 /// the volume `water` hold for the keys of every volume.
@@ -28,6 +29,39 @@ struct Rule {
 fn is(values: &Values, switch: &str, word: &str) -> bool {
     values.text(switch) == word
 }
+
+/// Keys of a volume that is made of curves, or of a file of cells.
+const OF_CURVES: &[&str] = &[
+    "curves.*",
+    "volume.coherence",
+    "volume.coverage",
+    "volume.crest",
+    "volume.file",
+    "volume.flow",
+    "volume.k_noise",
+    "volume.nx",
+    "volume.ny",
+    "volume.nz",
+    "volume.seed",
+    "volume.strand_length",
+];
+
+/// Keys of a volume that is made of the grids of a simulation.
+const OF_GRIDS: &[&str] = &[
+    "volume.cells",
+    "volume.grid",
+    "volume.reflect",
+    "volume.reflect_grid",
+    "volume.reflect_high",
+    "volume.reflect_k_d",
+    "volume.reflect_k_s",
+    "volume.reflect_low",
+    "volume.rho",
+    "volume.rho_scale",
+    "volume.source",
+    "volume.velocity",
+    "volume.velocity_at",
+];
 
 const RULES: &[Rule] = &[
     Rule {
@@ -173,6 +207,30 @@ const RULES: &[Rule] = &[
         switch: "curves.run",
         needs: "out",
         works: |v, switch| is(v, switch, Run::Out.word()),
+    },
+    Rule {
+        keys: OF_CURVES,
+        switch: "volume.builder",
+        needs: "curves",
+        works: |v, switch| is(v, switch, Builder::Curves.word()),
+    },
+    Rule {
+        keys: OF_GRIDS,
+        switch: "volume.builder",
+        needs: "flow",
+        works: |v, switch| is(v, switch, Builder::Flow.word()),
+    },
+    Rule {
+        keys: &["volume.reflect_grid"],
+        switch: "volume.reflect",
+        needs: "grid",
+        works: |v, switch| is(v, switch, ReflectBy::Grid.word()),
+    },
+    Rule {
+        keys: &["volume.reflect_high", "volume.reflect_k_d", "volume.reflect_k_s", "volume.reflect_low"],
+        switch: "volume.reflect",
+        needs: "speed, vorticity or grid",
+        works: |v, switch| !is(v, switch, ReflectBy::Even.word()),
     },
     Rule {
         keys: &["curves.*", "volume.nx", "volume.ny", "volume.nz", "volume.seed"],

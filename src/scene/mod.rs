@@ -1,11 +1,13 @@
 //! Reading of scenes: files, presets and `--set`, all checked before any work begins.
 
 mod animation;
+mod boxes;
 mod budget;
 mod build;
 mod effect;
 mod ground;
 mod keyframes;
+mod measured;
 mod meshes;
 mod names;
 mod open;
@@ -29,6 +31,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 pub use animation::Animation;
+pub use boxes::SceneBox;
 pub use build::resolve;
 pub use effect::{settings_without_effect, settings_without_file, without_effect};
 pub use meshes::{
@@ -100,8 +103,10 @@ pub struct Parts {
     pub wave_flow: f32,
     /// Quads that the volumes are mapped to.
     pub quads: Vec<Quad>,
-    /// Shells of the volume.
+    /// Shells of the volume: those of meshes, then those of boxes.
     pub shells: Vec<Arc<Shell>>,
+    /// Boxes that a volume fills once.
+    pub boxes: Vec<SceneBox>,
     /// Lights with an intensity above 0; the environment's sun is the last.
     pub lights: Vec<Light>,
     /// Light of the surroundings. It lights rock and is seen in place of the background.
@@ -187,6 +192,7 @@ impl Parts {
                 let to_eye = self.camera.eye_local().as_vec3() - map.point_world(uv[0], uv[1]);
                 map.n_world * if map.n_world.dot(to_eye) < 0.0 { -1.0 } else { 1.0 }
             }
+            Face::Hull(_, face) if face.is_eye() => -self.camera.forward.as_vec3(),
             // Only faces that the eye sees from outside are drawn.
             Face::Hull(shell, face) => {
                 let [a, b, c] = self.shells[shell].corners(face).map(|p| p.as_dvec3());
@@ -292,7 +298,8 @@ impl Scene {
         let image = build::image(v);
         check_image(&image, limits.memory)?;
         let meshes = meshes::read(v, folder, limits)?;
-        let origin = origin::origin(v, &meshes);
+        let boxes = boxes::read(v, &recipes)?;
+        let origin = origin::origin(v, &meshes, &boxes);
         let camera = build::camera(meshes::with_camera(v, &meshes, 0.0)?.as_ref().unwrap_or(v), origin)?;
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
@@ -300,11 +307,14 @@ impl Scene {
         let mut quads = quads::quads(v, origin, &recipes)?;
         let surfaces = meshes::build(v, &meshes, origin, &recipes, quads.len(), limits)?;
         quads.extend(surfaces.quads);
+        let mut shells = surfaces.shells;
+        shells.extend(boxes::shells(v, &boxes, origin, &recipes)?);
         let lights = meshes::lights(&meshes, origin)?;
         let mut parts = Parts {
             name: name.into(),
             quads,
-            shells: surfaces.shells,
+            shells,
+            boxes,
             recipes,
             wave_flow: v.float("volume.flow"),
             lights: build::lights(v, origin, lights, sun, environment_lights.len())?,
@@ -376,8 +386,7 @@ impl Scene {
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.
     pub fn references(&self) -> Vec<(String, PathBuf)> {
-        let volume =
-            |recipe: &Recipe| Some((key_of_volume(&recipe.name, "volume.file"), recipe.file.clone()?));
+        let volume = |recipe: &Recipe| Some((recipe.file_key(), recipe.file.clone()?));
         let map = self.environment.as_ref().and_then(|e| match &e.source {
             environment::Source::File(path) => Some(("environment.file".to_owned(), path.clone())),
             environment::Source::Sky(_) => None,
@@ -487,10 +496,12 @@ impl Scene {
         self.quads.iter().filter(|quad| quad.mist == 0.0).map(|quad| quad.corners).collect()
     }
 
-    /// Returns the triangles around the shells that hold water. Fibres that stand out of a surface are none.
+    /// Returns the triangles around the shells that hold water. Fibres that stand out of a surface are none,
+    /// and the sides of a box are no surface of water.
     fn water_faces(&self) -> WaterFaces {
-        let is_water =
-            |shell: &&Arc<Shell>| self.recipes[shell.volume as usize].water.structure.run == Run::Along;
+        let runs_along =
+            |shell: &Shell| self.recipes[shell.volume as usize].water.structure.run == Run::Along;
+        let is_water = |shell: &&Arc<Shell>| !shell.is_single && runs_along(shell);
         let shells = self.shells.iter().filter(is_water);
         WaterFaces(shells.flat_map(|shell| shell.hull.iter().map(|face| shell.corners(face))).collect())
     }
@@ -582,6 +593,7 @@ impl Scene {
             let [alpha, file] = ["volume.alpha", "volume.file"].map(|key| key_of_volume(&recipe.name, key));
             if let Some(values) = self.values.as_ref().filter(|v| v.is_set_by_user(&alpha))
                 && recipe.file.is_some()
+                && recipe.measured.is_none()
                 && values.float(&alpha) != volume.alpha
             {
                 warnings.push(format!(

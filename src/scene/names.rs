@@ -8,8 +8,8 @@ use super::volumes::used_materials;
 use crate::util::error::Error;
 
 /// Sections whose keys have a name of the scene's choice as their second part.
-pub const NAMED: [&str; 8] =
-    ["lights", "materials", "meshes", "pools", "rocks", "sheets", "splashes", "volumes"];
+pub const NAMED: [&str; 9] =
+    ["boxes", "lights", "materials", "meshes", "pools", "rocks", "sheets", "splashes", "volumes"];
 
 /// Least likeness of a key to a misspelt one that makes it worth a suggestion.
 const ALIKE: f64 = 0.7;
@@ -24,6 +24,10 @@ const OTHER_WORDS: &[(&str, &[&str])] = &[
     ("camera.eye", &["from", "location", "origin", "pos", "position"]),
     ("camera.fov", &["focal_length", "lens", "zoom"]),
     ("camera.target", &["at", "aim", "center", "centre", "interest", "look_at", "lookat", "to"]),
+    ("boxes.*.position", &["at", "center", "centre", "location", "origin", "pos", "translation"]),
+    ("boxes.*.size", &["scale", "sides"]),
+    ("boxes.*.turn", &["rotate", "rotation"]),
+    ("boxes.*.volume", &["material"]),
     ("meshes.*.file", &["model", "path", "source"]),
     ("meshes.*.position", &["at", "location", "origin", "pos", "translation"]),
     ("meshes.*.scale", &["size"]),

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::param::POINT_MAX;
-use super::{Parts, SceneMesh, Values};
+use super::{Parts, SceneBox, SceneMesh, Values};
 
 /// Distance between origins along each axis, metres. Within half of it a float32 is accurate to 2 µm. The
 /// origin stays where it is while the scene changes a little, and a scene near the world's origin has that.
@@ -11,12 +11,13 @@ const STEP_M: f64 = 64.0;
 /// Largest coordinates of an origin.
 const MOST: DVec3 = DVec3::splat(POINT_MAX);
 
-/// Returns the origin of a scene: the median of its water's points, of the middles of its meshes if it has no
+/// Returns the origin of a scene: the median of its water's points and boxes, of the middles of its meshes if it has no
 /// other water, or of the points of rocks and pools if it has no meshes either, rounded to whole steps. One
 /// part that lies far from the others does not move it. It does not depend on the camera, so that the mesh
 /// stays while the camera moves.
-pub(super) fn origin(v: &Values, meshes: &[SceneMesh]) -> DVec3 {
+pub(super) fn origin(v: &Values, meshes: &[SceneMesh], boxes: &[SceneBox]) -> DVec3 {
     let mut points = water(v);
+    points.extend(boxes.iter().map(SceneBox::middle));
     if points.is_empty() {
         points.extend(meshes.iter().filter_map(SceneMesh::middle));
     }

@@ -110,8 +110,10 @@ impl Scene {
     }
 
     /// Lists the meshes as comments of a scene file: their nodes, and their materials with what each becomes.
-    pub fn mesh_comments(&self) -> String {
-        self.meshes.iter().map(SceneMesh::comments).collect()
+    /// Boxes follow, with their places and cells.
+    pub fn comments(&self) -> String {
+        let boxes = self.boxes.iter().map(|own| own.comment(&self.recipes[own.volume as usize]));
+        self.meshes.iter().map(SceneMesh::comments).chain(boxes).collect()
     }
 
     /// Prints the scene as JSON: its parameters as in the scene file, and under `derived` the values computed
@@ -151,6 +153,7 @@ impl Scene {
             "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
             "mesh": mesh_json(&self.mesh(), origin),
             "meshes": self.meshes.iter().map(SceneMesh::json).collect::<Vec<_>>(),
+            "boxes": self.boxes.iter().map(|own| own.json(&self.recipes[own.volume as usize])).collect::<Vec<_>>(),
         })
     }
 }
@@ -168,6 +171,7 @@ fn volume_json(recipe: &Recipe) -> Json {
         "levels": shape.levels,
         "sigma_g_cells": shape.sigma_g_cells,
         "file": recipe.file.as_ref().map(|p| p.display().to_string()),
+        "size": recipe.knows_size().then_some(recipe.water.size),
     })
 }
 

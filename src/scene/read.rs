@@ -412,6 +412,7 @@ impl File<'_> {
             ("sheets", "points"),
             ("splashes", ""),
             ("meshes", "file"),
+            ("boxes", ""),
             ("materials", ""),
         ] {
             let parts: Vec<(String, usize, &Spanned<DeValue>)> = match root.get(section).map(Spanned::get_ref)
@@ -436,7 +437,7 @@ impl File<'_> {
                 if !need.is_empty() && !has() {
                     return Err(without(&path, need, values, &self.place(at)));
                 }
-                let volume = part.get_ref().as_table().filter(|_| section == "materials");
+                let volume = part.get_ref().as_table().filter(|_| ["boxes", "materials"].contains(&section));
                 if let Some(volume) = volume.and_then(|part| part.get("volume"))
                     && let Some(name) = volume.get_ref().as_str()
                     && let Some(fix) = volumes::unknown(values, name)
@@ -482,6 +483,7 @@ impl File<'_> {
             "splashes" => format!("{path}.from"),
             "volumes" => format!("{path}.nx"),
             "meshes" => format!("{path}.file"),
+            "boxes" => format!("{path}.volume"),
             _ => format!("{path}.corners"),
         };
         let place = self.place(value.span().start);
@@ -545,7 +547,8 @@ pub fn raw(value: &DeValue) -> Raw {
 
 /// Returns the keys of a scene whose values are paths.
 pub fn reference_keys(values: &Values) -> Vec<String> {
-    let files = volumes::names(values).into_iter().map(|name| key_of_volume(&name, "volume.file"));
+    let of_volume = |name: &String| ["volume.file", "volume.source"].map(|key| key_of_volume(name, key));
+    let files = volumes::names(values).iter().flat_map(of_volume).collect::<Vec<_>>().into_iter();
     let meshes = values.names("meshes").into_iter().map(|name| format!("meshes.{name}.file"));
     files.chain(["environment.file".into()]).chain(meshes).collect()
 }

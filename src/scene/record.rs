@@ -106,7 +106,7 @@ impl Scene {
         let map = self.environment.as_ref().filter(|e| matches!(e.source, Source::File(_)));
         let of_volumes = self.recipes.iter().zip(volumes).enumerate().map(|(i, (recipe, volume))| {
             let now = recipe.file.is_some().then(|| volume.checksum());
-            (key_of_volume(&recipe.name, "volume.file"), record.volumes.get(i).copied(), now)
+            (recipe.file_key(), record.volumes.get(i).copied(), now)
         });
         let map = ("environment.file".to_owned(), record.map, map.map(|e| e.map.checksum()));
         let differs = |(key, then, now): (String, Option<u32>, Option<u32>)| {

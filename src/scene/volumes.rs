@@ -3,16 +3,19 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use glam::DAffine3;
+
 use super::names::likeliest;
 use super::param::{PARAMS, WATER, key_of_volume, split_volume_key};
-use super::{Limits, Parts, Scene, Values, build, meshes};
+use super::{Limits, Parts, Scene, Values, boxes, build, measured, meshes};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    Bricks, Cell, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec, build_sparse_water,
-    build_water, dense_bytes, expected_cells, kept_water, read_npz, sparse_bytes,
+    Bricks, Cell, MeasuredSpec, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec,
+    build_measured, build_sparse_water, build_water, dense_bytes, expected_cells, kept_water, read_npz,
+    sparse_bytes,
 };
 
 /// Largest number of volumes that a scene shows. The GPU engine holds their constants in one uniform buffer,
@@ -26,7 +29,9 @@ pub struct Recipe {
     pub name: String,
     /// Recipe of the cells, used where there is no `file`.
     pub water: WaterSpec,
-    /// Path of the volume's `.npz` file, resolved and inside the allowed folders.
+    /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
+    pub measured: Option<MeasuredSpec>,
+    /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, or the simulation's.
     pub file: Option<PathBuf>,
     /// Storage of the cells.
     pub storage: Storage,
@@ -39,14 +44,41 @@ pub struct Recipe {
 impl Recipe {
     /// Reads the recipe of the volume `name`. Its storage is not chosen yet.
     fn new(v: &Values, name: &str, folder: Option<&Path>, limits: &Limits) -> Result<Recipe> {
+        let mut water = build::water(v, name);
+        let measured = measured::measured(v, name, folder, limits)?;
+        if let Some(measured) = &measured {
+            water.size = measured.size;
+        }
+        let file = match &measured {
+            Some(measured) => Some(measured.path.clone()),
+            None => build::volume_file(v, name, folder, limits)?,
+        };
+        // What was measured stands where it was; only copies of a volume can flow.
+        let flow = if measured.is_some() { 0.0 } else { v.float(&key_of_volume(name, "volume.flow")) };
         Ok(Recipe {
             name: name.into(),
-            water: build::water(v, name),
-            file: build::volume_file(v, name, folder, limits)?,
+            water,
+            measured,
+            file,
             storage: Storage::Dense,
             asked_storage: build::asked_storage(v, name)?,
-            flow: v.float(&key_of_volume(name, "volume.flow")),
+            flow,
         })
+    }
+
+    /// Whether the number of cells is known before the volume is read.
+    pub(super) fn knows_size(&self) -> bool {
+        self.file.is_none() || self.measured.is_some()
+    }
+
+    /// Transform from texture coordinates, 0 to 1, to the world, metres, if the volume has a place of its own.
+    pub fn world_from_texture(&self) -> Option<DAffine3> {
+        self.measured.as_ref().map(MeasuredSpec::world_from_texture)
+    }
+
+    /// Key that names the file.
+    pub(super) fn file_key(&self) -> String {
+        key_of_volume(&self.name, if self.measured.is_some() { "volume.source" } else { "volume.file" })
     }
 
     /// Bytes that the cells take in a storage while a picture is rendered.
@@ -100,7 +132,8 @@ pub(super) fn volume_of(v: &Values, material: &str) -> String {
 /// Returns the names of the volumes that the scene's surfaces show, in the order of their numbers. A scene
 /// without surfaces has `water`.
 pub(super) fn shown(v: &Values) -> Vec<String> {
-    let used: BTreeSet<String> = used_materials(v).iter().map(|material| volume_of(v, material)).collect();
+    let of_materials = used_materials(v).into_iter().map(|material| volume_of(v, &material));
+    let used: BTreeSet<String> = of_materials.chain(boxes::volumes(v)).collect();
     let mut shown = names(v);
     shown.retain(|name| used.contains(name) || (used.is_empty() && name == WATER));
     shown
@@ -134,7 +167,7 @@ pub(super) fn unused(v: &Values) -> Vec<String> {
 fn why_unused(v: &Values, name: &str) -> String {
     match v.names("materials").iter().find(|material| volume_of(v, material) == name) {
         Some(material) => format!("nothing has the material {material}, which shows the volume {name}"),
-        None => format!("no material shows the volume {name}: give one volume = {name:?}"),
+        None => format!("no material or box shows the volume {name}: give one volume = {name:?}"),
     }
 }
 
@@ -158,6 +191,13 @@ pub(super) fn recipes(v: &Values, folder: Option<&Path>, limits: &Limits) -> Res
         if let Some(fix) = unknown(v, &name) {
             let what = format!("materials.{material}.volume = {name:?}: the scene has no such volume");
             return Err(Error::input(what, fix));
+        }
+    }
+    for name in v.names("boxes") {
+        let key = format!("boxes.{name}.volume");
+        let volume = v.text(&key);
+        if let Some(fix) = unknown(v, &volume) {
+            return Err(Error::input(format!("{key} = {volume:?}: the scene has no such volume"), fix));
         }
     }
     let shown = shown(v);
@@ -321,8 +361,9 @@ impl Scene {
         memory: u64,
         monitor: &dyn Monitor,
     ) -> Result<VolumeTexture> {
-        let Recipe { name, water, file, storage, asked_storage, .. } = &self.recipes[number];
+        let Recipe { name, water, measured, file, storage, asked_storage, .. } = &self.recipes[number];
         let volume = match (file, storage, cache) {
+            _ if let Some(measured) = measured => build_measured(measured, *asked_storage, memory, monitor),
             (Some(path), ..) => {
                 let k = [water.k_d, water.k_s];
                 read_npz(path, &ReadOptions { storage: *asked_storage, budget: memory, k }, monitor)

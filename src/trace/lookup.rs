@@ -68,13 +68,15 @@ impl<'a> Level<'a> {
     /// Values interpolated between the eight cell centres around the midpoint of the ray's segment in a cell.
     /// The ray starts at `origin` and runs along `direction`, both in the level's cells.
     ///
-    /// x and y wrap; z is clamped to the slab. k and the moments are means weighted by ρ.
+    /// x and y wrap, except in a volume that is shown once (`is_single`); z is clamped to the slab. k and the
+    /// moments are means weighted by ρ.
     pub fn sample_trilinear(
         &self,
         crossing: &Crossing,
         origin: Vec3,
         direction: Vec3,
         matter: &SheetDensity,
+        is_single: bool,
     ) -> CellSample {
         let middle = (crossing.t_enter + crossing.t_exit) * 0.5;
         let p = origin + direction * middle;
@@ -88,12 +90,9 @@ impl<'a> Level<'a> {
             let away = IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);
             let shares = Vec3::select(away.cmpeq(IVec3::ZERO), 1.0 - far, far);
             let c = crossing.cell + side * away;
-            let index = IVec3::new(
-                c.x.rem_euclid(self.size.x),
-                c.y.rem_euclid(self.size.y),
-                c.z.clamp(0, self.size.z - 1),
-            );
-            let cell = self.cell(index);
+            let inside = c.clamp(IVec3::ZERO, self.size - 1);
+            let wrapped = IVec3::new(c.x.rem_euclid(self.size.x), c.y.rem_euclid(self.size.y), inside.z);
+            let cell = self.cell(if is_single { inside } else { wrapped });
             let weight = shares.x * shares.y * shares.z * cell.rho_code() as f32;
             let (k_d, k_s) = cell.k_codes();
             rho += weight;

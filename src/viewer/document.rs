@@ -320,7 +320,7 @@ impl Document {
 fn owner_exists(values: &Values, key: &str) -> bool {
     let mut parts = key.split('.');
     match (parts.next(), parts.next()) {
-        (Some(section @ ("lights" | "meshes" | "volumes")), Some(name)) => {
+        (Some(section @ ("boxes" | "lights" | "meshes" | "volumes")), Some(name)) => {
             values.has_under(&format!("{section}.{name}"))
         }
         _ => true,

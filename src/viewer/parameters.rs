@@ -39,7 +39,7 @@ const GROUPS: [Group; 11] = [
     group(
         "Mapping",
         "How the volumes are mapped onto the quads",
-        &["materials", "sheets", "splashes", "quads"],
+        &["materials", "sheets", "splashes", "quads", "boxes"],
     ),
     group("Meshes", "", MESHES),
     group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),

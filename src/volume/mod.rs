@@ -10,6 +10,7 @@ mod cells;
 mod file;
 mod flow;
 mod leaps;
+mod measured;
 mod pyramid;
 mod ripple;
 mod spec;
@@ -22,6 +23,10 @@ pub use cell::{Cell, V_SCALE};
 pub use cells::Cells;
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
+pub use measured::{
+    Measured, MeasuredSpec, ReflectBy, RhoRule, VelocityAt, VelocityNames, Wanted, build_measured,
+    find_measured,
+};
 pub use pyramid::{
     Leaps, LevelAtlas, LevelSets, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels,
     level_count, level_size, levels_of, stored_levels,

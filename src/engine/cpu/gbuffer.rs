@@ -13,7 +13,6 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::engine::overlap;
-use crate::mapping::shell::{HullFace, Shell};
 use crate::mapping::{PlaneView, Quad};
 use crate::picture::Image;
 use crate::picture::camera::sample_offset;
@@ -248,11 +247,11 @@ pub fn map_quad(quad: &Quad, plane: &PlaneView, at: Vec2, length: f32) -> [f32; 
     [uv.x, uv.y, t * length]
 }
 
-/// Returns where the ray from the eye in the direction of `ray` meets the face of a shell's hull: u, v and
-/// metres from the eye. A rasteriser rounds corners, so the ray may pass by the face; the point then lies in
-/// the face's plane, at a distance of its corners.
-pub fn map_hull(shell: &Shell, face: &HullFace, eye: DVec3, ray: Vec3) -> [f32; 3] {
-    let [a, b, c] = shell.corners(face).map(|p| p.as_dvec3() - eye);
+/// Returns where the ray from the eye in the direction of `ray` meets a face of a shell's hull, given by its
+/// corners and their texture coordinates: u, v and metres from the eye. A rasteriser rounds corners, so the
+/// ray may pass by the face; the point then lies in the face's plane, at a distance of its corners.
+pub fn map_hull((corners, uv): ([Vec3; 3], [Vec2; 3]), eye: DVec3, ray: Vec3) -> [f32; 3] {
+    let [a, b, c] = corners.map(|p| p.as_dvec3() - eye);
     let d = ray.as_dvec3().normalize();
     let normal = (b - a).cross(c - a);
     let along = [a, b, c].map(|p| p.dot(d));
@@ -264,6 +263,6 @@ pub fn map_hull(shell: &Shell, face: &HullFace, eye: DVec3, ray: Vec3) -> [f32; 
     let areas = [of([b, c]), of([c, a]), of([a, b])];
     let sum = areas[0] + areas[1] + areas[2];
     let shares = areas.map(|area| if sum > 0.0 { (area / sum) as f32 } else { 1.0 / 3.0 });
-    let uv: Vec2 = face.points.iter().zip(shares).map(|(&point, share)| shell.uv(face, point) * share).sum();
+    let uv: Vec2 = uv.into_iter().zip(shares).map(|(uv, share)| uv * share).sum();
     [uv.x, uv.y, t as f32]
 }

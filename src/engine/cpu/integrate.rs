@@ -19,6 +19,7 @@ use crate::light::scatter::media::{Media, MultipleMedium, kinds};
 use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
 use crate::light::{AngleFrame, Light, Reflection, Visibility};
+use crate::mapping::shell::Inside;
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
@@ -56,6 +57,8 @@ pub struct Integrator<'a> {
     shell_shadows: Option<Arc<ShellShadows>>,
     /// Whether V is kept at the vertices of each shell.
     kept_in: Vec<bool>,
+    /// Places of the eye inside the shells.
+    eyes: Vec<Option<Inside>>,
     medium: Medium,
     strand: Option<StrandShading>,
     media: Option<Media>,
@@ -320,6 +323,7 @@ impl<'a> Integrator<'a> {
                 .iter()
                 .map(|shell| is_kept_in(shell, volumes[shell.volume as usize].size))
                 .collect(),
+            eyes: scene.shells.iter().map(|shell| scene.eye_inside(shell)).collect(),
             medium: Medium::of(&scene.trace),
             strand: match &scene.reflection {
                 Reflection::Strand(params) => Some(StrandShading::new(params)),

@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::gbuffer::{Gbuffer, band_rows, pixel_bytes, shade_pools};
 use crate::light::environment::Environment;
+use crate::mapping::shell::Shell;
 use crate::picture::Image;
 use crate::picture::camera::sample_offset;
 use crate::place::Mesh;
@@ -152,6 +153,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
     let Parts {
         name: _,
         recipes: _,
+        boxes: _,
         // The waves of pools are drawn anew.
         wave_flow: _,
         quads,
@@ -197,7 +199,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         && trace.layers == b.trace.layers
         && *quads == b.quads
         && shells.len() == b.shells.len()
-        && shells.iter().zip(&b.shells).all(|(a, b)| Arc::ptr_eq(a, b))
+        && shells.iter().zip(&b.shells).all(|(a, b)| Shell::is_same(a, b))
         && *lights == b.lights
         && *ambient == b.ambient
         && *background == b.background

@@ -64,7 +64,7 @@ impl ShellInputs {
         self.levels.len() == other.levels.len()
             && self.levels.iter().zip(&other.levels).all(|(a, b)| Arc::ptr_eq(a, b))
             && self.shells.len() == other.shells.len()
-            && self.shells.iter().zip(&other.shells).all(|(a, b)| Arc::ptr_eq(a, b))
+            && self.shells.iter().zip(&other.shells).all(|(a, b)| Shell::is_same(a, b))
             && self.lights == other.lights
             && self.volumes == other.volumes
             && self.max_cells == other.max_cells

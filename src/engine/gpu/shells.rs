@@ -17,7 +17,7 @@ use super::specialise::Source;
 use super::timing::Timer;
 use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
-use crate::mapping::shell::Shell;
+use crate::mapping::shell::{Inside, Shell};
 use crate::place::ShellShadows;
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells};
@@ -37,8 +37,11 @@ pub const PRISM: u32 = 4;
 /// See [`SHELL_TABLE`].
 pub const TANGENTS: u32 = 4;
 
-/// Bit of a header's word that tells whether a shell has a skin; the others are the volume's number.
+/// Bits of a header's word that tell whether a shell has a skin, and whether it shows its volume once; the
+/// others are the volume's number. Twins: `skin` and `is_single` of `shaders/mapping/shell.wgsl`.
 const SKIN: u32 = 1 << 31;
+/// See [`SKIN`].
+const SINGLE: u32 = 1 << 30;
 
 /// Values of V in the first submission. The size of later ones follows the measured time, as for tiles.
 const FIRST_VALUES: u32 = 1 << 10;
@@ -60,6 +63,8 @@ pub struct ResidentShells(Option<(Table, wgpu::TextureView)>);
 #[derive(Clone, Default)]
 struct Table {
     shells: Vec<Arc<Shell>>,
+    /// Places of the eye inside the shells.
+    eyes: Vec<Option<Inside>>,
     /// Number of quads, in front of the faces of hulls.
     quads: u32,
     /// Layers between which V is interpolated in each shell; 0 where rays walk to the lights.
@@ -111,12 +116,15 @@ impl Table {
             let own = 2 * lights * shell.vertices() as u64;
             shadows.push(shadows[shadows.len() - 1].saturating_add(own.try_into().unwrap_or(u32::MAX)));
         }
-        Ok(Table { shells: scene.shells.clone(), quads: scene.quads.len() as u32, layers, firsts, shadows })
+        let eyes = scene.shells.iter().map(|shell| scene.eye_inside(shell)).collect();
+        let (shells, quads) = (scene.shells.clone(), scene.quads.len() as u32);
+        Ok(Table { shells, eyes, quads, layers, firsts, shadows })
     }
 
+    /// Whether both hold the same, wherever the eye is.
     fn is(&self, other: &Table) -> bool {
         self.shells.len() == other.shells.len()
-            && self.shells.iter().zip(&other.shells).all(|(a, b)| Arc::ptr_eq(a, b))
+            && self.shells.iter().zip(&other.shells).all(|(a, b)| Shell::is_same(a, b))
             && (self.quads, &self.layers) == (other.quads, &other.layers)
             && (&self.firsts, &self.shadows) == (&other.firsts, &other.shadows)
     }
@@ -143,14 +151,15 @@ impl Table {
             let tangents = points + shell.points.len() as u32;
             let prisms = tangents + shell.tangents.len() as u32 * TANGENTS;
             let hull = prisms + shell.prisms.len() as u32 * PRISM;
-            let volume = shell.volume | if shell.skin { SKIN } else { 0 };
+            let volume =
+                shell.volume | if shell.skin { SKIN } else { 0 } | if shell.is_single { SINGLE } else { 0 };
             out.push([points, prisms, hull, face]);
             out.push([volume, self.firsts[i], self.layers[i], shell.vertices() as u32]);
             out.push([self.shadows[i], 0, 0, 0]);
             face += shell.hull.len() as u32;
             points = hull + shell.hull.len() as u32;
         }
-        for shell in &self.shells {
+        for (shell, eye) in self.shells.iter().zip(&self.eyes) {
             out.extend(shell.points.iter().enumerate().map(|(i, point)| {
                 let [x, y, z] = point.to_array().map(f32::to_bits);
                 [x, y, z, shell.corner_of(i / 2)]
@@ -169,9 +178,15 @@ impl Table {
                 let [a, b, c] = prism.tangents;
                 out.push([a, b, c, 0]);
             }
-            out.extend(shell.hull.iter().map(|face| {
-                let [a, b, c] = face.points;
-                [4 * face.prism + face.tetrahedron, a, b, c]
+            out.extend(shell.hull.iter().map(|face| match (face.is_eye(), eye) {
+                (true, Some(Inside { tetrahedron: [prism, own], point })) => {
+                    let [x, y, z] = point.to_array().map(f32::to_bits);
+                    [4 * (4 * *prism as u32 + *own as u32) + face.tetrahedron, x, y, z]
+                }
+                _ => {
+                    let [a, b, c] = face.points;
+                    [4 * face.prism + face.tetrahedron, a, b, c]
+                }
             }));
         }
         out.resize(count.next_multiple_of(SHELL_ROW as usize), [0; 4]);
@@ -192,7 +207,7 @@ impl ResidentShells {
         faces: &[HullFace],
     ) -> Result<UploadedShells> {
         let table = Table::new(gpu, scene, volumes)?;
-        self.0.take_if(|(known, _)| !known.is(&table));
+        self.0.take_if(|(known, _)| !known.is(&table) || known.eyes != table.eyes);
         let texels = match &self.0 {
             Some((_, view)) => view.clone(),
             None => {
@@ -212,19 +227,14 @@ impl ResidentShells {
 
 /// Returns the faces of hulls that face the eye, numbered after the quads, shell by shell.
 pub fn seen_faces(scene: &Scene) -> Vec<HullFace> {
-    let eye = scene.camera.eye_local();
     let mut first = scene.quads.len() as u32;
     let mut out = Vec::new();
     for shell in &scene.shells {
+        let corners_of = scene.seen_hull(shell);
         let seen = shell.hull.par_iter().enumerate().filter_map(|(i, face)| {
-            let corners = shell.corners(face);
-            let [a, b, c] = corners.map(|p| p.as_dvec3());
-            let is_seen = (b - a).cross(c - a).dot(a - eye) < 0.0;
-            is_seen.then(|| {
-                let [a, b, c] = corners.map(|p: Vec3| p.to_array());
-                let [uv_a, uv_b, uv_c] = face.points.map(|point| shell.uv(face, point).to_array());
-                HullFace { a, number: first + i as u32, b, u_a: uv_a[0], c, v_a: uv_a[1], uv_b, uv_c }
-            })
+            let [a, b, c] = corners_of(face)?.map(|p: Vec3| p.to_array());
+            let [uv_a, uv_b, uv_c] = scene.hull_corners(shell, face).1.map(|uv| uv.to_array());
+            Some(HullFace { a, number: first + i as u32, b, u_a: uv_a[0], c, v_a: uv_a[1], uv_b, uv_c })
         });
         out.par_extend(seen);
         first += shell.hull.len() as u32;

@@ -107,16 +107,37 @@ impl Shell {
                 Side::Inward => [places[v], places[v] - away],
             });
         }
+        Shell::between(points, &kept, uv)
+    }
+
+    /// Builds the shell between the outer and inner points of each vertex. `kept` are the triangles, as
+    /// numbers of vertices and of texture coordinates, counter-clockwise as seen from outside.
+    ///
+    /// # Errors
+    /// [`ShellFault::Unmapped`] where no triangle has an area in the texture.
+    pub(super) fn between(
+        points: Vec<Vec3>,
+        kept: &[([u32; 3], [u32; 3])],
+        uv: &[Vec2],
+    ) -> Result<Shell, ShellFault> {
         let mut prisms: Vec<Prism> = kept.iter().map(|&(welded, own)| prism(welded, own, uv)).collect();
-        let mut corner_of = vec![0; count];
+        let mut corner_of = vec![0; points.len() / 2];
         for (i, prism) in prisms.iter().enumerate() {
             for (k, &vertex) in prism.vertices.iter().enumerate() {
                 corner_of[vertex as usize] = (4 * i + k) as u32;
             }
         }
         let tangents = tangents::average(&points, &mut prisms);
-        let mut shell =
-            Shell { points, prisms, hull: Vec::new(), tangents, corner_of, volume: 0, skin: false };
+        let mut shell = Shell {
+            points,
+            prisms,
+            hull: Vec::new(),
+            tangents,
+            corner_of,
+            volume: 0,
+            skin: false,
+            is_single: false,
+        };
         for i in 0..shell.prisms.len() {
             let volume = |k: usize| {
                 shell.jacobian(i, k).map_or(0.0, |[x, y, z]| Mat3::from_cols(x, y, z).determinant().abs())

@@ -15,12 +15,14 @@
 //!   positions. The shell has no crack there; the walk goes on with the other coordinates.
 //! - **Borders.** An edge of one triangle, or of more than two, is an end of the shell.
 
+mod block;
 mod build;
 mod path;
 mod tangents;
 
 use glam::{Vec2, Vec3};
 
+pub use block::Inside;
 pub use build::{ShellFault, Side, SurfaceMesh};
 pub use path::{End, INWARDS, LanePaths, LaneSegments, MOST_FACES, Segment, ShellPath};
 pub use tangents::Tangents;
@@ -42,6 +44,9 @@ pub struct Shell {
     pub volume: u32,
     /// Whether opaque matter lies behind the inner surface, so that no light comes from there.
     pub skin: bool,
+    /// Whether the shell is a box that shows the volume once ([`Shell::block`]): what is looked up near one
+    /// end of the volume does not go on at the other, and the eye may be inside.
+    pub is_single: bool,
 }
 
 /// A prism between the two surfaces.
@@ -86,6 +91,10 @@ pub const MAX_PRISMS: usize = 1 << 28;
 /// another it would be too coarse, and rays walk to the light.
 const MOST_EDGE: f32 = 16.0;
 
+/// Number in place of a tetrahedron's in [`HullFace::EYE`]. Twin: `EYE_FACE` of
+/// `shaders/mapping/shell.wgsl`.
+pub const EYE_FACE: u32 = 3;
+
 /// Edges of a prism, as positions of their ends among its vertices.
 pub const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
 
@@ -116,10 +125,22 @@ const AT_SIDES: [[usize; 2]; 3] = [[1, 2], [0, 1], [0, 2]];
 pub struct HullFace {
     /// Prism that it belongs to.
     pub prism: u32,
-    /// Its tetrahedron in the prism, 0 to 2.
+    /// Its tetrahedron in the prism, 0 to 2; or [`EYE_FACE`].
     pub tetrahedron: u32,
     /// Numbers of its points, counter-clockwise as seen from outside.
     pub points: [u32; 3],
+}
+
+impl HullFace {
+    /// The last face of a box, which stands for the place of an eye inside it. It has no area; the raster
+    /// pass draws it over the whole view where the eye is inside.
+    pub const EYE: HullFace = HullFace { prism: 0, tetrahedron: EYE_FACE, points: [0; 3] };
+
+    /// Whether the face stands for the place of the eye.
+    #[inline]
+    pub fn is_eye(&self) -> bool {
+        self.tetrahedron == EYE_FACE
+    }
 }
 
 impl Shell {

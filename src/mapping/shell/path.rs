@@ -46,6 +46,17 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// The part of the segment behind the parameter `t`, if it lies inside the segment.
+    pub fn from(&self, t: f32) -> Segment {
+        let [t_in, t_out] = self.t;
+        if t <= t_in || t > t_out {
+            return *self;
+        }
+        let share = ((t - t_in) / (t_out - t_in)).clamp(0.0, 1.0);
+        let part = |[from, to]: [Vec3; 2]| [from.lerp(to, share), to];
+        Segment { t: [t, t_out], at: part(self.at), shares: part(self.shares), ..*self }
+    }
+
     /// The part of the segment before the parameter `t`.
     pub fn until(&self, t: f32) -> Segment {
         let [t_in, t_out] = self.t;

@@ -154,7 +154,7 @@ impl OnShells {
     fn is_of(&self, mesh: &Mesh, shells: &[Arc<Shell>]) -> bool {
         Arc::ptr_eq(&self.vertices, &mesh.vertices)
             && self.shells.len() == shells.len()
-            && self.shells.iter().zip(shells).all(|(a, b)| Arc::ptr_eq(a, b))
+            && self.shells.iter().zip(shells).all(|(a, b)| Shell::is_same(a, b))
     }
 }
 

@@ -6,6 +6,7 @@
 //! A `*` in a key stands for a name that the scene chooses, or for the number of a quad or track. The words
 //! of a choice stand at its enum (see `src/util/words.rs`).
 
+mod boxes;
 mod light;
 mod meshes;
 mod picture;
@@ -112,7 +113,7 @@ pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
 /// Parameters that no scene has of itself, besides lists.
-const OPTIONAL: [&str; 2] = [meshes::COLOR, meshes::MATERIAL];
+const OPTIONAL: [&str; 4] = [boxes::POSITION, boxes::SIZE, meshes::COLOR, meshes::MATERIAL];
 /// Longest line of text in docs/parameters.md, characters.
 const COLUMNS: usize = 110;
 
@@ -130,6 +131,7 @@ pub const GROUPS: &[Group] = &[
     splash::SPLASHES,
     trace::MATERIALS_AND_QUADS,
     meshes::MESHES,
+    boxes::BOXES,
     trace::TRACE,
     light::LIGHT,
     light::STRAND,

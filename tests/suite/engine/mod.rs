@@ -1,5 +1,6 @@
 //! The engines: parity between them, and the code that they share.
 
+pub mod boxes;
 pub mod device_limits;
 pub mod every_preset;
 pub mod exposure;

@@ -244,6 +244,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(constant("SINE_SHARE"), taki::light::strand::table::SINE_SHARE as f64);
     assert_eq!(constant("MOST_FACES"), f64::from(taki::mapping::shell::MOST_FACES));
     assert_eq!(constant("INWARDS") as f32, taki::mapping::shell::INWARDS);
+    assert_eq!(constant("EYE_FACE"), f64::from(taki::mapping::shell::EYE_FACE));
     assert_eq!(1u32 << constant("SHELL_ROW") as u32, shells::SHELL_ROW);
     let ours = [shells::SHELL_TABLE, shells::SHELL_HEADER, shells::PRISM].map(f64::from);
     assert_eq!(["SHELL_TABLE", "SHELL_HEADER", "PRISM"].map(constant), ours);

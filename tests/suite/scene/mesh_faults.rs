@@ -131,7 +131,7 @@ fn names_with_the_same_underscores_are_told_apart_by_quotes() {
         let becomes = words(&scene).into_iter().find(|(name, _)| *name == part.material).unwrap().1;
         assert_eq!(becomes, "opaque", "{key}");
     }
-    let text = both.mesh_comments();
+    let text = both.comments();
     for line in ["material a b (key \"a b\"):", "material a.b (key \"a.b\"):", "material c d (key \"c.d\"):"]
     {
         assert!(text.contains(line), "{text}");

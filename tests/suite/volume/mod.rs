@@ -5,6 +5,7 @@ pub mod bricks;
 pub mod cell;
 pub mod file;
 pub mod leaps;
+pub mod measured;
 pub mod pyramid;
 pub mod structure;
 

@@ -70,16 +70,14 @@ impl<'a> Projection<'a> {
     /// Returns the triangles of the hulls of shells that face the eye, in pieces. Faces are numbered after
     /// the quads, shell by shell.
     pub fn hulls(&self) -> Vec<Piece> {
-        let eye = self.scene.camera.eye_local();
         let mut first = self.scene.quads.len() as u32;
         let mut pieces = Vec::new();
         for shell in &self.scene.shells {
+            let seen = self.scene.seen_hull(shell);
             let piece = |(part, faces): (usize, &[HullFace])| {
                 let mut out = Piece::default();
                 for (i, face) in (part * HULL_PART..).zip(faces) {
-                    let corners = shell.corners(face);
-                    let [a, b, c] = corners.map(|p| p.as_dvec3());
-                    if (b - a).cross(c - a).dot(a - eye) < 0.0 {
+                    if let Some(corners) = seen(face) {
                         let points = corners.map(|corner| self.point(corner, Vec2::ZERO, &mut out));
                         self.triangle(points, &mut out);
                         out.set_face(first + i as u32);

@@ -310,8 +310,8 @@ impl<'a> Shading<'a> {
                 out.surface[k] = match self.scene.face(number as usize) {
                     Face::Quad(quad) => map_quad(quad, &self.planes[number as usize], at, length),
                     Face::Hull(shell, face) => {
-                        let shell = &self.scene.shells[shell];
-                        map_hull(shell, face, self.eye_local, forward + right * at.x + up * at.y)
+                        let corners = self.scene.hull_corners(&self.scene.shells[shell], face);
+                        map_hull(corners, self.eye_local, forward + right * at.x + up * at.y)
                     }
                 };
             }

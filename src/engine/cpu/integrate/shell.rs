@@ -25,6 +25,20 @@ pub struct Hull<'a> {
     pub opaque: f32,
 }
 
+/// Start of a ray in a shell.
+pub(super) struct ShellStart<'a> {
+    /// Path, if the ray has one.
+    pub path: Option<ShellPath<'a>>,
+    /// Origin of the path, and its distance from the eye, metres.
+    pub origin: Vec3,
+    pub metres: f32,
+    /// Distance of the opaque scene from the origin, metres.
+    pub t_end: f32,
+    /// Parameter where the ray begins, metres: that of the eye inside a box. Other rays begin with their
+    /// path.
+    pub t_begin: f32,
+}
+
 /// A place in a tetrahedron of a shell.
 pub(super) struct Place {
     /// Number of the shell.
@@ -87,31 +101,40 @@ impl Integrator<'_> {
     ) -> RayResult {
         let scene = self.scene;
         let shell = &*scene.shells[hull.shell];
-        let (origin, t_end) = self.shell_start(hull, d);
+        let ShellStart { path, origin, metres, t_end, t_begin } = self.shell_start(hull, d);
         let mut ray = ShellRay {
             number: hull.shell,
             shell,
             origin,
-            metres: hull.metres,
+            metres,
             d,
             transmittance: order.before,
             radiance: [Vec3::ZERO; 2],
             cells: [0; 2],
         };
-        for segment in ShellPath::new(shell, hull.face, origin, d) {
+        for segment in path.into_iter().flatten() {
             if segment.t[0] >= t_end || ray.transmittance < scene.trace.early_end {
                 break;
             }
-            self.through(&mut ray, &segment.until(t_end), observer);
+            self.through(&mut ray, &segment.from(t_begin).until(t_end), observer);
         }
         self.left_shell(order, ray.transmittance, ray.radiance, ray.cells)
     }
 
-    /// Origin of the path of a ray in the direction `d` from a hull's face on, and the distance of the opaque
-    /// scene from it, metres.
-    pub(super) fn shell_start(&self, hull: &Hull, d: Vec3) -> (Vec3, f32) {
-        let origin = (self.scene.camera.eye_local() + d.as_dvec3() * f64::from(hull.metres)).as_vec3();
-        (origin, if hull.opaque > 0.0 { hull.opaque - hull.metres } else { f32::INFINITY })
+    /// Start of a ray in the direction `d` from a hull's face on, or from the eye inside a box.
+    pub(super) fn shell_start(&self, hull: &Hull, d: Vec3) -> ShellStart<'_> {
+        let shell = &*self.scene.shells[hull.shell];
+        let end = |metres: f32| if hull.opaque > 0.0 { hull.opaque - metres } else { f32::INFINITY };
+        if hull.face.is_eye() {
+            let path =
+                self.eyes[hull.shell].and_then(|eye| ShellPath::inside(shell, eye.tetrahedron, eye.point, d));
+            let origin = self.eyes[hull.shell].map_or(Vec3::ZERO, |eye| eye.point);
+            return ShellStart { path, origin, metres: 0.0, t_end: end(0.0), t_begin: 0.0 };
+        }
+        let metres = hull.metres;
+        let origin = (self.scene.camera.eye_local() + d.as_dvec3() * f64::from(metres)).as_vec3();
+        let path = Some(ShellPath::new(shell, hull.face, origin, d));
+        ShellStart { path, origin, metres, t_end: end(metres), t_begin: f32::NEG_INFINITY }
     }
 
     /// Result of a ray behind a shell. `radiance` is what cells of the volume itself, and coarser ones, have
@@ -176,7 +199,13 @@ impl Integrator<'_> {
             let Some(crossing) = walk.next() else { break };
             ray.cells[0] += 1;
             let sample = match scene.trace.lookup {
-                Lookup::Trilinear => level.sample_trilinear(&crossing, origin, d_cell, &SheetDensity::WHOLE),
+                Lookup::Trilinear => level.sample_trilinear(
+                    &crossing,
+                    origin,
+                    d_cell,
+                    &SheetDensity::WHOLE,
+                    ray.shell.is_single,
+                ),
                 Lookup::Nearest => level.sample_cell(cell, &SheetDensity::WHOLE),
             };
             observer.enter(&crossing, cell, sample.rho / 65535.0, ray.transmittance);

@@ -79,7 +79,7 @@ impl Integrator<'_> {
             let Some(crossing) = walk.next() else { break };
             walked[0] += 1;
             let CellSample { rho, k: [k_d, k_s], moments } = match scene.trace.lookup {
-                Lookup::Trilinear => level.sample_trilinear(&crossing, origin, d_cell, matter),
+                Lookup::Trilinear => level.sample_trilinear(&crossing, origin, d_cell, matter, false),
                 Lookup::Nearest => level.sample_cell(cell, matter),
             };
             observer.enter(&crossing, cell, rho / 65535.0, transmittance);

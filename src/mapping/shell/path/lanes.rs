@@ -55,6 +55,25 @@ pub struct LaneSegments {
 }
 
 impl LaneSegments {
+    /// Keeps the parts of the segments behind the parameters `least`, where these lie inside. Twin:
+    /// [`Segment::from`](super::Segment::from).
+    #[inline(always)]
+    pub fn begin_at<S: Simd>(&mut self, simd: S, least: Floats<S>) {
+        let [t_in, t_out] = [self.t[0].load(simd), self.t[1].load(simd)];
+        let begins = least.simd_gt(t_in) & least.simd_le(t_out);
+        if !begins.any_true() {
+            return;
+        }
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let share = ((least - t_in) / (t_out - t_in)).max(zero).min(one);
+        for begins_of in [&mut self.at, &mut self.shares] {
+            let [from, to] = [begins_of[0].load(simd), begins_of[1].load(simd)];
+            let part = from.times(one - share).plus(to.times(share));
+            begins_of[0].store(part.or(begins, from));
+        }
+        self.t[0].store(begins.select(least, t_in));
+    }
+
     /// Keeps the parts of the segments before the parameters `most`.
     #[inline(always)]
     pub fn end_at<S: Simd>(&mut self, simd: S, most: Floats<S>) {

@@ -15,7 +15,7 @@ use super::walk::{LaneUnits, Units, Walk};
 use crate::engine::cpu::integrate::shell::{Hull, Place};
 use crate::engine::cpu::integrate::{Integrator, RayResult, SheetOrder};
 use crate::light::AngleFrame;
-use crate::mapping::shell::{LanePaths, LaneSegments, ShellPath};
+use crate::mapping::shell::{LanePaths, LaneSegments};
 use crate::trace::lookup::Level;
 use crate::trace::{Lookup, Prefilter};
 use crate::util::lane_powers::{exp2, log2};
@@ -72,8 +72,9 @@ struct Rays {
     /// Origin of the path, and its distance from the eye, metres.
     origin: Stored3,
     metres: Stored,
-    /// Distance of the opaque scene from the path's origin, metres.
+    /// Distance of the opaque scene from the path's origin, and parameter where the ray begins, metres.
     t_end: Stored,
+    t_begin: Stored,
     transmittance: Stored,
     /// Cells walked.
     cells: [i32; LANES],
@@ -146,6 +147,7 @@ impl<'a> ShellLanes<'a> {
             let goes_on = self.paths.next(simd, on_way, &mut self.segments);
             let (enters, walks) = self.enter(ground.integrator, on_way, hits);
             if walks != 0 {
+                self.segments.begin_at(simd, self.rays.t_begin.load(simd));
                 self.segments.end_at(simd, self.rays.t_end.load(simd));
                 self.through(simd, ground, walks, hits);
             }
@@ -172,19 +174,19 @@ impl<'a> ShellLanes<'a> {
     ) -> bool {
         while let Some(hit) = hits.get(*next) {
             let shell = &*integrator.scene.shells[hit.hull.shell];
-            let (origin, t_end) = integrator.shell_start(&hit.hull, hit.d);
-            let path = ShellPath::new(shell, hit.hull.face, origin, hit.d);
+            let start = integrator.shell_start(&hit.hull, hit.d);
             self.hits[lane] = *next;
             *next += 1;
-            if !self.paths.start(lane, &path) {
+            if !start.path.is_some_and(|path| self.paths.start(lane, &path)) {
                 continue;
             }
             let volume = integrator.volume_of(shell);
             let rays = &mut self.rays;
             rays.d.set(lane, hit.d);
-            rays.origin.set(lane, origin);
-            rays.metres.0[lane] = hit.hull.metres;
-            rays.t_end.0[lane] = t_end;
+            rays.origin.set(lane, start.origin);
+            rays.metres.0[lane] = start.metres;
+            rays.t_end.0[lane] = start.t_end;
+            rays.t_begin.0[lane] = start.t_begin;
             rays.transmittance.0[lane] = hit.order.before;
             rays.cells[lane] = 0;
             rays.n.set(lane, Vec3::from_array(volume.size.map(|n| n as f32)));

@@ -1,0 +1,140 @@
+//! §2 Volumes measured in simulations: density and velocity of grids become ρ, v and k of cells.
+//!
+//! The texture's axes are those of the grid's index, so nothing is turned: rotation and shear of the grid's
+//! transform are those of the box in which the volume stands. A voxel is a box around its sample. Where there
+//! are fewer cells than voxels, each cell takes the share of every voxel that overlaps it, so ∫ρ stays.
+//!
+//! | element | value |
+//! |---|---|
+//! | ρ | `rho_scale` × density, or 1 − e^(−`rho_scale` × density × edge of a cell) |
+//! | v | mean velocity, weighted by the density, in the axes of the cells |
+//! | k_d, k_s | even, or between two values by speed, vorticity or another grid, weighted by the density |
+//!
+//! The cells hold ρ/α in 65535ths, where α is the largest ρ. So ρ is exact to α/131070, and a cell with less
+//! is empty. v is in the units of the cell that its direction needs: J·v is parallel to the velocity, whatever
+//! the shape of the voxels.
+
+mod build;
+mod field;
+mod find;
+mod overlap;
+
+use std::path::PathBuf;
+
+use glam::{DAffine3, DMat3, DVec3};
+
+pub use build::{Measured, build_measured};
+pub use find::{Wanted, find_measured};
+
+use crate::grid::Bounds;
+use crate::util::words::words;
+
+/// How ρ follows from the density.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RhoRule {
+    /// In proportion.
+    #[default]
+    Linear,
+    /// Share of light that an edge of a cell takes: 1 − e^(−κ·density·edge).
+    Opacity,
+}
+
+words! { RhoRule { Linear => "linear", Opacity => "opacity" } }
+
+/// Place of the velocity's samples among the voxels of the density.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VelocityAt {
+    /// On the lower faces if the file says that the grid is staggered, and at the centres otherwise.
+    #[default]
+    Auto,
+    /// At the centres of voxels.
+    Centre,
+    /// At the lower corners of voxels.
+    Node,
+    /// Each component in the middle of the lower face across its axis.
+    Staggered,
+}
+
+words! { VelocityAt { Auto => "auto", Centre => "centre", Node => "node", Staggered => "staggered" } }
+
+/// What k_d and k_s follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ReflectBy {
+    /// Nothing: all cells have the same.
+    #[default]
+    Even,
+    /// Speed.
+    Speed,
+    /// Length of the curl of the velocity.
+    Vorticity,
+    /// A grid of its own, such as foam or age.
+    Grid,
+}
+
+words! { ReflectBy { Even => "even", Speed => "speed", Vorticity => "vorticity", Grid => "grid" } }
+
+/// Names of the grids that hold the velocity.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum VelocityNames {
+    /// No velocity.
+    #[default]
+    None,
+    /// One grid of vectors.
+    Vector(String),
+    /// A grid for each component.
+    Components([String; 3]),
+}
+
+/// Recipe of a measured volume. Its grids were found in the file, but not read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredSpec {
+    /// File of the grids.
+    pub path: PathBuf,
+    /// Name of the density's grid.
+    pub density: String,
+    /// Names of the velocity's grids.
+    pub velocity: VelocityNames,
+    /// Name of the grid that k follows, with [`ReflectBy::Grid`].
+    pub second: Option<String>,
+    /// Voxels that the volume covers.
+    pub bounds: Bounds,
+    /// Transform from a voxel's index to its centre in the world, metres.
+    pub to_world: DAffine3,
+    /// Number of cells along x, y and z.
+    pub size: [u32; 3],
+    /// How ρ follows from the density.
+    pub rho: RhoRule,
+    /// ρ per density; with [`RhoRule::Opacity`], extinction per density, 1/m.
+    pub rho_scale: f32,
+    /// Place of the velocity's samples.
+    pub velocity_at: VelocityAt,
+    /// What k follows.
+    pub reflect: ReflectBy,
+    /// Values of that between which k changes.
+    pub reflect_range: [f32; 2],
+    /// k_d and k_s at the lower value, or everywhere, and at the upper value.
+    pub k: [[f32; 2]; 2],
+    /// Factor on ρ.
+    pub alpha: f32,
+}
+
+impl MeasuredSpec {
+    /// Transform from texture coordinates, 0 to 1 along each axis, to the world, metres. A voxel reaches half
+    /// an index to either side of its sample.
+    pub fn world_from_texture(&self) -> DAffine3 {
+        let low = DVec3::from_array(self.bounds.min.map(f64::from)) - 0.5;
+        let voxels = DVec3::from_array(self.bounds.size().map(|n| n as f64));
+        self.to_world * DAffine3::from_translation(low) * DAffine3::from_scale(voxels)
+    }
+
+    /// Metres of the world per cell along x, y and z, as columns.
+    fn world_from_cell(&self) -> DMat3 {
+        let cells = DVec3::from_array(self.size.map(f64::from));
+        self.world_from_texture().matrix3 * DMat3::from_diagonal(1.0 / cells)
+    }
+
+    /// Edge of the cube with the volume of a cell, metres.
+    fn edge(&self) -> f64 {
+        self.world_from_cell().determinant().abs().cbrt()
+    }
+}
