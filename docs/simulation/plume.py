@@ -86,4 +86,4 @@ if out.endswith(".vdb"):
         grid.transform = openvdb.createLinearTransform(voxelSize=voxel)
     openvdb.write(out, grids=[smoke, flow])
 else:
-    np.savez(out, density=density, velocity=velocity)
+    np.savez(out, density=density, velocity=velocity, origin=np.zeros(3), voxel=voxel)

@@ -36,7 +36,7 @@ enum Source {
     File {
         path: PathBuf,
         /// Recipe of a measured volume.
-        measured: Option<MeasuredSpec>,
+        measured: Option<Box<MeasuredSpec>>,
         storage: StorageChoice,
         /// Modification time and size in bytes, to notice changes.
         modified: Option<SystemTime>,
@@ -122,7 +122,7 @@ impl Source {
                 let meta = std::fs::metadata(path).ok();
                 Source::File {
                     path: path.clone(),
-                    measured: measured.clone(),
+                    measured: measured.clone().map(Box::new),
                     storage: *asked_storage,
                     modified: meta.as_ref().and_then(|m| m.modified().ok()),
                     bytes: meta.map_or(0, |m| m.len()),

@@ -15,7 +15,7 @@ use crate::trace::AttenuationKind;
 use crate::util::error::{Error, Result};
 use crate::volume::VelocityNames;
 
-/// Cells between the corners where V is kept, along x and y. With 16, the limit of shells, shadows of smoke
+/// Cells between the corners where V and shadows are kept, along x and y. With 16, the limit of shells, shadows of smoke
 /// are visibly coarse; with 4, V takes four times as much memory and the paths of rays have twice as many
 /// tetrahedra.
 const CELLS_A_SQUARE: u32 = 8;
@@ -197,11 +197,13 @@ pub(super) fn shells(
     recipes: &[Recipe],
 ) -> Result<Vec<Arc<Shell>>> {
     let is_kept = v.choice("light.visibility", Visibility::from_word) == Visibility::Cached;
+    // Shadows of opaque matter are kept at the corners too.
+    let is_cut = is_kept || ["rocks", "meshes"].iter().any(|section| !v.names(section).is_empty());
     let shell = |own: &SceneBox| {
         let recipe = &recipes[own.volume as usize];
         let [nx, ny, _] = recipe.water.size;
         // Nobody knows the size of a volume file before it is read.
-        let squares = match is_kept && recipe.knows_size() {
+        let squares = match is_cut && recipe.knows_size() {
             true => [nx, ny].map(|n| n.div_ceil(CELLS_A_SQUARE)),
             false => [1, 1],
         };

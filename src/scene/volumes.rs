@@ -45,7 +45,7 @@ impl Recipe {
     /// Reads the recipe of the volume `name`. Its storage is not chosen yet.
     fn new(v: &Values, name: &str, folder: Option<&Path>, limits: &Limits) -> Result<Recipe> {
         let mut water = build::water(v, name);
-        let measured = measured::measured(v, name, folder, limits)?;
+        let measured = measured::measured(v, name, folder, limits).map_err(|e| of_volume(name, e))?;
         if let Some(measured) = &measured {
             water.size = measured.size;
         }

@@ -1,8 +1,8 @@
 //! Boxes: shells that a volume fills once, without a mesh under them.
 //!
 //! The box is a parallelepiped. Its face z = 0 is the outer surface of a shell of even squares, and all that
-//! walks shells walks it too. An eye may stand inside: then no face of the hull is seen from outside, and rays
-//! begin at the eye, in the tetrahedron that holds it.
+//! walks shells walks it too. An eye may stand inside: then it sees no face of the hull from outside, and
+//! rays begin at the eye, in the tetrahedron that holds it.
 
 use std::sync::Arc;
 

@@ -11,8 +11,8 @@ pub(super) const SIZE: &str = "boxes.*.size";
 
 pub(super) const BOXES: Group = Group {
     title: "Boxes",
-    about: "A box is a body that one volume fills once: smoke, spray, or water measured in a simulation. Rays \
-         enter through any of its six faces, and the eye may be inside. A box around a volume with \
+    about: "A box is a body that one volume fills once: smoke, spray, or water measured in a simulation. \
+         Rays enter through any of its six faces, and the eye may be inside. A box around a volume with \
          `volumes.*.builder=flow` has the place and the size that its file says.",
     params: &[
         p("boxes.*.volume", "", "", Text("water"), Upload)

@@ -189,19 +189,17 @@ pub(super) const VOLUME: Group = Group {
             .when("Raise it for sparkle from cell to cell; lower it for even water."),
         p("volume.file", "", "", Text(""), Volume)
             .doc("Path of an .npz file that holds the volume texture. Without one the volume is built.")
-            .when(
-                "Set it to render cells of your own; `taki volume build` writes an example of the format.",
-            ),
+            .when("Set it to render cells of your own; `taki volume build` writes an example of the format."),
         p("volume.builder", "", "", Choice(Builder::WORDS), Volume)
             .doc(
-                "What the cells are made of: spatial fractal curves as in the paper (`curves`), or the grids of \
-                 a simulation in `volume.source` (`flow`).",
+                "What the cells are made of: spatial fractal curves as in the paper (`curves`), or the \
+                 grids of a simulation in `volume.source` (`flow`).",
             )
             .when("Choose `flow` for smoke or water that another program computed, and show it in a box."),
         p("volume.source", "", "", Text(""), Volume)
             .doc(
-                "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz). Like \
-                 all paths of a scene, it lies in the folder of the scene.",
+                "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz). \
+                 Like all paths of a scene, it lies in the folder of the scene.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),
         p("volume.grid", "", "", Text("density"), Volume)
@@ -217,23 +215,23 @@ pub(super) const VOLUME: Group = Group {
             .when("Name it if the file has another name for it."),
         p("volume.velocity_at", "", "", Choice(VelocityAt::WORDS), Volume)
             .doc(
-                "Place of the velocity's samples: at the centres of voxels (`centre`), at their lower corners \
-                 (`node`), or each component on the lower face across its axis (`staggered`). `auto` is \
-                 `staggered` if the file says so, and `centre` otherwise.",
+                "Place of the velocity's samples: at the centres of voxels (`centre`), at their lower \
+                 corners (`node`), or each component on the lower face across its axis (`staggered`). \
+                 `auto` is `staggered` if the file says so, and `centre` otherwise.",
             )
             .when("Choose one if the file does not say it; a wrong one moves the flow by half a voxel."),
         p("volume.cells", "", "cells", Int(0, 4096, 0), Volume)
             .slider(0.0, 512.0)
             .doc(
-                "Number of cells along the longest side of a volume with `volume.builder=flow`; the other sides \
-                 follow. 0 makes one cell of each voxel. Cells take the shares of the voxels that overlap \
-                 them, so the amount of matter stays.",
+                "Number of cells along the longest side of a volume with `volume.builder=flow`; the other \
+                 sides follow. 0 makes one cell of each voxel. Cells take the shares of the voxels that \
+                 overlap them, so the amount of matter stays.",
             )
             .when("Lower it to save memory and time."),
         p("volume.rho", "", "", Choice(RhoRule::WORDS), Volume)
             .doc(
-                "How ρ follows from the density of `volume.grid`: `volume.rho_scale` × density (`linear`), or \
-                 1 − e^(−`volume.rho_scale` × density × edge of a cell) (`opacity`).",
+                "How ρ follows from the density of `volume.grid`: `volume.rho_scale` × density (`linear`), \
+                 or 1 − e^(−`volume.rho_scale` × density × edge of a cell) (`opacity`).",
             )
             .when("Choose `opacity` for numbers without an upper end, such as sums of particles."),
         p("volume.rho_scale", "", "", Float(0.0, 1e6, 1.0), Volume)
@@ -245,10 +243,10 @@ pub(super) const VOLUME: Group = Group {
             .when("Raise it for thicker smoke; lower it for a veil."),
         p("volume.reflect", "", "", Choice(ReflectBy::WORDS), Volume)
             .doc(
-                "What k_d and k_s follow in a volume with `volume.builder=flow`: nothing (`even`), the speed, \
-                 the vorticity, or the grid `volume.reflect_grid`. They change from `volume.k_d` and \
-                 `volume.k_s` at `volume.reflect_low` to `volume.reflect_k_d` and `volume.reflect_k_s` at \
-                 `volume.reflect_high`.",
+                "What k_d and k_s follow in a volume with `volume.builder=flow`: nothing (`even`), the \
+                 speed, the vorticity, or the grid `volume.reflect_grid`. They change from `volume.k_d` \
+                 and `volume.k_s` at `volume.reflect_low` to `volume.reflect_k_d` and `volume.reflect_k_s` \
+                 at `volume.reflect_high`.",
             )
             .when("Choose `grid` with a grid of foam or age, or `vorticity` for foam where water churns."),
         p("volume.reflect_grid", "", "", Text(""), Volume)

@@ -71,7 +71,7 @@ pub(super) enum Field<'a> {
     Vector(Source<'a>),
     /// The components in grids of their own, or at places of their own. Of each, the number of the component
     /// in its grid.
-    Components([(Source<'a>, usize); 3]),
+    Components(Box<[(Source<'a>, usize); 3]>),
 }
 
 impl<'a> Field<'a> {
@@ -92,10 +92,10 @@ impl<'a> Field<'a> {
         if grids.len() == 1 && at != VelocityAt::Staggered {
             return Some(Field::Vector(Source::new(first, density, shift(0))));
         }
-        Some(Field::Components([0, 1, 2].map(|a| match grids.get(a) {
+        Some(Field::Components(Box::new([0, 1, 2].map(|a| match grids.get(a) {
             Some(grid) if grids.len() == 3 => (Source::new(grid, density, shift(a)), 0),
             _ => (Source::new(first, density, shift(a)), a),
-        })))
+        }))))
     }
 
     /// Velocity at a voxel of the density.

@@ -89,8 +89,9 @@ fn list(all: &[Summary]) -> String {
     }
 }
 
+/// Whether a grid holds vectors, by the words of its format.
 fn is_vector(own: &Summary) -> bool {
-    own.kind.to_ascii_lowercase().contains("vec")
+    own.kind.to_ascii_lowercase().contains("vec") || own.kind.ends_with("× 3")
 }
 
 /// Finds the grids of the velocity.

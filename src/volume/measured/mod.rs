@@ -11,8 +11,7 @@
 //! | k_d, k_s | even, or between two values by speed, vorticity or another grid, weighted by the density |
 //!
 //! The cells hold ρ/α in 65535ths, where α is the largest ρ. So ρ is exact to α/131070, and a cell with less
-//! is empty. v is in the units of the cell that its direction needs: J·v is parallel to the velocity, whatever
-//! the shape of the voxels.
+//! is empty. v is in cells, so that J·v is parallel to the velocity whatever the shape of the voxels.
 
 mod build;
 mod field;

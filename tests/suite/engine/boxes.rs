@@ -1,8 +1,9 @@
-//! Boxes that a volume fills once: transmittance against its closed form on both engines, from outside and from
-//! inside, and parity of everything else.
+//! Boxes that a volume fills once: transmittance against its closed form on both engines, from outside and
+//! from inside, and parity of everything else.
 
 use glam::{DAffine3, DVec3, Vec3};
 use taki::engine::cpu;
+use taki::engine::cpu::ray::inspect;
 use taki::engine::gpu::GpuRenderer;
 use taki::picture::camera::{CENTRE, sample_offset};
 use taki::picture::{Camera, Frame};
@@ -178,5 +179,22 @@ fn what_lies_at_one_end_of_a_box_is_not_seen_at_the_other() {
             "{:?}",
             frame.radiance
         );
+    }
+}
+
+#[test]
+fn a_single_ray_has_the_bits_of_its_pixel_from_inside_too() {
+    let volumes = [noise([16, 24, 10], 4)];
+    let sets = ["volumes.smoke.nx=16", "volumes.smoke.ny=24", "volumes.smoke.nz=10", "trace.filter=none"];
+    for eye in [EYES[0], EYES[2], EYES[3]] {
+        let scene = seen_from(PLACES[1], eye, &sets);
+        let mesh = scene.mesh();
+        let frame = cpu::render(&scene, &volumes, &mesh, true, &Unwatched).expect("a frame");
+        for i in (0..frame.radiance.len()).step_by(37) {
+            let pixel = [i as u32 % frame.width, i as u32 / frame.width];
+            let report = inspect(&scene, &volumes, &mesh, pixel);
+            let found = report.radiance.extend(report.transmittance).to_array();
+            assert_eq!(found, frame.radiance[i], "{eye:?} {pixel:?}");
+        }
     }
 }

@@ -1,7 +1,10 @@
 //! Boxes in scene files: their places, what scenes print of them, and every slip.
 
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3, Vec3};
+use taki::grid::{Grid, write_vdb};
 use taki::scene::Scene;
+use taki::util::monitor::Unwatched;
+use taki::volume::{ReflectBy, RhoRule, VelocityAt};
 
 use super::meshes::{Folder, PLACE};
 
@@ -106,4 +109,93 @@ fn values_without_effect_are_told() {
     assert!(said("volumes.smoke.rho_scale").is_some_and(|why| why.contains("flow")));
     assert!(said("volumes.smoke.nx").is_none());
     assert!(said("volume.nx").is_some_and(|why| why.contains("box")));
+}
+
+/// A grid of 6×8×4 voxels of 0.25 m, turned about z, with even matter and flow.
+fn grids(folder: &Folder, name: &str) -> DAffine3 {
+    let turn = DQuat::from_rotation_z(0.5);
+    let to_world =
+        DAffine3::from_scale_rotation_translation(DVec3::splat(0.25), turn, DVec3::new(2.0, 1.0, -3.0));
+    let (first, size) = ([-2, 5, 1], [6, 8, 4]);
+    let fill = |name: &str, value: &[f32]| {
+        let values = value.iter().copied().cycle().take(6 * 8 * 4 * value.len()).collect();
+        Grid::from_dense(name, value.len(), first, size, values, to_world)
+    };
+    let all = [fill("density", &[2.5]), fill("vel", &[0.0, 0.0, 3.0]), fill("foam", &[0.5])];
+    write_vdb(&folder.path(name), &all).expect("a file");
+    let low = DVec3::new(-2.5, 4.5, 0.5);
+    to_world * DAffine3::from_translation(low) * DAffine3::from_scale(DVec3::new(6.0, 8.0, 4.0))
+}
+
+fn flow(own: &str) -> String {
+    format!("{PLACE}[volumes.s]\nbuilder = \"flow\"\nsource = \"a.vdb\"\n{own}[boxes.b]\nvolume = \"s\"\n")
+}
+
+#[test]
+fn a_box_of_a_simulation_stands_where_the_simulation_was() {
+    let folder = Folder::new();
+    let truth = grids(&folder, "a.vdb");
+    let scene = folder.scene(&flow("rho_scale = 0.4\n"), &[]);
+    let own = &scene.boxes[0];
+    for corner in [DVec3::ZERO, DVec3::ONE, DVec3::X, DVec3::new(0.3, 0.9, 0.1)] {
+        let at = |place: &DAffine3| place.transform_point3(corner);
+        assert!(at(&own.world_from_texture).distance(at(&truth)) < 1e-6);
+    }
+    assert!(
+        scene.comments().contains("6 × 8 × 4 voxels: density density, velocity vel"),
+        "{}",
+        scene.comments()
+    );
+    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+    assert_eq!((volume.size, volume.alpha), ([6, 8, 4], 1.0));
+    let cell = volume.cell(3, 4, 2);
+    assert_eq!((cell.rho(), cell.v()), (1.0, Vec3::Z));
+    // Fewer cells, another place and size, and the flow turned with them.
+    let text =
+        flow("cells = 4\n") + "position = [1.0, 2.0, 3.0]\nsize = [6.0, 8.0, 4.0]\nturn = [0, 90, 0]\n";
+    let scene = folder.scene(&text, &[]);
+    assert_eq!(scene.recipes[0].water.size, [3, 4, 2]);
+    let own = &scene.boxes[0];
+    close(own.middle(), DVec3::new(1.0, 2.0, 3.0));
+    close(own.sides(), DVec3::new(6.0, 8.0, 4.0));
+    close(own.world_from_texture.matrix3.z_axis, DVec3::new(4.0, 0.0, 0.0));
+    // The printed scene names the file again.
+    let again = folder.scene(&scene.to_toml(), &[]);
+    assert_eq!((again.boxes.clone(), again.recipes.clone()), (scene.boxes.clone(), scene.recipes.clone()));
+    assert_eq!(scene.references()[0].0, "volumes.s.source");
+}
+
+#[test]
+fn every_word_of_a_measured_volume_gives_the_variant_of_its_name() {
+    let folder = Folder::new();
+    grids(&folder, "a.vdb");
+    let of = |own: &str| folder.scene(&flow(own), &[]).recipes[0].measured.clone().expect("measured");
+    for word in RhoRule::WORDS {
+        assert_eq!(of(&format!("rho = {word:?}\n")).rho.word(), *word);
+    }
+    for word in VelocityAt::WORDS {
+        assert_eq!(of(&format!("velocity_at = {word:?}\n")).velocity_at.word(), *word);
+    }
+    for word in ReflectBy::WORDS {
+        assert_eq!(of(&format!("reflect = {word:?}\nreflect_grid = \"foam\"\n")).reflect.word(), *word);
+    }
+}
+
+#[test]
+fn grids_that_a_file_does_not_have_are_told_with_those_it_has() {
+    let folder = Folder::new();
+    grids(&folder, "a.vdb");
+    for (own, words) in [
+        ("grid = \"smoke\"\n", ["no grid \"smoke\"", "density, vel, foam"]),
+        ("velocity = \"flow\"\n", ["no grid \"flow\"", "volumes.s.velocity"]),
+        ("velocity = \"foam\"\n", ["no vectors", "volumes.s.velocity=none"]),
+        ("reflect = \"grid\"\nreflect_grid = \"age\"\n", ["no grid \"age\"", "volumes.s.reflect_grid"]),
+        ("grid = \"vel\"\n", ["holds vectors", "another grid"]),
+    ] {
+        let loaded =
+            folder.load(&flow(own), &[]).and_then(|scene| scene.volume(1 << 30, &Unwatched).map(drop));
+        let said = format!("{:?}", loaded.expect_err("refused"));
+        words.iter().for_each(|word| assert!(said.contains(word), "{said}: no {word:?}"));
+    }
+    assert!(folder.load(&flow("velocity = \"none\"\n"), &[]).is_ok());
 }
