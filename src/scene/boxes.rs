@@ -15,9 +15,9 @@ use crate::trace::AttenuationKind;
 use crate::util::error::{Error, Result};
 use crate::volume::VelocityNames;
 
-/// Cells between the corners where V and shadows are kept, along x and y. With 16, the limit of shells, shadows of smoke
-/// are visibly coarse; with 4, V takes four times as much memory and the paths of rays have twice as many
-/// tetrahedra.
+/// Cells between the corners where V and shadows are kept, along x and y. With 16, the limit of shells,
+/// shadows of smoke are visibly coarse; with 4, V takes four times as much memory and the paths of rays have
+/// twice as many tetrahedra.
 const CELLS_A_SQUARE: u32 = 8;
 /// Largest number of boxes. Every ray may enter each of them, and the shader looks a face's shell up among
 /// all.

@@ -140,6 +140,7 @@ fn unknown(key: &str, raw: Option<&Raw>, values: &Values, near: Option<String>, 
         .or_else(|| word_of_choice(key, raw))
         .or_else(|| in_the_part_of_its_name(key, values).map(mean))
         .or_else(|| in_the_same_table(key).map(mean))
+        .or_else(|| size_of_the_picture(key))
         .or_else(|| elsewhere(key, raw, values))
         .or_else(|| own_table(key))
         .or_else(|| near.map(mean))
@@ -259,12 +260,16 @@ fn elsewhere(key: &str, raw: Option<&Raw>, values: &Values) -> Option<String> {
     (!keys.is_empty()).then(|| format!("did you mean {}?", keys.join(" or ")))
 }
 
-/// Returns advice on a key that is the name of a table, or the size of the picture.
+/// Returns advice on a key that is the size of the picture.
+fn size_of_the_picture(key: &str) -> Option<String> {
+    let (section, last) = key.rsplit_once('.')?;
+    let is_meant = ["size", "resolution"].contains(&last) && !section.starts_with("boxes");
+    is_meant.then(|| "write image.width and image.height".into())
+}
+
+/// Returns advice on a key that is the name of a table.
 fn own_table(key: &str) -> Option<String> {
     let (_, last) = key.rsplit_once('.')?;
-    if ["size", "resolution"].contains(&last) {
-        return Some("write image.width and image.height".into());
-    }
     if NAMED.contains(&last) || NUMBERED.contains(&last) {
         return Some(own_header(last));
     }

@@ -11,10 +11,10 @@ const STEP_M: f64 = 64.0;
 /// Largest coordinates of an origin.
 const MOST: DVec3 = DVec3::splat(POINT_MAX);
 
-/// Returns the origin of a scene: the median of its water's points and boxes, of the middles of its meshes if it has no
-/// other water, or of the points of rocks and pools if it has no meshes either, rounded to whole steps. One
-/// part that lies far from the others does not move it. It does not depend on the camera, so that the mesh
-/// stays while the camera moves.
+/// Returns the origin of a scene: the median of its water's points and boxes, of the middles of its meshes if
+/// it has no other water, or of the points of rocks and pools if it has no meshes either, rounded to whole
+/// steps. One part that lies far from the others does not move it. It does not depend on the camera, so that
+/// the mesh stays while the camera moves.
 pub(super) fn origin(v: &Values, meshes: &[SceneMesh], boxes: &[SceneBox]) -> DVec3 {
     let mut points = water(v);
     points.extend(boxes.iter().map(SceneBox::middle));

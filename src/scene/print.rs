@@ -139,6 +139,7 @@ impl Scene {
     fn derived_json(&self) -> Json {
         let origin = self.camera.origin;
         let water = build::water(self.written(), WATER);
+        let boxes = self.boxes.iter().map(|own| own.json(&self.recipes[own.volume as usize]));
         let file = self.recipes.iter().find(|recipe| recipe.name == WATER).and_then(|r| r.file.as_ref());
         json!({
             "curves": {
@@ -153,7 +154,7 @@ impl Scene {
             "environment": self.environment.as_ref().map(|e| environment_json(e, &self.environment_lights)),
             "mesh": mesh_json(&self.mesh(), origin),
             "meshes": self.meshes.iter().map(SceneMesh::json).collect::<Vec<_>>(),
-            "boxes": self.boxes.iter().map(|own| own.json(&self.recipes[own.volume as usize])).collect::<Vec<_>>(),
+            "boxes": boxes.collect::<Vec<_>>(),
         })
     }
 }

@@ -71,7 +71,8 @@ impl Recipe {
         self.file.is_none() || self.measured.is_some()
     }
 
-    /// Transform from texture coordinates, 0 to 1, to the world, metres, if the volume has a place of its own.
+    /// Transform from texture coordinates, 0 to 1, to the world, metres, if the volume has a place of its
+    /// own.
     pub fn world_from_texture(&self) -> Option<DAffine3> {
         self.measured.as_ref().map(MeasuredSpec::world_from_texture)
     }

@@ -261,10 +261,10 @@ pub(super) const VOLUME: Group = Group {
             .doc("Speed (m/s), vorticity (1/s) or number of the grid from which on k is even again.")
             .when("Set it to what the liveliest parts have."),
         p("volume.reflect_k_d", "", "", Float(0.0, 1.0, 1.0), Volume)
-            .doc("k_d at `volume.reflect_high`.")
+            .doc("Diffuse reflection coefficient at `volume.reflect_high`.")
             .when("Raise it for white foam."),
         p("volume.reflect_k_s", "", "", Float(0.0, 1.0, 0.0), Volume)
-            .doc("k_s at `volume.reflect_high`.")
+            .doc("Specular reflection coefficient at `volume.reflect_high`.")
             .when("Lower it for matt foam."),
     ],
 };

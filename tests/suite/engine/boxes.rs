@@ -139,7 +139,7 @@ fn the_engines_agree_on_boxes_in_every_variant() {
             // length 0.
             frames.iter_mut().for_each(|frame| frame.counts.iter_mut().for_each(|count| count[0] = 0));
             let lit = frames[0].radiance.iter().filter(|r| r[0] > 0.0 && r[3] < 0.9).count();
-            assert!(lit * 4 > frames[0].radiance.len() || eye == EYES[0], "{sets:?} {eye:?}: {lit} lit");
+            assert!(lit * 20 > frames[0].radiance.len(), "{sets:?} {eye:?}: {lit} lit");
             if let Ok(frames) = <[Frame; 2]>::try_from(frames) {
                 assert_parity(&format!("{sets:?} from {eye:?}"), &frames);
             }
@@ -171,7 +171,7 @@ fn what_lies_at_one_end_of_a_box_is_not_seen_at_the_other() {
         assert!(frame.radiance.iter().all(|r| r[3] > 1.0 - 2e-6), "{:?}", frame.radiance[0]);
     }
     // The last cells are as dense up to their end.
-    let sets = [&sets[..2], &["camera.eye=[0.98,0.013,5]", "camera.target=[0.98,0.013,0]", "camera.fov=0.3"]];
+    let sets = [&sets[..2], &["camera.eye=[0.98,0.013,5]", "camera.target=[0.98,0.013,0]", "camera.fov=0.1"]];
     let truth = (-SIGMA * 2.0).exp();
     for frame in both(&mut renderer, &scene(own, &sets.concat()), &volumes) {
         assert!(

@@ -136,7 +136,7 @@ fn only_volumes_that_a_surface_shows_are_built_and_the_others_are_told() {
     let warnings = |scene: &Scene| scene.warnings(&scene.volumes(1 << 30, &Unwatched).unwrap()).concat();
     assert_eq!(warnings(&scene), "");
     let said = warnings(&water);
-    assert!(said.contains("no material shows the volume fur: give one volume = \"fur\""), "{said}");
+    assert!(said.contains("no material or box shows the volume fur: give one volume = \"fur\""), "{said}");
     let unused = format!("{FUR}[volumes.moss]\nnx = 4\n[materials.green]\nvolume = \"moss\"\n");
     let said = warnings(&load(&unused, &[]).unwrap());
     assert!(said.contains("nothing has the material green, which shows the volume moss"), "{said}");
@@ -155,7 +155,7 @@ fn settings_of_a_volume_without_effect_are_told() {
         (&["fur.loose=0.5"][..], "volumes.fur.loose has no effect while volumes.fur.bundles is 0"),
         (
             &["volumes.fur.nx=7", "materials.pelt.volume=water"],
-            "volumes.fur.nx has no effect: no material shows",
+            "volumes.fur.nx has no effect: no material or box shows",
         ),
         (
             &["volume.seed=7", "quads.0.material=pelt"],
