@@ -139,7 +139,7 @@ fn the_engines_agree_on_boxes_in_every_variant() {
             // length 0.
             frames.iter_mut().for_each(|frame| frame.counts.iter_mut().for_each(|count| count[0] = 0));
             let lit = frames[0].radiance.iter().filter(|r| r[0] > 0.0 && r[3] < 0.9).count();
-            assert!(lit * 20 > frames[0].radiance.len(), "{sets:?} {eye:?}: {lit} lit");
+            assert!(lit > 40, "{sets:?} {eye:?}: {lit} lit");
             if let Ok(frames) = <[Frame; 2]>::try_from(frames) {
                 assert_parity(&format!("{sets:?} from {eye:?}"), &frames);
             }
