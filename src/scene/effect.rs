@@ -32,16 +32,31 @@ fn is(values: &Values, switch: &str, word: &str) -> bool {
 
 /// Keys of a volume that is made of curves, or of a file of cells.
 const OF_CURVES: &[&str] = &[
-    "curves.*",
-    "volume.coherence",
-    "volume.coverage",
+    "curves.across",
+    "curves.breathe",
+    "curves.bundles",
+    "curves.deep",
+    "curves.lean",
+    "curves.levels",
+    "curves.loose",
+    "curves.radius",
+    "curves.run",
+    "curves.wander",
     "volume.crest",
     "volume.file",
     "volume.flow",
-    "volume.k_noise",
     "volume.nx",
     "volume.ny",
     "volume.nz",
+];
+
+/// Keys of curves, and of strands along the flow of a simulation.
+const OF_STRANDS: &[&str] = &[
+    "curves.amplitude",
+    "curves.h",
+    "volume.coherence",
+    "volume.coverage",
+    "volume.k_noise",
     "volume.seed",
     "volume.strand_length",
 ];
@@ -59,6 +74,7 @@ const OF_GRIDS: &[&str] = &[
     "volume.rho",
     "volume.rho_scale",
     "volume.source",
+    "volume.strands",
     "volume.velocity",
     "volume.velocity_at",
 ];
@@ -213,6 +229,15 @@ const RULES: &[Rule] = &[
         switch: "volume.builder",
         needs: "curves",
         works: |v, switch| is(v, switch, Builder::Curves.word()),
+    },
+    Rule {
+        keys: OF_STRANDS,
+        switch: "volume.strands",
+        needs: "a number above 0, because volume.builder is \"flow\"",
+        works: |v, switch| {
+            let builder = format!("{}.builder", switch.rsplit_once('.').map_or("", |(head, _)| head));
+            is(v, &builder, Builder::Curves.word()) || v.int(switch) > 0
+        },
     },
     Rule {
         keys: OF_GRIDS,

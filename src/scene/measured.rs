@@ -7,7 +7,9 @@ use super::param::key_of_volume;
 use super::{Limits, Values};
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
-use crate::volume::{MeasuredSpec, ReflectBy, RhoRule, VelocityAt, Wanted, find_measured};
+use crate::volume::{
+    MeasuredSpec, ReflectBy, RhoRule, StrandSpec, VelocityAt, VelocityNames, Wanted, find_measured,
+};
 
 /// Most cells along a side of a measured volume.
 const MOST_CELLS: u64 = 4096;
@@ -62,10 +64,18 @@ pub(super) fn measured(
         second: (reflect == ReflectBy::Grid).then_some(second),
     };
     let (velocity, bounds, to_world) = find_measured(&path, &wanted, limits.memory)?;
+    let strands = strands(v, name);
+    if strands.is_some() && velocity == VelocityNames::None {
+        return Err(Error::input(
+            format!("{} without a velocity in {}", key("volume.strands"), path.display()),
+            format!("name its grid in {}, or set {} to 0", key("volume.velocity"), key("volume.strands")),
+        ));
+    }
     let voxels = bounds.size();
     let longest = voxels.into_iter().max().unwrap_or(1);
     let cells = match v.count(&key("volume.cells")) {
         0 => longest,
+        n if strands.is_some() => n.into(),
         n => u64::from(n).min(longest),
     };
     if cells > MOST_CELLS {
@@ -93,5 +103,22 @@ pub(super) fn measured(
             [float("volume.reflect_k_d"), float("volume.reflect_k_s")],
         ],
         alpha: float("volume.alpha"),
+        strands,
     }))
+}
+
+/// Returns the strands of the measured volume `name`, if it has any.
+fn strands(v: &Values, name: &str) -> Option<StrandSpec> {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let count = v.count(&key_of_volume(name, "volume.strands"));
+    (count > 0).then(|| StrandSpec {
+        count,
+        h: float("curves.h"),
+        amplitude: float("curves.amplitude"),
+        coherence: float("volume.coherence"),
+        strand_length: float("volume.strand_length"),
+        coverage: float("volume.coverage"),
+        k_noise: float("volume.k_noise"),
+        seed: v.int(&key_of_volume(name, "volume.seed")) as u64,
+    })
 }

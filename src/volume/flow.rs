@@ -45,11 +45,23 @@ impl Flow {
         self.strands.get(index).map_or(0.0, |[sum, squares]| sum / squares.max(1e-30).sqrt())
     }
 
-    /// Sums over all curves for every cell of the volume, in the order of dense storage.
+    /// Sums over the curves of a specification for every cell of the volume, in the order of dense storage.
     ///
     /// # Errors
     /// Returns an error if `monitor` ends the work.
     pub fn new(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Flow> {
+        Flow::along(spec, |curve, points| curve_points(spec, curve, points), monitor)
+    }
+
+    /// As [`Flow::new`], over other curves: `draw` writes the points of a curve, given its number.
+    ///
+    /// # Errors
+    /// Returns an error if `monitor` ends the work.
+    pub fn along(
+        spec: &WaterSpec,
+        draw: impl Fn(usize, &mut Vec<Vec3>) + Sync,
+        monitor: &dyn Monitor,
+    ) -> Result<Flow> {
         let [nx, ny, nz] = spec.size.map(|n| n as usize);
         let layers_per_slab = nz.div_ceil(16);
         let slab = nx * ny * layers_per_slab;
@@ -60,7 +72,7 @@ impl Flow {
             let in_slab = ((z % layers_per_slab) * ny + cell.y as usize) * nx + cell.x as usize;
             (z / layers_per_slab, in_slab as u32)
         };
-        Flow::summed(spec, &lengths, position, [0, 1], monitor)
+        Flow::summed(spec, &draw, &lengths, position, [0, 1], monitor)
     }
 
     /// Sums over all curves for the cells that `bricks` will store, in their order. Each sum equals that of
@@ -83,7 +95,8 @@ impl Flow {
             let stored = bricks.stored_index(x, y, z).expect("the same walk marked the cell");
             (slab, (stored - firsts[slab]) as u32)
         };
-        Flow::summed(spec, &lengths, position, [1, 2], monitor)
+        let draw = |curve: usize, points: &mut Vec<Vec3>| curve_points(spec, curve, points);
+        Flow::summed(spec, &draw, &lengths, position, [1, 2], monitor)
     }
 
     /// Sums over all curves. `lengths` are the numbers of cells of the slabs, and `position` gives the slab
@@ -94,6 +107,7 @@ impl Flow {
     /// the order of the curves, so the sums depend neither on the number of threads nor on the slabs.
     fn summed(
         spec: &WaterSpec,
+        draw: &(impl Fn(usize, &mut Vec<Vec3>) + Sync),
         lengths: &[usize],
         position: impl Fn(IVec3) -> (usize, u32) + Sync,
         [walks_before, walks]: [u64; 2],
@@ -111,7 +125,7 @@ impl Flow {
                 .par_iter()
                 .map(|&first| {
                     let own = first..(first + CURVES_PER_TASK).min(curves);
-                    contributions(spec, own, lengths.len(), &position)
+                    contributions(spec, draw, own, lengths.len(), &position)
                 })
                 .collect();
             flow.add(&tasks, lengths);
@@ -144,6 +158,7 @@ impl Flow {
 /// Walks `curves` and sorts their contributions into one bucket for each slab.
 fn contributions(
     spec: &WaterSpec,
+    draw: &impl Fn(usize, &mut Vec<Vec3>),
     curves: std::ops::Range<usize>,
     slabs: usize,
     position: &impl Fn(IVec3) -> (usize, u32),
@@ -152,9 +167,9 @@ fn contributions(
     let mut buckets = vec![Bucket::default(); slabs];
     let (mut points, mut noise) = (Vec::new(), Vec::new());
     for curve in curves {
-        curve_points(spec, curve, &mut points);
+        draw(curve, &mut points);
         if coherent {
-            strand_noise(spec, curve, points.len() - 1, &mut noise);
+            strand_noise(spec, curve, points.len().saturating_sub(1), &mut noise);
         }
         walk_curve(spec, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
             let (slab, in_slab) = position(cell);

@@ -98,7 +98,7 @@ pub fn set_density_and_reflection(spec: &WaterSpec, cells: &mut Cells) {
 /// With coherence c the normal number of ρ is (c·strand + (1 − c)·cell)/√(c² + (1 − c)²). It has variance 1
 /// again, so ρ keeps its distribution. Coverage then multiplies ρ by 1 − coverage·e^(−length of the strands
 /// in the cell), so that strands end softly.
-fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
+pub(super) fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
     let family = Family::new(spec.seed, Stream::Cell);
     let structure = &spec.structure;
     let (c, d) = (structure.coherence, 1.0 - structure.coherence);

@@ -227,7 +227,17 @@ pub(super) const VOLUME: Group = Group {
                  sides follow. 0 makes one cell of each voxel. Cells take the shares of the voxels that \
                  overlap them, so the amount of matter stays.",
             )
-            .when("Lower it to save memory and time."),
+            .when("Lower it to save memory and time; raise it above the voxels for fine `volume.strands`."),
+        p("volume.strands", "", "", Int(0, 1_000_000, 0), Volume)
+            .slider(0.0, 20_000.0)
+            .doc(
+                "Number of strands along the velocity in a volume with `volume.builder=flow`. Each starts \
+                 where there is density and runs both ways until that ends; `curves.h` and \
+                 `curves.amplitude` (here of a strand's length) bend it, and `volume.coherence`, \
+                 `volume.strand_length` and `volume.coverage` are those of curves. Cells between strands \
+                 are empty, and there may be more cells than voxels. 0 shows the density evenly.",
+            )
+            .when("Set some thousands for threads of water finer than the simulation."),
         p("volume.rho", "", "", Choice(RhoRule::WORDS), Volume)
             .doc(
                 "How ρ follows from the density of `volume.grid`: `volume.rho_scale` × density (`linear`), \

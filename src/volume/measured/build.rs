@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::field::{Field, Source};
 use super::overlap::{Covered, Overlap};
-use super::{MeasuredSpec, ReflectBy, RhoRule, VelocityNames};
+use super::{MeasuredSpec, ReflectBy, VelocityNames, strands};
 use crate::grid::{self, Block, BlockData, Class, Grid};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -71,6 +71,49 @@ struct Sum {
     second: f32,
 }
 
+/// How values of the density's grid are read.
+#[derive(Clone, Copy)]
+pub(super) struct Density {
+    is_level_set: bool,
+    /// Width of the surface of a level set, metres.
+    band: f64,
+}
+
+impl Density {
+    /// Density of a grid, of which cells with edges of `share` voxels are made.
+    pub fn of(grid: &Grid, share: f64) -> Density {
+        let is_level_set = grid.class == Class::LevelSet;
+        Density { is_level_set, band: share * grid.to_world.matrix3.determinant().abs().cbrt() }
+    }
+
+    /// Density of a value.
+    pub fn at(&self, value: f32) -> f64 {
+        match self.is_level_set {
+            // The share of a cell at this distance that is inside.
+            true => (0.5 - f64::from(value) / self.band).clamp(0.0, 1.0),
+            false => f64::from(value).max(0.0),
+        }
+    }
+
+    /// Density of the voxel of an index in a block. Voxels that are not active have none, but for those inside
+    /// a level set.
+    #[inline]
+    pub fn in_block(&self, data: &BlockData, index: [i32; 3]) -> f64 {
+        match data {
+            BlockData::Tile { value, is_active } if *is_active || self.is_level_set => self.at(value[0]),
+            BlockData::Tile { .. } => 0.0,
+            BlockData::Leaf { values, active } => {
+                let [i, j, k] = index.map(|c| (c & 7) as usize);
+                let i = i + 8 * j + 64 * k;
+                match self.is_level_set || active[i >> 6] >> (i & 63) & 1 == 1 {
+                    true => self.at(values[i]),
+                    false => 0.0,
+                }
+            }
+        }
+    }
+}
+
 /// Parts of the volume on their way to cells.
 struct Work<'a> {
     spec: &'a MeasuredSpec,
@@ -97,8 +140,15 @@ impl Measured {
         let size = spec.size;
         let storage = file_storage(size, storage, budget).map_err(fewer_cells)?;
         let work = Work::new(spec, self);
-        let most = work.largest(monitor)?;
-        let largest = work.rho(most);
+        let strands = match &spec.strands {
+            Some(own) => Some(strands::cells(spec, own, self, budget, monitor).map_err(fewer_cells)?),
+            None => None,
+        };
+        let most = match &strands {
+            Some((_, most)) => *most,
+            None => work.largest(monitor)?,
+        };
+        let largest = spec.rho_of(most);
         if !largest.is_finite() || largest > f64::from(f32::MAX) {
             return Err(Error::input(
                 format!("the volume's density reaches {most:e}, and ρ {largest:e}"),
@@ -109,12 +159,16 @@ impl Measured {
         let area = size[0] as usize * size[1] as usize;
         let slabs = size[2].div_ceil(BRICK);
         let layers = |slab: u32| slab * BRICK..size[2].min((slab + 1) * BRICK);
+        let fill = |layers: std::ops::Range<u32>, out: &mut [Cell]| match &strands {
+            Some((cells, _)) => out.copy_from_slice(&cells[layers.start as usize * area..][..out.len()]),
+            None => work.fill(layers, largest, out),
+        };
         let cells: Cells = match storage {
             Storage::Dense => {
                 let mut cells = vec![Cell::default(); area * size[2] as usize];
                 let slab = |(slab, out): (usize, &mut [Cell])| {
                     monitor.progress("volume", slab as u64, slabs.into())?;
-                    work.fill(layers(slab as u32), largest, out);
+                    fill(layers(slab as u32), out);
                     Ok(())
                 };
                 let slab_cells = area * BRICK as usize;
@@ -129,7 +183,7 @@ impl Measured {
                     let made = |slab: u32| {
                         let layers = layers(slab);
                         let mut out = vec![Cell::default(); area * layers.len()];
-                        work.fill(layers, largest, &mut out);
+                        fill(layers, &mut out);
                         out
                     };
                     let slabs: Vec<Vec<Cell>> =
@@ -177,15 +231,6 @@ impl<'a> Work<'a> {
             blocks: blocks.collect(),
             axes: [0, 1, 2].map(|a| Overlap::new(voxels[a], spec.size[a])),
             cell_from_world: spec.world_from_cell().inverse(),
-        }
-    }
-
-    /// ρ of a cell whose mean density is `mass`, before the factor of the scene.
-    fn rho(&self, mass: f64) -> f64 {
-        let scaled = f64::from(self.spec.rho_scale) * mass;
-        match self.spec.rho {
-            RhoRule::Linear => scaled,
-            RhoRule::Opacity => -(-scaled * self.spec.edge()).exp_m1(),
         }
     }
 
@@ -239,17 +284,9 @@ impl<'a> Work<'a> {
     /// The cell of a sum with some mass.
     fn cell(&self, sum: &Sum, largest: f64) -> Cell {
         let spec = self.spec;
-        let [low, high] = spec.reflect_range.map(f64::from);
-        let mean = f64::from(sum.second) / sum.mass;
-        let share = match spec.reflect {
-            ReflectBy::Even => 0.0,
-            _ if high > low => ((mean - low) / (high - low)).clamp(0.0, 1.0),
-            _ => f64::from(u8::from(mean >= low)),
-        } as f32;
-        let [from, to] = spec.k;
-        let [k_d, k_s] = [0, 1].map(|i| from[i] + (to[i] - from[i]) * share);
+        let [k_d, k_s] = spec.reflected(f64::from(sum.second) / sum.mass);
         let direction = (self.cell_from_world * sum.flow.as_dvec3()).try_normalize().unwrap_or(DVec3::Y);
-        let rho = if largest > 0.0 { self.rho(sum.mass) / largest } else { 0.0 };
+        let rho = if largest > 0.0 { spec.rho_of(sum.mass) / largest } else { 0.0 };
         let cell = Cell::from_direction(direction.as_vec3()).with_density(rho as f32, k_d, k_s);
         if cell.rho_code() == 0 { Cell::default() } else { cell }
     }
@@ -261,13 +298,7 @@ impl<'a> Work<'a> {
         let [x_axis, y_axis, z_axis] = &self.axes;
         let along_z = z_axis.voxels(layers.start, layers.end);
         let [min, voxels] = [self.spec.bounds.min.map(i64::from), self.spec.bounds.size().map(|n| n as i64)];
-        let is_level_set = self.grids.density.class == Class::LevelSet;
-        let band = self.grids.density.to_world.matrix3.determinant().abs().cbrt();
-        let density = |value: f32| match is_level_set {
-            // The share of a voxel at this distance that is inside.
-            true => (0.5 - f64::from(value) / band).clamp(0.0, 1.0),
-            false => f64::from(value).max(0.0),
-        };
+        let density = Density::of(&self.grids.density, 1.0);
         for (block, own) in &self.blocks {
             let [z0, z1] = [own.start.max(along_z.start as i64), own.end.min(along_z.end as i64)];
             if z0 >= z1 {
@@ -282,19 +313,7 @@ impl<'a> Work<'a> {
                 for y in y0..y1 {
                     for x in x0..x1 {
                         let index = [x + min[0], y + min[1], z + min[2]].map(|c| c as i32);
-                        let value = match block.data {
-                            BlockData::Tile { value, is_active } if is_active || is_level_set => value[0],
-                            BlockData::Tile { .. } => continue,
-                            BlockData::Leaf { values, active } => {
-                                let [i, j, k] = index.map(|c| (c & 7) as usize);
-                                let i = i + 8 * j + 64 * k;
-                                if !is_level_set && active[i >> 6] >> (i & 63) & 1 == 0 {
-                                    continue;
-                                }
-                                values[i]
-                            }
-                        };
-                        let density = density(value);
+                        let density = density.in_block(&block.data, index);
                         if density <= 0.0 {
                             continue;
                         }

@@ -17,6 +17,7 @@ mod build;
 mod field;
 mod find;
 mod overlap;
+mod strands;
 
 use std::path::PathBuf;
 
@@ -115,6 +116,29 @@ pub struct MeasuredSpec {
     pub k: [[f32; 2]; 2],
     /// Factor on ρ.
     pub alpha: f32,
+    /// Strands along the flow. `None` for cells with the even density of their voxels.
+    pub strands: Option<StrandSpec>,
+}
+
+/// Strands along the flow, which the density draws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StrandSpec {
+    /// Number of strands.
+    pub count: u32,
+    /// Complexity constant h of eq. (1).
+    pub h: f32,
+    /// Standard deviation of g, as a share of a strand's length.
+    pub amplitude: f32,
+    /// [`Structure::coherence`](crate::volume::Structure::coherence).
+    pub coherence: f32,
+    /// [`Structure::strand_length`](crate::volume::Structure::strand_length), as a share of a strand's length.
+    pub strand_length: f32,
+    /// [`Structure::coverage`](crate::volume::Structure::coverage).
+    pub coverage: f32,
+    /// Standard deviation of the noise of k_d and k_s.
+    pub k_noise: f32,
+    /// Seed of all randomness.
+    pub seed: u64,
 }
 
 impl MeasuredSpec {
@@ -130,6 +154,27 @@ impl MeasuredSpec {
     fn world_from_cell(&self) -> DMat3 {
         let cells = DVec3::from_array(self.size.map(f64::from));
         self.world_from_texture().matrix3 * DMat3::from_diagonal(1.0 / cells)
+    }
+
+    /// ρ of a cell whose mean density is `mass`, before the factor of the scene.
+    fn rho_of(&self, mass: f64) -> f64 {
+        let scaled = f64::from(self.rho_scale) * mass;
+        match self.rho {
+            RhoRule::Linear => scaled,
+            RhoRule::Opacity => -(-scaled * self.edge()).exp_m1(),
+        }
+    }
+
+    /// k_d and k_s of a cell where what they follow has this value.
+    fn reflected(&self, value: f64) -> [f32; 2] {
+        let [low, high] = self.reflect_range.map(f64::from);
+        let share = match self.reflect {
+            ReflectBy::Even => 0.0,
+            _ if high > low => ((value - low) / (high - low)).clamp(0.0, 1.0),
+            _ => f64::from(u8::from(value >= low)),
+        } as f32;
+        let [from, to] = self.k;
+        [0, 1].map(|i| from[i] + (to[i] - from[i]) * share)
     }
 
     /// Edge of the cube with the volume of a cell, metres.

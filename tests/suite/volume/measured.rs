@@ -8,17 +8,17 @@ use taki::volume::{
 };
 
 /// Voxels along each axis, and the index of the first.
-const SIZE: [u32; 3] = [21, 34, 17];
+pub const SIZE: [u32; 3] = [21, 34, 17];
 const FIRST: [i32; 3] = [-5, 3, 11];
 
 /// A transform with voxels of unequal sides, turned and moved.
-fn to_world() -> DAffine3 {
+pub fn to_world() -> DAffine3 {
     let turn = DQuat::from_euler(EulerRot::XYZ, 0.4, -0.9, 0.2);
     DAffine3::from_scale_rotation_translation(DVec3::new(0.1, 0.15, 0.07), turn, DVec3::new(3.0, -2.0, 5.0))
 }
 
 /// A grid of the values of a function of the indices.
-fn grid<const N: usize>(name: &str, f: impl Fn(DVec3) -> [f64; N]) -> Grid {
+pub fn grid<const N: usize>(name: &str, f: impl Fn(DVec3) -> [f64; N]) -> Grid {
     let mut values = Vec::new();
     // Other grids reach one voxel farther on each side, so that what lies between their samples is known.
     let more = i32::from(name != "density");
@@ -35,7 +35,7 @@ fn grid<const N: usize>(name: &str, f: impl Fn(DVec3) -> [f64; N]) -> Grid {
     Grid::from_dense(name, N, first, size, values, to_world())
 }
 
-fn spec(cells: [u32; 3]) -> MeasuredSpec {
+pub fn spec(cells: [u32; 3]) -> MeasuredSpec {
     let max = [0, 1, 2].map(|a| FIRST[a] + SIZE[a] as i32 - 1);
     MeasuredSpec {
         path: "none".into(),
@@ -52,10 +52,11 @@ fn spec(cells: [u32; 3]) -> MeasuredSpec {
         reflect_range: [0.0, 1.0],
         k: [[0.5, 0.25], [1.0, 0.0]],
         alpha: 1.0,
+        strands: None,
     }
 }
 
-fn build(grids: &Measured, spec: &MeasuredSpec) -> VolumeTexture {
+pub fn build(grids: &Measured, spec: &MeasuredSpec) -> VolumeTexture {
     grids.volume(spec, StorageChoice::Dense, 1 << 30, &Unwatched).expect("a volume")
 }
 
@@ -65,18 +66,18 @@ fn density(at: DVec3) -> [f64; 1] {
     [(2.5 * wave).max(0.0)]
 }
 
-fn measured(velocity: Vec<Grid>) -> Measured {
+pub fn measured(velocity: Vec<Grid>) -> Measured {
     Measured { density: grid("density", density), velocity, second: None }
 }
 
 /// Metres of the world per cell, as columns.
-fn world_from_cell(spec: &MeasuredSpec) -> DMat3 {
+pub fn world_from_cell(spec: &MeasuredSpec) -> DMat3 {
     spec.world_from_texture().matrix3
         * DMat3::from_diagonal(DVec3::ONE / DVec3::from_array(spec.size.map(f64::from)))
 }
 
 /// The centre of a cell in the world, metres.
-fn centre(spec: &MeasuredSpec, cell: [u32; 3]) -> DVec3 {
+pub fn centre(spec: &MeasuredSpec, cell: [u32; 3]) -> DVec3 {
     let at = (DVec3::from_array(cell.map(f64::from)) + 0.5) / DVec3::from_array(spec.size.map(f64::from));
     spec.world_from_texture().transform_point3(at)
 }
@@ -162,7 +163,7 @@ fn an_even_velocity_is_even_in_the_world_whatever_the_voxels() {
 }
 
 /// Velocity of a body that turns about an axis through a point.
-fn turning(at: DVec3) -> DVec3 {
+pub fn turning(at: DVec3) -> DVec3 {
     DVec3::new(0.2, 1.0, -0.4).cross(at - DVec3::new(3.7, 0.2, 6.1))
 }
 

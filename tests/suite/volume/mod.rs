@@ -6,6 +6,7 @@ pub mod cell;
 pub mod file;
 pub mod leaps;
 pub mod measured;
+pub mod measured_strands;
 pub mod pyramid;
 pub mod structure;
 
