@@ -3,8 +3,8 @@
 #
 # Version: bpy 5.2.3 of pip (Blender 5.2 LTS).
 # Expected: a mesh with one set of colours of vertices has one in the file, in COLOR_0.
-# Seen: if no material uses the colours, the exporter's defaults write COLOR_0 with 1 everywhere and the painted
-#   colours as COLOR_1; the log says that the active colours will not be exported. With
+# Seen: if no material uses the colours, the exporter's defaults write COLOR_0 with 1 everywhere and the
+#   painted colours as COLOR_1; the log says that the active colours will not be exported. With
 #   export_vertex_color="ACTIVE" the painted ones are COLOR_0, and there is no other.
 # Why it matters: a renderer that reads masks, thickness or growth from COLOR_0 gets a mask of 1, and nothing
 #   looks broken.
@@ -31,7 +31,8 @@ for name, options in [("defaults", {}), ("active", {"export_vertex_color": "ACTI
         if not key.startswith("COLOR"):
             continue
         accessor = document["accessors"][number]
-        first = document["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        view = document["bufferViews"][accessor["bufferView"]]
+        first = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         code, most = {5126: ("f", 1.0), 5123: ("H", 65535.0), 5121: ("B", 255.0)}[accessor["componentType"]]
         red = struct.unpack_from("<" + code, data, first)[0] / most
         print(f"{name} {key} = {red:.2f}")

@@ -77,8 +77,8 @@ struct OpaquePoint {
     pixel: vec2<u32>,
     position_world: vec3<f32>,
     normal_world: vec3<f32>,
-    // Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its vertices'
-    // normals; 0 in a grid.
+    // Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its
+    // vertices' normals; 0 in a grid.
     plane: vec3<f32>,
     albedo: vec3<f32>,
     // Occlusion, shadow and film of water, 0 to 1 each.

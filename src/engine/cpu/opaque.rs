@@ -16,8 +16,8 @@ pub struct Points<S: Simd> {
     pub position: Lanes3<S>,
     /// Normal, not normalised.
     pub normal: Lanes3<S>,
-    /// Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its vertices'
-    /// normals; 0 in a grid.
+    /// Normal of the plane of a triangle that is no part of a grid, of any length, on the side of its
+    /// vertices' normals; 0 in a grid.
     pub plane: Lanes3<S>,
     /// Linear albedo. A pool has its depth (metres) and the density of its foam (0 to 1) here.
     pub albedo: Lanes3<S>,
@@ -89,9 +89,9 @@ impl<S: Simd> Points<S> {
 
     /// Returns how the eye sees the points.
     ///
-    /// Both sides of a surface are seen. Which side it is, the plane of a triangle says: near the outline of a
-    /// smooth mesh, normals that were interpolated lean away from the eye. There the normal is taken that is
-    /// nearest to them among those that the eye sees.
+    /// Both sides of a surface are seen. Which side it is, the plane of a triangle says: near the outline of
+    /// a smooth mesh, normals that were interpolated lean away from the eye. There the normal is taken that
+    /// is nearest to them among those that the eye sees.
     #[inline(always)]
     pub fn view(&self, simd: S, scene: &Scene) -> View<S> {
         let splat = |x: f32| f32x8::splat(simd, x);

@@ -142,8 +142,8 @@ impl<'a> ShellPath<'a> {
     /// tetrahedron, with a parameter that is not above 0.
     ///
     /// A line in the plane of a face, or one that rounding moves, may pass the tetrahedron by. The origin is
-    /// then moved a little to the middle of the tetrahedron. `None` if the line misses it even so, because the
-    /// tetrahedron has no volume.
+    /// then moved a little to the middle of the tetrahedron. `None` if the line misses it even so, because
+    /// the tetrahedron has no volume.
     pub fn inside(shell: &'a Shell, place: [usize; 2], origin: Vec3, direction: Vec3) -> Option<Self> {
         ShellPath::along_line(shell, place, origin, direction).or_else(|| {
             let corners = shell.tetrahedron(place[0], place[1]).map(|point| shell.points[point as usize]);

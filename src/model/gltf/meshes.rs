@@ -145,7 +145,7 @@ impl Gltf<'_> {
         }
         if attributes.contains_key("COLOR_1") {
             model.note(format!(
-                "{place} has several sets of colours: COLOR_0 is used; in Blender, export the active colours alone"
+                "{place} has several sets of colours: COLOR_0 is used; in Blender, export the active ones"
             ));
         }
         Ok(out)

@@ -97,8 +97,8 @@ impl Part<'_> {
         Vec3::from(self.primitive.positions[vertex as usize]).as_dvec3()
     }
 
-    /// Corners of a triangle, counter-clockwise in the world as seen from the side that the file's normals are
-    /// on. Files wind triangles one way or the other.
+    /// Corners of a triangle, counter-clockwise in the world as seen from the side that the file's normals
+    /// are on. Files wind triangles one way or the other.
     pub fn facing(&self, [a, b, c]: [u32; 3]) -> [u32; 3] {
         let turned = self.primitive.normals.as_ref().is_some_and(|normals| {
             let [p, q, r] = [a, b, c].map(|i| self.vertex(i));
