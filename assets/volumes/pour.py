@@ -51,6 +51,8 @@ def body(name, low, high, edge=0.02, rough=0.0):
 
 def rock():
     """Returns the rock: a pillar, the ledge that leaves it to the right, and the spout above."""
+    # Without a seed, Blender's noise of vectors is another in each run.
+    noise.seed_set(1)
     pillar = body("pillar", (-0.75, -0.42, -0.25), (-0.33, 0.42, 0.94), rough=0.04)
     ledge = body("ledge", (-0.5, -0.25, 0.50), (-0.02, 0.27, 0.62), edge=0.014, rough=0.028)
     floor = body("spout", (-0.5, -0.12, 0.985), (-0.2, 0.12, 1.015), edge=0.008, rough=0.006)

@@ -1,4 +1,7 @@
-"""Renders the smoke of smoke.toml in Cycles, with a number of bounces: python beside.py 12 writes cycles-12.png."""
+"""Renders the smoke of smoke.toml in Cycles, with a number of bounces.
+
+    python beside.py 12               # writes cycles-12.png
+"""
 
 import math
 import os
