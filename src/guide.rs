@@ -10,6 +10,7 @@ pages! {
     tutorial "tutorial.md"
     meshes "meshes.md"
     grids "grids.md"
+    simulation "simulation.md"
     method "method.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"

@@ -21,6 +21,7 @@ mod nanovdb;
 mod npz;
 mod openvdb;
 mod order;
+mod own;
 mod save;
 mod source;
 mod statistics;
@@ -33,6 +34,7 @@ use glam::DAffine3;
 
 pub use builder::{Builder, Misplaced};
 pub use openvdb::encode_vdb;
+pub use own::own;
 pub use save::write_vdb;
 pub use statistics::Statistics;
 pub use tree::{Block, BlockData, Grid, Reader};
@@ -155,6 +157,9 @@ enum Format {
 
 /// Format of a file by its first bytes.
 fn format(path: &Path) -> Result<Format> {
+    if own(path).is_some() {
+        return Ok(Format::OpenVdb);
+    }
     let mut start = Vec::new();
     source::open(path)?.take(8).read_to_end(&mut start).map_err(|e| Error::read(path, e))?;
     if start == openvdb::MAGIC {

@@ -2,9 +2,10 @@
 
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
+use super::own;
 use crate::util::budget::Budget;
 use crate::util::error::{Error, Result};
 
@@ -31,10 +32,15 @@ pub(super) fn budget(bytes: u64) -> Budget {
     Budget::new(bytes, COARSER)
 }
 
+/// Bytes on the disk or in the program.
+trait Input: Read + Seek {}
+
+impl<T: Read + Seek> Input for T {}
+
 /// A file with a position.
 pub(super) struct Source {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<Box<dyn Input>>,
     at: u64,
     end: u64,
     /// Name of the grid that is being read, for errors.
@@ -43,8 +49,14 @@ pub(super) struct Source {
 
 impl Source {
     pub fn open(path: &Path) -> Result<Source> {
-        let file = open(path)?;
-        let end = file.metadata().map_err(|e| Error::read(path, e))?.len();
+        let (file, end): (Box<dyn Input>, u64) = match own(path) {
+            Some(bytes) => (Box::new(Cursor::new(bytes)), bytes.len() as u64),
+            None => {
+                let file = open(path)?;
+                let end = file.metadata().map_err(|e| Error::read(path, e))?.len();
+                (Box::new(file), end)
+            }
+        };
         let file = BufReader::with_capacity(1 << 16, file);
         Ok(Source { path: path.into(), file, at: 0, end, grid: String::new() })
     }

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use super::param::{key_of_volume, split_volume_key};
 use super::{Limits, MAX_LIGHTS, Place, Raw, Values, measured, meshes, presets, volumes};
 use crate::curve::{CurveShape, levels_for};
+use crate::grid;
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
 use crate::light::strand::StrandParams;
@@ -361,9 +362,10 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
 }
 
 /// Resolves a reference inside the scene's folder or an allowed one, and follows links. Without a folder the
-/// reference is trusted. The meshes of presets are no files, and stay as they are.
+/// reference is trusted. The meshes and grids of presets are no files, and stay as they are.
 pub(super) fn confine(key: &str, file: &Path, folder: Option<&Path>, allowed: &[PathBuf]) -> Result<PathBuf> {
-    let Some(folder) = folder.filter(|_| presets::mesh(file).is_none()) else { return Ok(file.to_owned()) };
+    let is_own = presets::mesh(file).is_some() || grid::own(file).is_some();
+    let Some(folder) = folder.filter(|_| !is_own) else { return Ok(file.to_owned()) };
     let joined = folder.join(file);
     let real = joined.canonicalize().map_err(|e| {
         Error::input(

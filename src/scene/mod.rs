@@ -49,6 +49,7 @@ pub use typed::{fraction, parse_value};
 pub use value::{Key, Place, Raw, Value, Values};
 pub use volumes::{MAX_VOLUMES, Recipe};
 
+use crate::grid;
 use crate::light::environment::{self, Environment, EnvironmentMemo};
 use crate::light::haze::Haze;
 use crate::light::scatter::media::Media;
@@ -386,12 +387,13 @@ impl Scene {
 
     /// Returns the files that the scene refers to, resolved, with the keys that name them.
     pub fn references(&self) -> Vec<(String, PathBuf)> {
-        let volume = |recipe: &Recipe| Some((recipe.file_key(), recipe.file.clone()?));
+        let on_disk = |file: &PathBuf| grid::own(file).is_none();
+        let volume = |recipe: &Recipe| Some((recipe.file_key(), recipe.file.clone().filter(on_disk)?));
         let map = self.environment.as_ref().and_then(|e| match &e.source {
             environment::Source::File(path) => Some(("environment.file".to_owned(), path.clone())),
             environment::Source::Sky(_) => None,
         });
-        // The program brings the presets' own meshes.
+        // The program brings the presets' own meshes and grids.
         let own = self.meshes.iter().filter(|mesh| presets::mesh(&mesh.file).is_none());
         let meshes = own.map(|m| (format!("meshes.{}.file", m.name), m.file.clone()));
         self.recipes.iter().filter_map(volume).chain(map).chain(meshes).collect()

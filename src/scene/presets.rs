@@ -9,6 +9,7 @@ type Preset = (&'static str, &'static str, &'static str);
 const MESHES: &[(&str, &[u8])] = &[
     ("taki:cliff.glb", include_bytes!("../../assets/meshes/cliff.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
+    ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
 ];
 
 /// Returns the content of a preset's mesh.
@@ -50,6 +51,7 @@ const PRESETS: &[Preset] = &[
         include_str!("../../assets/scenes/cliff.toml"),
     ),
     ("torus", "fur on a ring: fibres on a mesh", include_str!("../../assets/scenes/torus.toml")),
+    ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",
         "the paper's figure 5: a 40×40×40 volume on 8 quads",

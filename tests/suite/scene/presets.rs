@@ -2,10 +2,11 @@
 //!
 //! `TAKI_BLESS=1 tests/run presets` rewrites the snapshots. Look at each before you keep it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};
 use taki::engine::{RenderOptions, cpu};
+use taki::grid;
 use taki::output::frame::{Difference, Tolerance, encode_png, read_png};
 use taki::picture::Frame;
 use taki::scene::{Scene, presets};
@@ -66,6 +67,23 @@ fn the_gpu_engine_gives_the_same_figures() {
 fn a_snapshot_of_another_figure_does_not_pass() {
     let frame = on_cpu(&scene("fig6", &SMALL));
     assert!(std::panic::catch_unwind(|| assert_like_snapshot("fig5", &frame)).is_err());
+}
+
+#[test]
+fn the_program_brings_the_grids_of_presets() {
+    let file = Path::new("taki:pour.vdb");
+    let named = |name: &str| {
+        let grid = grid::read(file, name, 1 << 30).expect("a grid");
+        (grid.channels(), grid.bounds().expect("water").size())
+    };
+    let listed = grid::list(file, 1 << 30).expect("grids");
+    assert_eq!(listed.iter().map(|own| own.name.as_str()).collect::<Vec<_>>(), ["density", "velocity"]);
+    // The velocity has half the voxels along each side.
+    assert_eq!((named("density").0, named("velocity")), (1, (3, [36, 31, 55])));
+    assert!(grid::list(Path::new("taki:none.vdb"), 1 << 30).is_err());
+    let scene = scene("pour", &[]);
+    assert_eq!(scene.references(), [], "none lies on the disk");
+    assert_eq!(scene.recipes[0].water.size, named("density").1.map(|n| n as u32));
 }
 
 #[test]
