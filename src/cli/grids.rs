@@ -14,6 +14,8 @@ struct Entry {
     summary: Summary,
     /// Numbers of a sample, active samples, their bounds and their statistics.
     read: Option<(usize, u64, Option<Bounds>, Option<Statistics>)>,
+    /// What was changed on reading.
+    note: Option<String>,
 }
 
 /// Prints the grids of a file with statistics of those that can be read.
@@ -28,17 +30,20 @@ pub fn info(file: &Path, as_json: bool, memory: u64, terminal: &Terminal) -> Res
     let mut failed = None;
     for (done, mut summary) in summaries.into_iter().enumerate() {
         terminal.progress("reading", done as u64, total)?;
-        let mut found = None;
+        let (mut found, mut note) = (None, None);
         if summary.refusal.is_none() {
             match read(file, &summary.name, memory) {
-                Ok(grid) => found = Some(numbers(&grid)),
+                Ok(grid) => {
+                    note = grid.note();
+                    found = Some(numbers(&grid));
+                }
                 Err(error) => {
                     summary.refusal = Some(error.to_string());
                     failed.get_or_insert(error);
                 }
             }
         }
-        entries.push(Entry { summary, read: found });
+        entries.push(Entry { summary, read: found, note });
     }
     terminal.close();
     match as_json {
@@ -93,6 +98,9 @@ impl Entry {
                 [&found.min, &found.max, &mean].map(|value| components(&value[..*channels]));
             lines.push(format!("  values     {min} to {max}, mean {mean}"));
         }
+        if let Some(note) = &self.note {
+            lines.push(format!("  note       {note}"));
+        }
         if let Some(why) = &summary.refusal {
             lines.push(format!("  not read   {why}"));
         }
@@ -114,6 +122,7 @@ impl Entry {
                 let row = |a: usize| [x[a], y[a], z[a], t.translation.to_array()[a]];
                 [row(0), row(1), row(2)]
             }),
+            "note": self.note,
             "not_read": summary.refusal,
         });
         if let Some((channels, active, bounds, found)) = &self.read {

@@ -19,6 +19,8 @@ pub struct Misplaced;
 pub struct Builder {
     channels: usize,
     background: [f32; 3],
+    /// See [`Grid::mended`].
+    pub(super) mended: u64,
     store: Store,
 }
 
@@ -29,7 +31,7 @@ impl Builder {
     /// Panics at any other number.
     pub fn new(channels: usize, background: [f32; 3]) -> Builder {
         assert!(channels == 1 || channels == 3, "{channels} channels");
-        Builder { channels, background, store: Store::default() }
+        Builder { channels, background, mended: 0, store: Store::default() }
     }
 
     /// Value where no block is.
@@ -136,6 +138,7 @@ impl Builder {
             class,
             to_world,
             background: self.background,
+            mended: self.mended,
             channels: self.channels,
             bounds: None,
             active: 0,

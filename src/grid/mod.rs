@@ -5,7 +5,8 @@
 //! [blocks](Grid::blocks) of 8×8×8 samples and constant tiles; what no block covers has the background.
 //!
 //! Files are not trusted. The memory that a grid takes is known before it is taken, all of its numbers are
-//! finite, and a fault is reported with its file, its grid and its byte.
+//! finite (those that no active sample has are [mended](Grid::mended)), and a fault is reported with its file,
+//! its grid and its byte.
 //!
 //! # Conventions
 //!
@@ -121,6 +122,11 @@ pub fn is_grid(path: &Path) -> bool {
         Some("npz") => npz::has_grids(path),
         _ => false,
     }
+}
+
+/// Whether a file of OpenVDB starts with these bytes.
+pub(crate) fn starts_vdb(start: &[u8]) -> bool {
+    start.starts_with(&openvdb::MAGIC)
 }
 
 /// Lists the grids of a file (.vdb, .nvdb, .npz) without reading their voxels. The content decides which

@@ -14,6 +14,18 @@ pub struct Statistics {
 }
 
 impl Grid {
+    /// Tells of numbers that were not finite where nothing is active; `None` where all were.
+    pub fn note(&self) -> Option<String> {
+        let count = self.mended;
+        (count > 0).then(|| {
+            format!(
+                "the grid {:?} has {count} numbers outside of its active samples that are not finite; the \
+                 background stands for them",
+                self.name
+            )
+        })
+    }
+
     /// Statistics of the active samples; `None` where there are none.
     pub fn statistics(&self) -> Option<Statistics> {
         let channels = self.channels();

@@ -34,6 +34,9 @@ pub struct Grid {
     pub to_world: DAffine3,
     /// Value where no block is. A scalar stands in the first component, and the others are 0.
     pub background: [f32; 3],
+    /// Numbers outside of the active samples that were not finite in the file: they became the background, or
+    /// 0 if that was not finite itself.
+    pub mended: u64,
     pub(super) channels: usize,
     pub(super) bounds: Option<Bounds>,
     pub(super) active: u64,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use super::ahead::Ahead;
 use crate::scene::{Cost, Recipe, Scene};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
@@ -19,6 +20,7 @@ pub struct VolumeMemo {
     last: Vec<Remembered>,
     all: Arc<Vec<VolumeTexture>>,
     cache: Option<Cache>,
+    ahead: Ahead,
 }
 
 /// A volume of the last scene.
@@ -31,7 +33,7 @@ struct Remembered {
 
 /// The input that a volume was made from.
 #[derive(Clone, PartialEq)]
-enum Source {
+pub(super) enum Source {
     Water(WaterSpec, Storage),
     File {
         path: PathBuf,
@@ -57,6 +59,21 @@ impl VolumeMemo {
         self.cache = None;
     }
 
+    /// Starts to read the files of a scene that comes next, beside other work and within `memory` bytes.
+    /// [`VolumeMemo::volumes`] takes what was read if the files are still the same then.
+    pub fn read_ahead(&mut self, scene: Scene, memory: u64) {
+        let is_new = |recipe: &Recipe| {
+            let source = Source::of(recipe);
+            !self.last.iter().any(|old| old.name == recipe.name && old.source == source)
+        };
+        let recipes = scene.recipes.iter().enumerate();
+        let wanted: Vec<usize> =
+            recipes.filter(|(_, recipe)| recipe.file.is_some() && is_new(recipe)).map(|(i, _)| i).collect();
+        if !wanted.is_empty() && memory > 0 {
+            self.ahead.start(scene, wanted, memory);
+        }
+    }
+
     /// Returns the scene's volumes and how much work they took, that of the costliest: `None` if the
     /// remembered volumes fit unchanged. `memory` is the budget for building them, bytes.
     ///
@@ -70,6 +87,7 @@ impl VolumeMemo {
     ) -> Result<(Arc<Vec<VolumeTexture>>, Option<Cost>)> {
         let (mut now, mut made, mut dearest): (Vec<Remembered>, Vec<VolumeTexture>, _) =
             (Vec::new(), Vec::new(), None);
+        let mut early = self.ahead.take();
         for (number, recipe) in scene.recipes.iter().enumerate() {
             let source = Source::of(recipe);
             let old = self.last.iter().find(|old| old.name == recipe.name);
@@ -85,6 +103,11 @@ impl VolumeMemo {
                         set_density_and_reflection(new, &mut changed.cells);
                         (changed, Some(Cost::Upload))
                     }
+                }
+                _ if let Some(i) = early.iter().position(|e| e.name == recipe.name && e.source == source) => {
+                    let own = early.swap_remove(i);
+                    own.notes.iter().for_each(|note| monitor.warn(note));
+                    (own.volume, Some(Cost::Volume))
                 }
                 _ => {
                     let memory = scene.memory_for(number, &made, memory);
@@ -114,7 +137,7 @@ impl VolumeMemo {
 
 impl Source {
     /// The input of a scene's volume.
-    fn of(recipe: &Recipe) -> Source {
+    pub fn of(recipe: &Recipe) -> Source {
         let Recipe { water, measured, file, storage, asked_storage, .. } = recipe;
         match file {
             None => Source::Water(*water, *storage),

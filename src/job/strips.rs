@@ -105,6 +105,12 @@ pub fn spare_for_rasters(memory: u64, needed: u64) -> u64 {
     (memory.saturating_sub(needed).saturating_sub(PROGRAM_BYTES) / 2).min(256 << 20)
 }
 
+/// Bytes that reading the next picture's volumes may take meanwhile. `held` bytes are those of the volumes of
+/// this picture, and the writer may still hold as many of the one before.
+pub fn spare_for_next(memory: u64, needed: u64, held: u64) -> u64 {
+    (memory.saturating_sub(needed).saturating_sub(PROGRAM_BYTES) / 2).saturating_sub(2 * held)
+}
+
 /// Cuts a window into strips of at most `most` rows. Where possible, strips end between raster windows,
 /// which have `drawn` rows each; else they divide one raster window evenly.
 fn cut(window: Window, drawn: u32, most: u32) -> Vec<Window> {

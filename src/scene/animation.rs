@@ -4,6 +4,7 @@
 //! frame f is frame f mod N, so frame N equals frame 0 to the last bit. Frames before 0 are as good
 //! as others.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
@@ -12,8 +13,9 @@ use super::keyframes::{CameraPath, Interpolation, Keyframes};
 use super::names::check_names;
 use super::param::{Kind, Param, split_volume_key};
 use super::read::{Source, apply_sets};
+use super::sequence::Sequence;
 use super::value::{Place, Raw, Value, Values};
-use super::{Limits, Record, Scene, expose, meshes};
+use super::{Limits, Record, Scene, expose, meshes, volumes};
 use crate::util::error::{Error, Result};
 
 /// A scene and its motion.
@@ -178,6 +180,29 @@ impl Animation {
         Animation { measured: Some(stops), ..self }
     }
 
+    /// Checks that every file of a sequence is there which these frames read.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the first files that are missing.
+    pub fn check_files(&self, frames: &[i32]) -> Result<()> {
+        let folder = self.folder.as_deref();
+        let shown = volumes::shown(&self.values);
+        for sequence in shown.iter().filter_map(|name| Sequence::of(&self.values, name, folder)) {
+            let first = self.values.int(&sequence.frame);
+            let track = self.tracks.iter().find(|(key, _)| *key == sequence.frame);
+            let numbers = frames.iter().map(|&frame| {
+                let number = self.period.map_or(frame, |n| frame.rem_euclid(n as i32));
+                match track {
+                    Some((_, track)) => track.at(number.into())[0].round() as i64,
+                    None => first + i64::from(number),
+                }
+            });
+            let numbers: BTreeSet<i64> = numbers.collect();
+            sequence.check(&numbers.into_iter().collect::<Vec<_>>(), folder)?;
+        }
+        Ok(())
+    }
+
     /// Returns the scene of a frame. It contains nothing of the animation: printed as a scene file, it gives
     /// the same picture.
     ///
@@ -195,6 +220,11 @@ impl Animation {
             let moved = (self.flow.0 * time / self.flow.1) % 1.0;
             let flow = f64::from(values.float("volume.flow")) + moved;
             values.set("volume.flow", &Raw::Float(flow), &place("volume.flow"))?;
+        }
+        for name in volumes::names(&values).iter().filter(|_| number != 0) {
+            let Some(sequence) = Sequence::of(&values, name, self.folder.as_deref()) else { continue };
+            let now = values.int(&sequence.frame) + i64::from(number);
+            values.set(&sequence.frame, &Raw::Int(now), &place(&sequence.frame))?;
         }
         for (key, track) in &self.tracks {
             values.set(key, &raw(key, &track.at(time)), &place(key))?;

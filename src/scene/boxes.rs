@@ -13,7 +13,7 @@ use crate::light::{Scattering, Visibility};
 use crate::mapping::shell::{HullFace, Inside, Shell, ShellFault};
 use crate::trace::AttenuationKind;
 use crate::util::error::{Error, Result};
-use crate::volume::VelocityNames;
+use crate::volume::{VelocityNames, VolumeTexture};
 
 /// Cells between the corners where V and shadows are kept, along x and y. With 16, the limit of shells,
 /// shadows of smoke are visibly coarse; with 4, V takes four times as much memory and the paths of rays have
@@ -52,11 +52,16 @@ impl SceneBox {
         let number = recipes.iter().position(|recipe| recipe.name == volume);
         let number = number.expect("a volume that a box shows has a recipe");
         let recipe = &recipes[number];
-        let own = recipe.world_from_texture().unwrap_or_else(|| {
-            let size = DVec3::from_array(recipe.water.size.map(f64::from));
-            let sides = size / size.max_element();
-            DAffine3::from_scale_rotation_translation(sides, glam::DQuat::IDENTITY, -sides / 2.0)
-        });
+        let own = recipe.world_from_texture().unwrap_or_else(|| VolumeTexture::unit_box(recipe.water.size));
+        let moved = ["position", "size", "turn"].map(key).into_iter().find(|key| v.is_set(key));
+        if let Some(moved) = moved.filter(|_| recipe.is_sequence && recipe.measured.is_some()) {
+            return Err(Error::input(
+                format!("{moved}: the volume {volume} is a sequence, whose bounds change from file to file"),
+                format!(
+                    "leave {moved} out: each file stands where the simulation was; move the rest instead"
+                ),
+            ));
+        }
         let mut axes = own.matrix3;
         if v.is_set(&key("size")) {
             let size = v.point(&key("size"));

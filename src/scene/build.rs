@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec3};
 
 use super::param::{key_of_volume, split_volume_key};
-use super::{Limits, MAX_LIGHTS, Place, Raw, Values, measured, meshes, presets, volumes};
+use super::{Limits, MAX_LIGHTS, Place, Raw, Values, measured, meshes, presets, sequence, volumes};
 use crate::curve::{CurveShape, levels_for};
 use crate::grid;
 use crate::light::environment::{Environment, Settings, Sky, Source};
@@ -97,8 +97,8 @@ pub(super) fn volume_file(
     let key = key_of_volume(name, "volume.file");
     match v.text(&key) {
         file if file.is_empty() || measured::is_measured(v, name) => Ok(None),
-        file => {
-            let file = confine(&key, Path::new(&file), folder, &limits.allow_paths)?;
+        _ => {
+            let file = sequence::file(v, name, &key, folder, limits)?;
             check_npz(&file)?;
             Ok(Some(file))
         }
@@ -354,7 +354,11 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
     if file.is_empty() || unused || is_other || hidden || is_left_out {
         return Ok(());
     }
-    let whole = confine(key, Path::new(&file), folder, allowed)?;
+    let numbered = match is_source {
+        Some(_) => sequence::resolve(key, Path::new(&file), folder, allowed)?,
+        None => None,
+    };
+    let whole = numbered.map_or_else(|| confine(key, Path::new(&file), folder, allowed), Ok)?;
     let whole = whole.into_os_string().into_string().map_err(|path| {
         Error::input(format!("{key}: {} is not UTF-8", path.display()), "rename its folders")
     })?;

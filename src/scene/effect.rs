@@ -7,6 +7,7 @@ use super::meshes::{self, Carrier, Projection};
 use super::names::full_key;
 use super::param::{key_of_volume, matches, split_volume_key};
 use super::read::split;
+use super::sequence::{self, Sequence};
 use super::volumes;
 use crate::light::{LightKind, ReflectionKind, Visibility};
 use crate::mapping::shell::Side;
@@ -77,6 +78,7 @@ const OF_GRIDS: &[&str] = &[
     "volume.strands",
     "volume.velocity",
     "volume.velocity_at",
+    "volume.voxels",
 ];
 
 const RULES: &[Rule] = &[
@@ -293,9 +295,21 @@ pub fn without_effect(values: &Values, key: &str) -> Option<String> {
     if let Some(why) = without_volume(values, key).or_else(|| without_water(values, key)) {
         return Some(why);
     }
+    if let Some(why) = without_sequence(values, key) {
+        return Some(why);
+    }
     let (rule, switch) = rule(values, key)?;
     let now = values.get(&switch).to_toml();
     Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
+}
+
+/// Returns why the number of a volume's file has no effect: no name has a place for it.
+fn without_sequence(values: &Values, key: &str) -> Option<String> {
+    let (volume, _) = split_volume_key(key).filter(|(_, own)| *own == "volume.frame")?;
+    let file = sequence::key_of(values, volume);
+    let is_single = Sequence::of(values, volume, None).is_none();
+    is_single
+        .then(|| format!("{key} has no effect: {file} has no #### in its name, in the place of a number"))
 }
 
 /// Keys of meshes that place the volume.

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::build::confine;
 use super::param::key_of_volume;
+use super::sequence::{self, Sequence};
 use super::{Limits, Values};
+use crate::grid::Bounds;
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 use crate::volume::{
@@ -49,7 +50,8 @@ pub(super) fn measured(
             format!("give {} the .vdb, .nvdb or .npz of a simulation", key("volume.source")),
         ));
     }
-    let path = confine(&key("volume.source"), Path::new(&file), folder, &limits.allow_paths)?;
+    let path = sequence::file(v, name, &key("volume.source"), folder, limits)?;
+    let is_sequence = Sequence::of(v, name, folder).is_some();
     let reflect = v.choice(&key("volume.reflect"), ReflectBy::from_word);
     let second = v.text(&key("volume.reflect_grid"));
     if reflect == ReflectBy::Grid && second.is_empty() {
@@ -62,6 +64,7 @@ pub(super) fn measured(
         density: v.text(&key("volume.grid")),
         velocity: v.text(&key("volume.velocity")),
         second: (reflect == ReflectBy::Grid).then_some(second),
+        may_be_empty: is_sequence,
     };
     let (velocity, bounds, to_world) = find_measured(&path, &wanted, limits.memory)?;
     let strands = strands(v, name);
@@ -71,17 +74,35 @@ pub(super) fn measured(
             format!("name its grid in {}, or set {} to 0", key("volume.velocity"), key("volume.strands")),
         ));
     }
-    let voxels = bounds.size();
+    let [cells_key, edge_key] = ["volume.cells", "volume.voxels"].map(key);
+    let (asked, edge) = (v.count(&cells_key), v.count(&edge_key));
+    if asked != 0 && (is_sequence || edge > 1) {
+        let why = match is_sequence {
+            true => "the cells of a sequence would change their size from file to file".into(),
+            false => format!("{edge_key} = {edge} gives the size of the cells too"),
+        };
+        return Err(Error::input(
+            format!("{cells_key} = {asked}: {why}"),
+            format!("set {cells_key}=0, and {edge_key} to the voxels along an edge of a cell"),
+        ));
+    }
+    let bounds = whole_cells(bounds, edge).ok_or_else(|| {
+        Error::input(
+            format!("{}: the grid {:?} reaches the greatest index", path.display(), wanted.density),
+            format!("set {edge_key}=1"),
+        )
+    })?;
+    let voxels = bounds.size().map(|n| n / u64::from(edge));
     let longest = voxels.into_iter().max().unwrap_or(1);
-    let cells = match v.count(&key("volume.cells")) {
+    let cells = match asked {
         0 => longest,
         n if strands.is_some() => n.into(),
         n => u64::from(n).min(longest),
     };
     if cells > MOST_CELLS {
         return Err(Error::input(
-            format!("{}: the grid {:?} has {longest} voxels along a side", path.display(), wanted.density),
-            format!("set {} to {MOST_CELLS} or less, or crop the grid", key("volume.cells")),
+            format!("{}: the grid {:?} has {longest} cells along a side", path.display(), wanted.density),
+            format!("set {cells_key} to {MOST_CELLS} or less, or raise {edge_key}, or crop the grid"),
         ));
     }
     let size = voxels.map(|n| ((n as f64 * cells as f64 / longest as f64).round() as u32).max(1));
@@ -121,4 +142,14 @@ fn strands(v: &Values, name: &str) -> Option<StrandSpec> {
         k_noise: float("volume.k_noise"),
         seed: v.int(&key_of_volume(name, "volume.seed")) as u64,
     })
+}
+
+/// Returns bounds that reach out to multiples of `edge`; `None` where these are no indices.
+fn whole_cells(bounds: Bounds, edge: u32) -> Option<Bounds> {
+    let edge = i64::from(edge);
+    let low = |x: i32| i32::try_from(i64::from(x).div_euclid(edge) * edge).ok();
+    let high = |x: i32| i32::try_from((i64::from(x).div_euclid(edge) + 1) * edge - 1).ok();
+    let all =
+        |from: [i32; 3], to: &dyn Fn(i32) -> Option<i32>| Some([to(from[0])?, to(from[1])?, to(from[2])?]);
+    Some(Bounds { min: all(bounds.min, &low)?, max: all(bounds.max, &high)? })
 }

@@ -19,6 +19,7 @@ mod quads;
 mod read;
 mod record;
 mod remove;
+mod sequence;
 mod slips;
 mod typed;
 mod value;

@@ -7,6 +7,7 @@ use glam::DAffine3;
 
 use super::names::likeliest;
 use super::param::{PARAMS, WATER, key_of_volume, split_volume_key};
+use super::sequence::Sequence;
 use super::{Limits, Parts, Scene, Values, boxes, build, measured, meshes};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
@@ -33,6 +34,8 @@ pub struct Recipe {
     pub measured: Option<MeasuredSpec>,
     /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, or the simulation's.
     pub file: Option<PathBuf>,
+    /// Whether the file is one of a sequence, in which each frame has its own.
+    pub is_sequence: bool,
     /// Storage of the cells.
     pub storage: Storage,
     /// Storage that the scene asks for.
@@ -60,6 +63,7 @@ impl Recipe {
             water,
             measured,
             file,
+            is_sequence: Sequence::of(v, name, folder).is_some(),
             storage: Storage::Dense,
             asked_storage: build::asked_storage(v, name)?,
             flow,
@@ -349,6 +353,15 @@ impl Scene {
         let pyramid = self.has_pyramid();
         let later = self.recipes[number + 1..].iter().map(|recipe| recipe.bytes(pyramid)).sum::<u128>();
         memory.saturating_sub(held).saturating_sub(u64::try_from(later).unwrap_or(u64::MAX))
+    }
+
+    /// Transform from texture coordinates of a built volume to the world, metres: that of the first box that
+    /// shows it, or its own place, or a box around the origin whose longest side is 1.
+    pub(crate) fn place_of(&self, number: usize, volume: &VolumeTexture) -> DAffine3 {
+        let shown = self.boxes.iter().find(|own| own.volume as usize == number);
+        let shown = shown.map(|own| own.world_from_texture);
+        let own = || self.recipes[number].world_from_texture();
+        shown.or_else(own).unwrap_or_else(|| VolumeTexture::unit_box(volume.size))
     }
 
     /// Builds or reads volume `number`, or takes it from the cache where it is stored there.

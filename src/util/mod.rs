@@ -1,5 +1,6 @@
 //! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk
-//! cache, confined paths, unit vectors, parts of an image, colour spaces, and EXR files of any program.
+//! cache, confined paths, numbered files, unit vectors, parts of an image, colour spaces, and EXR files of any
+//! program.
 
 pub(crate) mod budget;
 pub mod cache;
@@ -10,6 +11,7 @@ pub(crate) mod lane_powers;
 pub mod lanes;
 pub mod monitor;
 pub(crate) mod npy;
+pub(crate) mod numbering;
 pub mod open_exr;
 pub mod powers;
 pub mod random;

@@ -9,6 +9,7 @@ mod cell;
 mod cells;
 mod file;
 mod flow;
+mod grids;
 mod leaps;
 mod measured;
 mod pyramid;

@@ -65,16 +65,28 @@ impl Nodes<'_> {
         Ok(())
     }
 
-    /// Reads a finite value.
-    fn value(&self, at: usize) -> Result<[f32; 3]> {
+    /// Reads a value, which need not be finite.
+    fn any(&self, at: usize) -> Result<[f32; 3]> {
         let outside = || Fault::Broken(at, "a value lies outside the grid".into());
         let mut value = [0.0; 3];
         for (i, x) in value.iter_mut().take(self.values.channels()).enumerate() {
             *x = self.memory.f32(at + 4 * i).ok_or_else(outside)?;
         }
-        match value.iter().all(|x| x.is_finite()) {
-            true => Ok(value),
-            false => Err(Fault::Broken(at, format!("it has the value {value:?}"))),
+        Ok(value)
+    }
+
+    /// Reads the value of a tile. Numbers that are not finite are refused in an active one, and become the
+    /// background in another.
+    fn value(&self, at: usize, is_active: bool, builder: &mut Builder) -> Result<[f32; 3]> {
+        let value = self.any(at)?;
+        match value.iter().filter(|x| !x.is_finite()).count() {
+            0 => Ok(value),
+            _ if is_active => Err(Fault::Broken(at, format!("it has the value {value:?}"))),
+            count => {
+                builder.mended += count as u64;
+                let background = builder.background();
+                Ok(std::array::from_fn(|a| if value[a].is_finite() { value[a] } else { background[a] }))
+            }
         }
     }
 
@@ -85,8 +97,10 @@ impl Nodes<'_> {
         let bytes =
             count.checked_mul(entry).and_then(|table| table.checked_add(before)).ok_or_else(outside)?;
         self.enter(root, bytes)?;
-        let background = self.value(root + 28)?;
-        let mut builder = Builder::new(self.values.channels(), background);
+        let background = self.any(root + 28)?;
+        let finite = background.map(|x| if x.is_finite() { x } else { 0.0 });
+        let mut builder = Builder::new(self.values.channels(), finite);
+        builder.mended = background.iter().filter(|x| !x.is_finite()).count() as u64;
         builder.reserve(self.leaves);
         for i in 0..count {
             let at = root + before + entry * i;
@@ -99,7 +113,7 @@ impl Nodes<'_> {
                 self.read_node(&mut builder, UPPER, at, origin)?;
             } else {
                 let state = self.memory.u32(at + 16).ok_or_else(outside)?;
-                let value = self.value(at + 20)?;
+                let value = self.value(at + 20, state != 0, &mut builder)?;
                 self.take(TILE_BYTES)?;
                 let placed = builder.tile(origin, 1 << (UPPER + LOWER + LEAF), value, state != 0);
                 placed.map_err(|e| Fault::Broken(at, e.to_string()))?;
@@ -145,7 +159,7 @@ impl Nodes<'_> {
                 if !bit(active) && numbers.iter().zip(&background[..channels]).all(same) {
                     continue;
                 }
-                let value = self.value(item)?;
+                let value = self.value(item, bit(active), builder)?;
                 self.take(TILE_BYTES)?;
                 let placed = builder.tile(place(), 1 << child_bits, value, bit(active));
                 placed.map_err(|e| Fault::Broken(at, e.to_string()))?;
@@ -197,6 +211,14 @@ impl Nodes<'_> {
                 let step = memory.f32(at + 84).ok_or_else(outside)?;
                 let value = |i: usize| code(data, bits as usize, i) as f32 * step + least;
                 self.buffer.extend((0..512).map(value));
+            }
+        }
+        let background = builder.background();
+        for (i, value) in self.buffer.iter_mut().enumerate().filter(|(_, x)| !x.is_finite()) {
+            let n = i / channels;
+            if mask[n / 8] >> (n % 8) & 1 == 0 {
+                *value = background[i % channels];
+                builder.mended += 1;
             }
         }
         if let Some(i) = self.buffer.iter().position(|x| !x.is_finite()) {

@@ -24,11 +24,13 @@ pub(super) fn read_tree(
     let mut values = ValueReader::new(kind, flags);
     let largest = 1 << (3 * upper.max(lower).max(leaf));
     budget.take(values.most_bytes(largest).into(), || source.place())?;
-    values.background = values.read_one(source)?;
+    let background = values.read_one(source)?;
+    values.background = values.mended_one(background);
     let builder = Builder::new(kind.channels, values.background);
     let mut tree = Tree { source, budget, values, builder, dims, leaves: Vec::new(), masks: Vec::new() };
     tree.read_root()?;
     tree.read_leaves()?;
+    tree.builder.mended = tree.values.mended;
     Ok(tree.builder)
 }
 
@@ -66,8 +68,13 @@ impl Tree<'_> {
         for _ in 0..tiles {
             let at = self.source.at();
             let origin = self.source.index()?;
-            let value = self.values.read_one(self.source)?;
+            let mut value = self.values.read_one(self.source)?;
             let is_active = self.source.u8()? != 0;
+            if !is_active {
+                value = self.values.mended_one(value);
+            } else if value.iter().any(|x| !x.is_finite()) {
+                return Err(self.not_finite(at, origin));
+            }
             self.take(TILE_BYTES + region_of_tile(side))?;
             self.builder.tile(origin, side, value, is_active).map_err(|e| self.source.fault(at, e))?;
         }
@@ -103,6 +110,7 @@ impl Tree<'_> {
             std::array::from_fn(|a| origin[a] + (local[a] << child_bits))
         };
         let background = self.values.background;
+        self.values.mend(|i| !bit(&children, i) && !bit(&active, i));
         for i in (0..count).filter(|&i| !bit(&children, i)) {
             let own = &self.values.values[channels * i..][..channels];
             let is_active = bit(&active, i);
@@ -148,6 +156,7 @@ impl Tree<'_> {
             let at = self.source.at();
             self.source.bytes(1 << (3 * log - 3), &mut mask)?;
             self.values.read(self.source, &mask)?;
+            self.values.mend(|i| !bit(&mask, i));
             if let Some(i) = self.values.values.iter().position(|x| !x.is_finite()) {
                 let i = i / channels;
                 let local = [i >> (2 * log), i >> log, i];

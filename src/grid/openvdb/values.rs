@@ -119,6 +119,8 @@ pub(super) struct ValueReader {
     selection: Vec<u8>,
     /// Values of the node that was read last, with their channels side by side.
     pub values: Vec<f32>,
+    /// Numbers that were not finite and whose samples are not active.
+    pub mended: u64,
 }
 
 impl ValueReader {
@@ -133,6 +135,7 @@ impl ValueReader {
             packed: Vec::new(),
             selection: Vec::new(),
             values: Vec::new(),
+            mended: 0,
         }
     }
 
@@ -141,16 +144,28 @@ impl ValueReader {
         count * (2 * self.kind.bytes() + 8 * self.kind.channels) as u64 + (64 << 10)
     }
 
-    /// Reads one value.
+    /// Reads one value, which need not be finite.
     pub fn read_one(&mut self, source: &mut Source) -> Result<[f32; 3]> {
-        let at = source.at();
         source.bytes(self.kind.bytes() as u64, &mut self.raw)?;
         self.packed.clear();
         Kind { is_half: false, ..self.kind }.decode(&self.raw, &mut self.packed);
-        let value = std::array::from_fn(|a| self.packed.get(a).copied().unwrap_or(0.0));
-        match value.iter().all(|x| x.is_finite()) {
-            true => Ok(value),
-            false => Err(source.fault_with(at, format!("it has the value {value:?}"), FINITE)),
+        Ok(std::array::from_fn(|a| self.packed.get(a).copied().unwrap_or(0.0)))
+    }
+
+    /// Returns a value that no active sample has, with the background for numbers that are not finite.
+    pub fn mended_one(&mut self, value: [f32; 3]) -> [f32; 3] {
+        self.mended += value.iter().filter(|x| !x.is_finite()).count() as u64;
+        std::array::from_fn(|a| if value[a].is_finite() { value[a] } else { self.background[a] })
+    }
+
+    /// Gives those values of the node that was read last the background which are not finite and `is_off`.
+    pub fn mend(&mut self, is_off: impl Fn(usize) -> bool) {
+        let channels = self.kind.channels;
+        for (i, value) in self.values.iter_mut().enumerate() {
+            if !value.is_finite() && is_off(i / channels) {
+                *value = self.background[i % channels];
+                self.mended += 1;
+            }
         }
     }
 

@@ -27,6 +27,7 @@ pub use pattern::Pattern;
 pub use report::{Event, Name, Summary, Watcher};
 pub use sweep::Sweep;
 
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -174,13 +175,10 @@ impl Batch {
         self.pictures.iter().map(|p| p.at(self.frame(number), &words)).collect()
     }
 
-    /// Scene of a picture.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if the scene is not valid at this frame and these values.
-    pub fn scene(&self, number: usize) -> Result<Scene> {
+    /// Animation with the sweeps' values at a picture.
+    fn animation(&self, number: usize) -> Result<Cow<'_, Animation>> {
         if self.sweeps.is_empty() {
-            return self.base.at(self.frame(number));
+            return Ok(Cow::Borrowed(&self.base));
         }
         let choice = self.choice(number);
         let changes: Vec<_> = choice
@@ -188,7 +186,15 @@ impl Batch {
             .zip(&self.sweeps)
             .map(|(&v, sweep)| (sweep.key.clone(), sweep.values[v].0.clone(), Place("--sweep".into())))
             .collect();
-        self.base.with(&changes)?.at(self.frame(number))
+        self.base.with(&changes).map(Cow::Owned)
+    }
+
+    /// Scene of a picture.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the scene is not valid at this frame and these values.
+    pub fn scene(&self, number: usize) -> Result<Scene> {
+        self.animation(number)?.at(self.frame(number))
     }
 
     /// Formats of the pictures.

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::output::frame::{Format, check_regular};
 use crate::output::movie::MovieKind;
 use crate::util::error::{Error, Result};
-
-/// Most digits that a placeholder may ask for. File systems allow names of 255 bytes.
-const MOST_DIGITS: usize = 200;
+use crate::util::numbering::{Notation, padded};
 
 /// The advice to number files.
 pub(crate) const NUMBER_IT: &str = "put #### where the frame's number goes, such as fall.####.png";
@@ -28,58 +26,6 @@ enum Part {
     Frame(usize),
     /// The value of the sweep with this index.
     Sweep(usize),
-}
-
-/// Notation of the frame's number in a file name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Notation {
-    /// `####`: one digit for each.
-    Hashes,
-    /// `%04d` or `%d`, as in C, FFmpeg and Nuke.
-    Percent,
-    /// `$F4` or `$F`, as in Houdini.
-    Dollar,
-    /// `@@@@`: one digit for each, at least two, as in Houdini's and RV's file sequences.
-    Ats,
-}
-
-impl Notation {
-    /// All notations. The first one that a name contains counts; the others are text in it.
-    const ALL: [Notation; 4] = [Notation::Hashes, Notation::Percent, Notation::Dollar, Notation::Ats];
-
-    /// Parses a placeholder at the start of a text. Returns its digits and its length in bytes.
-    fn parse(self, text: &str) -> Option<(usize, usize)> {
-        let run = |c: char, least: usize| {
-            let count = text.len() - text.trim_start_matches(c).len();
-            (count >= least).then_some((count, count))
-        };
-        let digits = |text: &str| text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-        let found = match self {
-            Notation::Hashes => run('#', 1),
-            Notation::Ats => run('@', 2),
-            Notation::Percent => {
-                let rest = text.strip_prefix('%')?;
-                let count = digits(rest);
-                let wide = count == 0 || rest.starts_with('0');
-                (wide && rest[count..].starts_with('d'))
-                    .then(|| (rest[..count].parse().unwrap_or(1), count + 2))
-            }
-            Notation::Dollar => {
-                let rest = text.strip_prefix("$F")?;
-                let count = digits(rest);
-                let ends = !rest[count..].starts_with(|c: char| c.is_alphanumeric());
-                (count > 0 || ends).then(|| (rest[..count].parse().unwrap_or(1), count + 2))
-            }
-        };
-        found.map(|(digits, bytes)| (digits.clamp(1, MOST_DIGITS), bytes))
-    }
-
-    /// Returns the notation of a file name, if it has one.
-    fn of(name: &str) -> Option<Notation> {
-        let occurs =
-            |notation: &Notation| name.char_indices().any(|(i, _)| notation.parse(&name[i..]).is_some());
-        Notation::ALL.into_iter().find(occurs)
-    }
 }
 
 impl Pattern {
@@ -206,8 +152,7 @@ impl Pattern {
         for part in &self.parts {
             match part {
                 Part::Text(text) => name.push(text),
-                // As in C, the sign of a frame before 0 counts among the characters.
-                Part::Frame(digits) => name.push(format!("{frame:0digits$}")),
+                Part::Frame(digits) => name.push(padded(frame.into(), *digits)),
                 Part::Sweep(sweep) => name.push(safe(&values[*sweep])),
             }
         }

@@ -30,6 +30,13 @@ impl Batch {
     /// [`Error::CannotCreate`] for outputs that cannot be written or are other pictures, [`Error::Memory`]
     /// for pictures that do not fit, or an error of the monitor.
     pub fn plan(base: Animation, mut request: Request, monitor: &dyn Monitor) -> Result<Batch> {
+        let frames: Vec<i32> = match &request.frames {
+            Some(frames) => frames.clone(),
+            None if !request.sweeps.is_empty() => vec![0],
+            None => (0..base.frames as i32).collect(),
+        };
+        // Measuring the exposure reads a file already.
+        base.check_files(&frames)?;
         // The volumes are made once more for the first picture, and warn then.
         let (base, measured) = exposed(base, &Unwarned(monitor))?;
         // A scene that is not valid is reported before the sweeps are read.
@@ -54,11 +61,6 @@ impl Batch {
                 )));
             }
         }
-        let frames = match &request.frames {
-            Some(frames) => frames.clone(),
-            None if !sweeps.is_empty() => vec![0],
-            None => (0..base.frames as i32).collect(),
-        };
         let points = sweeps.iter().try_fold(1usize, |n, s| n.checked_mul(s.values.len()));
         let count = points.and_then(|n| n.checked_mul(frames.len())).filter(|&n| n <= MAX_PICTURES);
         let Some(count) = count else {
@@ -125,6 +127,7 @@ impl Batch {
         };
         batch.check_names()?;
         batch.check_overviews()?;
+        batch.check_sequences()?;
         batch.check_scenes(monitor)?;
         batch.check_folders()?;
         batch.check_depth(monitor)?;
@@ -182,6 +185,19 @@ impl Batch {
             drop(Output::open(path)?);
         }
         Ok(())
+    }
+
+    /// Checks the files of sequences at every point of a grid that changes them.
+    fn check_sequences(&self) -> Result<()> {
+        let of_files = ["file", "source", "frame", "builder", "volume"];
+        let changes_files =
+            self.sweeps.iter().any(|s| of_files.iter().any(|own| s.key.rsplit('.').next() == Some(own)));
+        if !changes_files {
+            return Ok(());
+        }
+        (0..self.count())
+            .step_by(self.frames.len())
+            .try_for_each(|number| self.animation(number)?.check_files(&self.frames))
     }
 
     /// Checks the scenes of up to [`CHECKED_FRAMES`] pictures, spread evenly, and of the last one.

@@ -6,7 +6,9 @@ use super::Batch;
 use super::report::{Event, Name, Summary, Watcher};
 use super::writer::{Outcomes, Start, Writer};
 use crate::engine::{Engine, RenderOptions};
-use crate::job::{Asked, Claim, Claims, Still, VolumeMemo, beside_encoders, memory_of, spare_for_rasters};
+use crate::job::{
+    Asked, Claim, Claims, Still, VolumeMemo, beside_encoders, memory_of, spare_for_next, spare_for_rasters,
+};
 use crate::output::frame::remove_left_by;
 use crate::place::{Ground, Mesh};
 use crate::scene::Scene;
@@ -24,6 +26,10 @@ struct Work<'a> {
     claims: Claims,
     volumes: VolumeMemo,
     mesh: Option<(Ground, Mesh)>,
+    /// Picture that probably comes next.
+    next: Option<usize>,
+    /// Scene of a picture whose files are read ahead.
+    coming: Option<(usize, Scene)>,
     watcher: &'a dyn Watcher,
     /// Whether the scene's warnings have been shown.
     warned: bool,
@@ -61,6 +67,8 @@ impl Batch {
             claims: Claims::new(self.request.stale),
             volumes: VolumeMemo::with(self.base.limits().cache.clone()),
             mesh: None,
+            next: None,
+            coming: None,
             watcher,
             warned: false,
             summary: Summary { pictures, kept, auto_exposure: self.measured, ..Default::default() },
@@ -103,7 +111,8 @@ impl Work<'_> {
         while !numbers.is_empty() {
             let mut theirs = Vec::new();
             let mut who = String::new();
-            for number in numbers {
+            for (i, &number) in numbers.iter().enumerate() {
+                self.next = numbers.get(i + 1).copied();
                 // Notices signals even if other processes hold every picture.
                 self.watcher.progress("pictures", 0, 1)?;
                 match self.attempts(number, writer) {
@@ -175,7 +184,10 @@ impl Work<'_> {
         let name = self.batch.name(number);
         self.watcher.event(&Event::Rendering { picture: &name });
         let files = self.batch.files(number);
-        let scene = self.batch.scene(number)?;
+        let scene = match self.coming.take() {
+            Some((own, scene)) if own == number => scene,
+            _ => self.batch.scene(number)?,
+        };
         let memory = self.batch.base.limits().memory;
         let still = Still::open(&files)?.with_depth(self.batch.request.depth);
         let exr = &self.batch.request.exr;
@@ -204,6 +216,10 @@ impl Work<'_> {
         });
         let several = parts.len() > 1;
         let keep_rasters = if several { 0 } else { spare_for_rasters(memory, needed) };
+        if !several {
+            let held = volumes.iter().map(|volume| volume.cells.bytes()).sum();
+            self.read_ahead(&scene, spare_for_next(memory, needed, held));
+        }
         for part in parts {
             let options = RenderOptions { surface, window: Some(part), keep_rasters, ..Default::default() };
             let rows = [part.y - window.y, part.height, window.height];
@@ -234,6 +250,17 @@ impl Work<'_> {
         }
         writer.end();
         Ok(())
+    }
+
+    /// Starts to read the files of the next picture within `memory` bytes, if the scene has a sequence.
+    fn read_ahead(&mut self, scene: &Scene, memory: u64) {
+        let is_sequence = scene.recipes.iter().any(|recipe| recipe.is_sequence);
+        let Some(next) = self.next.filter(|_| is_sequence && memory > 0) else { return };
+        // A fault of the next picture is reported when its turn comes.
+        if let Ok(scene) = self.batch.scene(next) {
+            self.volumes.read_ahead(scene.clone(), memory);
+            self.coming = Some((next, scene));
+        }
     }
 
     fn mesh(&mut self, scene: &Scene) -> Mesh {

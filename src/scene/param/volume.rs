@@ -190,6 +190,14 @@ pub(super) const VOLUME: Group = Group {
         p("volume.file", "", "", Text(""), Volume)
             .doc("Path of an .npz file that holds the volume texture. Without one the volume is built.")
             .when("Set it to render cells of your own; `taki volume build` writes an example of the format."),
+        p("volume.frame", "", "", Int(-1_000_000_000, 1_000_000_000, 0), Volume)
+            .slider(0.0, 240.0)
+            .doc(
+                "Number of the file where the name in `volume.source` or `volume.file` has `####` (or \
+                 `%04d`, `$F4`, `@@@@`) in the place of one. In an animation it is the number of frame 0, \
+                 and each frame takes one more; a track of it takes the files that the track says.",
+            )
+            .when("Set it to the number of the first file of a sequence, or to that of a still."),
         p("volume.builder", "", "", Choice(Builder::WORDS), Volume)
             .doc(
                 "What the cells are made of: spatial fractal curves as in the paper (`curves`), or the \
@@ -199,7 +207,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.source", "", "", Text(""), Volume)
             .doc(
                 "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz). \
-                 Like all paths of a scene, it lies in the folder of the scene.",
+                 Like all paths of a scene, it lies in the folder of the scene. With `####` in its name it is \
+                 a sequence, of which `volume.frame` chooses the file.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),
         p("volume.grid", "", "", Text("density"), Volume)
@@ -228,6 +237,14 @@ pub(super) const VOLUME: Group = Group {
                  overlap them, so the amount of matter stays.",
             )
             .when("Lower it to save memory and time; raise it above the voxels for fine `volume.strands`."),
+        p("volume.voxels", "", "voxels", Int(1, 64, 1), Volume)
+            .slider(1.0, 16.0)
+            .doc(
+                "Voxels along an edge of a cell of a volume with `volume.builder=flow`. The faces of the \
+                 cells stand at multiples of it, so the cells of every file of a sequence have the same \
+                 places.",
+            )
+            .when("Raise it to save memory and time where the bounds change from file to file."),
         p("volume.strands", "", "", Int(0, 1_000_000, 0), Volume)
             .slider(0.0, 20_000.0)
             .doc(

@@ -40,6 +40,9 @@ pub fn build_measured(
     let mut read = |name: &str, channels: usize| -> Result<Grid> {
         let grid = grid::read(&spec.path, name, left)?;
         left = left.saturating_sub(grid.bytes());
+        if let Some(note) = grid.note() {
+            monitor.warn(&format!("{}: {note}", spec.path.display()));
+        }
         if grid.channels() != channels {
             let [have, need] =
                 [grid.channels(), channels].map(|n| if n == 1 { "numbers" } else { "vectors" });

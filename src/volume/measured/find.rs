@@ -16,6 +16,9 @@ pub struct Wanted {
     pub velocity: String,
     /// Name of the grid that k follows.
     pub second: Option<String>,
+    /// Whether the density may have no active samples, as before the first smoke of a simulation. It then
+    /// covers the voxel at index 0.
+    pub may_be_empty: bool,
 }
 
 /// Usual names of the velocity.
@@ -48,7 +51,8 @@ pub fn find_measured(path: &Path, wanted: &Wanted, budget: u64) -> Result<(Veloc
     let fault = |what: &str, fix: &str| {
         Error::input(format!("{}: the grid {:?} {what}", path.display(), density.name), fix)
     };
-    let bounds = bounds.filter(|bounds| bounds.size().iter().all(|&n| n > 0)).ok_or_else(|| {
+    let empty = wanted.may_be_empty.then_some(Bounds { min: [0; 3], max: [0; 3] });
+    let bounds = bounds.filter(|bounds| bounds.size().iter().all(|&n| n > 0)).or(empty).ok_or_else(|| {
         fault("has no active samples", "name another grid, or export a frame that has matter")
     })?;
     let to_world = density.to_world.filter(|to_world| {

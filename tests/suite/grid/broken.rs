@@ -1,8 +1,10 @@
 //! Broken and hostile files: each answer says where and what to do.
 
-use taki::grid::{list, read};
+use glam::DAffine3;
+use taki::grid::{Builder, Class, encode_vdb, list, read};
 
 use super::{Folder, MEMORY, sample};
+use crate::cli::faults::{run, taki};
 
 /// The error of reading a changed sample.
 fn error(name: &str, grid: &str, change: impl FnOnce(&mut Vec<u8>)) -> String {
@@ -113,4 +115,87 @@ fn what_is_no_grid_file_is_refused() {
     assert!(error.contains("there is no file"), "{error}");
     let error = list(folder.path().parent().expect("a folder"), MEMORY).expect_err("a folder").to_string();
     assert!(error.contains("not a regular file"), "{error}");
+}
+
+/// A grid whose first leaf has 3 active samples and other numbers in between, with an inactive tile.
+fn with_holes(channels: usize, off: f32, on: f32, background: f32) -> Vec<u8> {
+    let mut builder = Builder::new(channels, [background, 0.0, 0.0]);
+    let active = [0b1011, 0, 0, 0, 0, 0, 0, 0];
+    let fill = |into: &mut [f32]| {
+        into.fill(off);
+        into[..4 * channels].fill(0.5);
+        into[channels] = on;
+        // Another number, so that the writer keeps all.
+        into[9 * channels] = 7.0;
+    };
+    builder.leaf([8, 0, 0], active, fill).expect("placed");
+    builder.tile([128, 0, 0], 128, [off, 0.0, 0.0], false).expect("placed");
+    builder.tile([4096, 0, 0], 4096, [off, 0.0, 0.0], false).expect("placed");
+    let grid = builder.finish("density", Class::FogVolume, DAffine3::IDENTITY);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    encode_vdb(&[grid], &mut bytes).expect("written");
+    bytes.into_inner()
+}
+
+#[test]
+fn numbers_that_are_not_finite_count_as_the_background_where_nothing_is_active() {
+    for channels in [1, 3] {
+        for off in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let folder = Folder::new("x.vdb", &with_holes(channels, off, 0.5, 0.0));
+            let grid = folder.read("density");
+            assert_eq!(grid.active_count(), 3);
+            // 507 samples of the leaf, and the two tiles.
+            assert_eq!(grid.mended, 507 * channels as u64 + 2, "{channels} {off}");
+            assert_eq!(
+                [grid.at([8, 0, 0])[0], grid.at([10, 0, 0])[0], grid.at([9, 1, 0])[0]],
+                [0.5, 0.5, 7.0]
+            );
+            for index in [[13, 0, 0], [15, 7, 7], [130, 1, 1], [4100, 1, 1], [0, 0, 0]] {
+                assert_eq!(grid.at(index), [0.0; 3], "{index:?}");
+            }
+            let note = grid.note().expect("a note");
+            assert!(note.contains(&grid.mended.to_string()) && note.contains("\"density\""), "{note}");
+        }
+    }
+    // The background itself becomes 0, and numbers outside another background become that.
+    let grid = Folder::new("x.vdb", &with_holes(1, 0.25, 0.5, f32::NAN)).read("density");
+    assert_eq!((grid.background, grid.mended, grid.at([13, 0, 0])[0]), ([0.0; 3], 1, 0.25));
+    let grid = Folder::new("x.vdb", &with_holes(1, f32::NAN, 0.5, 3.0)).read("density");
+    assert_eq!((grid.background[0], grid.at([13, 0, 0])[0]), (3.0, 3.0));
+    let grid = Folder::new("x.vdb", &with_holes(1, 0.0, 0.5, 0.0)).read("density");
+    assert_eq!((grid.mended, grid.note()), (0, None));
+    // An active sample is refused with its index.
+    let folder = Folder::new("x.vdb", &with_holes(1, f32::NAN, f32::NAN, 0.0));
+    let said = read(&folder.path(), "density", MEMORY).expect_err("refused").to_string();
+    assert!(said.contains("the sample [9, 0, 0] is not a finite number"), "{said}");
+    let folder = Folder::new("x.vdb", &with_holes(1, f32::NAN, 0.5, 0.0));
+    let info = run(taki(["volume", "info"]).arg(folder.path()));
+    info.done();
+    assert!(info.stdout().contains("note       the grid \"density\" has 509 numbers"), "{}", info.stdout());
+}
+
+#[test]
+fn a_number_that_is_not_finite_never_changes_an_active_sample() {
+    for (name, grid) in [("tool_off_two_32.nvdb", "density"), ("warp_none.nvdb", "grid")] {
+        let whole = sample(name);
+        // Numbers stand at multiples of 4 from the start of the grid.
+        let start = (0..whole.len() - 7).rev().find(|&i| whole[i..].starts_with(b"NanoVDB")).expect("a grid");
+        let truth = Folder::new(name, &whole).read(grid).statistics();
+        let (mut mended, mut refused) = (0, 0);
+        let step = ((whole.len() - start) / 12000).max(1) * 4;
+        for at in (start..whole.len() - 4).step_by(step) {
+            let mut bytes = whole.clone();
+            bytes[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+            let folder = Folder::new(name, &bytes);
+            match read(&folder.path(), grid, MEMORY) {
+                Ok(grid) if grid.mended > 0 => {
+                    assert_eq!(grid.statistics(), truth, "{name}, byte {at}");
+                    mended += 1;
+                }
+                Ok(_) => {}
+                Err(e) => refused += usize::from(e.to_string().contains("finite")),
+            }
+        }
+        assert!(mended > 10 && refused > 10, "{name}: {mended} mended, {refused} refused");
+    }
 }

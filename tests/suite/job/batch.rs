@@ -4,6 +4,7 @@ mod crash;
 mod formats;
 mod moving;
 mod numbers;
+mod sequence;
 mod sweep;
 
 use std::collections::BTreeMap;

@@ -6,6 +6,7 @@ pub mod boxes;
 mod mesh_faults;
 pub mod meshes;
 pub mod presets;
+mod sequences;
 pub mod slips;
 pub mod volumes;
 

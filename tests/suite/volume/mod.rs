@@ -4,6 +4,7 @@ pub mod axes;
 pub mod bricks;
 pub mod cell;
 pub mod file;
+mod grids;
 pub mod leaps;
 pub mod measured;
 pub mod measured_strands;
