@@ -5,8 +5,8 @@
 //! [blocks](Grid::blocks) of 8×8×8 samples and constant tiles; what no block covers has the background.
 //!
 //! Files are not trusted. The memory that a grid takes is known before it is taken, all of its numbers are
-//! finite (those that no active sample has are [mended](Grid::mended)), and a fault is reported with its file,
-//! its grid and its byte.
+//! finite (those that no active sample has are [mended](Grid::mended)), and a fault is reported with its
+//! file, its grid and its byte.
 //!
 //! # Conventions
 //!

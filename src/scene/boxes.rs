@@ -53,7 +53,9 @@ impl SceneBox {
         let number = number.expect("a volume that a box shows has a recipe");
         let recipe = &recipes[number];
         let own = recipe.world_from_texture().unwrap_or_else(|| VolumeTexture::unit_box(recipe.water.size));
-        let moved = ["position", "size", "turn"].map(key).into_iter().find(|key| v.is_set(key));
+        let is_moved =
+            |key: &String| v.is_set(key) && (!key.ends_with(".turn") || v.point(key) != DVec3::ZERO);
+        let moved = ["position", "size", "turn"].map(key).into_iter().find(is_moved);
         if let Some(moved) = moved.filter(|_| recipe.is_sequence && recipe.measured.is_some()) {
             return Err(Error::input(
                 format!("{moved}: the volume {volume} is a sequence, whose bounds change from file to file"),

@@ -1,6 +1,6 @@
 //! Foundations that every other module builds on: errors, progress, random numbers, powers, lanes, the disk
-//! cache, confined paths, numbered files, unit vectors, parts of an image, colour spaces, and EXR files of any
-//! program.
+//! cache, confined paths, numbered files, unit vectors, parts of an image, colour spaces, and EXR files of
+//! any program.
 
 pub(crate) mod budget;
 pub mod cache;

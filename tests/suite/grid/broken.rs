@@ -97,10 +97,11 @@ fn counts_that_nothing_could_hold_are_refused_before_memory_is_taken() {
 #[test]
 fn numbers_that_are_not_finite_are_refused_with_their_sample() {
     let text = error("tool_none_32.vdb", "density", |bytes| {
-        let at = bytes.len() - 4;
-        bytes[at..].copy_from_slice(&f32::NAN.to_le_bytes());
+        // Sample 9 of the 512 of the last leaf.
+        let at = bytes.len() - 4 * (512 - 9);
+        bytes[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
     });
-    assert!(text.contains("the sample [15, 15, 15] is not a finite number"), "{text}");
+    assert!(text.contains("the sample [8, 9, 9] is not a finite number"), "{text}");
 }
 
 #[test]
@@ -144,8 +145,8 @@ fn numbers_that_are_not_finite_count_as_the_background_where_nothing_is_active()
             let folder = Folder::new("x.vdb", &with_holes(channels, off, 0.5, 0.0));
             let grid = folder.read("density");
             assert_eq!(grid.active_count(), 3);
-            // 507 samples of the leaf, and the two tiles.
-            assert_eq!(grid.mended, 507 * channels as u64 + 2, "{channels} {off}");
+            // 508 samples of the leaf without a number, and the two tiles.
+            assert_eq!(grid.mended, 508 * channels as u64 + 1, "{channels} {off}");
             assert_eq!(
                 [grid.at([8, 0, 0])[0], grid.at([10, 0, 0])[0], grid.at([9, 1, 0])[0]],
                 [0.5, 0.5, 7.0]

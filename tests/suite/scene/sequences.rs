@@ -35,8 +35,8 @@ fn folder() -> Folder {
 
 fn text(own: &str, of_box: &str, more: &str) -> String {
     format!(
-        "{PLACE}{more}[volumes.s]\nbuilder = \"flow\"\nsource = \"sim/smoke.####.vdb\"\n{own}[boxes.b]\nvolume \
-         = \"s\"\n{of_box}"
+        "{PLACE}{more}[volumes.s]\nbuilder = \"flow\"\nsource = \"sim/smoke.####.vdb\"\n{own}[boxes.b]\n\
+         volume = \"s\"\n{of_box}"
     )
 }
 

@@ -18,8 +18,8 @@ const MEMORY: u64 = 1 << 28;
 /// A scene whose volume of curves fills a turned box, sparse or dense.
 fn text(storage: &str) -> String {
     format!(
-        "{PLACE}[volumes.w]\nnx = 21\nny = 18\nnz = 9\nalpha = 0.7\nstorage = {storage:?}\n[curves]\nacross = \
-         4\n[boxes.b]\nvolume = \"w\"\nposition = [1.0, 2.0, -3.0]\nsize = [4.2, 1.8, 0.9]\nturn = [20, 30, \
+        "{PLACE}[volumes.w]\nnx = 21\nny = 18\nnz = 9\nalpha = 0.7\nstorage = {storage:?}\n[curves]\nacross \
+         = 4\n[boxes.b]\nvolume = \"w\"\nposition = [1.0, 2.0, -3.0]\nsize = [4.2, 1.8, 0.9]\nturn = [20, 30, \
          40]\n"
     )
 }

@@ -32,6 +32,7 @@ frame = 1
 volume = \"s\"
 [animate]
 frames = 4
+speed = 0
 ";
 
 /// A folder with a scene and the files 1 to 4 of its sequence, each larger than the one before.
@@ -96,7 +97,7 @@ fn files_of_batch(folder: &Path) -> Vec<Vec<u8>> {
 fn missing_files_are_told_before_any_work() {
     let dir = sequence();
     fs::create_dir(dir.path().join("out")).unwrap();
-    for auto in ["image.auto_exposure=false", "image.auto_exposure=true"] {
+    for auto in ["image.auto_exposure=none", "image.auto_exposure=average"] {
         let arguments = ["--frames", "0-9", "-o", "out/f.####.png", "--set", auto];
         let words =
             ["6 of 10 files are missing", "a.0005.vdb", "a.0008.vdb, …", "volumes.s.frame", "--frames"];
