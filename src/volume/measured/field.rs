@@ -109,16 +109,6 @@ impl<'a> Field<'a> {
         })
     }
 
-    /// Velocity at a place between the voxels of the density, interpolated.
-    pub fn between(&mut self, place: DVec3) -> DVec3 {
-        DVec3::from_array(match self {
-            Field::Vector(source) => source.between(place).map(f64::from),
-            Field::Components(parts) => {
-                parts.each_mut().map(|(source, own)| f64::from(source.between(place)[*own]))
-            }
-        })
-    }
-
     /// Length of the curl at a voxel of the density, 1/s. `density` is that grid's transform: differences are
     /// taken between the voxels on both sides.
     pub fn vorticity(&mut self, index: [i32; 3], density: &DAffine3) -> f64 {

@@ -100,7 +100,9 @@ impl Voxels {
         let (row, layer) = (self.size[0], self.size[0] * self.size[1]);
         let first = i + j * row + k * layer;
         let mut sum = Vec4::ZERO;
-        for (corner, step) in [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1].iter().enumerate() {
+        for (corner, step) in
+            [0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1].iter().enumerate()
+        {
             let of = |axis: usize| if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] };
             sum += Vec4::from_array(self.values[first + step]) * (of(0) * of(1) * of(2));
         }
@@ -142,7 +144,12 @@ pub(super) fn cells(
 ) -> Result<(Vec<Cell>, f64)> {
     let voxels = Voxels::bytes(spec);
     let left = u128::from(budget).checked_sub(voxels).ok_or_else(|| {
-        Error::memory("the voxels that strands run through", voxels, budget, "raise --memory, or crop the grid")
+        Error::memory(
+            "the voxels that strands run through",
+            voxels,
+            budget,
+            "raise --memory, or crop the grid",
+        )
     })?;
     check_budget(spec.size, MORE_BYTES, left as u64)?;
     let paths = Paths::new(spec, own, grids);
@@ -194,14 +201,7 @@ impl<'a> Paths<'a> {
                 seeds.push((own, sum));
             }
         }
-        Paths {
-            spec,
-            own,
-            density,
-            voxels: Voxels::new(spec, grids),
-            seeds,
-            largest,
-        }
+        Paths { spec, own, density, voxels: Voxels::new(spec, grids), seeds, largest }
     }
 
     /// Draws a place, in voxels, in proportion to the density. The places of all strands are spread evenly.
