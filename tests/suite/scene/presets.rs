@@ -18,8 +18,8 @@ const FIGURES: [&str; 3] = ["fig5", "fig6", "fig7"];
 const MAX_SNAPSHOT_BYTES: u64 = 64 << 10;
 
 fn on_cpu(scene: &Scene) -> Frame {
-    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
-    cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame")
+    let volumes = scene.volumes(1 << 30, &Unwatched).expect("volumes");
+    cpu::render(scene, &volumes, &scene.mesh(), false, &Unwatched).expect("a frame")
 }
 
 fn encoded(frame: &Frame) -> Vec<[f32; 3]> {
@@ -83,7 +83,8 @@ fn the_program_brings_the_grids_of_presets() {
     assert!(grid::list(Path::new("taki:none.vdb"), 1 << 30).is_err());
     let scene = scene("pour", &[]);
     assert_eq!(scene.references(), [], "none lies on the disk");
-    assert_eq!(scene.recipes[0].water.size, named("density").1.map(|n| n as u32));
+    let pour = scene.recipes.iter().find(|recipe| recipe.name == "pour").expect("its volume");
+    assert_eq!(pour.water.size, named("density").1.map(|n| n as u32));
 }
 
 #[test]
