@@ -84,7 +84,7 @@ pub(crate) fn numbered(name: &str, number: i64) -> Option<String> {
 pub(crate) fn ends(name: &str) -> Option<(&str, &str)> {
     let notation = Notation::of(name)?;
     let places = || name.char_indices().filter(|(i, _)| notation.parse(&name[*i..]).is_some());
-    let (first, last) = (places().next()?.0, places().last()?.0);
+    let (first, last) = (places().next()?.0, places().next_back()?.0);
     let (_, bytes) = notation.parse(&name[last..])?;
     Some((&name[..first], &name[last + bytes..]))
 }
