@@ -98,8 +98,8 @@ impl Density {
         }
     }
 
-    /// Density of the voxel of an index in a block. Voxels that are not active have none, but for those inside
-    /// a level set.
+    /// Density of the voxel of an index in a block. Voxels that are not active have none, but for those
+    /// inside a level set.
     #[inline]
     pub fn in_block(&self, data: &BlockData, index: [i32; 3]) -> f64 {
         match data {

@@ -19,7 +19,7 @@ const MEMORY: u64 = 1 << 28;
 fn text(storage: &str) -> String {
     format!(
         "{PLACE}[volumes.w]\nnx = 21\nny = 18\nnz = 9\nalpha = 0.7\nstorage = {storage:?}\n[curves]\nacross \
-         = 4\n[boxes.b]\nvolume = \"w\"\nposition = [1.0, 2.0, -3.0]\nsize = [4.2, 1.8, 0.9]\nturn = [20, 30, \
+         = 4\n[boxes.b]\nvolume = \"w\"\nposition = [1, 2, -3]\nsize = [4.2, 1.8, 0.9]\nturn = [20, 30, \
          40]\n"
     )
 }
