@@ -158,9 +158,10 @@ fn numbers_that_are_not_finite_count_as_the_background_where_nothing_is_active()
             assert!(note.contains(&grid.mended.to_string()) && note.contains("\"density\""), "{note}");
         }
     }
-    // The background itself becomes 0, and numbers outside another background become that.
+    // The background itself becomes 0, and with it the numbers that stand for it in the file's nodes. Numbers
+    // outside another background become that.
     let grid = Folder::new("x.vdb", &with_holes(1, 0.25, 0.5, f32::NAN)).read("density");
-    assert_eq!((grid.background, grid.mended, grid.at([13, 0, 0])[0]), ([0.0; 3], 1, 0.25));
+    assert_eq!((grid.background, grid.mended, grid.at([13, 0, 0])[0]), ([0.0; 3], 32_767, 0.25));
     let grid = Folder::new("x.vdb", &with_holes(1, f32::NAN, 0.5, 3.0)).read("density");
     assert_eq!((grid.background[0], grid.at([13, 0, 0])[0]), (3.0, 3.0));
     let grid = Folder::new("x.vdb", &with_holes(1, 0.0, 0.5, 0.0)).read("density");
