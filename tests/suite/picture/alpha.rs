@@ -15,8 +15,8 @@ const EVEN: [&str; 2] = ["background.zenith=[0.3, 0.5, 0.9]", "background.horizo
 const SMALL: [&str; 3] = ["image.width=96", "image.height=54", "image.samples=2"];
 
 fn on_cpu(scene: &Scene) -> Frame {
-    let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
-    cpu::render(scene, &volume, &scene.mesh(), false, &Unwatched).expect("a frame")
+    let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
+    cpu::render(scene, &volumes, &scene.mesh(), false, &Unwatched).expect("a frame")
 }
 
 /// Puts a frame with alpha over a backdrop, pixel by pixel.
