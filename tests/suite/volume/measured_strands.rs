@@ -72,14 +72,19 @@ fn cells_of_strands_have_the_papers_densities_and_lie_where_matter_is() {
     let own = fine(STRANDS);
     let volume = build(&uniform, &own);
     assert_eq!(volume.alpha, 2.0);
-    let flowing: Vec<f64> = volume.flow_cells().map(|cell| f64::from(cell.rho())).collect();
+    // At the border, values between voxels are lower: nothing is known beyond it.
+    let is_inside = |at: &[u32; 3]| (0..3).all(|a| at[a] >= 3 && at[a] + 3 < volume.size[a]);
+    let inside = occupied(&volume).into_iter().filter(|(at, _)| is_inside(at));
+    let flowing: Vec<f64> = inside.map(|(_, cell)| f64::from(cell.rho())).collect();
+    assert!(flowing.len() > 2000, "{} cells", flowing.len());
     let share =
         |is: fn(&f64) -> bool| flowing.iter().filter(|rho| is(rho)).count() as f64 / flowing.len() as f64;
     let mean = flowing.iter().sum::<f64>() / flowing.len() as f64;
     // Cells of ρ = 0 are not kept, so of the paper's shares (0.3085 at either end) the first is gone.
     let kept = 1.0 - 0.3085;
-    assert!((mean - 0.5 / kept).abs() < 0.01, "{mean}");
-    assert!((share(|rho| *rho == 1.0) - 0.3085 / kept).abs() < 0.015);
+    // Three standard errors of 2000 cells are 0.02 and 0.033.
+    let whole = share(|rho| *rho == 1.0);
+    assert!((mean - 0.5 / kept).abs() < 0.02 && (whole - 0.3085 / kept).abs() < 0.033, "{mean} {whole}");
 
     let grids = measured(velocity());
     let volume = build(&grids, &own);
