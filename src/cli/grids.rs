@@ -14,7 +14,7 @@ struct Entry {
     summary: Summary,
     /// Numbers of a sample, active samples, their bounds and their statistics.
     read: Option<(usize, u64, Option<Bounds>, Option<Statistics>)>,
-    /// What was changed on reading.
+    /// Changes made on reading.
     note: Option<String>,
 }
 

@@ -24,7 +24,7 @@ impl Decoder {
     /// Decompresses zlib data that must fill `out`.
     ///
     /// # Errors
-    /// What is wrong with the data.
+    /// Fault of the data.
     pub fn zlib(&mut self, data: &[u8], out: &mut [u8]) -> Result<(), String> {
         inflate(&mut self.zlib, data, out)
     }
@@ -32,7 +32,7 @@ impl Decoder {
     /// Decompresses the start of zlib data, as much as `out` takes. Returns how many bytes that are.
     ///
     /// # Errors
-    /// What is wrong with the data.
+    /// Fault of the data.
     pub fn zlib_start(&mut self, data: &[u8], out: &mut [u8]) -> Result<usize, String> {
         self.zlib.reset(true);
         let status = self.zlib.decompress(data, out, FlushDecompress::None);
@@ -49,7 +49,7 @@ impl Decoder {
     /// or BloscLZ, with or without the shuffle of bytes.
     ///
     /// # Errors
-    /// What is wrong with the data, or which codec it has.
+    /// Fault of the data, or the codec that is not read.
     pub fn blosc(&mut self, data: &[u8], out: &mut [u8]) -> Result<(), String> {
         let head = data.first_chunk::<HEADER>().ok_or_else(broken)?;
         let number = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| head[at + i])) as usize;

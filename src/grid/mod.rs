@@ -42,7 +42,7 @@ pub use tree::{Block, BlockData, Grid, Reader};
 
 use crate::util::error::{Error, Result};
 
-/// What the numbers of a grid mean, as far as its file says.
+/// Meaning of a grid's numbers, as far as its file says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Class {
     /// The file does not say.
