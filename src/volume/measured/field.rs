@@ -1,6 +1,6 @@
 //! Values of other grids at the voxels of the density.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use super::VelocityAt;
 use crate::grid::{Class, Grid, Reader};
@@ -24,8 +24,7 @@ impl<'a> Source<'a> {
     pub fn new(grid: &'a Grid, density: DAffine3, shift: DVec3) -> Source<'a> {
         let relative = grid.to_world.inverse() * density;
         let steps = relative.translation.round();
-        let is_even =
-            (relative.matrix3 - glam::DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-6);
+        let is_even = (relative.matrix3 - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-6);
         let is_aligned = is_even && (relative.translation - steps).abs().max_element() < ALIGNED;
         let aligned = if is_aligned { DAffine3::from_translation(steps) } else { relative };
         let from_density = DAffine3::from_translation(shift) * aligned;
@@ -119,9 +118,14 @@ impl<'a> Field<'a> {
         };
         // Columns: change of the velocity per index along each axis.
         let per_index = [0, 1, 2].map(|a| (self.at(step(a, 1)) - self.at(step(a, -1))) * 0.5);
-        let per_metre =
-            glam::DMat3::from_cols_array_2d(&per_index.map(|v| v.to_array())) * density.matrix3.inverse();
-        let [x, y, z] = [per_metre.x_axis, per_metre.y_axis, per_metre.z_axis];
-        DVec3::new(y.z - z.y, z.x - x.z, x.y - y.x).length()
+        curl(per_index, density.matrix3)
     }
+}
+
+/// Length of the curl, 1/s, where the velocity changes by `per_index` (m/s) per index along each axis.
+/// `to_world` gives the metres per index.
+pub(super) fn curl(per_index: [DVec3; 3], to_world: DMat3) -> f64 {
+    let [a, b, c] = per_index;
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = DMat3::from_cols(a, b, c) * to_world.inverse();
+    DVec3::new(y.z - z.y, z.x - x.z, x.y - y.x).length()
 }

@@ -7,12 +7,12 @@
 //!
 //! Simulations are coarse, and threads of water are fine. So the cells may be smaller than the voxels.
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DMat3, DVec3, Vec3, Vec4};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
 use super::build::{Density, Measured};
-use super::field::{Field, Source};
+use super::field::{Field, Source, curl};
 use super::{MeasuredSpec, ReflectBy, StrandSpec};
 use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use crate::grid::BlockData;
@@ -36,6 +36,9 @@ const MARGIN: f32 = 1e-3;
 /// Bytes that building takes for each cell beside the cell and its direction: sums of noise, and the cell in
 /// two more places.
 const MORE_BYTES: usize = 8 + 2 * size_of::<Cell>();
+/// Voxels around the volume whose values are known. At the faces, half a voxel beyond its last samples,
+/// differences reach one voxel farther.
+const AROUND: i32 = 2;
 /// Largest depth of recursion of a curve.
 const MOST_LEVELS: u32 = 16;
 
@@ -54,8 +57,8 @@ struct Paths<'a> {
     largest: f64,
 }
 
-/// Values at the voxels of a volume and one voxel around it, in an array: a path looks up some ten places a
-/// voxel, and finds them ten times as fast as in a grid's tree.
+/// Values at the voxels of a volume and [`AROUND`] it, in an array: a path looks up some ten places a voxel,
+/// and finds them ten times as fast as in a grid's tree.
 struct Voxels {
     /// Index of the first voxel.
     first: [i32; 3],
@@ -68,8 +71,8 @@ impl Voxels {
     fn new(spec: &MeasuredSpec, grids: &Measured) -> Option<Voxels> {
         let field = Field::new(&grids.velocity, spec.to_world, spec.velocity_at)?;
         let source = Source::new(&grids.density, spec.to_world, DVec3::ZERO);
-        let first = spec.bounds.min.map(|i| i.saturating_sub(1));
-        let size = spec.bounds.size().map(|n| n as usize + 2);
+        let first = spec.bounds.min.map(|i| i.saturating_sub(AROUND));
+        let size = spec.bounds.size().map(|n| n as usize + 2 * AROUND as usize);
         let index_from_world = spec.to_world.matrix3.inverse();
         let mut values = vec![[0.0; 4]; size.iter().product()];
         values.par_chunks_mut(size[0] * size[1]).enumerate().for_each(|(z, layer)| {
@@ -86,7 +89,8 @@ impl Voxels {
 
     /// Bytes of the values of a recipe.
     fn bytes(spec: &MeasuredSpec) -> u128 {
-        spec.bounds.size().map(|n| u128::from(n) + 2).iter().product::<u128>() * size_of::<[f32; 4]>() as u128
+        spec.bounds.size().map(|n| u128::from(n) + 2 * AROUND as u128).iter().product::<u128>()
+            * size_of::<[f32; 4]>() as u128
     }
 
     /// Interpolated velocity in indices per second, and value of the density's grid, at a place in voxels.
@@ -107,6 +111,13 @@ impl Voxels {
             sum += Vec4::from_array(self.values[first + step]) * (of(0) * of(1) * of(2));
         }
         (sum.truncate().as_dvec3(), sum.w)
+    }
+
+    /// Length of the curl of the interpolated velocity at a place in voxels, 1/s, by differences across two
+    /// voxels. `to_world` gives the metres per index. It changes smoothly between the voxels.
+    fn vorticity(&self, place: DVec3, to_world: DMat3) -> f64 {
+        let velocity = |at: DVec3| to_world * self.at(at).0;
+        curl(DVec3::AXES.map(|a| (velocity(place + a) - velocity(place - a)) * 0.5), to_world)
     }
 }
 
@@ -295,7 +306,6 @@ impl<'a> Paths<'a> {
         let fine = Density::of(&grids.density, step.min_element());
         let whole = spec.rho_of(self.largest).max(f64::MIN_POSITIVE);
         let of_layer = |(z, cells): (usize, &[Cell])| {
-            let mut field = Field::new(&grids.velocity, spec.to_world, spec.velocity_at);
             let mut second = grids.second.as_ref().map(|grid| Source::new(grid, spec.to_world, DVec3::ZERO));
             let of_cell = |(i, cell): (usize, &Cell)| {
                 let Some(voxels) = self.voxels.as_ref().filter(|_| cell.rho_code() > 0) else {
@@ -305,12 +315,10 @@ impl<'a> Paths<'a> {
                 let place = low + DVec3::from_array(at) * step;
                 let (v, density) = voxels.at(place);
                 let share = spec.rho_of(fine.at(density)) / whole;
-                let value = match (spec.reflect, &mut field, &mut second) {
-                    (ReflectBy::Speed, ..) => (spec.to_world.matrix3 * v).length(),
-                    (ReflectBy::Vorticity, Some(field), _) => {
-                        field.vorticity(place.round().to_array().map(|c| c as i32), &spec.to_world)
-                    }
-                    (ReflectBy::Grid, _, Some(grid)) => f64::from(grid.between(place)[0]),
+                let value = match (spec.reflect, &mut second) {
+                    (ReflectBy::Speed, _) => (spec.to_world.matrix3 * v).length(),
+                    (ReflectBy::Vorticity, _) => voxels.vorticity(place, spec.to_world.matrix3),
+                    (ReflectBy::Grid, Some(grid)) => f64::from(grid.between(place)[0]),
                     _ => 0.0,
                 };
                 let (k, [from, to]) = (cell.k(), [spec.k[0], spec.reflected(value)]);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use taki::util::monitor::Unwatched;
-use taki::volume::{Cell, Measured, MeasuredSpec, StorageChoice, StrandSpec, VolumeTexture};
+use taki::volume::{Cell, Measured, MeasuredSpec, ReflectBy, StorageChoice, StrandSpec, VolumeTexture};
 
 use super::measured::{SIZE, build, centre, grid, measured, spec, to_world, turning, world_from_cell};
 
@@ -100,6 +100,56 @@ fn cells_of_strands_have_the_papers_densities_and_lie_where_matter_is() {
             .any(|z| around(at[1], ny).any(|y| around(at[0], nx).any(|x| even.cell(x, y, z).rho_code() > 0)))
     };
     assert!(strands.iter().all(|(at, _)| near(*at)));
+}
+
+/// k_d of cells with strands, of which k follows the vorticity from 0 to `most`, 1/s. k_d is 0 at none.
+fn churned(velocity: impl Fn(DVec3) -> DVec3, most: f64) -> (MeasuredSpec, Vec<([u32; 3], f64)>) {
+    let velocity = grid("velocity", |at| velocity(to_world().transform_point3(at)).to_array());
+    let uniform = Measured { density: grid("density", |_| [2.0]), velocity: vec![velocity], second: None };
+    let own = MeasuredSpec {
+        reflect: ReflectBy::Vorticity,
+        reflect_range: [0.0, most as f32],
+        k: [[0.0, 0.5], [1.0, 0.5]],
+        ..fine(STRANDS)
+    };
+    let volume = build(&uniform, &own);
+    // The helper's velocity reaches one voxel around the matter. From half a voxel inside, all is known.
+    let is_known = |at: &[u32; 3]| (0..3).all(|a| at[a] >= 2 && at[a] + 2 < volume.size[a]);
+    let cells = occupied(&volume).into_iter().filter(|(at, _)| is_known(at));
+    let cells: Vec<_> = cells.map(|(at, cell)| (at, f64::from(cell.k().0))).collect();
+    assert!(cells.len() > 2000, "{} cells", cells.len());
+    (own, cells)
+}
+
+/// Steps of k_d are 1/255, so it is half of that off, and a little for the velocity in single precision.
+const K_STEP: f64 = 1.0 / 255.0;
+
+#[test]
+fn churn_is_smooth_in_cells_finer_than_voxels() {
+    // The velocity grows with the square of the way along `grows`, and its curl in proportion to that way.
+    let (grows, across) = (DVec3::new(2.0, -1.0, 2.0) / 3.0, DVec3::new(1.0, 2.0, 0.0) / 5f64.sqrt());
+    let way = |at: DVec3| (at - DVec3::new(3.0, -2.0, 5.0)).dot(grows) - 6.0;
+    let (own, cells) = churned(|at| across * way(at).powi(2), 24.0);
+    let truth = |at: [u32; 3]| 2.0 * way(centre(&own, at)).abs() / 24.0;
+    for &(at, k) in &cells {
+        assert!((k - truth(at)).abs() < 0.6 * K_STEP, "{at:?}: {k}, {}", truth(at));
+    }
+    // Voxel by voxel, k would stand still in two of three cells, and then take three steps at once.
+    let values: std::collections::HashMap<_, _> = cells.iter().copied().collect();
+    let longest = world_from_cell(&own).x_axis.dot(grows).abs() * 2.0 / 24.0;
+    let steps = cells
+        .iter()
+        .filter_map(|(at, k)| values.get(&[at[0] + 1, at[1], at[2]]).map(|next| (next - k).abs()));
+    let steps: Vec<f64> = steps.collect();
+    assert!(steps.len() > 500, "{} pairs", steps.len());
+    assert!(steps.iter().all(|step| *step < longest + 1.2 * K_STEP), "{longest}");
+}
+
+#[test]
+fn a_turning_body_churns_evenly_in_strands() {
+    let curl = 2.0 * DVec3::new(0.2, 1.0, -0.4).length();
+    let (_, cells) = churned(turning, 1.6 * curl);
+    assert!(cells.iter().all(|(_, k)| (k - 1.0 / 1.6).abs() < 0.6 * K_STEP));
 }
 
 #[test]
