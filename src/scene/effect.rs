@@ -64,7 +64,7 @@ const OF_STRANDS: &[&str] = &[
 
 /// Keys of a volume that is made of the grids of a simulation.
 const OF_GRIDS: &[&str] = &[
-    "volume.cells",
+    "volume.fine",
     "volume.grid",
     "volume.reflect",
     "volume.reflect_grid",

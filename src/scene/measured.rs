@@ -74,38 +74,23 @@ pub(super) fn measured(
             format!("name its grid in {}, or set {} to 0", key("volume.velocity"), key("volume.strands")),
         ));
     }
-    let [cells_key, edge_key] = ["volume.cells", "volume.voxels"].map(key);
-    let (asked, edge) = (v.count(&cells_key), v.count(&edge_key));
-    if asked != 0 && (is_sequence || edge > 1) {
-        let why = match is_sequence {
-            true => "the cells of a sequence would change their size from file to file".into(),
-            false => format!("{edge_key} = {edge} gives the size of the cells too"),
-        };
-        return Err(Error::input(
-            format!("{cells_key} = {asked}: {why}"),
-            format!("set {cells_key}=0, and {edge_key} to the voxels along an edge of a cell"),
-        ));
-    }
+    let [edge_key, fine_key] = ["volume.voxels", "volume.fine"].map(key);
+    let [edge, fine] = [&edge_key, &fine_key].map(|key| v.count(key));
     let bounds = whole_cells(bounds, edge).ok_or_else(|| {
         Error::input(
             format!("{}: the grid {:?} reaches the greatest index", path.display(), wanted.density),
             format!("set {edge_key}=1"),
         )
     })?;
-    let voxels = bounds.size().map(|n| n / u64::from(edge));
-    let longest = voxels.into_iter().max().unwrap_or(1);
-    let cells = match asked {
-        0 => longest,
-        n if strands.is_some() => n.into(),
-        n => u64::from(n).min(longest),
-    };
-    if cells > MOST_CELLS {
+    let cells = bounds.size().map(|n| n / u64::from(edge) * u64::from(fine));
+    let longest = cells.into_iter().max().unwrap_or(1);
+    if longest > MOST_CELLS {
         return Err(Error::input(
             format!("{}: the grid {:?} has {longest} cells along a side", path.display(), wanted.density),
-            format!("set {cells_key} to {MOST_CELLS} or less, or raise {edge_key}, or crop the grid"),
+            format!("at most {MOST_CELLS}: lower {fine_key}, or raise {edge_key}, or crop the grid"),
         ));
     }
-    let size = voxels.map(|n| ((n as f64 * cells as f64 / longest as f64).round() as u32).max(1));
+    let size = cells.map(|n| n as u32);
     Ok(Some(MeasuredSpec {
         path,
         density: wanted.density,

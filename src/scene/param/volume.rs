@@ -229,22 +229,25 @@ pub(super) const VOLUME: Group = Group {
                  `auto` is `staggered` if the file says so, and `centre` otherwise.",
             )
             .when("Choose one if the file does not say it; a wrong one moves the flow by half a voxel."),
-        p("volume.cells", "", "cells", Int(0, 4096, 0), Volume)
-            .slider(0.0, 512.0)
-            .doc(
-                "Number of cells along the longest side of a volume with `volume.builder=flow`; the other \
-                 sides follow. 0 makes one cell of each voxel. Cells take the shares of the voxels that \
-                 overlap them, so the amount of matter stays.",
-            )
-            .when("Lower it to save memory and time; raise it above the voxels for fine `volume.strands`."),
         p("volume.voxels", "", "voxels", Int(1, 64, 1), Volume)
             .slider(1.0, 16.0)
             .doc(
-                "Voxels along an edge of a cell of a volume with `volume.builder=flow`. The faces of the \
-                 cells stand at multiples of it, so the cells of every file of a sequence have the same \
-                 places.",
+                "Voxels along an edge of a cell of a volume with `volume.builder=flow`, before `volume.fine` \
+                 cuts the cells. Cells take the shares of the voxels that overlap them, so the amount of \
+                 matter stays. The faces of the cells stand at multiples of it, so the cells of every file \
+                 of a sequence have the same size and the same places.",
             )
-            .when("Raise it to save memory and time where the bounds change from file to file."),
+            .when("Raise it to save memory and time."),
+        p("volume.fine", "", "", Int(1, 64, 1), Volume)
+            .slider(1.0, 8.0)
+            .doc(
+                "Number of cells into which each cell is cut along each edge: with `volume.voxels=1`, cells \
+                 along an edge of a voxel. Without `volume.strands` finer cells show nothing more.",
+            )
+            .when(
+                "Raise it to 2 to 4 for `volume.strands` finer than the voxels; every step costs its cube in \
+                 memory. 3 with `volume.voxels=2` makes cells of two thirds of a voxel.",
+            ),
         p("volume.strands", "", "", Int(0, 1_000_000, 0), Volume)
             .slider(0.0, 20_000.0)
             .doc(

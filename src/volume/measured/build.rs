@@ -210,9 +210,10 @@ fn fewer_cells(error: Error) -> Error {
             what,
             need,
             budget,
-            fix: "give volume.cells fewer cells, or raise --memory; volume.storage=sparse (without \
+            fix:
+                "lower volume.fine or raise volume.voxels, or raise --memory; volume.storage=sparse (without \
                   trace.filter=pyramid) takes less where most cells are empty"
-                .into(),
+                    .into(),
         },
         other => other,
     }

@@ -150,11 +150,12 @@ fn a_box_of_a_simulation_stands_where_the_simulation_was() {
     assert_eq!((volume.size, volume.alpha), ([6, 8, 4], 1.0));
     let cell = volume.cell(3, 4, 2);
     assert_eq!((cell.rho(), cell.v()), (1.0, Vec3::Z));
-    // Fewer cells, another place and size, and the flow turned with them.
+    // Larger cells, another place and size, and the flow turned with them.
     let text =
-        flow("cells = 4\n") + "position = [1.0, 2.0, 3.0]\nsize = [6.0, 8.0, 4.0]\nturn = [0, 90, 0]\n";
+        flow("voxels = 2\n") + "position = [1.0, 2.0, 3.0]\nsize = [6.0, 8.0, 4.0]\nturn = [0, 90, 0]\n";
     let scene = folder.scene(&text, &[]);
-    assert_eq!(scene.recipes[0].water.size, [3, 4, 2]);
+    // Cells of two voxels begin at even indices: at −2, 4 and 0.
+    assert_eq!(scene.recipes[0].water.size, [3, 5, 3]);
     let own = &scene.boxes[0];
     close(own.middle(), DVec3::new(1.0, 2.0, 3.0));
     close(own.sides(), DVec3::new(6.0, 8.0, 4.0));

@@ -82,7 +82,7 @@ fn the_program_brings_the_grids_of_presets() {
     assert_eq!((named("density").0, named("velocity")), (1, (3, [36, 31, 55])));
     assert!(grid::list(Path::new("taki:none.vdb"), 1 << 30).is_err());
     // Without strands, a cell is a voxel.
-    let scene = scene("pour", &["volumes.pour.strands=0", "volumes.pour.cells=0"]);
+    let scene = scene("pour", &["volumes.pour.strands=0", "volumes.pour.fine=1"]);
     assert_eq!(scene.references(), [], "none lies on the disk");
     let pour = scene.recipes.iter().find(|recipe| recipe.name == "pour").expect("its volume");
     assert_eq!(pour.water.size, named("density").1.map(|n| n as u32));

@@ -93,6 +93,36 @@ fn larger_cells_keep_their_places_from_file_to_file() {
 }
 
 #[test]
+fn finer_cells_keep_their_size_and_places_from_file_to_file() {
+    let folder = folder();
+    for (edge, fine) in [(1, 3), (2, 3), (4, 2)] {
+        let own = format!("frame = 7\nvoxels = {edge}\nfine = {fine}\n");
+        let animation = animation(&folder, &text(&own, "", ""), &[]).expect("an animation");
+        let mut masses = Vec::new();
+        for (frame, (first, size)) in FILES.into_iter().enumerate() {
+            let scene = animation.at(frame as i32).expect("a scene");
+            let place = scene.boxes[0].world_from_texture;
+            let cells = scene.recipes[0].water.size;
+            // An edge has edge/fine voxels in every file, and the first corner is a multiple of it.
+            let corner = to_world().inverse().transform_point3(place.translation) + 0.5;
+            let end = to_world().inverse().transform_point3(place.transform_point3(DVec3::ONE)) + 0.5;
+            let cell = f64::from(edge) / f64::from(fine);
+            for a in 0..3 {
+                assert!((end[a] - corner[a] - cell * f64::from(cells[a])).abs() < 1e-9, "{end} {cells:?}");
+                assert!((corner[a] / cell - (corner[a] / cell).round()).abs() < 1e-9, "{corner}");
+                assert!(corner[a] <= f64::from(first[a]) + 1e-9);
+                assert!(end[a] >= f64::from(first[a]) + f64::from(size[a]) - 1e-9);
+            }
+            let volume = scene.volume(1 << 30, &Unwatched).expect("a volume");
+            assert_eq!(volume.size, cells);
+            let mass: f64 = volume.cells.iter().map(|cell| f64::from(cell.rho() * volume.alpha)).sum();
+            masses.push(cell.powi(3) * mass / (0.5 * f64::from(size.iter().product::<u32>())));
+        }
+        assert!(masses.iter().all(|share| (share - 1.0).abs() < 1e-4), "{masses:?}");
+    }
+}
+
+#[test]
 fn a_file_without_matter_is_an_empty_frame_of_a_sequence_alone() {
     let folder = folder();
     let scene = folder.scene(&text("frame = 6\n", "", ""), &[]);
@@ -167,9 +197,14 @@ fn every_slip_is_told_with_the_way_out() {
         let key = format!("boxes.b.{}", own.split(' ').next().expect("a key"));
         fault(&text("frame = 7\n", own, ""), &[&key, "is a sequence", "leave"]);
     }
-    fault(&text("frame = 7\ncells = 4\n", "", ""), &["volumes.s.cells = 4", "volumes.s.voxels"]);
-    let single = text("cells = 4\nvoxels = 2\n", "", "").replace("####", "0007");
-    fault(&single, &["volumes.s.cells = 4", "volumes.s.voxels = 2"]);
+    let many = folder.path("sim/many.vdb");
+    write_vdb(&many, &[Grid::from_dense("density", 1, [0; 3], [65, 1, 1], vec![1.0; 65], to_world())])
+        .expect("a file");
+    let fine = text("fine = 64\n", "", "").replace("smoke.####", "many");
+    fault(
+        &fine,
+        &["4160 cells along a side", "at most 4096", "lower volumes.s.fine", "raise volumes.s.voxels"],
+    );
     let scene = folder.scene(&text("frame = 7\n", "", ""), &[]);
     let without = |key: &str| taki::scene::without_effect(scene.values().expect("its values"), key);
     assert_eq!(without("volumes.s.frame"), None);

@@ -282,7 +282,7 @@ fn more_cells_than_the_memory_holds_are_refused_with_the_way_out() {
     for storage in [StorageChoice::Dense, StorageChoice::Sparse, StorageChoice::Auto] {
         let fault = grids.volume(&spec([4000; 3]), storage, 1 << 26, &Unwatched).expect_err("refused");
         assert_eq!(fault.exit_code(), 33);
-        assert!(format!("{fault:?}").contains("volume.cells"), "{fault:?}");
+        assert!(format!("{fault:?}").contains("volume.voxels"), "{fault:?}");
     }
     let spec = MeasuredSpec { rho_scale: f32::MAX, ..spec(SIZE) };
     let fault = grids.volume(&spec, StorageChoice::Dense, 1 << 30, &Unwatched).expect_err("refused");
