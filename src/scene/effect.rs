@@ -273,11 +273,17 @@ const RULES: &[Rule] = &[
     },
 ];
 
-/// Returns the rule by which a key has no effect, with its switch, whose key is full.
+/// Returns the first rule by which a key has no effect, with its switch, whose key is full.
 fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
+    rules(values, key).next()
+}
+
+/// Returns the rules by which a key has no effect, each with its switch, whose key is full.
+fn rules(values: &Values, key: &str) -> impl Iterator<Item = (&'static Rule, String)> {
     let of_volume = split_volume_key(key);
     let own = of_volume.map_or(key, |(_, of_water)| of_water);
-    RULES.iter().filter(|rule| rule.keys.iter().any(|pattern| matches(pattern, own))).find_map(|rule| {
+    let is_of_key = move |rule: &&Rule| rule.keys.iter().any(|pattern| matches(pattern, own));
+    RULES.iter().filter(is_of_key).filter_map(move |rule| {
         let name = key.split('.').nth(1).unwrap_or_default();
         let switch = match of_volume {
             Some((volume, _)) => key_of_volume(volume, rule.switch),
@@ -285,6 +291,13 @@ fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
         };
         (!(rule.works)(values, &switch)).then_some((rule, switch))
     })
+}
+
+/// Whether the way in which a volume is made takes no notice of a key: of a key of grids in a volume of
+/// curves, of a key of curves in one of grids, and of the number of a file where no name has a place for it.
+pub fn is_of_other_builder(values: &Values, key: &str) -> bool {
+    rules(values, key).any(|(rule, _)| ["volume.builder", "volume.strands"].contains(&rule.switch))
+        || without_sequence(values, key).is_some()
 }
 
 /// Returns why the value of a key has no effect; `None` where it has one.

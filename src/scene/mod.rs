@@ -34,7 +34,7 @@ use glam::Vec3;
 pub use animation::Animation;
 pub use boxes::SceneBox;
 pub use build::resolve;
-pub use effect::{settings_without_effect, settings_without_file, without_effect};
+pub use effect::{is_of_other_builder, settings_without_effect, settings_without_file, without_effect};
 pub use meshes::{
     Becomes, Loaded, ModelMemo, PartSummary, Projection, SceneMesh, box_corners, mesh_place, turn_of,
 };

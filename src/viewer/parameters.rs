@@ -17,7 +17,7 @@ use super::document::Document;
 use super::lights::Lights;
 use super::meshes::Meshes;
 use super::viewport::Selection;
-use crate::scene::{Cost, Kind, Param, Raw, Scene, Value, WATER, split_volume_key};
+use crate::scene::{Cost, Kind, Param, Raw, Scene, Value, WATER, is_of_other_builder, split_volume_key};
 use lobes::LobesPlot;
 use overview::Overview;
 use widget::{Field, direction_angles, list, triple};
@@ -138,7 +138,10 @@ impl ParameterPanel {
                     continue;
                 }
                 let in_group = |key: &&String| group.sections.contains(&key.split('.').next().unwrap_or(""));
-                let matching = keys.iter().filter(in_group).filter(|key| matches(key, &context.search));
+                // What another builder would take has no row.
+                let values = context.document.values();
+                let in_group = keys.iter().filter(in_group).filter(|key| !is_of_other_builder(values, key));
+                let matching = in_group.filter(|key| matches(key, &context.search));
                 let mut keys: Vec<&String> = matching.collect();
                 sort_by_parent(&mut keys);
                 keys.sort_by_cached_key(|key| !has_shown_volume(context.document.scene(), key));

@@ -147,7 +147,8 @@ impl Field<'_> {
         let response = match self.param.slider {
             Some((low, high)) => ui.add(
                 Slider::new(&mut new, low as i64..=high as i64)
-                    .logarithmic(is_logarithmic(low, high, default as f64))
+                    // Files are numbered by time.
+                    .logarithmic(!self.key.ends_with(".frame") && is_logarithmic(low, high, default as f64))
                     .clamping(SliderClamping::Never)
                     .update_while_editing(false)
                     .suffix(if self.param.unit == "cells" { String::new() } else { self.suffix() }),

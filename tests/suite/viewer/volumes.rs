@@ -68,3 +68,46 @@ fn the_inspectors_show_the_volume_that_is_chosen() {
     let slider = window.widget(Role::Slider, "Curves shown");
     assert_eq!(slider.accesskit_node().max_numeric_value(), Some(36.0));
 }
+
+#[test]
+fn a_volume_has_the_rows_of_its_builder_alone() {
+    let smoke = "[volumes.smoke]\nbuilder = \"flow\"\nsource = \"taki:pour.vdb\"\nvoxels = 4\n\
+                 [boxes.smoke]\nvolume = \"smoke\"\n";
+    let mut window =
+        Setup { scene: SCENE.to_owned() + smoke, size: [700.0, 2000.0], ..Setup::default() }.open();
+    let rows = |window: &mut Window, search: &str| -> Vec<String> {
+        window.enter("Search parameters", search);
+        let roles = [Role::Slider, Role::SpinButton, Role::ComboBox, Role::TextInput];
+        roles.into_iter().flat_map(|role| window.names(role)).collect()
+    };
+    let has = |rows: &[String], keys: &[&str], there: bool| {
+        for key in keys {
+            assert_eq!(rows.iter().any(|row| row == key), there, "{key}: {rows:?}");
+        }
+    };
+    let of_water = rows(&mut window, "volume.");
+    has(&of_water, &["volume.builder", "volume.nx", "volume.coherence", "volume.alpha"], true);
+    has(&of_water, &["volume.source", "volume.strands", "volume.voxels", "volume.reflect"], false);
+    has(&rows(&mut window, "curves."), &["curves.across", "curves.amplitude"], true);
+    let own = |key: &str| format!("volumes.smoke.{key}");
+    let own = |keys: &[&str]| keys.iter().map(|key| own(key)).collect::<Vec<_>>();
+    let [kept, curves, strands] = [
+        own(&[
+            "builder", "source", "grid", "velocity", "voxels", "fine", "strands", "rho", "reflect", "alpha",
+        ]),
+        own(&["across", "deep", "bundles", "lean", "radius", "nx", "crest", "flow"]),
+        own(&["amplitude", "h", "coherence", "coverage", "k_noise"]),
+    ];
+    let [kept, curves, strands] =
+        [&kept, &curves, &strands].map(|all| all.iter().map(String::as_str).collect::<Vec<_>>());
+    let without = rows(&mut window, "volumes.smoke");
+    has(&without, &kept, true);
+    has(&without, &curves, false);
+    has(&without, &strands, false);
+    window.set("volumes.smoke.strands", Raw::Int(20));
+    window.settle();
+    let with = rows(&mut window, "volumes.smoke");
+    has(&with, &kept, true);
+    has(&with, &curves, false);
+    has(&with, &strands, true);
+}

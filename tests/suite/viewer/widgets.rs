@@ -19,10 +19,14 @@ fn values(window: &Window) -> Values {
     window.viewer().document().values().clone()
 }
 
-/// All keys, except those of lights that have no meaning for their kind.
+/// All keys, except those of lights that have no meaning for their kind, and those of volumes that their
+/// builder does not take.
 fn keys(window: &Window) -> Vec<(String, &'static Param)> {
     let keys = window.viewer().document().scene().keys();
     let shown = |key: &String| {
+        if taki::scene::is_of_other_builder(window.viewer().document().values(), key) {
+            return false;
+        }
         let mut parts = key.split('.');
         let (Some("lights"), Some(light), Some(what)) = (parts.next(), parts.next(), parts.next()) else {
             return true;
