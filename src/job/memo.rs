@@ -21,6 +21,7 @@ pub struct VolumeMemo {
     all: Arc<Vec<VolumeTexture>>,
     cache: Option<Cache>,
     ahead: Ahead,
+    makes_room: bool,
 }
 
 /// A volume of the last scene.
@@ -54,6 +55,12 @@ impl VolumeMemo {
         VolumeMemo { cache, ..VolumeMemo::default() }
     }
 
+    /// Lets go of volumes that the next scene does not use before it builds that scene's. A budget then holds
+    /// one scene's volumes, not two. A build that fails leaves nothing to go back to.
+    pub fn making_room(self) -> VolumeMemo {
+        VolumeMemo { makes_room: true, ..self }
+    }
+
     /// Stops using the cache. Values that a user tries out by hand would only fill it.
     pub fn forget_cache(&mut self) {
         self.cache = None;
@@ -78,7 +85,8 @@ impl VolumeMemo {
     /// remembered volumes fit unchanged. `memory` is the budget for building them, bytes.
     ///
     /// # Errors
-    /// Any error of building or reading a volume, or of the monitor. The remembered volumes stay.
+    /// Any error of building or reading a volume, or of the monitor. The remembered volumes stay, but for a
+    /// memo that is [making room](VolumeMemo::making_room).
     pub fn volumes(
         &mut self,
         scene: &Scene,
@@ -88,6 +96,17 @@ impl VolumeMemo {
         let (mut now, mut made, mut dearest): (Vec<Remembered>, Vec<VolumeTexture>, _) =
             (Vec::new(), Vec::new(), None);
         let mut early = self.ahead.take();
+        if self.makes_room {
+            let sources: Vec<(&String, Source)> =
+                scene.recipes.iter().map(|recipe| (&recipe.name, Source::of(recipe))).collect();
+            let is_used = |old: &Remembered| {
+                sources.iter().any(|(name, source)| **name == old.name && old.source.is_like(source))
+            };
+            if !self.last.iter().all(is_used) {
+                self.last.retain(is_used);
+                self.all = Arc::default();
+            }
+        }
         for (number, recipe) in scene.recipes.iter().enumerate() {
             let source = Source::of(recipe);
             let old = self.last.iter().find(|old| old.name == recipe.name);
@@ -136,6 +155,16 @@ impl VolumeMemo {
 }
 
 impl Source {
+    /// Whether the volume of this source is that of another, or that with other density and reflection.
+    fn is_like(&self, other: &Source) -> bool {
+        match (self, other) {
+            (Source::Water(old, stored), Source::Water(new, wanted)) => {
+                stored == wanted && same_curves(old, new)
+            }
+            (old, new) => old == new,
+        }
+    }
+
     /// The input of a scene's volume.
     pub fn of(recipe: &Recipe) -> Source {
         let Recipe { water, measured, file, storage, asked_storage, .. } = recipe;

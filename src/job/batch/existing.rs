@@ -1,7 +1,8 @@
 //! Examines files that already exist: complete, damaged, or another picture.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use rayon::prelude::*;
 
@@ -20,12 +21,42 @@ use crate::util::monitor::Monitor;
 pub enum FileState {
     /// There is no file.
     Nothing,
-    /// Exactly this picture; all of it was decoded.
-    Whole,
+    /// Exactly this picture, if its volumes are those of this line; all of it was decoded.
+    Whole(String),
     /// A damaged picture: description of the damage.
     Broken(String),
     /// Another picture: description of the difference.
     Other(String),
+}
+
+/// Scene of a picture, and the state of each of its files.
+type Examined = (Scene, Vec<FileState>);
+
+impl FileState {
+    fn is_whole(&self) -> bool {
+        matches!(self, FileState::Whole(_))
+    }
+}
+
+/// Time at which a picture was written.
+fn written(picture: &Path) -> Option<SystemTime> {
+    picture.metadata().ok()?.modified().ok()
+}
+
+/// Time of the last change of a volume's file. A copy or a move may keep the time of the contents; on Unix
+/// the time of the change of the file itself counts too, and elsewhere that of its creation. `None` for a
+/// file without times, which must be read.
+fn changed(source: &Path) -> Option<SystemTime> {
+    let meta = source.metadata().ok()?;
+    #[cfg(unix)]
+    let own = {
+        use std::os::unix::fs::MetadataExt;
+        let [seconds, nanoseconds] = [meta.ctime(), meta.ctime_nsec()].map(|n| n.max(0) as u64);
+        SystemTime::UNIX_EPOCH + Duration::new(seconds, nanoseconds as u32)
+    };
+    #[cfg(not(unix))]
+    let own = meta.created().ok()?;
+    Some(meta.modified().ok()?.max(own))
 }
 
 /// The first 4096 bytes of a regular file; `None` if it is not a readable one.
@@ -74,16 +105,22 @@ impl Batch {
             .copied()
             .filter(|&n| self.files(n).iter().any(|f| f.symlink_metadata().is_ok()))
             .collect();
+        let mut memo = VolumeMemo::default();
         for (part, numbers) in there.chunks(16).enumerate() {
             monitor.progress("verifying", part as u64 * 16, there.len() as u64)?;
-            let examined: Vec<Result<Vec<FileState>>> = if self.request.overwrite {
-                numbers.iter().map(|_| Ok(Vec::new())).collect()
+            let examined: Vec<Option<Result<Examined>>> = if self.request.overwrite {
+                numbers.iter().map(|_| None).collect()
             } else {
-                numbers.par_iter().map(|&n| self.states(n)).collect()
+                numbers.par_iter().map(|&n| Some(self.states(n))).collect()
             };
-            for (&number, states) in numbers.iter().zip(examined) {
+            for (&number, examined) in numbers.iter().zip(examined) {
                 let files = self.files(number);
-                let states = states?;
+                let mut states = Vec::new();
+                if let Some(examined) = examined {
+                    let scene;
+                    (scene, states) = examined?;
+                    self.check_volumes(&scene, &files, &mut states, &mut memo, monitor)?;
+                }
                 for (file, state) in files.iter().zip(&states) {
                     match state {
                         FileState::Other(what) => {
@@ -92,10 +129,10 @@ impl Batch {
                         FileState::Broken(why) => {
                             monitor.warn(&format!("{}: {why}; it is rendered again", file.display()));
                         }
-                        FileState::Whole | FileState::Nothing => {}
+                        FileState::Whole(_) | FileState::Nothing => {}
                     }
                 }
-                if !states.is_empty() && states.iter().all(|f| *f == FileState::Whole) {
+                if !states.is_empty() && states.iter().all(FileState::is_whole) {
                     self.whole[number] = true;
                     files.iter().take(1).for_each(|file| Claims::clear_dead(file));
                     continue;
@@ -119,13 +156,14 @@ impl Batch {
 
     /// Whether another process has made the picture since [`Batch::look`]. Refuses a picture of another
     /// scene, as [`Batch::look`] does.
-    pub(super) fn made_meanwhile(&self, number: usize) -> Result<bool> {
+    pub(super) fn made_meanwhile(&self, number: usize, monitor: &dyn Monitor) -> Result<bool> {
         let files = self.files(number);
         let new = |file: &Path| stamp(file).is_some_and(|s| self.replaced.get(file) != Some(&s));
         if !files.iter().any(|file| new(file)) {
             return Ok(false);
         }
-        let states = self.states(number)?;
+        let (scene, mut states) = self.states(number)?;
+        self.check_volumes(&scene, &files, &mut states, &mut VolumeMemo::default(), monitor)?;
         for (file, state) in files.iter().zip(&states) {
             if let FileState::Other(what) = state
                 && new(file)
@@ -133,14 +171,48 @@ impl Batch {
                 return Err(taken(file, what));
             }
         }
-        Ok(files.iter().all(|file| new(file)) && states.iter().all(|f| *f == FileState::Whole))
+        Ok(files.iter().all(|file| new(file)) && states.iter().all(FileState::is_whole))
     }
 
-    /// State of each file of a picture.
-    fn states(&self, number: usize) -> Result<Vec<FileState>> {
+    /// Scene of a picture, and the state of each of its files. The contents of the volumes' files are not
+    /// compared yet.
+    fn states(&self, number: usize) -> Result<Examined> {
         let scene = self.scene(number)?;
         let files = self.files(number);
-        files.iter().zip(&self.layers).map(|(file, layers)| self.state_of(file, layers, &scene)).collect()
+        let state = |(file, layers): (&PathBuf, &Vec<Layer>)| self.state_of(file, layers, &scene);
+        let states = files.iter().zip(&self.layers).map(state).collect::<Result<_>>()?;
+        Ok((scene, states))
+    }
+
+    /// Puts [`FileState::Other`] in the place of pictures of other contents of the volumes' files. One
+    /// picture's volumes are read at a time, because they may fill the memory. They are not read for pictures
+    /// that are newer than all of the files.
+    fn check_volumes(
+        &self,
+        scene: &Scene,
+        files: &[PathBuf],
+        states: &mut [FileState],
+        memo: &mut VolumeMemo,
+        monitor: &dyn Monitor,
+    ) -> Result<()> {
+        let sources: Vec<&Path> = scene.recipes.iter().filter_map(|recipe| recipe.file.as_deref()).collect();
+        let is_older = |source: &&Path, picture: &Path| {
+            changed(source).zip(written(picture)).is_some_and(|(source, picture)| source < picture)
+        };
+        let is_known = |(file, state): (&PathBuf, &FileState)| {
+            !state.is_whole() || sources.iter().all(|source| is_older(source, file))
+        };
+        if files.iter().zip(states.iter()).all(is_known) {
+            return Ok(());
+        }
+        let (volumes, _) = memo.volumes(scene, self.base.limits().memory, monitor)?;
+        let wanted = volume_line(&volumes);
+        for state in states {
+            if matches!(state, FileState::Whole(line) if *line != wanted) {
+                *state = FileState::Other("it was made with other contents of volume.file".into());
+            }
+        }
+        Ok(())
     }
 
     fn state_of(&self, file: &Path, layers: &[Layer], scene: &Scene) -> Result<FileState> {
@@ -177,7 +249,10 @@ impl Batch {
             Err(e) => return Err(e),
         };
         Ok(match self.difference((file, layers), &verified, scene)? {
-            None => FileState::Whole,
+            None => {
+                let text = verified.scene.as_deref().unwrap_or_default();
+                FileState::Whole(text.lines().next().unwrap_or_default().into())
+            }
             Some(what) => FileState::Other(what),
         })
     }
@@ -192,7 +267,8 @@ impl Batch {
         let Some(text) = &verified.scene else {
             return Ok(Some("it does not name its scene".into()));
         };
-        let (line, text) = text.split_once('\n').unwrap_or((text, ""));
+        // The first line names the volumes.
+        let text = text.split_once('\n').map_or("", |(_, text)| text);
         let wanted = scene_text(scene);
         if text != wanted {
             let lines = text.lines().map(Some).chain(std::iter::repeat(None));
@@ -203,15 +279,6 @@ impl Batch {
                 }
                 None => "its scene has more parameters".into(),
             }));
-        }
-        if scene.recipes.iter().any(|recipe| recipe.file.is_some()) {
-            // A built volume follows from its parameters, but a volume file may have changed.
-            let memory = self.base.limits().memory;
-            let (volumes, _) =
-                VolumeMemo::default().volumes(scene, memory, &crate::util::monitor::Unwatched)?;
-            if line != volume_line(&volumes) {
-                return Ok(Some("it was made with other contents of volume.file".into()));
-            }
         }
         if verified.window != self.window(scene) {
             return Ok(Some("it shows another part of the picture".into()));

@@ -65,7 +65,7 @@ impl Batch {
             batch: self,
             engine,
             claims: Claims::new(self.request.stale),
-            volumes: VolumeMemo::with(self.base.limits().cache.clone()),
+            volumes: VolumeMemo::with(self.base.limits().cache.clone()).making_room(),
             mesh: None,
             next: None,
             coming: None,
@@ -168,7 +168,7 @@ impl Work<'_> {
             Asked::Theirs(who) => return Ok(Tried::Theirs(who)),
             Asked::Ours(claim) => claim,
         };
-        if self.batch.made_meanwhile(number)? {
+        if self.batch.made_meanwhile(number, self.watcher)? {
             claim.done();
             return Ok(Tried::Elsewhere);
         }

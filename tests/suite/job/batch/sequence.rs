@@ -3,14 +3,19 @@
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
 
 use glam::{DAffine3, DVec3};
 use taki::Result;
 use taki::grid::{Grid, write_vdb};
-use taki::job::VolumeMemo;
+use taki::job::batch::{Batch, Request};
+use taki::job::{Depth, VolumeMemo};
+use taki::output::frame::Exr;
+use taki::picture::Layer;
 use taki::scene::{Animation, Limits};
 use taki::util::monitor::Monitor;
+use taki::volume::VolumeTexture;
 use tempfile::TempDir;
 
 use super::{counts, files, folder};
@@ -146,4 +151,78 @@ fn volumes_that_were_read_ahead_are_taken_unless_their_file_changed() {
     std::thread::sleep(std::time::Duration::from_millis(300));
     fs::copy(dir.path().join("sim/a.0004.vdb"), dir.path().join("sim/a.0002.vdb")).unwrap();
     assert!(take(&mut memo, 1), "the file has changed since");
+}
+
+#[test]
+fn a_batch_that_continues_reads_only_files_that_changed() {
+    let dir = sequence();
+    let plan = || {
+        let sets = ["image.width=24", "image.height=18", "image.samples=1"].map(String::from);
+        let animation = Animation::load(&dir.path().join("s.toml"), &sets, &Limits::default()).unwrap();
+        let request = Request {
+            frames: None,
+            sweeps: Vec::new(),
+            outputs: vec![dir.path().join("f.####.png")],
+            sheet: None,
+            manifests: Vec::new(),
+            shard: None,
+            overwrite: false,
+            keep_going: false,
+            retries: 0,
+            crop: None,
+            exr: Exr::of(&Layer::ALL),
+            depth: Depth::default(),
+            codec: None,
+            movie_bits: None,
+            stale: Duration::from_secs(60),
+        };
+        let stages = Stages::default();
+        let batch = Batch::plan(animation, request, &stages)?;
+        let read = stages.0.into_inner().unwrap().iter().filter(|stage| **stage == "density").count();
+        Ok::<_, taki::Error>((batch.needs()?.to_render, read))
+    };
+    assert_eq!(plan().unwrap(), (4, 0));
+    run(&mut command(dir.path(), "batch", &["-o", "f.####.png"])).done();
+    assert_eq!(plan().unwrap(), (0, 0), "no file is read");
+    // The same contents, written again, are read and found to be the same.
+    let file = dir.path().join("sim/a.0003.vdb");
+    let contents = fs::read(&file).unwrap();
+    fs::write(&file, &contents).unwrap();
+    let (missing, read) = plan().unwrap();
+    assert!(missing == 0 && read > 0, "{missing} {read}");
+    // Other contents with the time of the old ones.
+    let time = fs::metadata(dir.path().join("sim/a.0001.vdb")).unwrap().modified().unwrap();
+    fs::copy(dir.path().join("sim/a.0002.vdb"), &file).unwrap();
+    fs::File::options().append(true).open(&file).unwrap().set_modified(time).unwrap();
+    let said = plan().unwrap_err().to_string();
+    assert!(said.contains("f.0002.png") && said.contains("other contents"), "{said}");
+}
+
+/// Monitor that notes, at every step of building, whether the last volumes are still held.
+struct Held(Weak<Vec<VolumeTexture>>, Mutex<Vec<bool>>);
+
+impl Monitor for Held {
+    fn progress(&self, _: &'static str, _: u64, _: u64) -> Result<()> {
+        self.1.lock().unwrap().push(self.0.strong_count() > 0);
+        Ok(())
+    }
+    fn warn(&self, _: &str) {}
+}
+
+#[test]
+fn a_memo_that_makes_room_lets_the_last_volume_go_before_it_builds_the_next() {
+    let dir = sequence();
+    let animation = Animation::load(&dir.path().join("s.toml"), &[], &Limits::default()).unwrap();
+    for (mut memo, is_held) in [(VolumeMemo::default(), true), (VolumeMemo::default().making_room(), false)] {
+        let (first, _) = memo.volumes(&animation.at(2).unwrap(), 1 << 30, &Stages::default()).unwrap();
+        // The same volume again takes no work.
+        assert_eq!(memo.volumes(&animation.at(2).unwrap(), 1 << 30, &Stages::default()).unwrap().1, None);
+        let held = Held(Arc::downgrade(&first), Mutex::default());
+        drop(first);
+        let (second, _) = memo.volumes(&animation.at(3).unwrap(), 1 << 30, &held).unwrap();
+        let truth = animation.at(3).unwrap().volume(1 << 30, &Stages::default()).unwrap();
+        assert_eq!(second[0].checksum(), truth.checksum());
+        let steps = held.1.into_inner().unwrap();
+        assert!(!steps.is_empty() && steps.iter().all(|step| *step == is_held), "{steps:?}");
+    }
 }
