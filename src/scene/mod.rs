@@ -46,6 +46,7 @@ pub use presets::{DEFAULT as DEFAULT_PRESET, list as presets};
 pub use read::{STDIN, Source, has_reference_by_hand, read_stdin, reference_keys};
 pub use record::{MAP_COMMENT, Record, VOLUME_COMMENT};
 pub use remove::REMOVE;
+pub use sequence::numbers_in;
 pub use typed::{fraction, parse_value};
 pub use value::{Key, Place, Raw, Value, Values};
 pub use volumes::{MAX_VOLUMES, Recipe};

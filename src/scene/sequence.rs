@@ -80,6 +80,19 @@ impl Sequence {
     }
 }
 
+/// Returns the numbers of the first and the last file in `folder` that have the name of the files of the
+/// volume `name`; `None` where that name has no place for a number, or no file has it.
+pub fn numbers_in(values: &Values, name: &str, folder: &Path) -> Option<[i64; 2]> {
+    let pattern = PathBuf::from(values.text(&key_of(values, name)));
+    let (before, behind) = ends(pattern.file_name()?.to_str()?)?;
+    let number = |file: std::fs::DirEntry| {
+        let own = file.file_name();
+        own.to_str()?.strip_prefix(before)?.strip_suffix(behind)?.parse::<i64>().ok()
+    };
+    let numbers = std::fs::read_dir(folder).ok()?.flatten().filter_map(number);
+    numbers.fold(None, |ends, n| Some(ends.map_or([n, n], |[low, high]: [i64; 2]| [low.min(n), high.max(n)])))
+}
+
 /// Returns the resolved path of the file of the volume `name`, whose key is `key`.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use egui::{Align, ComboBox, DragValue, Layout, Slider, SliderClamping, Ui};
 use rand::RngExt;
 
 use super::{MARKS_WIDTH, NAME_WIDTH, VALUE_WIDTH, name};
-use crate::scene::{Kind, Param, Raw, Value, WATER, split_volume_key};
+use crate::scene::{Kind, Param, Raw, Value, WATER, key_of_volume, numbers_in, split_volume_key};
 use crate::viewer::document::Document;
 use crate::viewer::meshes::choices;
 use crate::viewer::navigate;
@@ -144,11 +144,16 @@ impl Field<'_> {
 
     fn int(&self, ui: &mut Ui, [min, max, default]: [i64; 3], x: i64) -> Option<Raw> {
         let mut new = x;
+        let files = self.numbers_of_files(ui);
         let response = match self.param.slider {
+            _ if let Some([first, last]) = files => ui.add(
+                Slider::new(&mut new, first..=last)
+                    .clamping(SliderClamping::Never)
+                    .update_while_editing(false),
+            ),
             Some((low, high)) => ui.add(
                 Slider::new(&mut new, low as i64..=high as i64)
-                    // Files are numbered by time.
-                    .logarithmic(!self.key.ends_with(".frame") && is_logarithmic(low, high, default as f64))
+                    .logarithmic(is_logarithmic(low, high, default as f64))
                     .clamping(SliderClamping::Never)
                     .update_while_editing(false)
                     .suffix(if self.param.unit == "cells" { String::new() } else { self.suffix() }),
@@ -198,6 +203,20 @@ impl Field<'_> {
         }
         let entered = ui.data_mut(|d| d.remove_temp::<String>(id));
         entered.filter(|new| new != text).map(Raw::Text)
+    }
+
+    /// Numbers of the first and the last file that a volume's number of a file can choose, if it has several.
+    /// The folder is read once for each name.
+    fn numbers_of_files(&self, ui: &Ui) -> Option<[i64; 2]> {
+        let (volume, _) = split_volume_key(self.key).filter(|(_, own)| *own == "volume.frame")?;
+        let (scene, values) = (self.document.scene(), self.document.values());
+        let recipe = scene.recipes.iter().find(|own| own.name == volume && own.is_sequence)?;
+        let folder = recipe.file.as_ref()?.parent()?;
+        let names =
+            ["source", "file"].map(|own| values.text(&key_of_volume(volume, &format!("volume.{own}"))));
+        let id = egui::Id::unique((self.key, folder, names));
+        let read = || numbers_in(values, volume, folder).filter(|[first, last]| first < last);
+        ui.data_mut(|data| *data.get_temp_mut_or_insert_with(id, read))
     }
 
     /// The unit after a number, if it is short. The tooltip shows long units.

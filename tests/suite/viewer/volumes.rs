@@ -1,5 +1,8 @@
 //! A scene with several volumes: each has its parameters, and the inspectors show the one that is chosen.
 
+use glam::{DAffine3, DVec3};
+use taki::grid::{Grid, write_vdb};
+
 use super::*;
 
 /// The scene of the other tests with fur on one of its quads.
@@ -110,4 +113,42 @@ fn a_volume_has_the_rows_of_its_builder_alone() {
     has(&with, &kept, true);
     has(&with, &curves, false);
     has(&with, &strands, true);
+}
+
+#[test]
+fn the_slider_of_a_sequence_goes_over_its_files_and_a_missing_one_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for number in [3u32, 5, 6] {
+        let values = vec![1.0; number.pow(3) as usize];
+        let to_world = DAffine3::from_scale(DVec3::splat(0.2));
+        let grid = Grid::from_dense("density", 1, [0; 3], [number; 3], values, to_world);
+        write_vdb(&folder.path().join(format!("s.{number:04}.vdb")), &[grid]).expect("a file");
+    }
+    let source = folder.path().join("s.####.vdb");
+    let smoke = "[volumes.smoke]\nbuilder = \"flow\"\nsource = \"taki:pour.vdb\"\n\
+                 [boxes.smoke]\nvolume = \"smoke\"\n";
+    let mut window = Setup {
+        scene: SCENE.to_owned() + smoke,
+        sets: vec![format!("volumes.smoke.source={}", source.display()), "volumes.smoke.frame=3".into()],
+        size: [700.0, 900.0],
+        ..Setup::default()
+    }
+    .open();
+    window.settle();
+    window.enter("Search parameters", "volumes.smoke.frame");
+    let slider = window.widget(Role::Slider, "volumes.smoke.frame");
+    let ends = [slider.accesskit_node().min_numeric_value(), slider.accesskit_node().max_numeric_value()];
+    assert_eq!(ends, [Some(3.0), Some(6.0)]);
+    let scrub = |window: &mut Window, number: f64| {
+        window.widget(Role::Slider, "volumes.smoke.frame").set_value_accesskit(number);
+        window.harness.run_steps(2);
+        window.settle();
+        window.picture().frame.radiance.clone()
+    };
+    let first = window.picture().frame.radiance.clone();
+    let last = scrub(&mut window, 6.0);
+    assert_ne!(last, first, "another file is another picture");
+    assert_eq!(scrub(&mut window, 4.0), last, "the picture stays");
+    let fault = window.viewer().document().fault().expect("it is told").to_owned();
+    assert!(fault.contains("s.0004.vdb"), "{fault}");
 }
