@@ -257,7 +257,9 @@ const RULES: &[Rule] = &[
         keys: &["volume.reflect_high", "volume.reflect_k_d", "volume.reflect_k_s", "volume.reflect_low"],
         switch: "volume.reflect",
         needs: "speed, vorticity or grid",
-        works: |v, switch| !is(v, switch, ReflectBy::Even.word()),
+        works: |v, switch| {
+            ![ReflectBy::Even, ReflectBy::Stored].iter().any(|word| is(v, switch, word.word()))
+        },
     },
     Rule {
         keys: &["curves.*", "volume.nx", "volume.ny", "volume.nz", "volume.seed"],

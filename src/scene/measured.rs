@@ -15,6 +15,9 @@ use crate::volume::{
 /// Most cells along a side of a measured volume.
 const MOST_CELLS: u64 = 4096;
 
+/// Grids with k_d and k_s, as volumes are written.
+const STORED: [&str; 2] = ["kd", "ks"];
+
 /// What the cells of a volume are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Builder {
@@ -63,7 +66,12 @@ pub(super) fn measured(
     let wanted = Wanted {
         density: v.text(&key("volume.grid")),
         velocity: v.text(&key("volume.velocity")),
-        second: (reflect == ReflectBy::Grid).then_some(second),
+        second: match reflect {
+            ReflectBy::Grid => Some(second),
+            ReflectBy::Stored => Some(STORED[0].into()),
+            _ => None,
+        },
+        specular: (reflect == ReflectBy::Stored).then(|| STORED[1].into()),
         may_be_empty: is_sequence,
     };
     let (velocity, bounds, to_world) = find_measured(&path, &wanted, limits.memory)?;
@@ -72,6 +80,12 @@ pub(super) fn measured(
         return Err(Error::input(
             format!("{} without a velocity in {}", key("volume.strands"), path.display()),
             format!("name its grid in {}, or set {} to 0", key("volume.velocity"), key("volume.strands")),
+        ));
+    }
+    if strands.is_some() && reflect == ReflectBy::Stored {
+        return Err(Error::input(
+            format!("{} = \"stored\" with strands, which have k of their own", key("volume.reflect")),
+            format!("set {} to another word, or {} to 0", key("volume.reflect"), key("volume.strands")),
         ));
     }
     let [cells_key, edge_key] = ["volume.cells", "volume.voxels"].map(key);
@@ -111,6 +125,7 @@ pub(super) fn measured(
         density: wanted.density,
         velocity,
         second: wanted.second,
+        specular: wanted.specular,
         bounds,
         to_world,
         size,

@@ -271,7 +271,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.reflect", "", "", Choice(ReflectBy::WORDS), Volume)
             .doc(
                 "What k_d and k_s follow in a volume with `volume.builder=flow`: nothing (`even`), the \
-                 speed, the vorticity, or the grid `volume.reflect_grid`. They change from `volume.k_d` \
+                 speed, the vorticity, or the grid `volume.reflect_grid`; `stored` takes them from the grids \
+                 `kd` and `ks`, as `taki volume build` writes them. The others change from `volume.k_d` \
                  and `volume.k_s` at `volume.reflect_low` to `volume.reflect_k_d` and `volume.reflect_k_s` \
                  at `volume.reflect_high`.",
             )

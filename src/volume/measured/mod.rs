@@ -8,7 +8,7 @@
 //! |---|---|
 //! | ρ | `rho_scale` × density, or 1 − e^(−`rho_scale` × density × edge of a cell) |
 //! | v | mean velocity, weighted by the density, in the axes of the cells |
-//! | k_d, k_s | even, or between two values by speed, vorticity or another grid, weighted by the density |
+//! | k_d, k_s | even, or between two values by speed, vorticity or another grid, or those of two grids, weighted by the density |
 //!
 //! The cells hold ρ/α in 65535ths, where α is the largest ρ. So ρ is exact to α/131070, and a cell with less
 //! is empty. v is in cells, so that J·v is parallel to the velocity whatever the shape of the voxels.
@@ -69,9 +69,19 @@ pub enum ReflectBy {
     Vorticity,
     /// A grid of its own, such as foam or age.
     Grid,
+    /// The grids `kd` and `ks`, which hold k_d and k_s themselves.
+    Stored,
 }
 
-words! { ReflectBy { Even => "even", Speed => "speed", Vorticity => "vorticity", Grid => "grid" } }
+words! {
+    ReflectBy {
+        Even => "even",
+        Speed => "speed",
+        Vorticity => "vorticity",
+        Grid => "grid",
+        Stored => "stored",
+    }
+}
 
 /// Names of the grids that hold the velocity.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -94,8 +104,11 @@ pub struct MeasuredSpec {
     pub density: String,
     /// Names of the velocity's grids.
     pub velocity: VelocityNames,
-    /// Name of the grid that k follows, with [`ReflectBy::Grid`].
+    /// Name of the grid that k follows, with [`ReflectBy::Grid`], or of that of k_d, with
+    /// [`ReflectBy::Stored`].
     pub second: Option<String>,
+    /// Name of the grid of k_s, with [`ReflectBy::Stored`].
+    pub specular: Option<String>,
     /// Voxels that the volume covers.
     pub bounds: Bounds,
     /// Transform from a voxel's index to its centre in the world, metres.
@@ -169,7 +182,7 @@ impl MeasuredSpec {
     fn reflected(&self, value: f64) -> [f32; 2] {
         let [low, high] = self.reflect_range.map(f64::from);
         let share = match self.reflect {
-            ReflectBy::Even => 0.0,
+            ReflectBy::Even | ReflectBy::Stored => 0.0,
             _ if high > low => ((value - low) / (high - low)).clamp(0.0, 1.0),
             _ => f64::from(u8::from(value >= low)),
         } as f32;

@@ -68,7 +68,8 @@ fn strands_follow_the_flow_and_the_fractal_moves_them() {
 #[test]
 fn cells_of_strands_have_the_papers_densities_and_lie_where_matter_is() {
     let velocity = || vec![grid("velocity", |_| [0.3, -1.0, 0.2])];
-    let uniform = Measured { density: grid("density", |_| [2.0]), velocity: velocity(), second: None };
+    let uniform =
+        Measured { density: grid("density", |_| [2.0]), velocity: velocity(), second: None, specular: None };
     let own = fine(STRANDS);
     let volume = build(&uniform, &own);
     assert_eq!(volume.alpha, 2.0);
