@@ -66,6 +66,8 @@ const OF_STRANDS: &[&str] = &[
 const OF_GRIDS: &[&str] = &[
     "volume.cells",
     "volume.grid",
+    "volume.level_set_unit",
+    "volume.origin",
     "volume.reflect",
     "volume.reflect_grid",
     "volume.reflect_high",
@@ -76,8 +78,10 @@ const OF_GRIDS: &[&str] = &[
     "volume.rho_scale",
     "volume.source",
     "volume.strands",
+    "volume.up",
     "volume.velocity",
     "volume.velocity_at",
+    "volume.velocity_scale",
     "volume.voxels",
 ];
 

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::{DAffine3, DVec3};
+
 use super::param::key_of_volume;
 use super::sequence::{self, Sequence};
 use super::{Limits, Values};
@@ -9,7 +11,8 @@ use crate::grid::Bounds;
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 use crate::volume::{
-    MeasuredSpec, ReflectBy, RhoRule, StrandSpec, VelocityAt, VelocityNames, Wanted, find_measured,
+    LevelSetUnit, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, Up, VelocityAt, VelocityNames, Wanted,
+    find_measured,
 };
 
 /// Most cells along a side of a measured volume.
@@ -128,6 +131,9 @@ pub(super) fn measured(
         specular: wanted.specular,
         bounds,
         to_world,
+        scene_from_file: scene_from_file(v, name, to_world),
+        level_set_unit: v.choice(&key("volume.level_set_unit"), LevelSetUnit::from_word),
+        velocity_scale: float("volume.velocity_scale"),
         size,
         rho: v.choice(&key("volume.rho"), RhoRule::from_word),
         rho_scale: float("volume.rho_scale"),
@@ -141,6 +147,19 @@ pub(super) fn measured(
         alpha: float("volume.alpha"),
         strands,
     }))
+}
+
+/// Returns the turn and the shift from the world of a volume's file to that of the scene.
+fn scene_from_file(v: &Values, name: &str, to_world: DAffine3) -> DAffine3 {
+    let [up, origin] = ["volume.up", "volume.origin"].map(|key| key_of_volume(name, key));
+    let turn = DAffine3::from_mat3(v.choice(&up, Up::from_word).scene_from_file());
+    match v.is_set(&origin) {
+        true => {
+            let corner = to_world.transform_point3(DVec3::splat(-0.5));
+            turn * DAffine3::from_translation(v.point(&origin) - corner)
+        }
+        false => turn,
+    }
 }
 
 /// Returns the strands of the measured volume `name`, if it has any.

@@ -25,8 +25,8 @@ pub use cells::Cells;
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
 pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
 pub use measured::{
-    Measured, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, VelocityAt, VelocityNames, Wanted,
-    build_measured, find_measured,
+    LevelSetUnit, Measured, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, Up, VelocityAt, VelocityNames,
+    Wanted, build_measured, find_measured,
 };
 pub use pyramid::{
     Leaps, LevelAtlas, LevelSets, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels,

@@ -113,7 +113,8 @@ pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
 /// Parameters that no scene has of itself, besides lists.
-const OPTIONAL: [&str; 4] = [boxes::POSITION, boxes::SIZE, meshes::COLOR, meshes::MATERIAL];
+const OPTIONAL: [&str; 6] =
+    [boxes::POSITION, boxes::SIZE, meshes::COLOR, meshes::MATERIAL, volume::ORIGIN, volume::ORIGIN_OF_OTHERS];
 /// Longest line of text in docs/parameters.md, characters.
 const COLUMNS: usize = 110;
 

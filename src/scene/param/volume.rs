@@ -4,7 +4,11 @@ use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
 use crate::scene::measured::Builder;
-use crate::volume::{ReflectBy, RhoRule, Run, StorageChoice, VelocityAt};
+use crate::volume::{LevelSetUnit, ReflectBy, RhoRule, Run, StorageChoice, Up, VelocityAt};
+
+/// Place of the grid, if it is not the file's: of the water and of other volumes.
+pub(super) const ORIGIN: &str = "volume.origin";
+pub(super) const ORIGIN_OF_OTHERS: &str = "volumes.*.origin";
 
 pub(super) const CURVES: Group = Group {
     title: "Curves",
@@ -229,6 +233,31 @@ pub(super) const VOLUME: Group = Group {
                  `auto` is `staggered` if the file says so, and `centre` otherwise.",
             )
             .when("Choose one if the file does not say it; a wrong one moves the flow by half a voxel."),
+        p("volume.velocity_scale", "", "m/s", Float(1e-6, 1e6, 1.0), Volume)
+            .slider(0.0, 2.0)
+            .doc("Speed that a velocity of 1 in the file stands for.")
+            .when(
+                "Set it where speed or vorticity choose k and the file is not in m/s. Blender's fluids are \
+                 in voxels per 0.4 s: set it to the edge of a voxel / 0.4.",
+            ),
+        p("volume.level_set_unit", "", "", Choice(LevelSetUnit::WORDS), Volume)
+            .doc(
+                "Unit of the distances where `volume.grid` is a level set: `metres`, or edges of a voxel \
+                 (`voxels`). `auto` finds it by how much they change from voxel to voxel at the surface.",
+            )
+            .when("Choose `voxels` if water looks like bricks, and `metres` if it looks like fog."),
+        p("volume.up", "", "", Choice(Up::WORDS), Volume)
+            .doc(
+                "Axis of the file in `volume.source` that points up. With `z` the box is turned: the file's \
+                 (x, y, z) is (x, z, −y) in the scene.",
+            )
+            .when("Choose `z` for files of Blender and of other programs whose z axis points up."),
+        p(ORIGIN, "", "m", Point([0.0, 0.0, 0.0]), Volume)
+            .doc(
+                "Place of the lower corner of the voxel at index (0, 0, 0), in the axes of the file. Without \
+                 it, that is where the file puts it.",
+            )
+            .when("Set it to the lower corner of a Blender domain, which is not in its files."),
         p("volume.cells", "", "cells", Int(0, 4096, 0), Volume)
             .slider(0.0, 512.0)
             .doc(

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::field::{Field, Source};
 use super::overlap::{Covered, Overlap};
-use super::{MeasuredSpec, ReflectBy, VelocityNames, strands};
+use super::{MeasuredSpec, ReflectBy, VelocityNames, level_set, strands};
 use crate::grid::{self, Block, BlockData, Class, Grid};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -55,12 +55,14 @@ pub fn build_measured(
         }
         Ok(grid)
     };
-    let density = read(&spec.density, 1)?;
-    let velocity = match &spec.velocity {
+    let mut density = read(&spec.density, 1)?;
+    level_set::to_metres(&mut density, spec.level_set_unit);
+    let mut velocity = match &spec.velocity {
         VelocityNames::None => Vec::new(),
         VelocityNames::Vector(name) => vec![read(name, 3)?],
         VelocityNames::Components(names) => names.iter().map(|name| read(name, 1)).collect::<Result<_>>()?,
     };
+    velocity.iter_mut().for_each(|grid| grid.scale(spec.velocity_scale));
     let second = spec.second.as_ref().map(|name| read(name, 1)).transpose()?;
     let specular = spec.specular.as_ref().map(|name| read(name, 1)).transpose()?;
     Measured { density, velocity, second, specular }.volume(spec, storage, left, monitor)

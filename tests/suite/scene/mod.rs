@@ -196,7 +196,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
         // The scene's values do not tell the kind of its environment or its animation. Those of carriers and
         // projections are told by the surfaces of a mesh, which the tests of meshes compare; those of
         // measured volumes need the file of a simulation, as the tests of boxes have it.
-        let of_measured = ["builder", "velocity_at", "rho", "reflect"];
+        let of_measured = ["builder", "velocity_at", "rho", "reflect", "level_set_unit", "up"];
         let is_measured = of_measured.iter().any(|last| param.key.ends_with(&format!(".{last}")));
         let is_kept = !is_measured
             && ![

@@ -4,7 +4,8 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 use taki::grid::{Bounds, Class, Grid};
 use taki::util::monitor::Unwatched;
 use taki::volume::{
-    Measured, MeasuredSpec, ReflectBy, RhoRule, StorageChoice, VelocityAt, VelocityNames, VolumeTexture,
+    LevelSetUnit, Measured, MeasuredSpec, ReflectBy, RhoRule, StorageChoice, VelocityAt, VelocityNames,
+    VolumeTexture,
 };
 
 /// Voxels along each axis, and the index of the first.
@@ -45,6 +46,9 @@ pub fn spec(cells: [u32; 3]) -> MeasuredSpec {
         specular: None,
         bounds: Bounds { min: FIRST, max },
         to_world: to_world(),
+        scene_from_file: DAffine3::IDENTITY,
+        level_set_unit: LevelSetUnit::Auto,
+        velocity_scale: 1.0,
         size: cells,
         rho: RhoRule::Linear,
         rho_scale: 1.0,

@@ -10,6 +10,7 @@ pub mod measured;
 pub mod measured_strands;
 pub mod pyramid;
 pub mod structure;
+mod units;
 
 use std::collections::{HashMap, HashSet};
 
