@@ -9,6 +9,7 @@ macro_rules! pages {
 pages! {
     tutorial "tutorial.md"
     meshes "meshes.md"
+    materials "materials.md"
     grids "grids.md"
     simulation "simulation.md"
     method "method.md"

@@ -9,6 +9,7 @@
 #import light::fibre
 #import light::haze
 #import light::optical_depth
+#import light::ramp
 #import light::scatter
 #import light::strand
 #import mapping
@@ -34,7 +35,7 @@ override STRAND: bool = false;
 // Light is scattered more than once.
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
-override IN_COLOUR: bool = STRAND || MULTIPLE;
+override IN_COLOUR: bool = STRAND || MULTIPLE || COLORED;
 // The picture has an alpha channel.
 override ALPHA: bool = false;
 // Mist has its own walk, in which no cell is empty and all reflect alike.
@@ -85,6 +86,7 @@ const CUT: u32 = 0xffffffffu;
 struct Reflection {
     strand: Strand,
     similarity: Similarity,
+    ramp: Ramp,
 }
 
 struct VolumeConstants {
@@ -96,6 +98,7 @@ struct VolumeConstants {
     base: vec3<i32>,
     flow_cells: f32,
     similarity: Similarity,
+    ramp: Ramp,
     levels: u32,
     pad_a: u32,
     pad_b: u32,
@@ -114,6 +117,7 @@ fn volume_of(number: u32) -> VolumeConstants {
     only.levels = frame.levels;
     if IN_COLOUR {
         only.similarity = reflection.similarity;
+        only.ramp = reflection.ramp;
     }
     return only;
 }
@@ -208,6 +212,8 @@ struct Ray {
     cut: bool,
     // Optical depth so far, in bits; only if light is scattered more than once.
     depth: f32,
+    // Colour that the cells give to the ambient light, minus that of white ones.
+    tint: vec3<f32>,
 }
 
 // Values that are constant along a ray. The frame's uniforms are copied here because software Vulkan gathers
@@ -226,6 +232,8 @@ struct View {
     // Constants of the strand model and of multiple scattering, if the scene uses them.
     strand: Strand,
     similarity: Similarity,
+    // Colours of the cells.
+    ramp: Ramp,
     // The sheet's erosion and mist.
     matter: SheetDensity,
     // Whether the sheet leaves empty cells empty; mist does not.
@@ -278,6 +286,9 @@ fn trace(
         view.strand = reflection.strand;
         view.similarity = scatter_similarity(own.similarity, quad.mist);
     }
+    if COLORED {
+        view.ramp = own.ramp;
+    }
     var column: GainColumn;
     if MULTIPLE {
         column = scatter_column(slab_cosine(d.z, -d_cell));
@@ -296,6 +307,7 @@ fn trace(
     let walks = select(1u, 2u, share > 0.0);
     var end = 0.0;
     var light = vec3<f32>(0.0);
+    var tint = vec3<f32>(0.0);
     var i = 0u;
     for (; i < walks; i++) {
         let weight = select(share, 1.0 - share, i == 0u);
@@ -326,6 +338,7 @@ fn trace(
         }
         end += ray.transmittance * weight;
         light += ray.light * weight;
+        tint += ray.tint * weight;
         *count += vec2<u32>(ray.cells, ray.light_cells);
         if ray.cut | !ray.done {
             *count = vec2<u32>(CUT);
@@ -340,6 +353,9 @@ fn trace(
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
     var color = frame.ambient * (before.w - end) + passed;
+    if COLORED {
+        color += frame.ambient * tint;
+    }
     if (LIGHTS == 1u) & IN_COLOUR {
         color += view.light.intensity * light;
     } else if LIGHTS == 1u {
@@ -497,6 +513,14 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     seen.weight = (*ray).transmittance - passed;
     seen.k_d = sample.k_d;
     seen.k_s = sample.k_s;
+    if COLORED {
+        if !is_mist(view) {
+            let ink = ramp_ink(view.ramp, sample.k_s);
+            seen.k_s = ink.w;
+            seen.color = ink.rgb;
+            (*ray).tint += (ink.rgb - 1.0) * seen.weight;
+        }
+    }
     if MANY_DIRECTIONS {
         seen.spread = spread_new(view.metric, sample.moments, view.e_v);
     }

@@ -6,6 +6,7 @@
 #import layout
 #import light::fibre
 #import light::optical_depth
+#import light::ramp
 #import light::scatter
 #import light::strand
 #import mapping
@@ -73,6 +74,8 @@ struct CellShading {
     weight: f32,
     k_d: f32,
     k_s: f32,
+    // Colour of what is reflected diffusely, if any volume has colours.
+    color: vec3<f32>,
     v: vec3<f32>,
     t_dot_e: f32,
     sin2_e: f32,
@@ -157,30 +160,37 @@ fn is_mist(view: View) -> bool {
     return ERODED && view.matter.mist > 0.0;
 }
 
-// 255·Ψ of a cell's fibres, or of mist.
-fn psi_of(seen: CellShading, light: RayLight, view: View) -> f32 {
+// Summands of 255·Ψ of a cell's fibres, or 255·Ψ of mist.
+fn psi_parts_of(seen: CellShading, light: RayLight, view: View) -> vec2<f32> {
+    let mist = vec2<f32>(view.matter.mist, 0.0);
     if MANY_DIRECTIONS {
-        let psi = spread_psi(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
-        return select(psi, view.matter.mist, is_mist(view));
+        let parts = spread_psi_parts(seen.spread, seen.k_d, seen.k_s, view.p, light.l_v, light.l_dot_e);
+        return select(parts, mist, is_mist(view));
     }
     let t_dot_e = seen.t_dot_e;
-    let fibre = psi(view.p, seen.k_d, seen.k_s, seen.v, light.l_v, t_dot_e, seen.sin2_e, seen.inverse_q);
-    return select(fibre, view.matter.mist, is_mist(view));
+    let parts =
+        psi_parts(view.p, seen.k_d, seen.k_s, seen.v, light.l_v, t_dot_e, seen.sin2_e, seen.inverse_q);
+    return select(parts, mist, is_mist(view));
 }
 
 // Light that a cell sends to the eye from a light of intensity 1, in 255ths.
 fn lit(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> f32 {
-    let fibre = psi_of(seen, light, view);
-    return seen.weight * fibre * visibility_of(seen, light, view, ray).x;
+    let parts = psi_parts_of(seen, light, view);
+    return seen.weight * (parts.x + parts.y) * visibility_of(seen, light, view, ray).x;
 }
 
-// Light that a cell sends to the eye from a light of intensity 1, in colour: with the strand model or
-// multiple scattering.
+// Light that a cell sends to the eye from a light of intensity 1, in colour: with the strand model,
+// multiple scattering or colours of the cells.
 fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<function, Ray>) -> vec3<f32> {
     let visibility = visibility_of(seen, light, view, ray);
     let weight = seen.weight * visibility.x;
-    let fibre = psi_of(seen, light, view);
-    var lit = vec3<f32>(weight * fibre * (1.0 / 255.0));
+    let parts = psi_parts_of(seen, light, view);
+    var lit = vec3<f32>(weight * (parts.x + parts.y) * (1.0 / 255.0));
+    if COLORED {
+        if !is_mist(view) {
+            lit = (seen.color * parts.x + vec3<f32>(parts.y)) * (weight * (1.0 / 255.0));
+        }
+    }
     if STRAND {
         let root = sqrt(seen.inverse_q);
         var t_dot = vec2<f32>(dot3(seen.v, light.l_v), seen.t_dot_e) * root;

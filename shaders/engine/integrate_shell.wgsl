@@ -4,6 +4,7 @@
 #import engine::integrate
 #import layout
 #import light::fibre
+#import light::ramp
 #import light::shell_depth
 #import light::strand
 #import mapping
@@ -88,8 +89,9 @@ fn trace_shell(
         done = (segment.t_in >= t_end) | (ray.transmittance < frame.early_end);
         if !done {
             segment = segment_until(segment_from(segment, begin), t_end);
-            // A triangle without an area in the texture shows nothing of it.
-            if segment.is_mapped {
+            // A triangle without an area in the texture shows nothing of it, nor does a tetrahedron that
+            // the ray only touches.
+            if segment.is_mapped & (segment.t_out > segment.t_in) {
                 through_tetrahedron(&ray, segment, shell, own, origin, metres);
             }
             done = path.left == 0u;
@@ -208,7 +210,7 @@ fn walk_tetrahedron(
             let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * along;
             let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * along;
             let cell = ShellCell(segment, shares, depth, sample, texel.y, point);
-            if LIGHTS > 0u {
+            if (LIGHTS > 0u) | COLORED {
                 (*ray).light += shell_lit(ray, cell, level, shell, own) * weight;
             }
             (*ray).transmittance = passed;
@@ -253,9 +255,16 @@ fn shell_lit(
     let t_dot_e = dot3(t, e);
     let sin2_e = max(1.0 - t_dot_e * t_dot_e * inverse_q, 0.0);
     let k_d = cell.sample.k_d;
-    let k_s = cell.sample.k_s;
-    let count = arrayLength(&lights);
+    var k_s = cell.sample.k_s;
     var sum = vec3<f32>(0.0);
+    var color = vec3<f32>(1.0);
+    if COLORED {
+        let ink = ramp_ink(own.ramp, k_s);
+        k_s = ink.w;
+        color = ink.rgb;
+        sum = frame.ambient * (color - 1.0);
+    }
+    let count = select(0u, arrayLength(&lights), LIGHTS > 0u);
     var i = 0u;
     for (; i < count; i++) {
         let light = lights[i];
@@ -270,11 +279,17 @@ fn shell_lit(
                 t_dot = spread_of_one(spread, l);
             }
             fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
-        } else if MANY_DIRECTIONS {
-            fibre = vec3<f32>(spread_psi(spread, k_d, k_s, frame.p, l, l_dot_e) * (1.0 / 255.0));
         } else {
-            let grey = psi(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
-            fibre = vec3<f32>(grey * (1.0 / 255.0));
+            var parts = vec2<f32>(0.0);
+            if MANY_DIRECTIONS {
+                parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
+            } else {
+                parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
+            }
+            fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
+            if COLORED {
+                fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
+            }
         }
         let visible = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
         sum += light.intensity * arrives.w * fibre * visible;

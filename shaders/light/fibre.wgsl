@@ -1,5 +1,6 @@
 // §5 Decoding of a cell's direction, and the fibre model of Kajiya and Kay 1989. Twins: v_code in
-// src/volume/cell.rs, and src/light/fibre.rs. shaders/engine/integrate_light.wgsl calls psi for each cell.
+// src/volume/cell.rs, and src/light/fibre.rs. shaders/engine/integrate_light.wgsl calls psi_parts for each
+// cell.
 
 #import layout
 
@@ -36,8 +37,9 @@ fn specular_power(x: f32, p: f32) -> f32 {
     return result;
 }
 
-// Ψ = k_d·sin(t,l) + k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p, with t = v/√q in the view's metric.
-fn psi(
+// The summands of Ψ = k_d·sin(t,l) + k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p, with t = v/√q in the
+// view's metric.
+fn psi_parts(
     p: f32,
     k_d: f32,
     k_s: f32,
@@ -46,9 +48,9 @@ fn psi(
     t_dot_e: f32,
     sin2_e: f32,
     inverse_q: f32,
-) -> f32 {
+) -> vec2<f32> {
     let t_dot_l = dot3(v, l_v);
     let sin2_l = max(1.0 - t_dot_l * t_dot_l * inverse_q, 0.0);
     let base = sqrt(sin2_l * sin2_e) - t_dot_l * t_dot_e * inverse_q;
-    return k_d * sqrt(sin2_l) + k_s * specular_power(max(base, 0.0), p);
+    return vec2<f32>(k_d * sqrt(sin2_l), k_s * specular_power(max(base, 0.0), p));
 }

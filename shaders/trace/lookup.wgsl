@@ -141,8 +141,16 @@ fn spread_of_one(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(sqrt(clamp(cosines.x, 0.0, 1.0)), select(e, -e, cosines.y < 0.0));
 }
 
-// Ψ of a distribution of directions. Twin: Spread::psi, where the highlight's widening is derived.
-fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>, l_dot_e: f32) -> f32 {
+// Summands of Ψ of a distribution of directions. Twin: Spread::psi_parts, where the highlight's widening is
+// derived.
+fn spread_psi_parts(
+    spread: Spread,
+    k_d: f32,
+    k_s: f32,
+    p: f32,
+    l_v: vec3<f32>,
+    l_dot_e: f32,
+) -> vec2<f32> {
     let cosines = spread_cosines(spread, l_v);
     let sin2_l = max(1.0 - cosines.x, 0.0);
     let sin2_e = max(1.0 - spread.cos2_e, 0.0);
@@ -151,5 +159,5 @@ fn spread_psi(spread: Spread, k_d: f32, k_s: f32, p: f32, l_v: vec3<f32>, l_dot_
     let variance = spread.variance * (1.0 + cos_phi);
     let base = clamp(root - cosines.y + 0.5 * variance, 0.0, 1.0);
     let wide = 1.0 + p * variance;
-    return k_d * sqrt(sin2_l) + k_s * pow(base, p / wide) / sqrt(wide);
+    return vec2<f32>(k_d * sqrt(sin2_l), k_s * pow(base, p / wide) / sqrt(wide));
 }

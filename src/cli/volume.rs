@@ -8,8 +8,8 @@ use clap::{Args, Subcommand};
 use super::parse::memory;
 use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output, grids};
-use crate::grid::{encode_vdb, is_grid};
-use crate::job::{check_volume_replaced, is_vdb};
+use crate::grid::{GridFile, is_grid};
+use crate::job::check_volume_replaced;
 use crate::output::frame::Output;
 use crate::scene::{Scene, key_of_volume, likeliest};
 use crate::util::error::{Error, Result};
@@ -25,14 +25,15 @@ pub struct VolumeArgs {
 #[derive(Subcommand)]
 enum VolumeCommand {
     /// Builds a scene's volume texture and writes it: as an .npz file with the arrays rho, v, k and alpha, or
-    /// as a .vdb file with the grids density, velocity, kd and ks.
+    /// as a .vdb or .nvdb file with the grids density, velocity, kd and ks.
     Build {
         #[command(flatten)]
         scene: SceneOptions,
         /// Volume to build, where the scene shows several: water, or the name of a table in [volumes].
         #[arg(long = "volume", value_name = "NAME")]
         volume: Option<String>,
-        /// File to write, an .npz or a .vdb. Default: the scene's name with .npz, in the current folder.
+        /// File to write: an .npz, a .vdb or an .nvdb. Default: the scene's name with .npz, in the current
+        /// folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
         /// Replaces an existing file even if it is no volume.
@@ -60,11 +61,11 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let scene = options.load(&[])?;
             let number = number_of(&scene, name.as_deref())?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
-            let as_grids = is_vdb(&path);
-            if !as_grids && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+            let as_grids = GridFile::of(&path);
+            if as_grids.is_none() && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
                 let npz = path.with_extension("npz");
                 return Err(Error::Usage(format!(
-                    "-o {}: a volume is an .npz file, or a .vdb for other programs; use -o {}",
+                    "-o {}: a volume is an .npz file, or a .vdb or .nvdb for other programs; use -o {}",
                     path.display(),
                     npz.display()
                 )));
@@ -82,7 +83,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let mut out = Output::create(&path)?;
             let memory = options.limits().memory;
             let volume = scene.cached_volume(number, None, memory, terminal)?;
-            if volume.alpha > 1.0 && !as_grids {
+            if volume.alpha > 1.0 && as_grids.is_none() {
                 let scale = key_of_volume(&scene.recipes[number].name, "volume.rho_scale");
                 return Err(Error::input(
                     format!("ρ reaches {}, and a volume file holds at most 1", volume.alpha),
@@ -95,10 +96,10 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             terminal.progress("saving", 0, 1)?;
             let writer = std::io::BufWriter::with_capacity(1 << 20, out.file());
             let written = match as_grids {
-                false => write_npz(&volume, writer),
-                true => {
+                None => write_npz(&volume, writer),
+                Some(format) => {
                     let left = memory.saturating_sub(volume.cells.bytes());
-                    encode_vdb(&volume.grids(scene.place_of(number, &volume), left)?, writer)
+                    format.encode(&volume.grids(scene.place_of(number, &volume), left)?, writer)
                 }
             };
             written.map_err(|e| Error::write(&path, e))?;

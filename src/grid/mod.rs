@@ -16,6 +16,7 @@
 //! - Numbers are float32. Other types are rounded to it on reading.
 
 mod blosclz;
+mod branches;
 mod builder;
 mod codec;
 mod nanovdb;
@@ -34,9 +35,11 @@ use std::path::Path;
 use glam::DAffine3;
 
 pub use builder::{Builder, Misplaced};
+pub use nanovdb::encode_nvdb;
 pub use openvdb::encode_vdb;
 pub use own::own;
-pub use save::write_vdb;
+pub(crate) use save::GridFile;
+pub use save::{write_nvdb, write_vdb};
 pub use statistics::Statistics;
 pub use tree::{Block, BlockData, Grid, Reader};
 
@@ -122,11 +125,6 @@ pub fn is_grid(path: &Path) -> bool {
         Some("npz") => npz::has_grids(path),
         _ => false,
     }
-}
-
-/// Whether a file of OpenVDB starts with these bytes.
-pub(crate) fn starts_vdb(start: &[u8]) -> bool {
-    start.starts_with(&openvdb::MAGIC)
 }
 
 /// Lists the grids of a file (.vdb, .nvdb, .npz) without reading their voxels. The content decides which

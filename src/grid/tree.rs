@@ -238,6 +238,16 @@ impl Grid {
         self.reader().at(index)
     }
 
+    /// Multiplies all values and the background by a factor.
+    pub(crate) fn scale(&mut self, factor: f32) {
+        if factor == 1.0 {
+            return;
+        }
+        self.background = self.background.map(|x| x * factor);
+        self.store.values.iter_mut().for_each(|x| *x *= factor);
+        self.store.tiles.iter_mut().for_each(|tile| tile.value = tile.value.map(|x| x * factor));
+    }
+
     /// A reader that remembers where it read last, for indices that lie near one another.
     pub fn reader(&self) -> Reader<'_> {
         Reader { grid: self, region: [i32::MAX; 3], slots: None }

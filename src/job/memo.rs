@@ -10,7 +10,7 @@ use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    MeasuredSpec, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection,
+    Matter, MeasuredSpec, Storage, StorageChoice, Structure, VolumeTexture, WaterSpec, has_reflection,
     set_density_and_reflection,
 };
 
@@ -36,6 +36,7 @@ struct Remembered {
 #[derive(Clone, PartialEq)]
 pub(super) enum Source {
     Water(WaterSpec, Storage),
+    Matter(Box<Matter>),
     File {
         path: PathBuf,
         /// Recipe of a measured volume.
@@ -167,8 +168,9 @@ impl Source {
 
     /// The input of a scene's volume.
     pub fn of(recipe: &Recipe) -> Source {
-        let Recipe { water, measured, file, storage, asked_storage, .. } = recipe;
+        let Recipe { water, matter, measured, file, storage, asked_storage, .. } = recipe;
         match file {
+            None if let Some(matter) = matter => Source::Matter(Box::new(matter.clone())),
             None => Source::Water(*water, *storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use super::{Depth, check_alpha, check_side};
 use crate::engine::RenderOptions;
-use crate::grid::starts_vdb;
+use crate::grid::GridFile;
 use crate::light::environment::Source;
 use crate::output::frame::{
     CROP_TEXT, Channel, Compression, Encoding, Exr, ExrCamera, ExrHead, ExrWriter, FIGURES_TEXT, Figures,
@@ -219,19 +219,14 @@ pub(crate) fn check_replaced(path: &Path) -> Result<()> {
     check_kind(path, "picture", |start| Format::of_start(start).is_some() || start.starts_with(b"GIF8"))
 }
 
-/// Whether a path has the ending of OpenVDB's files.
-pub(crate) fn is_vdb(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("vdb"))
-}
-
 /// Refuses to replace a file that is no volume. An empty file may be replaced.
 ///
 /// # Errors
 /// [`Error::CannotCreate`] if the file is no volume.
 pub(crate) fn check_volume_replaced(path: &Path) -> Result<()> {
-    match is_vdb(path) {
-        true => check_kind(path, "OpenVDB file", starts_vdb),
-        false => check_kind(path, "volume", |start| start.starts_with(b"PK")),
+    match GridFile::of(path) {
+        Some(own) => check_kind(path, &format!("{} file", own.words()), |start| own.starts(start)),
+        None => check_kind(path, "volume", |start| start.starts_with(b"PK")),
     }
 }
 

@@ -71,8 +71,14 @@ pub fn whole_exponent(p: f32) -> Option<u32> {
 /// Reflection Ψ = k_d·sin(t,l) + k_s·max(0, sin(t,l)·sin(t,e) − (t·l)(t·e))^p. Arguments as in
 /// [`fibre_angles`].
 pub fn psi(k_d: f32, k_s: f32, p: f32, t_dot_l: f32, t_dot_e: f32, inverse_q: f32) -> f32 {
+    let [diffuse, specular] = psi_parts([k_d, k_s], p, t_dot_l, t_dot_e, inverse_q);
+    diffuse + specular
+}
+
+/// Returns the two summands of [`psi`], the diffuse one first.
+pub fn psi_parts([k_d, k_s]: [f32; 2], p: f32, t_dot_l: f32, t_dot_e: f32, inverse_q: f32) -> [f32; 2] {
     let (sin_l, base) = fibre_angles(t_dot_l, t_dot_e, inverse_q);
-    k_d * sin_l + k_s * specular_power(base.max(0.0), p)
+    [k_d * sin_l, k_s * specular_power(base.max(0.0), p)]
 }
 
 /// Reflection by fibres with a distribution of directions, given by its second moments S = Σ w·v·vᵀ.
@@ -132,15 +138,21 @@ impl Spread {
         [cos2_l.clamp(0.0, 1.0).sqrt(), if product < 0.0 { -e } else { e }]
     }
 
-    /// Reflection Ψ, with the highlight convolved with the spread of the directions. `l_dot_e` is the cosine
-    /// of the angle between light and eye.
+    /// Reflection Ψ, the sum of [`Spread::psi_parts`].
+    pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
+        let [diffuse, specular] = self.psi_parts([k_d, k_s], p, l_v, l_dot_e);
+        diffuse + specular
+    }
+
+    /// Diffuse and specular part of the reflection Ψ, with the highlight convolved with the spread of the
+    /// directions. `l_dot_e` is the cosine of the angle between light and eye.
     ///
     /// With x the cosine of an angle δ, x^p is about e^(−pδ²/2). Its convolution with a Gaussian of variance
     /// s² is the same function with the exponent p/(1 + p·s²), divided by √(1 + p·s²). δ is the sum of the
     /// angles that light and eye make with the plane across the flow. A turn of the flow's direction changes
     /// δ in proportion to the sum of the unit vectors of light and eye across the flow. That sum has the
     /// square 2 + 2 cos φ.
-    pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
+    pub fn psi_parts(&self, [k_d, k_s]: [f32; 2], p: f32, l_v: Vec3, l_dot_e: f32) -> [f32; 2] {
         let [cos2_l, product] = self.cosines(l_v);
         let sin2_l = (1.0 - cos2_l).max(0.0);
         let sin2_e = (1.0 - self.cos2_e).max(0.0);
@@ -151,6 +163,6 @@ impl Spread {
         // accounts for the variance already, so it is added back here.
         let base = (root - product + 0.5 * variance).clamp(0.0, 1.0);
         let wide = 1.0 + p * variance;
-        k_d * sin2_l.sqrt() + k_s * pow(base, p / wide) / wide.sqrt()
+        [k_d * sin2_l.sqrt(), k_s * pow(base, p / wide) / wide.sqrt()]
     }
 }

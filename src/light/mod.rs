@@ -9,6 +9,7 @@ pub mod fill;
 pub mod haze;
 mod lights;
 pub mod optical_depth;
+pub mod ramp;
 pub mod scatter;
 mod settings;
 pub mod strand;

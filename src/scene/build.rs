@@ -17,7 +17,7 @@ use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 use crate::util::words::words;
-use crate::volume::{Run, Storage, StorageChoice, Structure, WaterSpec, check_npz, storage_of};
+use crate::volume::{Storage, StorageChoice, Structure, WaterSpec, check_npz, storage_of};
 
 /// Source of a scene's environment, if it has one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,35 +37,30 @@ pub(super) fn water(v: &Values, name: &str) -> WaterSpec {
     let count = |key: &str| v.count(&key_of_volume(name, key));
     let float = |key: &str| v.float(&key_of_volume(name, key));
     let size = [count("volume.nx"), count("volume.ny"), count("volume.nz")];
-    let mut water = WaterSpec {
+    let levels = match count("curves.levels") {
+        0 => levels_for(size[1]).min(16),
+        n => n,
+    };
+    WaterSpec {
         size,
         across: count("curves.across"),
         deep: count("curves.deep"),
-        shape: CurveShape { h: float("curves.h"), sigma_g_cells: 0.0, levels: 0 },
+        shape: CurveShape {
+            h: float("curves.h"),
+            sigma_g_cells: float("curves.amplitude") * size[1] as f32,
+            levels,
+        },
         structure: structure(v, name),
         seed: v.int(&key_of_volume(name, "volume.seed")) as u64,
         alpha: float("volume.alpha"),
         k_d: float("volume.k_d"),
         k_s: float("volume.k_s"),
         k_noise: float("volume.k_noise"),
-    };
-    // Lengths are fractions of the volume, so a look survives a change of resolution.
-    let length = water.length();
-    water.shape.sigma_g_cells = float("curves.amplitude") * length as f32;
-    water.shape.levels = match count("curves.levels") {
-        0 => levels_for(length).min(16),
-        n => n,
-    };
-    if water.structure.bundles > 0 {
-        water.structure.wander_cells = float("curves.wander") * length as f32;
     }
-    if water.structure.run == Run::Out {
-        water.structure.lean_cells = float("curves.lean") * length as f32;
-    }
-    water
 }
 
-/// Returns the fine structure of the water, without what follows from the length of the curves.
+/// Returns the fine structure of the water. Lengths are fractions of the volume, so a look survives a change
+/// of resolution.
 fn structure(v: &Values, name: &str) -> Structure {
     let count = |key: &str| v.count(&key_of_volume(name, key));
     let float = |key: &str| v.float(&key_of_volume(name, key));
@@ -73,11 +68,9 @@ fn structure(v: &Values, name: &str) -> Structure {
     // Without bundles their parameters are 0, so that they do not tell equal volumes apart.
     let of_bundles = |key: &str| if bundles > 0 { float(key) } else { 0.0 };
     Structure {
-        run: v.choice(&key_of_volume(name, "curves.run"), Run::from_word),
-        lean_cells: 0.0,
         bundles,
         radius_cells: of_bundles("curves.radius") * count("volume.nx") as f32,
-        wander_cells: 0.0,
+        wander_cells: of_bundles("curves.wander") * count("volume.ny") as f32,
         breathe: of_bundles("curves.breathe"),
         loose: of_bundles("curves.loose"),
         coherence: float("volume.coherence"),

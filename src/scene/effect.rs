@@ -1,277 +1,16 @@
 //! Settings that have no effect, because another parameter switches off what they belong to.
 
+mod rules;
+
 use super::Values;
-use super::build::EnvironmentKind;
 use super::measured::Builder;
-use super::meshes::{self, Carrier, Projection};
+use super::meshes::{self, Carrier};
 use super::names::full_key;
-use super::param::{key_of_volume, matches, split_volume_key};
+use super::param::{Param, key_of_volume, matches, split_volume_key};
 use super::read::split;
 use super::sequence::{self, Sequence};
 use super::volumes;
-use crate::light::{LightKind, ReflectionKind, Visibility};
-use crate::mapping::shell::Side;
-use crate::trace::AttenuationKind;
-use crate::volume::{ReflectBy, Run};
-
-/// Parameters that only have an effect where another one, the switch, has a certain value. Rules on keys of
-/// the volume `water` hold for the keys of every volume.
-struct Rule {
-    /// Patterns of their keys.
-    keys: &'static [&'static str],
-    /// Key of the switch. A `*` is the same name as in the keys.
-    switch: &'static str,
-    /// Values of the switch under which they have an effect, in words.
-    needs: &'static str,
-    /// Whether they have an effect, by the values and the key of the switch.
-    works: fn(&Values, &str) -> bool,
-}
-
-fn is(values: &Values, switch: &str, word: &str) -> bool {
-    values.text(switch) == word
-}
-
-/// Keys of a volume that is made of curves, or of a file of cells.
-const OF_CURVES: &[&str] = &[
-    "curves.across",
-    "curves.breathe",
-    "curves.bundles",
-    "curves.deep",
-    "curves.lean",
-    "curves.levels",
-    "curves.loose",
-    "curves.radius",
-    "curves.run",
-    "curves.wander",
-    "volume.crest",
-    "volume.file",
-    "volume.flow",
-    "volume.nx",
-    "volume.ny",
-    "volume.nz",
-];
-
-/// Keys of curves, and of strands along the flow of a simulation.
-const OF_STRANDS: &[&str] = &[
-    "curves.amplitude",
-    "curves.h",
-    "volume.coherence",
-    "volume.coverage",
-    "volume.k_noise",
-    "volume.seed",
-    "volume.strand_length",
-];
-
-/// Keys of a volume that is made of the grids of a simulation.
-const OF_GRIDS: &[&str] = &[
-    "volume.fine",
-    "volume.grid",
-    "volume.reflect",
-    "volume.reflect_grid",
-    "volume.reflect_high",
-    "volume.reflect_k_d",
-    "volume.reflect_k_s",
-    "volume.reflect_low",
-    "volume.rho",
-    "volume.rho_scale",
-    "volume.source",
-    "volume.strands",
-    "volume.velocity",
-    "volume.velocity_at",
-    "volume.voxels",
-];
-
-const RULES: &[Rule] = &[
-    Rule {
-        keys: &["environment.file"],
-        switch: "environment.kind",
-        needs: "file",
-        works: |v, switch| is(v, switch, EnvironmentKind::File.word()),
-    },
-    Rule {
-        keys: &["environment.intensity", "environment.lights", "environment.turn"],
-        switch: "environment.kind",
-        needs: "sky or file",
-        works: |v, switch| !is(v, switch, EnvironmentKind::None.word()),
-    },
-    Rule {
-        keys: &["sky.*"],
-        switch: "environment.kind",
-        needs: "sky",
-        works: |v, switch| is(v, switch, EnvironmentKind::Sky.word()),
-    },
-    Rule {
-        keys: &["strand.*"],
-        switch: "light.reflection",
-        needs: "strand",
-        works: |v, switch| is(v, switch, ReflectionKind::Strand.word()),
-    },
-    Rule {
-        keys: &["trace.sigma"],
-        switch: "trace.attenuation",
-        needs: "path-length",
-        works: |v, switch| is(v, switch, AttenuationKind::PathLength.word()),
-    },
-    Rule {
-        keys: &["trace.tau"],
-        switch: "trace.attenuation",
-        needs: "per-cell",
-        works: |v, switch| is(v, switch, AttenuationKind::PerCell.word()),
-    },
-    Rule {
-        keys: &["light.cache"],
-        switch: "light.visibility",
-        needs: "cached",
-        works: |v, switch| is(v, switch, Visibility::Cached.word()),
-    },
-    Rule {
-        keys: &["lights.*.position"],
-        switch: "lights.*.kind",
-        needs: "point or spot",
-        works: |v, switch| !is(v, switch, LightKind::Directional.word()),
-    },
-    Rule {
-        keys: &["lights.*.direction"],
-        switch: "lights.*.kind",
-        needs: "directional or spot",
-        works: |v, switch| !is(v, switch, LightKind::Point.word()),
-    },
-    Rule {
-        keys: &["lights.*.angle", "lights.*.softness"],
-        switch: "lights.*.kind",
-        needs: "spot",
-        works: |v, switch| is(v, switch, LightKind::Spot.word()),
-    },
-    Rule {
-        keys: &["camera.eye", "camera.target", "camera.up", "camera.fov"],
-        switch: "camera.from",
-        needs: "no mesh, whose camera stands in their place",
-        works: |v, switch| v.text(switch).is_empty(),
-    },
-    Rule {
-        keys: &["materials.*.side", "materials.*.thickness_from"],
-        switch: "materials.*.carrier",
-        needs: "shell",
-        works: |v, switch| is(v, switch, Carrier::Shell.word()),
-    },
-    Rule {
-        keys: &["materials.*.skin"],
-        switch: "materials.*.carrier",
-        needs: "shell",
-        works: |v, switch| is(v, switch, Carrier::Shell.word()),
-    },
-    Rule {
-        keys: &["materials.*.skin"],
-        switch: "materials.*.side",
-        needs: "outward",
-        works: |v, switch| is(v, switch, Side::Outward.word()),
-    },
-    Rule {
-        keys: &["meshes.*.projection_size"],
-        switch: "meshes.*.projection",
-        needs: "box, planar or cylinder",
-        works: |v, switch| !is(v, switch, Projection::None.word()),
-    },
-    Rule {
-        keys: &["meshes.*.uv"],
-        switch: "meshes.*.projection",
-        needs: "none, because a projection has its own coordinates",
-        works: |v, switch| is(v, switch, Projection::None.word()),
-    },
-    Rule {
-        keys: &["meshes.*.wet_reach"],
-        switch: "meshes.*.wet",
-        needs: "a number above 0",
-        works: |v, switch| v.float(switch) > 0.0,
-    },
-    Rule {
-        keys: &["rocks.*.wet_reach"],
-        switch: "rocks.*.wet",
-        needs: "a number above 0",
-        works: |v, switch| v.float(switch) > 0.0,
-    },
-    Rule {
-        keys: &["haze.color", "haze.far", "haze.level", "haze.scale_height"],
-        switch: "haze.density",
-        needs: "a number above 0",
-        works: |v, switch| v.float(switch) > 0.0,
-    },
-    Rule {
-        keys: &["background.*"],
-        switch: "environment.kind",
-        needs: "none, because the environment is seen in its place",
-        works: |v, switch| is(v, switch, EnvironmentKind::None.word()),
-    },
-    Rule {
-        keys: &["image.filter"],
-        switch: "image.samples",
-        needs: "2 or more",
-        works: |v, switch| v.int(switch) > 1,
-    },
-    Rule {
-        keys: &["image.bloom_radius"],
-        switch: "image.bloom",
-        needs: "a number above 0",
-        works: |v, switch| v.float(switch) > 0.0,
-    },
-    Rule {
-        keys: &["curves.breathe", "curves.loose", "curves.radius", "curves.wander"],
-        switch: "curves.bundles",
-        needs: "a number above 0",
-        works: |v, switch| v.int(switch) > 0,
-    },
-    Rule {
-        keys: &["curves.lean"],
-        switch: "curves.run",
-        needs: "out",
-        works: |v, switch| is(v, switch, Run::Out.word()),
-    },
-    Rule {
-        keys: OF_CURVES,
-        switch: "volume.builder",
-        needs: "curves",
-        works: |v, switch| is(v, switch, Builder::Curves.word()),
-    },
-    Rule {
-        keys: OF_STRANDS,
-        switch: "volume.strands",
-        needs: "a number above 0, because volume.builder is \"flow\"",
-        works: |v, switch| {
-            let builder = format!("{}.builder", switch.rsplit_once('.').map_or("", |(head, _)| head));
-            is(v, &builder, Builder::Curves.word()) || v.int(switch) > 0
-        },
-    },
-    Rule {
-        keys: OF_GRIDS,
-        switch: "volume.builder",
-        needs: "flow",
-        works: |v, switch| is(v, switch, Builder::Flow.word()),
-    },
-    Rule {
-        keys: &["volume.reflect_grid"],
-        switch: "volume.reflect",
-        needs: "grid",
-        works: |v, switch| is(v, switch, ReflectBy::Grid.word()),
-    },
-    Rule {
-        keys: &["volume.reflect_high", "volume.reflect_k_d", "volume.reflect_k_s", "volume.reflect_low"],
-        switch: "volume.reflect",
-        needs: "speed, vorticity or grid",
-        works: |v, switch| !is(v, switch, ReflectBy::Even.word()),
-    },
-    Rule {
-        keys: &["curves.*", "volume.nx", "volume.ny", "volume.nz", "volume.seed"],
-        switch: "volume.file",
-        needs: "no file, because a file brings its own cells",
-        works: |v, switch| v.text(switch).is_empty(),
-    },
-    Rule {
-        keys: &["animate.frames"],
-        switch: "animate.loop",
-        needs: "0, because a loop is as long as it says",
-        works: |v, switch| v.int(switch) == 0,
-    },
-];
+use rules::{RULES, Rule, builder};
 
 /// Returns the first rule by which a key has no effect, with its switch, whose key is full.
 fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
@@ -312,7 +51,8 @@ pub fn without_effect(values: &Values, key: &str) -> Option<String> {
         return Some(why);
     }
     let (rule, switch) = rule(values, key)?;
-    let now = values.get(&switch).to_toml();
+    let is_missing = !values.is_set(&switch) && Param::find(&switch).is_some_and(Param::is_optional);
+    let now = if is_missing { "not set".into() } else { values.get(&switch).to_toml() };
     Some(format!("{key} has no effect while {switch} is {now}: it needs {}", rule.needs))
 }
 
@@ -343,11 +83,10 @@ fn without_water(values: &Values, key: &str) -> Option<String> {
     let wets = |material: &String| {
         let own = |what: &str| format!("materials.{material}.{what}");
         let volume = volumes::volume_of(values, material);
-        let run = || values.choice(&key_of_volume(&volume, "curves.run"), Run::from_word);
         match values.choice(&own("carrier"), Carrier::from_word) {
             Carrier::Face => values.float(&own("mist")) == 0.0,
-            // Fibres that stand out of a surface are no water. A volume that the scene lacks is refused.
-            Carrier::Shell => run() == Run::Along,
+            // Fur and cloth are no water. A volume that the scene lacks is refused.
+            Carrier::Shell => ![Builder::Fur, Builder::Cloth].contains(&builder(values, &volume)),
         }
     };
     let is_dry = || values.names("pools").is_empty() && !volumes::used_materials(values).iter().any(wets);

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::{DAffine3, DVec3};
+
 use super::param::key_of_volume;
 use super::sequence::{self, Sequence};
 use super::{Limits, Values};
@@ -9,22 +11,30 @@ use crate::grid::Bounds;
 use crate::util::error::{Error, Result};
 use crate::util::words::words;
 use crate::volume::{
-    MeasuredSpec, ReflectBy, RhoRule, StrandSpec, VelocityAt, VelocityNames, Wanted, find_measured,
+    LevelSetUnit, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, Up, VelocityAt, VelocityNames, Wanted,
+    find_measured,
 };
 
 /// Most cells along a side of a measured volume.
 const MOST_CELLS: u64 = 4096;
+
+/// Grids with k_d and k_s, as volumes are written.
+const STORED: [&str; 2] = ["kd", "ks"];
 
 /// What the cells of a volume are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Builder {
     /// Spatial fractal curves.
     Curves,
+    /// Hairs on a skin.
+    Fur,
+    /// Woven yarns.
+    Cloth,
     /// Grids of a simulation.
     Flow,
 }
 
-words! { Builder { Curves => "curves", Flow => "flow" } }
+words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Flow => "flow" } }
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {
@@ -63,7 +73,12 @@ pub(super) fn measured(
     let wanted = Wanted {
         density: v.text(&key("volume.grid")),
         velocity: v.text(&key("volume.velocity")),
-        second: (reflect == ReflectBy::Grid).then_some(second),
+        second: match reflect {
+            ReflectBy::Grid => Some(second),
+            ReflectBy::Stored => Some(STORED[0].into()),
+            _ => None,
+        },
+        specular: (reflect == ReflectBy::Stored).then(|| STORED[1].into()),
         may_be_empty: is_sequence,
     };
     let (velocity, bounds, to_world) = find_measured(&path, &wanted, limits.memory)?;
@@ -72,6 +87,12 @@ pub(super) fn measured(
         return Err(Error::input(
             format!("{} without a velocity in {}", key("volume.strands"), path.display()),
             format!("name its grid in {}, or set {} to 0", key("volume.velocity"), key("volume.strands")),
+        ));
+    }
+    if strands.is_some() && reflect == ReflectBy::Stored {
+        return Err(Error::input(
+            format!("{} = \"stored\" with strands, which have k of their own", key("volume.reflect")),
+            format!("set {} to another word, or {} to 0", key("volume.reflect"), key("volume.strands")),
         ));
     }
     let [edge_key, fine_key] = ["volume.voxels", "volume.fine"].map(key);
@@ -96,8 +117,12 @@ pub(super) fn measured(
         density: wanted.density,
         velocity,
         second: wanted.second,
+        specular: wanted.specular,
         bounds,
         to_world,
+        scene_from_file: scene_from_file(v, name, to_world),
+        level_set_unit: v.choice(&key("volume.level_set_unit"), LevelSetUnit::from_word),
+        velocity_scale: float("volume.velocity_scale"),
         size,
         rho: v.choice(&key("volume.rho"), RhoRule::from_word),
         rho_scale: float("volume.rho_scale"),
@@ -111,6 +136,19 @@ pub(super) fn measured(
         alpha: float("volume.alpha"),
         strands,
     }))
+}
+
+/// Returns the turn and the shift from the world of a volume's file to that of the scene.
+fn scene_from_file(v: &Values, name: &str, to_world: DAffine3) -> DAffine3 {
+    let [up, origin] = ["volume.up", "volume.origin"].map(|key| key_of_volume(name, key));
+    let turn = DAffine3::from_mat3(v.choice(&up, Up::from_word).scene_from_file());
+    match v.is_set(&origin) {
+        true => {
+            let corner = to_world.transform_point3(DVec3::splat(-0.5));
+            turn * DAffine3::from_translation(v.point(&origin) - corner)
+        }
+        false => turn,
+    }
 }
 
 /// Returns the strands of the measured volume `name`, if it has any.

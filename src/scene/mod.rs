@@ -7,6 +7,7 @@ mod build;
 mod effect;
 mod ground;
 mod keyframes;
+mod matter;
 mod measured;
 mod meshes;
 mod names;
@@ -68,7 +69,7 @@ use crate::trace::{Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::volume::{PyramidSpec, Run, StorageChoice, VolumeTexture};
+use crate::volume::{PyramidSpec, StorageChoice, VolumeTexture};
 
 /// Largest number of lights in a scene. No buffer has this size. Every cell walks to every light, and with
 /// more lights even the smallest tile of a picture would run into the driver's timeout.
@@ -503,9 +504,8 @@ impl Scene {
     /// Returns the triangles around the shells that hold water. Fibres that stand out of a surface are none,
     /// and the sides of a box are no surface of water.
     fn water_faces(&self) -> WaterFaces {
-        let runs_along =
-            |shell: &Shell| self.recipes[shell.volume as usize].water.structure.run == Run::Along;
-        let is_water = |shell: &&Arc<Shell>| !shell.is_single && runs_along(shell);
+        let holds_water = |shell: &Shell| self.recipes[shell.volume as usize].matter.is_none();
+        let is_water = |shell: &&Arc<Shell>| !shell.is_single && holds_water(shell);
         let shells = self.shells.iter().filter(is_water);
         WaterFaces(shells.flat_map(|shell| shell.hull.iter().map(|face| shell.corners(face))).collect())
     }
@@ -607,6 +607,7 @@ impl Scene {
                 ));
             }
         }
+        warnings.extend(self.recipes.iter().filter_map(matter::too_thick));
         warnings.extend(self.other_files(volumes));
         warnings.extend(self.values.iter().flat_map(quads::unused_materials));
         warnings.extend(self.values.iter().flat_map(volumes::unused));

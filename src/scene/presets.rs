@@ -8,6 +8,8 @@ type Preset = (&'static str, &'static str, &'static str);
 /// Meshes of the presets, by the path that a scene names them by.
 const MESHES: &[(&str, &[u8])] = &[
     ("taki:cliff.glb", include_bytes!("../../assets/meshes/cliff.glb")),
+    ("taki:bear.glb", include_bytes!("../../assets/meshes/bear.glb")),
+    ("taki:cloth.glb", include_bytes!("../../assets/meshes/cloth.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
     ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
 ];
@@ -50,7 +52,13 @@ const PRESETS: &[Preset] = &[
         "water over a cliff that was modelled in Blender",
         include_str!("../../assets/scenes/cliff.toml"),
     ),
-    ("torus", "fur on a ring: fibres on a mesh", include_str!("../../assets/scenes/torus.toml")),
+    ("torus", "fur on a ring: hairs on a mesh", include_str!("../../assets/scenes/torus.toml")),
+    ("cloth", "twill and satin, draped over balls", include_str!("../../assets/scenes/cloth.toml")),
+    (
+        "bear",
+        "a bear of ellipsoids in fur, after Kajiya and Kay's",
+        include_str!("../../assets/scenes/bear.toml"),
+    ),
     ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",

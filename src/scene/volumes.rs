@@ -3,18 +3,21 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use glam::DAffine3;
+use glam::{DAffine3, Vec3};
 
+use super::measured::Builder;
 use super::names::likeliest;
-use super::param::{PARAMS, WATER, key_of_volume, split_volume_key};
+use super::param::{COLORS, PARAMS, WATER, key_of_volume, split_volume_key};
 use super::sequence::Sequence;
-use super::{Limits, Parts, Scene, Values, boxes, build, measured, meshes};
+use super::{Limits, Parts, Scene, Values, boxes, build, matter, measured, meshes};
+use crate::light::ramp::Ramp;
+use crate::light::{ReflectionKind, Scattering};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 use crate::volume::{
-    Bricks, Cell, MeasuredSpec, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec,
+    Bricks, Cell, Matter, MeasuredSpec, ReadOptions, Storage, StorageChoice, VolumeTexture, WaterSpec,
     build_measured, build_sparse_water, build_water, dense_bytes, expected_cells, kept_water, read_npz,
     sparse_bytes,
 };
@@ -30,6 +33,10 @@ pub struct Recipe {
     pub name: String,
     /// Recipe of the cells, used where there is no `file`.
     pub water: WaterSpec,
+    /// Recipe of the cells of fur or cloth, in place of `water`, whose size and α are theirs too.
+    pub matter: Option<Matter>,
+    /// Colours of the cells.
+    pub ramp: Ramp,
     /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
     pub measured: Option<MeasuredSpec>,
     /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, or the simulation's.
@@ -52,15 +59,20 @@ impl Recipe {
         if let Some(measured) = &measured {
             water.size = measured.size;
         }
+        let colors = colors(v, name)?;
+        let matter = matter::matter(v, name, &water, colors.len() > 1)?;
         let file = match &measured {
             Some(measured) => Some(measured.path.clone()),
+            None if matter.is_some() => None,
             None => build::volume_file(v, name, folder, limits)?,
         };
         // What was measured stands where it was; only copies of a volume can flow.
         let flow = if measured.is_some() { 0.0 } else { v.float(&key_of_volume(name, "volume.flow")) };
         Ok(Recipe {
             name: name.into(),
+            ramp: Ramp::new(&colors, water.k_s),
             water,
+            matter,
             measured,
             file,
             is_sequence: Sequence::of(v, name, folder).is_some(),
@@ -86,6 +98,24 @@ impl Recipe {
         key_of_volume(&self.name, if self.measured.is_some() { "volume.source" } else { "volume.file" })
     }
 
+    /// Returns the storage of the cells within `memory` bytes, of which the picture needs `beside` for other
+    /// things.
+    fn storage_within(&self, memory: u64, beside: u64) -> Result<Storage> {
+        if self.matter.is_none() {
+            return build::water_storage(&self.water, self.asked_storage, memory, beside);
+        }
+        let [nx, ny, nz] = self.water.size;
+        let cells = u128::from(nx) * u128::from(ny) * u128::from(nz);
+        let building = cells * (size_of::<Cell>() + Matter::BYTES_PER_CELL) as u128;
+        let need = building.max(dense_bytes(self.water.size, false) + u128::from(beside));
+        if need > u128::from(memory) {
+            let what = format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)");
+            let fix = "lower volume.nx, volume.ny or volume.nz, or raise --memory";
+            return Err(Error::memory(what, need, memory, fix));
+        }
+        Ok(Storage::Dense)
+    }
+
     /// Bytes that the cells take in a storage while a picture is rendered.
     fn bytes_in(&self, storage: Storage, pyramid: bool) -> u128 {
         match storage {
@@ -97,7 +127,10 @@ impl Recipe {
     /// Bytes that the cells take once they are built, on the host, and most bytes while they are built.
     fn bytes_to_build(&self) -> [u128; 2] {
         let cells: u128 = self.water.size.iter().map(|&n| u128::from(n)).product();
-        let extra = size_of::<glam::Vec3>() + self.water.strand_bytes();
+        let extra = match self.matter {
+            Some(_) => Matter::BYTES_PER_CELL,
+            None => size_of::<glam::Vec3>() + self.water.strand_bytes(),
+        };
         let built = match self.storage {
             Storage::Dense => cells * size_of::<Cell>() as u128,
             Storage::Sparse => Bricks::bytes_of(self.water.size, expected_cells(&self.water))[0],
@@ -114,6 +147,43 @@ impl Recipe {
     pub(crate) fn bytes(&self, pyramid: bool) -> u128 {
         if self.file.is_some() { 0 } else { self.bytes_in(self.storage, pyramid) }
     }
+}
+
+/// Returns the colours of the volume `name` that the scene gives.
+fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
+    let keys = COLORS.map(|key| key_of_volume(name, key));
+    let colors: Vec<Vec3> = keys.iter().take_while(|key| v.is_set(key)).map(|key| v.triple(key)).collect();
+    if let Some((key, color)) = keys.iter().zip(&colors).find(|(_, color)| color.max_element() > 1.0) {
+        return Err(Error::input(
+            format!("{key} = {color} reflects more light than it receives"),
+            "choose components of at most 1; for more light raise lights.*.intensity",
+        ));
+    }
+    let of_light = |key: &str, word: &str, other: &str| {
+        Err(Error::input(
+            format!("{} with {key} = {word:?}, which has colours of its own", keys[0]),
+            format!("set {key}={other}, or leave the colours out"),
+        ))
+    };
+    if colors.is_empty() {
+        return Ok(colors);
+    }
+    if v.choice("light.reflection", ReflectionKind::from_word) == ReflectionKind::Strand {
+        return of_light("light.reflection", ReflectionKind::Strand.word(), ReflectionKind::KajiyaKay.word());
+    }
+    if v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple {
+        return of_light("light.scattering", Scattering::Multiple.word(), Scattering::Single.word());
+    }
+    let builder = key_of_volume(name, "volume.builder");
+    let is_of_curves = v.choice(&builder, Builder::from_word) == Builder::Curves
+        && v.text(&key_of_volume(name, "volume.file")).is_empty();
+    if is_of_curves && colors.len() > 1 {
+        return Err(Error::input(
+            format!("{}: cells of curves have no place on a ramp of colours", keys[1]),
+            format!("leave all but {} out, or set {builder} to fur, cloth or flow", keys[0]),
+        ));
+    }
+    Ok(colors)
 }
 
 /// Returns the names of all volumes of a scene, `water` first.
@@ -216,8 +286,7 @@ pub(super) fn recipes(v: &Values, folder: Option<&Path>, limits: &Limits) -> Res
         let recipe = Recipe::new(v, name, folder, limits)?;
         if recipe.file.is_none() {
             // A volume that is too large by itself is refused with its own numbers.
-            build::water_storage(&recipe.water, recipe.asked_storage, limits.memory, 0)
-                .map_err(|e| of_volume(name, e))?;
+            recipe.storage_within(limits.memory, 0).map_err(|e| of_volume(name, e))?;
         }
         Ok(recipe)
     });
@@ -257,8 +326,8 @@ impl Parts {
         let (beside, pyramid) = (self.least_bytes_beside_volume(), self.has_pyramid());
         if let [recipe] = &mut self.recipes[..] {
             if recipe.file.is_none() {
-                recipe.storage = build::water_storage(&recipe.water, recipe.asked_storage, memory, beside)
-                    .map_err(|e| of_volume(&recipe.name, e))?;
+                recipe.storage =
+                    recipe.storage_within(memory, beside).map_err(|e| of_volume(&recipe.name, e))?;
             }
             return Ok(());
         }
@@ -280,6 +349,7 @@ impl Parts {
             }
             let saved = |recipe: &Recipe| {
                 let may = recipe.file.is_none()
+                    && recipe.matter.is_none()
                     && recipe.asked_storage == StorageChoice::Auto
                     && recipe.storage == Storage::Dense;
                 let [dense, sparse] = [Storage::Dense, Storage::Sparse].map(|s| recipe.bytes_in(s, pyramid));
@@ -346,6 +416,11 @@ impl Scene {
         self.recipes.iter().map(|recipe| recipe.flow).collect()
     }
 
+    /// Whether any volume has colours.
+    pub(crate) fn is_colored(&self) -> bool {
+        self.recipes.iter().any(|recipe| recipe.ramp != Ramp::WHITE)
+    }
+
     /// Returns the bytes that are left for volume `number`: those before it are `made`, and those behind it
     /// are built later.
     pub(crate) fn memory_for(&self, number: usize, made: &[VolumeTexture], memory: u64) -> u64 {
@@ -375,13 +450,15 @@ impl Scene {
         memory: u64,
         monitor: &dyn Monitor,
     ) -> Result<VolumeTexture> {
-        let Recipe { name, water, measured, file, storage, asked_storage, .. } = &self.recipes[number];
+        let Recipe { name, water, matter, measured, file, storage, asked_storage, .. } =
+            &self.recipes[number];
         let volume = match (file, storage, cache) {
             _ if let Some(measured) = measured => build_measured(measured, *asked_storage, memory, monitor),
             (Some(path), ..) => {
                 let k = [water.k_d, water.k_s];
                 read_npz(path, &ReadOptions { storage: *asked_storage, budget: memory, k }, monitor)
             }
+            _ if let Some(matter) = matter => matter.build(monitor),
             (None, Storage::Dense, Some(cache)) => kept_water(water, cache, monitor),
             (None, Storage::Dense, None) => build_water(water, monitor),
             // A sparse volume's cache file would be large enough to evict every other.

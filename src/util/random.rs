@@ -30,6 +30,8 @@ pub enum Stream {
     Wave = 9,
     /// One arc of a splash; index: number of the arc.
     Splash = 10,
+    /// One hair; index: number of the hair.
+    Hair = 11,
 }
 
 /// The generators of one seed and one stream.

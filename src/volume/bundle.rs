@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::ripple::Ripple;
-use super::spec::{Run, WaterSpec};
+use super::spec::WaterSpec;
 use crate::curve::{CurveShape, spatial_fractal_curve};
 use crate::util::random::{Family, Stream};
 
@@ -19,11 +19,8 @@ const BREATH_LENGTH: f32 = 0.12;
 const MIN_WIDTH: f32 = 0.15;
 
 /// Writes the points of one curve into `points`, in cells and not wrapped around. `curve` is its number in
-/// the jitter grid, column + row·across. The volume is built from exactly these points. The ends of a curve
-/// along the flow have the same x and z.
-///
-/// A curve out of the surface is one along the flow that is turned: its way along y becomes the way from the
-/// root to the tip. Then it leans down the flow, in proportion to the square of that way.
+/// the jitter grid, column + row·across. The volume is built from exactly these points. The curve's ends have
+/// the same x and z.
 ///
 /// The curve is drawn level by level, so a specification with fewer `shape.levels` gives every
 /// 2^(difference)-th point of the same curve.
@@ -31,25 +28,7 @@ const MIN_WIDTH: f32 = 0.15;
 /// In a bundle each point of the curve is moved by the displacement of its parent at that point. The curve's
 /// distance from the parent is scaled by the bundle's width there. Both are periodic along the flow.
 pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
-    curve_along(spec, curve, points);
-    if spec.structure.run == Run::Out {
-        let nz = spec.size[2] as f32;
-        for point in points {
-            let way = point.y / nz;
-            *point = Vec3::new(point.x, point.z + spec.structure.lean_cells * way * way, nz - point.y);
-        }
-    }
-}
-
-/// As [`curve_points`], for a curve that runs along y.
-fn curve_along(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
-    let [nx, ny, nz] = match (spec.structure.run, spec.size) {
-        (Run::Along, size) => size,
-        (Run::Out, [nx, ny, nz]) => [nx, nz, ny],
-    }
-    .map(|n| n as f32);
-    // Curves out of the surface wrap around on all sides.
-    let margin = if spec.structure.run == Run::Along { MARGIN } else { 0.0 };
+    let [nx, ny, nz] = spec.size.map(|n| n as f32);
     let mut rng = Family::new(spec.seed, Stream::Curve).member(curve as u64);
     let column = (curve % spec.across as usize) as f32;
     let row = (curve / spec.across as usize) as f32;
@@ -71,7 +50,7 @@ fn curve_along(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
 
     let mut rng_parent = Family::new(spec.seed, Stream::Bundle).member(u64::from(parent));
     let x = (parent as f32 + rng_parent.random::<f32>()) / structure.bundles as f32 * nx;
-    let z = (margin + (1.0 - 2.0 * margin) * rng_parent.random::<f32>()) * nz;
+    let z = (MARGIN + (1.0 - 2.0 * MARGIN) * rng_parent.random::<f32>()) * nz;
     let breath = Ripple::new(BREATH_LENGTH, &mut rng_parent);
     let shape = CurveShape { sigma_g_cells: structure.wander_cells, ..spec.shape };
     let mut parent_points = Vec::new();

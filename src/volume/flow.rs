@@ -171,7 +171,7 @@ fn contributions(
         if coherent {
             strand_noise(spec, curve, points.len().saturating_sub(1), &mut noise);
         }
-        walk_curve(spec, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
+        walk_curve(spec.size, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
             let (slab, in_slab) = position(cell);
             let bucket = &mut buckets[slab];
             bucket.parts.push((in_slab, part));
@@ -198,7 +198,7 @@ pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
             let mut points = Vec::new();
             for curve in first..(first + CURVES_PER_TASK).min(curves) {
                 curve_points(spec, curve, &mut points);
-                walk_curve(spec, &points, &mut |cell: IVec3, _: Vec3, _: usize| marks.add(cell));
+                walk_curve(spec.size, &points, &mut |cell: IVec3, _: Vec3, _: usize| marks.add(cell));
             }
         });
     }
@@ -215,7 +215,7 @@ pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
         .map(|&curve| {
             let (mut points, mut passed) = (Vec::new(), 0);
             curve_points(spec, curve, &mut points);
-            walk_curve(spec, &points, &mut |_: IVec3, _: Vec3, _: usize| passed += 1);
+            walk_curve(spec.size, &points, &mut |_: IVec3, _: Vec3, _: usize| passed += 1);
             passed
         })
         .sum();
@@ -234,8 +234,8 @@ fn strand_noise(spec: &WaterSpec, curve: usize, segments: usize, noise: &mut Vec
 /// Reports each cell that the curve passes, with length × direction of the curve there and the number of the
 /// segment that enters. Successive parts inside one cell are reported as one. x and y wrap around; cells
 /// outside the slab in z are dropped.
-fn walk_curve(spec: &WaterSpec, points: &[Vec3], report: &mut impl FnMut(IVec3, Vec3, usize)) {
-    let size = IVec3::from_array(spec.size.map(|n| n as i32));
+pub(super) fn walk_curve(size: [u32; 3], points: &[Vec3], report: &mut impl FnMut(IVec3, Vec3, usize)) {
+    let size = IVec3::from_array(size.map(|n| n as i32));
     let mut open: Option<(IVec3, Vec3, usize)> = None;
     let mut add = |cell: IVec3, part: Vec3, segment: usize| match &mut open {
         Some((last, sum, _)) if *last == cell => *sum += part,

@@ -24,7 +24,8 @@ impl VolumeTexture {
 
     /// Grids with a voxel for each cell that has a direction, which are the active ones: `density` (ρ with
     /// α), `velocity` (v as a unit vector in the axes of the world), `kd` and `ks`. `world_from_texture`
-    /// takes texture coordinates, 0 to 1 along each axis, to the world.
+    /// takes texture coordinates, 0 to 1 along each axis, to the world. Where it only moves and scales, all
+    /// axes alike, `velocity` has the bits of v.
     ///
     /// # Errors
     /// [`Error::Memory`] where the grids take more than `budget` bytes.
@@ -33,6 +34,7 @@ impl VolumeTexture {
         let to_world = world_from_texture
             * DAffine3::from_scale(1.0 / cells)
             * DAffine3::from_translation(DVec3::splat(0.5));
+        let axes = (!is_even(&to_world.matrix3)).then_some(to_world.matrix3);
         let mut builders = GRIDS.map(|(_, channels)| Builder::new(channels, [0.0; 3]));
         let [nx, ny, nz] = self.size.map(|n| n.div_ceil(LEAF));
         let mut taken = 0;
@@ -41,7 +43,7 @@ impl VolumeTexture {
             for y in 0..ny {
                 for x in 0..nx {
                     let low = [x, y, z].map(|n| n * LEAF);
-                    let active = self.leaf(low, &to_world.matrix3, &mut numbers);
+                    let active = self.leaf(low, axes.as_ref(), &mut numbers);
                     if active == [0; 8] {
                         continue;
                     }
@@ -75,8 +77,8 @@ impl VolumeTexture {
     }
 
     /// Writes the numbers of the 8×8×8 cells from `low` on: ρ, v, k_d and k_s. Returns those with a
-    /// direction.
-    fn leaf(&self, low: [u32; 3], world_from_index: &DMat3, numbers: &mut [[f32; 6]]) -> [u64; 8] {
+    /// direction. `axes` takes v to the world, where its direction is another there.
+    fn leaf(&self, low: [u32; 3], axes: Option<&DMat3>, numbers: &mut [[f32; 6]]) -> [u64; 8] {
         let mut active = [0u64; 8];
         for (i, out) in numbers.iter_mut().enumerate() {
             *out = [0.0; 6];
@@ -88,11 +90,24 @@ impl VolumeTexture {
             let cell = self.cell(at[0], at[1], at[2]);
             if cell.has_direction() {
                 active[i >> 6] |= 1 << (i & 63);
-                let v = (*world_from_index * cell.v().as_dvec3()).normalize_or_zero().as_vec3();
+                let v = match axes {
+                    Some(axes) => (*axes * cell.v().as_dvec3()).normalize_or_zero().as_vec3(),
+                    None => cell.v(),
+                };
                 let (k_d, k_s) = cell.k();
                 *out = [cell.rho() * self.alpha, v.x, v.y, v.z, k_d, k_s];
             }
         }
         active
     }
+}
+
+/// Largest difference of two sides, as a share, that the rounding of a transform explains.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether a matrix scales all axes alike and turns nothing, so that directions stay.
+fn is_even(matrix: &DMat3) -> bool {
+    let scale = matrix.x_axis.x;
+    let rest = *matrix - DMat3::from_diagonal(DVec3::splat(scale));
+    scale > 0.0 && rest.to_cols_array().iter().all(|x| x.abs() <= ROUNDING * scale)
 }

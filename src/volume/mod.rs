@@ -7,33 +7,40 @@ mod bricks;
 mod bundle;
 mod cell;
 mod cells;
+mod cloth;
 mod file;
 mod flow;
+mod fur;
 mod grids;
 mod leaps;
+mod matter;
 mod measured;
 mod pyramid;
 mod ripple;
 mod spec;
 mod storage;
+mod threads;
 mod water;
 
 pub use bricks::{BRICK, Bricks, grid as brick_grid};
 pub use bundle::curve_points;
 pub use cell::{Cell, V_SCALE};
 pub use cells::Cells;
+pub use cloth::{ClothSpec, Weave, WeaveName};
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
+pub use fur::FurSpec;
 pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
+pub use matter::Matter;
 pub use measured::{
-    Measured, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, VelocityAt, VelocityNames, Wanted,
-    build_measured, find_measured,
+    LevelSetUnit, Measured, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, Up, VelocityAt, VelocityNames,
+    Wanted, build_measured, find_measured,
 };
 pub use pyramid::{
     Leaps, LevelAtlas, LevelSets, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels,
     level_count, level_size, levels_of, stored_levels,
 };
 pub use ripple::Ripple;
-pub use spec::{Run, Structure, WaterSpec};
+pub use spec::{Structure, WaterSpec};
 pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
 pub use water::{
     BUILDER_VERSION, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,

@@ -1,7 +1,6 @@
 //! §2 Input of the builder of water volumes.
 
 use crate::curve::CurveShape;
-use crate::util::words::words;
 
 /// Specification of a water volume. Equal specifications build equal bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,8 +9,7 @@ pub struct WaterSpec {
     pub size: [u32; 3],
     /// Columns (along x) of the jitter grid of curve starts on the face y = 0.
     pub across: u32,
-    /// Rows (along z) of the jitter grid of curve starts on the face y = 0; along y on the face z = nz for
-    /// curves that run out of the surface.
+    /// Rows (along z) of the jitter grid of curve starts on the face y = 0.
     pub deep: u32,
     /// Shape of the curves.
     pub shape: CurveShape,
@@ -29,36 +27,10 @@ pub struct WaterSpec {
     pub k_noise: f32,
 }
 
-/// Faces between which curves run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Run {
-    /// Along the flow, from y = 0 to y = ny: water.
-    #[default]
-    Along,
-    /// Out of the surface, from the roots on z = nz to the tips on z = 0: fur and grass.
-    Out,
-}
-
-words!(Run { Along => "along", Out => "out" });
-
-impl WaterSpec {
-    /// Length of the volume along the curves, cells.
-    pub fn length(&self) -> u32 {
-        match self.structure.run {
-            Run::Along => self.size[1],
-            Run::Out => self.size[2],
-        }
-    }
-}
-
 /// Structure that the paper's curves and densities lack. With all values 0 (`Default`) the volume is the
 /// paper's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Structure {
-    /// Faces between which the curves run.
-    pub run: Run,
-    /// Distance by which curves that run out of the surface lean down the flow at their tips, cells.
-    pub lean_cells: f32,
     /// Number of parent curves. With 0 every curve is independent.
     pub bundles: u32,
     /// Standard deviation of a curve's distance from its parent, in x and in z, cells.

@@ -15,6 +15,7 @@ use super::gbuffer::Gbuffer;
 use super::visibility::{Filled, LightVolumeCache};
 use crate::light::fibre::Metric;
 use crate::light::haze::EyeHaze;
+use crate::light::ramp::{Ink, Ramp};
 use crate::light::scatter::media::{Media, MultipleMedium, kinds};
 use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
@@ -61,6 +62,8 @@ pub struct Integrator<'a> {
     eyes: Vec<Option<Inside>>,
     medium: Medium,
     strand: Option<StrandShading>,
+    /// Whether any volume has colours.
+    is_colored: bool,
     media: Option<Media>,
     /// Index of each quad's medium in `media`.
     medium_of_quad: Vec<u32>,
@@ -79,6 +82,8 @@ struct FrameVolume {
     extinction: f32,
     /// Distance that the volume has moved down the flow, cells.
     flow_cells: f32,
+    /// Colours of the cells.
+    ramp: Ramp,
 }
 
 /// The result of one ray.
@@ -300,15 +305,16 @@ impl<'a> Integrator<'a> {
 
     fn of_levels(scene: &'a Scene, volumes: &[VolumeTexture], levels: &[Levels]) -> Self {
         let flows = scene.flows(volumes);
-        let frame_volume = |((volume, levels), flow): ((&VolumeTexture, &Levels), f32)| FrameVolume {
+        let frame_volume = |(i, (volume, levels)): (usize, (&VolumeTexture, &Levels))| FrameVolume {
             levels: levels.clone(),
             size: volume.size,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
-            flow_cells: flow_cells(flow, volume.size[1]),
+            flow_cells: flow_cells(flows[i], volume.size[1]),
+            ramp: scene.recipes[i].ramp,
         };
         Integrator {
             scene,
-            volumes: volumes.iter().zip(levels).zip(flows).map(frame_volume).collect(),
+            volumes: volumes.iter().zip(levels).enumerate().map(frame_volume).collect(),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             footprint: footprint(&scene.camera, &scene.image),
             lights: scene.volume_lights(),
@@ -329,6 +335,7 @@ impl<'a> Integrator<'a> {
                 Reflection::Strand(params) => Some(StrandShading::new(params)),
                 Reflection::KajiyaKay => None,
             },
+            is_colored: scene.is_colored(),
             media: scene.media(volumes),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
@@ -454,24 +461,27 @@ impl<'a> Integrator<'a> {
             let next = self.walk(&ray, &Level::new(levels, level + 1), before, observer);
             result = result.mixed(next, share);
         }
-        let LevelResult { transmittance, lit, cells } = result;
-        self.composed(ray.point, transmittance, cells, &lit, SheetOrder { before, is_last, behind })
+        let LevelResult { transmittance, lit, tint, cells } = result;
+        self.composed(ray.point, transmittance, cells, (&lit, tint), SheetOrder { before, is_last, behind })
     }
 
     /// Result of a sheet that a ray meets at `point` of the world and that lets `transmittance` pass, in
-    /// which the lights send `lit` to the eye.
+    /// which the lights send `lit` to the eye. The second part of `lit` is [`LevelResult::tint`].
     #[inline]
     fn composed(
         &self,
         point: Vec3,
         transmittance: f32,
         cells: [u32; 2],
-        lit: &[Lit],
+        (lit, tint): (&[Lit], Vec3),
         SheetOrder { before, is_last, behind }: SheetOrder,
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
         let mut radiance = self.scene.ambient * (before - transmittance) + passed;
+        if self.is_colored {
+            radiance += self.scene.ambient * tint;
+        }
         for (light, lit) in self.lights.iter().zip(lit) {
             let (_, intensity) = light.at(point);
             let sum = if self.in_colour() { lit.colour } else { Vec3::splat(lit.sum * (1.0 / 255.0)) };
@@ -488,7 +498,13 @@ impl<'a> Integrator<'a> {
     /// Whether the light of a cell has a colour of its own.
     #[inline]
     fn in_colour(&self) -> bool {
-        self.strand.is_some() || self.media.is_some()
+        self.strand.is_some() || self.media.is_some() || self.is_colored
+    }
+
+    /// Ink of a cell of volume `volume` with this k_s, if any volume has colours.
+    #[inline]
+    fn ink(&self, volume: usize, k_s: f32) -> Option<Ink> {
+        self.is_colored.then(|| self.volumes[volume].ramp.ink(k_s))
     }
 
     /// Extinction in the cells of a level of volume `volume`.

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use crate::light::strand::table::StrandShading;
-use crate::light::{AngleFrame, environment, scatter};
+use crate::light::{AngleFrame, environment, ramp, scatter};
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::{MAX_VOLUMES, Scene};
@@ -284,6 +284,21 @@ pub struct Similarity {
     pub pad_2: f32,
 }
 
+/// Colours of a volume's cells.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Ramp {
+    pub first: [f32; 3],
+    pub count: f32,
+    pub step_0: [f32; 3],
+    pub k_s_factor: f32,
+    pub step_1: [f32; 3],
+    pub k_s_summand: f32,
+    pub step_2: [f32; 3],
+    pub pad: f32,
+}
+
 /// Constants of one of several volumes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -294,6 +309,7 @@ pub struct VolumeConstants {
     pub base: [i32; 3],
     pub flow_cells: f32,
     pub similarity: Similarity,
+    pub ramp: Ramp,
     pub levels: u32,
     pub pad_a: u32,
     pub pad_b: u32,
@@ -315,6 +331,7 @@ pub fn volume_constants(
         base: origins[i].map(|n| n as i32),
         flow_cells: flow_cells(flows[i], volume.size[1]),
         similarity: waters.get(i).map(Similarity::from).unwrap_or_default(),
+        ramp: Ramp::from(&scene.recipes[i].ramp),
         levels: level_atlas(&scene.trace, volume.size).count,
         ..VolumeConstants::default()
     };
@@ -330,14 +347,41 @@ pub fn volume_constants(
 pub struct Reflection {
     pub strand: Strand,
     pub similarity: Similarity,
+    pub ramp: Ramp,
 }
 
 impl Reflection {
-    /// Packs the constants of the models that a scene uses; the others stay 0.
-    pub fn new(strand: Option<&StrandShading>, similarity: Option<&scatter::Similarity>) -> Self {
+    /// Packs the constants of the models that a scene uses, and the colours of its first volume; the others
+    /// stay 0.
+    pub fn new(
+        strand: Option<&StrandShading>,
+        similarity: Option<&scatter::Similarity>,
+        ramp: &ramp::Ramp,
+    ) -> Self {
         let similarity = similarity.map(Similarity::from);
         let strand = strand.map(Strand::from);
-        Reflection { strand: strand.unwrap_or_default(), similarity: similarity.unwrap_or_default() }
+        Reflection {
+            strand: strand.unwrap_or_default(),
+            similarity: similarity.unwrap_or_default(),
+            ramp: Ramp::from(ramp),
+        }
+    }
+}
+
+impl From<&ramp::Ramp> for Ramp {
+    fn from(ramp: &ramp::Ramp) -> Self {
+        let [step_0, step_1, step_2] = ramp.steps.map(|step| step.to_array());
+        let [k_s_factor, k_s_summand] = ramp.k_s;
+        Ramp {
+            first: ramp.first.to_array(),
+            count: ramp.count,
+            step_0,
+            k_s_factor,
+            step_1,
+            k_s_summand,
+            step_2,
+            pad: 0.0,
+        }
     }
 }
 

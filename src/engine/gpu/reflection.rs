@@ -41,7 +41,7 @@ impl Reflections {
         };
         let media = scene.media(volumes);
         let waters = media.as_ref().map_or(Vec::new(), |media| media.waters.clone());
-        let uniform = layout::Reflection::new(strand.as_ref(), waters.first());
+        let uniform = layout::Reflection::new(strand.as_ref(), waters.first(), &scene.recipes[0].ramp);
         let table = strand.map(|strand| strand.table);
         let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,

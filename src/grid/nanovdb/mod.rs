@@ -5,7 +5,10 @@
 
 mod layout;
 mod nodes;
+mod plan;
 mod segment;
+mod stats;
+mod write;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -16,6 +19,8 @@ use super::{Bounds, Class, Grid, Summary};
 use crate::util::error::{Error, Result};
 use layout::{GRID_BYTES, GridData, Kind, TREE_BYTES};
 use segment::{Codec, Record, read_records};
+
+pub use write::encode_nvdb;
 
 /// First bytes of a file or of a segment.
 const MAGICS: [&[u8; 8]; 3] = [b"NanoVDB0", b"NanoVDB1", b"NanoVDB2"];

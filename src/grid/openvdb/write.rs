@@ -1,11 +1,11 @@
 //! Writing of OpenVDB's files: version 224, trees 5_4_3, zlib with the mask of active samples.
 
-use std::collections::BTreeMap;
 use std::io::{Result, Seek, SeekFrom, Write};
 
 use flate2::{Compress, Compression, FlushCompress, Status};
 
-use super::super::{BlockData, Class, Grid};
+use super::super::branches::{LOWER, Slot, Slots, Tree, UPPER, children, for_each_in_order};
+use super::super::{Class, Grid};
 use super::MAGIC;
 
 const VERSION: u32 = 224;
@@ -13,13 +13,6 @@ const VERSION: u32 = 224;
 const LIBRARY: [u32; 2] = [10, 0];
 /// zlib and the mask of active samples.
 const FLAGS: u32 = 3;
-/// log₂ of the children of upper and lower nodes and of the samples of leaves along an axis.
-const UPPER: u32 = 5;
-const LOWER: u32 = 4;
-const LEAF: u32 = 3;
-/// Most tiles that one larger tile is divided into.
-const MOST_PARTS: u64 = 1 << 20;
-
 /// Writes grids as a file of OpenVDB to `out`, with their float32 as they are. The bytes depend on the grids
 /// alone.
 ///
@@ -137,85 +130,6 @@ fn write_transform(out: &mut impl Write, grid: &Grid) -> Result<()> {
     numbers.iter().try_for_each(|number| out.write_all(&number.to_le_bytes()))
 }
 
-/// What a place of a node holds.
-enum Slot<N> {
-    Tile([f32; 3], bool),
-    Node(N),
-}
-
-type Slots<N> = BTreeMap<usize, Slot<N>>;
-/// A leaf: its values and its active samples.
-type Leaf<'a> = (&'a [f32], &'a [u64; 8]);
-
-/// Tree of a grid, in the order of the file.
-#[derive(Default)]
-struct Tree<'a> {
-    nodes: BTreeMap<[i32; 3], Slots<Slots<Leaf<'a>>>>,
-    tiles: BTreeMap<[i32; 3], ([f32; 3], bool)>,
-}
-
-/// Number of a place in a node of 2^`log` places along each axis, each 2^`bits` samples long.
-fn place(origin: [i32; 3], bits: u32, log: u32) -> usize {
-    let [x, y, z] = origin.map(|x| (x >> bits) as usize & ((1 << log) - 1));
-    z | y << log | x << (2 * log)
-}
-
-impl<'a> Tree<'a> {
-    fn of(grid: &'a Grid) -> Result<Tree<'a>> {
-        let mut tree = Tree::default();
-        for block in grid.blocks() {
-            match block.data {
-                BlockData::Leaf { values, active } => {
-                    let lower = tree.lower(block.origin);
-                    lower.insert(place(block.origin, LEAF, LOWER), Slot::Node((values, active)));
-                }
-                BlockData::Tile { value, is_active } => {
-                    let bits = block.side.trailing_zeros();
-                    let own = [12, 7, 3].into_iter().find(|own| *own <= bits).unwrap_or(3);
-                    let parts = 1u64 << (bits - own);
-                    if parts.saturating_pow(3) > MOST_PARTS {
-                        let why = format!("a tile of {} samples along an axis is too large", block.side);
-                        return Err(std::io::Error::other(why));
-                    }
-                    for i in 0..parts.pow(3) {
-                        let local = [i % parts, i / parts % parts, i / parts / parts];
-                        let origin = std::array::from_fn(|a| block.origin[a] + ((local[a] as i32) << own));
-                        tree.add_tile(origin, own, value, is_active);
-                    }
-                }
-            }
-        }
-        Ok(tree)
-    }
-
-    fn upper(&mut self, origin: [i32; 3]) -> &mut Slots<Slots<Leaf<'a>>> {
-        self.nodes.entry(origin.map(|x| x & !4095)).or_default()
-    }
-
-    fn lower(&mut self, origin: [i32; 3]) -> &mut Slots<Leaf<'a>> {
-        let slot = self.upper(origin).entry(place(origin, LOWER + LEAF, UPPER));
-        let slot = slot.or_insert_with(|| Slot::Node(BTreeMap::new()));
-        if let Slot::Tile(..) = slot {
-            *slot = Slot::Node(BTreeMap::new());
-        }
-        match slot {
-            Slot::Node(lower) => lower,
-            Slot::Tile(..) => unreachable!("a node stands there now"),
-        }
-    }
-
-    fn add_tile(&mut self, origin: [i32; 3], bits: u32, value: [f32; 3], is_active: bool) {
-        match bits {
-            12 => drop(self.tiles.insert(origin, (value, is_active))),
-            7 => {
-                let slot = place(origin, LOWER + LEAF, UPPER);
-                self.upper(origin).entry(slot).or_insert(Slot::Tile(value, is_active));
-            }
-            _ => drop(self.lower(origin).insert(place(origin, LEAF, LOWER), Slot::Tile(value, is_active))),
-        }
-    }
-}
-
 /// Writes nodes of one grid, and keeps what it needs for that.
 struct Writer {
     channels: usize,
@@ -296,18 +210,17 @@ impl Writer {
         self.write_values(out)
     }
 
-    /// Takes a leaf, x fastest, to the order of the file, z fastest.
+    /// Takes a leaf to the order of the file.
     fn set_leaf(&mut self, values: Option<&[f32]>, active: &[u64; 8]) {
         self.mask.clear();
         self.mask.resize(64, 0);
         self.values.clear();
-        for n in 0..512 {
-            let i = n >> 6 | n & 0o70 | (n & 7) << 6;
-            self.mask[n / 8] |= ((active[i >> 6] >> (i & 63) & 1) as u8) << (n % 8);
+        for_each_in_order(active, |n, i, is_active| {
+            self.mask[n / 8] |= u8::from(is_active) << (n % 8);
             if let Some(values) = values {
                 self.values.extend_from_slice(&values[self.channels * i..][..self.channels]);
             }
-        }
+        });
     }
 
     /// Writes the values, without those that are not active where these have the background or its negative.
@@ -343,12 +256,4 @@ impl Writer {
             }
         }
     }
-}
-
-/// Nodes of a node.
-fn children<N>(node: &Slots<N>) -> impl Iterator<Item = &N> {
-    node.values().filter_map(|slot| match slot {
-        Slot::Node(node) => Some(node),
-        Slot::Tile(..) => None,
-    })
 }

@@ -29,7 +29,7 @@ pub(super) const BOXES: Group = Group {
                 "Turn about the x, then the y, then the z axis of the scene, around the middle of the box, \
                  after the turn that the volume's file has.",
             )
-            .when("Set [-90, 0, 0] for a file of a program whose z axis points up."),
+            .when("Turn smoke to the wind. For a file whose z axis points up, set `volume.up`."),
         p(SIZE, "", "m", Point([1.0, 1.0, 1.0]), Upload)
             .doc(
                 "Lengths of the sides along x, y and z of the volume. Without them, they are those of the \

@@ -8,6 +8,7 @@
 
 mod boxes;
 mod light;
+mod matter;
 mod meshes;
 mod picture;
 mod place;
@@ -23,6 +24,7 @@ use std::sync::LazyLock;
 use Cost::*;
 use Kind::*;
 pub(super) use meshes::MATERIAL as MESH_MATERIAL;
+pub use volume::COLORS;
 pub use volumes::{WATER, key_of_volume, split_volume_key};
 
 /// Work that a change of a parameter causes in an interactive renderer.
@@ -113,7 +115,22 @@ pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
 /// Parameters that no scene has of itself, besides lists.
-const OPTIONAL: [&str; 4] = [boxes::POSITION, boxes::SIZE, meshes::COLOR, meshes::MATERIAL];
+const OPTIONAL: [&str; 14] = [
+    boxes::POSITION,
+    boxes::SIZE,
+    meshes::COLOR,
+    meshes::MATERIAL,
+    volume::ORIGIN,
+    volume::ORIGIN_OF_OTHERS,
+    COLORS[0],
+    COLORS[1],
+    COLORS[2],
+    COLORS[3],
+    "volumes.*.color",
+    "volumes.*.color_2",
+    "volumes.*.color_3",
+    "volumes.*.color_4",
+];
 /// Longest line of text in docs/parameters.md, characters.
 const COLUMNS: usize = 110;
 
@@ -126,6 +143,8 @@ const fn p(key: &'static str, symbol: &'static str, unit: &'static str, kind: Ki
 pub const GROUPS: &[Group] = &[
     volume::CURVES,
     volume::VOLUME,
+    matter::FUR,
+    matter::CLOTH,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,

@@ -4,7 +4,11 @@ use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
 use crate::scene::measured::Builder;
-use crate::volume::{ReflectBy, RhoRule, Run, StorageChoice, VelocityAt};
+use crate::volume::{LevelSetUnit, ReflectBy, RhoRule, StorageChoice, Up, VelocityAt};
+
+/// Place of the grid, if it is not the file's: of the water and of other volumes.
+pub(super) const ORIGIN: &str = "volume.origin";
+pub(super) const ORIGIN_OF_OTHERS: &str = "volumes.*.origin";
 
 pub(super) const CURVES: Group = Group {
     title: "Curves",
@@ -40,20 +44,6 @@ pub(super) const CURVES: Group = Group {
                  ny.",
             )
             .when("Raise it for strands that wander and cross; lower it for straight, parallel ones."),
-        p("curves.run", "", "", Choice(Run::WORDS), Volume)
-            .doc(
-                "Faces between which the curves run: `along` the flow, as in the paper, or `out` of the \
-                 surface, from roots on its inner face to tips on its outer one. Then lengths that are \
-                 fractions of the flow length are fractions of the depth nz.",
-            )
-            .when("Choose `out` for fur and grass."),
-        p("curves.lean", "", "depths", Float(-10.0, 10.0, 0.0), Volume)
-            .slider(-2.0, 2.0)
-            .doc(
-                "Distance by which the tips of curves that run `out` of the surface lean down the flow, as \
-                 a fraction of the depth nz.",
-            )
-            .when("Raise it to comb the fur; lower it below 0 to comb it the other way."),
         p("curves.levels", "", "", Int(0, 16, 0), Volume)
             .doc(
                 "Depth of the recursion: a curve has 2^levels segments. 0 chooses the depth at which a \
@@ -98,6 +88,9 @@ pub(super) const CURVES: Group = Group {
             .when("Raise it to fill the gaps between bundles with fine threads; lower it for clear gaps."),
     ],
 };
+
+/// Keys of the ramp's colours.
+pub const COLORS: [&str; 4] = ["volume.color", "volume.color_2", "volume.color_3", "volume.color_4"];
 
 pub(super) const VOLUME: Group = Group {
     title: "Volume",
@@ -184,6 +177,23 @@ pub(super) const VOLUME: Group = Group {
         p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload)
             .doc("Specular reflection coefficient of the cells, before noise is added.")
             .when("Raise it for bright highlights along the strands; lower it for matt, milky water."),
+        p(COLORS[0], "", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc(
+                "Colour of what the cells reflect diffusely, and first of up to four on a ramp. Along it \
+                 lie the cells of `volume.builder=fur` from root to tip, those of `cloth` from warp to \
+                 weft, and those of `flow` and of a file by their k_s; all cells then have the k_s of \
+                 `volume.k_s`. Highlights keep the colour of the light. Cells are white without it.",
+            )
+            .when("Set it for fur, cloth or soil; water is white, and takes its colour from light and sky."),
+        p(COLORS[1], "", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc("Second colour of the ramp.")
+            .when("Set it where the colour changes, such as from root to tip."),
+        p(COLORS[2], "", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc("Third colour of the ramp.")
+            .when("Set it for bands of colour, as in the hair of wild animals."),
+        p(COLORS[3], "", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc("Fourth colour of the ramp.")
+            .when("Set it for a tip of its own, such as a light one."),
         p("volume.k_noise", "", "", Float(0.0, 1.0, 0.1), Upload)
             .doc("Standard deviation of the normal noise that is added to k_d and k_s in every cell.")
             .when("Raise it for sparkle from cell to cell; lower it for even water."),
@@ -200,10 +210,14 @@ pub(super) const VOLUME: Group = Group {
             .when("Set it to the number of the first file of a sequence, or to that of a still."),
         p("volume.builder", "", "", Choice(Builder::WORDS), Volume)
             .doc(
-                "What the cells are made of: spatial fractal curves as in the paper (`curves`), or the \
-                 grids of a simulation in `volume.source` (`flow`).",
+                "What the cells are made of: spatial fractal curves as in the paper (`curves`), hairs on a \
+                 skin (`fur`), woven yarns (`cloth`), or the grids of a simulation in `volume.source` \
+                 (`flow`).",
             )
-            .when("Choose `flow` for smoke or water that another program computed, and show it in a box."),
+            .when(
+                "Choose `fur` or `cloth` for a shell over a mesh, and `flow` for smoke or water that another \
+                 program computed, in a box.",
+            ),
         p("volume.source", "", "", Text(""), Volume)
             .doc(
                 "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz). \
@@ -229,6 +243,31 @@ pub(super) const VOLUME: Group = Group {
                  `auto` is `staggered` if the file says so, and `centre` otherwise.",
             )
             .when("Choose one if the file does not say it; a wrong one moves the flow by half a voxel."),
+        p("volume.velocity_scale", "", "m/s", Float(1e-6, 1e6, 1.0), Volume)
+            .slider(0.0, 2.0)
+            .doc("Speed that a velocity of 1 in the file stands for.")
+            .when(
+                "Set it where speed or vorticity choose k and the file is not in m/s. Blender's fluids are \
+                 in voxels per 0.4 s: set it to the edge of a voxel / 0.4.",
+            ),
+        p("volume.level_set_unit", "", "", Choice(LevelSetUnit::WORDS), Volume)
+            .doc(
+                "Unit of the distances where `volume.grid` is a level set: `metres`, or edges of a voxel \
+                 (`voxels`). `auto` finds it by how much they change from voxel to voxel at the surface.",
+            )
+            .when("Choose `voxels` if water looks like bricks, and `metres` if it looks like fog."),
+        p("volume.up", "", "", Choice(Up::WORDS), Volume)
+            .doc(
+                "Axis of the file in `volume.source` that points up. With `z` the box is turned: the file's \
+                 (x, y, z) is (x, z, −y) in the scene.",
+            )
+            .when("Choose `z` for files of Blender and of other programs whose z axis points up."),
+        p(ORIGIN, "", "m", Point([0.0, 0.0, 0.0]), Volume)
+            .doc(
+                "Place of the lower corner of the voxel at index (0, 0, 0), in the axes of the file. Without \
+                 it, that is where the file puts it.",
+            )
+            .when("Set it to the lower corner of a Blender domain, which is not in its files."),
         p("volume.voxels", "", "voxels", Int(1, 64, 1), Volume)
             .slider(1.0, 16.0)
             .doc(
@@ -274,7 +313,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.reflect", "", "", Choice(ReflectBy::WORDS), Volume)
             .doc(
                 "What k_d and k_s follow in a volume with `volume.builder=flow`: nothing (`even`), the \
-                 speed, the vorticity, or the grid `volume.reflect_grid`. They change from `volume.k_d` \
+                 speed, the vorticity, or the grid `volume.reflect_grid`; `stored` takes them from the grids \
+                 `kd` and `ks`, as `taki volume build` writes them. The others change from `volume.k_d` \
                  and `volume.k_s` at `volume.reflect_low` to `volume.reflect_k_d` and `volume.reflect_k_s` \
                  at `volume.reflect_high`.",
             )

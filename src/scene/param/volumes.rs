@@ -1,7 +1,8 @@
-//! Further volumes beside `water`. Each has all keys of the groups Curves and Volume in a table of its own.
+//! Further volumes beside `water`. Each has the keys of the groups Curves, Volume, Fur and Cloth in a table.
 
 use std::str::from_utf8;
 
+use super::matter::{CLOTH, FUR};
 use super::volume::{CURVES, VOLUME};
 use super::{Group, Param, last_part};
 
@@ -11,20 +12,31 @@ pub const WATER: &str = "water";
 pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
     about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
-         of `curves` and `volume` in one table; where a description names one of those keys, it means the \
-         key of the same volume. A material says with `materials.*.volume` which volume it shows. A volume \
-         that no surface shows is not built.",
+         of `curves`, `volume`, `fur` and `cloth` in one table; where a description names one of those \
+         keys, it means the key of the same volume. A material says with `materials.*.volume` which volume \
+         it shows. A volume that no surface shows is not built.",
     params: &PARAMS,
 };
 
 /// Prefix of the keys.
 const PREFIX: &[u8] = b"volumes.*.";
-const COUNT: usize = CURVES.params.len() + VOLUME.params.len();
+/// Groups whose keys every volume has.
+const GROUPS: [&[Param]; 4] = [CURVES.params, VOLUME.params, FUR.params, CLOTH.params];
+const COUNT: usize = {
+    let (mut sum, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        (sum, group) = (sum + GROUPS[group].len(), group + 1);
+    }
+    sum
+};
 
-/// Parameter number `i` of the groups Curves and Volume.
-const fn source(i: usize) -> &'static Param {
-    let first = CURVES.params.len();
-    if i < first { &CURVES.params[i] } else { &VOLUME.params[i - first] }
+/// Parameter number `i` of these groups.
+const fn source(mut i: usize) -> &'static Param {
+    let mut group = 0;
+    while i >= GROUPS[group].len() {
+        (i, group) = (i - GROUPS[group].len(), group + 1);
+    }
+    &GROUPS[group][i]
 }
 
 /// Position of the last part of a key.

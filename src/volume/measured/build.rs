@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::field::{Field, Source};
 use super::overlap::{Covered, Overlap};
-use super::{MeasuredSpec, ReflectBy, VelocityNames, strands};
+use super::{MeasuredSpec, ReflectBy, VelocityNames, level_set, strands};
 use crate::grid::{self, Block, BlockData, Class, Grid};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -20,8 +20,10 @@ pub struct Measured {
     pub density: Grid,
     /// Velocity: no grid, one of vectors, or one for each component.
     pub velocity: Vec<Grid>,
-    /// What k follows, with [`ReflectBy::Grid`].
+    /// What k follows, with [`ReflectBy::Grid`], or k_d, with [`ReflectBy::Stored`].
     pub second: Option<Grid>,
+    /// k_s, with [`ReflectBy::Stored`].
+    pub specular: Option<Grid>,
 }
 
 /// Reads the grids of a recipe and builds its volume within `budget` bytes. The cells have the same bits on
@@ -53,14 +55,17 @@ pub fn build_measured(
         }
         Ok(grid)
     };
-    let density = read(&spec.density, 1)?;
-    let velocity = match &spec.velocity {
+    let mut density = read(&spec.density, 1)?;
+    level_set::to_metres(&mut density, spec.level_set_unit);
+    let mut velocity = match &spec.velocity {
         VelocityNames::None => Vec::new(),
         VelocityNames::Vector(name) => vec![read(name, 3)?],
         VelocityNames::Components(names) => names.iter().map(|name| read(name, 1)).collect::<Result<_>>()?,
     };
+    velocity.iter_mut().for_each(|grid| grid.scale(spec.velocity_scale));
     let second = spec.second.as_ref().map(|name| read(name, 1)).transpose()?;
-    Measured { density, velocity, second }.volume(spec, storage, left, monitor)
+    let specular = spec.specular.as_ref().map(|name| read(name, 1)).transpose()?;
+    Measured { density, velocity, second, specular }.volume(spec, storage, left, monitor)
 }
 
 /// What the voxels of a cell add up to, each weighted by its share of the cell.
@@ -70,8 +75,8 @@ struct Sum {
     mass: f64,
     /// Density times velocity.
     flow: Vec3,
-    /// Density times what k follows.
-    second: f32,
+    /// Density times what k follows, or times k_d and k_s.
+    second: [f32; 2],
 }
 
 /// How values of the density's grid are read.
@@ -260,22 +265,29 @@ impl<'a> Work<'a> {
         let spec = self.spec;
         let density = spec.to_world;
         let mut field = Field::new(&self.grids.velocity, density, spec.velocity_at);
-        let mut second = self.grids.second.as_ref().map(|grid| Source::new(grid, density, DVec3::ZERO));
+        let source = |grid: &'a Grid| Source::new(grid, density, DVec3::ZERO);
+        let mut second = self.grids.second.as_ref().map(source);
+        let mut specular = self.grids.specular.as_ref().map(source);
         let mut sums = vec![Sum::default(); out.len()];
         self.each(layers, |cells, index, mass| {
             let v = field.as_mut().map_or(DVec3::ZERO, |field| field.at(index));
-            let value = match spec.reflect {
-                ReflectBy::Even => 0.0,
-                ReflectBy::Speed => v.length(),
-                ReflectBy::Vorticity => field.as_mut().map_or(0.0, |field| field.vorticity(index, &density)),
-                ReflectBy::Grid => second.as_mut().map_or(0.0, |grid| f64::from(grid.at(index)[0])),
+            let of =
+                |grid: &mut Option<Source>| grid.as_mut().map_or(0.0, |grid| f64::from(grid.at(index)[0]));
+            let values = match spec.reflect {
+                ReflectBy::Even => [0.0; 2],
+                ReflectBy::Speed => [v.length(), 0.0],
+                ReflectBy::Vorticity => {
+                    [field.as_mut().map_or(0.0, |field| field.vorticity(index, &density)), 0.0]
+                }
+                ReflectBy::Grid => [of(&mut second), 0.0],
+                ReflectBy::Stored => [of(&mut second), of(&mut specular)],
             };
             cells.each(|i, share| {
                 let weight = share * mass;
                 let sum = &mut sums[i];
                 sum.mass += weight;
                 sum.flow += (v * weight).as_vec3();
-                sum.second += (value * weight) as f32;
+                (0..2).for_each(|i| sum.second[i] += (values[i] * weight) as f32);
             });
         });
         for (cell, sum) in out.iter_mut().zip(&sums) {
@@ -288,7 +300,11 @@ impl<'a> Work<'a> {
     /// The cell of a sum with some mass.
     fn cell(&self, sum: &Sum, largest: f64) -> Cell {
         let spec = self.spec;
-        let [k_d, k_s] = spec.reflected(f64::from(sum.second) / sum.mass);
+        let means = sum.second.map(|sum_of| f64::from(sum_of) / sum.mass);
+        let [k_d, k_s] = match spec.reflect {
+            ReflectBy::Stored => means.map(|k| k as f32),
+            _ => spec.reflected(means[0]),
+        };
         let direction = (self.cell_from_world * sum.flow.as_dvec3()).try_normalize().unwrap_or(DVec3::Y);
         let rho = if largest > 0.0 { spec.rho_of(sum.mass) / largest } else { 0.0 };
         let cell = Cell::from_direction(direction.as_vec3()).with_density(rho as f32, k_d, k_s);

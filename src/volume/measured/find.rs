@@ -14,8 +14,10 @@ pub struct Wanted {
     pub density: String,
     /// Name of the velocity's grid, `none`, or nothing for one of the usual names.
     pub velocity: String,
-    /// Name of the grid that k follows.
+    /// Name of the grid that k follows, or of that of k_d.
     pub second: Option<String>,
+    /// Name of the grid of k_s.
+    pub specular: Option<String>,
     /// Whether the density may have no active samples, as before the first smoke of a simulation. It then
     /// covers the voxel at index 0.
     pub may_be_empty: bool,
@@ -40,7 +42,11 @@ pub fn find_measured(path: &Path, wanted: &Wanted, budget: u64) -> Result<(Veloc
     let all = grid::list(path, budget)?;
     let density = named(path, &all, &wanted.density, "volume.grid")?;
     if let Some(second) = &wanted.second {
-        named(path, &all, second, "volume.reflect_grid")?;
+        let key = if wanted.specular.is_some() { "volume.reflect" } else { "volume.reflect_grid" };
+        named(path, &all, second, key)?;
+    }
+    if let Some(specular) = &wanted.specular {
+        named(path, &all, specular, "volume.reflect")?;
     }
     let velocity = velocity(path, &all, &wanted.velocity)?;
     let bounds = match density.bounds {

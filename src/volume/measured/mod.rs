@@ -8,7 +8,7 @@
 //! |---|---|
 //! | ρ | `rho_scale` × density, or 1 − e^(−`rho_scale` × density × edge of a cell) |
 //! | v | mean velocity, weighted by the density, in the axes of the cells |
-//! | k_d, k_s | even, or between two values by speed, vorticity or another grid, weighted by the density |
+//! | k_d, k_s | even, or between two values by speed, vorticity or another grid, or those of two grids, weighted by the density |
 //!
 //! The cells hold ρ/α in 65535ths, where α is the largest ρ. So ρ is exact to α/131070, and a cell with less
 //! is empty. v is in cells, so that J·v is parallel to the velocity whatever the shape of the voxels.
@@ -16,6 +16,7 @@
 mod build;
 mod field;
 mod find;
+mod level_set;
 mod overlap;
 mod strands;
 
@@ -57,6 +58,42 @@ pub enum VelocityAt {
 
 words! { VelocityAt { Auto => "auto", Centre => "centre", Node => "node", Staggered => "staggered" } }
 
+/// Axis of a file that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Up {
+    /// y, as in scenes.
+    #[default]
+    Y,
+    /// z: the file's y is the scene's −z.
+    Z,
+}
+
+words! { Up { Y => "y", Z => "z" } }
+
+impl Up {
+    /// Turn from the axes of the file to those of the scene.
+    pub fn scene_from_file(self) -> DMat3 {
+        match self {
+            Up::Y => DMat3::IDENTITY,
+            Up::Z => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
+        }
+    }
+}
+
+/// Unit of the distances in a level set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LevelSetUnit {
+    /// Voxels if the distances grow by about 1 from voxel to voxel, and metres otherwise.
+    #[default]
+    Auto,
+    /// Metres of the file's transform.
+    Metres,
+    /// Edges of a voxel.
+    Voxels,
+}
+
+words! { LevelSetUnit { Auto => "auto", Metres => "metres", Voxels => "voxels" } }
+
 /// What k_d and k_s follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReflectBy {
@@ -69,9 +106,19 @@ pub enum ReflectBy {
     Vorticity,
     /// A grid of its own, such as foam or age.
     Grid,
+    /// The grids `kd` and `ks`, which hold k_d and k_s themselves.
+    Stored,
 }
 
-words! { ReflectBy { Even => "even", Speed => "speed", Vorticity => "vorticity", Grid => "grid" } }
+words! {
+    ReflectBy {
+        Even => "even",
+        Speed => "speed",
+        Vorticity => "vorticity",
+        Grid => "grid",
+        Stored => "stored",
+    }
+}
 
 /// Names of the grids that hold the velocity.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -94,12 +141,21 @@ pub struct MeasuredSpec {
     pub density: String,
     /// Names of the velocity's grids.
     pub velocity: VelocityNames,
-    /// Name of the grid that k follows, with [`ReflectBy::Grid`].
+    /// Name of the grid that k follows, with [`ReflectBy::Grid`], or of that of k_d, with
+    /// [`ReflectBy::Stored`].
     pub second: Option<String>,
+    /// Name of the grid of k_s, with [`ReflectBy::Stored`].
+    pub specular: Option<String>,
     /// Voxels that the volume covers.
     pub bounds: Bounds,
-    /// Transform from a voxel's index to its centre in the world, metres.
+    /// Transform from a voxel's index to its centre in the world of the file, metres.
     pub to_world: DAffine3,
+    /// Turn and shift from the world of the file to that of the scene.
+    pub scene_from_file: DAffine3,
+    /// Unit of the density's grid if it is a level set.
+    pub level_set_unit: LevelSetUnit,
+    /// Metres per second of a velocity of 1.
+    pub velocity_scale: f32,
     /// Number of cells along x, y and z.
     pub size: [u32; 3],
     /// How ρ follows from the density.
@@ -142,18 +198,23 @@ pub struct StrandSpec {
 }
 
 impl MeasuredSpec {
-    /// Transform from texture coordinates, 0 to 1 along each axis, to the world, metres. A voxel reaches half
-    /// an index to either side of its sample.
+    /// Transform from texture coordinates, 0 to 1 along each axis, to the world of the scene, metres. A voxel
+    /// reaches half an index to either side of its sample.
     pub fn world_from_texture(&self) -> DAffine3 {
+        self.scene_from_file * self.file_from_texture()
+    }
+
+    /// Transform from texture coordinates to the world of the file.
+    fn file_from_texture(&self) -> DAffine3 {
         let low = DVec3::from_array(self.bounds.min.map(f64::from)) - 0.5;
         let voxels = DVec3::from_array(self.bounds.size().map(|n| n as f64));
         self.to_world * DAffine3::from_translation(low) * DAffine3::from_scale(voxels)
     }
 
-    /// Metres of the world per cell along x, y and z, as columns.
+    /// Metres of the file's world per cell along x, y and z, as columns.
     fn world_from_cell(&self) -> DMat3 {
         let cells = DVec3::from_array(self.size.map(f64::from));
-        self.world_from_texture().matrix3 * DMat3::from_diagonal(1.0 / cells)
+        self.file_from_texture().matrix3 * DMat3::from_diagonal(1.0 / cells)
     }
 
     /// ρ of a cell whose mean density is `mass`, before the factor of the scene.
@@ -169,7 +230,7 @@ impl MeasuredSpec {
     fn reflected(&self, value: f64) -> [f32; 2] {
         let [low, high] = self.reflect_range.map(f64::from);
         let share = match self.reflect {
-            ReflectBy::Even => 0.0,
+            ReflectBy::Even | ReflectBy::Stored => 0.0,
             _ if high > low => ((value - low) / (high - low)).clamp(0.0, 1.0),
             _ => f64::from(u8::from(value >= low)),
         } as f32;

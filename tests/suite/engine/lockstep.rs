@@ -11,6 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use taki::engine::cpu::LightVolumeCache;
 use taki::engine::cpu::gbuffer::{self, Gbuffer};
 use taki::engine::cpu::integrate::{Integrator, Lanes, RayResult};
+use taki::light::ramp::Ramp;
 use taki::light::strand::StrandParams;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::shell::{Shell, Side};
@@ -78,6 +79,12 @@ fn light(rng: &mut Pcg64Mcg) -> Light {
     }
 }
 
+/// A ramp of some colours, of which there may be none.
+fn ramp(count: usize) -> Ramp {
+    let colors = [Vec3::new(0.9, 0.1, 0.2), Vec3::new(0.3, 0.7, 0.0), Vec3::new(0.0, 0.2, 0.8)];
+    Ramp::new(&colors[..count], 0.35)
+}
+
 /// A random scene. Its camera looks at the quads along their normal, along a diagonal, or at a steep angle.
 fn scene(rng: &mut Pcg64Mcg) -> Scene {
     let mut scene = Scene::load(Path::new("front"), &[], &Limits::default()).expect("a preset");
@@ -97,6 +104,9 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
         0 => Reflection::Strand(StrandParams::default()),
         _ => Reflection::KajiyaKay,
     };
+    if parts.scattering == Scattering::Single && parts.reflection == Reflection::KajiyaKay {
+        parts.recipes[0].ramp = ramp(one_of(4) as usize);
+    }
     parts.trace.attenuation =
         [Attenuation::PathLength { sigma: 6.0 }, Attenuation::PerCell { tau: 0.8 }][one_of(2) as usize];
     parts.trace.filter = [Prefilter::None, Prefilter::Pyramid][one_of(2) as usize];
@@ -164,7 +174,9 @@ fn volumes(rng: &mut Pcg64Mcg, scene: &mut Scene, count: usize) -> Vec<VolumeTex
     let parts = scene.edit();
     let recipe = parts.recipes[0].clone();
     let flow = |number: usize| recipe.flow + 0.1 * number as f32;
-    parts.recipes = (0..count).map(|number| Recipe { flow: flow(number), ..recipe.clone() }).collect();
+    let ramp = |number: usize| if number == 1 { Ramp::WHITE } else { recipe.ramp };
+    let own = |number: usize| Recipe { flow: flow(number), ramp: ramp(number), ..recipe.clone() };
+    parts.recipes = (0..count).map(own).collect();
     for quad in &mut parts.quads {
         quad.material.volume = rng.random_range(0..count as u32);
     }
@@ -175,7 +187,7 @@ fn volumes(rng: &mut Pcg64Mcg, scene: &mut Scene, count: usize) -> Vec<VolumeTex
 fn every_instruction_set_gives_the_bits_of_the_scalar_walk() {
     let mut walked = [0u64; 2];
     let mut bright = 0;
-    for seed in 0..600 {
+    for seed in 0..640 {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed);
         let mut scene = scene(rng);
         let is_sparse = scene.trace.filter == Prefilter::None && rng.random();
@@ -241,7 +253,12 @@ fn results_do_not_depend_on_the_rays_beside_them() {
 fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
     let (strand, pyramid) = ("light.reflection=strand", "trace.filter=pyramid");
     let (none, cached) = ("light.visibility=none", "light.visibility=cached");
-    let variants: [&[&str]; 12] = [
+    let colored = "light.ambient=[0.1,0.3,0.2]";
+    let variants: [&[&str]; 16] = [
+        &[colored],
+        &[colored, none],
+        &[colored, pyramid, cached],
+        &[colored, "trace.lookup=trilinear", none],
         &[],
         &[none],
         &[cached],
@@ -272,7 +289,8 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
         let parts = scene.edit();
         [parts.image.width, parts.image.height] = [61, 40];
         let recipe = parts.recipes[0].clone();
-        parts.recipes = vec![recipe.clone(), Recipe { flow: 0.3, ..recipe }];
+        let ramp = if sets.contains(&colored) { ramp(3) } else { Ramp::WHITE };
+        parts.recipes = vec![Recipe { ramp, ..recipe.clone() }, Recipe { flow: 0.3, ..recipe }];
         let mut torn = torn.clone();
         torn.volume = 1;
         parts.shells.extend([Arc::new(torn), Arc::new(ball.clone())]);

@@ -1,6 +1,7 @@
 //! The engines: parity between them, and the code that they share.
 
 pub mod boxes;
+pub mod colors;
 pub mod device_limits;
 pub mod every_preset;
 pub mod exposure;

@@ -8,7 +8,7 @@ use std::path::Path;
 use taki::engine::cpu::gloss;
 use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
-    Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Quad, Reflection,
+    Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Quad, Ramp, Reflection,
     ShellLightPart, Similarity, Strand, Tile, VertexMaterial, VolumeConstants, WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
@@ -177,9 +177,11 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
     let similarity = fields!(Similarity: extinction g albedo pad_0 reduced pad_1 isotropic pad_2);
     assert_eq!(members(&module, "Similarity"), similarity);
-    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity));
+    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity ramp));
+    let ramp = fields!(Ramp: first count step_0 k_s_factor step_1 k_s_summand step_2 pad);
+    assert_eq!(members(&module, "Ramp"), ramp);
     let volume =
-        fields!(VolumeConstants: cells extinction base flow_cells similarity levels pad_a pad_b pad_c);
+        fields!(VolumeConstants: cells extinction base flow_cells similarity ramp levels pad_a pad_b pad_c);
     assert_eq!(members(&module, "VolumeConstants"), volume);
     let module = validate(&stage("resolve")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced dither));
@@ -293,7 +295,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 21] = [
+const COMPARED: [&str; 22] = [
     "Develop",
     "Environment",
     "Foam",
@@ -305,6 +307,7 @@ const COMPARED: [&str; 21] = [
     "MeshTile",
     "Paint",
     "Quad",
+    "Ramp",
     "Reflection",
     "ShellLightPart",
     "Similarity",

@@ -21,7 +21,7 @@ use crate::trace::shells::scene_with;
 
 /// The shell of a mesh. Its texture is moved, so that no edge lies between cells: there rounding decides
 /// whether a ray counts one more cell, of length 0.
-fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
+pub fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
     let mut mesh = mesh.clone();
     mesh.uv.iter_mut().for_each(|uv| *uv += Vec2::new(0.1371, 0.0713));
     Shell::new(&mesh, side).expect("a valid mesh")

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use taki::grid::{BlockData, Grid, list, read};
 
-use super::{Folder, sample};
+use super::{Folder, npz, sample, written};
 
 /// Memory that a mutated file may take, bytes.
 const MEMORY: u64 = 4 << 20;
@@ -113,7 +113,11 @@ fn change(file: &mut File, from: &[u8], to: &[u8]) {
 
 /// Reads mutations of a sample. Returns how many still had a grid.
 fn read_mutations(seed: u64, name: &str, count: usize) -> usize {
-    let whole = sample(name);
+    let whole = match name {
+        WRITTEN => written::nano(),
+        ARRAYS => npz::small(),
+        _ => sample(name),
+    };
     let filled: Vec<usize> = (0..whole.len()).filter(|&i| whole[i] != 0).collect();
     let folder = Folder::new(name, &whole);
     let path = folder.path();
@@ -142,8 +146,13 @@ fn read_mutations(seed: u64, name: &str, count: usize) -> usize {
     grids
 }
 
+/// A file that the library itself writes.
+const WRITTEN: &str = "written.nvdb";
+/// Arrays of NumPy.
+const ARRAYS: &str = "arrays.npz";
+
 /// Samples, how many mutations of each are read, and how many of these may still be grids.
-const FILES: [(&str, usize, [usize; 2]); 9] = [
+const FILES: [(&str, usize, [usize; 2]); 11] = [
     ("old_off_two.vdb", 4000, [100, 3900]),
     ("cc_zip_mask.vdb", 4000, [100, 3900]),
     ("tool_active_16.vdb", 4000, [100, 3900]),
@@ -153,6 +162,8 @@ const FILES: [(&str, usize, [usize; 2]); 9] = [
     ("tool_blosc.nvdb", 3000, [30, 2900]),
     ("warp_blosc.nvdb", 2000, [20, 1950]),
     ("warp_none.nvdb", 10_000, [100, 9900]),
+    (WRITTEN, 2000, [20, 1950]),
+    (ARRAYS, 2000, [20, 1950]),
 ];
 
 #[test]

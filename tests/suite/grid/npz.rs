@@ -44,6 +44,16 @@ fn fortran_order(channels: usize) -> Vec<f32> {
     all.map(|[x, y, z, channel]| value(x, y, z, channel)).collect()
 }
 
+/// A small archive of a density and a velocity.
+pub fn small() -> Vec<u8> {
+    archive(&[
+        ("density", &[2, 3, 4], false, c_order(1)),
+        ("velocity", &[2, 3, 4, 3], true, fortran_order(3)),
+        ("origin", &[3], false, vec![1.0, 2.0, 3.0]),
+        ("voxel", &[], false, vec![0.5]),
+    ])
+}
+
 #[test]
 fn arrays_of_an_archive_are_grids() {
     let bytes = archive(&[

@@ -4,6 +4,7 @@ pub mod environment;
 pub mod fibre;
 pub mod haze;
 pub mod lights;
+pub mod ramp;
 pub mod scatter;
 pub mod strand;
 pub mod visibility;

@@ -365,7 +365,7 @@ fn shells_of_water_wet_meshes_and_rocks_and_shells_of_fur_do_not() {
         );
         assert!((vertex.wet - truth).abs() < 1e-4, "{:?}: {} {truth}", vertex.position, vertex.wet);
     }
-    assert!(vertices(&["curves.run=out"]).iter().all(|vertex| vertex.wet == 0.0));
+    assert!(vertices(&["volume.builder=fur"]).iter().all(|vertex| vertex.wet == 0.0));
 }
 
 #[test]

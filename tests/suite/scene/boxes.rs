@@ -121,7 +121,13 @@ fn grids(folder: &Folder, name: &str) -> DAffine3 {
         let values = value.iter().copied().cycle().take(6 * 8 * 4 * value.len()).collect();
         Grid::from_dense(name, value.len(), first, size, values, to_world)
     };
-    let all = [fill("density", &[2.5]), fill("vel", &[0.0, 0.0, 3.0]), fill("foam", &[0.5])];
+    let all = [
+        fill("density", &[2.5]),
+        fill("vel", &[0.0, 0.0, 3.0]),
+        fill("foam", &[0.5]),
+        fill("kd", &[0.25]),
+        fill("ks", &[0.75]),
+    ];
     write_vdb(&folder.path(name), &all).expect("a file");
     let low = DVec3::new(-2.5, 4.5, 0.5);
     to_world * DAffine3::from_translation(low) * DAffine3::from_scale(DVec3::new(6.0, 8.0, 4.0))
@@ -180,6 +186,12 @@ fn every_word_of_a_measured_volume_gives_the_variant_of_its_name() {
     for word in ReflectBy::WORDS {
         assert_eq!(of(&format!("reflect = {word:?}\nreflect_grid = \"foam\"\n")).reflect.word(), *word);
     }
+    let stored = folder.scene(&flow("reflect = \"stored\"\n"), &[]);
+    let volume = stored.volume(1 << 30, &Unwatched).expect("a volume");
+    assert_eq!(volume.cell(3, 4, 2).k_codes(), (64, 191));
+    let strands = folder.load(&flow("reflect = \"stored\"\nstrands = 10\n"), &[]);
+    let said = format!("{:?}", strands.expect_err("refused"));
+    assert!(said.contains("volumes.s.reflect") && said.contains("volumes.s.strands"), "{said}");
 }
 
 #[test]

@@ -272,7 +272,7 @@ fn films_and_coordinates_without_effect_are_told() {
     dry("", &["meshes.a.wet=1"], "meshes.a.wet");
     dry("", &["meshes.a.wet=1"], "meshes.a.wet_reach");
     dry(quad, &["meshes.a.wet=1", "materials.water.mist=0.5"], "meshes.a.wet");
-    dry(shell, &["meshes.a.wet=1", "curves.run=out"], "meshes.a.wet");
+    dry(shell, &["meshes.a.wet=1", "volume.builder=fur"], "meshes.a.wet");
     wet(shell, &["meshes.a.wet=1"], "meshes.a.wet");
     wet(quad, &["meshes.a.wet=1"], "meshes.a.wet_reach");
     wet(pool, &["meshes.a.wet=1"], "meshes.a.wet");

@@ -3,6 +3,7 @@
 
 pub mod animation;
 pub mod boxes;
+mod fur;
 mod mesh_faults;
 pub mod meshes;
 pub mod presets;
@@ -118,9 +119,11 @@ fn another(param: &Param) -> String {
         Kind::Int(min, max, d) => (if d == min { max.min(min + 1) } else { min }).to_string(),
         Kind::Choice(words) => words[1].into(),
         Kind::Switch(on) => (!on).to_string(),
-        // Colours of pools and rocks are albedos.
+        // Colours of pools, rocks and cells are albedos.
         Kind::Color(_)
-            if param.key.starts_with("pools") || ["rocks.*.color", "meshes.*.color"].contains(&param.key) =>
+            if param.key.starts_with("pools")
+                || param.key.starts_with("volume")
+                || ["rocks.*.color", "meshes.*.color"].contains(&param.key) =>
         {
             "[0.25, 0.5, 1.0]".into()
         }
@@ -196,7 +199,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
         // The scene's values do not tell the kind of its environment or its animation. Those of carriers and
         // projections are told by the surfaces of a mesh, which the tests of meshes compare; those of
         // measured volumes need the file of a simulation, as the tests of boxes have it.
-        let of_measured = ["builder", "velocity_at", "rho", "reflect"];
+        let of_measured = ["builder", "velocity_at", "rho", "reflect", "level_set_unit", "up"];
         let is_measured = of_measured.iter().any(|last| param.key.ends_with(&format!(".{last}")));
         let is_kept = !is_measured
             && ![
@@ -234,8 +237,6 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),
                 "trace.filter" => scene.trace.filter.word(),
                 "trace.lookup" => scene.trace.lookup.word(),
-                "curves.run" => scene.recipes[0].water.structure.run.word(),
-                "volumes.*.run" => scene.recipes[1].water.structure.run.word(),
                 "volume.storage" => scene.recipes[0].asked_storage.word(),
                 "volumes.*.storage" => scene.recipes[1].asked_storage.word(),
                 other => panic!("the variant of {other} is not compared"),

@@ -52,7 +52,6 @@ fn spec() -> impl Strategy<Value = WaterSpec> {
                 strand_length: 0.1,
                 coverage,
                 crest,
-                ..Default::default()
             },
             seed,
             alpha: 0.9,

@@ -4,7 +4,8 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 use taki::grid::{Bounds, Class, Grid};
 use taki::util::monitor::Unwatched;
 use taki::volume::{
-    Measured, MeasuredSpec, ReflectBy, RhoRule, StorageChoice, VelocityAt, VelocityNames, VolumeTexture,
+    LevelSetUnit, Measured, MeasuredSpec, ReflectBy, RhoRule, StorageChoice, VelocityAt, VelocityNames,
+    VolumeTexture,
 };
 
 /// Voxels along each axis, and the index of the first.
@@ -42,8 +43,12 @@ pub fn spec(cells: [u32; 3]) -> MeasuredSpec {
         density: "density".into(),
         velocity: VelocityNames::None,
         second: None,
+        specular: None,
         bounds: Bounds { min: FIRST, max },
         to_world: to_world(),
+        scene_from_file: DAffine3::IDENTITY,
+        level_set_unit: LevelSetUnit::Auto,
+        velocity_scale: 1.0,
         size: cells,
         rho: RhoRule::Linear,
         rho_scale: 1.0,
@@ -67,7 +72,7 @@ fn density(at: DVec3) -> [f64; 1] {
 }
 
 pub fn measured(velocity: Vec<Grid>) -> Measured {
-    Measured { density: grid("density", density), velocity, second: None }
+    Measured { density: grid("density", density), velocity, second: None, specular: None }
 }
 
 /// Metres of the world per cell, as columns.
@@ -143,7 +148,8 @@ fn each_voxel_is_the_cell_of_its_index() {
 
 #[test]
 fn opacity_is_that_of_an_edge_of_a_cell() {
-    let grids = Measured { density: grid("density", |_| [3.0]), velocity: Vec::new(), second: None };
+    let grids =
+        Measured { density: grid("density", |_| [3.0]), velocity: Vec::new(), second: None, specular: None };
     let spec = MeasuredSpec { rho: RhoRule::Opacity, rho_scale: 2.0, ..spec(SIZE) };
     let volume = build(&grids, &spec);
     let edge = (0.1f64 * 0.15 * 0.07).cbrt();
@@ -296,7 +302,7 @@ fn the_inside_of_a_level_set_is_even() {
     // Distances are metres, and these voxels are cubes of 1 m.
     distance.to_world = DAffine3::IDENTITY;
     distance.class = Class::LevelSet;
-    let grids = Measured { density: distance, velocity: Vec::new(), second: None };
+    let grids = Measured { density: distance, velocity: Vec::new(), second: None, specular: None };
     let spec = MeasuredSpec { to_world: DAffine3::IDENTITY, ..spec(SIZE) };
     let volume = build(&grids, &spec);
     let sum: f64 = volume.cells.iter().map(|cell| f64::from(cell.rho() * volume.alpha)).sum();

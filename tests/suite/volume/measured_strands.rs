@@ -68,7 +68,8 @@ fn strands_follow_the_flow_and_the_fractal_moves_them() {
 #[test]
 fn cells_of_strands_have_the_papers_densities_and_lie_where_matter_is() {
     let velocity = || vec![grid("velocity", |_| [0.3, -1.0, 0.2])];
-    let uniform = Measured { density: grid("density", |_| [2.0]), velocity: velocity(), second: None };
+    let uniform =
+        Measured { density: grid("density", |_| [2.0]), velocity: velocity(), second: None, specular: None };
     let own = fine(STRANDS);
     let volume = build(&uniform, &own);
     assert_eq!(volume.alpha, 2.0);
@@ -105,7 +106,12 @@ fn cells_of_strands_have_the_papers_densities_and_lie_where_matter_is() {
 /// k_d of cells with strands, of which k follows the vorticity from 0 to `most`, 1/s. k_d is 0 at none.
 fn churned(velocity: impl Fn(DVec3) -> DVec3, most: f64) -> (MeasuredSpec, Vec<([u32; 3], f64)>) {
     let velocity = grid("velocity", |at| velocity(to_world().transform_point3(at)).to_array());
-    let uniform = Measured { density: grid("density", |_| [2.0]), velocity: vec![velocity], second: None };
+    let uniform = Measured {
+        density: grid("density", |_| [2.0]),
+        velocity: vec![velocity],
+        second: None,
+        specular: None,
+    };
     let own = MeasuredSpec {
         reflect: ReflectBy::Vorticity,
         reflect_range: [0.0, most as f32],

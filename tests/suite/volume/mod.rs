@@ -3,13 +3,16 @@
 pub mod axes;
 pub mod bricks;
 pub mod cell;
+pub mod cloth;
 pub mod file;
+pub mod fur;
 mod grids;
 pub mod leaps;
 pub mod measured;
 pub mod measured_strands;
 pub mod pyramid;
 pub mod structure;
+mod units;
 
 use std::collections::{HashMap, HashSet};
 

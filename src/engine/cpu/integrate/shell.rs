@@ -7,7 +7,8 @@ use glam::{Mat3, Vec2, Vec3};
 
 use super::{FrameVolume, Integrator, Observer, RayResult, SheetOrder};
 use crate::light::AngleFrame;
-use crate::light::fibre::{Metric, Spread, psi};
+use crate::light::fibre::{Metric, Spread, psi_parts};
+use crate::light::ramp::Ink;
 use crate::mapping::shell::{End, HullFace, Segment, Shell, ShellPath};
 use crate::trace::lookup::{CellSample, Level, level_at};
 use crate::trace::{Lookup, Prefilter, SheetDensity};
@@ -156,6 +157,10 @@ impl Integrator<'_> {
     fn through<O: Observer>(&self, ray: &mut ShellRay, segment: &Segment, observer: &mut O) {
         // A triangle without an area in the texture shows nothing of it.
         let Some(volumes) = &ray.shell.prisms[segment.prism].volumes else { return };
+        // Where a ray only touches a tetrahedron, mixing two levels would round T.
+        if segment.t[1] <= segment.t[0] {
+            return;
+        }
         let volume = self.volume_of(ray.shell);
         let (origin, d_cell) = in_cells(segment, volume.size, volume.flow_cells);
         let (mut level, mut share) = (0, 0.0);
@@ -216,7 +221,10 @@ impl Integrator<'_> {
                 sample.rho * self.volume_of(ray.shell).extinction * (crossing.t_exit - crossing.t_enter);
             let passed = ray.transmittance * exp2(-tau_bits);
             let weight = (ray.transmittance - passed) * share;
-            observer.ambient(scene.ambient * weight);
+            let ink = self.ink(ray.shell.volume as usize, sample.k[1]);
+            let k = [sample.k[0], ink.map_or(sample.k[1], |ink| ink.k_s)];
+            let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));
+            observer.ambient(scene.ambient * weight + more);
             let middle = 0.5 * (crossing.t_enter + crossing.t_exit);
             let along = middle / length;
             let place = Place {
@@ -228,10 +236,10 @@ impl Integrator<'_> {
             };
             let j = self.frame(ray.shell, &place);
             let fibres = self.fibres(level, cell, &sample, &j);
-            let mut sum = Vec3::ZERO;
+            let mut sum = more;
             for i in 0..self.lights.len() {
                 let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
-                let lit = self.shell_light_of(&fibres, sample.k, &j, (&place, ray.d), i);
+                let lit = self.shell_light_of(&fibres, (k, ink), &j, (&place, ray.d), i);
                 let radiance = lit * (weight * visibility);
                 observer.light(visibility, radiance);
                 sum += radiance;
@@ -267,7 +275,7 @@ impl Integrator<'_> {
     fn shell_light_of(
         &self,
         fibres: &Fibres,
-        [k_d, k_s]: [f32; 2],
+        ([k_d, k_s], ink): ([f32; 2], Option<Ink>),
         j: &Mat3,
         (place, d): (&Place, Vec3),
         i: usize,
@@ -280,12 +288,14 @@ impl Integrator<'_> {
         let (l, e) = (frame(to_light), frame(-d));
         let l_dot_e = l.dot(e);
         let (p, identity) = (self.scene.p, Metric::IDENTITY);
-        let grey = match (&self.strand, fibres) {
+        let parts = match (&self.strand, fibres) {
             (None, Fibres::One(t)) => {
                 let inverse_q = 1.0 / t.length_squared().max(1e-30);
-                psi(k_d, k_s, p, t.dot(l), t.dot(e), inverse_q)
+                psi_parts([k_d, k_s], p, t.dot(l), t.dot(e), inverse_q)
             }
-            (None, Fibres::Many(moments)) => Spread::new(&identity, *moments, e).psi(k_d, k_s, p, l, l_dot_e),
+            (None, Fibres::Many(moments)) => {
+                Spread::new(&identity, *moments, e).psi_parts([k_d, k_s], p, l, l_dot_e)
+            }
             (Some(strand), fibres) => {
                 let [t_dot_l, t_dot_e] = match fibres {
                     Fibres::One(t) => {
@@ -297,7 +307,10 @@ impl Integrator<'_> {
                 return intensity * strand.psi(k_d, k_s, t_dot_l, t_dot_e, l_dot_e);
             }
         };
-        intensity * (grey * (1.0 / 255.0))
+        match ink {
+            Some(ink) => intensity * (ink.lit(parts) * (1.0 / 255.0)),
+            None => intensity * ((parts[0] + parts[1]) * (1.0 / 255.0)),
+        }
     }
 
     /// Optical depth, Σ ρ code × metres, from a place to where the light ray along the unit vector `l` leaves

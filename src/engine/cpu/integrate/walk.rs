@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::light::{RayLight, RayScatter};
 use super::{Integrator, Observer, SheetHit};
-use crate::light::fibre::{Spread, fibre_angles, specular_power};
+use crate::light::fibre::{Spread, psi_parts};
 use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
 use crate::trace::Lookup;
@@ -20,6 +20,8 @@ pub struct LevelResult {
     pub transmittance: f32,
     /// Light that each of the scene's lights sent to the eye.
     pub lit: Vec<Lit>,
+    /// Colour that the cells give to the ambient light, minus that of white ones.
+    pub tint: Vec3,
     /// Number of cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
 }
@@ -29,6 +31,7 @@ impl LevelResult {
     pub fn mixed(mut self, other: LevelResult, share: f32) -> LevelResult {
         self.transmittance = self.transmittance * (1.0 - share) + other.transmittance * share;
         self.lit.iter_mut().zip(&other.lit).for_each(|(lit, next)| *lit = lit.mixed(next, share));
+        self.tint = self.tint * (1.0 - share) + other.tint * share;
         self.cells = [0, 1].map(|c| self.cells[c] + other.cells[c]);
         self
     }
@@ -69,7 +72,7 @@ impl Integrator<'_> {
         let extinction = self.extinction_in(ray.volume, level);
         let (origin, d_cell) = (ray.origin * level.scale, ray.d_cell * level.scale);
         let filtered = !level.is_whole || scene.trace.lookup == Lookup::Trilinear;
-        let mut transmittance = before;
+        let (mut transmittance, mut tint) = (before, Vec3::ZERO);
         let mut depth = -log2(before.max(1e-30));
         let mut walked = [0u32; 2];
         let mut walk = Walk::new(level.size, origin, d_cell, f32::INFINITY);
@@ -92,7 +95,11 @@ impl Integrator<'_> {
             }
             let passed = transmittance * exp2(-tau_bits);
             let weight = transmittance - passed;
-            observer.ambient(scene.ambient * weight);
+            let ink = self.ink(ray.volume, k_s).filter(|_| matter.mist == 0.0);
+            let k = [k_d, ink.map_or(k_s, |ink| ink.k_s)];
+            let more = ink.map_or(Vec3::ZERO, |ink| (ink.color - Vec3::ONE) * weight);
+            tint += more;
+            observer.ambient(scene.ambient * (Vec3::splat(weight) + more));
 
             let v = cell.v_code();
             let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
@@ -107,16 +114,19 @@ impl Integrator<'_> {
                     self.visibility_of(ray, level, crossing.cell, light, &mut walked[1]);
                 let fibre = || {
                     if matter.mist > 0.0 {
-                        return matter.mist;
+                        return [matter.mist, 0.0];
                     }
-                    if let Some(spread) = &spread {
-                        return spread.psi(k_d, k_s, scene.p, light.l_v, light.l_dot_e);
+                    match &spread {
+                        Some(spread) => spread.psi_parts(k, scene.p, light.l_v, light.l_dot_e),
+                        None => psi_parts(k, scene.p, v.dot(light.l_v), t_dot_e, inverse_q),
                     }
-                    let (sin_l, base) = fibre_angles(v.dot(light.l_v), t_dot_e, inverse_q);
-                    k_d * sin_l + k_s * specular_power(base.max(0.0), scene.p)
+                };
+                let grey = || {
+                    let [diffuse, specular] = fibre();
+                    diffuse + specular
                 };
                 if !self.in_colour() {
-                    let lit = weight * fibre() * visibility;
+                    let lit = weight * grey() * visibility;
                     total.sum += lit;
                     observer.light(visibility, light.intensity * (lit * (1.0 / 255.0)));
                     continue;
@@ -129,7 +139,10 @@ impl Integrator<'_> {
                         };
                         strand.psi(k_d, k_s, t_dot_l, t_dot_e, light.l_dot_e) * (weight * visibility)
                     }
-                    _ => Vec3::splat(weight * visibility * fibre() * (1.0 / 255.0)),
+                    _ => match &ink {
+                        Some(ink) => ink.lit(fibre()) * (weight * visibility * (1.0 / 255.0)),
+                        None => Vec3::splat(weight * visibility * grey() * (1.0 / 255.0)),
+                    },
                 };
                 if let (Some(MultipleMedium { similarity, profile }), Some(scatter)) = (medium, &scatter) {
                     let RayScatter { row, gain, peak } = &scatter[i];
@@ -143,7 +156,7 @@ impl Integrator<'_> {
             transmittance = passed;
             depth += tau_bits;
         }
-        LevelResult { transmittance, lit: lit_by, cells: walked }
+        LevelResult { transmittance, lit: lit_by, tint, cells: walked }
     }
 
     /// Returns the own layer of volume `volume` at the middle of layer `z` of a level.

@@ -30,7 +30,7 @@ impl<S: Simd> Metric<S> {
 
 /// See [`crate::light::fibre::fibre_angles`].
 #[inline(always)]
-pub fn fibre_angles<S: Simd>(
+fn fibre_angles<S: Simd>(
     simd: S,
     t_dot_l: Floats<S>,
     t_dot_e: Floats<S>,
@@ -40,6 +40,20 @@ pub fn fibre_angles<S: Simd>(
     let sin2_l = (one - t_dot_l * t_dot_l * inverse_q).max(zero);
     let sin2_e = (one - t_dot_e * t_dot_e * inverse_q).max(zero);
     [sin2_l.sqrt(), (sin2_l * sin2_e).sqrt() - t_dot_l * t_dot_e * inverse_q]
+}
+
+/// See [`crate::light::fibre::psi_parts`].
+#[inline(always)]
+pub fn psi_parts<S: Simd>(
+    simd: S,
+    [k_d, k_s]: [Floats<S>; 2],
+    exponent: &Exponent,
+    t_dot_l: Floats<S>,
+    t_dot_e: Floats<S>,
+    inverse_q: Floats<S>,
+) -> [Floats<S>; 2] {
+    let [sin_l, base] = fibre_angles(simd, t_dot_l, t_dot_e, inverse_q);
+    [k_d * sin_l, k_s * exponent.power(simd, base.max(f32x8::splat(simd, 0.0)))]
 }
 
 /// Exponent of the specular term.
@@ -228,15 +242,16 @@ impl<S: Simd> Spread<S> {
         [cos2_l.max(zero).min(one).sqrt(), product.simd_lt(zero).select(-e, e)]
     }
 
-    /// Reflection Ψ, with the highlight convolved with the spread of the directions.
+    /// Diffuse and specular part of the reflection Ψ, with the highlight convolved with the spread of the
+    /// directions.
     #[inline(always)]
-    pub fn psi(
+    pub fn psi_parts(
         &self,
         [k_d, k_s]: [Floats<S>; 2],
         p: &Exponent,
         l_v: Lanes3<S>,
         l_dot_e: Floats<S>,
-    ) -> Floats<S> {
+    ) -> [Floats<S>; 2] {
         let splat = |x: f32| f32x8::splat(self.simd, x);
         let (zero, one) = (splat(0.0), splat(1.0));
         let [cos2_l, product] = self.cosines(l_v);
@@ -247,6 +262,6 @@ impl<S: Simd> Spread<S> {
         let variance = self.variance * (one + cos_phi);
         let base = (root - product + splat(0.5) * variance).max(zero).min(one);
         let wide = one + splat(p.p) * variance;
-        k_d * sin2_l.sqrt() + k_s * pow(self.simd, base, splat(p.p) / wide) / wide.sqrt()
+        [k_d * sin2_l.sqrt(), k_s * pow(self.simd, base, splat(p.p) / wide) / wide.sqrt()]
     }
 }

@@ -5,11 +5,13 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
+use glam::Vec3;
 
 use super::between::Between;
 use super::cells::{Row, Store, k_codes, rho_codes, v_codes, words};
-use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
+use super::fibre::{Exponent, Metric, Moments, Spread, psi_parts};
 use super::hits::Hits;
+use super::ink::Ink;
 use super::light::LaneLight;
 use super::scatter::{Depths, LaneScatter};
 use super::strand;
@@ -19,7 +21,7 @@ use crate::engine::cpu::integrate::walk::Lit;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::lane_powers::exp2;
-use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Words};
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words};
 use crate::util::powers::log2;
 use crate::volume::Cell;
 
@@ -91,13 +93,20 @@ pub struct Ends {
 pub struct Scratch<'a> {
     steps: Steps,
     lights: Vec<LaneLight<'a>>,
+    /// Colour that the cells give to the ambient light, minus that of white ones.
+    tint: Stored3,
 }
 
 impl Scratch<'_> {
     /// Memory for rays of an integrator.
     pub fn new(integrator: &Integrator) -> Self {
         let lights = integrator.lights.iter().map(|_| LaneLight::default()).collect();
-        Scratch { steps: Steps::default(), lights }
+        Scratch { steps: Steps::default(), lights, tint: Stored3::default() }
+    }
+
+    /// Colour that the cells along ray `lane` give to the ambient light, minus that of white ones.
+    pub fn tint(&self, lane: usize) -> Vec3 {
+        self.tint.get(lane)
     }
 
     /// Light that each light sent along ray `lane`.
@@ -138,7 +147,8 @@ impl<'a, 'h> Group<'a, 'h> {
     /// Walks the rays to the end of the slab, or to their own.
     #[inline(always)]
     pub fn walk<S: Simd>(&self, simd: S, scratch: &mut Scratch<'a>) -> Ends {
-        let Scratch { steps, lights } = scratch;
+        let Scratch { steps, lights, tint } = scratch;
+        *tint = Stored3::default();
         for (i, light) in lights.iter_mut().enumerate() {
             light.reset(simd, self, i);
         }
@@ -171,10 +181,10 @@ impl<'a, 'h> Group<'a, 'h> {
                     }
                 }
                 if is_packed {
-                    self.shade_packed(simd, steps, lights);
+                    self.shade_packed(simd, steps, (lights, tint));
                 } else {
                     for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                        self.shade(simd, steps, j, lights, scatter.as_ref());
+                        self.shade(simd, steps, j, (lights, tint), scatter.as_ref());
                     }
                 }
                 (steps.count, pending) = (0, 0);
@@ -259,15 +269,21 @@ impl<'a, 'h> Group<'a, 'h> {
         simd: S,
         steps: &Steps,
         j: usize,
-        lights: &mut [LaneLight],
+        (lights, tint): (&mut [LaneLight], &mut Stored3),
         scatter: Option<&LaneScatter>,
     ) {
         let weight = steps.weight[j].load(simd);
         let [first, second] = words(simd, &steps.cells[j]);
-        let k = match self.is_between {
+        let mut k = match self.is_between {
             true => [steps.between.k[j][0].load(simd), steps.between.k[j][1].load(simd)],
             false => k_codes(first),
         };
+        let ink = self.ink(simd, &mut k);
+        if let Some(ink) = &ink {
+            let is_lit = Mask::from_bitmask(simd, steps.lit[j].into());
+            let before = tint.load(simd);
+            tint.store(before.plus(ink.tint(simd, weight)).or(is_lit, before));
+        }
         let e_v = self.hits.values.e_v.load(simd);
         let metric = Metric::load(simd, &self.hits.values.metric);
         let angles = match self.is_between {
@@ -282,7 +298,7 @@ impl<'a, 'h> Group<'a, 'h> {
         for (i, light) in lights.iter_mut().enumerate() {
             let to_light = (light.l_v.load(simd), light.l_dot_e.load(simd));
             let visible = light.visible[j].load(simd);
-            let mut lit = match self.lit(simd, &angles, k, to_light, weight, visible) {
+            let mut lit = match self.lit(simd, &angles, (k, &ink), to_light, weight, visible) {
                 Light::Grey(lit) => {
                     let sum = light.sum.load(simd);
                     light.sum.store(sum + weight.simd_gt(0.0).select(lit, f32x8::splat(simd, 0.0)));
@@ -316,7 +332,7 @@ impl<'a, 'h> Group<'a, 'h> {
         &self,
         simd: S,
         angles: &Angles<S>,
-        k: [Floats<S>; 2],
+        (k, ink): ([Floats<S>; 2], &Option<Ink<S>>),
         (l_v, l_dot_e): (Lanes3<S>, Floats<S>),
         weight: Floats<S>,
         visible: Floats<S>,
@@ -325,19 +341,33 @@ impl<'a, 'h> Group<'a, 'h> {
             let cosines = angles.cosines(l_v);
             return Light::Colour(strand::psi(simd, shading, k, cosines, l_dot_e).times(weight * visible));
         }
-        let fibre = match angles {
-            Angles::Mist(psi) => *psi,
-            Angles::Many(spread) => spread.psi(k, &self.exponent, l_v, l_dot_e),
+        let parts = match angles {
+            Angles::Mist(psi) => [*psi, f32x8::splat(simd, 0.0)],
+            Angles::Many(spread) => spread.psi_parts(k, &self.exponent, l_v, l_dot_e),
             Angles::One { v, t_dot_e, inverse_q } => {
-                let [sin_l, base] = fibre_angles(simd, v.dot(l_v), *t_dot_e, *inverse_q);
-                k[0] * sin_l + k[1] * self.exponent.power(simd, base.max(f32x8::splat(simd, 0.0)))
+                psi_parts(simd, k, &self.exponent, v.dot(l_v), *t_dot_e, *inverse_q)
             }
         };
+        if let Some(ink) = ink {
+            return Light::Colour(ink.lit(parts).times(weight * visible * (1.0 / 255.0)));
+        }
+        let fibre = parts[0] + parts[1];
         if !self.integrator.in_colour() {
             return Light::Grey(weight * fibre * visible);
         }
         let grey = weight * visible * fibre * (1.0 / 255.0);
         Light::Colour(Lanes3 { x: grey, y: grey, z: grey })
+    }
+
+    /// Inks of eight cells of strands, if any volume has colours. Gives the cells the k_s of their ramp.
+    #[inline(always)]
+    pub fn ink<S: Simd>(&self, simd: S, k: &mut [Floats<S>; 2]) -> Option<Ink<S>> {
+        if !self.integrator.is_colored || self.is_mist {
+            return None;
+        }
+        let ink = Ink::of(simd, &self.integrator.volumes[self.volume].ramp, k[1]);
+        k[1] = ink.k_s;
+        Some(ink)
     }
 
     /// Directions in eight cells of strands, given by their second words.

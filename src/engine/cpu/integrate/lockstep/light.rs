@@ -141,6 +141,13 @@ impl<'a> LaneLight<'a> {
             last = Some(quad);
             let corners = patch_corners(plan, quad, i, group.hits.values.at.get(lane).truncate());
             self.marches |= u8::from(corners.marched) << lane;
+            // Where a ray walks to the light there are no light volumes, and numbers stand for any others.
+            if corners.marched {
+                self.codes[0][lane] = &[];
+                self.depths[0][lane] = &[];
+                self.between[lane] = false;
+                continue;
+            }
             (self.at[0].0[lane], self.at[1].0[lane]) = corners.at.into();
             self.between[lane] = corners.numbers != [corners.numbers[0]; 4];
             self.is_between |= self.between[lane];

@@ -18,6 +18,7 @@ mod cells;
 mod fibre;
 mod group;
 mod hits;
+mod ink;
 mod light;
 mod packed;
 mod rows;
@@ -29,6 +30,7 @@ mod strand;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};
+use glam::Vec3;
 
 use self::cells::Store;
 use self::group::{Ends, Group, Scratch};
@@ -116,6 +118,9 @@ struct Met {
     walks: Vec<[Vec<(usize, usize)>; 2]>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
+    /// Colour that each sheet's two levels give to the ambient light; see
+    /// [`LevelResult`](super::LevelResult).
+    tints: Vec<[Vec3; 2]>,
 }
 
 impl<'a> Lockstep<'a> {
@@ -230,7 +235,9 @@ impl<'a> Lockstep<'a> {
     /// Walks the levels of the sheets.
     fn walk(&mut self) {
         let lights = self.integrator.lights.len();
-        let Met { sheets, packs, walks, lit } = &mut self.met;
+        let Met { sheets, packs, walks, lit, tints } = &mut self.met;
+        tints.clear();
+        tints.resize(sheets.len(), Default::default());
         lit.clear();
         lit.resize(2 * lights * sheets.len(), Lit::default());
         let mut room = Hits::default();
@@ -257,6 +264,7 @@ impl<'a> Lockstep<'a> {
                     let Ends { transmittance, cells } =
                         dispatch!(self.simd, simd => group.walk(simd, &mut self.scratch));
                     for (lane, &(i, which)) in walks.iter().enumerate() {
+                        tints[i][which] = self.scratch.tint(lane);
                         sheets[i].ends[which] = (transmittance[lane], cells.map(|cells| cells[lane]));
                         let own = &mut lit[(2 * i + which) * lights..][..lights];
                         own.iter_mut().zip(self.scratch.lit(lane)).for_each(|(own, lit)| *own = lit);
@@ -275,13 +283,15 @@ impl<'a> Lockstep<'a> {
             let share = values.share.0[i % LANES];
             let (own, next) = met.lit[2 * i * lights..][..2 * lights].split_at_mut(lights);
             let [(mut transmittance, mut cells), (other, more)] = sheet.ends;
+            let [mut tint, other_tint] = met.tints[i];
             if share > 0.0 {
                 transmittance = transmittance * (1.0 - share) + other * share;
                 cells = [0, 1].map(|c| cells[c] + more[c]);
                 own.iter_mut().zip(&*next).for_each(|(lit, next)| *lit = lit.mixed(next, share));
+                tint = tint * (1.0 - share) + other_tint * share;
             }
             let point = values.point.get(i % LANES);
-            let passed = integrator.composed(point, transmittance, cells, own, sheet.order);
+            let passed = integrator.composed(point, transmittance, cells, (own, tint), sheet.order);
             integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }

@@ -56,6 +56,17 @@ impl<S: Simd> Picks<S> {
         Lanes3 { x: self.of_rays(simd, x), y: self.of_rays(simd, y), z: self.of_rays(simd, z) }
     }
 
+    /// Adds vectors of the cells to those of their rays, cell by cell.
+    #[inline(always)]
+    fn add(&self, Lanes3 { x, y, z }: Lanes3<S>, sums: &mut Stored3) {
+        let more = [x.to_array(), y.to_array(), z.to_array()];
+        for i in 0..self.count {
+            for c in 0..3 {
+                sums.0[c].0[self.cells[i].1] += more[c][i];
+            }
+        }
+    }
+
     /// Numbers of the cells.
     #[inline(always)]
     fn of_cells(&self, simd: S, numbers: &[Stored]) -> Floats<S> {
@@ -87,7 +98,12 @@ impl Group<'_, '_> {
 
     /// Adds the light of all lit cells of the batch, eight at a time.
     #[inline(always)]
-    pub fn shade_packed<S: Simd>(&self, simd: S, steps: &Steps, lights: &mut [LaneLight]) {
+    pub fn shade_packed<S: Simd>(
+        &self,
+        simd: S,
+        steps: &Steps,
+        (lights, tint): (&mut [LaneLight], &mut Stored3),
+    ) {
         let mut cells = [(0, 0); LANES];
         let mut count = 0;
         for j in 0..steps.count {
@@ -95,19 +111,25 @@ impl Group<'_, '_> {
                 cells[count] = (j, lane);
                 count += 1;
                 if count == LANES {
-                    self.shade_cells(simd, steps, &cells, lights);
+                    self.shade_cells(simd, steps, &cells, (lights, tint));
                     count = 0;
                 }
             }
         }
         if count > 0 {
-            self.shade_cells(simd, steps, &cells[..count], lights);
+            self.shade_cells(simd, steps, &cells[..count], (lights, tint));
         }
     }
 
     /// Adds the light of up to eight cells, given by step and ray.
     #[inline(always)]
-    fn shade_cells<S: Simd>(&self, simd: S, steps: &Steps, lit: &[(usize, usize)], lights: &mut [LaneLight]) {
+    fn shade_cells<S: Simd>(
+        &self,
+        simd: S,
+        steps: &Steps,
+        lit: &[(usize, usize)],
+        (lights, tint): (&mut [LaneLight], &mut Stored3),
+    ) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -121,8 +143,12 @@ impl Group<'_, '_> {
                     index[i] = steps.passed.index[j][lane];
                 }
                 let [first, second] = words(simd, &cells);
-                let k = k_codes(first);
+                let mut k = k_codes(first);
+                let ink = self.ink(simd, &mut k);
                 let weight = picks.of_cells(simd, &steps.weight);
+                if let Some(ink) = &ink {
+                    picks.add(ink.tint(simd, weight), tint);
+                }
                 let e_v = picks.vectors(simd, &values.e_v);
                 let mut metric = Metric([weight; 4]);
                 for i in 0..4 {
@@ -137,21 +163,14 @@ impl Group<'_, '_> {
                         Some(form) => self.packed_visibility(simd, &picks, &at, form, light),
                         None => picks.of_cells(simd, &light.visible),
                     };
-                    match self.lit(simd, &angles, k, to_light, weight, visible) {
+                    match self.lit(simd, &angles, (k, &ink), to_light, weight, visible) {
                         Light::Grey(lit) => {
                             let lit = weight.simd_gt(0.0).select(lit, f32x8::splat(simd, 0.0)).to_array();
                             for i in 0..picks.count {
                                 light.sum.0[picks.cells[i].1] += lit[i];
                             }
                         }
-                        Light::Colour(Lanes3 { x, y, z }) => {
-                            let lit = [x.to_array(), y.to_array(), z.to_array()];
-                            for i in 0..picks.count {
-                                for c in 0..3 {
-                                    light.colour.0[c].0[picks.cells[i].1] += lit[c][i];
-                                }
-                            }
-                        }
+                        Light::Colour(lit) => picks.add(lit, &mut light.colour),
                     }
                 }
             },

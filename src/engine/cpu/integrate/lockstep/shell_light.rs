@@ -4,7 +4,8 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::cells::{k_codes, v_codes, words};
-use super::fibre::{Exponent, Metric, Moments, Spread, fibre_angles};
+use super::fibre::{Exponent, Metric, Moments, Spread, psi_parts};
+use super::ink::Ink;
 use super::shell::ShellHit;
 use super::strand;
 use crate::engine::cpu::integrate::Integrator;
@@ -37,6 +38,9 @@ pub struct Pending {
     frame: [Stored3; 3],
     /// V of each light.
     visible: Vec<Stored>,
+    /// Colours, and k_s in 255ths, where any volume has colours.
+    color: Stored3,
+    k_s: Stored,
 }
 
 impl Pending {
@@ -51,6 +55,8 @@ impl Pending {
             point: Stored3::default(),
             frame: [Stored3::default(); 3],
             visible: vec![Stored::default(); lights],
+            color: Stored3::default(),
+            k_s: Stored::default(),
         }
     }
 
@@ -73,6 +79,11 @@ impl Pending {
         self.frame[0].set(i, frame.x_axis);
         self.frame[1].set(i, frame.y_axis);
         self.frame[2].set(i, frame.z_axis);
+        let volume = integrator.scene.shells[place.shell].volume as usize;
+        if let Some(ink) = integrator.ink(volume, lit.cell.k_codes().1 as f32) {
+            self.color.set(i, ink.color);
+            self.k_s.0[i] = ink.k_s;
+        }
         let visible = &mut self.visible;
         integrator.shell_visibilities(level, place, &mut hit.cells[1], |light, v| visible[light].0[i] = v);
         self.count += 1;
@@ -83,7 +94,12 @@ impl Pending {
     #[inline(always)]
     pub fn shade<S: Simd>(&mut self, simd: S, integrator: &Integrator, kind: usize, hits: &mut [ShellHit]) {
         let [first, second] = words(simd, &self.cells);
-        let k = k_codes(first);
+        let mut k = k_codes(first);
+        let ink =
+            integrator.is_colored.then(|| Ink { color: self.color.load(simd), k_s: self.k_s.load(simd) });
+        if let Some(ink) = &ink {
+            k[1] = ink.k_s;
+        }
         let d = self.d.load(simd);
         let e = Lanes3 { x: -d.x, y: -d.y, z: -d.z };
         let frame = [self.frame[0].load(simd), self.frame[1].load(simd), self.frame[2].load(simd)];
@@ -92,12 +108,21 @@ impl Pending {
         let (point, weight) = (self.point.load(simd), self.weight.load(simd));
         let zero = f32x8::splat(simd, 0.0);
         let mut sum = Lanes3 { x: zero, y: zero, z: zero };
+        if let Some(ink) = &ink {
+            sum = Lanes3::splat(simd, integrator.scene.ambient).by(ink.tint(simd, weight));
+        }
         for (light, visible) in integrator.lights.iter().zip(&self.visible) {
             let (l, intensity) = light_at(simd, light, point);
             let l_dot_e = l.dot(e);
             let lit = match &integrator.strand {
                 Some(shading) => intensity.by(strand::psi(simd, shading, k, fibres.cosines(l, e), l_dot_e)),
-                None => intensity.times(fibres.psi(simd, k, &exponent, l, e) * (1.0 / 255.0)),
+                None => {
+                    let parts = fibres.psi_parts(simd, k, &exponent, l, e);
+                    match &ink {
+                        Some(ink) => intensity.by(ink.lit(parts).times(f32x8::splat(simd, 1.0 / 255.0))),
+                        None => intensity.times((parts[0] + parts[1]) * (1.0 / 255.0)),
+                    }
+                }
             };
             sum = sum.plus(lit.times(weight * visible.load(simd)));
         }
@@ -131,15 +156,19 @@ impl<S: Simd> Fibres<S> {
         Fibres::Many(Spread::new(simd, &Metric([one, zero, one, one]), moments, e))
     }
 
-    /// Reflection Ψ of Kajiya and Kay's model, times 255.
+    /// Diffuse and specular part of the reflection Ψ of Kajiya and Kay's model, times 255.
     #[inline(always)]
-    fn psi(&self, simd: S, k: [Floats<S>; 2], exponent: &Exponent, l: Lanes3<S>, e: Lanes3<S>) -> Floats<S> {
+    fn psi_parts(
+        &self,
+        simd: S,
+        k: [Floats<S>; 2],
+        exponent: &Exponent,
+        l: Lanes3<S>,
+        e: Lanes3<S>,
+    ) -> [Floats<S>; 2] {
         match self {
-            Fibres::One { t, inverse_q } => {
-                let [sin_l, base] = fibre_angles(simd, t.dot(l), t.dot(e), *inverse_q);
-                k[0] * sin_l + k[1] * exponent.power(simd, base.max(f32x8::splat(simd, 0.0)))
-            }
-            Fibres::Many(spread) => spread.psi(k, exponent, l, l.dot(e)),
+            Fibres::One { t, inverse_q } => psi_parts(simd, k, exponent, t.dot(l), t.dot(e), *inverse_q),
+            Fibres::Many(spread) => spread.psi_parts(k, exponent, l, l.dot(e)),
         }
     }
 

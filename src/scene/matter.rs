@@ -1,0 +1,112 @@
+//! Recipes of matter that is made of threads: fur and cloth.
+
+use super::measured::Builder;
+use super::param::key_of_volume;
+use super::{Recipe, Values};
+use crate::util::error::{Error, Result};
+use crate::volume::{ClothSpec, FurSpec, Matter, StorageChoice, WaterSpec, Weave, WeaveName};
+
+/// Returns the recipe of the volume `name`, whose size, seed and coefficients `water` has; `None` for water
+/// and simulations. With a ramp of colours, cells hold their places on it.
+///
+/// # Errors
+/// [`Error::Input`] for sparse storage, and for a weave that does not fit the yarns.
+pub(super) fn matter(v: &Values, name: &str, water: &WaterSpec, has_ramp: bool) -> Result<Option<Matter>> {
+    let k_s = (!has_ramp).then_some(water.k_s);
+    let matter = match v.choice(&key_of_volume(name, "volume.builder"), Builder::from_word) {
+        Builder::Curves | Builder::Flow => return Ok(None),
+        Builder::Fur => Matter::Fur(fur(v, name, water, k_s)),
+        Builder::Cloth => Matter::Cloth(cloth(v, name, water, k_s)?),
+    };
+    let storage = key_of_volume(name, "volume.storage");
+    if v.choice(&storage, StorageChoice::from_word) == StorageChoice::Sparse {
+        return Err(Error::input(
+            format!("{storage} = \"sparse\": fur and cloth fill most of their cells"),
+            format!("set {storage}=auto"),
+        ));
+    }
+    Ok(Some(matter))
+}
+
+fn fur(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> FurSpec {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let count = |own: &str| v.count(&key_of_volume(name, own));
+    FurSpec {
+        size: water.size,
+        hairs: count("fur.hairs"),
+        length: float("fur.hair_length"),
+        spread: float("fur.hair_spread"),
+        width_cells: float("fur.hair_width") * water.size[0] as f32,
+        taper: float("fur.taper"),
+        undercoat: float("fur.undercoat"),
+        undercoat_length: float("fur.undercoat_length"),
+        lean: float("fur.lean"),
+        h: water.shape.h,
+        amplitude: float("curves.amplitude"),
+        clumps: count("fur.clumps"),
+        clumping: float("fur.clumping"),
+        seed: water.seed,
+        alpha: water.alpha,
+        k_d: water.k_d,
+        shade: float("fur.hair_shade"),
+        k_s,
+    }
+}
+
+fn cloth(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> Result<ClothSpec> {
+    let key = |own: &str| key_of_volume(name, own);
+    let float = |own: &str| v.float(&key(own));
+    let text = v.text(&key("cloth.weave"));
+    let named = WeaveName::from_word(&text).map(Weave::named);
+    let weave = named.or_else(|| Weave::of_text(&text)).ok_or_else(|| {
+        Error::input(
+            format!("{} = {text:?} is no weave, nor rows of equal length", key("cloth.weave")),
+            format!(
+                "use {}, or rows of 0 and 1 (the warp on top) such as \"10/01\"",
+                WeaveName::WORDS.join(", ")
+            ),
+        )
+    })?;
+    let yarns = ["cloth.warp", "cloth.weft"].map(|own| v.count(&key(own)));
+    for (axis, own) in ["cloth.warp", "cloth.weft"].into_iter().enumerate() {
+        let (count, repeat) = (yarns[axis], weave.repeat()[axis]);
+        if count % repeat != 0 {
+            return Err(Error::input(
+                format!("{} = {count}: the weave repeats after {repeat} yarns", key(own)),
+                format!("set it to {} or another multiple of {repeat}", count.next_multiple_of(repeat)),
+            ));
+        }
+    }
+    Ok(ClothSpec {
+        size: water.size,
+        yarns,
+        weave,
+        thickness: float("cloth.yarn"),
+        fibres: v.count(&key("cloth.fibres")),
+        fibre_width: float("cloth.fibre_width"),
+        twist: float("cloth.twist"),
+        crimp: float("cloth.crimp"),
+        fuzz: float("cloth.fuzz"),
+        seed: water.seed,
+        alpha: water.alpha,
+        k_d: water.k_d,
+        shade: float("cloth.yarn_shade"),
+        k_s,
+    })
+}
+
+/// Returns a warning about cloth that does not fit into the depth of its volume.
+pub(super) fn too_thick(recipe: &Recipe) -> Option<String> {
+    let Some(Matter::Cloth(cloth)) = &recipe.matter else { return None };
+    let (depth, nz) = (cloth.depth_cells(), cloth.size[2]);
+    let key = |own: &str| key_of_volume(&recipe.name, own);
+    (depth > nz as f32 + 0.5).then(|| {
+        format!(
+            "{} = {nz} cuts the cloth off, which is {depth:.0} cells thick: raise it, and the thickness of \
+             the material with it, or lower {} or {}",
+            key("volume.nz"),
+            key("cloth.crimp"),
+            key("cloth.yarn"),
+        )
+    })
+}

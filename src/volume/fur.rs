@@ -1,0 +1,187 @@
+//! §2 Builder of fur: hairs that stand on the skin, z = nz, and end above it.
+//!
+//! Fur is what texels were invented for (Kajiya and Kay 1989). Two kinds of hair make it read as fur: few
+//! long guard hairs, and the short, dense undercoat between them. Neighbours gather in clumps, which gives
+//! a coat its texture from afar. The spatial fractal curves of the paper bend each hair.
+
+use glam::{Vec2, Vec3};
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::VolumeTexture;
+use super::threads::{Look, Thread, cells_of_threads};
+use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
+use crate::util::error::Result;
+use crate::util::monitor::Monitor;
+use crate::util::random::{Family, Stream};
+
+/// Largest depth of recursion of a hair's curve.
+const MOST_LEVELS: u32 = 16;
+/// Share of the lean that hairs of the undercoat have.
+const LEAN_OF_UNDERCOAT: f32 = 0.5;
+
+/// Recipe of fur. Equal recipes build equal bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FurSpec {
+    /// nx, ny, nz, cells.
+    pub size: [u32; 3],
+    /// Number of hairs on a copy of the volume.
+    pub hairs: u32,
+    /// Mean length of guard hairs, depths nz.
+    pub length: f32,
+    /// Relative standard deviation of the lengths.
+    pub spread: f32,
+    /// Diameter at the root, cells.
+    pub width_cells: f32,
+    /// Share of the diameter that is lost up to the tip.
+    pub taper: f32,
+    /// Share of the hairs that are undercoat.
+    pub undercoat: f32,
+    /// Length of the undercoat relative to guard hairs.
+    pub undercoat_length: f32,
+    /// Distance by which a tip leans down the flow, lengths of the hair.
+    pub lean: f32,
+    /// Roughness h of the hairs' bend.
+    pub h: f32,
+    /// Standard deviation of the bend, lengths of the hair.
+    pub amplitude: f32,
+    /// Number of clumps.
+    pub clumps: u32,
+    /// Share of the way to the middle of its clump that a tip is drawn.
+    pub clumping: f32,
+    /// Seed of all randomness in the volume.
+    pub seed: u64,
+    /// Scale α of the density, kept beside the cells and not in them.
+    pub alpha: f32,
+    /// k_d.
+    pub k_d: f32,
+    /// Relative standard deviation of k_d from hair to hair.
+    pub shade: f32,
+    /// k_s of all cells. `None`: each cell has its place on a ramp of colours there, 0 for the undercoat, and
+    /// for guard hairs the way from root to tip.
+    pub k_s: Option<f32>,
+}
+
+impl FurSpec {
+    /// Builds the volume texture in dense storage.
+    ///
+    /// # Errors
+    /// Returns an error if `monitor` ends the work.
+    pub fn build(&self, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+        let roots = Spots { size: self.face(), count: self.hairs };
+        let clumps = Spots { size: self.face(), count: self.clumps };
+        let family = Family::new(self.seed, Stream::Bundle);
+        let middles: Vec<Vec2> =
+            (0..self.clumps).map(|i| clumps.at(i, &mut family.member(u64::from(i)))).collect();
+        let draw = |hair: usize, thread: &mut Thread| {
+            let mut rng = Family::new(self.seed, Stream::Hair).member(hair as u64);
+            let root = roots.at(hair as u32, &mut rng);
+            let away = clumps.nearest(&middles, root) * self.clumping;
+            self.hair(root, away, &mut rng, thread);
+        };
+        let cells = cells_of_threads(self.size, self.hairs as usize, draw, self.k_s, monitor)?;
+        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+    }
+
+    /// nx and ny.
+    fn face(&self) -> Vec2 {
+        Vec2::new(self.size[0] as f32, self.size[1] as f32)
+    }
+
+    /// Writes the hair on a root. Its tip is drawn by `away`, cells.
+    fn hair(&self, root: Vec2, away: Vec2, rng: &mut impl Rng, thread: &mut Thread) {
+        let nz = self.size[2] as f32;
+        let is_under = rng.random::<f32>() < self.undercoat;
+        let share = if is_under { self.undercoat_length } else { 1.0 };
+        let length = (self.length * share * (1.0 + self.spread * normal(rng))).clamp(0.0, 1.0) * nz;
+        let k_d = self.k_d * (1.0 + self.shade * normal(rng)).max(0.0);
+        if length <= 0.0 {
+            return;
+        }
+        // A fractal curve returns to its line at its end. A tip is free, so the hair is the first half of a
+        // curve twice as long.
+        let shape = CurveShape {
+            h: self.h,
+            sigma_g_cells: self.amplitude * length,
+            levels: levels_for((2.0 * length).ceil() as u32).min(MOST_LEVELS),
+        };
+        spatial_fractal_curve(&shape, Vec3::ZERO, Vec3::Y * (2.0 * length), rng, &mut thread.points);
+        let steps = thread.points.len() / 2;
+        thread.points.truncate(steps + 1);
+        let lean = self.lean * if is_under { LEAN_OF_UNDERCOAT } else { 1.0 } * length;
+        for (i, point) in thread.points.iter_mut().enumerate() {
+            let way = i as f32 / steps as f32;
+            let at = root + Vec2::new(point.x, point.z) + (away + Vec2::Y * lean) * (way * way);
+            *point = at.extend(nz - point.y);
+            thread.looks.push(Look {
+                width: self.width_cells * (1.0 - self.taper * way),
+                place: if is_under { 0.0 } else { way },
+                k_d,
+            });
+        }
+    }
+}
+
+/// Places on the skin, spread evenly: one in each field of a grid of nearly square fields.
+#[derive(Clone, Copy)]
+struct Spots {
+    /// Size of the skin, cells.
+    size: Vec2,
+    count: u32,
+}
+
+impl Spots {
+    fn rows(&self) -> u32 {
+        let rows = (f64::from(self.count) * f64::from(self.size.y / self.size.x)).sqrt().round();
+        (rows as u32).clamp(1, self.count.max(1))
+    }
+
+    /// First spot of a row.
+    fn first(&self, row: u32) -> u32 {
+        (u64::from(self.count) * u64::from(row) / u64::from(self.rows())) as u32
+    }
+
+    /// Row of a spot.
+    fn row(&self, i: u32) -> u32 {
+        let guess = (u64::from(i) * u64::from(self.rows()) / u64::from(self.count)) as u32;
+        if self.first(guess + 1) <= i { guess + 1 } else { guess }
+    }
+
+    /// Place of spot number `i`, cells.
+    fn at(&self, i: u32, rng: &mut impl Rng) -> Vec2 {
+        let row = self.row(i);
+        let (first, end) = (self.first(row), self.first(row + 1));
+        let x = ((i - first) as f32 + rng.random::<f32>()) / (end - first) as f32;
+        Vec2::new(x, (row as f32 + rng.random::<f32>()) / self.rows() as f32) * self.size
+    }
+
+    /// Way from a place to the nearest of the spots, which stand at `middles`. It may lead across the border
+    /// of the volume. Zero without spots.
+    fn nearest(&self, middles: &[Vec2], place: Vec2) -> Vec2 {
+        let rows = i64::from(self.rows());
+        let row = (place.y / self.size.y * rows as f32) as i64;
+        let mut least = (f32::INFINITY, Vec2::ZERO);
+        // A spot two fields away may be nearer than that of the own field; one three fields away is not.
+        for row in (row - 2..=row + 2).map(|row| row.rem_euclid(rows) as u32) {
+            let (first, end) = (self.first(row), self.first(row + 1));
+            let count = i64::from(end - first);
+            let column = (place.x / self.size.x * count as f32) as i64;
+            for column in (column - 2..=column + 2).filter(|_| count > 0) {
+                let Some(&middle) = middles.get(first as usize + column.rem_euclid(count) as usize) else {
+                    continue;
+                };
+                let way = middle - place;
+                let way = way - self.size * (way / self.size).round();
+                if way.length_squared() < least.0 {
+                    least = (way.length_squared(), way);
+                }
+            }
+        }
+        least.1
+    }
+}
+
+/// Draws a normal number of mean 0 and variance 1.
+fn normal(rng: &mut impl Rng) -> f32 {
+    StandardNormal.sample(rng)
+}

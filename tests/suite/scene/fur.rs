@@ -1,0 +1,119 @@
+//! Keys of fur and of colours: what they are read as, what is refused, and what has no effect.
+
+use std::path::Path;
+
+use glam::Vec3;
+use taki::job::VolumeMemo;
+use taki::light::ramp::Ramp;
+use taki::scene::{Cost, Limits, Scene, settings_without_effect};
+use taki::util::monitor::Unwatched;
+
+fn with(sets: &[&str]) -> Result<Scene, String> {
+    let scene = Scene::preset("fig5").expect("a preset");
+    scene.with(sets).map_err(|e| e.to_string())
+}
+
+const FUR: [&str; 5] =
+    ["volume.builder=fur", "volume.nx=16", "volume.ny=16", "volume.nz=10", "fur.hairs=200"];
+
+#[test]
+fn colours_are_read_in_their_order_up_to_the_first_that_is_missing() {
+    let [a, b] = ["volume.color=[0.1,0.2,0.3]", "volume.color_2=[0.4,0.5,0.6]"];
+    let ramp = |sets: &[&str]| with(&[&FUR, sets].concat()).expect("a scene").recipes[0].ramp;
+    let [first, second] = [Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.4, 0.5, 0.6)];
+    assert_eq!(ramp(&[]), Ramp::WHITE);
+    assert_eq!(ramp(&[a]), Ramp::new(&[first], 0.5));
+    assert_eq!(ramp(&[a, b, "volume.k_s=0.25"]), Ramp::new(&[first, second], 0.25));
+    assert_eq!(ramp(&[a, "volume.color_3=[0,1,0]"]), Ramp::new(&[first], 0.5));
+}
+
+#[test]
+fn colours_that_cannot_be_shown_are_refused() {
+    let color = "volume.color=[0.1,0.2,0.3]";
+    let cases: [(&[&str], &[&str]); 5] = [
+        (&["volume.color=[0.1,1.2,0.3]"], &["volume.color", "more light than it receives", "at most 1"]),
+        (&[color, "light.reflection=strand"], &["volume.color", "light.reflection=kajiya-kay"]),
+        (
+            &[color, "light.visibility=march", "light.scattering=multiple"],
+            &["volume.color", "light.scattering=single"],
+        ),
+        (&[color, "volume.color_2=[0,1,0]"], &["volume.color_2", "fur, cloth or flow"]),
+        (&["volume.builder=fur", "volume.storage=sparse"], &["volume.storage", "auto"]),
+    ];
+    for (sets, words) in cases {
+        super::refused(with(sets).map(|_| ()), words);
+    }
+    // Water may have one colour.
+    with(&[color]).expect("a scene");
+}
+
+#[test]
+fn settings_of_other_builders_have_no_effect() {
+    let fur = with(&FUR).expect("a scene");
+    let said = |scene: &Scene, set: &str| {
+        let set = set.to_owned();
+        !settings_without_effect(scene.with(&[&set]).expect("valid").values().expect("values"), &[set], &[])
+            .is_empty()
+    };
+    for set in [
+        "curves.across=20",
+        "volume.crest=0.3",
+        "volume.coherence=0.5",
+        "volume.strands=100",
+        "fur.clumping=0.3",
+    ] {
+        assert!(said(&fur, set), "{set}");
+    }
+    for set in
+        ["fur.lean=1", "curves.h=0.8", "curves.amplitude=0.2", "volume.nx=20", "fur.taper=0", "volume.seed=3"]
+    {
+        assert!(!said(&fur, set), "{set}");
+    }
+    let water = with(&[]).expect("a scene");
+    assert!(said(&water, "fur.taper=0.2") && said(&water, "volume.color_2=[1,0,0]"));
+    assert!(!said(&water, "volume.color=[1,0,0]"));
+}
+
+#[test]
+fn a_colour_is_changed_without_building_the_fur_again() {
+    let scene = with(&[&FUR[..], &["volume.color=[0.1,0.2,0.3]"]].concat()).expect("a scene");
+    let mut memo = VolumeMemo::default();
+    let mut cost = |scene: &Scene| memo.volumes(scene, 1 << 30, &Unwatched).expect("volumes").1;
+    assert_eq!(cost(&scene), Some(Cost::Volume));
+    assert_eq!(cost(&scene.with(&["volume.color=[0.5,0.2,0.3]"]).expect("valid")), None);
+    // With a second colour the cells need places on the ramp.
+    let two = scene.with(&["volume.color_2=[0.5,0.2,0.3]"]).expect("valid");
+    assert_eq!(cost(&two), Some(Cost::Volume));
+    assert_eq!(cost(&two.with(&["volume.color_2=[0.5,0.9,0.3]"]).expect("valid")), None);
+    assert_eq!(cost(&two.with(&["fur.taper=0.1"]).expect("valid")), Some(Cost::Volume));
+}
+
+#[test]
+fn a_file_of_cells_is_not_read_where_another_builder_makes_them() {
+    let scene = with(&[&FUR[..], &["volume.file=nowhere.npz"]].concat()).expect("a scene");
+    assert!(scene.recipes[0].file.is_none() && scene.recipes[0].matter.is_some());
+}
+
+#[test]
+fn fur_that_does_not_fit_is_refused_before_it_is_built_without_advice_that_leads_nowhere() {
+    let limits = Limits { memory: 50 << 20, ..Limits::default() };
+    let sets = ["volume.builder=fur", "volume.nx=200", "volume.ny=200", "volume.nz=200"].map(str::to_owned);
+    let told = Scene::load(Path::new("fig5"), &sets, &limits).map(|_| ()).map_err(|e| e.to_string());
+    super::refused(told.clone(), &["200×200×200", "244.1 MiB", "volume.nx"]);
+    assert!(!told.unwrap_err().contains("sparse"));
+}
+
+#[test]
+fn cloth_that_is_cut_off_by_its_volume_is_told() {
+    let told = |sets: &[&str]| {
+        let cloth =
+            ["volume.builder=cloth", "volume.nx=40", "volume.ny=40", "cloth.warp=10", "cloth.weft=10"];
+        let scene = with(&[&cloth[..], sets].concat()).expect("a scene");
+        let volumes = scene.volumes(1 << 30, &Unwatched).expect("volumes");
+        scene.warnings(&volumes).into_iter().find(|words| words.contains("cuts the cloth off"))
+    };
+    // A yarn is 4 × 0.95 cells wide, and its middle swings by 0.4 of that to each side: 6.84 cells.
+    assert_eq!(told(&["volume.nz=7"]), None);
+    let words = told(&["volume.nz=6"]).expect("a warning");
+    assert!(words.contains("volume.nz = 6") && words.contains("7 cells thick"), "{words}");
+}
