@@ -1,15 +1,15 @@
-"""Writes bear.glb, the mesh of the preset `bear`: a sitting bear of ellipsoids, after the one of Kajiya and Kay.
+"""Writes bear.glb, the mesh of the preset `bear`: a sitting bear of ellipsoids, after Kajiya and Kay's.
 
 Run: python3 bear.py [FILE]   (Python alone)
 
-Texture coordinates count copies of the volume: u around an ellipsoid and v along it, in the direction in which
-the fur is combed. Poles are where v begins and ends; most of them lie inside another ellipsoid.
+Texture coordinates count copies of the volume: u around an ellipsoid and v along it, in the direction in
+which the fur is combed. Poles are where v begins and ends; most of them lie inside another ellipsoid.
 """
 
-import json
 import math
-import struct
 import sys
+
+import glb
 
 TILE = 0.22  # metres of skin that a copy of the volume covers
 ROUND, LONG = 56, 28  # quads around an ellipsoid and along it
@@ -103,50 +103,14 @@ def ground():
 
 
 def main(path):
-    materials = ["Coat", "Muzzle", "Dark", "Ground"]
-    meshes = [joined(COAT), joined(MUZZLE), joined(DARK), ground()]
-    blob, views, accessors, primitives = b"", [], [], []
-
-    def accessor(data, count, kind, component, **more):
-        nonlocal blob
-        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(data)})
-        blob += data + b"\0" * (-len(data) % 4)
-        own = {"bufferView": len(views) - 1, "componentType": component, "count": count, "type": kind}
-        accessors.append(own | more)
-        return len(accessors) - 1
-
-    for material, (points, uvs, triangles) in enumerate(meshes):
-        low, high = ([f(p[k] for p in points) for k in range(3)] for f in (min, max))
-        data = b"".join(struct.pack("<3f", *p) for p in points)
-        low, high = (list(struct.unpack("<3f", struct.pack("<3f", *x))) for x in (low, high))
-        position = accessor(data, len(points), "VEC3", 5126, min=low, max=high)
-        uv = accessor(b"".join(struct.pack("<2f", *p) for p in uvs), len(uvs), "VEC2", 5126)
-        data = b"".join(struct.pack("<3H", *t) for t in triangles)
-        indices = accessor(data, 3 * len(triangles), "SCALAR", 5123)
-        attributes = {"POSITION": position, "TEXCOORD_0": uv}
-        primitives.append({"attributes": attributes, "indices": indices, "material": material})
-    looks = {
-        "Coat": {"baseColorFactor": [0.05, 0.03, 0.02, 1.0]},
-        "Muzzle": {"baseColorFactor": [0.2, 0.14, 0.09, 1.0]},
-        "Dark": {"baseColorFactor": [0.012, 0.01, 0.01, 1.0], "roughnessFactor": 0.25, "metallicFactor": 0.0},
-        "Ground": {"baseColorFactor": [0.2, 0.185, 0.165, 1.0], "roughnessFactor": 0.9, "metallicFactor": 0.0},
-    }
-    document = {
-        "asset": {"version": "2.0", "generator": "bear.py"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "bear", "mesh": 0}],
-        "meshes": [{"name": "bear", "primitives": primitives}],
-        "materials": [{"name": name, "pbrMetallicRoughness": looks[name]} for name in materials],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(blob)}],
-    }
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<2I", len(text), 0x4E4F534A) + text + struct.pack("<2I", len(blob), 0x004E4942) + blob
-    with open(path, "wb") as file:
-        file.write(struct.pack("<3I", 0x46546C67, 2, 12 + len(chunks)) + chunks)
+    matt = {"roughnessFactor": 0.9, "metallicFactor": 0.0}
+    looks = [
+        ("Coat", {"baseColorFactor": [0.05, 0.03, 0.02, 1.0]}, joined(COAT)),
+        ("Muzzle", {"baseColorFactor": [0.2, 0.14, 0.09, 1.0]}, joined(MUZZLE)),
+        ("Dark", {"baseColorFactor": [0.012, 0.01, 0.01, 1.0]} | matt | {"roughnessFactor": 0.25}, joined(DARK)),
+        ("Ground", {"baseColorFactor": [0.2, 0.185, 0.165, 1.0]} | matt, ground()),
+    ]
+    glb.write(path, "bear", [(name, look, *part) for name, look, part in looks])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ pub(super) const LEAF: u32 = 3;
 /// Most tiles that one larger tile is divided into.
 const MOST_PARTS: u64 = 1 << 20;
 
-/// What a place of a node holds.
+/// Content of a place of a node.
 pub(super) enum Slot<N> {
     Tile([f32; 3], bool),
     Node(N),

@@ -18,7 +18,7 @@ pub fn write_vdb(path: &Path, grids: &[Grid]) -> Result<()> {
 /// Writes grids to a file of NanoVDB, as [`write_vdb`] does. See [`encode_nvdb`] for what is in it.
 ///
 /// # Errors
-/// Those of [`write_vdb`].
+/// The errors of [`write_vdb`].
 pub fn write_nvdb(path: &Path, grids: &[Grid]) -> Result<()> {
     write(path, grids, GridFile::NanoVdb)
 }

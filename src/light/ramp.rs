@@ -60,7 +60,7 @@ impl Ramp {
     }
 }
 
-/// What a ramp gives a cell.
+/// Colour and k_s that a ramp gives a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
     /// Colour of what is reflected diffusely, linear RGB.

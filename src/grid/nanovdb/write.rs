@@ -155,7 +155,7 @@ fn voxel_size(grid: &Grid) -> [f64; 3] {
     [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.length())
 }
 
-/// What the segment says about a grid, with its name. The bytes in the file are set later.
+/// Entry of a grid in the segment's head, with its name. The bytes in the file are set later.
 fn record(grid: &Grid, plan: &Plan) -> Vec<u8> {
     let name = name(grid);
     let mut out = Bytes::zeros(RECORD_BYTES);

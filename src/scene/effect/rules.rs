@@ -74,9 +74,9 @@ const OF_GRIDS: &[&str] = &[
     "volume.voxels",
 ];
 
-/// What strands need where `volume.builder` is `flow`.
+/// Need of strands where `volume.builder` is `flow`.
 const STRANDS: &str = "a number above 0, because volume.builder is \"flow\"";
-/// What a colour needs of the one before.
+/// Need of a colour that follows another.
 const FIRST: &str = "a colour, because the ramp ends at a gap";
 
 /// Builder of the volume `name`.

@@ -1,16 +1,12 @@
 //! Colours of volumes: the engines agree, on quads and in shells, beside a volume without colours.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 use taki::light::ramp::Ramp;
-use taki::mapping::shell::Side;
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
 
 use super::gpu::{SURFACE, assert_parity, renderer};
-use super::shells::shell;
-use crate::mapping::shell::torus;
+use super::shells::add_rings;
 
 /// Two volumes, of which the first is coloured.
 fn scene(sets: &[&str], colors: usize) -> Scene {
@@ -32,16 +28,7 @@ fn the_engines_agree_on_colours_of_quads_and_shells() {
         let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
         let mut white = scene.clone();
         white.edit().recipes[0].ramp = Ramp::WHITE;
-        for number in 0..2 {
-            let mut mesh = torus(20, 12, 0.4);
-            for p in &mut mesh.positions {
-                *p = *p * 0.2 + Vec3::new(0.5 * number as f32 - 0.3, 0.1, 0.35 * number as f32);
-            }
-            mesh.thickness.fill(0.07);
-            let mut own = shell(&mesh, Side::Outward);
-            own.volume = number;
-            scene.edit().shells.push(Arc::new(own));
-        }
+        add_rings(&mut scene);
         for lights in [scene.lights.len(), 1, 0] {
             scene.edit().lights.truncate(lights);
             let mesh = scene.mesh();

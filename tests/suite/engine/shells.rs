@@ -21,7 +21,7 @@ use crate::trace::shells::scene_with;
 
 /// The shell of a mesh. Its texture is moved, so that no edge lies between cells: there rounding decides
 /// whether a ray counts one more cell, of length 0.
-pub fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
+fn shell(mesh: &SurfaceMesh, side: Side) -> Shell {
     let mut mesh = mesh.clone();
     mesh.uv.iter_mut().for_each(|uv| *uv += Vec2::new(0.1371, 0.0713));
     Shell::new(&mesh, side).expect("a valid mesh")
@@ -163,6 +163,20 @@ fn the_engines_agree_where_vertices_are_too_far_from_one_another_to_keep_light()
     agree(&mut renderer, "another light", &two, &volumes);
 }
 
+/// Adds a ring to the scene of `volumes::two` for each of its volumes.
+pub fn add_rings(scene: &mut Scene) {
+    for number in 0..2 {
+        let mut mesh = torus(20, 12, 0.4);
+        for p in &mut mesh.positions {
+            *p = *p * 0.2 + Vec3::new(0.5 * number as f32 - 0.3, 0.1, 0.35 * number as f32);
+        }
+        mesh.thickness.fill(0.07);
+        let mut own = shell(&mesh, Side::Outward);
+        own.volume = number;
+        scene.edit().shells.push(Arc::new(own));
+    }
+}
+
 #[test]
 fn the_engines_agree_on_shells_of_two_volumes_among_quads() {
     let Some(mut renderer) = renderer("two volumes in shells") else { return };
@@ -171,16 +185,7 @@ fn the_engines_agree_on_shells_of_two_volumes_among_quads() {
     {
         let mut scene = super::volumes::two(&sets);
         let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
-        for number in 0..2 {
-            let mut mesh = torus(20, 12, 0.4);
-            for p in &mut mesh.positions {
-                *p = *p * 0.2 + Vec3::new(0.5 * number as f32 - 0.3, 0.1, 0.35 * number as f32);
-            }
-            mesh.thickness.fill(0.07);
-            let mut own = shell(&mesh, Side::Outward);
-            own.volume = number;
-            scene.edit().shells.push(Arc::new(own));
-        }
+        add_rings(&mut scene);
         agree(&mut renderer, &format!("{sets:?}"), &scene, &volumes);
     }
 }
