@@ -1,10 +1,10 @@
-//! Recipes of matter that is made of threads: fur and cloth.
+//! Recipes of matter that is made of threads: fur, cloth and hair.
 
 use super::measured::Builder;
 use super::param::key_of_volume;
 use super::{Recipe, Values};
 use crate::util::error::{Error, Result};
-use crate::volume::{ClothSpec, FurSpec, Matter, StorageChoice, WaterSpec, Weave, WeaveName};
+use crate::volume::{ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, WaterSpec, Weave, WeaveName};
 
 /// Returns the recipe of the volume `name`, whose size, seed and coefficients `water` has; `None` for water
 /// and simulations. With a ramp of colours, cells hold their places on it.
@@ -17,11 +17,12 @@ pub(super) fn matter(v: &Values, name: &str, water: &WaterSpec, has_ramp: bool) 
         Builder::Curves | Builder::Flow => return Ok(None),
         Builder::Fur => Matter::Fur(fur(v, name, water, k_s)),
         Builder::Cloth => Matter::Cloth(cloth(v, name, water, k_s)?),
+        Builder::Hair => Matter::Hair(hair(v, name, water, k_s)),
     };
     let storage = key_of_volume(name, "volume.storage");
     if v.choice(&storage, StorageChoice::from_word) == StorageChoice::Sparse {
         return Err(Error::input(
-            format!("{storage} = \"sparse\": fur and cloth fill most of their cells"),
+            format!("{storage} = \"sparse\": fur, cloth and hair fill most of their cells"),
             format!("set {storage}=auto"),
         ));
     }
@@ -49,6 +50,32 @@ fn fur(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> FurSpec {
         alpha: water.alpha,
         k_d: water.k_d,
         shade: float("fur.hair_shade"),
+        k_s,
+    }
+}
+
+fn hair(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> HairSpec {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let count = |own: &str| v.count(&key_of_volume(name, own));
+    let [nx, ny] = [water.size[0] as f32, water.size[1] as f32];
+    HairSpec {
+        size: water.size,
+        strands: count("tress.strands"),
+        reach: float("tress.reach"),
+        spread: float("tress.reach_spread"),
+        width_cells: float("tress.strand_width") * nx,
+        thinning: float("tress.thinning"),
+        locks: count("tress.locks"),
+        gathering: float("tress.gathering"),
+        stray: float("tress.stray"),
+        wave_cells: float("tress.wave") * nx,
+        waves: float("tress.waves"),
+        h: water.shape.h,
+        amplitude_cells: float("curves.amplitude") * ny,
+        seed: water.seed,
+        alpha: water.alpha,
+        k_d: water.k_d,
+        shade: float("tress.strand_shade"),
         k_s,
     }
 }

@@ -30,11 +30,13 @@ pub(super) enum Builder {
     Fur,
     /// Woven yarns.
     Cloth,
+    /// Long hair along the flow.
+    Hair,
     /// Grids of a simulation.
     Flow,
 }
 
-words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Flow => "flow" } }
+words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Flow => "flow" } }
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {

@@ -9,6 +9,7 @@ type Preset = (&'static str, &'static str, &'static str);
 const MESHES: &[(&str, &[u8])] = &[
     ("taki:cliff.glb", include_bytes!("../../assets/meshes/cliff.glb")),
     ("taki:bear.glb", include_bytes!("../../assets/meshes/bear.glb")),
+    ("taki:hair.glb", include_bytes!("../../assets/meshes/hair.glb")),
     ("taki:cloth.glb", include_bytes!("../../assets/meshes/cloth.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
     ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
@@ -59,6 +60,7 @@ const PRESETS: &[Preset] = &[
         "a bear of ellipsoids in fur, after Kajiya and Kay's",
         include_str!("../../assets/scenes/bear.toml"),
     ),
+    ("hair", "long hair, parted and in locks", include_str!("../../assets/scenes/hair.toml")),
     ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",

@@ -33,7 +33,7 @@ pub struct Recipe {
     pub name: String,
     /// Recipe of the cells, used where there is no `file`.
     pub water: WaterSpec,
-    /// Recipe of the cells of fur or cloth, in place of `water`, whose size and α are theirs too.
+    /// Recipe of the cells of fur, cloth or hair, in place of `water`, whose size and α are theirs too.
     pub matter: Option<Matter>,
     /// Colours of the cells.
     pub ramp: Ramp,
@@ -180,7 +180,7 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if is_of_curves && colors.len() > 1 {
         return Err(Error::input(
             format!("{}: cells of curves have no place on a ramp of colours", keys[1]),
-            format!("leave all but {} out, or set {builder} to fur, cloth or flow", keys[0]),
+            format!("leave all but {} out, or set {builder} to fur, cloth, hair or flow", keys[0]),
         ));
     }
     Ok(colors)

@@ -9,6 +9,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::VolumeTexture;
+use super::spots::Spots;
 use super::threads::{Look, Thread, cells_of_threads};
 use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use crate::util::error::Result;
@@ -68,15 +69,15 @@ impl FurSpec {
     /// # Errors
     /// Returns an error if `monitor` ends the work.
     pub fn build(&self, monitor: &dyn Monitor) -> Result<VolumeTexture> {
-        let roots = Spots { size: self.face(), count: self.hairs };
-        let clumps = Spots { size: self.face(), count: self.clumps };
+        let roots = Spots { size: self.face(), count: self.hairs, wraps: true };
+        let clumps = Spots { size: self.face(), count: self.clumps, wraps: true };
         let family = Family::new(self.seed, Stream::Bundle);
         let middles: Vec<Vec2> =
             (0..self.clumps).map(|i| clumps.at(i, &mut family.member(u64::from(i)))).collect();
         let draw = |hair: usize, thread: &mut Thread| {
             let mut rng = Family::new(self.seed, Stream::Hair).member(hair as u64);
             let root = roots.at(hair as u32, &mut rng);
-            let away = clumps.nearest(&middles, root) * self.clumping;
+            let away = clumps.nearest(&middles, root).map_or(Vec2::ZERO, |(_, way)| way * self.clumping);
             self.hair(root, away, &mut rng, thread);
         };
         let cells = cells_of_threads(self.size, self.hairs as usize, draw, self.k_s, monitor)?;
@@ -119,65 +120,6 @@ impl FurSpec {
                 k_d,
             });
         }
-    }
-}
-
-/// Places on the skin, spread evenly: one in each field of a grid of nearly square fields.
-#[derive(Clone, Copy)]
-struct Spots {
-    /// Size of the skin, cells.
-    size: Vec2,
-    count: u32,
-}
-
-impl Spots {
-    fn rows(&self) -> u32 {
-        let rows = (f64::from(self.count) * f64::from(self.size.y / self.size.x)).sqrt().round();
-        (rows as u32).clamp(1, self.count.max(1))
-    }
-
-    /// First spot of a row.
-    fn first(&self, row: u32) -> u32 {
-        (u64::from(self.count) * u64::from(row) / u64::from(self.rows())) as u32
-    }
-
-    /// Row of a spot.
-    fn row(&self, i: u32) -> u32 {
-        let guess = (u64::from(i) * u64::from(self.rows()) / u64::from(self.count)) as u32;
-        if self.first(guess + 1) <= i { guess + 1 } else { guess }
-    }
-
-    /// Place of spot number `i`, cells.
-    fn at(&self, i: u32, rng: &mut impl Rng) -> Vec2 {
-        let row = self.row(i);
-        let (first, end) = (self.first(row), self.first(row + 1));
-        let x = ((i - first) as f32 + rng.random::<f32>()) / (end - first) as f32;
-        Vec2::new(x, (row as f32 + rng.random::<f32>()) / self.rows() as f32) * self.size
-    }
-
-    /// Way from a place to the nearest of the spots, which stand at `middles`. It may lead across the border
-    /// of the volume. Zero without spots.
-    fn nearest(&self, middles: &[Vec2], place: Vec2) -> Vec2 {
-        let rows = i64::from(self.rows());
-        let row = (place.y / self.size.y * rows as f32) as i64;
-        let mut least = (f32::INFINITY, Vec2::ZERO);
-        // A spot two fields away may be nearer than that of the own field; one three fields away is not.
-        for row in (row - 2..=row + 2).map(|row| row.rem_euclid(rows) as u32) {
-            let (first, end) = (self.first(row), self.first(row + 1));
-            let count = i64::from(end - first);
-            let column = (place.x / self.size.x * count as f32) as i64;
-            for column in (column - 2..=column + 2).filter(|_| count > 0) {
-                let Some(&middle) = middles.get(first as usize + column.rem_euclid(count) as usize) else {
-                    continue;
-                };
-                let way = middle - place;
-                let way = way - self.size * (way / self.size).round();
-                if way.length_squared() < least.0 {
-                    least = (way.length_squared(), way);
-                }
-            }
-        }
-        least.1
     }
 }
 

@@ -1,7 +1,7 @@
 //! §2 Recipes of matter that is made of threads with a width.
 
 use super::threads::BYTES_PER_CELL;
-use super::{ClothSpec, FurSpec, VolumeTexture};
+use super::{ClothSpec, FurSpec, HairSpec, VolumeTexture};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 
@@ -12,6 +12,8 @@ pub enum Matter {
     Fur(FurSpec),
     /// Woven yarns.
     Cloth(ClothSpec),
+    /// Long hair along the flow.
+    Hair(HairSpec),
 }
 
 impl Matter {
@@ -26,6 +28,7 @@ impl Matter {
         match self {
             Matter::Fur(fur) => fur.build(monitor),
             Matter::Cloth(cloth) => cloth.build(monitor),
+            Matter::Hair(hair) => hair.build(monitor),
         }
     }
 }

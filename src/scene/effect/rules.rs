@@ -232,7 +232,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: OF_BUILT,
         switch: "volume.builder",
-        needs: "curves, fur or cloth",
+        needs: "curves, fur, cloth or hair",
         works: |v, switch| !is(v, switch, Builder::Flow.word()),
     },
     Rule {
@@ -252,7 +252,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: &["curves.amplitude", "curves.h"],
         switch: "volume.builder",
-        needs: "curves, fur or flow",
+        needs: "curves, fur, hair or flow",
         works: |v, switch| !is(v, switch, Builder::Cloth.word()),
     },
     Rule {
@@ -278,6 +278,24 @@ pub(super) const RULES: &[Rule] = &[
         switch: "volume.builder",
         needs: "fur",
         works: |v, switch| is(v, switch, Builder::Fur.word()),
+    },
+    Rule {
+        keys: &["tress.*"],
+        switch: "volume.builder",
+        needs: "hair",
+        works: |v, switch| is(v, switch, Builder::Hair.word()),
+    },
+    Rule {
+        keys: &["tress.gathering", "tress.stray", "tress.wave"],
+        switch: "tress.locks",
+        needs: "a number above 0",
+        works: |v, switch| v.int(switch) > 0,
+    },
+    Rule {
+        keys: &["tress.waves"],
+        switch: "tress.wave",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
     },
     Rule {
         keys: &["fur.clumping"],

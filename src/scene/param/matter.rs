@@ -1,4 +1,4 @@
-//! Parameters of matter that is made of threads: fur and cloth.
+//! Parameters of matter that is made of threads: fur, cloth and hair.
 
 use super::Cost::Volume;
 use super::Kind::{Float, Int, Text};
@@ -97,5 +97,56 @@ pub(super) const CLOTH: Group = Group {
         p("cloth.yarn_shade", "", "", Float(0.0, 1.0, 0.06), Volume)
             .doc("Relative standard deviation of k_d from yarn to yarn.")
             .when("Raise it for slub linen and worn denim."),
+    ],
+};
+
+pub(super) const HAIR: Group = Group {
+    title: "Long hair",
+    about: "Strands of a volume with `volume.builder=hair`. They run along v, from the root to the tip, and \
+         leave the skin, the face z = nz, at their roots. `curves.h` and `curves.amplitude` bend each of them. \
+         `volume.color` to `volume.color_4` run from root to tip. A copy of the volume is as long as the \
+         hair, so let v grow from 0 to 1 on the mesh.",
+    params: &[
+        p("tress.strands", "", "", Int(1, 10_000_000, 6000), Volume)
+            .slider(100.0, 50_000.0)
+            .doc("Number of strands on one copy of the volume.")
+            .when("Raise it for thick hair; lower it where the skin should show."),
+        p("tress.reach", "", "lengths", Float(0.01, 1.0, 0.9), Volume)
+            .doc("Mean way of a strand from root to tip, as a fraction of the flow length ny.")
+            .when("Leave room for longer strands above 1 − 2 × `tress.reach_spread`; they are cut at ny."),
+        p("tress.reach_spread", "", "", Float(0.0, 1.0, 0.05), Volume)
+            .doc("Relative standard deviation of the reach.")
+            .when("Raise it for layered or ragged ends; lower it for a blunt cut."),
+        p("tress.strand_width", "", "widths", Float(1e-6, 0.5, 0.004), Volume)
+            .slider(0.0005, 0.05)
+            .doc("Diameter of a strand at its root, as a fraction of the volume's width nx.")
+            .when("Lower it with more `tress.strands`. Below one cell, 1/nx, cells thin out in proportion."),
+        p("tress.thinning", "", "", Float(0.0, 1.0, 0.5), Volume)
+            .doc("Share of its diameter that a strand loses from root to tip.")
+            .when("Raise it for soft ends."),
+        p("tress.locks", "", "", Int(0, 65536, 60), Volume)
+            .slider(0.0, 400.0)
+            .doc("Number of locks in which strands gather. 0 lets each hang alone.")
+            .when("Raise it for fine locks; a hundredth of the strands is a usual number."),
+        p("tress.gathering", "", "", Float(0.0, 1.0, 0.5), Volume)
+            .doc("Share of the way to the middle of its lock that the tip of a strand is drawn.")
+            .when("Raise it for wet or oiled hair with pointed locks; lower it for brushed hair."),
+        p("tress.stray", "", "", Float(0.0, 1.0, 0.06), Volume)
+            .doc("Share of the strands that belong to no lock.")
+            .when("Raise it for unruly hair."),
+        p("tress.wave", "", "widths", Float(0.0, 1.0, 0.0), Volume)
+            .slider(0.0, 0.1)
+            .doc(
+                "Amplitude of the waves of a lock across the flow, as a fraction of the volume's width nx; \
+                 half of it in the depth.",
+            )
+            .when("Raise it for wavy hair and curls; leave it at 0 for straight hair."),
+        p("tress.waves", "", "", Float(0.0, 200.0, 4.0), Volume)
+            .slider(0.0, 20.0)
+            .doc("Mean number of waves along the flow length ny.")
+            .when("Raise it with a larger `tress.wave` for curls."),
+        p("tress.strand_shade", "", "", Float(0.0, 1.0, 0.15), Volume)
+            .doc("Relative standard deviation of k_d from strand to strand.")
+            .when("Raise it for streaks; lower it for dyed hair."),
     ],
 };

@@ -145,6 +145,7 @@ pub const GROUPS: &[Group] = &[
     volume::VOLUME,
     matter::FUR,
     matter::CLOTH,
+    matter::HAIR,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,
