@@ -1,20 +1,23 @@
 //! `taki volume`: writes volume textures as NumPy arrays and prints their statistics.
 
-use std::path::PathBuf;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use clap::{Args, Subcommand};
+use glam::DVec3;
 
 use super::parse::memory;
 use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output, grids};
 use crate::grid::{GridFile, is_grid};
-use crate::job::check_volume_replaced;
+use crate::job::{check_volume_replaced, is_hair};
+use crate::model::Strands;
 use crate::output::frame::Output;
 use crate::scene::{Scene, key_of_volume, likeliest};
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
-use crate::volume::{ReadOptions, Statistics, read_npz, write_npz};
+use crate::volume::{ReadOptions, Statistics, VolumeTexture, read_npz, write_npz};
 
 #[derive(Args)]
 pub struct VolumeArgs {
@@ -25,14 +28,15 @@ pub struct VolumeArgs {
 #[derive(Subcommand)]
 enum VolumeCommand {
     /// Builds a scene's volume texture and writes it: as an .npz file with the arrays rho, v, k and alpha, or
-    /// as a .vdb or .nvdb file with the grids density, velocity, kd and ks.
+    /// as a .vdb or .nvdb file with the grids density, velocity, kd and ks. As a .hair, fur, cloth and hair are
+    /// written as the strands that their cells are made of.
     Build {
         #[command(flatten)]
         scene: SceneOptions,
         /// Volume to build, where the scene shows several: water, or the name of a table in [volumes].
         #[arg(long = "volume", value_name = "NAME")]
         volume: Option<String>,
-        /// File to write: an .npz, a .vdb or an .nvdb. Default: the scene's name with .npz, in the current
+        /// File to write: an .npz, a .vdb, an .nvdb or a .hair. Default: the scene's name with .npz, in the current
         /// folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
@@ -40,9 +44,9 @@ enum VolumeCommand {
         #[arg(long)]
         overwrite: bool,
     },
-    /// Prints statistics of a volume file, or the grids of a simulation.
+    /// Prints statistics of a volume file, the grids of a simulation, or what strands a .hair has.
     Info {
-        /// The file to read: an .npz with a volume or with grids, a .vdb or an .nvdb.
+        /// The file to read: an .npz with a volume or with grids, a .vdb, an .nvdb or a .hair.
         file: PathBuf,
         /// Prints the statistics as one JSON object.
         #[arg(long)]
@@ -62,10 +66,13 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let number = number_of(&scene, name.as_deref())?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             let as_grids = GridFile::of(&path);
+            if is_hair(&path) {
+                return write_strands(&scene, number, &path, *overwrite, options.limits().memory, terminal);
+            }
             if as_grids.is_none() && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
                 let npz = path.with_extension("npz");
                 return Err(Error::Usage(format!(
-                    "-o {}: a volume is an .npz file, or a .vdb or .nvdb for other programs; use -o {}",
+                    "-o {}: a volume is an .npz file, or a .vdb, .nvdb or .hair for other programs; use -o {}",
                     path.display(),
                     npz.display()
                 )));
@@ -94,7 +101,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let notes = notes.chain(scene.note_on_volume(number, &volume));
             notes.for_each(|n| terminal.note(&format!("taki: {n}")));
             terminal.progress("saving", 0, 1)?;
-            let writer = std::io::BufWriter::with_capacity(1 << 20, out.file());
+            let writer = BufWriter::with_capacity(1 << 20, out.file());
             let written = match as_grids {
                 None => write_npz(&volume, writer),
                 Some(format) => {
@@ -111,6 +118,9 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         }
         VolumeCommand::Info { file, json, memory } => {
             terminal.watch();
+            if is_hair(file) {
+                return strand_info(file, *json, *memory);
+            }
             if is_grid(file) {
                 return grids::info(file, *json, *memory, terminal);
             }
@@ -133,6 +143,64 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             Ok(())
         }
     }
+}
+
+/// Prints what strands a `.hair` has, in its own unit.
+fn strand_info(file: &Path, json: bool, memory: u64) -> Result<()> {
+    let strands = Strands::read(file, memory)?;
+    let [low, high] = strands.bounds().unwrap_or_default();
+    let (thin, thick) = strands.widths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), w| (a.min(*w), b.max(*w)));
+    if json {
+        return say(&serde_json::json!({
+            "strands": strands.count(),
+            "points": strands.points.len(),
+            "bounds": [low.to_array(), high.to_array()],
+            "thickness": [thin, thick],
+        })
+        .to_string());
+    }
+    say(&format!("strands    {}", strands.count()))?;
+    say(&format!("points     {}", strands.points.len()))?;
+    say(&format!("bounds     {low} to {high}, in the file's unit"))?;
+    say(&format!("thickness  {thin} to {thick}"))
+}
+
+/// Writes the strands of a scene's volume as a `.hair`, in metres, where a box shows them.
+fn write_strands(
+    scene: &Scene,
+    number: usize,
+    path: &Path,
+    overwrite: bool,
+    memory: u64,
+    terminal: &Terminal,
+) -> Result<()> {
+    let recipe = &scene.recipes[number];
+    let Some(matter) = &recipe.matter else {
+        return Err(Error::Usage(format!(
+            "-o {}: the volume {} is not made of strands with a width; use -o {}",
+            path.display(),
+            recipe.name,
+            path.with_extension("npz").display()
+        )));
+    };
+    if !overwrite {
+        check_volume_replaced(path)?;
+    }
+    let mut out = Output::create(path)?;
+    let mut strands = matter.strands(memory, terminal)?;
+    let size = recipe.water.size;
+    let place = recipe.world_from_texture().unwrap_or_else(|| VolumeTexture::unit_box(size));
+    let cell = DVec3::ONE / DVec3::from_array(size.map(f64::from));
+    // Cells are cubes in both places.
+    let edge = (place.matrix3.x_axis.length() * cell.x) as f32;
+    strands.points.iter_mut().for_each(|p| *p = place.transform_point3(p.as_dvec3() * cell).as_vec3());
+    strands.widths.iter_mut().for_each(|width| *width *= edge);
+    terminal.progress("saving", 0, 1)?;
+    strands.write(BufWriter::with_capacity(1 << 20, out.file())).map_err(|e| Error::write(path, e))?;
+    out.finish()?;
+    terminal.close();
+    terminal.note(&format!("taki: wrote {} ({} strands)", path.display(), strands.count()));
+    Ok(())
 }
 
 /// Returns the number of the volume `name` of a scene, or of its only volume.

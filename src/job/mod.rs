@@ -13,7 +13,7 @@ pub use claim::{Asked, Claim, Claims};
 pub use depth::Depth;
 pub(crate) use depth::{beside_encoders, check_alpha, check_side, held_bytes};
 pub use memo::VolumeMemo;
-pub(crate) use still::{About, Sink, check_kind, check_replaced, check_volume_replaced};
+pub(crate) use still::{About, Sink, check_kind, check_replaced, check_volume_replaced, is_hair};
 pub use still::{STDOUT, Still, StillWriter};
 pub(crate) use stitch::is_same_file;
 pub use stitch::{StitchOptions, stitch, stitch_with};

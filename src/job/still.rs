@@ -224,10 +224,18 @@ pub(crate) fn check_replaced(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::CannotCreate`] if the file is no volume.
 pub(crate) fn check_volume_replaced(path: &Path) -> Result<()> {
+    if is_hair(path) {
+        return check_kind(path, "file of hair", |start| start.starts_with(b"HAIR"));
+    }
     match GridFile::of(path) {
         Some(own) => check_kind(path, &format!("{} file", own.words()), |start| own.starts(start)),
         None => check_kind(path, "volume", |start| start.starts_with(b"PK")),
     }
+}
+
+/// Whether a path has the ending of a file of hair.
+pub(crate) fn is_hair(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hair"))
 }
 
 /// Refuses to replace a file whose first 4096 bytes are not those of a `kind`. An empty file may be replaced.

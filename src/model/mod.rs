@@ -1,4 +1,5 @@
-//! Geometry that other programs wrote: glTF 2.0 (`.gltf` with its buffers, `.glb`) and OBJ with MTL.
+//! Geometry that other programs wrote: glTF 2.0 (`.gltf` with its buffers, `.glb`), OBJ with MTL, and strands
+//! of hair (`.hair`).
 //!
 //! [`Model::read`] reads a whole file and checks all of it: a [`Model`] holds only finite numbers and indices
 //! that lead somewhere. Files are not trusted. References to other files are confined to the file's folder,
@@ -35,6 +36,7 @@ mod look;
 mod names;
 mod obj;
 mod paths;
+mod strands;
 mod summary;
 
 use std::io::Read;
@@ -50,6 +52,7 @@ pub use look::{
     Wrap,
 };
 pub use names::{find_name, folded_name};
+pub use strands::Strands;
 pub use summary::{MaterialSummary, NodeSummary, Summary};
 
 use crate::util::error::{Error, Result};

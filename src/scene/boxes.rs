@@ -56,7 +56,7 @@ impl SceneBox {
         let is_moved =
             |key: &String| v.is_set(key) && (!key.ends_with(".turn") || v.point(key) != DVec3::ZERO);
         let moved = ["position", "size", "turn"].map(key).into_iter().find(is_moved);
-        if let Some(moved) = moved.filter(|_| recipe.is_sequence && recipe.measured.is_some()) {
+        if let Some(moved) = moved.filter(|_| recipe.is_sequence && recipe.world_from_texture().is_some()) {
             return Err(Error::input(
                 format!("{moved}: the volume {volume} is a sequence, whose bounds change from file to file"),
                 format!(

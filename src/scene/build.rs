@@ -89,7 +89,7 @@ pub(super) fn volume_file(
 ) -> Result<Option<PathBuf>> {
     let key = key_of_volume(name, "volume.file");
     match v.text(&key) {
-        file if file.is_empty() || measured::is_measured(v, name) => Ok(None),
+        file if file.is_empty() || measured::reads_source(v, name) => Ok(None),
         _ => {
             let file = sequence::file(v, name, &key, folder, limits)?;
             check_npz(&file)?;
@@ -339,7 +339,7 @@ pub fn resolve(values: &mut Values, key: &str, folder: Option<&Path>, allowed: &
     let file = values.text(key);
     let is_source = split_volume_key(key).map(|(name, own)| (name, own == "volume.source"));
     let is_other =
-        is_source.is_some_and(|(name, is_source)| is_source != measured::is_measured(values, name));
+        is_source.is_some_and(|(name, is_source)| is_source != measured::reads_source(values, name));
     let unused = key == "environment.file"
         && values.choice("environment.kind", EnvironmentKind::from_word) != EnvironmentKind::File;
     let hidden = split_volume_key(key).is_some_and(|(name, _)| !volumes::is_shown(values, name));

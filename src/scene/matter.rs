@@ -1,10 +1,16 @@
-//! Recipes of matter that is made of threads: fur, cloth and hair.
+//! Recipes of matter that is made of threads: fur, cloth, hair, and strands of a file.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::Vec3;
 
 use super::measured::Builder;
 use super::param::key_of_volume;
-use super::{Recipe, Values};
+use super::{Limits, Recipe, Values, sequence};
+use crate::model::Strands;
 use crate::util::error::{Error, Result};
-use crate::volume::{ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, WaterSpec, Weave, WeaveName};
+use crate::volume::{ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, StrandsSpec, Up, WaterSpec, Weave, WeaveName};
 
 /// Returns the recipe of the volume `name`, whose size, seed and coefficients `water` has; `None` for water
 /// and simulations. With a ramp of colours, cells hold their places on it.
@@ -14,19 +20,81 @@ use crate::volume::{ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, WaterSp
 pub(super) fn matter(v: &Values, name: &str, water: &WaterSpec, has_ramp: bool) -> Result<Option<Matter>> {
     let k_s = (!has_ramp).then_some(water.k_s);
     let matter = match v.choice(&key_of_volume(name, "volume.builder"), Builder::from_word) {
-        Builder::Curves | Builder::Flow => return Ok(None),
+        Builder::Curves | Builder::Flow | Builder::Strands => return Ok(None),
         Builder::Fur => Matter::Fur(fur(v, name, water, k_s)),
         Builder::Cloth => Matter::Cloth(cloth(v, name, water, k_s)?),
         Builder::Hair => Matter::Hair(hair(v, name, water, k_s)),
     };
+    not_sparse(v, name)?;
+    Ok(Some(matter))
+}
+
+/// Refuses sparse storage.
+fn not_sparse(v: &Values, name: &str) -> Result<()> {
     let storage = key_of_volume(name, "volume.storage");
     if v.choice(&storage, StorageChoice::from_word) == StorageChoice::Sparse {
         return Err(Error::input(
-            format!("{storage} = \"sparse\": fur, cloth and hair fill most of their cells"),
+            format!("{storage} = \"sparse\": fur, cloth and hair are built in dense storage"),
             format!("set {storage}=auto"),
         ));
     }
-    Ok(Some(matter))
+    Ok(())
+}
+
+/// Returns the recipe of the volume `name` if it is made of the strands of a file. The other arguments are
+/// those of [`matter`], and what the file may be.
+///
+/// # Errors
+/// Those of [`Strands::read`] and of paths; [`Error::Input`] for strands without extent or thickness, and for
+/// sparse storage.
+pub(super) fn strands(
+    v: &Values,
+    name: &str,
+    water: &WaterSpec,
+    has_ramp: bool,
+    folder: Option<&Path>,
+    limits: &Limits,
+) -> Result<Option<Matter>> {
+    let key = |own: &str| key_of_volume(name, own);
+    if v.choice(&key("volume.builder"), Builder::from_word) != Builder::Strands {
+        return Ok(None);
+    }
+    not_sparse(v, name)?;
+    let source = key("volume.source");
+    if v.text(&source).is_empty() {
+        return Err(Error::input(
+            format!("{} = \"strands\" without a file", key("volume.builder")),
+            format!("give {source} the .hair of another program"),
+        ));
+    }
+    let path = sequence::file(v, name, &source, folder, limits)?;
+    let strands = Strands::read(&path, limits.memory)?;
+    let unit = f64::from(v.float(&key("import.file_unit")));
+    let [diameter, longest] = ["import.strand_diameter", "import.longest"].map(key);
+    let width = Some(v.float(&diameter)).filter(|width| *width > 0.0).map(|width| width / unit as f32);
+    if width.is_none() && strands.widths.iter().all(|width| *width == 0.0) {
+        return Err(Error::input(
+            format!("{}: the strands have no thickness", path.display()),
+            format!("give them one with {diameter}, metres"),
+        ));
+    }
+    let rest = StrandsSpec {
+        strands: Arc::new(strands),
+        size: [0; 3],
+        corner: Vec3::ZERO,
+        edge: 0.0,
+        width,
+        unit,
+        scene_from_file: v.choice(&key("volume.up"), Up::from_word).scene_from_file(),
+        alpha: water.alpha,
+        k_d: water.k_d,
+        k_s: (!has_ramp).then_some(water.k_s),
+    };
+    let spec = StrandsSpec::around(v.count(&longest), rest).ok_or_else(|| {
+        let fix = format!("export them again, or give them a thickness with {diameter}, metres");
+        Error::input(format!("{}: the strands have no extent", path.display()), fix)
+    })?;
+    Ok(Some(Matter::Strands(spec)))
 }
 
 fn fur(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> FurSpec {

@@ -32,15 +32,23 @@ pub(super) enum Builder {
     Cloth,
     /// Long hair along the flow.
     Hair,
+    /// Strands of a file.
+    Strands,
     /// Grids of a simulation.
     Flow,
 }
 
-words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Flow => "flow" } }
+words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands", Flow => "flow" } }
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {
     v.choice(&key_of_volume(name, "volume.builder"), Builder::from_word) == Builder::Flow
+}
+
+/// Whether the volume `name` is made of the file in `volume.source`.
+pub(super) fn reads_source(v: &Values, name: &str) -> bool {
+    let builder = v.choice(&key_of_volume(name, "volume.builder"), Builder::from_word);
+    [Builder::Flow, Builder::Strands].contains(&builder)
 }
 
 /// Returns the recipe of the measured volume `name`; `None` for a volume of curves.

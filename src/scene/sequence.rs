@@ -27,7 +27,7 @@ pub(super) struct Sequence {
 
 /// Returns the key that names the file of the volume `name`.
 pub(super) fn key_of(v: &Values, name: &str) -> String {
-    let own = if measured::is_measured(v, name) { "volume.source" } else { "volume.file" };
+    let own = if measured::reads_source(v, name) { "volume.source" } else { "volume.file" };
     key_of_volume(name, own)
 }
 

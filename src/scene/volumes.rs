@@ -61,13 +61,19 @@ impl Recipe {
         }
         let colors = colors(v, name)?;
         let matter = matter::matter(v, name, &water, colors.len() > 1)?;
+        let strands = matter::strands(v, name, &water, colors.len() > 1, folder, limits);
+        let matter = matter.or(strands.map_err(|e| of_volume(name, e))?);
+        if let Some(Matter::Strands(strands)) = &matter {
+            water.size = strands.size;
+        }
         let file = match &measured {
             Some(measured) => Some(measured.path.clone()),
             None if matter.is_some() => None,
             None => build::volume_file(v, name, folder, limits)?,
         };
         // What was measured stands where it was; only copies of a volume can flow.
-        let flow = if measured.is_some() { 0.0 } else { v.float(&key_of_volume(name, "volume.flow")) };
+        let is_placed = measured.is_some() || matches!(matter, Some(Matter::Strands(_)));
+        let flow = if is_placed { 0.0 } else { v.float(&key_of_volume(name, "volume.flow")) };
         Ok(Recipe {
             name: name.into(),
             ramp: Ramp::new(&colors, water.k_s),
@@ -90,7 +96,10 @@ impl Recipe {
     /// Transform from texture coordinates, 0 to 1, to the world, metres, if the volume has a place of its
     /// own.
     pub fn world_from_texture(&self) -> Option<DAffine3> {
-        self.measured.as_ref().map(MeasuredSpec::world_from_texture)
+        match &self.matter {
+            Some(Matter::Strands(strands)) => Some(strands.world_from_texture()),
+            _ => self.measured.as_ref().map(MeasuredSpec::world_from_texture),
+        }
     }
 
     /// Key that names the file.
@@ -180,7 +189,7 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if is_of_curves && colors.len() > 1 {
         return Err(Error::input(
             format!("{}: cells of curves have no place on a ramp of colours", keys[1]),
-            format!("leave all but {} out, or set {builder} to fur, cloth, hair or flow", keys[0]),
+            format!("leave all but {} out, or set {builder} to fur, cloth, hair, strands or flow", keys[0]),
         ));
     }
     Ok(colors)

@@ -10,7 +10,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::VolumeTexture;
-use super::threads::{Look, Thread, cells_of_threads};
+use super::threads::{Look, Thread, Threads, cells_of_threads};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::random::{Family, Stream};
@@ -117,15 +117,20 @@ impl ClothSpec {
     /// # Errors
     /// Returns an error if `monitor` ends the work.
     pub fn build(&self, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+        let cells = cells_of_threads(self.size, self.threads(), self.k_s, monitor)?;
+        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+    }
+
+    /// The fibres, stray ones behind those of the yarns.
+    pub(super) fn threads(&self) -> Threads<impl Fn(usize, &mut Thread) + Sync> {
         let [warp, weft] = self.yarns.map(|n| n as usize);
         let fibres = (warp + weft) * self.fibres as usize;
         let strays = (self.fuzz * (warp * weft) as f32).round() as usize;
-        let draw = |number: usize, thread: &mut Thread| match number.checked_sub(fibres) {
+        let draw = move |number: usize, thread: &mut Thread| match number.checked_sub(fibres) {
             None => self.fibre(number / self.fibres as usize, number, thread),
             Some(stray) => self.stray(stray, thread),
         };
-        let cells = cells_of_threads(self.size, fibres + strays, draw, self.k_s, monitor)?;
-        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+        Threads { count: fibres + strays, draw }
     }
 
     /// Depth that the yarns take, cells. What lies outside the volume is cut off.

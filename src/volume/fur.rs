@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::VolumeTexture;
 use super::spots::Spots;
-use super::threads::{Look, Thread, cells_of_threads};
+use super::threads::{Look, Thread, Threads, cells_of_threads};
 use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -69,19 +69,24 @@ impl FurSpec {
     /// # Errors
     /// Returns an error if `monitor` ends the work.
     pub fn build(&self, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+        let cells = cells_of_threads(self.size, self.threads(), self.k_s, monitor)?;
+        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+    }
+
+    /// The hairs.
+    pub(super) fn threads(&self) -> Threads<impl Fn(usize, &mut Thread) + Sync> {
         let roots = Spots { size: self.face(), count: self.hairs, wraps: true };
         let clumps = Spots { size: self.face(), count: self.clumps, wraps: true };
         let family = Family::new(self.seed, Stream::Bundle);
         let middles: Vec<Vec2> =
             (0..self.clumps).map(|i| clumps.at(i, &mut family.member(u64::from(i)))).collect();
-        let draw = |hair: usize, thread: &mut Thread| {
+        let draw = move |hair: usize, thread: &mut Thread| {
             let mut rng = Family::new(self.seed, Stream::Hair).member(hair as u64);
             let root = roots.at(hair as u32, &mut rng);
             let away = clumps.nearest(&middles, root).map_or(Vec2::ZERO, |(_, way)| way * self.clumping);
             self.hair(root, away, &mut rng, thread);
         };
-        let cells = cells_of_threads(self.size, self.hairs as usize, draw, self.k_s, monitor)?;
-        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+        Threads { count: self.hairs as usize, draw }
     }
 
     /// nx and ny.

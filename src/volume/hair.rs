@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::VolumeTexture;
 use super::spots::Spots;
-use super::threads::{Look, Thread, cells_of_threads};
+use super::threads::{Look, Thread, Threads, cells_of_threads};
 use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -83,6 +83,12 @@ impl HairSpec {
     /// # Errors
     /// Returns an error if `monitor` ends the work.
     pub fn build(&self, monitor: &dyn Monitor) -> Result<VolumeTexture> {
+        let cells = cells_of_threads(self.size, self.threads(), self.k_s, monitor)?;
+        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+    }
+
+    /// The strands.
+    pub(super) fn threads(&self) -> Threads<impl Fn(usize, &mut Thread) + Sync> {
         let face = Vec2::new(self.size[0] as f32, self.size[2] as f32);
         let places = Spots { size: face, count: self.strands, wraps: false };
         let spots = Spots { size: face, count: self.locks, wraps: false };
@@ -99,15 +105,14 @@ impl HairSpec {
             })
             .collect();
         let middles: Vec<Vec2> = locks.iter().map(|lock| lock.middle).collect();
-        let draw = |strand: usize, thread: &mut Thread| {
+        let draw = move |strand: usize, thread: &mut Thread| {
             let mut rng = Family::new(self.seed, Stream::Hair).member(strand as u64);
             let place = places.at(strand as u32, &mut rng);
             let nearest = spots.nearest(&middles, place);
             let away = nearest.map_or(Vec2::ZERO, |(_, away)| away);
             self.strand(place, nearest.map(|(lock, _)| &locks[lock]), away, &mut rng, thread);
         };
-        let cells = cells_of_threads(self.size, self.strands as usize, draw, self.k_s, monitor)?;
-        Ok(VolumeTexture { size: self.size, alpha: self.alpha, cells })
+        Threads { count: self.strands as usize, draw }
     }
 
     /// Writes the strand at a place in x and z, `away` cells from the middle of its lock.
@@ -115,7 +120,8 @@ impl HairSpec {
         let [ny, nz] = [self.size[1] as f32, self.size[2] as f32];
         let reach = (self.reach * (1.0 + self.spread * normal(rng))).clamp(0.0, 1.0);
         let k_d = self.k_d * (1.0 + self.shade * normal(rng)).max(0.0);
-        let lock = lock.filter(|_| rng.random::<f32>() >= self.stray);
+        let is_stray = rng.random::<f32>() < self.stray;
+        let lock = lock.filter(|_| !is_stray);
         if reach <= 0.0 {
             return;
         }

@@ -1,8 +1,9 @@
 //! §2 Recipes of matter that is made of threads with a width.
 
-use super::threads::BYTES_PER_CELL;
-use super::{ClothSpec, FurSpec, HairSpec, VolumeTexture};
-use crate::util::error::Result;
+use super::threads::{BYTES_PER_CELL, Thread, Threads};
+use super::{ClothSpec, FurSpec, HairSpec, StrandsSpec, VolumeTexture};
+use crate::model::Strands;
+use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
 /// Recipe of a volume of hairs or yarns. Equal recipes build equal bytes.
@@ -14,6 +15,8 @@ pub enum Matter {
     Cloth(ClothSpec),
     /// Long hair along the flow.
     Hair(HairSpec),
+    /// Strands of a file.
+    Strands(StrandsSpec),
 }
 
 impl Matter {
@@ -29,6 +32,47 @@ impl Matter {
             Matter::Fur(fur) => fur.build(monitor),
             Matter::Cloth(cloth) => cloth.build(monitor),
             Matter::Hair(hair) => hair.build(monitor),
+            Matter::Strands(strands) => strands.build(monitor),
         }
     }
+
+    /// Draws all threads as strands, in cells. They may reach beyond the volume, where copies of it would
+    /// stand.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if they take more than `budget` bytes, and errors of `monitor`.
+    pub fn strands(&self, budget: u64, monitor: &dyn Monitor) -> Result<Strands> {
+        match self {
+            Matter::Fur(fur) => drawn(fur.threads(), budget, monitor),
+            Matter::Cloth(cloth) => drawn(cloth.threads(), budget, monitor),
+            Matter::Hair(hair) => drawn(hair.threads(), budget, monitor),
+            Matter::Strands(strands) => drawn(strands.threads(), budget, monitor),
+        }
+    }
+}
+
+/// Threads between two reports of progress.
+const THREADS_PER_REPORT: usize = 1024;
+
+fn drawn(
+    threads: Threads<impl Fn(usize, &mut Thread) + Sync>,
+    budget: u64,
+    monitor: &dyn Monitor,
+) -> Result<Strands> {
+    let (mut strands, mut thread) = (Strands::default(), Thread::default());
+    for number in 0..threads.count {
+        if number % THREADS_PER_REPORT == 0 {
+            monitor.progress("strands", number as u64, threads.count as u64)?;
+        }
+        thread.clear();
+        (threads.draw)(number, &mut thread);
+        let width = |i: usize| thread.looks.get(i).or(thread.looks.last()).map_or(0.0, |look| look.width);
+        strands.push(thread.points.iter().enumerate().map(|(i, point)| (*point, width(i))));
+        let need = 16 * strands.points.len() as u128;
+        if need > u128::from(budget) {
+            let what = format!("{} strands", threads.count);
+            return Err(Error::memory(what, need, budget, "draw fewer of them, or raise --memory"));
+        }
+    }
+    Ok(strands)
 }

@@ -21,6 +21,7 @@ mod ripple;
 mod spec;
 mod spots;
 mod storage;
+mod strands;
 mod threads;
 mod water;
 
@@ -45,6 +46,7 @@ pub use pyramid::{
 pub use ripple::Ripple;
 pub use spec::{Structure, WaterSpec};
 pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
+pub use strands::StrandsSpec;
 pub use water::{
     BUILDER_VERSION, build_sparse_water, build_water, expected_cells, kept_water, set_density_and_reflection,
 };

@@ -99,8 +99,15 @@ struct Sum {
 /// Parts of the threads of one task in one slab: the cell's index there, length × direction, and the look.
 type Parts = Vec<(u32, Vec3, Look)>;
 
-/// Builds the cells of `count` threads in dense storage. `draw` writes the thread with a number. Without
-/// `k_s`, each cell has its place on the ramp of colours where k_s stands elsewhere.
+/// All threads of a volume.
+pub(super) struct Threads<Draw: Fn(usize, &mut Thread) + Sync> {
+    /// Number of threads.
+    pub count: usize,
+    /// Writes the thread with a number into an empty one.
+    pub draw: Draw,
+}
+
+/// Builds the cells of threads in dense storage. Without `k_s`, each cell has its place on the ramp of colours where k_s stands elsewhere.
 ///
 /// The sums depend neither on the number of processors nor on the order in which they work.
 ///
@@ -108,8 +115,7 @@ type Parts = Vec<(u32, Vec3, Look)>;
 /// Errors of `monitor`, which may stop the work.
 pub(super) fn cells_of_threads(
     size: [u32; 3],
-    count: usize,
-    draw: impl Fn(usize, &mut Thread) + Sync,
+    Threads { count, draw }: Threads<impl Fn(usize, &mut Thread) + Sync>,
     k_s: Option<f32>,
     monitor: &dyn Monitor,
 ) -> Result<Cells> {

@@ -65,9 +65,7 @@ const OF_GRIDS: &[&str] = &[
     "volume.reflect_low",
     "volume.rho",
     "volume.rho_scale",
-    "volume.source",
     "volume.strands",
-    "volume.up",
     "volume.velocity",
     "volume.velocity_at",
     "volume.velocity_scale",
@@ -233,7 +231,13 @@ pub(super) const RULES: &[Rule] = &[
         keys: OF_BUILT,
         switch: "volume.builder",
         needs: "curves, fur, cloth or hair",
-        works: |v, switch| !is(v, switch, Builder::Flow.word()),
+        works: |v, switch| ![Builder::Flow, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
+    },
+    Rule {
+        keys: &["volume.source", "volume.up"],
+        switch: "volume.builder",
+        needs: "flow or strands",
+        works: |v, switch| [Builder::Flow, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
     },
     Rule {
         keys: OF_CURVES,
@@ -253,7 +257,7 @@ pub(super) const RULES: &[Rule] = &[
         keys: &["curves.amplitude", "curves.h"],
         switch: "volume.builder",
         needs: "curves, fur, hair or flow",
-        works: |v, switch| !is(v, switch, Builder::Cloth.word()),
+        works: |v, switch| ![Builder::Cloth, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
     },
     Rule {
         keys: &["cloth.*"],
@@ -284,6 +288,18 @@ pub(super) const RULES: &[Rule] = &[
         switch: "volume.builder",
         needs: "hair",
         works: |v, switch| is(v, switch, Builder::Hair.word()),
+    },
+    Rule {
+        keys: &["import.*"],
+        switch: "volume.builder",
+        needs: "strands",
+        works: |v, switch| is(v, switch, Builder::Strands.word()),
+    },
+    Rule {
+        keys: &["volume.seed"],
+        switch: "volume.builder",
+        needs: "curves, fur, cloth, hair or flow",
+        works: |v, switch| !is(v, switch, Builder::Strands.word()),
     },
     Rule {
         keys: &["tress.gathering", "tress.stray", "tress.wave"],

@@ -1,4 +1,4 @@
-//! Parameters of matter that is made of threads: fur, cloth and hair.
+//! Parameters of matter that is made of threads: fur, cloth, hair, and strands of a file.
 
 use super::Cost::Volume;
 use super::Kind::{Float, Int, Text};
@@ -148,5 +148,27 @@ pub(super) const HAIR: Group = Group {
         p("tress.strand_shade", "", "", Float(0.0, 1.0, 0.15), Volume)
             .doc("Relative standard deviation of k_d from strand to strand.")
             .when("Raise it for streaks; lower it for dyed hair."),
+    ],
+};
+
+pub(super) const IMPORT: Group = Group {
+    title: "Strands of a file",
+    about: "Strands of a volume with `volume.builder=strands`, which `volume.source` names: a `.hair` in the \
+         format of Cem Yuksel's models. The cells are cubes, and a box around the volume stands where the \
+         strands stand. Turn files whose z axis points up with `volume.up=z`. `volume.color` to \
+         `volume.color_4` run from root to tip.",
+    params: &[
+        p("import.longest", "", "cells", Int(3, 4096, 256), Volume)
+            .slider(32.0, 512.0)
+            .doc("Number of cells along the longest side of the strands' bounds.")
+            .when("Raise it until single strands show; memory grows with its cube."),
+        p("import.file_unit", "", "m", Float(1e-6, 1e6, 1.0), Volume)
+            .slider(0.001, 1.0)
+            .doc("Length of the file's unit.")
+            .when("Set 0.01 for a file in centimetres, and 0.0254 for one in inches."),
+        p("import.strand_diameter", "", "m", Float(0.0, 1.0, 0.0), Volume)
+            .slider(0.0, 0.01)
+            .doc("Diameter of all strands. 0 takes that of each point from the file.")
+            .when("Set it where the file has no thickness, or few strands stand for many."),
     ],
 };

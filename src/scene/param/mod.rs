@@ -146,6 +146,7 @@ pub const GROUPS: &[Group] = &[
     matter::FUR,
     matter::CLOTH,
     matter::HAIR,
+    matter::IMPORT,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,

@@ -211,8 +211,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.builder", "", "", Choice(Builder::WORDS), Volume)
             .doc(
                 "What the cells are made of: spatial fractal curves as in the paper (`curves`), hairs on a \
-                 skin (`fur`), woven yarns (`cloth`), long hair along v (`hair`), or the grids of a \
-                 simulation in `volume.source` (`flow`).",
+                 skin (`fur`), woven yarns (`cloth`), long hair along v (`hair`), the strands of a \
+                 file in `volume.source` (`strands`), or the grids of a simulation there (`flow`).",
             )
             .when(
                 "Choose `fur`, `cloth` or `hair` for a shell over a mesh, and `flow` for smoke or water that \
@@ -220,8 +220,8 @@ pub(super) const VOLUME: Group = Group {
             ),
         p("volume.source", "", "", Text(""), Volume)
             .doc(
-                "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz). \
-                 Like all paths of a scene, it lies in the folder of the scene. With `####` in its name it \
+                "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz); \
+                 with `volume.builder=strands`, of a file of hair (.hair). Like all paths of a scene, it lies in the folder of the scene. With `####` in its name it \
                  is a sequence, of which `volume.frame` chooses the file.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),

@@ -6,6 +6,7 @@ mod gltf;
 mod mutations;
 mod obj;
 mod paths;
+mod strands;
 mod written;
 
 use std::path::{Path, PathBuf};

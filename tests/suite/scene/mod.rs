@@ -4,6 +4,7 @@
 pub mod animation;
 pub mod boxes;
 mod fur;
+mod hair;
 mod mesh_faults;
 pub mod meshes;
 pub mod presets;

@@ -7,6 +7,7 @@ pub mod cloth;
 pub mod file;
 pub mod fur;
 mod grids;
+pub mod hair;
 pub mod leaps;
 pub mod measured;
 pub mod measured_strands;
