@@ -149,7 +149,8 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
 fn strand_info(file: &Path, json: bool, memory: u64) -> Result<()> {
     let strands = Strands::read(file, memory)?;
     let [low, high] = strands.bounds().unwrap_or_default();
-    let (thin, thick) = strands.widths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), w| (a.min(*w), b.max(*w)));
+    let (thin, thick) =
+        strands.widths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), w| (a.min(*w), b.max(*w)));
     if json {
         return say(&serde_json::json!({
             "strands": strands.count(),

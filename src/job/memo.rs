@@ -170,7 +170,7 @@ impl Source {
     pub fn of(recipe: &Recipe) -> Source {
         let Recipe { water, matter, measured, file, storage, asked_storage, .. } = recipe;
         match file {
-            None if let Some(matter) = matter => Source::Matter(Box::new(matter.clone())),
+            _ if let Some(matter) = matter => Source::Matter(Box::new(matter.clone())),
             None => Source::Water(*water, *storage),
             Some(path) => {
                 let meta = std::fs::metadata(path).ok();

@@ -108,10 +108,8 @@ impl Strands {
             return Err(fault(format!("has {strands} strands and {points} points")));
         }
         let own = |flag: u32, bytes: u64| if flags & flag != 0 { bytes } else { 0 };
-        let want = HEADER as u64
-            + own(SEGMENTS, 2 * of_strands)
-            + 12 * of_points
-            + own(THICKNESS, 4 * of_points);
+        let want =
+            HEADER as u64 + own(SEGMENTS, 2 * of_strands) + 12 * of_points + own(THICKNESS, 4 * of_points);
         if length < want {
             let bytes = format!("{length} bytes long, and {strands} strands of {points} points take {want}");
             return Err(fault(format!("ends early: it is {bytes}")));
@@ -119,7 +117,12 @@ impl Strands {
         let need = 4 * (of_strands + 1) + 16 * of_points;
         if need > budget {
             let what = format!("{} with {points} points", path.display());
-            return Err(Error::memory(what, u128::from(need), budget, "export fewer strands, or raise --memory"));
+            return Err(Error::memory(
+                what,
+                u128::from(need),
+                budget,
+                "export fewer strands, or raise --memory",
+            ));
         }
         let mut starts = Vec::with_capacity(strands as usize + 1);
         starts.push(0);

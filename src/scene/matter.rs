@@ -10,7 +10,9 @@ use super::param::key_of_volume;
 use super::{Limits, Recipe, Values, sequence};
 use crate::model::Strands;
 use crate::util::error::{Error, Result};
-use crate::volume::{ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, StrandsSpec, Up, WaterSpec, Weave, WeaveName};
+use crate::volume::{
+    ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, StrandsSpec, Up, WaterSpec, Weave, WeaveName,
+};
 
 /// Returns the recipe of the volume `name`, whose size, seed and coefficients `water` has; `None` for water
 /// and simulations. With a ramp of colours, cells hold their places on it.
@@ -79,6 +81,7 @@ pub(super) fn strands(
         ));
     }
     let rest = StrandsSpec {
+        path: path.clone(),
         strands: Arc::new(strands),
         size: [0; 3],
         corner: Vec3::ZERO,

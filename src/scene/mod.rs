@@ -598,6 +598,7 @@ impl Scene {
             if let Some(values) = self.values.as_ref().filter(|v| v.is_set_by_user(&alpha))
                 && recipe.file.is_some()
                 && recipe.measured.is_none()
+                && recipe.matter.is_none()
                 && values.float(&alpha) != volume.alpha
             {
                 warnings.push(format!(

@@ -39,7 +39,8 @@ pub struct Recipe {
     pub ramp: Ramp,
     /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
     pub measured: Option<MeasuredSpec>,
-    /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, or the simulation's.
+    /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, the simulation's, or that
+    /// of the strands in `matter`.
     pub file: Option<PathBuf>,
     /// Whether the file is one of a sequence, in which each frame has its own.
     pub is_sequence: bool,
@@ -68,6 +69,7 @@ impl Recipe {
         }
         let file = match &measured {
             Some(measured) => Some(measured.path.clone()),
+            None if let Some(Matter::Strands(strands)) = &matter => Some(strands.path.clone()),
             None if matter.is_some() => None,
             None => build::volume_file(v, name, folder, limits)?,
         };
@@ -88,9 +90,14 @@ impl Recipe {
         })
     }
 
+    /// Whether the cells are read from a file, and not built.
+    fn is_read(&self) -> bool {
+        self.file.is_some() && self.matter.is_none()
+    }
+
     /// Whether the number of cells is known before the volume is read.
     pub(super) fn knows_size(&self) -> bool {
-        self.file.is_none() || self.measured.is_some()
+        !self.is_read() || self.measured.is_some()
     }
 
     /// Transform from texture coordinates, 0 to 1, to the world, metres, if the volume has a place of its
@@ -104,7 +111,8 @@ impl Recipe {
 
     /// Key that names the file.
     pub(super) fn file_key(&self) -> String {
-        key_of_volume(&self.name, if self.measured.is_some() { "volume.source" } else { "volume.file" })
+        let is_source = self.measured.is_some() || self.matter.is_some();
+        key_of_volume(&self.name, if is_source { "volume.source" } else { "volume.file" })
     }
 
     /// Returns the storage of the cells within `memory` bytes, of which the picture needs `beside` for other
@@ -148,13 +156,13 @@ impl Recipe {
             Storage::Dense => built + cells * extra as u128,
             Storage::Sparse => sparse_bytes(self.water.size, expected_cells(&self.water), extra),
         };
-        if self.file.is_some() { [0; 2] } else { [built, building] }
+        if self.is_read() { [0; 2] } else { [built, building] }
     }
 
     /// Bytes that the volume takes while a picture is rendered, if it is built. Those of a file are counted
     /// when it is read.
     pub(crate) fn bytes(&self, pyramid: bool) -> u128 {
-        if self.file.is_some() { 0 } else { self.bytes_in(self.storage, pyramid) }
+        if self.is_read() { 0 } else { self.bytes_in(self.storage, pyramid) }
     }
 }
 
@@ -293,7 +301,7 @@ pub(super) fn recipes(v: &Values, folder: Option<&Path>, limits: &Limits) -> Res
     }
     let recipes = shown.iter().map(|name| {
         let recipe = Recipe::new(v, name, folder, limits)?;
-        if recipe.file.is_none() {
+        if !recipe.is_read() {
             // A volume that is too large by itself is refused with its own numbers.
             recipe.storage_within(limits.memory, 0).map_err(|e| of_volume(name, e))?;
         }
@@ -334,7 +342,7 @@ impl Parts {
     pub(super) fn choose_storages(&mut self, memory: u64) -> Result<()> {
         let (beside, pyramid) = (self.least_bytes_beside_volume(), self.has_pyramid());
         if let [recipe] = &mut self.recipes[..] {
-            if recipe.file.is_none() {
+            if !recipe.is_read() {
                 recipe.storage =
                     recipe.storage_within(memory, beside).map_err(|e| of_volume(&recipe.name, e))?;
             }
@@ -463,11 +471,11 @@ impl Scene {
             &self.recipes[number];
         let volume = match (file, storage, cache) {
             _ if let Some(measured) = measured => build_measured(measured, *asked_storage, memory, monitor),
+            _ if let Some(matter) = matter => matter.build(monitor),
             (Some(path), ..) => {
                 let k = [water.k_d, water.k_s];
                 read_npz(path, &ReadOptions { storage: *asked_storage, budget: memory, k }, monitor)
             }
-            _ if let Some(matter) = matter => matter.build(monitor),
             (None, Storage::Dense, Some(cache)) => kept_water(water, cache, monitor),
             (None, Storage::Dense, None) => build_water(water, monitor),
             // A sparse volume's cache file would be large enough to evict every other.

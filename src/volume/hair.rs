@@ -149,7 +149,11 @@ impl HairSpec {
             let risen = smooth((along / RISE).min(1.0));
             let z = nz + (at.y - nz) * risen;
             *point = Vec3::new(at.x, point.y, z);
-            thread.looks.push(Look { width: self.width_cells * (1.0 - self.thinning * way), place: way, k_d });
+            thread.looks.push(Look {
+                width: self.width_cells * (1.0 - self.thinning * way),
+                place: way,
+                k_d,
+            });
         }
     }
 }

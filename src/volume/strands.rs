@@ -1,5 +1,6 @@
 //! §2 Builder of strands that another program made: a wig, a fleece, a field of grass.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -13,6 +14,8 @@ use crate::util::monitor::Monitor;
 /// Recipe of a volume of given strands. Equal recipes build equal bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrandsSpec {
+    /// File of the strands.
+    pub path: PathBuf,
     /// The strands.
     pub strands: Arc<Strands>,
     /// nx, ny, nz, cells, which are cubes.
@@ -71,7 +74,10 @@ impl StrandsSpec {
 
     /// The strands.
     pub(super) fn threads(&self) -> Threads<impl Fn(usize, &mut Thread) + Sync> {
-        Threads { count: self.strands.count(), draw: |number, thread: &mut Thread| self.strand(number, thread) }
+        Threads {
+            count: self.strands.count(),
+            draw: |number, thread: &mut Thread| self.strand(number, thread),
+        }
     }
 
     /// Writes the strand with a number.

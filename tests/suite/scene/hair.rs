@@ -73,10 +73,9 @@ fn strands_without_thickness_take_that_of_the_scene() {
     let given = given.expect("a scene");
     let Some(Matter::Strands(spec)) = &given.recipes[0].matter else { panic!("no strands") };
     assert_eq!(spec.width, Some(0.02));
-    for (own, words) in [
-        ("storage = \"sparse\"", &["volumes.s.storage", "auto"][..]),
-        ("memory = 1", &["memory"]),
-    ] {
+    for (own, words) in
+        [("storage = \"sparse\"", &["volumes.s.storage", "auto"][..]), ("memory = 1", &["memory"])]
+    {
         super::refused(scene(own, 0.1).1, words);
     }
 }
@@ -102,5 +101,7 @@ fn keys_of_hair_and_of_files_have_their_effect_with_their_builder_alone() {
     for set in ["volumes.s.nx=20", "volumes.s.seed=3", "volumes.s.amplitude=0.3", "volumes.s.grid=smoke"] {
         assert!(said(&strands, set), "{set}");
     }
+    // The file is one that the picture depends on.
+    assert_eq!(strands.references()[0].0, "volumes.s.source");
     assert!(!said(&strands, "volumes.s.longest=30") && !said(&strands, "volumes.s.up=y"));
 }

@@ -51,7 +51,10 @@ fn strands_hide_length_times_width_from_the_rise_to_the_tip() {
     let cases = [
         (PLAIN, want * 80.0),
         // At `way` of its length a strand has lost that share of its width.
-        (HairSpec { thinning: 1.0, ..PLAIN }, want * (10..90).map(|y| 1.0 - (f64::from(y) + 0.5) / 90.0).sum::<f64>()),
+        (
+            HairSpec { thinning: 1.0, ..PLAIN },
+            want * (10..90).map(|y| 1.0 - (f64::from(y) + 0.5) / 90.0).sum::<f64>(),
+        ),
         // Gathering and locks move strands, and do not lengthen them much.
         (HairSpec { locks: 12, gathering: 0.3, ..PLAIN }, want * 80.0),
         (HairSpec { size: [48, 240, 16], width_cells: 0.03, ..PLAIN }, want * 160.0),
@@ -69,7 +72,8 @@ fn strands_hide_length_times_width_from_the_rise_to_the_tip() {
 
 #[test]
 fn strands_run_from_the_skin_to_the_tip_with_the_sign_of_the_flow() {
-    let spec = HairSpec { locks: 20, gathering: 0.6, wave_cells: 1.0, waves: 3.0, amplitude_cells: 1.0, ..PLAIN };
+    let spec =
+        HairSpec { locks: 20, gathering: 0.6, wave_cells: 1.0, waves: 3.0, amplitude_cells: 1.0, ..PLAIN };
     let volume = build(&spec);
     let back = volume.flow_cells().filter(|cell| cell.v().y <= 0.0).count();
     assert!(back * 200 < volume.flow_cells().count(), "{back} cells point to the root");
@@ -103,8 +107,7 @@ fn locks_gather_their_strands_at_the_tip_and_strays_stay_away() {
 fn waves_have_the_amplitude_and_the_number_that_the_recipe_says() {
     // Few strands in a wide volume, so that hardly any two meet in a cell.
     let size = [120, 120, 40];
-    let spec =
-        HairSpec { size, strands: 400, locks: 400, wave_cells: 0.8, waves: 4.0, reach: 1.0, ..PLAIN };
+    let spec = HairSpec { size, strands: 400, locks: 400, wave_cells: 0.8, waves: 4.0, reach: 1.0, ..PLAIN };
     let volume = build(&spec);
     let (mut sum, mut all) = (0.0, 0.0);
     for cell in (12..120).flat_map(|y| layer(&volume, y)).filter(|cell| cell.has_direction()) {
