@@ -30,8 +30,10 @@ override CODES: bool = false;
 override CORNERED: bool = false;
 // Whether rays walk to a light in some patches, because it is too close for light volumes.
 override MARCHED: bool = false;
-// The strand model of flowing water replaces fibres.
+// The strand model of flowing water and hair replaces fibres.
 override STRAND: bool = false;
+// The strands are hairs, whose colour the ambient light takes.
+override HAIR: bool = false;
 // Light is scattered more than once.
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
@@ -87,6 +89,9 @@ struct Reflection {
     strand: Strand,
     similarity: Similarity,
     ramp: Ramp,
+    // Ambient light that hairs send on.
+    ambient: vec3<f32>,
+    pad: f32,
 }
 
 struct VolumeConstants {
@@ -103,6 +108,14 @@ struct VolumeConstants {
     pad_a: u32,
     pad_b: u32,
     pad_c: u32,
+}
+
+// Ambient light that cells, of mist or not, send on.
+fn ambient_of(is_of_mist: bool) -> vec3<f32> {
+    if HAIR {
+        return select(reflection.ambient, frame.ambient, is_of_mist);
+    }
+    return frame.ambient;
 }
 
 // Constants of the volume with this number.
@@ -352,7 +365,7 @@ fn trace(
     // The weights of the ambient light add up: Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end.
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    var color = frame.ambient * (before.w - end) + passed;
+    var color = ambient_of(quad.mist > 0.0) * (before.w - end) + passed;
     if COLORED {
         color += frame.ambient * tint;
     }

@@ -195,7 +195,11 @@ fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
         let root = sqrt(seen.inverse_q);
         var t_dot = vec2<f32>(dot3(seen.v, light.l_v), seen.t_dot_e) * root;
         if MANY_DIRECTIONS {
-            t_dot = spread_of_one(seen.spread, light.l_v);
+            if TILTED {
+                t_dot = spread_along(seen.spread, light.l_v, ROOT_TO_TIP);
+            } else {
+                t_dot = spread_of_one(seen.spread, light.l_v);
+            }
         }
         if !is_mist(view) {
             let k_d = seen.k_d;

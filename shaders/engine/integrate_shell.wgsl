@@ -104,7 +104,7 @@ fn trace_shell(
     let end = ray.transmittance;
     let ends = is_last | (end < frame.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    return vec4<f32>(before.rgb + ray.light + frame.ambient * (before.w - end) + passed, end);
+    return vec4<f32>(before.rgb + ray.light + ambient_of(false) * (before.w - end) + passed, end);
 }
 
 // Walks through a tetrahedron. Twin: Integrator::through.
@@ -276,7 +276,16 @@ fn shell_lit(
             let root = sqrt(inverse_q);
             var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
             if MANY_DIRECTIONS {
-                t_dot = spread_of_one(spread, l);
+                if TILTED {
+                    var way = ROOT_TO_TIP;
+                    if !is_texture {
+                        way = row_x * way.x + row_y * way.y + row_z * way.z;
+                        way = select(way, -way, det < 0.0);
+                    }
+                    t_dot = spread_along(spread, l, way);
+                } else {
+                    t_dot = spread_of_one(spread, l);
+                }
             }
             fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
         } else {

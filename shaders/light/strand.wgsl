@@ -1,11 +1,19 @@
-// §5 The reflection model for flowing water: Ψ of the strands from a table, and Ψ of the air between them.
+// §5 The reflection model for flowing water and for hair: Ψ of the strands from a table, and Ψ of the air
+// between them.
 // Twin: src/light/strand/table.rs, which describes the table's axes; src/light/strand/mod.rs describes the
 // model.
 
-// Number of nodes of the table along each axis.
+// Whether scales on the strands are tilted, so that the sign of t matters.
+override TILTED: bool = false;
+
+// Number of nodes of the table along each axis, and that along x with tilted scales.
 const STRAND_X: f32 = 40.0;
+const TILTED_X: f32 = 79.0;
 const STRAND_Y: f32 = 48.0;
 const STRAND_Z: f32 = 128.0;
+// Way along which hairs run from root to tip, in the space of the texture. Twin: ROOT_TO_TIP of
+// src/light/strand/mod.rs.
+const ROOT_TO_TIP: vec3<f32> = vec3<f32>(0.0, 1.0, -1.0);
 // Weight w of the table's z axis.
 const SINE_SHARE: f32 = 0.75;
 
@@ -36,9 +44,13 @@ fn strand_psi(
     let s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));
     let cos_d = sqrt(clamp((1.0 + coco + sisi) * 0.5, 0.0, 1.0));
     let sin2_half_phi = clamp((coco + sisi - l_dot_e) / (2.0 * max(coco, 1e-6)), 0.0, 1.0);
-    let x = s * (1.0 + strand.squeeze) / (s + strand.squeeze);
+    var x = s * (1.0 + strand.squeeze) / (s + strand.squeeze);
+    var size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
+    if TILTED {
+        x = 0.5 + 0.5 * select(x, -x, t_dot_l + t_dot_e < 0.0);
+        size.x = TILTED_X;
+    }
     let z = SINE_SHARE * sqrt(sin2_half_phi) + (1.0 - SINE_SHARE) * (1.0 - sqrt(1.0 - sin2_half_phi));
-    let size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
     let node = vec3<f32>(x, cos_d, z) * (size - 1.0);
     let texel = textureSampleLevel(table, linear, (node + 0.5) / size, 0.0).rgb;
     let strands = texel / sqrt(coco + strand.spread);

@@ -141,6 +141,14 @@ fn spread_of_one(spread: Spread, l_v: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(sqrt(clamp(cosines.x, 0.0, 1.0)), select(e, -e, cosines.y < 0.0));
 }
 
+// Cosines of spread_of_one with the sign by which the direction runs along `way`, a covector as `l_v`. Twin:
+// Spread::along.
+fn spread_along(spread: Spread, l_v: vec3<f32>, way: vec3<f32>) -> vec2<f32> {
+    let one = spread_of_one(spread, l_v);
+    let mean = moments_times(spread.moments, l_v) * spread.inverse_q + spread.s_e;
+    return select(one, -one, (dot3(mean, way) < 0.0) != (one.x + one.y < 0.0));
+}
+
 // Summands of Ψ of a distribution of directions. Twin: Spread::psi_parts, where the highlight's widening is
 // derived.
 fn spread_psi_parts(

@@ -138,6 +138,14 @@ impl Spread {
         [cos2_l.clamp(0.0, 1.0).sqrt(), if product < 0.0 { -e } else { e }]
     }
 
+    /// Returns the cosines of [`Spread::of_one`] with the sign by which the direction runs along `way`, a
+    /// covector as `l_v`. The mean of v·(v·(l + e)) tells it.
+    pub fn along(&self, [t_dot_l, t_dot_e]: [f32; 2], l_v: Vec3, way: Vec3) -> [f32; 2] {
+        let mean = self.moments.times(l_v) * self.inverse_q + self.s_e;
+        let is_against = (mean.dot(way) < 0.0) != (t_dot_l + t_dot_e < 0.0);
+        if is_against { [-t_dot_l, -t_dot_e] } else { [t_dot_l, t_dot_e] }
+    }
+
     /// Reflection Ψ, the sum of [`Spread::psi_parts`].
     pub fn psi(&self, k_d: f32, k_s: f32, p: f32, l_v: Vec3, l_dot_e: f32) -> f32 {
         let [diffuse, specular] = self.psi_parts([k_d, k_s], p, l_v, l_dot_e);

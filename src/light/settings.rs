@@ -1,6 +1,9 @@
 //! §5 Settings of the light: where angles are measured, visibility, reflection and scattering.
 
+use glam::Vec3;
+
 use super::strand::StrandParams;
+use super::strand::table::{StrandShading, StrandTable};
 use crate::util::words::words;
 
 /// Space in which the fibre model's angles are measured.
@@ -34,6 +37,8 @@ pub enum Reflection {
     KajiyaKay,
     /// Strands of water with air between them ([`super::strand`]).
     Strand(StrandParams),
+    /// Hairs ([`super::strand::hair`]). The ambient light takes their colour, too.
+    Hair(StrandParams),
 }
 
 /// Model of a [`Reflection`], without its parameters.
@@ -43,9 +48,11 @@ pub enum ReflectionKind {
     KajiyaKay,
     /// [`Reflection::Strand`].
     Strand,
+    /// [`Reflection::Hair`].
+    Hair,
 }
 
-words! { ReflectionKind { KajiyaKay => "kajiya-kay", Strand => "strand" } }
+words! { ReflectionKind { KajiyaKay => "kajiya-kay", Strand => "strand", Hair => "hair" } }
 
 impl Reflection {
     /// Returns the model without its parameters.
@@ -53,6 +60,29 @@ impl Reflection {
         match self {
             Reflection::KajiyaKay => ReflectionKind::KajiyaKay,
             Reflection::Strand(_) => ReflectionKind::Strand,
+            Reflection::Hair(_) => ReflectionKind::Hair,
+        }
+    }
+
+    /// Strands that cells hold, if the model is one of strands.
+    pub fn strands(&self) -> Option<&StrandParams> {
+        match self {
+            Reflection::KajiyaKay => None,
+            Reflection::Strand(params) | Reflection::Hair(params) => Some(params),
+        }
+    }
+
+    /// The model of [`Reflection::strands`], with its table.
+    pub fn shading(&self) -> Option<StrandShading> {
+        self.strands().map(StrandShading::new)
+    }
+
+    /// Share of the ambient light that cells give back, linear RGB. Only that of hairs is below 1: water is
+    /// nearly white, and what fibres absorb of it is not known.
+    pub fn ambient_share(&self) -> Vec3 {
+        match self {
+            Reflection::KajiyaKay | Reflection::Strand(_) => Vec3::ONE,
+            Reflection::Hair(params) => StrandTable::of(params).moments().albedo.as_vec3(),
         }
     }
 }

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
-use super::param::{key_of_volume, split_volume_key};
+use super::param::{HAIR_COLOR, key_of_volume, split_volume_key};
 use super::{Limits, MAX_LIGHTS, Place, Raw, Values, measured, meshes, presets, sequence, volumes};
 use crate::curve::{CurveShape, levels_for};
 use crate::grid;
 use crate::light::environment::{Environment, Settings, Sky, Source};
 use crate::light::haze::Haze;
 use crate::light::strand::StrandParams;
+use crate::light::strand::hair::{Hair, Pigment};
+use crate::light::strand::water::Water;
 use crate::light::{Background, Cone, Light, LightKind, Reflection, ReflectionKind, Scattering, Visibility};
 use crate::picture::{AutoExposure, Camera, Dither, Filter, Gamut, Image, Look, Tone};
 use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
@@ -299,22 +301,47 @@ pub(super) fn background(v: &Values) -> Background {
     Background { zenith: v.triple("background.zenith"), horizon: v.triple("background.horizon") }
 }
 
-pub(super) fn reflection(v: &Values) -> Reflection {
-    match v.choice("light.reflection", ReflectionKind::from_word) {
+pub(super) fn reflection(v: &Values) -> Result<Reflection> {
+    Ok(match v.choice("light.reflection", ReflectionKind::from_word) {
         ReflectionKind::KajiyaKay => Reflection::KajiyaKay,
         ReflectionKind::Strand => Reflection::Strand(strand(v)),
-    }
+        ReflectionKind::Hair => Reflection::Hair(hair(v)?),
+    })
+}
+
+fn hair(v: &Values) -> Result<StrandParams> {
+    let pigment = if v.is_set(HAIR_COLOR) {
+        let color = v.triple(HAIR_COLOR);
+        if color.max_element() > 1.0 {
+            return Err(Error::input(
+                format!("{HAIR_COLOR} = {color} reflects more light than it receives"),
+                "choose components of at most 1; for more light raise lights.*.intensity",
+            ));
+        }
+        Pigment::Color(color.as_dvec3())
+    } else {
+        Pigment::Melanin(v.float("hair.melanin"), v.float("hair.redness"))
+    };
+    let hair = Hair {
+        eta: v.float("hair.eta"),
+        tilt_degrees: v.float("hair.tilt"),
+        roughness_m: v.float("hair.beta_m"),
+        roughness_n: v.float("hair.beta_n"),
+        pigment,
+    };
+    Ok(hair.strand())
 }
 
 fn strand(v: &Values) -> StrandParams {
-    StrandParams {
+    let water = Water {
         radius_m: v.float("strand.radius"),
         roughness_m: v.float("strand.roughness_m"),
         roughness_n: v.float("strand.roughness_n"),
         absorption: v.float("strand.absorption"),
         aeration: v.float("strand.aeration"),
         g: v.float("strand.g"),
-    }
+    };
+    water.strand()
 }
 
 pub(super) fn scattering(v: &Values) -> Result<Scattering> {

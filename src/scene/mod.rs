@@ -336,7 +336,7 @@ impl Scene {
             angles: v.choice("light.frame", AngleFrame::from_word),
             visibility: v.choice("light.visibility", Visibility::from_word),
             light_cache: (u64::from(v.count("light.cache")) << 20).min(limits.memory / 2),
-            reflection: build::reflection(v),
+            reflection: build::reflection(v)?,
             scattering: build::scattering(v)?,
             p: v.float("light.p"),
             camera,

@@ -185,8 +185,9 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if colors.is_empty() {
         return Ok(colors);
     }
-    if v.choice("light.reflection", ReflectionKind::from_word) == ReflectionKind::Strand {
-        return of_light("light.reflection", ReflectionKind::Strand.word(), ReflectionKind::KajiyaKay.word());
+    let reflection = v.choice("light.reflection", ReflectionKind::from_word);
+    if reflection != ReflectionKind::KajiyaKay {
+        return of_light("light.reflection", reflection.word(), ReflectionKind::KajiyaKay.word());
     }
     if v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple {
         return of_light("light.scattering", Scattering::Multiple.word(), Scattering::Single.word());

@@ -121,6 +121,16 @@ impl<S: Simd> Lanes3<S> {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// Vector product.
+    #[inline(always)]
+    pub fn cross(self, other: Lanes3<S>) -> Lanes3<S> {
+        Lanes3 {
+            x: self.y * other.z - other.y * self.z,
+            y: self.z * other.x - other.z * self.x,
+            z: self.x * other.y - other.x * self.y,
+        }
+    }
+
     /// Sum of two vectors.
     #[inline(always)]
     pub fn plus(self, other: Lanes3<S>) -> Lanes3<S> {

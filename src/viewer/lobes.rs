@@ -1,4 +1,4 @@
-//! Scattering lobes: the distribution of the water's reflection over directions, for one light. These are the
+//! Scattering lobes: the distribution of a cell's reflection over directions, for one light. These are the
 //! numbers behind the plot in the parameter panel.
 
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -95,7 +95,7 @@ pub fn alpha(step: usize) -> f64 {
 pub fn curves(setting: &Setting) -> Vec<Curve> {
     match setting.reflection {
         Reflection::KajiyaKay => fibre(setting),
-        Reflection::Strand(mut params) => {
+        Reflection::Strand(mut params) | Reflection::Hair(mut params) => {
             params.aeration = cell_aeration(params.aeration, setting.k_d, setting.k_s);
             strand(&Strand::new(&params), setting)
         }
@@ -110,7 +110,9 @@ fn strand(strand: &Strand, setting: &Setting) -> Vec<Curve> {
     let parts: [Part<Lobes>; 6] = [
         ("R", "Reflected off the outside of the strand", |l| luminance(l.r)),
         ("TT", "Transmitted through the strand", |l| luminance(l.tt)),
-        ("TRT", "Reflected once inside the strand: the rainbow", |l| luminance(l.trt)),
+        ("TRT", "Reflected once inside the strand: the rainbow, or the coloured highlight of hair", |l| {
+            luminance(l.trt)
+        }),
         ("rest", "Reflected inside the strand twice or more", |l| luminance(l.residual)),
         ("aerated", "Scattered by air bubbles", |l| luminance(l.aerated)),
         ("total", "Φ, the sum", |l| luminance(l.total())),

@@ -46,7 +46,11 @@ const GROUPS: [Group; 11] = [
         &["materials", "sheets", "splashes", "quads", "boxes"],
     ),
     group("Meshes", "", MESHES),
-    group("Light", "The walk through the cells, attenuation and reflection", &["trace", "light", "strand"]),
+    group(
+        "Light",
+        "The walk through the cells, attenuation and reflection",
+        &["trace", "light", "strand", "hair"],
+    ),
     group("Lights", "", LIGHTS),
     group(
         "Surroundings",

@@ -19,7 +19,7 @@ use crate::light::ramp::{Ink, Ramp};
 use crate::light::scatter::media::{Media, MultipleMedium, kinds};
 use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
-use crate::light::{AngleFrame, Light, Reflection, Visibility};
+use crate::light::{AngleFrame, Light, Visibility};
 use crate::mapping::shell::Inside;
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::Camera;
@@ -62,6 +62,8 @@ pub struct Integrator<'a> {
     eyes: Vec<Option<Inside>>,
     medium: Medium,
     strand: Option<StrandShading>,
+    /// Ambient light that cells send on, but those of mist.
+    ambient: Vec3,
     /// Whether any volume has colours.
     is_colored: bool,
     media: Option<Media>,
@@ -331,10 +333,8 @@ impl<'a> Integrator<'a> {
                 .collect(),
             eyes: scene.shells.iter().map(|shell| scene.eye_inside(shell)).collect(),
             medium: Medium::of(&scene.trace),
-            strand: match &scene.reflection {
-                Reflection::Strand(params) => Some(StrandShading::new(params)),
-                Reflection::KajiyaKay => None,
-            },
+            strand: scene.reflection.shading(),
+            ambient: scene.ambient * scene.reflection.ambient_share(),
             is_colored: scene.is_colored(),
             media: scene.media(volumes),
             medium_of_quad: kinds(&scene.quads).1,
@@ -462,15 +462,18 @@ impl<'a> Integrator<'a> {
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, tint, cells } = result;
-        self.composed(ray.point, transmittance, cells, (&lit, tint), SheetOrder { before, is_last, behind })
+        let order = SheetOrder { before, is_last, behind };
+        let is_mist = ray.matter[0].mist > 0.0;
+        self.composed((ray.point, is_mist), transmittance, cells, (&lit, tint), order)
     }
 
-    /// Result of a sheet that a ray meets at `point` of the world and that lets `transmittance` pass, in
-    /// which the lights send `lit` to the eye. The second part of `lit` is [`LevelResult::tint`].
+    /// Result of a sheet, of mist or not, that a ray meets at `point` of the world and that lets
+    /// `transmittance` pass, in which the lights send `lit` to the eye. The second part of `lit` is
+    /// [`LevelResult::tint`].
     #[inline]
     fn composed(
         &self,
-        point: Vec3,
+        (point, is_mist): (Vec3, bool),
         transmittance: f32,
         cells: [u32; 2],
         (lit, tint): (&[Lit], Vec3),
@@ -478,7 +481,7 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let mut radiance = self.scene.ambient * (before - transmittance) + passed;
+        let mut radiance = self.ambient_of(is_mist) * (before - transmittance) + passed;
         if self.is_colored {
             radiance += self.scene.ambient * tint;
         }
@@ -488,6 +491,12 @@ impl<'a> Integrator<'a> {
             radiance += intensity * sum;
         }
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
+    }
+
+    /// Ambient light that cells, of mist or not, send on.
+    #[inline]
+    fn ambient_of(&self, is_mist: bool) -> Vec3 {
+        if is_mist { self.scene.ambient } else { self.ambient }
     }
 
     /// Multiple scattering in a quad, if the scene asks for it.

@@ -8,6 +8,7 @@ use super::shader::resolve;
 use super::specialise::Source;
 use super::{Inputs, compute_pipeline};
 use crate::light::fibre::whole_exponent;
+use crate::light::strand::StrandParams;
 use crate::light::visibility::{Form, LightVolumes};
 use crate::light::{Reflection, Scattering, Visibility};
 use crate::scene::Scene;
@@ -45,6 +46,8 @@ pub struct Variant {
     cornered: bool,
     marched: bool,
     strand: bool,
+    hair: bool,
+    tilted: bool,
     colored: bool,
     multiple: bool,
     eroded: bool,
@@ -81,7 +84,9 @@ impl Variant {
             codes: light_volumes.is_some_and(|volumes| volumes.form == Form::Codes),
             cornered: light_volumes.is_some_and(LightVolumes::cornered),
             marched: light_volumes.is_some_and(LightVolumes::marches),
-            strand: matches!(scene.reflection, Reflection::Strand(_)),
+            strand: scene.reflection.strands().is_some(),
+            hair: matches!(scene.reflection, Reflection::Hair(_)),
+            tilted: scene.reflection.strands().is_some_and(StrandParams::is_tilted),
             colored: scene.is_colored(),
             multiple: scene.scattering == Scattering::Multiple,
             eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
@@ -202,6 +207,8 @@ impl Integrate {
             ("CORNERED", number(variant.cornered)),
             ("MARCHED", number(variant.marched)),
             ("STRAND", number(variant.strand)),
+            ("HAIR", number(variant.hair)),
+            ("TILTED", number(variant.tilted)),
             ("COLORED", number(variant.colored)),
             ("MULTIPLE", number(variant.multiple)),
             ("ERODED", number(variant.eroded)),

@@ -348,22 +348,26 @@ pub struct Reflection {
     pub strand: Strand,
     pub similarity: Similarity,
     pub ramp: Ramp,
+    pub ambient: [f32; 3],
+    pub pad: f32,
 }
 
 impl Reflection {
-    /// Packs the constants of the models that a scene uses, and the colours of its first volume; the others
-    /// stay 0.
+    /// Packs the constants of the models that a scene uses, the colours of its first volume and the ambient
+    /// light that cells send on; the others stay 0.
     pub fn new(
+        scene: &Scene,
         strand: Option<&StrandShading>,
         similarity: Option<&scatter::Similarity>,
-        ramp: &ramp::Ramp,
     ) -> Self {
         let similarity = similarity.map(Similarity::from);
         let strand = strand.map(Strand::from);
         Reflection {
             strand: strand.unwrap_or_default(),
             similarity: similarity.unwrap_or_default(),
-            ramp: Ramp::from(ramp),
+            ramp: Ramp::from(&scene.recipes[0].ramp),
+            ambient: (scene.ambient * scene.reflection.ambient_share()).to_array(),
+            pad: 0.0,
         }
     }
 }

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::device::Gpu;
 use super::layout;
 use super::strand::StrandTexture;
-use crate::light::Reflection;
 use crate::light::scatter::{Profile, Similarity};
-use crate::light::strand::table::{StrandShading, StrandTable};
+use crate::light::strand::table::StrandTable;
 use crate::scene::Scene;
 use crate::volume::VolumeTexture;
 
@@ -35,13 +34,10 @@ pub struct BoundReflection {
 impl Reflections {
     /// Returns the bindings for a scene, and uploads the tables that are not on the device yet.
     pub fn bind(&mut self, gpu: &Gpu, scene: &Scene, volumes: &[VolumeTexture]) -> BoundReflection {
-        let strand = match &scene.reflection {
-            Reflection::Strand(params) => Some(StrandShading::new(params)),
-            Reflection::KajiyaKay => None,
-        };
+        let strand = scene.reflection.shading();
         let media = scene.media(volumes);
         let waters = media.as_ref().map_or(Vec::new(), |media| media.waters.clone());
-        let uniform = layout::Reflection::new(strand.as_ref(), waters.first(), &scene.recipes[0].ramp);
+        let uniform = layout::Reflection::new(scene, strand.as_ref(), waters.first());
         let table = strand.map(|strand| strand.table);
         let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,

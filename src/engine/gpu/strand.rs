@@ -1,7 +1,7 @@
-//! The strand model's table on the device: the reflection of flowing water.
+//! The strand model's table on the device: the reflection of flowing water and of hair.
 
 use super::device::Gpu;
-use crate::light::strand::table::{SIZE, StrandTable};
+use crate::light::strand::table::StrandTable;
 
 /// The table as `shaders/light/strand.wgsl` reads it.
 pub struct StrandTexture {
@@ -12,9 +12,9 @@ pub struct StrandTexture {
 }
 
 impl StrandTexture {
-    /// Uploads a table, 1 MB.
+    /// Uploads a table, 1 or 2 MB.
     pub fn new(gpu: &Gpu, table: &StrandTable) -> Self {
-        Self::with(gpu, SIZE.map(|n| n as u32), table.texels())
+        Self::with(gpu, table.size().map(|n| n as u32), table.texels())
     }
 
     /// Uploads one texel, which is bound for scenes without the strand model.

@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{COSINES, Layers, Profile, Scattering, Similarity, VIEWS, full_depth, layer_means};
 use crate::light::Reflection;
-use crate::light::strand::table::StrandShading;
 use crate::mapping::{Material, Quad};
 use crate::trace::{Attenuation, MIST_OF_CELLS, MIST_RHO};
 use crate::volume::VolumeTexture;
@@ -105,13 +104,13 @@ pub fn profile_length(layers: u32) -> u32 {
 }
 
 fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scattering {
-    match reflection {
-        Reflection::Strand(params) => {
-            let moments = StrandShading::new(params).moments();
+    match reflection.shading() {
+        Some(shading) => {
+            let moments = shading.moments();
             let g = moments.mean_cosine.element_sum() / 3.0;
             Scattering { albedo: moments.albedo.as_vec3(), g: g as f32 }
         }
-        Reflection::KajiyaKay => {
+        None => {
             let s = volume.statistics();
             Scattering::kajiya_kay(s.k_d_mean as f32, s.k_s_mean as f32, p, MOST_ALBEDO)
         }

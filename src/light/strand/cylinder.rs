@@ -7,9 +7,6 @@
 
 use glam::DVec3;
 
-/// Index of refraction of water at 20 °C in yellow light.
-pub const ETA: f64 = 1.333;
-
 /// Number of lobes: R, TT, TRT, and a residual for all longer paths.
 pub const LOBES: usize = 4;
 

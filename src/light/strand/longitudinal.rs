@@ -11,12 +11,34 @@ pub fn variances(roughness: f64) -> [f64; LOBES] {
     [v, v / 4.0, 4.0 * v, 4.0 * v]
 }
 
+/// Sums θ_i + θ_o, radians, at which the four lobes have their middle, for scales on the surface that are
+/// tilted by `tilt`.
+///
+/// The outer surface of a scale widens towards the tip, so its normal is tilted towards the root. What it
+/// reflects is turned by 2α towards the root, and what comes through or back from the inside is turned towards
+/// the tip. The values are those of Marschner et al. 2003, table 1: half of the sum is −α for R, α/2 for TT and
+/// 3α/2 for TRT. Light that stays inside for longer leaves without a preference, as it does around the strand.
+pub fn shifts(tilt: f64) -> [f64; LOBES] {
+    [-2.0 * tilt, tilt, 3.0 * tilt, 0.0]
+}
+
 /// Longitudinal lobe M(θ_i, θ_o) per unit of sin θ_o; its integral over sin θ_o is 1.
 ///
 /// `coco` = cos θ_i·cos θ_o and `sisi` = sin θ_i·sin θ_o. Both directions point outward, so the mirror
 /// direction is θ_o = −θ_i. The exponential and I₀ are scaled so that neither overflows for any v.
+/// [`shifted`] may turn an inclination beyond 90°, where `coco` is negative; I₀ is even.
 pub fn longitudinal(v: f64, coco: f64, sisi: f64) -> f64 {
-    ((coco - sisi - 1.0) / v).exp() * bessel_i0e(coco / v) / (v * -(-2.0 / v).exp_m1())
+    let x = coco.abs();
+    ((x - sisi - 1.0) / v).exp() * bessel_i0e(x / v) / (v * -(-2.0 / v).exp_m1())
+}
+
+/// Longitudinal lobe M(θ_i − s/2, θ_o − s/2) whose middle is at θ_i + θ_o = `shift` = s. Both inclinations are
+/// turned by one half, so light and eye may change places. `sum` = θ_i + θ_o, the rest as in [`longitudinal`].
+pub fn shifted(v: f64, shift: f64, sum: f64, coco: f64, sisi: f64) -> f64 {
+    // The turn keeps cos(θ_i − θ_o) = coco + sisi and changes cos(θ_i + θ_o) = coco − sisi. It is exactly 0
+    // without a shift.
+    let more = 0.5 * ((sum - shift).cos() - sum.cos());
+    longitudinal(v, coco + more, sisi - more)
 }
 
 /// Scaled Bessel function e^(−x)·I₀(x) for x ≥ 0 (Abramowitz and Stegun 1964, 9.8.1 and 9.8.2; error below

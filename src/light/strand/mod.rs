@@ -1,73 +1,72 @@
-//! §5, beyond the paper: a reflection model for flowing water. Every cell of the volume holds strands of
-//! water along the flow, with air between them.
+//! §5, beyond the paper: a reflection model for matter of round, clear strands. Every cell of the volume holds
+//! strands along its direction: water with air between them, or hair.
 //!
 //! A strand is a dielectric cylinder along the cell's direction t. Light that meets it leaves by reflection
 //! (R), by transmission (TT), after one internal reflection (TRT, which makes the rainbow) or after several.
 //! The sum is a phase function
 //!
-//! Φ(l→e) = b(θ_i)·b(θ_o)·Σ_p M_p(θ_i, θ_o)·N_p(θ_d, φ),   θ_d = (θ_o − θ_i)/2
+//! Φ(l→e) = b(θ_i)·b(θ_o)·Σ_p M_p(θ_i − s_p/2, θ_o − s_p/2)·N_p(θ_d, φ),   θ_d = (θ_o − θ_i)/2
 //!
 //! in 1/sr. Its integral over all directions is the albedo, which is 1 without absorption. The vectors l and
 //! e point outward; sin θ_i = t·l, sin θ_o = t·e, and φ is the angle between l and e around t. Φ does not
-//! change when l and e are exchanged, when t is reversed, or for φ → −φ.
+//! change when l and e are exchanged, or for φ → −φ.
 //!
-//! The sum over lobes follows Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light Scattering from Human
-//! Hair Fibers", SIGGRAPH 2003. [`longitudinal`] follows d'Eon et al. 2011 and [`azimuthal`] Chiang et al.
-//! 2016. [`cylinder`] and [`absorption`] describe water, and [`balance`] conserves energy. The air has a
-//! Henyey–Greenstein phase function (1941), mixed in by the cell's own coefficients. [`table`] tabulates the
-//! model for the renderers.
+//! The surface of a hair is covered with scales that are tilted by α against it. They turn lobe p by s_p
+//! along the strand ([`longitudinal::shifts`]), which makes two highlights of one. With α = 0, as in water,
+//! Φ does not change either when t is reversed. Otherwise t runs from root to tip.
+//!
+//! The sum over lobes and their shifts follow Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light
+//! Scattering from Human Hair Fibers", SIGGRAPH 2003. [`longitudinal`] follows d'Eon et al. 2011 and
+//! [`azimuthal`] Chiang et al. 2016. [`cylinder`] has the optics, [`water`] and [`hair`] describe what the
+//! strands are of, and [`balance`] conserves energy. The air has a Henyey–Greenstein phase function (1941),
+//! mixed in by the cell's own coefficients. [`table`] tabulates the model for the renderers.
 //!
 //! Intensities are irradiance over π, so Ψ = π·Φ takes the place of the fibre model's Ψ.
 
-pub mod absorption;
 pub mod azimuthal;
 pub mod balance;
 pub mod cylinder;
+pub mod hair;
 pub mod longitudinal;
 pub mod table;
+pub mod water;
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use azimuthal::{Azimuth, logistic_scale};
 use balance::Balance;
-use cylinder::{ETA, LOBES};
+use cylinder::LOBES;
 
-/// Properties of a strand of water.
+/// Way in the space of the texture along which hairs run from root to tip, where only the second moments of
+/// directions are known: down the texture (+y) and out of the surface (−z). A covector.
+pub const ROOT_TO_TIP: Vec3 = Vec3::new(0.0, 1.0, -1.0);
+
+/// Strands as the model takes them, and the air between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrandParams {
-    /// Radius of the cylinder, metres.
-    pub radius_m: f32,
+    /// Index of refraction, above 1.
+    pub eta: f64,
+    /// Angle α by which scales on the surface are tilted, radians. Where it is positive, their outer ends
+    /// point to the tip.
+    pub tilt: f64,
+    /// Optical depth σ_a · 2r of a diameter, linear RGB.
+    pub depth: DVec3,
     /// Roughness along the strand, β_m, 0.1 to 1.
     pub roughness_m: f32,
     /// Roughness around the strand, β_n, 0.1 to 1.
     pub roughness_n: f32,
-    /// Absorption as a multiple of pure water's.
-    pub absorption: f32,
     /// Share of the light that meets air bubbles instead of strands in a cell with k_d = k_s, 0 to 1.
     pub aeration: f32,
     /// Mean cosine of the scattering angle at air bubbles, −0.99 to 0.99.
     pub g: f32,
 }
 
-impl Default for StrandParams {
-    fn default() -> Self {
-        StrandParams {
-            radius_m: 5e-4,
-            roughness_m: 0.3,
-            roughness_n: 0.2,
-            absorption: 1.0,
-            aeration: 0.5,
-            g: 0.8,
-        }
-    }
-}
-
 impl StrandParams {
-    /// Optical depth σ_a · 2r of a diameter, linear RGB.
-    pub fn depth(&self) -> DVec3 {
-        absorption::pure_water() * (2.0 * self.radius_m as f64 * self.absorption as f64)
+    /// Whether the sign of t matters, because scales on the strands are tilted.
+    pub fn is_tilted(&self) -> bool {
+        self.tilt != 0.0
     }
 }
 
@@ -96,8 +95,9 @@ impl Lobes {
 /// Direct evaluation of the model in float64. The table is built from it and measured against it.
 pub struct Strand {
     params: StrandParams,
-    depth: DVec3,
     v: [f64; LOBES],
+    /// Sums θ_i + θ_o at which the lobes have their middle, radians.
+    shifts: [f64; LOBES],
     s: f64,
     balance: Balance,
 }
@@ -106,12 +106,13 @@ impl Strand {
     /// Model of a strand with these properties.
     pub fn new(params: &StrandParams) -> Self {
         let v = longitudinal::variances(params.roughness_m as f64);
+        let shifts = longitudinal::shifts(params.tilt);
         Strand {
             params: *params,
-            depth: params.depth(),
             v,
+            shifts,
             s: logistic_scale(params.roughness_n as f64),
-            balance: Balance::new(&v),
+            balance: Balance::new(&v, &shifts, params.eta),
         }
     }
 
@@ -131,12 +132,13 @@ impl Strand {
     /// Balanced longitudinal lobes b(θ_i)·b(θ_o)·M_p.
     fn along(&self, theta_i: f64, theta_o: f64, coco: f64, sisi: f64) -> [f64; LOBES] {
         let balance = self.balance.at(theta_i) * self.balance.at(theta_o);
-        self.v.map(|v| balance * longitudinal::longitudinal(v, coco, sisi))
+        let m = |p| longitudinal::shifted(self.v[p], self.shifts[p], theta_i + theta_o, coco, sisi);
+        std::array::from_fn(|p| balance * m(p))
     }
 
     /// Azimuthal lobes N_p at inclination θ_d.
     fn around(&self, cos_d: f64) -> Azimuth {
-        Azimuth::new(self.s, ETA, cos_d, self.depth)
+        Azimuth::new(self.s, self.params.eta, cos_d, self.params.depth)
     }
 }
 

@@ -3,11 +3,12 @@
 //!
 //! | axis | coordinate | nodes |
 //! |---|---|---|
-//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: starts at the mirror cone, with steps as fine as the cone is narrow | 40 |
+//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: starts at the mirror cone, with steps as fine as the cone is narrow. With tilted scales it has the sign of θ_i + θ_o | 40, or 79 |
 //! | y | cos θ_d | 48 |
 //! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the side of the light, where the rainbow is, to the far side | 128 |
 //!
-//! All three coordinates follow from the cosines between the directions by square roots alone.
+//! All three coordinates follow from the cosines between the directions by square roots alone. The sign is that
+//! of sin θ_i + sin θ_o.
 //!
 //! A texel holds Ψ·√(cos θ_i·cos θ_o + v_R/2). Near the mirror cone M is inversely proportional to that root,
 //! within a factor of 1.8 over all inclinations. Without the factor the steps of y would be too coarse where
@@ -24,9 +25,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{PSI_PER_PHI, Strand, StrandParams, cell_aeration};
+use crate::light::fibre::Spread;
 
 /// Number of nodes along x, y and z.
 pub const SIZE: [usize; 3] = [40, 48, 128];
+/// Number of nodes along x where scales are tilted: those of both signs share the one in the middle.
+pub const TILTED_X: usize = 2 * SIZE[0] - 1;
 /// Weight w of the z axis. With w = 1 the steps of φ would grow without bound at the far side, with w = 0 at
 /// the side of the light.
 pub const SINE_SHARE: f32 = 0.75;
@@ -37,7 +41,7 @@ const CACHED_TABLES: usize = 4;
 
 /// Tabulated Ψ of the strands alone, without air.
 pub struct StrandTable {
-    key: [u32; 4],
+    key: StrandParams,
     /// Constant k of the x axis.
     pub squeeze: f32,
     /// v_R/2, with v_R the longitudinal variance of lobe R.
@@ -74,7 +78,8 @@ impl StrandTable {
     /// Builds the table of a strand, which does not depend on aeration.
     pub fn build(params: &StrandParams) -> StrandTable {
         let strand = Strand::new(params);
-        let [nx, ny, nz] = SIZE;
+        let is_tilted = params.is_tilted();
+        let [nx, ny, nz] = size(is_tilted);
         let node = |i: usize, n: usize| i as f64 / (n - 1) as f64;
         let squeeze = strand.v[0].sqrt().min(1.0) as f32;
         let spread = (strand.v[0] / 2.0) as f32;
@@ -87,8 +92,8 @@ impl StrandTable {
                 let n: Vec<_> = (0..nz).map(|iz| around.at(azimuth_of(node(iz, nz)))).collect();
                 let m: Vec<_> = (0..nx)
                     .map(|ix| {
-                        let x = node(ix, nx);
-                        let s = x * k / (1.0 + k - x);
+                        let x = if is_tilted { 2.0 * node(ix, nx) - 1.0 } else { node(ix, nx) };
+                        let s = x * k / (1.0 + k - x.abs());
                         // Nodes with S > cos θ_d belong to no pair of directions and repeat the edge.
                         let coco = (cos_d * cos_d - s * s).max(0.0);
                         let sisi = coco - 1.0 + 2.0 * s * s;
@@ -112,7 +117,18 @@ impl StrandTable {
                 })
             })
             .collect();
-        StrandTable { key: key(params), squeeze, spread, texels, moments: OnceLock::new() }
+        let key = key(params);
+        StrandTable { key, squeeze, spread, texels, moments: OnceLock::new() }
+    }
+
+    /// Whether the sign of t matters, because scales on the strands are tilted.
+    pub fn is_tilted(&self) -> bool {
+        self.key.is_tilted()
+    }
+
+    /// Number of nodes along x, y and z.
+    pub fn size(&self) -> [usize; 3] {
+        size(self.is_tilted())
     }
 
     /// Returns the texels as `rgb9e5ufloat`; x runs fastest, then y, then z.
@@ -127,14 +143,17 @@ impl StrandTable {
         let s = ((1.0 - coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
         let cos_d = ((1.0 + coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
         let sin2_half_phi = ((coco + sisi - l_dot_e) / (2.0 * coco.max(1e-6))).clamp(0.0, 1.0);
-        let x = s * (1.0 + self.squeeze) / (s + self.squeeze);
+        let mut x = s * (1.0 + self.squeeze) / (s + self.squeeze);
+        if self.is_tilted() {
+            x = 0.5 + 0.5 * if t_dot_l + t_dot_e < 0.0 { -x } else { x };
+        }
         let z = SINE_SHARE * sin2_half_phi.sqrt() + (1.0 - SINE_SHARE) * (1.0 - (1.0 - sin2_half_phi).sqrt());
         self.sample(Vec3::new(x, cos_d, z)) / (coco + self.spread).sqrt()
     }
 
     /// Trilinear interpolation at coordinates from 0 to 1, as a texture sampler does it.
     fn sample(&self, position: Vec3) -> Vec3 {
-        let [nx, ny, nz] = SIZE;
+        let [nx, ny, nz] = self.size();
         let split = |x: f32, n: usize| {
             let x = x * (n - 1) as f32;
             let i = (x as usize).min(n - 2);
@@ -163,8 +182,9 @@ impl StrandTable {
         let theta = |i: usize| (i as f64 + 0.5) * step - FRAC_PI_2;
         let weight = |i: usize| (theta(i) + 0.5 * step).sin() - (theta(i) - 0.5 * step).sin();
         let cos_phi: Vec<f64> = (0..PHI).map(|i| ((i as f64 + 0.5) * PI / PHI as f64).cos()).collect();
-        // Reversing the flow changes nothing, so light from one side is enough.
-        let (albedo, cosine) = (THETA / 2..THETA)
+        // Where reversing t changes nothing, light from one side is enough.
+        let first = if self.is_tilted() { 0 } else { THETA / 2 };
+        let (albedo, cosine) = (first..THETA)
             .into_par_iter()
             .map(|i| {
                 let (sin_i, cos_i) = theta(i).sin_cos();
@@ -183,7 +203,7 @@ impl StrandTable {
             .collect::<Vec<_>>()
             .into_iter()
             .fold((DVec3::ZERO, DVec3::ZERO), |a, b| (a.0 + b.0, a.1 + b.1));
-        let per_direction = 2.0 / PHI as f64;
+        let per_direction = if self.is_tilted() { 1.0 } else { 2.0 } / PHI as f64;
         // The bound keeps the table's error from adding energy.
         Moments { albedo: (albedo * per_direction).min(DVec3::ONE), mean_cosine: cosine / albedo }
     }
@@ -218,8 +238,15 @@ fn unit(e: i32) -> f32 {
     ((24 + e) as f32).exp2()
 }
 
-fn key(params: &StrandParams) -> [u32; 4] {
-    [params.radius_m, params.absorption, params.roughness_m, params.roughness_n].map(f32::to_bits)
+/// Number of nodes along x, y and z, for strands with tilted scales or without.
+fn size(is_tilted: bool) -> [usize; 3] {
+    let [nx, ny, nz] = SIZE;
+    [if is_tilted { TILTED_X } else { nx }, ny, nz]
+}
+
+/// What the table depends on: all but the air.
+fn key(params: &StrandParams) -> StrandParams {
+    StrandParams { aeration: 0.0, g: 0.0, ..*params }
 }
 
 /// Complete model as the renderers evaluate it: strands from the table, and air.
@@ -236,6 +263,13 @@ impl StrandShading {
     /// Model of a strand with these properties.
     pub fn new(params: &StrandParams) -> Self {
         StrandShading { table: StrandTable::of(params), aeration: params.aeration, g: params.g }
+    }
+
+    /// Cosines t·l and t·e of the single direction t that stands for those of `spread`, given the direction to
+    /// the light and the way from root to tip ([`ROOT_TO_TIP`](super::ROOT_TO_TIP)) as the spread takes them.
+    pub fn cosines(&self, spread: &Spread, l_v: Vec3, way: Vec3) -> [f32; 2] {
+        let cosines = spread.of_one(l_v);
+        if self.table.is_tilted() { spread.along(cosines, l_v, way) } else { cosines }
     }
 
     /// Reflection Ψ = π·Φ of a cell with the coefficients k_d and k_s, in any common unit, from the cosines

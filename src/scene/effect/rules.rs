@@ -6,7 +6,7 @@ use crate::scene::Values;
 use crate::scene::build::EnvironmentKind;
 use crate::scene::measured::Builder;
 use crate::scene::meshes::{Carrier, Projection};
-use crate::scene::param::{COLORS, key_of_volume, split_volume_key};
+use crate::scene::param::{COLORS, HAIR_COLOR, key_of_volume, split_volume_key};
 use crate::trace::AttenuationKind;
 use crate::volume::ReflectBy;
 
@@ -112,6 +112,18 @@ pub(super) const RULES: &[Rule] = &[
         switch: "light.reflection",
         needs: "strand",
         works: |v, switch| is(v, switch, ReflectionKind::Strand.word()),
+    },
+    Rule {
+        keys: &["hair.*"],
+        switch: "light.reflection",
+        needs: "hair",
+        works: |v, switch| is(v, switch, ReflectionKind::Hair.word()),
+    },
+    Rule {
+        keys: &["hair.melanin", "hair.redness"],
+        switch: HAIR_COLOR,
+        needs: "no colour, which stands in the place of melanin",
+        works: |v, switch| !v.is_set(switch),
     },
     Rule {
         keys: &["trace.sigma"],

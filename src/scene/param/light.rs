@@ -44,11 +44,12 @@ pub(super) const LIGHT: Group = Group {
         p("light.reflection", "Ψ", "", Choice(ReflectionKind::WORDS), Uniform)
             .doc(
                 "Reflection of a cell: `kajiya-kay` takes the paper's fibres, with k_d, k_s and p; \
-                 `strand` takes strands of water with air between them.",
+                 `strand` takes strands of water with air between them, `hair` takes hairs with pigments \
+                 and scales.",
             )
             .when(
                 "Choose `strand` when light should shine through the water, as the light of a low sun \
-                 behind a fall.",
+                 behind a fall; choose `hair` for hair and fur with two highlights and a glow from behind.",
             ),
         p("light.scattering", "", "", Choice(Scattering::WORDS), Uniform)
             .doc(
@@ -64,7 +65,10 @@ pub(super) const LIGHT: Group = Group {
             )
             .when("Raise it for narrow, sharp highlights; lower it for a broad sheen."),
         p("light.ambient", "", "", Color([0.1, 0.1, 0.1]), Uniform)
-            .doc("Light from everywhere, added in every cell and on rocks and pools.")
+            .doc(
+                "Light from everywhere, added in every cell and on rocks and pools. With \
+                 `light.reflection=hair`, cells give back the hairs' own share of each colour.",
+            )
             .when(
                 "Raise it when shadows are too black; lower it to 0 under an environment, which fills \
                  them itself.",
@@ -106,6 +110,55 @@ pub(super) const STRAND: Group = Group {
                 "Raise it for foam that glows in front of the light; lower it for foam that is bright on \
                  its lit side.",
             ),
+    ],
+};
+
+/// Key of the colour that takes the place of a hair's pigments.
+pub const HAIR_COLOR: &str = "hair.color";
+
+pub(super) const HAIR: Group = Group {
+    title: "Hair",
+    about: "These parameters have an effect with `light.reflection=hair`. A cell then holds hairs along its \
+         direction, which runs from root to tip: dielectric fibres with pigments inside and tilted scales \
+         outside. k_d and k_s have no effect on them.",
+    params: &[
+        p("hair.melanin", "", "", Float(0.0, 100.0, 1.3), Uniform)
+            .slider(0.0, 10.0)
+            .doc(
+                "Concentration of both melanins together, which absorb light in the hair: 0 is white, 0.1 \
+                 light blond, 0.3 blond, 1 brown, 3 dark brown, 8 black.",
+            )
+            .when("Raise it for darker hair; lower it for lighter hair."),
+        p("hair.redness", "", "", Float(0.0, 1.0, 0.2), Uniform)
+            .doc("Share of pheomelanin, the red melanin, in `hair.melanin`. The rest is eumelanin.")
+            .when("Raise it to 0.5 for ginger and to 1 for red hair; lower it to 0 for ashen hair."),
+        p(HAIR_COLOR, "C", "", Color([1.0, 1.0, 1.0]), Uniform)
+            .doc(
+                "Colour of a mass of hairs after light has been scattered among them, linear RGB up to 1, \
+                 in the place of melanin. The absorption of a hair is made from it. Hair has the colour of \
+                 its melanin without it.",
+            )
+            .when("Set it for dyed hair and for the fur of animals."),
+        p("hair.eta", "η", "", Float(1.1, 3.0, 1.55), Uniform)
+            .doc("Index of refraction of a hair.")
+            .when("Raise it for a stronger white highlight; lower it to 1.33 for fibres that seem wet."),
+        p("hair.tilt", "α", "°", Float(-10.0, 10.0, 3.0), Uniform)
+            .doc(
+                "Angle by which scales on a hair are tilted, their outer ends to the tip. They turn what is \
+                 reflected outside by 2α towards the root, and what comes back from the inside by 3α \
+                 towards the tip. On a head the white highlight so lies nearer to the tips than the \
+                 coloured one.",
+            )
+            .when(
+                "Raise it to part the two highlights; set it to 0 for smooth fibres, and below 0 where \
+                 directions run from tip to root.",
+            ),
+        p("hair.beta_m", "β_m", "", Float(0.1, 1.0, 0.3), Uniform)
+            .doc("Roughness along the hair. Small values give two sharp highlights.")
+            .when("Lower it for shiny hair; raise it for dull, dry hair."),
+        p("hair.beta_n", "β_n", "", Float(0.1, 1.0, 0.3), Uniform)
+            .doc("Roughness around the hair. Small values keep the light that comes through together.")
+            .when("Lower it for a strong glow in front of a light; raise it for soft, even hair."),
     ],
 };
 

@@ -23,6 +23,7 @@ use std::sync::LazyLock;
 
 use Cost::*;
 use Kind::*;
+pub use light::HAIR_COLOR;
 pub(super) use meshes::MATERIAL as MESH_MATERIAL;
 pub use volume::COLORS;
 pub use volumes::{WATER, key_of_volume, split_volume_key};
@@ -115,9 +116,10 @@ pub const MAX_KEYFRAMES: usize = 10_000;
 /// Largest frame number.
 pub const MAX_FRAME: i64 = 999_999_999;
 /// Parameters that no scene has of itself, besides lists.
-const OPTIONAL: [&str; 14] = [
+const OPTIONAL: [&str; 15] = [
     boxes::POSITION,
     boxes::SIZE,
+    HAIR_COLOR,
     meshes::COLOR,
     meshes::MATERIAL,
     volume::ORIGIN,
@@ -156,6 +158,7 @@ pub const GROUPS: &[Group] = &[
     trace::TRACE,
     light::LIGHT,
     light::STRAND,
+    light::HAIR,
     light::LIGHTS,
     place::ROCKS,
     place::POOLS,

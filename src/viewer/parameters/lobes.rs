@@ -87,6 +87,7 @@ impl LobesPlot {
         let model = match setting.reflection {
             Reflection::KajiyaKay => "Fibre of Kajiya and Kay, Ψ/π",
             Reflection::Strand(_) => "Strand of water with air bubbles, Φ",
+            Reflection::Hair(_) => "Hair, Φ",
         };
         ui.label(format!("θ_i = {theta_i} of {}", incidence.light)).on_hover_text(
             "Inclination of the light to the plane across the flow. The flow is v at the middle of the first \

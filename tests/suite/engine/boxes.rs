@@ -118,8 +118,11 @@ fn the_engines_agree_on_boxes_in_every_variant() {
     let volumes = [noise([16, 24, 10], 4)];
     let (strand, pyramid) = ("light.reflection=strand", "trace.filter=pyramid");
     let (trilinear, cached) = ("trace.lookup=trilinear", "light.visibility=cached");
-    let variants: [&[&str]; 10] = [
+    let hair = "light.reflection=hair";
+    let variants: [&[&str]; 12] = [
         &["light.visibility=none", "trace.filter=none"],
+        &[hair, "trace.filter=none"],
+        &[hair, trilinear, cached, "hair.tilt=-8"],
         &[cached, "trace.filter=none"],
         &[trilinear, "trace.filter=none"],
         &[pyramid],

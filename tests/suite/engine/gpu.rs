@@ -122,8 +122,13 @@ fn the_engines_agree_in_every_variant_of_the_integrate_pass() {
     let spot =
         ["lights.key.kind=spot", "lights.key.position=[0.4,0.5,1.5]", "lights.key.direction=[0.3,0.4,1.5]"];
     let (strand, multiple) = ("light.reflection=strand", "light.scattering=multiple");
-    let variants: [&[&str]; 19] = [
+    let hair = "light.reflection=hair";
+    let variants: [&[&str]; 23] = [
         &["light.visibility=march"],
+        &[hair, "hair.tilt=6", "light.visibility=march"],
+        &[hair, "light.frame=texture", "trace.lookup=trilinear", "lights.key.direction=[0.4,0.2,-0.9]"],
+        &[hair, multiple, "light.visibility=cached", "hair.melanin=0.3"],
+        &[hair, multiple, "light.visibility=cached", "materials.water.mist=0.1", "hair.tilt=0"],
         &["trace.attenuation=per-cell", "trace.tau=0.3"],
         &["trace.attenuation=per-cell", "light.visibility=march", "light.frame=texture"],
         &["light.frame=texture", "light.p=7.5"],

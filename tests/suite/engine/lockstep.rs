@@ -12,7 +12,8 @@ use taki::engine::cpu::LightVolumeCache;
 use taki::engine::cpu::gbuffer::{self, Gbuffer};
 use taki::engine::cpu::integrate::{Integrator, Lanes, RayResult};
 use taki::light::ramp::Ramp;
-use taki::light::strand::StrandParams;
+use taki::light::strand::hair::Hair;
+use taki::light::strand::water::Water;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::shell::{Shell, Side};
 use taki::mapping::{Material, Quad};
@@ -100,8 +101,9 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
     parts.angles = [AngleFrame::World, AngleFrame::Texture][one_of(2) as usize];
     parts.visibility = [Visibility::None, Visibility::March, Visibility::Cached][one_of(3) as usize];
     parts.scattering = [Scattering::Single, Scattering::Single, Scattering::Multiple][one_of(3) as usize];
-    parts.reflection = match one_of(3) {
-        0 => Reflection::Strand(StrandParams::default()),
+    parts.reflection = match one_of(4) {
+        0 => Reflection::Strand(Water::default().strand()),
+        1 => Reflection::Hair(Hair::default().strand()),
         _ => Reflection::KajiyaKay,
     };
     if parts.scattering == Scattering::Single && parts.reflection == Reflection::KajiyaKay {
@@ -252,9 +254,14 @@ fn results_do_not_depend_on_the_rays_beside_them() {
 #[test]
 fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
     let (strand, pyramid) = ("light.reflection=strand", "trace.filter=pyramid");
+    let (hair, trilinear) = ("light.reflection=hair", "trace.lookup=trilinear");
     let (none, cached) = ("light.visibility=none", "light.visibility=cached");
     let colored = "light.ambient=[0.1,0.3,0.2]";
-    let variants: [&[&str]; 16] = [
+    let variants: [&[&str]; 20] = [
+        &[hair, "hair.tilt=8"],
+        &[hair, pyramid, cached, "camera.fov=80"],
+        &[hair, trilinear, "light.frame=texture"],
+        &[hair, pyramid, "hair.tilt=0", none],
         &[colored],
         &[colored, none],
         &[colored, pyramid, cached],

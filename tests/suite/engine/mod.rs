@@ -7,6 +7,7 @@ pub mod every_preset;
 pub mod exposure;
 pub mod far;
 pub mod gpu;
+pub mod hair;
 pub mod layers;
 pub mod lockstep;
 pub mod long_walks;

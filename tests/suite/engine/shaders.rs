@@ -177,7 +177,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
     let similarity = fields!(Similarity: extinction g albedo pad_0 reduced pad_1 isotropic pad_2);
     assert_eq!(members(&module, "Similarity"), similarity);
-    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity ramp));
+    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity ramp ambient pad));
     let ramp = fields!(Ramp: first count step_0 k_s_factor step_1 k_s_summand step_2 pad);
     assert_eq!(members(&module, "Ramp"), ramp);
     let volume =
@@ -263,6 +263,7 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::light::strand::table::SIZE);
+    assert_eq!(constant("TILTED_X") as usize, taki::light::strand::table::TILTED_X);
 }
 
 /// Names and numbers of the bindings that a stage's shader uses.

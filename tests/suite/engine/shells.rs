@@ -118,8 +118,13 @@ fn the_engines_agree_on_shells_in_every_variant_of_the_integrate_pass() {
     let volumes = [noise([12, 16, 10], 4)];
     let (strand, pyramid) = ("light.reflection=strand", "trace.filter=pyramid");
     let (trilinear, cached) = ("trace.lookup=trilinear", "light.visibility=cached");
-    let variants: [&[&str]; 14] = [
+    let hair = "light.reflection=hair";
+    let variants: [&[&str]; 18] = [
         &["light.visibility=none"],
+        &[hair, "hair.tilt=6"],
+        &[hair, trilinear, "light.frame=texture"],
+        &[hair, pyramid, cached, "camera.fov=80"],
+        &[hair, pyramid, cached, "hair.tilt=0"],
         &[cached],
         &[trilinear],
         &[pyramid],

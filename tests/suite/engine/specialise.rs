@@ -126,6 +126,8 @@ fn the_walk_without_light_has_no_model_of_light() {
         &[
             ("LIGHTS", 2.0),
             ("STRAND", 1.0),
+            ("HAIR", 1.0),
+            ("TILTED", 1.0),
             ("MULTIPLE", 1.0),
             ("MARCH", 1.0),
             ("TRILINEAR", 1.0),
@@ -142,8 +144,8 @@ fn the_walk_without_light_has_no_model_of_light() {
 #[test]
 fn every_set_of_switches_leaves_a_valid_shader() {
     let switches = [
-        "PER_CELL", "MARCH", "CACHED", "CODES", "CORNERED", "STRAND", "MULTIPLE", "ERODED", "PYRAMID",
-        "LEAPS",
+        "PER_CELL", "MARCH", "CACHED", "CODES", "CORNERED", "STRAND", "HAIR", "TILTED", "MULTIPLE", "ERODED",
+        "PYRAMID", "LEAPS",
     ];
     for many in [false, true] {
         let source = Source::read("integrate", &integrate_source(many));

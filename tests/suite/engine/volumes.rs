@@ -111,12 +111,15 @@ const POINT: [&str; 2] = ["lights.key.kind=point", "lights.key.position=[0.1,0.3
 const CACHED: &str = "light.visibility=cached";
 const MARCH: &str = "light.visibility=march";
 const STRAND: &str = "light.reflection=strand";
+const HAIR: &str = "light.reflection=hair";
 const MULTIPLE: &str = "light.scattering=multiple";
 const PYRAMID: &str = "trace.filter=pyramid";
 const FAR: &str = "camera.eye=[4,3,20]";
 
 /// Settings under which the volumes are compared.
-const CASES: [&[&str]; 16] = [
+const CASES: [&[&str]; 18] = [
+    &[CACHED, HAIR],
+    &[PYRAMID, MARCH, HAIR, FAR],
     &[],
     &[MARCH],
     &[CACHED],

@@ -1,6 +1,7 @@
-//! The reflection model of flowing water. Reference truth: closed forms of optics, and for the table the
+//! The reflection model of flowing water and of hair. Reference truth: closed forms of optics, and for the table the
 //! direct model in float64. The shader is tested for parity with the CPU.
 
+mod hair;
 mod lookup;
 mod optics;
 
@@ -9,15 +10,21 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use taki::light::strand::table::{StrandShading, StrandTable};
+use taki::light::strand::water::Water;
 use taki::light::strand::{Strand, StrandParams, cell_aeration, henyey_greenstein};
 
 /// Roughnesses along and around the strand: both ends of the range, the default, and mixtures.
 const ROUGHNESSES: [[f32; 2]; 7] =
     [[0.1, 0.1], [0.1, 1.0], [0.3, 0.2], [0.3, 0.1], [0.6, 0.6], [1.0, 0.1], [1.0, 1.0]];
 
+/// Water without air.
+fn clear([roughness_m, roughness_n]: [f32; 2], absorption: f32) -> Water {
+    Water { roughness_m, roughness_n, absorption, aeration: 0.0, ..Water::default() }
+}
+
 /// Parameters of strands without air.
-fn strands([roughness_m, roughness_n]: [f32; 2], absorption: f32) -> StrandParams {
-    StrandParams { roughness_m, roughness_n, absorption, aeration: 0.0, ..StrandParams::default() }
+fn strands(roughness: [f32; 2], absorption: f32) -> StrandParams {
+    clear(roughness, absorption).strand()
 }
 
 /// Cosines t·l, t·e and l·e of two directions, given by their inclinations and the azimuth between them.
@@ -83,8 +90,8 @@ fn the_model_itself_gives_back_all_light() {
 
 #[test]
 fn light_and_eye_change_places_without_a_change() {
-    let strand = Strand::new(&StrandParams { radius_m: 0.1, ..StrandParams::default() });
-    let shading = StrandShading::new(&StrandParams { radius_m: 0.1, ..StrandParams::default() });
+    let params = Water { radius_m: 0.1, ..Water::default() }.strand();
+    let (strand, shading) = (Strand::new(&params), StrandShading::new(&params));
     for [theta_i, theta_o, phi] in directions(300, 0.3) {
         let there = strand.lobes(theta_i, theta_o, phi).total();
         let back = strand.lobes(theta_o, theta_i, phi).total();
@@ -96,8 +103,8 @@ fn light_and_eye_change_places_without_a_change() {
 
 #[test]
 fn neither_the_sense_of_the_flow_nor_that_of_the_azimuth_matters() {
-    let strand = Strand::new(&StrandParams::default());
-    let shading = StrandShading::new(&StrandParams::default());
+    let params = Water::default().strand();
+    let (strand, shading) = (Strand::new(&params), StrandShading::new(&params));
     for [theta_i, theta_o, phi] in directions(300, 0.3) {
         let here = strand.lobes(theta_i, theta_o, phi).total();
         for other in [strand.lobes(-theta_i, -theta_o, phi), strand.lobes(theta_i, theta_o, -phi)] {
@@ -126,12 +133,12 @@ fn light_goes_to_the_mirror_cone_and_on_through_the_strand() {
 #[test]
 fn water_takes_most_of_red_and_least_of_blue() {
     // The strand is a metre thick, because thin ones absorb almost nothing.
-    let thick = StrandParams { radius_m: 0.5, ..strands([0.3, 0.2], 1.0) };
-    let albedo = StrandTable::of(&thick).moments().albedo;
+    let thick = |absorption| Water { radius_m: 0.5, ..clear([0.3, 0.2], absorption) }.strand();
+    let albedo = StrandTable::of(&thick(1.0)).moments().albedo;
     assert!(albedo.x < albedo.y && albedo.y < albedo.z && albedo.z < 1.0, "{albedo}");
-    let more = StrandTable::of(&StrandParams { absorption: 2.0, ..thick }).moments().albedo;
+    let more = StrandTable::of(&thick(2.0)).moments().albedo;
     assert!(more.cmplt(albedo).all(), "{more}, {albedo}");
-    let none = StrandTable::of(&StrandParams { absorption: 0.0, ..thick }).moments().albedo;
+    let none = StrandTable::of(&thick(0.0)).moments().albedo;
     assert!((none - 1.0).abs().max_element() < 1e-3, "{none}");
 }
 
@@ -153,7 +160,7 @@ fn air_scatters_all_light_by_its_mean_cosine() {
 
 #[test]
 fn isotropic_air_alone_is_a_quarter_everywhere_and_g_is_its_own_mean_cosine() {
-    let air = |g: f32| StrandShading::new(&StrandParams { aeration: 1.0, g, ..StrandParams::default() });
+    let air = |g: f32| StrandShading::new(&Water { aeration: 1.0, g, ..Water::default() }.strand());
     for [theta_i, theta_o, phi] in directions(100, 0.3) {
         let [l, e, le] = cosines(theta_i, theta_o, phi);
         assert_eq!(air(0.0).psi(0.5, 0.5, l, e, le).to_array(), [0.25; 3]);
@@ -166,7 +173,7 @@ fn isotropic_air_alone_is_a_quarter_everywhere_and_g_is_its_own_mean_cosine() {
 
 #[test]
 fn means_over_all_directions_are_those_of_the_model() {
-    let params = StrandParams { radius_m: 0.1, ..strands([0.4, 0.4], 1.0) };
+    let params = Water { radius_m: 0.1, ..clear([0.4, 0.4], 1.0) }.strand();
     let strand = Strand::new(&params);
     let moments = StrandTable::of(&params).moments();
     let mut albedo = 0.0;

@@ -442,7 +442,7 @@ fn bad_values_of_light_in_the_volume_have_their_line() {
         ("light.cache=0", "1 to 65536"),
         ("light.cache=1.5", "1 to 65536"),
         ("trace.layers=17", "1 to 16"),
-        ("light.reflection=water", "kajiya-kay, strand"),
+        ("light.reflection=water", "kajiya-kay, strand, hair"),
         ("light.scattering=twice", "single, multiple"),
         ("light.scattering=multiple", "use light.visibility=cached or march"),
         ("strand.radius=0", "1e-5 to 1"),
@@ -451,6 +451,12 @@ fn bad_values_of_light_in_the_volume_have_their_line() {
         ("strand.absorption=-1", "0 to 10000"),
         ("strand.aeration=1.5", "0 to 1"),
         ("strand.g=1", "-0.99 to 0.99"),
+        ("hair.eta=1", "1.1 to 3"),
+        ("hair.tilt=11", "-10 to 10"),
+        ("hair.melanin=-1", "0 to 100"),
+        ("hair.redness=1.1", "0 to 1"),
+        ("hair.beta_m=0.05", "0.1 to 1"),
+        ("hair.beta_n=1.01", "0.1 to 1"),
     ] {
         let error =
             Scene::load("front".as_ref(), &[set.into()], &Limits::default()).expect_err(set).to_string();

@@ -30,9 +30,14 @@ fn colours_are_read_in_their_order_up_to_the_first_that_is_missing() {
 #[test]
 fn colours_that_cannot_be_shown_are_refused() {
     let color = "volume.color=[0.1,0.2,0.3]";
-    let cases: [(&[&str], &[&str]); 5] = [
+    let cases: [(&[&str], &[&str]); 7] = [
         (&["volume.color=[0.1,1.2,0.3]"], &["volume.color", "more light than it receives", "at most 1"]),
         (&[color, "light.reflection=strand"], &["volume.color", "light.reflection=kajiya-kay"]),
+        (&[color, "light.reflection=hair"], &["volume.color", "hair", "light.reflection=kajiya-kay"]),
+        (
+            &["light.reflection=hair", "hair.color=[0.2,1.1,0.3]"],
+            &["hair.color", "more light than it receives", "at most 1"],
+        ),
         (
             &[color, "light.visibility=march", "light.scattering=multiple"],
             &["volume.color", "light.scattering=single"],

@@ -238,6 +238,7 @@ fn settings_without_effect_are_told() {
         ("sky.elevation=5", "while environment.kind is \"none\": it needs sky"),
         ("turn=3", "environment.turn has no effect while environment.kind is \"none\""),
         ("strand.g=0.5", "light.reflection"),
+        ("hair.tilt=1", "light.reflection"),
         ("tau=3", "trace.tau has no effect while trace.attenuation is \"path-length\": it needs per-cell"),
         ("lights.key.position=[0,0,1]", "lights.key.kind is \"directional\": it needs point or spot"),
         ("haze.color=1,0,0", "haze.density is 0.0: it needs a number above 0"),

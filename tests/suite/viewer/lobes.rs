@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 use super::*;
 use glam::DVec3;
 use taki::light::Reflection;
-use taki::light::strand::StrandParams;
+use taki::light::strand::water::Water;
 use taki::scene::Scene;
 use taki::viewer::lobes::{
     Curve, DECADES, Incidence, Plane, STEPS, Scale, Setting, alpha, curves, flow, incidence,
@@ -13,7 +13,7 @@ use taki::viewer::lobes::{
 
 /// Setting of smooth strands, whose lobes all stand out.
 fn strand(theta_i: f64, plane: Plane) -> Setting {
-    let params = StrandParams { aeration: 0.4, ..StrandParams::default() };
+    let params = Water { aeration: 0.4, ..Water::default() }.strand();
     Setting { reflection: Reflection::Strand(params), k_d: 0.5, k_s: 0.5, p: 12.0, theta_i, plane }
 }
 

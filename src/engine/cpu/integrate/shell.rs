@@ -9,6 +9,7 @@ use super::{FrameVolume, Integrator, Observer, RayResult, SheetOrder};
 use crate::light::AngleFrame;
 use crate::light::fibre::{Metric, Spread, psi_parts};
 use crate::light::ramp::Ink;
+use crate::light::strand::ROOT_TO_TIP;
 use crate::mapping::shell::{End, HullFace, Segment, Shell, ShellPath};
 use crate::trace::lookup::{CellSample, Level, level_at};
 use crate::trace::{Lookup, Prefilter, SheetDensity};
@@ -85,6 +86,16 @@ pub(super) fn in_cells(segment: &Segment, size: [u32; 3], flow_cells: f32) -> (V
     (wrapped(from - Vec3::Y * flow_cells, n.truncate()), direction)
 }
 
+/// Way from root to tip in the world, a covector of any length, of cells with the Jacobian `j`.
+#[inline]
+fn way_of(j: &Mat3) -> Vec3 {
+    // The rows of J⁻¹ times the determinant.
+    let (row_x, row_y, row_z) =
+        (j.y_axis.cross(j.z_axis), j.z_axis.cross(j.x_axis), j.x_axis.cross(j.y_axis));
+    let way = row_x * ROOT_TO_TIP.x + row_y * ROOT_TO_TIP.y + row_z * ROOT_TO_TIP.z;
+    if j.x_axis.dot(row_x) < 0.0 { -way } else { way }
+}
+
 /// A point in cells, moved into a tile of `n` cells.
 pub(super) fn wrapped(at: Vec3, n: Vec2) -> Vec3 {
     let copies = at.truncate() / n;
@@ -149,7 +160,7 @@ impl Integrator<'_> {
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let radiance = radiance[0] + radiance[1] + self.scene.ambient * (before - transmittance) + passed;
+        let radiance = radiance[0] + radiance[1] + self.ambient * (before - transmittance) + passed;
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
 
@@ -224,7 +235,7 @@ impl Integrator<'_> {
             let ink = self.ink(ray.shell.volume as usize, sample.k[1]);
             let k = [sample.k[0], ink.map_or(sample.k[1], |ink| ink.k_s)];
             let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));
-            observer.ambient(scene.ambient * weight + more);
+            observer.ambient(self.ambient * weight + more);
             let middle = 0.5 * (crossing.t_enter + crossing.t_exit);
             let along = middle / length;
             let place = Place {
@@ -302,7 +313,11 @@ impl Integrator<'_> {
                         let root = (1.0 / t.length_squared().max(1e-30)).sqrt();
                         [t.dot(l) * root, t.dot(e) * root]
                     }
-                    Fibres::Many(moments) => Spread::new(&identity, *moments, e).of_one(l),
+                    Fibres::Many(moments) => {
+                        let way =
+                            if self.scene.angles == AngleFrame::Texture { ROOT_TO_TIP } else { way_of(j) };
+                        strand.cosines(&Spread::new(&identity, *moments, e), l, way)
+                    }
                 };
                 return intensity * strand.psi(k_d, k_s, t_dot_l, t_dot_e, l_dot_e);
             }

@@ -9,6 +9,7 @@ use super::{Integrator, Observer, SheetHit};
 use crate::light::fibre::{Spread, psi_parts};
 use crate::light::scatter::media::MultipleMedium;
 use crate::light::scatter::multiple;
+use crate::light::strand::ROOT_TO_TIP;
 use crate::trace::Lookup;
 use crate::trace::lookup::{CellSample, Level};
 use crate::util::powers::{exp2, log2};
@@ -99,7 +100,7 @@ impl Integrator<'_> {
             let k = [k_d, ink.map_or(k_s, |ink| ink.k_s)];
             let more = ink.map_or(Vec3::ZERO, |ink| (ink.color - Vec3::ONE) * weight);
             tint += more;
-            observer.ambient(scene.ambient * (Vec3::splat(weight) + more));
+            observer.ambient(self.ambient_of(matter.mist > 0.0) * (Vec3::splat(weight) + more));
 
             let v = cell.v_code();
             let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
@@ -134,7 +135,7 @@ impl Integrator<'_> {
                 let mut lit = match &self.strand {
                     Some(strand) if matter.mist == 0.0 => {
                         let [t_dot_l, t_dot_e] = match &spread {
-                            Some(spread) => spread.of_one(light.l_v),
+                            Some(spread) => strand.cosines(spread, light.l_v, ROOT_TO_TIP),
                             None => [v.dot(light.l_v) * root, t_dot_e * root],
                         };
                         strand.psi(k_d, k_s, t_dot_l, t_dot_e, light.l_dot_e) * (weight * visibility)

@@ -3,13 +3,16 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::{cosines, directions, strands};
+use super::hair::hairs;
+use super::{clear, cosines, directions, strands};
 use crate::engine::gpu::renderer;
 use glam::Vec3;
 use taki::engine::gpu::layout::Strand as Uniform;
 use taki::engine::gpu::shader::resolve;
 use taki::engine::gpu::{Gpu, StrandTexture};
+use taki::light::strand::hair::Hair;
 use taki::light::strand::table::{StrandShading, StrandTable};
+use taki::light::strand::water::Water;
 use taki::light::strand::{Strand, StrandParams};
 
 /// Sorted errors of Φ from the table in units of Φ + 1/4π, and the mean error divided by the mean Φ.
@@ -43,7 +46,7 @@ fn the_table_is_the_model_within_its_stated_error() {
         ([1.0, 1.0], 0.005, 0.002, 0.002),
     ] {
         for radius_m in [5e-4, 0.3] {
-            let (errors, of_mean) = errors(&StrandParams { radius_m, ..strands(roughness, 1.0) });
+            let (errors, of_mean) = errors(&Water { radius_m, ..clear(roughness, 1.0) }.strand());
             let (worst, most) = (errors[errors.len() - 1], errors[errors.len() * 99 / 100]);
             assert!(
                 worst < largest && most < usual && of_mean < mean,
@@ -55,13 +58,15 @@ fn the_table_is_the_model_within_its_stated_error() {
 
 #[test]
 fn light_along_the_strand_and_every_corner_are_finite() {
-    let shading = StrandShading::new(&StrandParams::default());
     let ends = [-1.0f32, -1.0 + 1e-7, -1e-20, 0.0, 0.5, 1.0 - 1e-7, 1.0, 1.000001];
-    for l in ends {
-        for e in ends {
-            for le in ends {
-                let psi = shading.psi(0.5, 0.5, l, e, le);
-                assert!(psi.is_finite() && psi.min_element() >= 0.0, "{psi} at {l}, {e}, {le}");
+    for params in [Water::default().strand(), Hair::default().strand(), hairs(1.1, -10.0, [0.1; 2], 100.0)] {
+        let shading = StrandShading::new(&params);
+        for l in ends {
+            for e in ends {
+                for le in ends {
+                    let psi = shading.psi(0.5, 0.5, l, e, le);
+                    assert!(psi.is_finite() && psi.min_element() >= 0.0, "{psi} at {l}, {e}, {le}");
+                }
             }
         }
     }
@@ -69,10 +74,13 @@ fn light_along_the_strand_and_every_corner_are_finite() {
 
 #[test]
 fn one_strand_has_one_table_whatever_the_air() {
-    let params = StrandParams { radius_m: 0.123, ..StrandParams::default() };
+    let params = Water { radius_m: 0.123, ..Water::default() }.strand();
     let table = StrandTable::of(&params);
     assert!(Arc::ptr_eq(&table, &StrandTable::of(&StrandParams { aeration: 0.1, g: 0.0, ..params })));
-    assert!(!Arc::ptr_eq(&table, &StrandTable::of(&StrandParams { radius_m: 0.124, ..params })));
+    let thicker = Water { radius_m: 0.124, ..Water::default() }.strand();
+    for other in [thicker, StrandParams { eta: 1.4, ..params }, StrandParams { tilt: 0.01, ..params }] {
+        assert!(!Arc::ptr_eq(&table, &StrandTable::of(&other)));
+    }
 }
 
 /// Ψ of the shader for (t·l, t·e, l·e, k_d), with k_s = 1 − k_d.
@@ -94,12 +102,13 @@ fn on_gpu(gpu: &Gpu, shading: &StrandShading, inputs: &[[f32; 4]]) -> Vec<Vec3> 
         label: None,
         source: wgpu::ShaderSource::Wgsl(resolve(stage).into()),
     });
+    let tilted = [("TILTED", f64::from(u8::from(shading.table.is_tilted())))];
     let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
         layout: None,
         module: &module,
         entry_point: Some("main"),
-        compilation_options: Default::default(),
+        compilation_options: wgpu::PipelineCompilationOptions { constants: &tilted, ..Default::default() },
         cache: None,
     });
     let texture = StrandTexture::new(gpu, &shading.table);
@@ -140,7 +149,8 @@ fn on_gpu(gpu: &Gpu, shading: &StrandShading, inputs: &[[f32; 4]]) -> Vec<Vec3> 
 #[test]
 fn the_shader_looks_up_what_the_cpu_does() {
     let Some(renderer) = renderer("the_shader_looks_up_what_the_cpu_does") else { return };
-    for params in [StrandParams::default(), strands([0.1, 0.1], 1.0)] {
+    let tilted = [Hair::default().strand(), hairs(1.55, -10.0, [0.1; 2], 0.3)];
+    for params in [Water::default().strand(), strands([0.1, 0.1], 1.0)].into_iter().chain(tilted) {
         let shading = StrandShading::new(&params);
         let inputs: Vec<[f32; 4]> = directions(4096, 0.2)
             .into_iter()

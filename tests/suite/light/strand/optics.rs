@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
-use taki::light::strand::absorption::pure_water;
 use taki::light::strand::azimuthal::{Azimuth, Logistic, logistic_scale};
-use taki::light::strand::cylinder::{ETA, Passage, exit_azimuth, fresnel, modified_index, refracted_cosine};
+use taki::light::strand::cylinder::{Passage, exit_azimuth, fresnel, modified_index, refracted_cosine};
 use taki::light::strand::longitudinal::{bessel_i0e, longitudinal, variances};
+use taki::light::strand::water::{ETA, pure_water};
 
 fn reflectance(cos_i: f64) -> [f64; 2] {
     fresnel(cos_i, refracted_cosine(cos_i, ETA), ETA)

@@ -242,6 +242,20 @@ impl<S: Simd> Spread<S> {
         [cos2_l.max(zero).min(one).sqrt(), product.simd_lt(zero).select(-e, e)]
     }
 
+    /// See [`crate::light::fibre::Spread::along`].
+    #[inline(always)]
+    pub fn along(
+        &self,
+        [t_dot_l, t_dot_e]: [Floats<S>; 2],
+        l_v: Lanes3<S>,
+        way: Lanes3<S>,
+    ) -> [Floats<S>; 2] {
+        let zero = f32x8::splat(self.simd, 0.0);
+        let mean = self.moments.times(l_v).times(self.inverse_q).plus(self.s_e);
+        let is_against = mean.dot(way).simd_lt(zero) ^ (t_dot_l + t_dot_e).simd_lt(zero);
+        [is_against.select(-t_dot_l, t_dot_l), is_against.select(-t_dot_e, t_dot_e)]
+    }
+
     /// Diffuse and specular part of the reflection Ψ, with the highlight convolved with the spread of the
     /// directions.
     #[inline(always)]

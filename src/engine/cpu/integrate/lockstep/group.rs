@@ -18,6 +18,8 @@ use super::strand;
 use super::walk::{BATCH, NO_CELL, Passed, ROW, Walk};
 use crate::engine::cpu::integrate::Integrator;
 use crate::engine::cpu::integrate::walk::Lit;
+use crate::light::strand::ROOT_TO_TIP;
+use crate::light::strand::table::StrandShading;
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
 use crate::util::lane_powers::exp2;
@@ -338,7 +340,7 @@ impl<'a, 'h> Group<'a, 'h> {
         visible: Floats<S>,
     ) -> Light<S> {
         if let Some(shading) = self.integrator.strand.as_ref().filter(|_| !self.is_mist) {
-            let cosines = angles.cosines(l_v);
+            let cosines = angles.cosines(simd, shading, l_v);
             return Light::Colour(strand::psi(simd, shading, k, cosines, l_dot_e).times(weight * visible));
         }
         let parts = match angles {
@@ -424,10 +426,12 @@ pub enum Angles<S: Simd> {
 impl<S: Simd> Angles<S> {
     /// Cosines of the angles between a single direction and light and eye.
     #[inline(always)]
-    fn cosines(&self, l_v: Lanes3<S>) -> [Floats<S>; 2] {
+    fn cosines(&self, simd: S, shading: &StrandShading, l_v: Lanes3<S>) -> [Floats<S>; 2] {
         match self {
             Angles::Mist(psi) => [*psi, *psi],
-            Angles::Many(spread) => spread.of_one(l_v),
+            Angles::Many(spread) => {
+                strand::cosines(shading, spread, l_v, || Lanes3::splat(simd, ROOT_TO_TIP))
+            }
             Angles::One { v, t_dot_e, inverse_q } => {
                 let root = inverse_q.sqrt();
                 [v.dot(l_v) * root, *t_dot_e * root]

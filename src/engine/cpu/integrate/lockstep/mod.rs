@@ -291,7 +291,8 @@ impl<'a> Lockstep<'a> {
                 tint = tint * (1.0 - share) + other_tint * share;
             }
             let point = values.point.get(i % LANES);
-            let passed = integrator.composed(point, transmittance, cells, (own, tint), sheet.order);
+            let met = (point, values.mist.0[i % LANES] > 0.0);
+            let passed = integrator.composed(met, transmittance, cells, (own, tint), sheet.order);
             integrator.add(&mut rays[sheet.ray].1, passed);
         }
     }

@@ -2,6 +2,7 @@
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use glam::Vec3;
 
 use super::cells::{k_codes, v_codes, words};
 use super::fibre::{Exponent, Metric, Moments, Spread, psi_parts};
@@ -11,6 +12,8 @@ use super::strand;
 use crate::engine::cpu::integrate::Integrator;
 use crate::engine::cpu::integrate::shell::Place;
 use crate::engine::cpu::lights::light_at;
+use crate::light::strand::ROOT_TO_TIP;
+use crate::light::strand::table::StrandShading;
 use crate::trace::lookup::Level;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, Words};
 use crate::volume::Cell;
@@ -115,7 +118,10 @@ impl Pending {
             let (l, intensity) = light_at(simd, light, point);
             let l_dot_e = l.dot(e);
             let lit = match &integrator.strand {
-                Some(shading) => intensity.by(strand::psi(simd, shading, k, fibres.cosines(l, e), l_dot_e)),
+                Some(shading) => {
+                    let cosines = fibres.cosines(shading, (l, e), &frame);
+                    intensity.by(strand::psi(simd, shading, k, cosines, l_dot_e))
+                }
                 None => {
                     let parts = fibres.psi_parts(simd, k, &exponent, l, e);
                     match &ink {
@@ -133,6 +139,17 @@ impl Pending {
         }
         self.count = 0;
     }
+}
+
+/// Way from root to tip in the world; twin of the function of this name in
+/// `src/engine/cpu/integrate/shell.rs`.
+#[inline(always)]
+fn way_of<S: Simd>([x, y, z]: &[Lanes3<S>; 3]) -> Lanes3<S> {
+    let [row_x, row_y, row_z] = [y.cross(*z), z.cross(*x), x.cross(*y)];
+    let part = |row: Lanes3<S>, factor: f32| row.scaled(Vec3::splat(factor));
+    let way = part(row_x, ROOT_TO_TIP.x).plus(part(row_y, ROOT_TO_TIP.y)).plus(part(row_z, ROOT_TO_TIP.z));
+    let is_mirrored = x.dot(row_x).simd_lt(0.0);
+    Lanes3 { x: -way.x, y: -way.y, z: -way.z }.or(is_mirrored, way)
 }
 
 /// Directions of the fibres in eight cells, in the world.
@@ -174,13 +191,18 @@ impl<S: Simd> Fibres<S> {
 
     /// Cosines of the angles between a single direction and light and eye.
     #[inline(always)]
-    fn cosines(&self, l: Lanes3<S>, e: Lanes3<S>) -> [Floats<S>; 2] {
+    fn cosines(
+        &self,
+        shading: &StrandShading,
+        (l, e): (Lanes3<S>, Lanes3<S>),
+        frame: &[Lanes3<S>; 3],
+    ) -> [Floats<S>; 2] {
         match self {
             Fibres::One { t, inverse_q } => {
                 let root = inverse_q.sqrt();
                 [t.dot(l) * root, t.dot(e) * root]
             }
-            Fibres::Many(spread) => spread.of_one(l),
+            Fibres::Many(spread) => strand::cosines(shading, spread, l, || way_of(frame)),
         }
     }
 }

@@ -4,11 +4,26 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 
-use crate::light::strand::table::{SINE_SHARE, SIZE, StrandShading, StrandTable, UNIT_BITS};
+use super::fibre::Spread;
+use crate::light::strand::table::{SINE_SHARE, SIZE, StrandShading, StrandTable, TILTED_X, UNIT_BITS};
 use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 
-/// Texels from the first to the last that one lookup reads.
-const SPAN: usize = SIZE[0] * SIZE[1] + SIZE[0] + 2;
+/// Texels from the first to the last that one lookup reads, in a table of `nx` nodes along x.
+const fn span(nx: usize) -> usize {
+    nx * SIZE[1] + nx + 2
+}
+
+/// See [`StrandShading::cosines`].
+#[inline(always)]
+pub fn cosines<S: Simd>(
+    shading: &StrandShading,
+    spread: &Spread<S>,
+    l_v: Lanes3<S>,
+    way: impl FnOnce() -> Lanes3<S>,
+) -> [Floats<S>; 2] {
+    let cosines = spread.of_one(l_v);
+    if shading.table.is_tilted() { spread.along(cosines, l_v, way()) } else { cosines }
+}
 
 /// See [`StrandShading::psi`].
 #[inline(always)]
@@ -50,15 +65,25 @@ fn of_table<S: Simd>(
     let x = s * (1.0 + table.squeeze) / (s + table.squeeze);
     let far = (one - (one - sin2_half_phi).sqrt()) * (1.0 - SINE_SHARE);
     let z = sin2_half_phi.sqrt() * SINE_SHARE + far;
-    let Lanes3 { x, y, z } = sample(simd, table.texels(), [x, cos_d, z]);
+    let Lanes3 { x, y, z } = if table.is_tilted() {
+        let is_back = (t_dot_l + t_dot_e).simd_lt(zero);
+        let x = is_back.select(-x, x) * 0.5 + 0.5;
+        sample::<S, TILTED_X, { span(TILTED_X) }>(simd, table.texels(), [x, cos_d, z])
+    } else {
+        sample::<S, { SIZE[0] }, { span(SIZE[0]) }>(simd, table.texels(), [x, cos_d, z])
+    };
     let root = (coco + table.spread).sqrt();
     Lanes3 { x: x / root, y: y / root, z: z / root }
 }
 
-/// Trilinear interpolation at coordinates from 0 to 1.
+/// Trilinear interpolation at coordinates from 0 to 1, in a table of `NX` nodes along x.
 #[inline(always)]
-fn sample<S: Simd>(simd: S, texels: &[u32], [x, y, z]: [Floats<S>; 3]) -> Lanes3<S> {
-    let [nx, ny, nz] = SIZE;
+fn sample<S: Simd, const NX: usize, const SPAN: usize>(
+    simd: S,
+    texels: &[u32],
+    [x, y, z]: [Floats<S>; 3],
+) -> Lanes3<S> {
+    let [nx, ny, nz] = [NX, SIZE[1], SIZE[2]];
     let (ix, fx) = split(simd, x, nx);
     let (iy, fy) = split(simd, y, ny);
     let (iz, fz) = split(simd, z, nz);

@@ -1,6 +1,49 @@
-//! Absorption of pure water in linear sRGB.
+//! Strands of water: their index of refraction, and the absorption of pure water in linear sRGB.
 
 use glam::DVec3;
+
+use super::StrandParams;
+
+/// Index of refraction of water at 20 °C in yellow light.
+pub const ETA: f64 = 1.333;
+
+/// Properties of strands of water and of the air between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Water {
+    /// Radius of a strand, metres.
+    pub radius_m: f32,
+    /// Roughness along the strand, β_m, 0.1 to 1.
+    pub roughness_m: f32,
+    /// Roughness around the strand, β_n, 0.1 to 1.
+    pub roughness_n: f32,
+    /// Absorption as a multiple of pure water's.
+    pub absorption: f32,
+    /// See [`StrandParams::aeration`].
+    pub aeration: f32,
+    /// See [`StrandParams::g`].
+    pub g: f32,
+}
+
+impl Default for Water {
+    fn default() -> Self {
+        Water { radius_m: 5e-4, roughness_m: 0.3, roughness_n: 0.2, absorption: 1.0, aeration: 0.5, g: 0.8 }
+    }
+}
+
+impl Water {
+    /// Strands of this water. Their surface is smooth, so nothing is tilted.
+    pub fn strand(&self) -> StrandParams {
+        StrandParams {
+            eta: ETA,
+            tilt: 0.0,
+            depth: pure_water() * (2.0 * self.radius_m as f64 * self.absorption as f64),
+            roughness_m: self.roughness_m,
+            roughness_n: self.roughness_n,
+            aeration: self.aeration,
+            g: self.g,
+        }
+    }
+}
 
 /// Wavelength of the first value in the table, nm.
 const FIRST_NM: f64 = 380.0;
