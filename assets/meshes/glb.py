@@ -6,7 +6,8 @@ import struct
 
 def write(path, name, parts):
     """Writes a mesh called `name`. Each part is its material's name and look (glTF's pbrMetallicRoughness),
-    points, texture coordinates, triangles by the numbers of their points, and perhaps normals."""
+    points, texture coordinates, triangles by the numbers of their points, and perhaps a table of
+    further attributes, of three numbers a point."""
     blob, views, accessors, primitives, materials = b"", [], [], [], []
 
     def accessor(code, rows, kind, component, **more):
@@ -19,15 +20,15 @@ def write(path, name, parts):
         accessors.append(own | more)
         return len(accessors) - 1
 
-    for material, (label, look, points, uvs, triangles, *normals) in enumerate(parts):
+    for material, (label, look, points, uvs, triangles, *more) in enumerate(parts):
         stored = [struct.unpack("<3f", struct.pack("<3f", *p)) for p in points]
         low, high = ([f(p[k] for p in stored) for k in range(3)] for f in (min, max))
         attributes = {
             "POSITION": accessor("<3f", points, "VEC3", 5126, min=low, max=high),
             "TEXCOORD_0": accessor("<2f", uvs, "VEC2", 5126),
         }
-        if normals:
-            attributes["NORMAL"] = accessor("<3f", normals[0], "VEC3", 5126)
+        for own, rows in (more[0] if more else {}).items():
+            attributes[own] = accessor("<3f", rows, "VEC3", 5126)
         indices = accessor("<3H", triangles, "SCALAR", 5123)
         primitives.append({"attributes": attributes, "indices": indices, "material": material})
         materials.append({"name": label, "pbrMetallicRoughness": look})

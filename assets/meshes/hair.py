@@ -106,8 +106,8 @@ def quads(columns, rows, points, uvs):
 
 
 def hair(rows, inwards):
-    """The first `rows` rows of the hair, `inwards` metres below its roots."""
-    points, uvs = [], []
+    """The first `rows` rows of the hair, `inwards` metres below its roots. The colour is the thickness."""
+    points, uvs, thick = [], [], []
     for i in range(AROUND + 1):
         a = OPEN * (2 * i / AROUND - 1)
         for j, (x, y, z) in enumerate(path(a)[: rows + 1]):
@@ -115,7 +115,8 @@ def hair(rows, inwards):
             step = inwards * min(1.0, out / 0.03) / max(out, 1e-6)
             points.append((x - x * step, y - inwards * (1 - min(1.0, out / 0.1)), z - z * step))
             uvs.append((COPIES * i / AROUND, j / LONG))
-    return quads(AROUND, rows, points, uvs)
+            thick.append([0.1 + 0.9 * smooth(j / (0.2 * LONG)) ** 0.5] * 3)
+    return *quads(AROUND, rows, points, uvs), {"COLOR_0": thick}
 
 
 def smoothed(rings):
@@ -134,7 +135,7 @@ def smoothed(rings):
         for k in triangle:
             normals[k] = [x + y for x, y in zip(normals[k], n)]
     unit = lambda n: [x / max(math.hypot(*n), 1e-30) for x in n]
-    return points, [(0.0, 0.0)] * len(points), triangles, [unit(n) for n in normals]
+    return points, [(0.0, 0.0)] * len(points), triangles, {"NORMAL": [unit(n) for n in normals]}
 
 
 def ellipsoid(centre, radii, columns=40, rows=24):
@@ -163,10 +164,10 @@ def bust(rings, columns=64):
 
 def joined(parts):
     points, uvs, triangles, normals = [], [], [], []
-    for p, uv, t, n in parts:
+    for p, uv, t, more in parts:
         triangles += [tuple(len(points) + k for k in triangle) for triangle in t]
-        points, uvs, normals = points + p, uvs + uv, normals + n
-    return points, uvs, triangles, normals
+        points, uvs, normals = points + p, uvs + uv, normals + more["NORMAL"]
+    return points, uvs, triangles, {"NORMAL": normals}
 
 
 def main(path):
