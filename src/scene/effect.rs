@@ -85,8 +85,8 @@ fn without_water(values: &Values, key: &str) -> Option<String> {
         let volume = volumes::volume_of(values, material);
         match values.choice(&own("carrier"), Carrier::from_word) {
             Carrier::Face => values.float(&own("mist")) == 0.0,
-            // Fur and cloth are no water. A volume that the scene lacks is refused.
-            Carrier::Shell => ![Builder::Fur, Builder::Cloth].contains(&builder(values, &volume)),
+            // Fur, cloth and rock are no water. A volume that the scene lacks is refused.
+            Carrier::Shell => [Builder::Curves, Builder::Flow].contains(&builder(values, &volume)),
         }
     };
     let is_dry = || values.names("pools").is_empty() && !volumes::used_materials(values).iter().any(wets);

@@ -30,11 +30,15 @@ pub(super) enum Builder {
     Fur,
     /// Woven yarns.
     Cloth,
+    /// Rock, scree, moss and grass.
+    Mountain,
+    /// Loose grains.
+    Grains,
     /// Grids of a simulation.
     Flow,
 }
 
-words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Flow => "flow" } }
+words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Mountain => "mountain", Grains => "grains", Flow => "flow" } }
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {

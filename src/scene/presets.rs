@@ -10,6 +10,8 @@ const MESHES: &[(&str, &[u8])] = &[
     ("taki:cliff.glb", include_bytes!("../../assets/meshes/cliff.glb")),
     ("taki:bear.glb", include_bytes!("../../assets/meshes/bear.glb")),
     ("taki:cloth.glb", include_bytes!("../../assets/meshes/cloth.glb")),
+    ("taki:slope.glb", include_bytes!("../../assets/meshes/slope.glb")),
+    ("taki:sugar.glb", include_bytes!("../../assets/meshes/sugar.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
     ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
 ];
@@ -59,6 +61,12 @@ const PRESETS: &[Preset] = &[
         "a bear of ellipsoids in fur, after Kajiya and Kay's",
         include_str!("../../assets/scenes/bear.toml"),
     ),
+    (
+        "slope",
+        "rock and grass of a mountainside, before a valley",
+        include_str!("../../assets/scenes/slope.toml"),
+    ),
+    ("sugar", "lumps and a heap of sugar: grains", include_str!("../../assets/scenes/sugar.toml")),
     ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",

@@ -34,7 +34,11 @@ struct Group {
 /// The groups of the panel, in order.
 const GROUPS: [Group; 11] = [
     group("Curves", "The spatial fractal curves that give each cell its flow direction", &["curves"]),
-    group("Volume", "The volume texture: cells, density, reflection", &["volume", "fur", "cloth"]),
+    group(
+        "Volume",
+        "The volume texture: cells, density, reflection",
+        &["volume", "fur", "cloth", "mountain", "grains"],
+    ),
     group("Volumes", "Other volumes beside the water, each with its curves", &["volumes"]),
     group(
         "Mapping",

@@ -7,6 +7,7 @@
 //! of a choice stand at its enum (see `src/util/words.rs`).
 
 mod boxes;
+mod ground;
 mod light;
 mod matter;
 mod meshes;
@@ -145,6 +146,8 @@ pub const GROUPS: &[Group] = &[
     volume::VOLUME,
     matter::FUR,
     matter::CLOTH,
+    ground::MOUNTAIN,
+    ground::GRAINS,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,
