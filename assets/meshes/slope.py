@@ -2,8 +2,8 @@
 
 Run: python3 slope.py [FILE]   (Python alone)
 
-Texture coordinates count copies of the volume: u across the slope and v down it. They are bent, so that copies
-do not stand in rows.
+Texture coordinates count copies of the volume: u across the slope and v down it. They are bent, so that
+copies do not stand in rows.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Writes sugar.glb, the mesh of the preset `sugar`: three lumps of sugar and a heap, ten times as large as life.
+"""Writes sugar.glb, the mesh of the preset `sugar`: three lumps and a heap, ten times as large as life.
 
 Run: python3 sugar.py [FILE]   (Python alone)
 

@@ -38,7 +38,12 @@ pub(super) enum Builder {
     Flow,
 }
 
-words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Mountain => "mountain", Grains => "grains", Flow => "flow" } }
+words! {
+    Builder {
+        Curves => "curves", Fur => "fur", Cloth => "cloth", Mountain => "mountain", Grains => "grains",
+        Flow => "flow",
+    }
+}
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {

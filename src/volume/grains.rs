@@ -1,7 +1,7 @@
 //! §2 Builder of loose grains: particles without strands.
 //!
-//! Water of particles (Sims 1990) looks like granulated sugar; the paper's curves give it strands. This volume
-//! is what they are compared with: each grain is filled or not by chance, and its direction is any.
+//! Water of particles (Sims 1990) looks like granulated sugar; the paper's curves give it strands. This
+//! volume is what they are compared with: each grain is filled or not by chance, and its direction is any.
 
 use glam::Vec3;
 use rand::RngExt;

@@ -26,11 +26,13 @@ const TIP: f32 = 1.0;
 const LENGTH_SPREAD: f32 = 0.3;
 const SHADE_SPREAD: f32 = 0.16;
 const PLACE_SPREAD: f32 = 0.08;
-/// Mean number of blades in a tuft, the share of blades in tufts, and the radius of a tuft, lengths of a blade.
+/// Mean number of blades in a tuft, the share of blades in tufts, and the radius of a tuft, lengths of a
+/// blade.
 const BLADES_A_TUFT: u32 = 40;
 const IN_TUFTS: f32 = 0.75;
 const TUFT_RADIUS: f32 = 0.13;
-/// Standard deviation of the lean to any side, and lean away from the middle of a tuft at its radius, lengths.
+/// Standard deviation of the lean to any side, and lean away from the middle of a tuft at its radius, heights
+/// of a blade.
 const STRAY_LEAN: f32 = 0.3;
 const TUFT_LEAN: f32 = 0.3;
 /// Share of its width that a blade loses up to its tip.

@@ -6,10 +6,10 @@ use super::{Group, p};
 
 pub(super) const MOUNTAIN: Group = Group {
     title: "Mountain",
-    about: "A near face of a mountain, of a volume with `volume.builder=mountain`: rock fills it from the skin, \
-         the face z = nz, up to a fractal height of roughness `curves.h`; stones lie in its hollows, moss on \
-         what is flat, and grass grows where soil gathers. v leads down the slope. `volume.color` to \
-         `volume.color_4` are light rock, dark rock and soil, moss and the roots of grass, and its tips.",
+    about: "A near face of a mountain, of a volume with `volume.builder=mountain`: rock fills it from the \
+         skin, the face z = nz, up to a fractal height of roughness `curves.h`; stones lie in its hollows, \
+         moss on what is flat, and grass grows where soil gathers. v leads down the slope. `volume.color` \
+         to `volume.color_4` are light rock, dark rock and soil, moss and the roots of grass, and its tips.",
     params: &[
         p("mountain.relief", "", "depths", Float(0.0, 1.0, 0.11), Volume)
             .slider(0.0, 0.3)
@@ -23,7 +23,7 @@ pub(super) const MOUNTAIN: Group = Group {
             .doc("Size of the largest forms of the rock, as a fraction of the volume's width nx.")
             .when("Lower it for rubble; raise it for a few large slabs, which show that copies repeat."),
         p("mountain.fracture", "", "", Float(0.0, 1.0, 0.7), Volume)
-            .doc("Share of the relief that is broken into blocks with flat faces and cracks; the rest is smooth.")
+            .doc("Share of the relief that is broken into blocks with flat faces and cracks.")
             .when("Raise it for limestone and slate; lower it for rock that ice or water has rounded."),
         p("mountain.beds", "", "", Float(0.0, 1.0, 0.4), Volume)
             .doc("Share by which the blocks lie in beds: they are long, and their edges are ledges.")
@@ -52,7 +52,9 @@ pub(super) const MOUNTAIN: Group = Group {
         p("mountain.blade_width", "", "widths", Float(1e-6, 0.5, 0.0015), Volume)
             .slider(0.0002, 0.02)
             .doc("Width of a blade at its root, as a fraction of nx.")
-            .when("Lower it with more `mountain.blades`. Below one cell, 1/nx, cells thin out in proportion."),
+            .when(
+                "Lower it with more `mountain.blades`. Below one cell, 1/nx, cells thin out in proportion.",
+            ),
         p("mountain.blade_lean", "", "heights", Float(-10.0, 10.0, 0.5), Volume)
             .slider(-2.0, 2.0)
             .doc("Distance by which a blade's tip leans down the slope, as a fraction of its height.")

@@ -15,8 +15,8 @@ pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
     about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
          of `curves`, `volume`, `fur`, `cloth`, `mountain` and `grains` in one table; where a description \
-         names one of those keys, it means the key of the same volume. A material says with `materials.*.volume` which volume \
-         it shows. A volume that no surface shows is not built.",
+         names one of those keys, it means the key of the same volume. A material says with \
+         `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
     params: &PARAMS,
 };
 

@@ -129,9 +129,9 @@ fn spline(t: f32) -> [f32; 4] {
     [s2 * s, 4.0 - 6.0 * t2 + 3.0 * t2 * t, 4.0 - 6.0 * s2 + 3.0 * s2 * s, t2 * t].map(|w| w / 6.0)
 }
 
-/// Fractal surface of complexity h: level n adds normal numbers times S(n) = 2^(−n·h), as the midpoints of the
-/// paper's curves, on a lattice that is twice as fine as that of level n − 1. Between lattice points lie cubic
-/// splines. Successive additions, unlike displaced midpoints, show no creases (Saupe 1988).
+/// Fractal surface of complexity h: level n adds normal numbers times S(n) = 2^(−n·h), as the midpoints of
+/// the paper's curves, on a lattice that is twice as fine as that of level n − 1. Between lattice points lie
+/// cubic splines. Successive additions, unlike displaced midpoints, show no creases (Saupe 1988).
 pub(super) fn fractal(cells: [usize; 2], size: f32, h: f32, family: Family) -> Field {
     let mut levels = Vec::new();
     while let Some(counts) = lattice(cells, size, levels.len()) {
@@ -202,8 +202,8 @@ impl Blocks {
 }
 
 /// Broken rock: blocks with flat, tilted faces, on levels as those of [`fractal`], and nearness to open
-/// cracks, 0 to 1. `beds` is the share by which blocks are long and tilt alike, as layers are that come out of
-/// a slope.
+/// cracks, 0 to 1. `beds` is the share by which blocks are long and tilt alike, as layers are that come out
+/// of a slope.
 pub(super) fn blocks(cells: [usize; 2], size: f32, h: f32, beds: f32, family: Family) -> [Field; 2] {
     let mut levels = Vec::new();
     while let Some(counts) = lattice(cells, size, levels.len()) {

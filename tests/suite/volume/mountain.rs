@@ -100,9 +100,8 @@ fn heights_have_the_mean_and_the_deviation_of_their_relief() {
 
 /// B-spline of degree 7, the autocorrelation of a cubic one.
 fn spline_7(x: f64) -> f64 {
-    let binomial = [1.0, 8.0, 28.0, 56.0, 70.0, 56.0, 28.0, 8.0, 1.0];
-    let term =
-        |k: usize| binomial[k] * if k % 2 == 0 { 1.0 } else { -1.0 } * (x + 4.0 - k as f64).max(0.0).powi(7);
+    let binomial = [1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0];
+    let term = |k: usize| binomial[k] * (x + 4.0 - k as f64).max(0.0).powi(7);
     (0..9).map(term).sum::<f64>() / 5040.0
 }
 
@@ -187,8 +186,8 @@ fn blades_stand_up_and_lean_down_the_slope() {
     };
     let [x, y] = lean(0.0);
     assert!(x.abs() < 0.04 && y.abs() < 0.04, "{x} {y}");
-    // The mean of 2s over a blade's way s, by its width 1 − 0.85s, is 0.75; without the first tenth, which lies
-    // below these layers, 0.9.
+    // The mean of 2s over a blade's way s, by its width 1 − 0.85s, is 0.75; without the first tenth, which
+    // lies below these layers, 0.9.
     let [x, y] = lean(1.0);
     assert!(x.abs() < 0.04 && (0.75..0.9).contains(&y), "{x} {y}");
 }
