@@ -176,7 +176,11 @@ fn write_strands(
     terminal: &Terminal,
 ) -> Result<()> {
     let recipe = &scene.recipes[number];
-    let Some(matter) = &recipe.matter else {
+    if !overwrite {
+        check_volume_replaced(path)?;
+    }
+    let strands = recipe.matter.as_ref().map(|matter| matter.strands(memory, terminal)).transpose()?;
+    let Some(mut strands) = strands.flatten() else {
         return Err(Error::Usage(format!(
             "-o {}: the volume {} is not made of strands with a width; use -o {}",
             path.display(),
@@ -184,11 +188,7 @@ fn write_strands(
             path.with_extension("npz").display()
         )));
     };
-    if !overwrite {
-        check_volume_replaced(path)?;
-    }
     let mut out = Output::create(path)?;
-    let mut strands = matter.strands(memory, terminal)?;
     let size = recipe.water.size;
     let place = recipe.world_from_texture().unwrap_or_else(|| VolumeTexture::unit_box(size));
     let cell = DVec3::ONE / DVec3::from_array(size.map(f64::from));

@@ -85,7 +85,7 @@ fn without_water(values: &Values, key: &str) -> Option<String> {
         let volume = volumes::volume_of(values, material);
         match values.choice(&own("carrier"), Carrier::from_word) {
             Carrier::Face => values.float(&own("mist")) == 0.0,
-            // A volume that the scene lacks is refused.
+            // Fur, cloth and rock are no water. A volume that the scene lacks is refused.
             Carrier::Shell => [Builder::Curves, Builder::Flow].contains(&builder(values, &volume)),
         }
     };

@@ -1,4 +1,4 @@
-//! Recipes of matter that is made of threads: fur, cloth, hair, and strands of a file.
+//! Recipes of matter other than water: fur, cloth, hair, strands of a file, mountain, grains.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +11,8 @@ use super::{Limits, Recipe, Values, sequence};
 use crate::model::Strands;
 use crate::util::error::{Error, Result};
 use crate::volume::{
-    ClothSpec, FurSpec, HairSpec, Matter, StorageChoice, StrandsSpec, Up, WaterSpec, Weave, WeaveName,
+    ClothSpec, FurSpec, GrainsSpec, HairSpec, Matter, MountainSpec, StorageChoice, StrandsSpec, Up,
+    WaterSpec, Weave, WeaveName,
 };
 
 /// Returns the recipe of the volume `name`, whose size, seed and coefficients `water` has; `None` for water
@@ -26,6 +27,8 @@ pub(super) fn matter(v: &Values, name: &str, water: &WaterSpec, has_ramp: bool) 
         Builder::Fur => Matter::Fur(fur(v, name, water, k_s)),
         Builder::Cloth => Matter::Cloth(cloth(v, name, water, k_s)?),
         Builder::Hair => Matter::Hair(hair(v, name, water, k_s)),
+        Builder::Mountain => Matter::Mountain(mountain(v, name, water, k_s)),
+        Builder::Grains => Matter::Grains(grains(v, name, water, k_s)),
     };
     not_sparse(v, name)?;
     Ok(Some(matter))
@@ -36,7 +39,7 @@ fn not_sparse(v: &Values, name: &str) -> Result<()> {
     let storage = key_of_volume(name, "volume.storage");
     if v.choice(&storage, StorageChoice::from_word) == StorageChoice::Sparse {
         return Err(Error::input(
-            format!("{storage} = \"sparse\": fur, cloth and hair are built in dense storage"),
+            format!("{storage} = \"sparse\": only curves and simulations are stored so"),
             format!("set {storage}=auto"),
         ));
     }
@@ -207,4 +210,44 @@ pub(super) fn too_thick(recipe: &Recipe) -> Option<String> {
             key("cloth.yarn"),
         )
     })
+}
+
+fn mountain(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> MountainSpec {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let width = water.size[0] as f32;
+    MountainSpec {
+        size: water.size,
+        relief: float("mountain.relief"),
+        h: water.shape.h,
+        block: float("mountain.block_size"),
+        fracture: float("mountain.fracture"),
+        beds: float("mountain.beds"),
+        scree: float("mountain.scree"),
+        stone_cells: float("mountain.stone_size") * width,
+        moss: float("mountain.moss"),
+        soil: float("mountain.soil"),
+        blades: v.count(&key_of_volume(name, "mountain.blades")),
+        blade_length: float("mountain.blade_length"),
+        blade_width_cells: float("mountain.blade_width") * width,
+        blade_lean: float("mountain.blade_lean"),
+        seed: water.seed,
+        alpha: water.alpha,
+        k_d: water.k_d,
+        k_s,
+    }
+}
+
+fn grains(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> GrainsSpec {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    GrainsSpec {
+        size: water.size,
+        filled: float("grains.filled"),
+        settled: float("grains.settled"),
+        grain_cells: float("grains.grain_size"),
+        shade: float("grains.grain_shade"),
+        seed: water.seed,
+        alpha: water.alpha,
+        k_d: water.k_d,
+        k_s,
+    }
 }

@@ -34,11 +34,20 @@ pub(super) enum Builder {
     Hair,
     /// Strands of a file.
     Strands,
+    /// Rock, scree, moss and grass.
+    Mountain,
+    /// Loose grains.
+    Grains,
     /// Grids of a simulation.
     Flow,
 }
 
-words! { Builder { Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands", Flow => "flow" } }
+words! {
+    Builder {
+        Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands", Mountain => "mountain", Grains => "grains",
+        Flow => "flow",
+    }
+}
 
 /// Whether the volume `name` is made of the grids of a simulation.
 pub(super) fn is_measured(v: &Values, name: &str) -> bool {

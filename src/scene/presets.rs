@@ -11,6 +11,8 @@ const MESHES: &[(&str, &[u8])] = &[
     ("taki:bear.glb", include_bytes!("../../assets/meshes/bear.glb")),
     ("taki:hair.glb", include_bytes!("../../assets/meshes/hair.glb")),
     ("taki:cloth.glb", include_bytes!("../../assets/meshes/cloth.glb")),
+    ("taki:slope.glb", include_bytes!("../../assets/meshes/slope.glb")),
+    ("taki:sugar.glb", include_bytes!("../../assets/meshes/sugar.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
     ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
 ];
@@ -61,6 +63,12 @@ const PRESETS: &[Preset] = &[
         include_str!("../../assets/scenes/bear.toml"),
     ),
     ("hair", "long hair, parted and in locks", include_str!("../../assets/scenes/hair.toml")),
+    (
+        "slope",
+        "rock and grass of a mountainside, before a valley",
+        include_str!("../../assets/scenes/slope.toml"),
+    ),
+    ("sugar", "lumps and a heap of sugar: grains", include_str!("../../assets/scenes/sugar.toml")),
     ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",

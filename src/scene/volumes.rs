@@ -33,7 +33,7 @@ pub struct Recipe {
     pub name: String,
     /// Recipe of the cells, used where there is no `file`.
     pub water: WaterSpec,
-    /// Recipe of the cells of fur, cloth or hair, in place of `water`, whose size and α are theirs too.
+    /// Recipe of the cells of other matter, in place of `water`, whose size and α are theirs too.
     pub matter: Option<Matter>,
     /// Colours of the cells.
     pub ramp: Ramp,
@@ -118,12 +118,12 @@ impl Recipe {
     /// Returns the storage of the cells within `memory` bytes, of which the picture needs `beside` for other
     /// things.
     fn storage_within(&self, memory: u64, beside: u64) -> Result<Storage> {
-        if self.matter.is_none() {
+        let Some(matter) = &self.matter else {
             return build::water_storage(&self.water, self.asked_storage, memory, beside);
-        }
+        };
         let [nx, ny, nz] = self.water.size;
         let cells = u128::from(nx) * u128::from(ny) * u128::from(nz);
-        let building = cells * (size_of::<Cell>() + Matter::BYTES_PER_CELL) as u128;
+        let building = cells * (size_of::<Cell>() + Matter::BYTES_PER_CELL) as u128 + matter.bytes_beside();
         let need = building.max(dense_bytes(self.water.size, false) + u128::from(beside));
         if need > u128::from(memory) {
             let what = format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)");
@@ -153,7 +153,9 @@ impl Recipe {
             Storage::Sparse => Bricks::bytes_of(self.water.size, expected_cells(&self.water))[0],
         };
         let building = match self.storage {
-            Storage::Dense => built + cells * extra as u128,
+            Storage::Dense => {
+                built + cells * extra as u128 + self.matter.as_ref().map_or(0, Matter::bytes_beside)
+            }
             Storage::Sparse => sparse_bytes(self.water.size, expected_cells(&self.water), extra),
         };
         if self.is_read() { [0; 2] } else { [built, building] }
@@ -198,7 +200,7 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if is_of_curves && colors.len() > 1 {
         return Err(Error::input(
             format!("{}: cells of curves have no place on a ramp of colours", keys[1]),
-            format!("leave all but {} out, or set {builder} to fur, cloth, hair, strands or flow", keys[0]),
+            format!("leave all but {} out, or set {builder} to another word", keys[0]),
         ));
     }
     Ok(colors)

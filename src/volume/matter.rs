@@ -1,12 +1,13 @@
-//! §2 Recipes of matter that is made of threads with a width.
+//! §2 Recipes of matter other than water and simulations.
 
+use super::mountain::BYTES_PER_COLUMN;
 use super::threads::{BYTES_PER_CELL, Thread, Threads};
-use super::{ClothSpec, FurSpec, HairSpec, StrandsSpec, VolumeTexture};
+use super::{ClothSpec, FurSpec, GrainsSpec, HairSpec, MountainSpec, StrandsSpec, VolumeTexture};
 use crate::model::Strands;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
 
-/// Recipe of a volume of hairs or yarns. Equal recipes build equal bytes.
+/// Recipe of a volume of other matter. Equal recipes build equal bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Matter {
     /// Hairs on a skin.
@@ -17,11 +18,25 @@ pub enum Matter {
     Hair(HairSpec),
     /// Strands of a file.
     Strands(StrandsSpec),
+    /// A face of rock with grass.
+    Mountain(MountainSpec),
+    /// Loose grains.
+    Grains(GrainsSpec),
 }
 
 impl Matter {
     /// Bytes that building takes for each cell beside the cell itself.
     pub const BYTES_PER_CELL: usize = BYTES_PER_CELL;
+
+    /// Bytes that building takes beside those of the cells.
+    pub fn bytes_beside(&self) -> u128 {
+        match self {
+            Matter::Mountain(MountainSpec { size: [nx, ny, _], .. }) => {
+                u128::from(*nx) * u128::from(*ny) * BYTES_PER_COLUMN as u128
+            }
+            _ => 0,
+        }
+    }
 
     /// Builds the volume texture in dense storage.
     ///
@@ -31,23 +46,27 @@ impl Matter {
         match self {
             Matter::Fur(fur) => fur.build(monitor),
             Matter::Cloth(cloth) => cloth.build(monitor),
+            Matter::Mountain(mountain) => mountain.build(monitor),
+            Matter::Grains(grains) => grains.build(monitor),
             Matter::Hair(hair) => hair.build(monitor),
             Matter::Strands(strands) => strands.build(monitor),
         }
     }
 
-    /// Draws all threads as strands, in cells. They may reach beyond the volume, where copies of it would
-    /// stand.
+    /// Draws all threads as strands, in cells; `None` for matter that is not made of threads alone. They may
+    /// reach beyond the volume, where copies of it would stand.
     ///
     /// # Errors
     /// [`Error::Memory`] if they take more than `budget` bytes, and errors of `monitor`.
-    pub fn strands(&self, budget: u64, monitor: &dyn Monitor) -> Result<Strands> {
-        match self {
+    pub fn strands(&self, budget: u64, monitor: &dyn Monitor) -> Result<Option<Strands>> {
+        let strands = match self {
             Matter::Fur(fur) => drawn(fur.threads(), budget, monitor),
             Matter::Cloth(cloth) => drawn(cloth.threads(), budget, monitor),
             Matter::Hair(hair) => drawn(hair.threads(), budget, monitor),
             Matter::Strands(strands) => drawn(strands.threads(), budget, monitor),
-        }
+            Matter::Mountain(_) | Matter::Grains(_) => return Ok(None),
+        };
+        strands.map(Some)
     }
 }
 

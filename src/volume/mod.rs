@@ -11,11 +11,13 @@ mod cloth;
 mod file;
 mod flow;
 mod fur;
+mod grains;
 mod grids;
 mod hair;
 mod leaps;
 mod matter;
 mod measured;
+mod mountain;
 mod pyramid;
 mod ripple;
 mod spec;
@@ -32,6 +34,7 @@ pub use cells::Cells;
 pub use cloth::{ClothSpec, Weave, WeaveName};
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};
 pub use fur::FurSpec;
+pub use grains::GrainsSpec;
 pub use hair::HairSpec;
 pub use leaps::{box_exponents, empty_share, with_boxes, worth_leaping};
 pub use matter::Matter;
@@ -39,6 +42,7 @@ pub use measured::{
     LevelSetUnit, Measured, MeasuredSpec, ReflectBy, RhoRule, StrandSpec, Up, VelocityAt, VelocityNames,
     Wanted, build_measured, find_measured,
 };
+pub use mountain::MountainSpec;
 pub use pyramid::{
     Leaps, LevelAtlas, LevelSets, Levels, LevelsCache, Moments, Pyramid, PyramidSpec, coarse_levels,
     level_count, level_size, levels_of, stored_levels,

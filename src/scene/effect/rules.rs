@@ -242,7 +242,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: OF_BUILT,
         switch: "volume.builder",
-        needs: "curves, fur, cloth or hair",
+        needs: "another word",
         works: |v, switch| ![Builder::Flow, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
     },
     Rule {
@@ -266,10 +266,58 @@ pub(super) const RULES: &[Rule] = &[
         },
     },
     Rule {
-        keys: &["curves.amplitude", "curves.h"],
+        keys: &["curves.h"],
+        switch: "volume.builder",
+        needs: "curves, fur, hair, mountain or flow",
+        works: |v, switch| {
+            let smooth = [Builder::Cloth, Builder::Grains, Builder::Strands];
+            !smooth.iter().any(|builder| is(v, switch, builder.word()))
+        },
+    },
+    Rule {
+        keys: &["curves.amplitude"],
         switch: "volume.builder",
         needs: "curves, fur, hair or flow",
-        works: |v, switch| ![Builder::Cloth, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
+        works: |v, switch| {
+            let bends = [Builder::Curves, Builder::Fur, Builder::Hair, Builder::Flow];
+            bends.iter().any(|builder| is(v, switch, builder.word()))
+        },
+    },
+    Rule {
+        keys: &["mountain.*"],
+        switch: "volume.builder",
+        needs: "mountain",
+        works: |v, switch| is(v, switch, Builder::Mountain.word()),
+    },
+    Rule {
+        keys: &["mountain.blade_lean", "mountain.blade_length", "mountain.blade_width"],
+        switch: "mountain.blades",
+        needs: "a number above 0",
+        works: |v, switch| v.int(switch) > 0,
+    },
+    Rule {
+        keys: &["mountain.blades"],
+        switch: "mountain.soil",
+        needs: "a number above 0, because grass grows on soil",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["mountain.beds"],
+        switch: "mountain.fracture",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["mountain.stone_size"],
+        switch: "mountain.scree",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["grains.*"],
+        switch: "volume.builder",
+        needs: "grains",
+        works: |v, switch| is(v, switch, Builder::Grains.word()),
     },
     Rule {
         keys: &["cloth.*"],
@@ -310,7 +358,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: &["volume.seed"],
         switch: "volume.builder",
-        needs: "curves, fur, cloth, hair or flow",
+        needs: "another word",
         works: |v, switch| !is(v, switch, Builder::Strands.word()),
     },
     Rule {

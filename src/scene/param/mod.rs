@@ -7,6 +7,7 @@
 //! of a choice stand at its enum (see `src/util/words.rs`).
 
 mod boxes;
+mod ground;
 mod light;
 mod matter;
 mod meshes;
@@ -149,6 +150,8 @@ pub const GROUPS: &[Group] = &[
     matter::CLOTH,
     matter::HAIR,
     matter::IMPORT,
+    ground::MOUNTAIN,
+    ground::GRAINS,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,

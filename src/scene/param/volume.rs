@@ -180,8 +180,9 @@ pub(super) const VOLUME: Group = Group {
         p(COLORS[0], "", "", Color([1.0, 1.0, 1.0]), Uniform)
             .doc(
                 "Colour of what the cells reflect diffusely, and first of up to four on a ramp. Along it \
-                 lie the cells of `volume.builder=fur` and `hair` from root to tip, those of `cloth` from \
-                 warp to weft, and those of `flow` and of a file by their k_s; all cells then have the k_s of \
+                 lie the cells of `volume.builder=fur`, `hair` and `strands` from root to tip, those of \
+                 `cloth` from warp to weft, those of `mountain` from rock to grass, those of `grains` by \
+                 chance, and those of `flow` and of a file by their k_s; all cells then have the k_s of \
                  `volume.k_s`. Highlights keep the colour of the light. Cells are white without it.",
             )
             .when("Set it for fur, cloth or soil; water is white, and takes its colour from light and sky."),
@@ -211,12 +212,13 @@ pub(super) const VOLUME: Group = Group {
         p("volume.builder", "", "", Choice(Builder::WORDS), Volume)
             .doc(
                 "What the cells are made of: spatial fractal curves as in the paper (`curves`), hairs on a \
-                 skin (`fur`), woven yarns (`cloth`), long hair along v (`hair`), the strands of a \
-                 file in `volume.source` (`strands`), or the grids of a simulation there (`flow`).",
+                 skin (`fur`), woven yarns (`cloth`), long hair along v (`hair`), the strands of a file in \
+                 `volume.source` (`strands`), a near face of rock with grass (`mountain`), loose grains \
+                 (`grains`), or the grids of a simulation in `volume.source` (`flow`).",
             )
             .when(
-                "Choose `fur`, `cloth` or `hair` for a shell over a mesh, and `flow` for smoke or water that \
-                 another program computed, in a box.",
+                "Choose `fur`, `cloth`, `hair` or `mountain` for a shell over a mesh, and `strands`, or `flow` \
+                 for smoke or water that another program computed, in a box.",
             ),
         p("volume.source", "", "", Text(""), Volume)
             .doc(

@@ -1,7 +1,9 @@
-//! Further volumes beside `water`. Each has the keys of the groups that make cells, in a table.
+//! Further volumes beside `water`. Each has the keys of the groups of a volume, such as Curves and Fur, in a
+//! table.
 
 use std::str::from_utf8;
 
+use super::ground::{GRAINS, MOUNTAIN};
 use super::matter::{CLOTH, FUR, HAIR, IMPORT};
 use super::volume::{CURVES, VOLUME};
 use super::{Group, Param, last_part};
@@ -12,17 +14,25 @@ pub const WATER: &str = "water";
 pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
     about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
-         of `curves`, `volume`, `fur`, `cloth`, `tress` and `import` in one table; where a description names one of those \
-         keys, it means the key of the same volume. A material says with `materials.*.volume` which volume \
-         it shows. A volume that no surface shows is not built.",
+         of `curves`, `volume`, `fur`, `cloth`, `tress`, `import`, `mountain` and `grains` in one table; where \
+         a description names one of those keys, it means the key of the same volume. A material says with \
+         `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
     params: &PARAMS,
 };
 
 /// Prefix of the keys.
 const PREFIX: &[u8] = b"volumes.*.";
 /// Groups whose keys every volume has.
-const GROUPS: [&[Param]; 6] =
-    [CURVES.params, VOLUME.params, FUR.params, CLOTH.params, HAIR.params, IMPORT.params];
+const GROUPS: [&[Param]; 8] = [
+    CURVES.params,
+    VOLUME.params,
+    FUR.params,
+    CLOTH.params,
+    HAIR.params,
+    IMPORT.params,
+    MOUNTAIN.params,
+    GRAINS.params,
+];
 const COUNT: usize = {
     let (mut sum, mut group) = (0, 0);
     while group < GROUPS.len() {

@@ -42,7 +42,7 @@ fn colours_that_cannot_be_shown_are_refused() {
             &[color, "light.visibility=march", "light.scattering=multiple"],
             &["volume.color", "light.scattering=single"],
         ),
-        (&[color, "volume.color_2=[0,1,0]"], &["volume.color_2", "fur, cloth or flow"]),
+        (&[color, "volume.color_2=[0,1,0]"], &["volume.color_2", "set volume.builder to another word"]),
         (&["volume.builder=fur", "volume.storage=sparse"], &["volume.storage", "auto"]),
     ];
     for (sets, words) in cases {
@@ -121,4 +121,47 @@ fn cloth_that_is_cut_off_by_its_volume_is_told() {
     assert_eq!(told(&["volume.nz=7"]), None);
     let words = told(&["volume.nz=6"]).expect("a warning");
     assert!(words.contains("volume.nz = 6") && words.contains("7 cells thick"), "{words}");
+}
+
+#[test]
+fn mountains_and_grains_take_their_own_keys_alone_and_no_sparse_storage() {
+    let size = ["volume.nx=16", "volume.ny=16", "volume.nz=10"];
+    let of =
+        |builder: &str| with(&[&size[..], &[&format!("volume.builder={builder}")]].concat()).expect("valid");
+    let said = |scene: &Scene, set: &str| {
+        let set = set.to_owned();
+        let scene = scene.with(&[&set]).expect("valid");
+        !settings_without_effect(scene.values().expect("values"), &[set], &[]).is_empty()
+    };
+    let (mountain, grains) = (of("mountain"), of("grains"));
+    for set in ["curves.amplitude=0.2", "fur.lean=1", "curves.across=9", "cloth.twist=1", "grains.filled=0.2"]
+    {
+        assert!(said(&mountain, set), "{set}");
+    }
+    for set in
+        ["curves.h=0.8", "mountain.relief=0.2", "mountain.stone_size=0.1", "volume.seed=3", "volume.k_d=1"]
+    {
+        assert!(!said(&mountain, set), "{set}");
+    }
+    for [set, switch] in [
+        ["mountain.blade_lean=1", "mountain.blades=0"],
+        ["mountain.stone_size=0.1", "mountain.scree=0"],
+        ["mountain.blades=10", "mountain.soil=0"],
+        ["mountain.beds=0.2", "mountain.fracture=0"],
+    ] {
+        assert!(!said(&mountain, set), "{set}");
+        assert!(said(&mountain.with(&[switch]).expect("valid"), set), "{set} with {switch}");
+    }
+    for set in
+        ["curves.h=0.8", "curves.amplitude=0.2", "mountain.moss=0.5", "fur.hairs=9", "volume.file=a.npz"]
+    {
+        assert!(said(&grains, set), "{set}");
+    }
+    for set in ["grains.filled=0.2", "grains.grain_size=3", "volume.nx=20", "volume.seed=3", "volume.k_s=1"] {
+        assert!(!said(&grains, set), "{set}");
+    }
+    for builder in ["mountain", "grains"] {
+        let sets = [&format!("volume.builder={builder}"), "volume.storage=sparse"];
+        super::refused(with(&sets).map(|_| ()), &["volume.storage", "auto"]);
+    }
 }
