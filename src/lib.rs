@@ -29,7 +29,7 @@
 //! 4. [`trace`] is what a view ray finds on its way through the cells (§4): the level of the volume it looks
 //!    into, the sample there, and what a sheet leaves of it.
 //! 5. [`light`] is what lights send, what of it reaches a cell, and what the cell sends on to the eye (§5):
-//!    the paper's [fibre](light::fibre) or [strands](light::strand) of water,
+//!    the paper's [fibre](light::fibre) or [strands](light::strand) of water or hair,
 //!    [visibility](light::visibility), multiple [scattering](light::scatter),
 //!    [environments](light::environment), [haze](light::haze).
 //! 6. [`picture`] has the camera, the linear [`Frame`], and its way to an image (§6).

@@ -8,7 +8,9 @@ override TILTED: bool = false;
 
 // Number of nodes of the table along each axis, and that along x with tilted scales.
 const STRAND_X: f32 = 40.0;
-const TILTED_X: f32 = 79.0;
+const TILTED_X: f32 = 159.0;
+// Share of the steps along x that begin at the mirror cone, with tilted scales.
+const CONE_SHARE: f32 = 0.75;
 const STRAND_Y: f32 = 48.0;
 const STRAND_Z: f32 = 128.0;
 // Way along which hairs run from root to tip, in the space of the texture. Twin: ROOT_TO_TIP of
@@ -46,14 +48,18 @@ fn strand_psi(
     let sin2_half_phi = clamp((coco + sisi - l_dot_e) / (2.0 * max(coco, 1e-6)), 0.0, 1.0);
     var x = s * (1.0 + strand.squeeze) / (s + strand.squeeze);
     var size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
+    var near = coco;
     if TILTED {
+        near = cos_d * cos_d;
+        let cos_h = sqrt(clamp((1.0 + coco - sisi) * 0.5, 0.0, 1.0));
+        x = CONE_SHARE * x + (1.0 - CONE_SHARE) * (1.0 - cos_h);
         x = 0.5 + 0.5 * select(x, -x, t_dot_l + t_dot_e < 0.0);
         size.x = TILTED_X;
     }
     let z = SINE_SHARE * sqrt(sin2_half_phi) + (1.0 - SINE_SHARE) * (1.0 - sqrt(1.0 - sin2_half_phi));
     let node = vec3<f32>(x, cos_d, z) * (size - 1.0);
     let texel = textureSampleLevel(table, linear, (node + 0.5) / size, 0.0).rgb;
-    let strands = texel / sqrt(coco + strand.spread);
+    let strands = texel / sqrt(near + strand.spread);
 
     let k = k_d + k_s;
     let a = select(strand.aeration, clamp(strand.aeration * (2.0 * k_d / k), 0.0, 1.0), k > 0.0);

@@ -12,7 +12,7 @@ pub struct StrandTexture {
 }
 
 impl StrandTexture {
-    /// Uploads a table, 1 or 2 MB.
+    /// Uploads a table, 1 or 4 MB.
     pub fn new(gpu: &Gpu, table: &StrandTable) -> Self {
         Self::with(gpu, table.size().map(|n| n as u32), table.texels())
     }

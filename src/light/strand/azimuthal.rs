@@ -70,6 +70,12 @@ impl Azimuth {
         sum
     }
 
+    /// Share of light that leaves, per radian, in every direction alike: that of light that meets the edges of
+    /// scales. It is absorbed as all other light in the mean.
+    pub fn stray(&self) -> DVec3 {
+        self.attenuation().into_iter().sum::<DVec3>() / TAU
+    }
+
     /// Azimuthal lobes N_p(φ) = ½ ∫ A_p(h)·D(φ − Φ_p(h)) dh with h from −1 to 1, per radian. The residual
     /// lobe is uniform, 1/2π, because light that stays inside for longer than TRT leaves in every direction
     /// alike.

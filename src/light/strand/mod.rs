@@ -12,8 +12,9 @@
 //! change when l and e are exchanged, or for φ → −φ.
 //!
 //! The surface of a hair is covered with scales that are tilted by α against it. They turn lobe p by s_p
-//! along the strand ([`longitudinal::shifts`]), which makes two highlights of one. With α = 0, as in water,
-//! Φ does not change either when t is reversed. Otherwise t runs from root to tip.
+//! along the strand ([`longitudinal::shifts`]), which makes two highlights of one. A little light is spread by
+//! their edges ([`balance`]). With α = 0, as in water, Φ does not change either when t is reversed. Otherwise
+//! t runs from root to tip.
 //!
 //! The sum over lobes and their shifts follow Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light
 //! Scattering from Human Hair Fibers", SIGGRAPH 2003. [`longitudinal`] follows d'Eon et al. 2011 and
@@ -79,7 +80,7 @@ pub struct Lobes {
     pub tt: DVec3,
     /// TRT: light reflected once inside.
     pub trt: DVec3,
-    /// Residual: light reflected inside twice or more.
+    /// Residual: light reflected inside twice or more, and light that meets the edges of tilted scales.
     pub residual: DVec3,
     /// Light scattered by air bubbles.
     pub aerated: DVec3,
@@ -122,8 +123,10 @@ impl Strand {
         let ((sin_i, cos_i), (sin_o, cos_o)) = (theta_i.sin_cos(), theta_o.sin_cos());
         let a = self.params.aeration as f64;
         let m = self.along(theta_i, theta_o, cos_i * cos_o, sin_i * sin_o);
-        let n = self.around((0.5 * (theta_o - theta_i)).cos()).at(phi);
-        let [r, tt, trt, residual] = std::array::from_fn(|p| n[p] * ((1.0 - a) * m[p]));
+        let around = self.around((0.5 * (theta_o - theta_i)).cos());
+        let n = around.at(phi);
+        let [r, tt, trt, later] = std::array::from_fn(|p| n[p] * ((1.0 - a) * m[p]));
+        let residual = later + around.stray() * ((1.0 - a) * self.balance.stray(theta_i, theta_o));
         let cos = -(sin_i * sin_o + cos_i * cos_o * phi.cos());
         let aerated = DVec3::splat(a * henyey_greenstein(self.params.g as f64, cos));
         Lobes { r, tt, trt, residual, aerated }

@@ -3,21 +3,25 @@
 //!
 //! | axis | coordinate | nodes |
 //! |---|---|---|
-//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: starts at the mirror cone, with steps as fine as the cone is narrow. With tilted scales it has the sign of θ_i + θ_o | 40, or 79 |
+//! | x | S·(1 + k)/(S + k), S = sin(\|θ_i + θ_o\|/2), k = √v_R: starts at the mirror cone, with steps as fine as the cone is narrow | 40 |
 //! | y | cos θ_d | 48 |
 //! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the side of the light, where the rainbow is, to the far side | 128 |
 //!
-//! All three coordinates follow from the cosines between the directions by square roots alone. The sign is that
-//! of sin θ_i + sin θ_o.
+//! All three coordinates follow from the cosines between the directions by square roots alone.
 //!
 //! A texel holds Ψ·√(cos θ_i·cos θ_o + v_R/2). Near the mirror cone M is inversely proportional to that root,
 //! within a factor of 1.8 over all inclinations. Without the factor the steps of y would be too coarse where
 //! a strand is seen end on. Texels are linear RGB as `rgb9e5ufloat`, which software Vulkan filters in half
 //! the time of float16.
 //!
+//! Where scales are tilted by α, x has the sign of θ_i + θ_o, which is that of sin θ_i + sin θ_o, and
+//! [`TILTED_X`] nodes. k is √v_R + |sin α|, because the lobes stand beside the mirror cone. On the cone of each
+//! of them M is inversely proportional to √(cos² θ_d + v_R/2), so that takes the place of the root above.
+//!
 //! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
-//! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones
-//! (`tests/suite/light/strand.rs`).
+//! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones. With scales
+//! tilted by 3° the latter is 0.12, where light is sent back along the hair
+//! (`tests/suite/light/strand/lookup.rs`).
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -29,8 +33,11 @@ use crate::light::fibre::Spread;
 
 /// Number of nodes along x, y and z.
 pub const SIZE: [usize; 3] = [40, 48, 128];
-/// Number of nodes along x where scales are tilted: those of both signs share the one in the middle.
-pub const TILTED_X: usize = 2 * SIZE[0] - 1;
+/// Number of nodes along x where scales are tilted, for both signs.
+pub const TILTED_X: usize = 159;
+/// Share of the steps along x that begin at the mirror cone, where scales are tilted; the others are even in
+/// the cosine of (θ_i + θ_o)/2, for light that they send back along the strand.
+pub const CONE_SHARE: f32 = 0.75;
 /// Weight w of the z axis. With w = 1 the steps of φ would grow without bound at the far side, with w = 0 at
 /// the side of the light.
 pub const SINE_SHARE: f32 = 0.75;
@@ -81,7 +88,7 @@ impl StrandTable {
         let is_tilted = params.is_tilted();
         let [nx, ny, nz] = size(is_tilted);
         let node = |i: usize, n: usize| i as f64 / (n - 1) as f64;
-        let squeeze = strand.v[0].sqrt().min(1.0) as f32;
+        let squeeze = (strand.v[0].sqrt() + params.tilt.sin().abs()).min(1.0) as f32;
         let spread = (strand.v[0] / 2.0) as f32;
         let (k, half_v) = (squeeze as f64, spread as f64);
         let rows: Vec<_> = (0..ny)
@@ -90,17 +97,22 @@ impl StrandTable {
                 let cos_d = node(iy, ny);
                 let around = strand.around(cos_d);
                 let n: Vec<_> = (0..nz).map(|iz| around.at(azimuth_of(node(iz, nz)))).collect();
+                let edges = if is_tilted { around.stray() } else { DVec3::ZERO };
                 let m: Vec<_> = (0..nx)
                     .map(|ix| {
-                        let x = if is_tilted { 2.0 * node(ix, nx) - 1.0 } else { node(ix, nx) };
-                        let s = x * k / (1.0 + k - x.abs());
-                        // Nodes with S > cos θ_d belong to no pair of directions and repeat the edge.
-                        let coco = (cos_d * cos_d - s * s).max(0.0);
+                        let x = node(ix, nx);
+                        let s = if is_tilted { tilted_sine(2.0 * x - 1.0, k) } else { x * k / (1.0 + k - x) };
+                        // Nodes with S > cos θ_d belong to no pair of directions. They repeat the edge, or go
+                        // on beyond it where scales may turn a lobe there.
+                        let coco = cos_d * cos_d - s * s;
+                        let coco = if is_tilted { coco } else { coco.max(0.0) };
                         let sisi = coco - 1.0 + 2.0 * s * s;
+                        let near = if is_tilted { cos_d * cos_d } else { coco };
                         let (half_sum, theta_d) = (s.asin(), cos_d.acos());
-                        strand
-                            .along(half_sum - theta_d, half_sum + theta_d, coco, sisi)
-                            .map(|m| m * PSI_PER_PHI * (coco + half_v).sqrt())
+                        let (theta_i, theta_o) = (half_sum - theta_d, half_sum + theta_d);
+                        let scale = |m: f64| m * PSI_PER_PHI * (near + half_v).sqrt();
+                        let stray = edges * scale(strand.balance.stray(theta_i, theta_o));
+                        (strand.along(theta_i, theta_o, coco, sisi).map(scale), stray)
                     })
                     .collect();
                 (n, m)
@@ -111,9 +123,9 @@ impl StrandTable {
             .flat_map_iter(|i| {
                 let (n, m) = &rows[i % ny];
                 let n = n[i / ny];
-                m.iter().map(move |m| {
+                m.iter().map(move |(m, stray)| {
                     let psi: DVec3 = (0..n.len()).map(|p| n[p] * m[p]).sum();
-                    pack_rgb9e5(psi.as_vec3())
+                    pack_rgb9e5((psi + *stray).as_vec3())
                 })
             })
             .collect();
@@ -145,10 +157,13 @@ impl StrandTable {
         let sin2_half_phi = ((coco + sisi - l_dot_e) / (2.0 * coco.max(1e-6))).clamp(0.0, 1.0);
         let mut x = s * (1.0 + self.squeeze) / (s + self.squeeze);
         if self.is_tilted() {
+            let cos_h = ((1.0 + coco - sisi) * 0.5).clamp(0.0, 1.0).sqrt();
+            x = CONE_SHARE * x + (1.0 - CONE_SHARE) * (1.0 - cos_h);
             x = 0.5 + 0.5 * if t_dot_l + t_dot_e < 0.0 { -x } else { x };
         }
         let z = SINE_SHARE * sin2_half_phi.sqrt() + (1.0 - SINE_SHARE) * (1.0 - (1.0 - sin2_half_phi).sqrt());
-        self.sample(Vec3::new(x, cos_d, z)) / (coco + self.spread).sqrt()
+        let near = if self.is_tilted() { cos_d * cos_d } else { coco };
+        self.sample(Vec3::new(x, cos_d, z)) / (near + self.spread).sqrt()
     }
 
     /// Trilinear interpolation at coordinates from 0 to 1, as a texture sampler does it.
@@ -207,6 +222,23 @@ impl StrandTable {
         // The bound keeps the table's error from adding energy.
         Moments { albedo: (albedo * per_direction).min(DVec3::ONE), mean_cosine: cosine / albedo }
     }
+}
+
+/// Sine of (θ_i + θ_o)/2 at the coordinate x from −1 to 1 of the x axis where scales are tilted.
+fn tilted_sine(x: f64, k: f64) -> f64 {
+    let share = CONE_SHARE as f64;
+    let at = |s: f64| share * s * (1.0 + k) / (s + k) + (1.0 - share) * (1.0 - (1.0 - s * s).sqrt());
+    // The coordinate grows with the sine.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if at(middle) < x.abs() {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (0.5 * (low + high)).copysign(x)
 }
 
 /// Angle φ, in radians, at the coordinate z from 0 to 1 of the z axis.

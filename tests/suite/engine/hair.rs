@@ -4,7 +4,7 @@
 use glam::Vec3;
 use taki::engine::cpu;
 use taki::engine::cpu::integrate::Integrator;
-use taki::light::strand::hair::Hair;
+use taki::light::strand::hair::{Hair, Pigment};
 use taki::light::strand::table::StrandShading;
 use taki::light::{Light, Reflection};
 use taki::mapping::shell::{Shell, Side};
@@ -22,6 +22,33 @@ use crate::trace::shells::scene_with;
 /// Hairs whose sense is easy to see.
 fn scaly(tilt_degrees: f32) -> Reflection {
     Reflection::Hair(Hair { tilt_degrees, roughness_m: 0.2, ..Hair::default() }.strand())
+}
+
+#[test]
+fn the_keys_of_a_scene_make_its_hair() {
+    let of = |sets: &[&str]| {
+        let scene = Scene::preset("front").expect("a preset");
+        scene.with(&[&["light.reflection=hair"], sets].concat()).expect("valid").reflection
+    };
+    assert_eq!(of(&[]), Reflection::Hair(Hair::default().strand()));
+    let own = Hair {
+        eta: 1.4,
+        tilt_degrees: -2.0,
+        roughness_m: 0.4,
+        roughness_n: 0.6,
+        pigment: Pigment::Melanin(3.0, 0.5),
+    };
+    let sets = [
+        "hair.eta=1.4",
+        "hair.tilt=-2",
+        "hair.beta_m=0.4",
+        "hair.beta_n=0.6",
+        "hair.melanin=3",
+        "hair.redness=0.5",
+    ];
+    assert_eq!(of(&sets), Reflection::Hair(own.strand()));
+    let dyed = Hair { pigment: Pigment::Color(Vec3::new(0.5, 0.25, 0.125).as_dvec3()), ..own };
+    assert_eq!(of(&[&sets[..], &["hair.color=[0.5,0.25,0.125]"]].concat()), Reflection::Hair(dyed.strand()));
 }
 
 /// A rectangle of 2 m × 3 m in the plane z = 0 under one light, with v along +y.

