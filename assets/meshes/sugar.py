@@ -77,7 +77,7 @@ def around(inner, outer, height, rings, middle):
 def heap(r, a):
     """Height of the heap, metres. Its foot dives below the table, so the last grains stand alone."""
     x, z = r * math.cos(a), r * math.sin(a)
-    slope = RISE * (1.0 - r / RADIUS) * (1.0 + 0.1 * math.sin(2 * a + 0.7))
+    slope = RISE * (1.0 - r / RADIUS) * (1.0 + 0.1 * math.sin(2 * a + 0.7) * min(1.0, r / 0.1))
     # The tip is blunt.
     top = RISE * 0.85 - 0.02 * math.log(1.0 + math.exp((RISE * 0.85 - slope) / 0.02))
     bump = math.sin(31 * x + 4 * math.sin(23 * z)) * math.sin(27 * z + 3 * math.sin(19 * x))

@@ -21,7 +21,7 @@ picture patch.toml curl --set volumes.fur.clumps=0 --set volumes.fur.amplitude=0
 picture slope_patch.toml slope
 picture slope_patch.toml smooth --set volumes.face.fracture=0
 picture slope_patch.toml beds --set volumes.face.beds=1
-picture slope_patch.toml scree --set volumes.face.scree=0.6
+picture slope_patch.toml scree --set volumes.face.scree=0.6 --set volumes.face.stone_size=0.1
 picture slope_patch.toml moss --set volumes.face.moss=0.9 --set volumes.face.soil=0.15 \
     --set volumes.face.blades=3000
 picture slope_patch.toml meadow --set volumes.face.soil=0.85 --set volumes.face.blades=28000

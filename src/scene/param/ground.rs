@@ -65,8 +65,8 @@ pub(super) const MOUNTAIN: Group = Group {
 pub(super) const GRAINS: Group = Group {
     title: "Grains",
     about: "Loose grains of a volume with `volume.builder=grains`: each has any direction, and there are no \
-         strands. Water of particles alone looks so. With two colours or more a grain has a place on the ramp \
-         by chance.",
+         strands. Water of particles alone looks so. With two colours or more a grain has a place on the \
+         ramp by chance.",
     params: &[
         p("grains.filled", "", "", Float(0.0, 1.0, 0.5), Volume)
             .doc("Share of the grains that are filled; the others are gaps.")
