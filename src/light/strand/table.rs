@@ -15,8 +15,9 @@
 //! the time of float16.
 //!
 //! Where scales are tilted by α, x has the sign of θ_i + θ_o, which is that of sin θ_i + sin θ_o, and
-//! [`TILTED_X`] nodes. k is √v_R + |sin α|, because the lobes stand beside the mirror cone. On the cone of each
-//! of them M is inversely proportional to √(cos² θ_d + v_R/2), so that takes the place of the root above.
+//! [`TILTED_X`] nodes. k is √v_R + |sin α|, because the lobes stand beside the mirror cone. On the cone of
+//! each of them M is inversely proportional to √(cos² θ_d + v_R/2), so that takes the place of the root
+//! above.
 //!
 //! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
 //! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones. With scales
@@ -297,8 +298,9 @@ impl StrandShading {
         StrandShading { table: StrandTable::of(params), aeration: params.aeration, g: params.g }
     }
 
-    /// Cosines t·l and t·e of the single direction t that stands for those of `spread`, given the direction to
-    /// the light and the way from root to tip ([`ROOT_TO_TIP`](super::ROOT_TO_TIP)) as the spread takes them.
+    /// Cosines t·l and t·e of the single direction t that stands for those of `spread`, given the direction
+    /// to the light and the way from root to tip ([`ROOT_TO_TIP`](super::ROOT_TO_TIP)) as the spread takes
+    /// them.
     pub fn cosines(&self, spread: &Spread, l_v: Vec3, way: Vec3) -> [f32; 2] {
         let cosines = spread.of_one(l_v);
         if self.table.is_tilted() { spread.along(cosines, l_v, way) } else { cosines }
