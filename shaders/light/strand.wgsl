@@ -43,15 +43,18 @@ fn strand_psi(
 ) -> vec3<f32> {
     let sisi = t_dot_l * t_dot_e;
     let coco = sqrt(max(1.0 - t_dot_l * t_dot_l, 0.0) * max(1.0 - t_dot_e * t_dot_e, 0.0));
-    let s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));
+    var s = sqrt(clamp((1.0 - coco + sisi) * 0.5, 0.0, 1.0));
     let cos_d = sqrt(clamp((1.0 + coco + sisi) * 0.5, 0.0, 1.0));
     let sin2_half_phi = clamp((coco + sisi - l_dot_e) / (2.0 * max(coco, 1e-6)), 0.0, 1.0);
+    if TILTED {
+        s = min(abs(t_dot_l + t_dot_e) / (2.0 * max(cos_d, 1e-6)), 1.0);
+    }
     var x = s * (1.0 + strand.squeeze) / (s + strand.squeeze);
     var size = vec3<f32>(STRAND_X, STRAND_Y, STRAND_Z);
     var near = coco;
     if TILTED {
         near = cos_d * cos_d;
-        let cos_h = sqrt(clamp((1.0 + coco - sisi) * 0.5, 0.0, 1.0));
+        let cos_h = sqrt(1.0 - s * s);
         x = CONE_SHARE * x + (1.0 - CONE_SHARE) * (1.0 - cos_h);
         x = 0.5 + 0.5 * select(x, -x, t_dot_l + t_dot_e < 0.0);
         size.x = TILTED_X;

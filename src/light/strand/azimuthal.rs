@@ -70,8 +70,8 @@ impl Azimuth {
         sum
     }
 
-    /// Share of light that leaves, per radian, in every direction alike: that of light that meets the edges of
-    /// scales. It is absorbed as all other light in the mean.
+    /// Share of light that leaves, per radian, in every direction alike: that of light that meets the edges
+    /// of scales. It is absorbed as all other light in the mean.
     pub fn stray(&self) -> DVec3 {
         self.attenuation().into_iter().sum::<DVec3>() / TAU
     }

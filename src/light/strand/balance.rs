@@ -5,13 +5,16 @@
 //! and keeps Φ reciprocal (Sinkhorn 1964, for a symmetric matrix).
 //!
 //! Where scales are tilted, the lobes alone cannot conserve energy. In even light on a white strand, the mean
-//! of sin θ_i + sin θ_o over all light is 2·⟨sin θ_i⟩ = 0 if Φ is reciprocal and loses nothing: no light moves
-//! along the strand on balance. But most of it goes through, and so moves towards the tip. A factor b that
-//! mended this would be a large power of 10 at one end of the strand, and would move the lobes back. Here b
-//! only makes the integral 1 in the mean over both senses of θ_i, and at most 1 for each. The rest d stands
-//! for light that meets the edges of scales, and goes towards the root. It is spread as
-//! d(θ_i)·u(θ_o) + u(θ_i)·d(θ_o) − u(θ_i)·u(θ_o)·∫d, where u is a density on the root's side: so it is
-//! reciprocal, and d in the sum over θ_o. With a tilt of 3° it is 2 % of all light.
+//! of sin θ_i + sin θ_o over all light is 2·⟨sin θ_i⟩ = 0 if Φ is reciprocal and loses nothing: no light
+//! moves along the strand on balance. But most of it goes through, and so moves towards the tip. A factor b
+//! that mended this would be a large power of 10 at one end of the strand, and would move the lobes back.
+//! Here b only makes the integral 1 in the mean over both senses of θ_i, and at most 1 for each. The rest d
+//! stands for light that meets the edges of scales, and goes towards the root. It is spread as
+//!
+//! d(θ_i)·u(θ_o) + u(θ_i)·d(θ_o) − u(θ_i)·u(θ_o)·∫d
+//!
+//! where u is a density on the root's side: so it is reciprocal, and d in the sum over θ_o. With a tilt of 3°
+//! it is 2 % of all light.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

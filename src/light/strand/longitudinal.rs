@@ -15,9 +15,10 @@ pub fn variances(roughness: f64) -> [f64; LOBES] {
 /// tilted by `tilt`.
 ///
 /// The outer surface of a scale widens towards the tip, so its normal is tilted towards the root. What it
-/// reflects is turned by 2α towards the root, and what comes through or back from the inside is turned towards
-/// the tip. The values are those of Marschner et al. 2003, table 1: half of the sum is −α for R, α/2 for TT and
-/// 3α/2 for TRT. Light that stays inside for longer leaves without a preference, as it does around the strand.
+/// reflects is turned by 2α towards the root, and what comes through or back from the inside is turned
+/// towards the tip. The values are those of Marschner et al. 2003, table 1: half of the sum is −α for R, α/2
+/// for TT and 3α/2 for TRT. Light that stays inside for longer leaves without a preference, as it does around
+/// the strand.
 pub fn shifts(tilt: f64) -> [f64; LOBES] {
     [-2.0 * tilt, tilt, 3.0 * tilt, 0.0]
 }
@@ -32,8 +33,9 @@ pub fn longitudinal(v: f64, coco: f64, sisi: f64) -> f64 {
     ((x - sisi - 1.0) / v).exp() * bessel_i0e(x / v) / (v * -(-2.0 / v).exp_m1())
 }
 
-/// Longitudinal lobe M(θ_i − s/2, θ_o − s/2) whose middle is at θ_i + θ_o = `shift` = s. Both inclinations are
-/// turned by one half, so light and eye may change places. `sum` = θ_i + θ_o, the rest as in [`longitudinal`].
+/// Longitudinal lobe M(θ_i − s/2, θ_o − s/2) whose middle is at θ_i + θ_o = `shift` = s. Both inclinations
+/// are turned by one half, so light and eye may change places. `sum` = θ_i + θ_o, the rest as in
+/// [`longitudinal`].
 pub fn shifted(v: f64, shift: f64, sum: f64, coco: f64, sisi: f64) -> f64 {
     // The turn keeps cos(θ_i − θ_o) = coco + sisi and changes cos(θ_i + θ_o) = coco − sisi. It is exactly 0
     // without a shift.

@@ -1,5 +1,5 @@
-//! §5, beyond the paper: a reflection model for matter of round, clear strands. Every cell of the volume holds
-//! strands along its direction: water with air between them, or hair.
+//! §5, beyond the paper: a reflection model for matter of round, clear strands. Every cell of the volume
+//! holds strands along its direction: water with air between them, or hair.
 //!
 //! A strand is a dielectric cylinder along the cell's direction t. Light that meets it leaves by reflection
 //! (R), by transmission (TT), after one internal reflection (TRT, which makes the rainbow) or after several.
@@ -12,9 +12,9 @@
 //! change when l and e are exchanged, or for φ → −φ.
 //!
 //! The surface of a hair is covered with scales that are tilted by α against it. They turn lobe p by s_p
-//! along the strand ([`longitudinal::shifts`]), which makes two highlights of one. A little light is spread by
-//! their edges ([`balance`]). With α = 0, as in water, Φ does not change either when t is reversed. Otherwise
-//! t runs from root to tip.
+//! along the strand ([`longitudinal::shifts`]), which makes two highlights of one. A little light is spread
+//! by their edges ([`balance`]). With α = 0, as in water, Φ does not change either when t is reversed.
+//! Otherwise t runs from root to tip.
 //!
 //! The sum over lobes and their shifts follow Marschner, Jensen, Cammarano, Worley and Hanrahan, "Light
 //! Scattering from Human Hair Fibers", SIGGRAPH 2003. [`longitudinal`] follows d'Eon et al. 2011 and

@@ -7,7 +7,7 @@
 //! | y | cos θ_d | 48 |
 //! | z | w·sin(φ/2) + (1 − w)·(1 − cos(φ/2)): from the side of the light, where the rainbow is, to the far side | 128 |
 //!
-//! All three coordinates follow from the cosines between the directions by square roots alone.
+//! All three coordinates follow from the cosines between the directions by square roots and quotients alone.
 //!
 //! A texel holds Ψ·√(cos θ_i·cos θ_o + v_R/2). Near the mirror cone M is inversely proportional to that root,
 //! within a factor of 1.8 over all inclinations. Without the factor the steps of y would be too coarse where
@@ -15,8 +15,9 @@
 //! the time of float16.
 //!
 //! Where scales are tilted by α, x has the sign of θ_i + θ_o, which is that of sin θ_i + sin θ_o, and
-//! [`TILTED_X`] nodes. k is √v_R + |sin α|, because the lobes stand beside the mirror cone. On the cone of each
-//! of them M is inversely proportional to √(cos² θ_d + v_R/2), so that takes the place of the root above.
+//! [`TILTED_X`] nodes. k is √v_R + |sin α|, because the lobes stand beside the mirror cone. On the cone of
+//! each of them M is inversely proportional to √(cos² θ_d + v_R/2), so that takes the place of the root
+//! above.
 //!
 //! Against [`Strand::lobes`], over directions uniform on the sphere and near the mirror cone, the error in
 //! units of Φ + 1/4π is at most 0.02 for the default roughnesses and 0.07 for the smallest ones. With scales
@@ -152,12 +153,16 @@ impl StrandTable {
     pub fn psi(&self, t_dot_l: f32, t_dot_e: f32, l_dot_e: f32) -> Vec3 {
         let sisi = t_dot_l * t_dot_e;
         let coco = ((1.0 - t_dot_l * t_dot_l).max(0.0) * (1.0 - t_dot_e * t_dot_e).max(0.0)).sqrt();
-        let s = ((1.0 - coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
+        let mut s = ((1.0 - coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
         let cos_d = ((1.0 + coco + sisi) * 0.5).clamp(0.0, 1.0).sqrt();
         let sin2_half_phi = ((coco + sisi - l_dot_e) / (2.0 * coco.max(1e-6))).clamp(0.0, 1.0);
+        if self.is_tilted() {
+            // Beside the cone the root above has few digits, which would decide on the side.
+            s = ((t_dot_l + t_dot_e).abs() / (2.0 * cos_d.max(1e-6))).min(1.0);
+        }
         let mut x = s * (1.0 + self.squeeze) / (s + self.squeeze);
         if self.is_tilted() {
-            let cos_h = ((1.0 + coco - sisi) * 0.5).clamp(0.0, 1.0).sqrt();
+            let cos_h = (1.0 - s * s).sqrt();
             x = CONE_SHARE * x + (1.0 - CONE_SHARE) * (1.0 - cos_h);
             x = 0.5 + 0.5 * if t_dot_l + t_dot_e < 0.0 { -x } else { x };
         }
@@ -297,8 +302,9 @@ impl StrandShading {
         StrandShading { table: StrandTable::of(params), aeration: params.aeration, g: params.g }
     }
 
-    /// Cosines t·l and t·e of the single direction t that stands for those of `spread`, given the direction to
-    /// the light and the way from root to tip ([`ROOT_TO_TIP`](super::ROOT_TO_TIP)) as the spread takes them.
+    /// Cosines t·l and t·e of the single direction t that stands for those of `spread`, given the direction
+    /// to the light and the way from root to tip ([`ROOT_TO_TIP`](super::ROOT_TO_TIP)) as the spread takes
+    /// them.
     pub fn cosines(&self, spread: &Spread, l_v: Vec3, way: Vec3) -> [f32; 2] {
         let cosines = spread.of_one(l_v);
         if self.table.is_tilted() { spread.along(cosines, l_v, way) } else { cosines }

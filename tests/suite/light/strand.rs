@@ -1,5 +1,5 @@
-//! The reflection model of flowing water and of hair. Reference truth: closed forms of optics, and for the table the
-//! direct model in float64. The shader is tested for parity with the CPU.
+//! The reflection model of flowing water and of hair. Reference truth: closed forms of optics, and for the
+//! table the direct model in float64. The shader is tested for parity with the CPU.
 
 mod hair;
 mod lookup;

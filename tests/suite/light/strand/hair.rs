@@ -203,8 +203,8 @@ fn each_lobe_has_its_middle_where_the_scales_turn_it() {
                 peak(theta_i, |theta_o| lobe(strand.lobes(theta_i, theta_o, phi)).x)
             };
             let found = [at(0.0, |l| l.r), at(PI, |l| l.tt), at(0.0, |l| l.trt)];
-            // A lobe's height varies with θ_o beside its Gaussian, which moves its peak by less than a seventh
-            // of its width: 4.6° of R, 2.3° of TT and 9.2° of TRT.
+            // A lobe's height varies with θ_o beside its Gaussian, which moves its peak by less than a
+            // seventh of its width: 4.6° of R, 2.3° of TT and 9.2° of TRT.
             for ((found, want), bound) in found.into_iter().zip([-2.0, 1.0, 3.0]).zip([0.3, 0.15, 1.3]) {
                 let want = want * tilt;
                 assert!((found - want).abs() < bound, "{found}°, not {want}° for α = {tilt}° at {degrees}°");

@@ -61,15 +61,19 @@ fn of_table<S: Simd>(
     let (zero, one) = (splat(0.0), splat(1.0));
     let sisi = t_dot_l * t_dot_e;
     let coco = ((one - t_dot_l * t_dot_l).max(zero) * (one - t_dot_e * t_dot_e).max(zero)).sqrt();
-    let s = ((one - coco + sisi) * 0.5).max(zero).min(one).sqrt();
+    let mut s = ((one - coco + sisi) * 0.5).max(zero).min(one).sqrt();
     let cos_d = ((one + coco + sisi) * 0.5).max(zero).min(one).sqrt();
     let sin2_half_phi = ((coco + sisi - l_dot_e) / (coco.max(splat(1e-6)) * 2.0)).max(zero).min(one);
+    let both = t_dot_l + t_dot_e;
+    if table.is_tilted() {
+        s = (both.abs() / (cos_d.max(splat(1e-6)) * 2.0)).min(one);
+    }
     let x = s * (1.0 + table.squeeze) / (s + table.squeeze);
     let far = (one - (one - sin2_half_phi).sqrt()) * (1.0 - SINE_SHARE);
     let z = sin2_half_phi.sqrt() * SINE_SHARE + far;
     let Lanes3 { x, y, z } = if table.is_tilted() {
-        let is_back = (t_dot_l + t_dot_e).simd_lt(zero);
-        let cos_h = ((one + coco - sisi) * 0.5).max(zero).min(one).sqrt();
+        let is_back = both.simd_lt(zero);
+        let cos_h = (one - s * s).sqrt();
         let x = x * CONE_SHARE + (one - cos_h) * (1.0 - CONE_SHARE);
         let x = is_back.select(-x, x) * 0.5 + 0.5;
         sample::<S, TILTED_X, { span(TILTED_X) }>(simd, table.texels(), [x, cos_d, z])
