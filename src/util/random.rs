@@ -5,6 +5,7 @@
 //! change.
 
 use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 /// Purpose of a generator. Each purpose has its own index.
@@ -54,4 +55,9 @@ impl Family {
     pub fn member(self, index: u64) -> Pcg64Mcg {
         Pcg64Mcg::seed_from_u64(self.0.wrapping_add(index))
     }
+}
+
+/// Draws a normal number of mean 0 and variance 1, the paper's normal_rand().
+pub fn normal(rng: &mut impl Rng) -> f32 {
+    StandardNormal.sample(rng)
 }

@@ -1,13 +1,12 @@
 //! §2 Curves of the water builder: independent ones, as in the paper, or bundles of curves around parents.
 
 use glam::Vec3;
-use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
+use rand::RngExt;
 
 use super::ripple::Ripple;
 use super::spec::WaterSpec;
 use crate::curve::{CurveShape, spatial_fractal_curve};
-use crate::util::random::{Family, Stream};
+use crate::util::random::{Family, Stream, normal};
 
 /// Distance that parents keep from the volume's faces z = 0 and z = nz, as a share of its depth. Around a
 /// parent on a face half of the children would be lost.
@@ -68,9 +67,4 @@ pub fn curve_points(spec: &WaterSpec, curve: usize, points: &mut Vec<Vec3>) {
         let width = (1.0 + structure.breathe * widths[i]).max(MIN_WIDTH);
         *point += (*parent - straight) + away * (width - 1.0);
     }
-}
-
-/// Draws a normal number of mean 0 and variance 1.
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }

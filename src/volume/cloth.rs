@@ -6,14 +6,13 @@
 //! shines across its long floats, and the highlight turns with the cloth.
 
 use glam::{Vec2, Vec3};
-use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
+use rand::RngExt;
 
 use super::VolumeTexture;
 use super::threads::{Look, Thread, Threads, cells_of_threads};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::random::{Family, Stream};
+use crate::util::random::{Family, Stream, normal};
 use crate::util::words::words;
 
 /// Segments of a fibre from one crossing to the next.
@@ -237,9 +236,4 @@ impl Yarn<'_> {
         let (across, along) = (self.middle + out.x, along * self.crossing);
         if self.axis == 0 { Vec3::new(across, along, z) } else { Vec3::new(along, across, z) }
     }
-}
-
-/// Draws a normal number of mean 0 and variance 1.
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }

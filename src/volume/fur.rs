@@ -6,7 +6,6 @@
 
 use glam::{Vec2, Vec3};
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 
 use super::VolumeTexture;
 use super::spots::Spots;
@@ -14,7 +13,7 @@ use super::threads::{Look, Thread, Threads, cells_of_threads};
 use crate::curve::{CurveShape, levels_for, spatial_fractal_curve};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::random::{Family, Stream};
+use crate::util::random::{Family, Stream, normal};
 
 /// Largest depth of recursion of a hair's curve.
 const MOST_LEVELS: u32 = 16;
@@ -126,9 +125,4 @@ impl FurSpec {
             });
         }
     }
-}
-
-/// Draws a normal number of mean 0 and variance 1.
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }

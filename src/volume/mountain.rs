@@ -9,14 +9,13 @@ mod ground;
 
 use glam::Vec2;
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::threads::{Look, Thread, Threads, cells_of_threads};
 use super::{Cell, VolumeTexture};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::random::{Family, Stream};
+use crate::util::random::{Family, Stream, normal};
 use ground::{Column, Ground};
 
 /// Places on the ramp of the roots of grass and of its tips. Moss has the third of four colours.
@@ -208,9 +207,4 @@ impl MountainSpec {
             });
         }
     }
-}
-
-/// Draws a normal number of mean 0 and variance 1.
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }

@@ -4,8 +4,6 @@
 
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::flow::{self, Flow};
@@ -14,7 +12,7 @@ use super::{Cell, Cells, VolumeTexture};
 use crate::util::cache::{Cache, key};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::random::{Family, Stream};
+use crate::util::random::{self, Family, Stream};
 use crate::volume::WaterSpec;
 
 impl WaterSpec {
@@ -110,7 +108,7 @@ pub(super) fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
             return cell;
         }
         let mut rng = family.member(index);
-        let mut normal = || normal_rand(&mut rng);
+        let mut normal = || random::normal(&mut rng);
         let mut rho = normal();
         if let Some(flow) = flow {
             rho = (c * flow.noise(stored) + d * rho) / root;
@@ -125,9 +123,4 @@ pub(super) fn set(spec: &WaterSpec, cells: &mut Cells, flow: Option<&Flow>) {
         }
         cell.with_density(rho, k_d, k_s)
     });
-}
-
-/// Draws the paper's normal_rand(), a normal number of mean 0 and variance 1.
-fn normal_rand(rng: &mut Pcg64Mcg) -> f32 {
-    StandardNormal.sample(rng)
 }

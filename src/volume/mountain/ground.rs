@@ -2,14 +2,13 @@
 
 use glam::{Vec2, Vec3};
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::MountainSpec;
 use super::field::{Field, blocks, fractal};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use crate::util::random::{Family, Stream};
+use crate::util::random::{Family, Stream, normal};
 
 /// Place of moss on the ramp: the third of four colours.
 pub(super) const MOSS: f32 = 2.0 / 3.0;
@@ -253,9 +252,4 @@ impl Stone {
             faces.fold(round.sqrt(), f32::min) * self.axes.z
         })
     }
-}
-
-/// Draws a normal number of mean 0 and variance 1.
-fn normal(rng: &mut impl Rng) -> f32 {
-    StandardNormal.sample(rng)
 }
