@@ -134,7 +134,7 @@ fn hair(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> HairSpec
     let [nx, ny] = [water.size[0] as f32, water.size[1] as f32];
     HairSpec {
         size: water.size,
-        strands: count("tress.strands"),
+        strands: count("tress.strand_count"),
         reach: float("tress.reach"),
         spread: float("tress.reach_spread"),
         width_cells: float("tress.strand_width") * nx,

@@ -161,7 +161,7 @@ fn only_files_of_openvdb_are_replaced() {
     refused.refused(73, &["v.nvdb", "no NanoVDB file", "--overwrite"]);
     let mut command = taki(["volume", "build", "fig5", "-o", "v.abc"]);
     let refused = run(command.current_dir(folder.0.path()));
-    refused.refused(2, &["v.abc", "an .npz file, or a .vdb or .nvdb for other programs", "v.npz"]);
+    refused.refused(2, &["v.abc", "an .npz file, or a .vdb, .nvdb or .hair for other programs", "v.npz"]);
     fs::rename(folder.path("v.nvdb"), folder.path("v.vdb")).unwrap();
     folder.write("s.toml", text("dense"));
     let own = ["--set", "volume.builder=flow", "--set", "volume.source=v.vdb", "-o", "v.vdb"];
