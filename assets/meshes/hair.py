@@ -173,7 +173,7 @@ def joined(parts):
 def main(path):
     looks = [
         ("Hair", {"baseColorFactor": [0.03, 0.018, 0.01, 1.0]}, hair(LONG, 0.0)),
-        ("Under", {"baseColorFactor": [0.02, 0.012, 0.007, 1.0]}, hair(LONG * 3 // 4, 0.004)),
+        ("Under", {"baseColorFactor": [0.02, 0.012, 0.007, 1.0]}, hair(LONG * 2 // 3, 0.004)),
         ("Skin", {"baseColorFactor": [0.62, 0.36, 0.25, 1.0]}, joined([ellipsoid(*e) for e in HEAD] + [bust(NECK + BODY[:1])])),
         ("Clothes", {"baseColorFactor": [0.055, 0.075, 0.10, 1.0]}, bust(BODY)),
     ]

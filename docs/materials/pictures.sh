@@ -47,6 +47,6 @@ hair() {
 hair hair
 hair loose --set volumes.locks.locks=0
 hair gathered --set volumes.locks.gathering=0.95
-hair waves --set volumes.locks.wave=0.06 --set volumes.locks.waves=5
+hair waves --set volumes.locks.wave=0.06
 hair unruly --set volumes.locks.stray=0.6 --set volumes.locks.amplitude=0.02
 hair layers --set volumes.locks.reach=0.7 --set volumes.locks.reach_spread=0.15
