@@ -196,7 +196,8 @@ fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
         var t_dot = vec2<f32>(dot3(seen.v, light.l_v), seen.t_dot_e) * root;
         if MANY_DIRECTIONS {
             if TILTED {
-                t_dot = spread_along(seen.spread, light.l_v, ROOT_TO_TIP);
+                let many = spread_along(seen.spread, light.l_v, ROOT_TO_TIP);
+                t_dot = select(many, t_dot, has_one_direction(view.level));
             } else {
                 t_dot = spread_of_one(seen.spread, light.l_v);
             }

@@ -248,8 +248,11 @@ fn shell_lit(
             mapped = moments_mapped(moments, j);
         }
         spread = spread_new(vec4<f32>(1.0, 0.0, 1.0, 1.0), mapped, e);
-    } else if !is_texture {
-        t = j.x * t.x + j.y * t.y + j.z * t.z;
+    }
+    if !MANY_DIRECTIONS | TILTED {
+        if !is_texture {
+            t = j.x * t.x + j.y * t.y + j.z * t.z;
+        }
     }
     let inverse_q = 1.0 / max(dot3(t, t), 1e-30);
     let t_dot_e = dot3(t, e);
@@ -282,7 +285,7 @@ fn shell_lit(
                         way = row_x * way.x + row_y * way.y + row_z * way.z;
                         way = select(way, -way, det < 0.0);
                     }
-                    t_dot = spread_along(spread, l, way);
+                    t_dot = select(spread_along(spread, l, way), t_dot, has_one_direction(level));
                 } else {
                     t_dot = spread_of_one(spread, l);
                 }

@@ -149,6 +149,11 @@ fn spread_along(spread: Spread, l_v: vec3<f32>, way: vec3<f32>) -> vec2<f32> {
     return select(one, -one, (dot3(mean, way) < 0.0) != (one.x + one.y < 0.0));
 }
 
+// Whether a cell of the level has one direction, whose sign is known.
+fn has_one_direction(level: Level) -> bool {
+    return !TRILINEAR & (level.number == 0u);
+}
+
 // Summands of Ψ of a distribution of directions. Twin: Spread::psi_parts, where the highlight's widening is
 // derived.
 fn spread_psi_parts(
