@@ -2,8 +2,8 @@
 
 Run: TAKI=taki python3 beside_cycles.py [fur|hair|bear]      (Python with bpy 5 and numpy)
 
-For each azimuth of one distant light, both render `truth.toml` with that light alone: taki as cells of a volume,
-Cycles as curves with the principled hair BSDF and direct light. Printed are the share of the pixels that the
+For each azimuth of one distant light, both render `truth.toml` with that light alone: taki as cells of a
+volume, Cycles as curves with the principled hair BSDF and direct light. Printed are the share of the pixels that the
 strands cover, and the mean radiance. `bear` grows the hairs of the preset `bear` on its mesh, without taki's
 shells, and prints what each program takes to the same noise.
 """
@@ -194,7 +194,8 @@ def grown(part, tile, size, thickness):
 def compare(kind, folder):
     scene = os.path.join(HERE, "truth.toml")
     hair = os.path.join(folder, f"{kind}.hair")
-    taki("volume", "build", os.path.join(HERE, "strands.toml"), "--volume", kind, "-o", hair, "--overwrite")
+    source = os.path.join(HERE, "strands.toml")
+    taki("volume", "build", source, "--volume", kind, "-o", hair, "--overwrite")
     with open(scene) as file:
         text = file.read()
     number = lambda key: float(re.search(rf"^{key} = (.*)$", text, re.M).group(1))
@@ -209,16 +210,22 @@ def compare(kind, folder):
         "Random Roughness": 0.0,
     }
     counts, points, widths = strands(hair)
-    blend = stage(lambda: curves_of(counts, points if UP[kind] == "z" else upright(points), widths, fibre), VIEW)
+    places = points if UP[kind] == "z" else upright(points)
+    blend = stage(lambda: curves_of(counts, places, widths, fibre), VIEW)
     # A cell with ρ = 1 is hidden once over by the strands in it.
     sigma = (number("longest") - 2) / (np.ptp(points, 0).max() + widths.max())
     print(f"| {kind}, light at | covered, taki | Cycles | radiance, taki | Cycles | ratio |")
     print("|---|--:|--:|--:|--:|--:|")
     for azimuth in AZIMUTHS:
         own, other = (os.path.join(folder, f"{kind}_{azimuth}_{who}.exr") for who in ("taki", "cycles"))
-        direction = ",".join(f"{x:.7f}" for x in light(azimuth))
-        taki("render", scene, "-o", own, "--overwrite", "--layers", "rgb", "--set", f"volumes.strands.source={hair}",
-             "--set", f"volumes.strands.up={UP[kind]}", "--set", f"trace.sigma={sigma}", "--set", f"lights.sun.direction=[{direction}]")
+        sets = {
+            "volumes.strands.source": hair,
+            "volumes.strands.up": UP[kind],
+            "trace.sigma": sigma,
+            "lights.sun.direction": ",".join(f"{x:.7f}" for x in light(azimuth)),
+        }
+        given = [f"--set={key}={value}" for key, value in sets.items()]
+        taki("render", scene, "-o", own, "--overwrite", "--layers", "rgb", *given)
         turned(blend, light(azimuth))
         blend.render.filepath = other
         bpy.ops.render.render(write_still=True)
@@ -226,8 +233,9 @@ def compare(kind, folder):
         cover = [100 * p[:, 3].mean() for p in (a, b)]
         mean = [p[:, :3].mean(0) for p in (a, b)]
         green = [m @ [0.2126, 0.7152, 0.0722] for m in mean]
-        print(f"| {azimuth}° | {cover[0]:.2f} % | {cover[1]:.2f} % | {green[0]:.5f} | {green[1]:.5f} | "
-              f"{green[0] / green[1]:.3f} |", flush=True)
+        ratio = green[0] / green[1]
+        row = [f"{azimuth}°", *(f"{c:.2f} %" for c in cover), *(f"{g:.5f}" for g in green), f"{ratio:.3f}"]
+        print("|", " | ".join(row), "|", flush=True)
 
 
 def bear(folder):

@@ -28,16 +28,16 @@ pub struct VolumeArgs {
 #[derive(Subcommand)]
 enum VolumeCommand {
     /// Builds a scene's volume texture and writes it: as an .npz file with the arrays rho, v, k and alpha, or
-    /// as a .vdb or .nvdb file with the grids density, velocity, kd and ks. As a .hair, fur, cloth and hair are
-    /// written as the strands that their cells are made of.
+    /// as a .vdb or .nvdb file with the grids density, velocity, kd and ks. As a .hair, fur, cloth and hair
+    /// are written as the strands that their cells are made of.
     Build {
         #[command(flatten)]
         scene: SceneOptions,
         /// Volume to build, where the scene shows several: water, or the name of a table in [volumes].
         #[arg(long = "volume", value_name = "NAME")]
         volume: Option<String>,
-        /// File to write: an .npz, a .vdb, an .nvdb or a .hair. Default: the scene's name with .npz, in the current
-        /// folder.
+        /// File to write: an .npz, a .vdb, an .nvdb or a .hair. Default: the scene's name with .npz, in the
+        /// current folder.
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
         /// Replaces an existing file even if it is no volume.
@@ -72,7 +72,8 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             if as_grids.is_none() && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
                 let npz = path.with_extension("npz");
                 return Err(Error::Usage(format!(
-                    "-o {}: a volume is an .npz file, or a .vdb, .nvdb or .hair for other programs; use -o {}",
+                    "-o {}: a volume is an .npz file, or a .vdb, .nvdb or .hair for other programs; use \
+                     -o {}",
                     path.display(),
                     npz.display()
                 )));

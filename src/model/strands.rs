@@ -15,8 +15,8 @@
 //! | 40 | text of 88 bytes |
 //!
 //! The arrays follow in the order of their bits: u16 segments of each strand, f32 × 3 each point, f32
-//! thickness of each point; the others are not read. A strand of n segments has n + 1 points, from its root to
-//! its tip. Such files say nothing about units; in the models of their author z points up.
+//! thickness of each point; the others are not read. A strand of n segments has n + 1 points, from its root
+//! to its tip. Such files say nothing about units; in the models of their author z points up.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Write};

@@ -44,8 +44,8 @@ pub(super) enum Builder {
 
 words! {
     Builder {
-        Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands", Mountain => "mountain", Grains => "grains",
-        Flow => "flow",
+        Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands",
+        Mountain => "mountain", Grains => "grains", Flow => "flow",
     }
 }
 

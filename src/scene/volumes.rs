@@ -39,8 +39,8 @@ pub struct Recipe {
     pub ramp: Ramp,
     /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
     pub measured: Option<MeasuredSpec>,
-    /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, the simulation's, or that
-    /// of the strands in `matter`.
+    /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, the simulation's, or
+    /// that of the strands in `matter`.
     pub file: Option<PathBuf>,
     /// Whether the file is one of a sequence, in which each frame has its own.
     pub is_sequence: bool,

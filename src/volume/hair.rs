@@ -2,8 +2,8 @@
 //!
 //! Long hair lies along the skin instead of standing on it. So it fills a volume as water does, and its
 //! strands are the spatial fractal curves of the paper. Neighbours gather in locks on their way to the tip,
-//! and a lock waves as one. The strands of a lock end at lengths of their own, which makes a tip pointed and a
-//! hem ragged.
+//! and a lock waves as one. The strands of a lock end at lengths of their own, which makes a tip pointed and
+//! a hem ragged.
 
 use glam::{Vec2, Vec3};
 use rand::{Rng, RngExt};
@@ -60,7 +60,8 @@ pub struct HairSpec {
     pub k_d: f32,
     /// Relative standard deviation of k_d from strand to strand.
     pub shade: f32,
-    /// k_s of all cells. `None`: each cell has its place on a ramp of colours there, the way from root to tip.
+    /// k_s of all cells. `None`: each cell has its place on a ramp of colours there, the way from root to
+    /// tip.
     pub k_s: Option<f32>,
 }
 

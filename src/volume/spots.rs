@@ -42,8 +42,8 @@ impl Spots {
         Vec2::new(x, (row as f32 + rng.random::<f32>()) / self.rows() as f32) * self.size
     }
 
-    /// Nearest of the spots, which stand at `middles`: its number, and the way from a place to it. The way may
-    /// lead across a border where the face goes on. `None` without spots.
+    /// Nearest of the spots, which stand at `middles`: its number, and the way from a place to it. The way
+    /// may lead across a border where the face goes on. `None` without spots.
     pub fn nearest(&self, middles: &[Vec2], place: Vec2) -> Option<(usize, Vec2)> {
         let rows = i64::from(self.rows());
         let row = (place.y / self.size.y * rows as f32) as i64;

@@ -34,7 +34,8 @@ pub struct StrandsSpec {
     pub alpha: f32,
     /// k_d.
     pub k_d: f32,
-    /// k_s of all cells. `None`: each cell has its place on a ramp of colours there, the way from root to tip.
+    /// k_s of all cells. `None`: each cell has its place on a ramp of colours there, the way from root to
+    /// tip.
     pub k_s: Option<f32>,
 }
 

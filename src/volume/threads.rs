@@ -107,7 +107,8 @@ pub(super) struct Threads<Draw: Fn(usize, &mut Thread) + Sync> {
     pub draw: Draw,
 }
 
-/// Builds the cells of threads in dense storage. Without `k_s`, each cell has its place on the ramp of colours where k_s stands elsewhere.
+/// Builds the cells of threads in dense storage. Without `k_s`, each cell has its place on the ramp of
+/// colours where k_s stands elsewhere.
 ///
 /// The sums depend neither on the number of processors nor on the order in which they work.
 ///

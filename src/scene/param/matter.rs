@@ -103,9 +103,9 @@ pub(super) const CLOTH: Group = Group {
 pub(super) const HAIR: Group = Group {
     title: "Long hair",
     about: "Strands of a volume with `volume.builder=hair`. They run along v, from the root to the tip, and \
-         leave the skin, the face z = nz, at their roots. `curves.h` and `curves.amplitude` bend each of them. \
-         `volume.color` to `volume.color_4` run from root to tip. A copy of the volume is as long as the \
-         hair, so let v grow from 0 to 1 on the mesh.",
+         leave the skin, the face z = nz, at their roots. `curves.h` and `curves.amplitude` bend each of \
+         them. `volume.color` to `volume.color_4` run from root to tip. A copy of the volume is as long as \
+         the hair, so let v grow from 0 to 1 on the mesh.",
     params: &[
         p("tress.strand_count", "", "", Int(1, 10_000_000, 6000), Volume)
             .slider(100.0, 50_000.0)
@@ -120,7 +120,9 @@ pub(super) const HAIR: Group = Group {
         p("tress.strand_width", "", "widths", Float(1e-6, 0.5, 0.004), Volume)
             .slider(0.0005, 0.05)
             .doc("Diameter of a strand at its root, as a fraction of the volume's width nx.")
-            .when("Lower it with more `tress.strand_count`. Below one cell, 1/nx, cells thin out in proportion."),
+            .when(
+                "Lower it with more `tress.strand_count`. Below one cell, 1/nx, cells thin out in proportion.",
+            ),
         p("tress.thinning", "", "", Float(0.0, 1.0, 0.5), Volume)
             .doc("Share of its diameter that a strand loses from root to tip.")
             .when("Raise it for soft ends."),
@@ -154,8 +156,8 @@ pub(super) const HAIR: Group = Group {
 pub(super) const IMPORT: Group = Group {
     title: "Strands of a file",
     about: "Strands of a volume with `volume.builder=strands`, which `volume.source` names: a file .hair in \
-         the format of Cem Yuksel's models. The cells are cubes, and a box around the volume stands where the \
-         strands stand. Turn files whose z axis points up with `volume.up=z`. `volume.color` to \
+         the format of Cem Yuksel's models. The cells are cubes, and a box around the volume stands where \
+         the strands stand. Turn files whose z axis points up with `volume.up=z`. `volume.color` to \
          `volume.color_4` run from root to tip.",
     params: &[
         p("import.longest", "", "cells", Int(3, 4096, 256), Volume)

@@ -217,14 +217,15 @@ pub(super) const VOLUME: Group = Group {
                  (`grains`), or the grids of a simulation in `volume.source` (`flow`).",
             )
             .when(
-                "Choose `fur`, `cloth`, `hair` or `mountain` for a shell over a mesh, and `strands`, or `flow` \
-                 for smoke or water that another program computed, in a box.",
+                "Choose `fur`, `cloth`, `hair` or `mountain` for a shell over a mesh, and `strands`, or \
+                 `flow` for smoke or water that another program computed, in a box.",
             ),
         p("volume.source", "", "", Text(""), Volume)
             .doc(
                 "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz); \
-                 with `volume.builder=strands`, of a file of hair (.hair). Like all paths of a scene, it lies in the folder of the scene. With `####` in its name it \
-                 is a sequence, of which `volume.frame` chooses the file.",
+                 with `volume.builder=strands`, of a file of hair (.hair). Like all paths of a scene, it \
+                 lies in the folder of the scene. With `####` in its name it is a sequence, of which \
+                 `volume.frame` chooses the file.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),
         p("volume.grid", "", "", Text("density"), Volume)

@@ -14,9 +14,9 @@ pub const WATER: &str = "water";
 pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
     about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
-         of `curves`, `volume`, `fur`, `cloth`, `tress`, `import`, `mountain` and `grains` in one table; where \
-         a description names one of those keys, it means the key of the same volume. A material says with \
-         `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
+         of `curves`, `volume`, `fur`, `cloth`, `tress`, `import`, `mountain` and `grains` in one table; \
+         where a description names one of those keys, it means the key of the same volume. A material says \
+         with `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
     params: &PARAMS,
 };
 
