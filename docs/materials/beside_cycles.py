@@ -3,9 +3,9 @@
 Run: TAKI=taki python3 beside_cycles.py [fur|hair|bear]      (Python with bpy 5 and numpy)
 
 For each azimuth of one distant light, both render `truth.toml` with that light alone: taki as cells of a
-volume, Cycles as curves with the principled hair BSDF and direct light. Printed are the share of the pixels that the
-strands cover, and the mean radiance. `bear` grows the hairs of the preset `bear` on its mesh, without taki's
-shells, and prints what each program takes to the same noise.
+volume, Cycles as curves with the principled hair BSDF and direct light. Printed are the share of the pixels
+that the strands cover, and the mean radiance. `bear` grows the hairs of the preset `bear` on its mesh,
+without taki's shells, and prints what each program takes to the same noise.
 """
 
 import json
