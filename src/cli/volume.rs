@@ -66,10 +66,8 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             let number = number_of(&scene, name.as_deref())?;
             let path = output.clone().unwrap_or_else(|| default_output(&scene, "npz"));
             let as_grids = GridFile::of(&path);
-            if is_hair(&path) {
-                return write_strands(&scene, number, &path, *overwrite, options.limits().memory, terminal);
-            }
-            if as_grids.is_none() && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+            let is_known = as_grids.is_some() || is_hair(&path);
+            if !is_known && !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
                 let npz = path.with_extension("npz");
                 return Err(Error::Usage(format!(
                     "-o {}: a volume is an .npz file, or a .vdb, .nvdb or .hair for other programs; use \
@@ -84,6 +82,9 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
             if scene.recipes[number].file.as_ref().is_some_and(same) {
                 let what = format!("-o {}: the scene reads its volume from this file", path.display());
                 return Err(Error::Usage(format!("{what}; give another name with -o")));
+            }
+            if is_hair(&path) {
+                return write_strands(&scene, number, &path, *overwrite, options.limits().memory, terminal);
             }
             if !overwrite {
                 check_volume_replaced(&path)?;
@@ -201,7 +202,8 @@ fn write_strands(
     strands.write(BufWriter::with_capacity(1 << 20, out.file())).map_err(|e| Error::write(path, e))?;
     out.finish()?;
     terminal.close();
-    terminal.note(&format!("taki: wrote {} ({} strands)", path.display(), strands.count()));
+    let (count, points) = (strands.count(), strands.points.len());
+    terminal.note(&format!("taki: wrote {} ({count} strands, {points} points)", path.display()));
     Ok(())
 }
 

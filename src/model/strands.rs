@@ -81,7 +81,7 @@ impl Strands {
     ///
     /// # Errors
     /// [`Error::Input`] for a file of another kind, one that ends early, and numbers that are not finite;
-    /// [`Error::Memory`] for one that is too large.
+    /// [`Error::Io`] where it cannot be read; [`Error::Memory`] for one that is too large.
     pub fn read(path: &Path, budget: u64) -> Result<Strands> {
         let fault = |what: String| {
             Error::input(
@@ -89,12 +89,23 @@ impl Strands {
                 "export it again as .hair (Yuksel's format), or check that it was copied whole",
             )
         };
-        let file = File::open(path).map_err(|e| Error::read(path, e))?;
-        let length = file.metadata().map_err(|e| Error::read(path, e))?.len();
+        let meta = std::fs::metadata(path).map_err(|e| Error::open(path, e))?;
+        if !meta.is_file() {
+            // A pipe would be waited for without end.
+            let fix = "give a .hair in the format of Yuksel's hair models";
+            return Err(Error::input(format!("{} is not a regular file", path.display()), fix));
+        }
+        let length = meta.len();
+        let file = File::open(path).map_err(|e| Error::open(path, e))?;
         let mut input = BufReader::with_capacity(1 << 16, file);
         let mut header = [0; HEADER];
-        if length < HEADER as u64 || input.read_exact(&mut header).is_err() || !header.starts_with(MAGIC) {
+        let start = &mut header[..(HEADER as u64).min(length) as usize];
+        input.read_exact(start).map_err(|e| Error::read(path, e))?;
+        if !start.starts_with(MAGIC) {
             return Err(fault("is no file of hair: it does not begin with the letters HAIR".into()));
+        }
+        if length < HEADER as u64 {
+            return Err(fault(format!("ends early: it is {length} bytes long, and its head takes {HEADER}")));
         }
         let word = |at: usize| [header[at], header[at + 1], header[at + 2], header[at + 3]];
         let [strands, points, flags, segments] = [4, 8, 12, 16].map(|at| u32::from_le_bytes(word(at)));

@@ -46,6 +46,26 @@ fn not_sparse(v: &Values, name: &str) -> Result<()> {
     Ok(())
 }
 
+/// Refuses a file of hair where another builder would make the cells, or read it as something else.
+pub(super) fn no_strands_elsewhere(v: &Values, name: &str) -> Result<()> {
+    let key = |own: &str| key_of_volume(name, own);
+    let is_hair = |own: &&str| v.text(&key(own)).to_ascii_lowercase().ends_with(".hair");
+    let builder = key("volume.builder");
+    let reads = v.choice(&builder, Builder::from_word) == Builder::Strands;
+    let given = ["volume.source", "volume.file"].into_iter().find(is_hair);
+    match given {
+        Some(own) if !(reads && own == "volume.source") => Err(Error::input(
+            format!(
+                "{} = {:?}: a file of hair is read by the builder \"strands\"",
+                key(own),
+                v.text(&key(own))
+            ),
+            format!("set {builder}=strands, and name the file in {}", key("volume.source")),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Returns the recipe of the volume `name` if it is made of the strands of a file. The other arguments are
 /// those of [`matter`], and what the file may be.
 ///
@@ -97,8 +117,8 @@ pub(super) fn strands(
         k_s: (!has_ramp).then_some(water.k_s),
     };
     let spec = StrandsSpec::around(v.count(&longest), rest).ok_or_else(|| {
-        let fix = format!("export them again, or give them a thickness with {diameter}, metres");
-        Error::input(format!("{}: the strands have no extent", path.display()), fix)
+        let fix = format!("check the points in the program that wrote them, or set {diameter}, metres");
+        Error::input(format!("{}: the strands have no extent, or an endless one", path.display()), fix)
     })?;
     Ok(Some(Matter::Strands(spec)))
 }

@@ -56,6 +56,7 @@ impl Recipe {
     /// Reads the recipe of the volume `name`. Its storage is not chosen yet.
     fn new(v: &Values, name: &str, folder: Option<&Path>, limits: &Limits) -> Result<Recipe> {
         let mut water = build::water(v, name);
+        matter::no_strands_elsewhere(v, name)?;
         let measured = measured::measured(v, name, folder, limits).map_err(|e| of_volume(name, e))?;
         if let Some(measured) = &measured {
             water.size = measured.size;
@@ -126,8 +127,11 @@ impl Recipe {
         let building = cells * (size_of::<Cell>() + Matter::BYTES_PER_CELL) as u128 + matter.bytes_beside();
         let need = building.max(dense_bytes(self.water.size, false) + u128::from(beside));
         if need > u128::from(memory) {
-            let what = format!("a volume of {nx}×{ny}×{nz} cells (volume.nx, ny, nz)");
-            let fix = "lower volume.nx, volume.ny or volume.nz, or raise --memory";
+            let (keys, fix) = match self.matter {
+                Some(Matter::Strands(_)) => ("import.longest", "lower import.longest, or raise --memory"),
+                _ => ("volume.nx, ny, nz", "lower volume.nx, volume.ny or volume.nz, or raise --memory"),
+            };
+            let what = format!("a volume of {nx}×{ny}×{nz} cells ({keys})");
             return Err(Error::memory(what, need, memory, fix));
         }
         Ok(Storage::Dense)

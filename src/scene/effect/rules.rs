@@ -72,6 +72,16 @@ const OF_GRIDS: &[&str] = &[
     "volume.voxels",
 ];
 
+/// Keys of k_d and k_s, which fibres of hair do without.
+const OF_SHADES: &[&str] = &[
+    "cloth.yarn_shade",
+    "fur.hair_shade",
+    "tress.strand_shade",
+    "volume.k_d",
+    "volume.k_noise",
+    "volume.k_s",
+];
+
 /// Need of strands where `volume.builder` is `flow`.
 const STRANDS: &str = "a number above 0, because volume.builder is \"flow\"";
 /// Need of a colour that follows another.
@@ -124,6 +134,12 @@ pub(super) const RULES: &[Rule] = &[
         switch: HAIR_COLOR,
         needs: "no colour, which stands in the place of melanin",
         works: |v, switch| !v.is_set(switch),
+    },
+    Rule {
+        keys: OF_SHADES,
+        switch: "light.reflection",
+        needs: "kajiya-kay or strand",
+        works: |v, switch| !is(v, switch, ReflectionKind::Hair.word()),
     },
     Rule {
         keys: &["trace.sigma"],
@@ -242,7 +258,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: OF_BUILT,
         switch: "volume.builder",
-        needs: "another word",
+        needs: "a builder that leaves the size to the scene",
         works: |v, switch| ![Builder::Flow, Builder::Strands].iter().any(|b| is(v, switch, b.word())),
     },
     Rule {
@@ -358,7 +374,7 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         keys: &["volume.seed"],
         switch: "volume.builder",
-        needs: "another word",
+        needs: "a builder that draws at random",
         works: |v, switch| !is(v, switch, Builder::Strands.word()),
     },
     Rule {

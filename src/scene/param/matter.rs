@@ -120,9 +120,7 @@ pub(super) const HAIR: Group = Group {
         p("tress.strand_width", "", "widths", Float(1e-6, 0.5, 0.004), Volume)
             .slider(0.0005, 0.05)
             .doc("Diameter of a strand at its root, as a fraction of the volume's width nx.")
-            .when(
-                "Lower it with more `tress.strand_count`. Below one cell, 1/nx, cells thin out in proportion.",
-            ),
+            .when("Lower it with more `tress.strand_count`. Below one cell, 1/nx, cells thin out."),
         p("tress.thinning", "", "", Float(0.0, 1.0, 0.5), Volume)
             .doc("Share of its diameter that a strand loses from root to tip.")
             .when("Raise it for soft ends."),

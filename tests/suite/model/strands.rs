@@ -84,8 +84,9 @@ fn broken_files_are_told() {
         file
     };
     let nan = f32::NAN.to_le_bytes();
-    let cases: [(Vec<u8>, &str); 9] = [
-        (b"HAIR".to_vec(), "letters HAIR"),
+    let cases: [(Vec<u8>, &str); 10] = [
+        (b"HAIR".to_vec(), "ends early"),
+        (Vec::new(), "letters HAIR"),
         (with(0, b"hair"), "letters HAIR"),
         (whole()[..150].to_vec(), "ends early"),
         (with(4, &0u32.to_le_bytes()), "no strands"),

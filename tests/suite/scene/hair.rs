@@ -81,6 +81,38 @@ fn strands_without_thickness_take_that_of_the_scene() {
 }
 
 #[test]
+fn a_file_of_hair_leads_to_its_builder() {
+    for sets in [
+        &["volume.builder=hair", "volume.source=wig.hair"][..],
+        &["volume.source=wig.HAIR"],
+        &["volume.builder=flow", "volume.source=wig.hair"],
+        &["volume.file=wig.hair"],
+    ] {
+        let told = Scene::preset("fig5").expect("a preset").with(sets).map_err(|e| e.to_string());
+        super::refused(told, &["volume.builder=strands", "volume.source"]);
+    }
+}
+
+#[test]
+fn strands_too_fine_for_the_memory_name_the_key_that_makes_them_so() {
+    let (folder, _scene) = scene("longest = 400", 0.1);
+    let limits = Limits { memory: 8 << 20, ..Limits::default() };
+    let told = Scene::load(&folder.path("s.toml"), &[], &limits).map_err(|e| e.to_string());
+    super::refused(told, &["volumes.s.longest", "--memory"]);
+}
+
+#[test]
+fn fibres_of_hair_do_without_k() {
+    let hair = ["volume.builder=hair", "light.reflection=hair"];
+    let hair = Scene::preset("fig5").expect("a preset").with(&hair).expect("valid");
+    for set in ["volume.k_d=0.5", "volume.k_s=0.1", "tress.strand_shade=0.5"] {
+        let set = set.to_owned();
+        let values = hair.with(&[&set]).expect("valid");
+        assert!(!settings_without_effect(values.values().expect("values"), &[set], &[]).is_empty());
+    }
+}
+
+#[test]
 fn keys_of_hair_and_of_files_have_their_effect_with_their_builder_alone() {
     let hair = Scene::preset("fig5").expect("a preset").with(&["volume.builder=hair"]).expect("valid");
     let said = |scene: &Scene, set: &str| {

@@ -266,7 +266,7 @@ fn of_a_thousand_lights_those_in_sight_are_laid_out() {
     for i in 0..1000 {
         scene += &format!("[lights.l{i}]\nkind = \"point\"\nintensity = 0.0\n");
     }
-    let mut window = Setup { scene, size: [700.0, 1600.0], ..with_list() }.open();
+    let mut window = Setup { scene, size: [700.0, 1800.0], ..with_list() }.open();
     let drawn = window.names(Role::Button).iter().filter(|name| name.starts_with("Remove l")).count();
     assert!(drawn > 3 && drawn < 200, "{drawn} of 1000 entries are laid out");
     assert_eq!(lights(&window).len(), 1001);

@@ -16,7 +16,7 @@ fn an_input_that_does_not_exist_is_bad_input_and_not_tried_again() {
     let map = "--set=environment.file=";
     for folder in ["", "absent/", "file/"] {
         let at = |before: &str, name: &str| format!("{before}{folder}{name}");
-        let commands: [(String, &[&str]); 14] = [
+        let commands: [(String, &[&str]); 15] = [
             (at("", "no.toml"), &["render"]),
             (at("", "no.toml"), &["batch", "--frames=0"]),
             (at("", "no.toml"), &["scene"]),
@@ -28,6 +28,7 @@ fn an_input_that_does_not_exist_is_bad_input_and_not_tried_again() {
             (at(volume, "no.npz"), &["batch", "front", "--frames=0", "--dry-run"]),
             (at("--volume=", "no.npz"), &["bench", "--engine=cpu", "--size=16x16", "--runs=1"]),
             (at("", "no.npz"), &["volume", "info"]),
+            (at("", "no.hair"), &["volume", "info"]),
             (at(map, "no.hdr"), &["render", "front", "--set=environment.kind=file"]),
             (at("", "no.png"), &["compare", "no.png"]),
             (at("", "no.png"), &["stitch", "-o", "whole.png"]),
@@ -75,14 +76,17 @@ fn a_pipe_in_place_of_a_file_is_refused_and_not_waited_for() {
     let dir = tempdir().unwrap();
     assert!(Command::new("mkfifo").arg(dir.path().join("f")).status().unwrap().success());
     run(&mut render("front", dir.path().join("p.png"))).done();
+    symlink("f", dir.path().join("f.hair")).unwrap();
     for arguments in [
         &["compare", "f", "p.png"][..],
         &["compare", "p.png", "f"],
         &["compare", "--eye", "f"],
         &["stitch", "f", "-o", "x.png"],
         &["volume", "info", "f"],
+        &["volume", "info", "f.hair"],
         &["scene", "f"],
         &["scene", "front", "--set=volume.file=f"],
+        &["scene", "front", "--set=volume.builder=strands", "--set=volume.source=f"],
         &["scene", "front", "--set=environment.kind=file", "--set=environment.file=f"],
     ] {
         run(taki(arguments).current_dir(&dir)).refused(65, &["f", "not a regular file"]);
