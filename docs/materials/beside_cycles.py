@@ -126,6 +126,16 @@ def taki(*args):
     subprocess.run([TAKI, *map(str, args)], check=True, stderr=subprocess.DEVNULL)
 
 
+def thinned(tile, pieces):
+    """The same strands with fewer points: about `pieces` segments each."""
+    counts, points, widths = tile
+    ends = counts.cumsum()
+    kept = [np.linspace(end - count, end - 1, min(pieces + 1, count)).round().astype(int)
+            for count, end in zip(counts, ends)]
+    every = np.concatenate(kept)
+    return np.array([len(own) for own in kept]), points[every], widths[every]
+
+
 def parts(path):
     """Points, texture coordinates and triangles of the parts of a .glb of `glb.py`, by material."""
     with open(path, "rb") as file:
@@ -244,7 +254,7 @@ def bear(folder):
     mesh = dict(parts(os.path.join(assets, "meshes", "bear.glb")))
     tile = os.path.join(folder, "coat.hair")
     taki("volume", "build", "bear", "--volume", "coat", "-o", tile, "--overwrite")
-    counts, points, widths = grown(mesh["Coat"], strands(tile), (96, 96, 44), 0.095)
+    counts, points, widths = grown(mesh["Coat"], thinned(strands(tile), 10), (96, 96, 44), 0.095)
     print(f"{len(counts)} hairs, {len(points)} points")
     fibre = {"Absorption Coefficient": [0.4, 0.7, 1.2], "IOR": 1.55, "Offset": math.radians(3.0),
              "Roughness": 0.3, "Radial Roughness": 0.3}

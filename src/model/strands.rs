@@ -113,7 +113,7 @@ impl Strands {
         if flags & POINTS == 0 || strands == 0 {
             return Err(fault("has no strands".into()));
         }
-        // What the arrays need is compared with the file before memory is taken.
+        // The bytes that the arrays need are compared with the file before memory is taken.
         let [of_strands, of_points] = [u64::from(strands), u64::from(points)];
         if of_strands > of_points {
             return Err(fault(format!("has {strands} strands and {points} points")));

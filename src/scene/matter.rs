@@ -70,8 +70,8 @@ pub(super) fn no_strands_elsewhere(v: &Values, name: &str) -> Result<()> {
 /// those of [`matter`], and what the file may be.
 ///
 /// # Errors
-/// Those of [`Strands::read`] and of paths; [`Error::Input`] for strands without extent or thickness, and for
-/// sparse storage.
+/// Errors of [`Strands::read`] and of paths; [`Error::Input`] for strands without extent or thickness, and
+/// for sparse storage.
 pub(super) fn strands(
     v: &Values,
     name: &str,

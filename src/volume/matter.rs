@@ -87,7 +87,7 @@ fn drawn(
         (threads.draw)(number, &mut thread);
         let width = |i: usize| thread.looks.get(i).or(thread.looks.last()).map_or(0.0, |look| look.width);
         strands.push(thread.points.iter().enumerate().map(|(i, point)| (*point, width(i))));
-        // What the first strands take tells what all will take.
+        // The first strands tell how much all will take.
         let drawn = 16 * strands.points.len() as u128;
         let expected = drawn * threads.count as u128 / (number as u128 + 1);
         let need = if (number + 1) % THREADS_PER_REPORT == 0 { expected } else { drawn };

@@ -26,11 +26,11 @@ pub struct Hair {
     pub roughness_m: f32,
     /// Roughness around the hair, β_n, 0.1 to 1.
     pub roughness_n: f32,
-    /// What colours the hair.
+    /// Source of the colour.
     pub pigment: Pigment,
 }
 
-/// What colours a hair.
+/// Source of a hair's colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pigment {
     /// Concentration of both melanins together, and the share of pheomelanin, 0 to 1.

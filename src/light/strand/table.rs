@@ -281,7 +281,7 @@ fn size(is_tilted: bool) -> [usize; 3] {
     [if is_tilted { TILTED_X } else { nx }, ny, nz]
 }
 
-/// What the table depends on: all but the air.
+/// Properties that the table depends on: all but the air.
 fn key(params: &StrandParams) -> StrandParams {
     StrandParams { aeration: 0.0, g: 0.0, ..*params }
 }

@@ -41,7 +41,7 @@ const MOSS_CELLS: f32 = 1.6;
 /// Steepest surface that directions follow, cells a cell. A step of the height field is a wall.
 const STEEPEST: f32 = 4.0;
 
-/// What stands on one column of cells.
+/// Matter on one column of cells.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Column {
     /// Height of rock, soil and stones above the skin, cells.
