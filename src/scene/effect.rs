@@ -25,8 +25,10 @@ fn rules(values: &Values, key: &str) -> impl Iterator<Item = (&'static Rule, Str
     RULES.iter().filter(is_of_key).filter_map(move |rule| {
         let name = key.split('.').nth(1).unwrap_or_default();
         let switch = match of_volume {
-            Some((volume, _)) => key_of_volume(volume, rule.switch),
-            None => rule.switch.replace('*', name),
+            Some((volume, _)) if split_volume_key(rule.switch).is_some() => {
+                key_of_volume(volume, rule.switch)
+            }
+            _ => rule.switch.replace('*', name),
         };
         (!(rule.works)(values, &switch)).then_some((rule, switch))
     })

@@ -110,6 +110,16 @@ fn fibres_of_hair_do_without_k() {
         let values = hair.with(&[&set]).expect("valid");
         assert!(!settings_without_effect(values.values().expect("values"), &[set], &[]).is_empty());
     }
+    // The same goes for the keys of a volume with a name.
+    let (_folder, strands) = scene("", 0.1);
+    let strands = strands.expect("a scene");
+    let said = |sets: &[&str]| {
+        let values = strands.with(sets).expect("valid");
+        let last = [sets[sets.len() - 1].to_owned()];
+        !settings_without_effect(values.values().expect("values"), &last, &[]).is_empty()
+    };
+    assert!(!said(&["volumes.s.k_d=0.5"]));
+    assert!(said(&["light.reflection=hair", "volumes.s.k_d=0.5"]));
 }
 
 #[test]
