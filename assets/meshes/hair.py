@@ -43,7 +43,7 @@ def smooth(x):
 
 
 def around(a, shrink=0.0):
-    """The point that hair of azimuth `a` from the back has reached `shrink` metres below the skull's equator."""
+    """The point of hair of azimuth `a` from the back, `shrink` metres below the skull's equator."""
     (cx, cy, cz), (rx, _, rz) = SKULL
     # Hair beside the face is drawn behind the shoulders on its way down.
     own = a * (1 - 0.42 * smooth(shrink / 0.3))
@@ -155,7 +155,8 @@ def bust(rings, columns=64):
         p0, p1, p2, p3 = (rings[min(max(k + d, 0), len(rings) - 1)] for d in (-1, 0, 1, 2))
         for i in range(4):
             s = i / 4
-            weights = -s * (1 - s) ** 2, 2 - 5 * s * s + 3 * s**3, s * (1 + 4 * s - 3 * s * s), -s * s * (1 - s)
+            t = 1 - s
+            weights = -s * t * t, 2 - 5 * s * s + 3 * s**3, s * (1 + 4 * s - 3 * s * s), -s * s * t
             fine.append([sum(w * x for w, x in zip(weights, xs)) / 2 for xs in zip(p0, p1, p2, p3)])
     fine.append(rings[-1])
     turns = [2 * math.pi * i / columns for i in range(columns)]
@@ -171,10 +172,11 @@ def joined(parts):
 
 
 def main(path):
+    body = joined([ellipsoid(*e) for e in HEAD] + [bust(NECK + BODY[:1])])
     looks = [
         ("Hair", {"baseColorFactor": [0.03, 0.018, 0.01, 1.0]}, hair(LONG, 0.0)),
         ("Under", {"baseColorFactor": [0.02, 0.012, 0.007, 1.0]}, hair(LONG * 2 // 3, 0.004)),
-        ("Skin", {"baseColorFactor": [0.62, 0.36, 0.25, 1.0]}, joined([ellipsoid(*e) for e in HEAD] + [bust(NECK + BODY[:1])])),
+        ("Skin", {"baseColorFactor": [0.62, 0.36, 0.25, 1.0]}, body),
         ("Clothes", {"baseColorFactor": [0.055, 0.075, 0.10, 1.0]}, bust(BODY)),
     ]
     matt = {"roughnessFactor": 0.8, "metallicFactor": 0.0}

@@ -20,7 +20,7 @@ pub struct Measured {
     pub density: Grid,
     /// Velocity: no grid, one of vectors, or one for each component.
     pub velocity: Vec<Grid>,
-    /// What k follows, with [`ReflectBy::Grid`], or k_d, with [`ReflectBy::Stored`].
+    /// Grid that k follows, with [`ReflectBy::Grid`], or that of k_d, with [`ReflectBy::Stored`].
     pub second: Option<Grid>,
     /// k_s, with [`ReflectBy::Stored`].
     pub specular: Option<Grid>,

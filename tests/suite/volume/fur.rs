@@ -1,7 +1,5 @@
 //! §2 The builder of fur: what its hairs hide, where they stand and lean, and what does not change them.
 
-use std::time::Instant;
-
 use glam::Vec3;
 use taki::util::monitor::Unwatched;
 use taki::volume::{FurSpec, VolumeTexture};
@@ -164,13 +162,7 @@ fn one_seed_gives_the_same_bytes_on_any_number_of_threads() {
         k_s: None,
         ..PLAIN
     };
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| build(&spec))
-    };
-    let one = on(1);
-    assert_eq!(one, on(4));
-    assert_eq!(one, on(3));
+    let one = super::same_on_any_number_of_threads(|| build(&spec));
     assert_ne!(one, build(&FurSpec { seed: 6, ..spec }));
 }
 
@@ -187,9 +179,5 @@ fn time_of_128_cells_a_side() {
         clumping: 0.5,
         ..PLAIN
     };
-    for _ in 0..5 {
-        let start = Instant::now();
-        let cells = build(&spec).statistics().occupied_cells;
-        println!("{cells} cells in {:.3} s", start.elapsed().as_secs_f64());
-    }
+    super::print_times(|| build(&spec));
 }

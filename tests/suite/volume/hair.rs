@@ -1,8 +1,6 @@
 //! §2 The builder of long hair: what its strands hide, where they run, and what does not change them.
 
 use std::f64::consts::PI;
-use std::time::Instant;
-
 use taki::util::monitor::Unwatched;
 use taki::volume::{Cell, HairSpec, VolumeTexture};
 
@@ -153,13 +151,7 @@ fn one_seed_gives_the_same_bytes_on_any_number_of_threads() {
         k_s: None,
         ..PLAIN
     };
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| build(&spec))
-    };
-    let one = on(1);
-    assert_eq!(one, on(4));
-    assert_eq!(one, on(3));
+    let one = super::same_on_any_number_of_threads(|| build(&spec));
     assert_ne!(one, build(&HairSpec { seed: 6, ..spec }));
 }
 
@@ -177,9 +169,5 @@ fn time_of_128_cells_a_side() {
         amplitude_cells: 1.0,
         ..PLAIN
     };
-    for _ in 0..5 {
-        let start = Instant::now();
-        let cells = build(&spec).statistics().occupied_cells;
-        println!("{cells} cells in {:.3} s", start.elapsed().as_secs_f64());
-    }
+    super::print_times(|| build(&spec));
 }

@@ -26,6 +26,27 @@ use taki::util::monitor::Unwatched;
 use taki::util::random::{Family, Stream};
 use taki::volume::{Structure, VolumeTexture, WaterSpec, build_water};
 
+/// Checks that a builder gives the same cells on one, three and four threads, and returns them.
+fn same_on_any_number_of_threads(build: impl Fn() -> VolumeTexture + Sync) -> VolumeTexture {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(&build)
+    };
+    let one = on(1);
+    assert_eq!(one, on(4));
+    assert_eq!(one, on(3));
+    one
+}
+
+/// Prints how long a builder takes, five times.
+fn print_times(build: impl Fn() -> VolumeTexture) {
+    for _ in 0..5 {
+        let start = std::time::Instant::now();
+        let cells = build().statistics().occupied_cells;
+        println!("{cells} cells in {:.3} s", start.elapsed().as_secs_f64());
+    }
+}
+
 fn spec(size: [u32; 3], grid: u32) -> WaterSpec {
     WaterSpec {
         size,
