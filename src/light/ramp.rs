@@ -48,6 +48,11 @@ impl Ramp {
         ramp
     }
 
+    /// k_s of all cells, if their bytes are places on the ramp.
+    pub fn even_k_s(&self) -> Option<f32> {
+        (self.count > 0.0).then_some(self.k_s[1] * (1.0 / 255.0))
+    }
+
     /// Ink of a cell with this byte in the place of k_s.
     #[inline]
     pub fn ink(&self, code: f32) -> Ink {

@@ -55,7 +55,8 @@ pub use volumes::{MAX_VOLUMES, Recipe};
 use crate::grid;
 use crate::light::environment::{self, Environment, EnvironmentMemo};
 use crate::light::haze::Haze;
-use crate::light::scatter::media::Media;
+use crate::light::scatter::media::{Media, scattering};
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::visibility::{LightVolumes, LitQuads};
 use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility};
 use crate::mapping::Quad;
@@ -476,6 +477,17 @@ impl Scene {
         let volumes = volumes.as_ref();
         let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volumes);
         (self.scattering == Scattering::Multiple).then(make)
+    }
+
+    /// Returns how the matter of each volume scatters light many times where shells show it; `None` where
+    /// light scatters once.
+    pub fn shell_optics(&self, volumes: &[VolumeTexture]) -> Vec<Option<ShellOptics>> {
+        let is_multiple = self.scattering == Scattering::Multiple && !self.shells.is_empty();
+        let of = |(recipe, volume): (&Recipe, &VolumeTexture)| {
+            let fibres = || scattering(&self.reflection, self.p, volume, recipe.ramp.even_k_s());
+            is_multiple.then(|| ShellOptics::of_fibres(&fibres().similarity()))
+        };
+        self.recipes.iter().zip(volumes).map(of).collect()
     }
 
     /// Returns everything that determines the opaque mesh.

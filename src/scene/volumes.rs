@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, Vec3};
 
 use super::measured::Builder;
+use super::meshes::Carrier;
 use super::names::likeliest;
 use super::param::{COLORS, PARAMS, WATER, key_of_volume, split_volume_key};
 use super::sequence::Sequence;
@@ -195,7 +196,8 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if reflection != ReflectionKind::KajiyaKay {
         return of_light("light.reflection", reflection.word(), ReflectionKind::KajiyaKay.word());
     }
-    if v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple {
+    let is_multiple = v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple;
+    if is_multiple && is_on_quads(v, name) {
         return of_light("light.scattering", Scattering::Multiple.word(), Scattering::Single.word());
     }
     let builder = key_of_volume(name, "volume.builder");
@@ -221,6 +223,17 @@ pub(super) fn used_materials(v: &Values) -> BTreeSet<String> {
         v.names(section).into_iter().map(move |name| v.text(&format!("{section}.{name}.material")))
     });
     users.chain(meshes::named_materials(v)).collect()
+}
+
+/// Whether quads or faces of meshes show the volume `name`.
+fn is_on_quads(v: &Values, name: &str) -> bool {
+    let of_shells: BTreeSet<String> = meshes::named_materials(v).into_iter().collect();
+    used_materials(v).into_iter().any(|material| {
+        // Quads refuse a material of shells.
+        let carrier = v.choice(&format!("materials.{material}.carrier"), Carrier::from_word);
+        let is_shell = carrier == Carrier::Shell && of_shells.contains(&material);
+        volume_of(v, &material) == name && !is_shell
+    })
 }
 
 /// Returns the name of the volume that a material shows.

@@ -52,7 +52,7 @@ impl Media {
         p: f32,
         volumes: &[VolumeTexture],
     ) -> Media {
-        let waters: Vec<Scattering> = volumes.iter().map(|v| scattering(reflection, p, v)).collect();
+        let waters: Vec<Scattering> = volumes.iter().map(|v| scattering(reflection, p, v, None)).collect();
         let own = if matches!(attenuation, Attenuation::PerCell { .. }) { 0.5 } else { 0.0 };
         let medium = |Kind { thickness_m, mist, volume }: &Kind| {
             let (water, volume) = (waters[*volume as usize], &volumes[*volume as usize]);
@@ -103,7 +103,9 @@ pub fn profile_length(layers: u32) -> u32 {
     2 * COSINES * (layers + VIEWS)
 }
 
-fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scattering {
+/// Scattering by the matter of a volume over the colour of its cells. `p` is the exponent of the specular
+/// term, and `k_s` that of all cells where colours take the place of it.
+pub fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture, k_s: Option<f32>) -> Scattering {
     match reflection.shading() {
         Some(shading) => {
             let moments = shading.moments();
@@ -112,7 +114,7 @@ fn scattering(reflection: &Reflection, p: f32, volume: &VolumeTexture) -> Scatte
         }
         None => {
             let s = volume.statistics();
-            Scattering::kajiya_kay(s.k_d_mean as f32, s.k_s_mean as f32, p, MOST_ALBEDO)
+            Scattering::kajiya_kay(s.k_d_mean as f32, k_s.unwrap_or(s.k_s_mean as f32), p, MOST_ALBEDO)
         }
     }
 }

@@ -7,7 +7,6 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::paint::{Plan, untextured};
 use super::{Becomes, Carrier, Projection, SceneMesh, ThicknessFrom, faces, opaque, shells};
-use crate::light::Scattering;
 use crate::mapping::shell::{Shell, Side};
 use crate::mapping::{Material, Quad};
 use crate::model::{Primitive, is_collapsed};
@@ -269,12 +268,6 @@ fn check(v: &Values, key: &Key, cover: &Cover) -> Result<()> {
         return bad(
             "needs attenuation by length, and trace.attenuation is \"per-cell\"",
             format!("set trace.attenuation=path-length with a trace.sigma, {or_face}"),
-        );
-    }
-    if v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple {
-        return bad(
-            "has no multiple scattering, which is defined for flat water alone",
-            format!("set light.scattering=single, {or_face}"),
         );
     }
     if cover.mist > 0.0 {

@@ -161,7 +161,6 @@ fn every_slip_is_told_with_the_way_out() {
     );
     let fur = "Leaf = \"fur\"\n";
     fault(fur, &["trace.attenuation=per-cell"], &["mesh cliff, material fur", "path-length"]);
-    fault(fur, &["light.scattering=multiple", "light.visibility=march"], &["light.scattering=single"]);
     fault(fur, &["materials.fur.mist=0.5"], &["cannot be mist"]);
     fault(fur, &["materials.fur.thickness_from=color"], &["paint the vertices"]);
     let trimesh = "[meshes.b]\nfile = \"trimesh.glb\"\nmaterial = \"water\"\n";
