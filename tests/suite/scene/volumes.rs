@@ -66,7 +66,8 @@ fn names(scene: &Scene) -> Vec<&str> {
 #[test]
 fn a_volume_has_every_key_of_water_with_the_same_texts() {
     let of = |title: &str| GROUPS.iter().find(|group| group.title == title).expect("a group").params;
-    let groups = ["Curves", "Volume", "Fur", "Cloth", "Long hair", "Strands of a file", "Mountain", "Grains"];
+    let groups =
+        ["Curves", "Volume", "Fur", "Cloth", "Long hair", "Strands of a file", "Mountain", "Grains", "Skin"];
     let own: Vec<&Param> = groups.into_iter().flat_map(of).collect();
     let named = of("Volumes");
     assert_eq!(own.len(), named.len());
