@@ -203,7 +203,7 @@ impl Engine {
         if !cut.is_empty() {
             let levels = renderer.levels(scene, volumes.as_ref());
             let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels)
-                .with_shadows_of(mesh, monitor)?;
+                .with_shadows_of(volumes, mesh, monitor)?;
             cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
             // Strips and frames would repeat it.
             if !std::mem::replace(told, true) {

@@ -65,8 +65,10 @@ use crate::picture::camera::DepthRange;
 use crate::picture::{AutoExposure, Camera, Image, check_image};
 use crate::place::paint::coarsened;
 use crate::place::paint::texture::MOST_BYTES;
-use crate::place::{Ground, Mesh, Pool, Rock, ShadeMemo, ShellShadows, Triangles, WaterFaces};
-use crate::trace::{Trace, pyramid_spec};
+use crate::place::{
+    DiffuseKey, DiffuseOfShells, Ground, Mesh, Pool, Rock, ShadeMemo, ShellShadows, Triangles, WaterFaces,
+};
+use crate::trace::{Attenuation, Trace, pyramid_spec};
 use crate::util::cache::Cache;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -546,6 +548,38 @@ impl Scene {
             return Ok(None);
         }
         self.shades.shadows_on_shells(mesh, &self.shells, &lights, monitor)
+    }
+
+    /// Returns the diffuse light in the shells with optics ([`Parts::shell_optics`]), shell by shell. `mesh` is
+    /// the scene's opaque mesh, and `shadows` are those of [`Parts::shadows_on_shells`]. It is kept until
+    /// something else than the camera changes. `None` where no shell has optics.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
+    pub fn diffuse_on_shells(
+        &self,
+        volumes: &[VolumeTexture],
+        mesh: &Mesh,
+        shadows: Option<&Arc<ShellShadows>>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Arc<DiffuseOfShells>>> {
+        let optics = self.shell_optics(volumes);
+        if !self.shells.iter().any(|shell| optics[shell.volume as usize].is_some()) {
+            return Ok(None);
+        }
+        let Attenuation::PathLength { sigma } = self.trace.attenuation else { return Ok(None) };
+        let key = DiffuseKey {
+            shells: self.shells.clone(),
+            volumes: volumes.to_vec(),
+            ramps: self.recipes.iter().map(|recipe| recipe.ramp).collect(),
+            optics,
+            sigma,
+            lights: self.volume_lights(),
+            ambient: self.ambient,
+            shadows: shadows.cloned(),
+            vertices: mesh.vertices.clone(),
+        };
+        self.shades.diffuse_in_shells(key, monitor).map(Some)
     }
 
     /// Builds all opaque geometry as one mesh.

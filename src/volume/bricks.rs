@@ -183,6 +183,25 @@ impl Bricks {
         sums
     }
 
+    /// Sums the ρ codes of each layer of cells by the codes of k_s.
+    pub(super) fn layer_codes_by_k_s(&self) -> Vec<[u64; 256]> {
+        let area = self.grid[0] as usize * self.grid[1] as usize;
+        let sums_of_layer = |layer: usize| {
+            let mut sums = [[0u64; 256]; BRICK as usize];
+            for brick in layer * area..(layer + 1) * area {
+                for (stored, bit) in (self.bases[brick] as usize..).zip(bits(self.masks[brick])) {
+                    let cell = self.cells[stored];
+                    sums[bit as usize >> 4][cell.k_codes().1 as usize] += u64::from(cell.rho_code());
+                }
+            }
+            sums
+        };
+        let sums = (0..self.grid[2] as usize).into_par_iter().flat_map_iter(sums_of_layer);
+        let mut sums: Vec<[u64; 256]> = sums.collect();
+        sums.truncate(self.size[2] as usize);
+        sums
+    }
+
     /// CRC-32 of the bytes of all cells in the order of dense storage.
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         let [nx, ny, nz] = self.size;

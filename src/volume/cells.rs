@@ -118,6 +118,19 @@ impl Cells {
         }
     }
 
+    /// Sums the ρ codes of each layer of `area` cells by the codes of k_s, from z = 0 on.
+    pub fn layer_codes_by_k_s(&self, area: usize) -> Vec<[u64; 256]> {
+        let of_layer = |layer: &[Cell]| {
+            let mut sums = [0u64; 256];
+            layer.iter().for_each(|cell| sums[cell.k_codes().1 as usize] += u64::from(cell.rho_code()));
+            sums
+        };
+        match self {
+            Cells::Dense(cells) => cells.par_chunks(area).map(of_layer).collect(),
+            Cells::Sparse(bricks) => bricks.layer_codes_by_k_s(),
+        }
+    }
+
     /// CRC-32 of the bytes of all cells in their order.
     pub(super) fn checksum(&self) -> crc32fast::Hasher {
         match self {

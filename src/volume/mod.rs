@@ -108,6 +108,12 @@ impl VolumeTexture {
         self.cells.layer_codes(self.size[0] as usize * self.size[1] as usize)
     }
 
+    /// Sums the ρ codes of each layer of cells by the codes of k_s, which may be places on a ramp of colours,
+    /// from z = 0 on.
+    pub fn layer_codes_by_k_s(&self) -> Vec<[u64; 256]> {
+        self.cells.layer_codes_by_k_s(self.size[0] as usize * self.size[1] as usize)
+    }
+
     /// CRC-32 of size, α and cells. Equal volumes have equal checksums, whether built or read.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();

@@ -5,6 +5,7 @@ mod light;
 mod lockstep;
 mod shell;
 mod shell_light;
+mod shell_scatter;
 mod walk;
 
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use crate::light::fibre::Metric;
 use crate::light::haze::EyeHaze;
 use crate::light::ramp::{Ink, Ramp};
 use crate::light::scatter::media::{Media, MultipleMedium, kinds};
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::table::StrandShading;
 use crate::light::visibility::{LightVolumes, Medium};
 use crate::light::{AngleFrame, Light, Visibility};
@@ -24,7 +26,7 @@ use crate::mapping::shell::Inside;
 use crate::mapping::{CellFrame, Quad, QuadMap};
 use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
-use crate::place::{Mesh, ShellShadows};
+use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
@@ -56,6 +58,10 @@ pub struct Integrator<'a> {
     shell_light: Option<Arc<ShellLight>>,
     /// Shadows of opaque matter on shells, if there are any.
     shell_shadows: Option<Arc<ShellShadows>>,
+    /// How light scatters many times in the shells of each volume, if it does.
+    optics: Vec<Option<ShellOptics>>,
+    /// J in each shell, if light scatters many times in any.
+    diffuse: Option<Arc<DiffuseOfShells>>,
     /// Whether V is kept at the vertices of each shell.
     kept_in: Vec<bool>,
     /// Places of the eye inside the shells.
@@ -109,7 +115,8 @@ pub trait Observer {
     /// The ray enters a cell, empty or not. `_rho` is the density after the sheet's erosion or mist, without
     /// α; `_transmittance` is T before the cell.
     fn enter(&mut self, _crossing: &Crossing, _cell: Cell, _rho: f32, _transmittance: f32) {}
-    /// The cell sends `_radiance` of the ambient light to the eye.
+    /// The cell sends `_radiance` of the ambient light to the eye; in shells in which light scatters many
+    /// times, that of all diffuse light.
     fn ambient(&mut self, _radiance: Vec3) {}
     /// The cell sends `_radiance` of the scene's next light to the eye; `_visibility` is V of that light.
     fn light(&mut self, _visibility: f32, _radiance: Vec3) {}
@@ -268,17 +275,24 @@ impl<'a> Integrator<'a> {
         if scene.visibility == Visibility::Cached && !scene.shells.is_empty() {
             integrator.shell_light = Some(cache.shell_light(&integrator));
         }
-        integrator.with_shadows_of(mesh, monitor)
+        integrator.with_shadows_of(volumes, mesh, monitor)
     }
 
     /// Returns the integrator with the shadows that the scene's opaque `mesh` and the skins of shells cast on
-    /// shells. Only [`Integrator::prepared`] has them already.
+    /// shells, and with the diffuse light in shells. Only [`Integrator::prepared`] has them already.
     ///
     /// # Errors
     /// Errors of `monitor`, which may stop the work.
-    pub fn with_shadows_of(self, mesh: &Mesh, monitor: &dyn Monitor) -> Result<Self> {
+    pub fn with_shadows_of(
+        self,
+        volumes: &(impl AsRef<[VolumeTexture]> + ?Sized),
+        mesh: &Mesh,
+        monitor: &dyn Monitor,
+    ) -> Result<Self> {
         let shell_shadows = self.scene.shadows_on_shells(mesh, monitor)?;
-        Ok(Integrator { shell_shadows, ..self })
+        let shadows = shell_shadows.as_ref();
+        let diffuse = self.scene.diffuse_on_shells(volumes.as_ref(), mesh, shadows, monitor)?;
+        Ok(Integrator { shell_shadows, diffuse, ..self })
     }
 
     /// Prepares a scene and its volumes for a few rays. With cached visibility, the values of light volumes
@@ -326,6 +340,8 @@ impl<'a> Integrator<'a> {
             filled: None,
             shell_light: None,
             shell_shadows: None,
+            optics: scene.shell_optics(volumes),
+            diffuse: None,
             kept_in: scene
                 .shells
                 .iter()

@@ -139,7 +139,7 @@ pub fn inspect(
     (trace.filter, trace.lookup) = (Prefilter::None, Lookup::Nearest);
     let mut integrator = Integrator::new(&plain, volumes);
     if faces.iter().any(|face| matches!(scene.face(face.quad), Face::Hull(..))) {
-        let shaded = integrator.with_shadows_of(mesh, &Unwatched);
+        let shaded = integrator.with_shadows_of(volumes, mesh, &Unwatched);
         integrator = shaded.expect("nobody stops the work");
     }
     let result = integrator.pixel(&gbuffer, pixel, CENTRE, &mut recorder);

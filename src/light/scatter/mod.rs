@@ -47,6 +47,7 @@ pub mod doubling;
 mod gain;
 pub mod media;
 pub mod optics;
+pub mod shell;
 pub mod slab;
 
 use glam::{Vec3, Vec4};

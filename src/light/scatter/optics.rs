@@ -13,10 +13,20 @@
 //!
 //! `shaders/light/optics.wgsl` is the twin.
 
+use std::f32::consts::LN_2;
+
 use glam::{Mat3, Vec3};
 
-use super::Similarity;
+use super::{ORDERS, Similarity};
+use crate::util::powers::{exp2, log2};
 use crate::volume::Moments;
+
+/// Extinction of the surface's lobe, relative to the walk's: the first occupied cells have it, however deep
+/// they are.
+pub const SURFACE_EXTINCTION: f32 = 24.0;
+
+/// V below which nothing is known of the depth, 2⁻²⁴.
+pub const LEAST_VISIBLE: f32 = 1.0 / 16_777_216.0;
 
 /// Least share of the directions' squares along z with which slopes are measured, so that walls have some.
 /// Slopes reach 1/√this = 10 in cells.
@@ -50,9 +60,112 @@ impl ShellOptics {
         }
     }
 
-    /// Albedo ω of fibres by colour, over the cell's colour.
-    pub fn whole_albedo(&self) -> Vec3 {
-        self.isotropic * (4.0 / (1.0 - self.g))
+    /// Optics of a cell of this colour, as the engines compute with them.
+    #[inline]
+    pub fn of_cell(&self, color: Vec3) -> CellOptics {
+        let albedo = self.albedo * color;
+        let isotropic = self.isotropic * color;
+        CellOptics {
+            extinction: self.extinction,
+            albedo,
+            reduced: albedo * 0.25,
+            isotropic,
+            whole: isotropic * (4.0 / (1.0 - self.g)),
+        }
+    }
+}
+
+/// Optics of a cell, per colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellOptics {
+    /// a: extinction of the reduced medium.
+    pub extinction: Vec3,
+    /// ω'.
+    pub albedo: Vec3,
+    /// b' = ω'/4.
+    pub reduced: Vec3,
+    /// b.
+    pub isotropic: Vec3,
+    /// Albedo ω of fibres.
+    pub whole: Vec3,
+}
+
+/// Way of a view ray through a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage {
+    /// T at the shell's start, times the share that the cell's level counts by.
+    pub start: f32,
+    /// Optical depth from the shell's start to the cell, bits.
+    pub view: f32,
+    /// Optical depth in the cell, bits.
+    pub cell: f32,
+}
+
+impl Passage {
+    /// w': share of the cell in what the eye sees, in a medium with this extinction.
+    #[inline]
+    pub fn weight(&self, extinction: Vec3) -> Vec3 {
+        let passed = (extinction * -self.view).map(exp2);
+        (passed - (extinction * -(self.view + self.cell)).map(exp2)) * self.start
+    }
+
+    /// Share of the cell in the light that the surface throws back.
+    #[inline]
+    pub fn surface_weight(&self) -> f32 {
+        let passed = exp2(-SURFACE_EXTINCTION * self.view);
+        (passed - exp2(-SURFACE_EXTINCTION * (self.view + self.cell))) * self.start
+    }
+}
+
+/// Light of one light at a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arriving {
+    /// V in the shell.
+    pub through: f32,
+    /// Share that opaque matter lets through.
+    pub open: f32,
+}
+
+impl Arriving {
+    /// V.
+    #[inline]
+    pub fn visible(&self) -> f32 {
+        self.through * self.open
+    }
+
+    /// Optical depth from the cell to the light, bits.
+    #[inline]
+    pub fn depth(&self) -> f32 {
+        -log2(self.through.max(1e-30))
+    }
+
+    /// V' in a medium with this extinction, `depth` bits from the light. Rays to the light go no further
+    /// than 24 bits, so what is behind is dark, however small the extinction is.
+    #[inline]
+    pub fn reduced(&self, extinction: Vec3, depth: f32) -> Vec3 {
+        let open = if self.through > LEAST_VISIBLE { self.open } else { 0.0 };
+        (extinction * -depth).map(exp2) * open
+    }
+}
+
+impl CellOptics {
+    /// Radiance that a cell of fibres sends to the eye for a light of intensity 1, without the single
+    /// scattering w·V·Ψ and the diffuse light w'·ω'·J.
+    ///
+    /// `weight` is w', `once` is w·V, and `peak` the forward peak.
+    #[inline]
+    pub fn more(&self, weight: Vec3, once: f32, peak: &[f32; ORDERS - 1], light: &Arriving) -> Vec3 {
+        let depth = light.depth();
+        let s = self.whole * (depth * LN_2);
+        // Σ h_n s^(n−1)/(n−1)! by Horner's rule.
+        let mut forward = Vec3::splat(peak[4] * 0.2);
+        forward = (forward * s + peak[3]) * 0.25;
+        forward = (forward * s + peak[2]) * (1.0 / 3.0);
+        forward = (forward * s + peak[1]) * 0.5;
+        forward = (forward * s + peak[0]) * s;
+        let sum = weight * (self.reduced * light.reduced(self.extinction, depth))
+            + (self.whole * forward - self.isotropic) * once;
+        sum.max(Vec3::ZERO)
     }
 }
 
@@ -86,6 +199,21 @@ impl Surface {
     #[inline]
     pub fn stretch(&self, mu: f32) -> f32 {
         mu / self.refracted(mu).max(1e-6)
+    }
+
+    /// Share of the radiance inside that leaves towards the eye, and the factor of the way inside. `mu` ≥ 0
+    /// is the eye's cosine with the normal.
+    #[inline]
+    pub fn leaving(&self, mu: f32) -> [f32; 2] {
+        [(1.0 - self.fresnel(mu)) / (self.eta * self.eta), self.stretch(mu)]
+    }
+
+    /// Factor of the radiance of light that scatters once below the surface, and of its way inside. `mu` ≥ 0
+    /// is the light's cosine with the normal.
+    #[inline]
+    pub fn entering(&self, mu: f32) -> [f32; 2] {
+        let stretch = self.stretch(mu);
+        [(1.0 - self.fresnel(mu)) * stretch, stretch]
     }
 
     /// π·f·(m·l): radiance that the surface throws back to the unit vector `e` from a light of intensity 1

@@ -1,5 +1,5 @@
 //! What the shade of meshes needs again when only the sun, the water or a strength has changed, and what the
-//! shadows on shells need again when only the camera or the lights have.
+//! shadows on shells and the diffuse light in them need again when only the camera or the lights have.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -11,7 +11,7 @@ use crate::light::Light;
 use crate::mapping::shell::Shell;
 use crate::place::bvh::Bvh;
 use crate::place::shell_shadows::{ShellShadows, casters};
-use crate::place::{Mesh, Rock, Triangles, Vertex};
+use crate::place::{DiffuseKey, DiffuseOfShells, Mesh, Rock, Triangles, Vertex};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 
@@ -83,6 +83,7 @@ pub struct ShadeMemo(Arc<Memories>);
 struct Memories {
     of_meshes: Mutex<Option<Entry>>,
     on_shells: Mutex<Option<OnShells>>,
+    in_shells: Mutex<Option<(DiffuseKey, Arc<DiffuseOfShells>)>>,
 }
 
 /// A key, and what is kept for it.
@@ -137,6 +138,21 @@ impl ShadeMemo {
             shadows: shadows.clone(),
         });
         Ok(shadows)
+    }
+
+    /// Returns the diffuse light in shells. It is made unless it was asked for with the same key last.
+    ///
+    /// # Errors
+    /// Errors of `monitor`, which may stop the work.
+    pub fn diffuse_in_shells(&self, key: DiffuseKey, monitor: &dyn Monitor) -> Result<Arc<DiffuseOfShells>> {
+        if let Some((known, made)) = &*lock(&self.0.in_shells)
+            && known.is_same(&key)
+        {
+            return Ok(made.clone());
+        }
+        let made = Arc::new(key.solve(monitor)?);
+        *lock(&self.0.in_shells) = Some((key, made.clone()));
+        Ok(made)
     }
 }
 

@@ -5,10 +5,12 @@
 
 use glam::{Mat3, Vec2, Vec3};
 
+use super::shell_scatter::{ScatterCell, color_of, depth_between};
 use super::{FrameVolume, Integrator, Observer, RayResult, SheetOrder};
 use crate::light::AngleFrame;
 use crate::light::fibre::{Metric, Spread, psi_parts};
 use crate::light::ramp::Ink;
+use crate::light::scatter::optics::Passage;
 use crate::light::strand::ROOT_TO_TIP;
 use crate::mapping::shell::{End, HullFace, Segment, Shell, ShellPath};
 use crate::trace::lookup::{CellSample, Level, level_at};
@@ -42,6 +44,7 @@ pub(super) struct ShellStart<'a> {
 }
 
 /// A place in a tetrahedron of a shell.
+#[derive(Clone, Copy)]
 pub(super) struct Place {
     /// Number of the shell.
     pub shell: usize,
@@ -62,7 +65,11 @@ struct ShellRay<'a> {
     origin: Vec3,
     metres: f32,
     d: Vec3,
+    /// T at the start, and here.
+    start: f32,
     transmittance: f32,
+    /// Last occupied cell and its colour, if light scatters many times in the shell.
+    last: Option<(Place, Vec3)>,
     /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
     radiance: [Vec3; 2],
     /// Cells walked by the view ray, and by its light rays.
@@ -70,7 +77,7 @@ struct ShellRay<'a> {
 }
 
 /// Directions of the fibres in a cell, in the frame where angles are measured.
-enum Fibres {
+pub(super) enum Fibres {
     /// One direction, of any length.
     One(Vec3),
     /// Second moments of several.
@@ -120,7 +127,9 @@ impl Integrator<'_> {
             origin,
             metres,
             d,
+            start: order.before,
             transmittance: order.before,
+            last: None,
             radiance: [Vec3::ZERO; 2],
             cells: [0; 2],
         };
@@ -130,7 +139,13 @@ impl Integrator<'_> {
             }
             self.through(&mut ray, &segment.from(t_begin).until(t_end), observer);
         }
-        self.left_shell(order, ray.transmittance, ray.radiance, ray.cells)
+        let beyond = match &ray.last {
+            Some((place, color)) if ray.transmittance < scene.trace.early_end => {
+                self.beyond_end(place, *color, d, [ray.start, ray.transmittance])
+            }
+            _ => Vec3::ZERO,
+        };
+        self.left_shell(shell, order, ray.transmittance, (ray.radiance, beyond), ray.cells)
     }
 
     /// Start of a ray in the direction `d` from a hull's face on, or from the eye inside a box.
@@ -150,17 +165,23 @@ impl Integrator<'_> {
     }
 
     /// Result of a ray behind a shell. `radiance` is what cells of the volume itself, and coarser ones, have
-    /// sent to the eye.
+    /// sent to the eye, and `beyond` comes from behind the ray's end ([`Integrator::beyond_end`]).
     pub(super) fn left_shell(
         &self,
+        shell: &Shell,
         SheetOrder { before, is_last, behind }: SheetOrder,
         transmittance: f32,
-        radiance: [Vec3; 2],
+        (radiance, beyond): ([Vec3; 2], Vec3),
         cells: [u32; 2],
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let radiance = radiance[0] + radiance[1] + self.ambient * (before - transmittance) + passed;
+        // Diffuse light in a medium with optics holds the ambient light.
+        let even = match self.optics_of(shell) {
+            Some(_) => beyond,
+            None => self.ambient * (before - transmittance),
+        };
+        let radiance = radiance[0] + radiance[1] + even + passed;
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
 
@@ -204,6 +225,7 @@ impl Integrator<'_> {
         observer: &mut O,
     ) {
         let scene = self.scene;
+        let optics = self.optics_of(ray.shell);
         let (origin, d_cell) = (origin * level.scale, d_cell * level.scale);
         let length = segment.t[1] - segment.t[0];
         let mut walk = Walk::new(level.size, origin, d_cell, length);
@@ -234,8 +256,6 @@ impl Integrator<'_> {
             let weight = (ray.transmittance - passed) * share;
             let ink = self.ink(ray.shell.volume as usize, sample.k[1]);
             let k = [sample.k[0], ink.map_or(sample.k[1], |ink| ink.k_s)];
-            let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));
-            observer.ambient(self.ambient * weight + more);
             let middle = 0.5 * (crossing.t_enter + crossing.t_exit);
             let along = middle / length;
             let place = Place {
@@ -247,6 +267,27 @@ impl Integrator<'_> {
             };
             let j = self.frame(ray.shell, &place);
             let fibres = self.fibres(level, cell, &sample, &j);
+            if let Some(optics) = optics {
+                let view = depth_between(ray.start, ray.transmittance);
+                let cell = ScatterCell {
+                    place: &place,
+                    d: ray.d,
+                    j: &j,
+                    k,
+                    ink,
+                    fibres: &fibres,
+                    moments: sample.moments.unwrap_or_else(|| level.moments(cell)),
+                    weight,
+                    passage: Passage { start: ray.start * share, view, cell: tau_bits },
+                };
+                let sum = self.scattered(optics, level, &cell, &mut ray.cells[1], observer);
+                ray.radiance[usize::from(!level.is_whole)] += sum;
+                ray.transmittance = passed;
+                ray.last = Some((place, color_of(ink)));
+                continue;
+            }
+            let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));
+            observer.ambient(self.ambient * weight + more);
             let mut sum = more;
             for i in 0..self.lights.len() {
                 let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
@@ -283,7 +324,7 @@ impl Integrator<'_> {
 
     /// Light of light number `i` that a cell at `place` sends against the direction `d`, without the share of
     /// the cell and without V.
-    fn shell_light_of(
+    pub(super) fn shell_light_of(
         &self,
         fibres: &Fibres,
         ([k_d, k_s], ink): ([f32; 2], Option<Ink>),

@@ -12,6 +12,7 @@ use super::shell::Place;
 use super::{Integrator, Lanes};
 use crate::engine::cpu::visibility::ShellInputs;
 use crate::light::Visibility;
+use crate::light::scatter::optics::Arriving;
 use crate::mapping::shell::Shell;
 use crate::trace::lookup::Level;
 use crate::util::powers::exp2;
@@ -57,7 +58,12 @@ impl KeptPlace {
 impl Integrator<'_> {
     /// V of light number `i` at a place in a shell.
     pub(super) fn shell_visibility(&self, level: &Level, place: &Place, i: usize, walked: &mut u32) -> f32 {
-        let through_shell = match self.scene.visibility {
+        self.arriving(level, place, i, walked).visible()
+    }
+
+    /// Light of light number `i` that reaches a place in a shell.
+    pub(super) fn arriving(&self, level: &Level, place: &Place, i: usize, walked: &mut u32) -> Arriving {
+        let through = match self.scene.visibility {
             Visibility::None => 1.0,
             Visibility::Cached if self.kept_in[place.shell] => {
                 self.kept_place(place).mean(|at, next| match &self.shell_light {
@@ -70,7 +76,7 @@ impl Integrator<'_> {
             }
             Visibility::Cached | Visibility::March => self.walked_visibility(level, place, i, walked),
         };
-        through_shell * self.past_opaque_matter(place, i)
+        Arriving { through, open: self.past_opaque_matter(place, i) }
     }
 
     /// Share of light number `i` that opaque matter lets through to a place in a shell.
@@ -81,29 +87,42 @@ impl Integrator<'_> {
         shadows.at(place.shell, i, vertices, place.shares, place.depth)
     }
 
-    /// V of all lights at a place in a shell.
+    /// Light of all lights that reaches a place in a shell.
     #[inline]
-    pub(super) fn shell_visibilities(
+    pub(super) fn all_arriving(
         &self,
         level: &Level,
         place: &Place,
         walked: &mut u32,
-        mut visible: impl FnMut(usize, f32),
+        mut arrives: impl FnMut(usize, Arriving),
     ) {
         match &self.shell_light {
             Some(kept) if self.kept_in[place.shell] => {
                 let at = self.kept_place(place);
                 for (i, values) in kept.0[place.shell].iter().enumerate() {
-                    let through_shell = at.mean(|at, next| [values[at], values[next]]);
-                    visible(i, through_shell * self.past_opaque_matter(place, i));
+                    let through = at.mean(|at, next| [values[at], values[next]]);
+                    arrives(i, Arriving { through, open: self.past_opaque_matter(place, i) });
                 }
             }
-            _ => (0..self.lights.len())
-                .for_each(|i| visible(i, self.shell_visibility(level, place, i, walked))),
+            _ => (0..self.lights.len()).for_each(|i| arrives(i, self.arriving(level, place, i, walked))),
         }
     }
 
-    /// Where V is kept around a place in a shell.
+    /// J at a place in a shell, as far as it is known.
+    #[inline]
+    pub(super) fn diffuse_at(&self, place: &Place) -> Vec3 {
+        let Some(own) = self.diffuse.as_ref().and_then(|of| of[place.shell].as_ref()) else {
+            return Vec3::ZERO;
+        };
+        let KeptPlace { first, shares, share } = self.kept_place(place);
+        let [a, b, c] = first.map(|at| {
+            let [near, far] = [own.values[at], own.values[at + 1]];
+            near + (far - near) * share
+        });
+        (a * shares.x + b * shares.y + c * shares.z).max(Vec3::ZERO)
+    }
+
+    /// Where V and J are kept around a place in a shell.
     #[inline]
     fn kept_place(&self, place: &Place) -> KeptPlace {
         let layers = self.layers(place.shell);
@@ -136,7 +155,7 @@ impl Integrator<'_> {
         self.walked_visibility(&level, &place, i, &mut 0)
     }
 
-    /// Number of layers between which V is interpolated in a shell: two cells each.
+    /// Number of layers between which V and J are interpolated in a shell: two cells each.
     fn layers(&self, shell: usize) -> usize {
         self.volume_of(&self.scene.shells[shell]).size[2].div_ceil(2) as usize
     }

@@ -35,6 +35,8 @@ pub struct ShellHit<'a> {
     transmittance: f32,
     /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
     pub radiance: [Vec3; 2],
+    /// Diffuse light from behind the ray's end.
+    beyond: Vec3,
     /// Cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
 }
@@ -49,13 +51,16 @@ impl<'a> ShellHit<'a> {
             order,
             transmittance: order.before,
             radiance: [Vec3::ZERO; 2],
+            beyond: Vec3::ZERO,
             cells: [0; 2],
         }
     }
 
     /// The result of a ray that has left the shell.
     pub fn result(&self, integrator: &Integrator) -> RayResult {
-        integrator.left_shell(self.order, self.transmittance, self.radiance, self.cells)
+        let shell = &integrator.scene.shells[self.hull.shell];
+        let radiance = (self.radiance, self.beyond);
+        integrator.left_shell(shell, self.order, self.transmittance, radiance, self.cells)
     }
 }
 

@@ -88,7 +88,8 @@ impl Pending {
             self.k_s.0[i] = ink.k_s;
         }
         let visible = &mut self.visible;
-        integrator.shell_visibilities(level, place, &mut hit.cells[1], |light, v| visible[light].0[i] = v);
+        let walked = &mut hit.cells[1];
+        integrator.all_arriving(level, place, walked, |light, own| visible[light].0[i] = own.visible());
         self.count += 1;
     }
 
