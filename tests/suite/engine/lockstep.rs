@@ -323,8 +323,9 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
             lit += u32::from(result.radiance.x > 0.3);
         }
         // Here each ray walks to the lights for what eight lanes have kept at the vertices.
-        let on_demand =
-            Integrator::new(&scene, &volumes).with_shadows_of(&volumes, &mesh, &Unwatched).expect("nobody stops it");
+        let on_demand = Integrator::new(&scene, &volumes)
+            .with_shadows_of(&volumes, &mesh, &Unwatched)
+            .expect("nobody stops it");
         for (pixel, truth) in pixels.iter().zip(&truth).step_by(5) {
             let alone = on_demand.pixel(&targets, *pixel, 0, &mut ());
             assert_eq!(bits(&alone), bits(truth), "{sets:?}, on demand, {pixel:?}: {alone:?} not {truth:?}");
