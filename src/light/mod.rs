@@ -12,6 +12,7 @@ pub mod optical_depth;
 pub mod ramp;
 pub mod scatter;
 mod settings;
+pub mod skin;
 pub mod strand;
 pub mod visibility;
 

@@ -1,4 +1,5 @@
-//! Recipes of matter other than water: fur, cloth, hair, strands of a file, mountain, grains.
+//! Recipes of matter other than water: fur, cloth, hair, strands of a file, mountain, grains,
+//! skin.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,10 +9,12 @@ use glam::Vec3;
 use super::measured::Builder;
 use super::param::key_of_volume;
 use super::{Limits, Recipe, Values, sequence};
+use crate::light::scatter::optics::{ShellOptics, Surface};
+use crate::light::skin::Tissue;
 use crate::model::Strands;
 use crate::util::error::{Error, Result};
 use crate::volume::{
-    ClothSpec, FurSpec, GrainsSpec, HairSpec, Matter, MountainSpec, StorageChoice, StrandsSpec, Up,
+    ClothSpec, FurSpec, GrainsSpec, HairSpec, Matter, MountainSpec, SkinSpec, StorageChoice, StrandsSpec, Up,
     WaterSpec, Weave, WeaveName,
 };
 
@@ -29,6 +32,7 @@ pub(super) fn matter(v: &Values, name: &str, water: &WaterSpec, has_ramp: bool) 
         Builder::Hair => Matter::Hair(hair(v, name, water, k_s)),
         Builder::Mountain => Matter::Mountain(mountain(v, name, water, k_s)),
         Builder::Grains => Matter::Grains(grains(v, name, water, k_s)),
+        Builder::Skin => Matter::Skin(skin(v, name, water)),
     };
     not_sparse(v, name)?;
     Ok(Some(matter))
@@ -269,5 +273,38 @@ fn grains(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> Grains
         alpha: water.alpha,
         k_d: water.k_d,
         k_s,
+    }
+}
+
+fn skin(v: &Values, name: &str, water: &WaterSpec) -> SkinSpec {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let depth = water.size[2] as f32;
+    SkinSpec {
+        size: water.size,
+        plates: v.count(&key_of_volume(name, "skin.plates")),
+        furrow_cells: float("skin.furrow") * depth,
+        epidermis_cells: float("skin.epidermis") * depth,
+        freckles: float("skin.freckles"),
+        flush: float("skin.flush"),
+        seed: water.seed,
+        alpha: water.alpha,
+    }
+}
+
+/// Returns how the skin of the volume `name` scatters light. Colours that the scene does not give become
+/// those of the tissue.
+pub(super) fn skin_light(v: &Values, name: &str, spec: &SkinSpec, colors: &mut Vec<Vec3>) -> ShellOptics {
+    let float = |own: &str| v.float(&key_of_volume(name, own));
+    let tissue =
+        Tissue { melanin: float("skin.melanin"), blood: float("skin.blood"), oxygen: float("skin.oxygen") };
+    if colors.is_empty() {
+        colors.extend(tissue.albedos(spec.epidermis_share()));
+    }
+    ShellOptics {
+        extinction: tissue.extinction(),
+        albedo: Vec3::ONE,
+        isotropic: Vec3::ZERO,
+        g: 0.0,
+        surface: Some(Surface { eta: float("skin.eta"), roughness: float("skin.roughness") }),
     }
 }

@@ -38,6 +38,8 @@ pub(super) enum Builder {
     Mountain,
     /// Loose grains.
     Grains,
+    /// Skin.
+    Skin,
     /// Grids of a simulation.
     Flow,
 }
@@ -45,7 +47,7 @@ pub(super) enum Builder {
 words! {
     Builder {
         Curves => "curves", Fur => "fur", Cloth => "cloth", Hair => "hair", Strands => "strands",
-        Mountain => "mountain", Grains => "grains", Flow => "flow",
+        Mountain => "mountain", Grains => "grains", Skin => "skin", Flow => "flow",
     }
 }
 

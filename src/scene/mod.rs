@@ -487,7 +487,8 @@ impl Scene {
         let is_multiple = self.scattering == Scattering::Multiple && !self.shells.is_empty();
         let of = |(recipe, volume): (&Recipe, &VolumeTexture)| {
             let fibres = || scattering(&self.reflection, self.p, volume, recipe.ramp.even_k_s());
-            is_multiple.then(|| ShellOptics::of_fibres(&fibres().similarity()))
+            let of_fibres = || is_multiple.then(|| ShellOptics::of_fibres(&fibres().similarity()));
+            recipe.skin.or_else(of_fibres)
         };
         self.recipes.iter().zip(volumes).map(of).collect()
     }

@@ -13,6 +13,7 @@ const MESHES: &[(&str, &[u8])] = &[
     ("taki:cloth.glb", include_bytes!("../../assets/meshes/cloth.glb")),
     ("taki:slope.glb", include_bytes!("../../assets/meshes/slope.glb")),
     ("taki:sugar.glb", include_bytes!("../../assets/meshes/sugar.glb")),
+    ("taki:hand.glb", include_bytes!("../../assets/meshes/hand.glb")),
     ("taki:torus.glb", include_bytes!("../../assets/meshes/torus.glb")),
     ("taki:pour.glb", include_bytes!("../../assets/meshes/pour.glb")),
 ];
@@ -69,6 +70,11 @@ const PRESETS: &[Preset] = &[
         include_str!("../../assets/scenes/slope.toml"),
     ),
     ("sugar", "lumps and a heap of sugar: grains", include_str!("../../assets/scenes/sugar.toml")),
+    (
+        "skin",
+        "an open hand before the low sun, red at its edges",
+        include_str!("../../assets/scenes/skin.toml"),
+    ),
     ("pour", "water of a simulation that pours over a ledge", include_str!("../../assets/scenes/pour.toml")),
     (
         "fig5",

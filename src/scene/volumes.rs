@@ -12,6 +12,7 @@ use super::param::{COLORS, PARAMS, WATER, key_of_volume, split_volume_key};
 use super::sequence::Sequence;
 use super::{Limits, Parts, Scene, Values, boxes, build, matter, measured, meshes};
 use crate::light::ramp::Ramp;
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::{ReflectionKind, Scattering};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
@@ -38,6 +39,8 @@ pub struct Recipe {
     pub matter: Option<Matter>,
     /// Colours of the cells.
     pub ramp: Ramp,
+    /// How skin scatters light; `None` for other matter.
+    pub skin: Option<ShellOptics>,
     /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
     pub measured: Option<MeasuredSpec>,
     /// Path of the volume's file, resolved and inside the allowed folders: an `.npz`, the simulation's, or
@@ -62,8 +65,12 @@ impl Recipe {
         if let Some(measured) = &measured {
             water.size = measured.size;
         }
-        let colors = colors(v, name)?;
+        let mut colors = colors(v, name)?;
         let matter = matter::matter(v, name, &water, colors.len() > 1)?;
+        let skin = match &matter {
+            Some(Matter::Skin(spec)) => Some(matter::skin_light(v, name, spec, &mut colors)),
+            _ => None,
+        };
         let strands = matter::strands(v, name, &water, colors.len() > 1, folder, limits);
         let matter = matter.or(strands.map_err(|e| of_volume(name, e))?);
         if let Some(Matter::Strands(strands)) = &matter {
@@ -81,6 +88,7 @@ impl Recipe {
         Ok(Recipe {
             name: name.into(),
             ramp: Ramp::new(&colors, water.k_s),
+            skin,
             water,
             matter,
             measured,
@@ -192,6 +200,11 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if colors.is_empty() {
         return Ok(colors);
     }
+    let builder = key_of_volume(name, "volume.builder");
+    // Its light is not that of fibres.
+    if v.choice(&builder, Builder::from_word) == Builder::Skin {
+        return Ok(colors);
+    }
     let reflection = v.choice("light.reflection", ReflectionKind::from_word);
     if reflection != ReflectionKind::KajiyaKay {
         return of_light("light.reflection", reflection.word(), ReflectionKind::KajiyaKay.word());
@@ -200,7 +213,6 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     if is_multiple && is_on_quads(v, name) {
         return of_light("light.scattering", Scattering::Multiple.word(), Scattering::Single.word());
     }
-    let builder = key_of_volume(name, "volume.builder");
     let is_of_curves = v.choice(&builder, Builder::from_word) == Builder::Curves
         && v.text(&key_of_volume(name, "volume.file")).is_empty();
     if is_of_curves && colors.len() > 1 {
@@ -234,6 +246,30 @@ fn is_on_quads(v: &Values, name: &str) -> bool {
         let is_shell = carrier == Carrier::Shell && of_shells.contains(&material);
         volume_of(v, &material) == name && !is_shell
     })
+}
+
+/// Refuses skin on quads and in boxes, in which its light is not known.
+fn skin_is_on_shells(v: &Values) -> Result<()> {
+    let is_skin = |name: &str| {
+        let builder = v.choice(&key_of_volume(name, "volume.builder"), Builder::from_word);
+        builder == Builder::Skin
+    };
+    let refused = |what: String, fix: &str| {
+        Err(Error::input(format!("{what} shows skin, which only the shells of meshes do"), fix))
+    };
+    for name in names(v).iter().filter(|name| is_skin(name)) {
+        if is_on_quads(v, name) {
+            return refused(
+                format!("a quad or face with the volume {name}"),
+                "set carrier = \"shell\" in its material, and give it to a mesh",
+            );
+        }
+        let own = |other: &String| v.text(&format!("boxes.{other}.volume")) == *name;
+        if let Some(own) = v.names("boxes").into_iter().find(own) {
+            return refused(format!("the box {own}"), "give it another volume");
+        }
+    }
+    Ok(())
 }
 
 /// Returns the name of the volume that a material shows.
@@ -312,6 +348,7 @@ pub(super) fn recipes(v: &Values, folder: Option<&Path>, limits: &Limits) -> Res
             return Err(Error::input(format!("{key} = {volume:?}: the scene has no such volume"), fix));
         }
     }
+    skin_is_on_shells(v)?;
     let shown = shown(v);
     if shown.len() > MAX_VOLUMES {
         return Err(Error::input(

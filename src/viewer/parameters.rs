@@ -37,7 +37,7 @@ const GROUPS: [Group; 11] = [
     group(
         "Volume",
         "The volume texture: cells, density, reflection",
-        &["volume", "fur", "cloth", "tress", "import", "mountain", "grains"],
+        &["volume", "fur", "cloth", "tress", "import", "mountain", "grains", "skin"],
     ),
     group("Volumes", "Other volumes beside the water, each with its curves", &["volumes"]),
     group(

@@ -1,8 +1,9 @@
 //! §2 Recipes of matter other than water and simulations.
 
-use super::mountain::BYTES_PER_COLUMN;
+use super::mountain;
+use super::skin;
 use super::threads::{BYTES_PER_CELL, Thread, Threads};
-use super::{ClothSpec, FurSpec, GrainsSpec, HairSpec, MountainSpec, StrandsSpec, VolumeTexture};
+use super::{ClothSpec, FurSpec, GrainsSpec, HairSpec, MountainSpec, SkinSpec, StrandsSpec, VolumeTexture};
 use crate::model::Strands;
 use crate::util::error::{Error, Result};
 use crate::util::monitor::Monitor;
@@ -22,6 +23,8 @@ pub enum Matter {
     Mountain(MountainSpec),
     /// Loose grains.
     Grains(GrainsSpec),
+    /// Skin.
+    Skin(SkinSpec),
 }
 
 impl Matter {
@@ -30,12 +33,12 @@ impl Matter {
 
     /// Bytes that building takes beside those of the cells.
     pub fn bytes_beside(&self) -> u128 {
-        match self {
-            Matter::Mountain(MountainSpec { size: [nx, ny, _], .. }) => {
-                u128::from(*nx) * u128::from(*ny) * BYTES_PER_COLUMN as u128
-            }
-            _ => 0,
-        }
+        let ([nx, ny, _], per_column) = match self {
+            Matter::Mountain(MountainSpec { size, .. }) => (*size, mountain::BYTES_PER_COLUMN),
+            Matter::Skin(SkinSpec { size, .. }) => (*size, skin::BYTES_PER_COLUMN),
+            _ => return 0,
+        };
+        u128::from(nx) * u128::from(ny) * per_column as u128
     }
 
     /// Builds the volume texture in dense storage.
@@ -48,6 +51,7 @@ impl Matter {
             Matter::Cloth(cloth) => cloth.build(monitor),
             Matter::Mountain(mountain) => mountain.build(monitor),
             Matter::Grains(grains) => grains.build(monitor),
+            Matter::Skin(skin) => skin.build(monitor),
             Matter::Hair(hair) => hair.build(monitor),
             Matter::Strands(strands) => strands.build(monitor),
         }
@@ -64,7 +68,7 @@ impl Matter {
             Matter::Cloth(cloth) => drawn(cloth.threads(), budget, monitor),
             Matter::Hair(hair) => drawn(hair.threads(), budget, monitor),
             Matter::Strands(strands) => drawn(strands.threads(), budget, monitor),
-            Matter::Mountain(_) | Matter::Grains(_) => return Ok(None),
+            Matter::Mountain(_) | Matter::Grains(_) | Matter::Skin(_) => return Ok(None),
         };
         strands.map(Some)
     }

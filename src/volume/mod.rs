@@ -8,6 +8,7 @@ mod bundle;
 mod cell;
 mod cells;
 mod cloth;
+mod field;
 mod file;
 mod flow;
 mod fur;
@@ -20,6 +21,7 @@ mod measured;
 mod mountain;
 mod pyramid;
 mod ripple;
+mod skin;
 mod spec;
 mod spots;
 mod storage;
@@ -48,6 +50,7 @@ pub use pyramid::{
     level_count, level_size, levels_of, stored_levels,
 };
 pub use ripple::Ripple;
+pub use skin::SkinSpec;
 pub use spec::{Structure, WaterSpec};
 pub use storage::{Storage, StorageChoice, check_budget, dense_bytes, sparse_bytes, storage_of};
 pub use strands::StrandsSpec;

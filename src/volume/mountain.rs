@@ -4,7 +4,6 @@
 //! Everything but grass is a height field, so the ρ of a column sums up to its height. Grass are threads.
 //! +y leads down the slope.
 
-mod field;
 mod ground;
 
 use glam::Vec2;

@@ -286,7 +286,7 @@ pub(super) const RULES: &[Rule] = &[
         switch: "volume.builder",
         needs: "curves, fur, hair, mountain or flow",
         works: |v, switch| {
-            let smooth = [Builder::Cloth, Builder::Grains, Builder::Strands];
+            let smooth = [Builder::Cloth, Builder::Grains, Builder::Strands, Builder::Skin];
             !smooth.iter().any(|builder| is(v, switch, builder.word()))
         },
     },
@@ -334,6 +334,30 @@ pub(super) const RULES: &[Rule] = &[
         switch: "volume.builder",
         needs: "grains",
         works: |v, switch| is(v, switch, Builder::Grains.word()),
+    },
+    Rule {
+        keys: &["skin.*"],
+        switch: "volume.builder",
+        needs: "skin",
+        works: |v, switch| is(v, switch, Builder::Skin.word()),
+    },
+    Rule {
+        keys: &["skin.furrow"],
+        switch: "skin.plates",
+        needs: "a number above 0",
+        works: |v, switch| v.int(switch) > 0,
+    },
+    Rule {
+        keys: &["skin.blood", "skin.melanin", "skin.oxygen"],
+        switch: COLORS[0],
+        needs: "no colour, which stands in the place of melanin and blood",
+        works: |v, switch| !v.is_set(switch),
+    },
+    Rule {
+        keys: &["volume.k_d", "volume.k_s"],
+        switch: "volume.builder",
+        needs: "a builder other than skin, whose light has no such coefficients",
+        works: |v, switch| !is(v, switch, Builder::Skin.word()),
     },
     Rule {
         keys: &["cloth.*"],

@@ -24,7 +24,10 @@ pub(super) struct Cover {
     pub mist: f32,
     pub carrier: Carrier,
     pub side: Side,
+    /// Whether the mesh under the shell is drawn as an opaque surface.
     pub skin: bool,
+    /// Whether opaque matter lies behind the inner surface: that mesh, or flesh.
+    pub has_body: bool,
     pub from: ThicknessFrom,
 }
 
@@ -239,19 +242,22 @@ fn cover(v: &Values, name: &str, recipes: &[Recipe]) -> Cover {
     let float = |what: &str| v.float(&key(what));
     let volume = crate::scene::volumes::volume_of(v, name);
     let volume = recipes.iter().position(|recipe| recipe.name == volume);
+    let volume = volume.expect("a volume that a mesh shows has a recipe");
     let side = v.choice(&key("side"), Side::from_word);
+    let skin = side == Side::Outward && v.is_on(&key("skin"));
     Cover {
         name: name.into(),
         material: Material {
             thickness_m: float("thickness"),
             repeat_u: float("repeat_u"),
             repeat_v: float("repeat_v"),
-            volume: volume.expect("a volume that a mesh shows has a recipe") as u32,
+            volume: volume as u32,
         },
         mist: float("mist"),
         carrier: v.choice(&key("carrier"), Carrier::from_word),
         side,
-        skin: side == Side::Outward && v.is_on(&key("skin")),
+        skin,
+        has_body: skin || recipes[volume].skin.is_some(),
         from: v.choice(&key("thickness_from"), ThicknessFrom::from_word),
     }
 }

@@ -74,7 +74,7 @@ fn shell(key: &Key, cover: &Cover) -> Result<Shell> {
     };
     let mut shell = Shell::new(&surface, cover.side).map_err(fault)?;
     shell.volume = cover.material.volume;
-    shell.skin = cover.skin;
+    shell.skin = cover.has_body;
     Ok(shell)
 }
 

@@ -14,6 +14,7 @@ mod meshes;
 mod picture;
 mod place;
 mod sheet;
+mod skin;
 mod splash;
 mod trace;
 mod volume;
@@ -152,6 +153,7 @@ pub const GROUPS: &[Group] = &[
     matter::IMPORT,
     ground::MOUNTAIN,
     ground::GRAINS,
+    skin::SKIN,
     volumes::VOLUMES,
     sheet::SHEETS,
     splash::SPLASHES,

@@ -182,8 +182,9 @@ pub(super) const VOLUME: Group = Group {
                 "Colour of what the cells reflect diffusely, and first of up to four on a ramp. Along it \
                  lie the cells of `volume.builder=fur`, `hair` and `strands` from root to tip, those of \
                  `cloth` from warp to weft, those of `mountain` from rock to grass, those of `grains` by \
-                 chance, and those of `flow` and of a file by their k_s; all cells then have the k_s of \
-                 `volume.k_s`. Highlights keep the colour of the light. Cells are white without it.",
+                 chance, those of `skin` by their tissue, and those of `flow` and of a file by their k_s; \
+                 all cells then have the k_s of `volume.k_s`. Highlights keep the colour of the light. \
+                 Cells are white without it, but those of skin.",
             )
             .when("Set it for fur, cloth or soil; water is white, and takes its colour from light and sky."),
         p(COLORS[1], "", "", Color([1.0, 1.0, 1.0]), Uniform)
@@ -214,11 +215,11 @@ pub(super) const VOLUME: Group = Group {
                 "What the cells are made of: spatial fractal curves as in the paper (`curves`), hairs on a \
                  skin (`fur`), woven yarns (`cloth`), long hair along v (`hair`), the strands of a file in \
                  `volume.source` (`strands`), a near face of rock with grass (`mountain`), loose grains \
-                 (`grains`), or the grids of a simulation in `volume.source` (`flow`).",
+                 (`grains`), skin (`skin`), or the grids of a simulation in `volume.source` (`flow`).",
             )
             .when(
-                "Choose `fur`, `cloth`, `hair` or `mountain` for a shell over a mesh, and `strands`, or \
-                 `flow` for smoke or water that another program computed, in a box.",
+                "Choose `fur`, `cloth`, `hair`, `mountain` or `skin` for a shell over a mesh, and `strands`, \
+                 or `flow` for smoke or water that another program computed, in a box.",
             ),
         p("volume.source", "", "", Text(""), Volume)
             .doc(

@@ -5,6 +5,7 @@ use std::str::from_utf8;
 
 use super::ground::{GRAINS, MOUNTAIN};
 use super::matter::{CLOTH, FUR, HAIR, IMPORT};
+use super::skin::SKIN;
 use super::volume::{CURVES, VOLUME};
 use super::{Group, Param, last_part};
 
@@ -14,16 +15,16 @@ pub const WATER: &str = "water";
 pub(super) const VOLUMES: Group = Group {
     title: "Volumes",
     about: "Volumes of other matter beside `water`, each under a name such as `fur`. A volume has every key \
-         of `curves`, `volume`, `fur`, `cloth`, `tress`, `import`, `mountain` and `grains` in one table; \
-         where a description names one of those keys, it means the key of the same volume. A material says \
-         with `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
+         of `curves`, `volume`, `fur`, `cloth`, `tress`, `import`, `mountain`, `grains` and `skin` in one \
+         table; where a description names one of those keys, it means the key of the same volume. A material \
+         says with `materials.*.volume` which volume it shows. A volume that no surface shows is not built.",
     params: &PARAMS,
 };
 
 /// Prefix of the keys.
 const PREFIX: &[u8] = b"volumes.*.";
 /// Groups whose keys every volume has.
-const GROUPS: [&[Param]; 8] = [
+const GROUPS: [&[Param]; 9] = [
     CURVES.params,
     VOLUME.params,
     FUR.params,
@@ -32,6 +33,7 @@ const GROUPS: [&[Param]; 8] = [
     IMPORT.params,
     MOUNTAIN.params,
     GRAINS.params,
+    SKIN.params,
 ];
 const COUNT: usize = {
     let (mut sum, mut group) = (0, 0);

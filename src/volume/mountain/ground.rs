@@ -5,10 +5,10 @@ use rand::{Rng, RngExt};
 use rayon::prelude::*;
 
 use super::MountainSpec;
-use super::field::{Field, blocks, fractal};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::util::random::{Family, Stream, normal};
+use crate::volume::field::{Field, blocks, fractal};
 
 /// Place of moss on the ramp: the third of four colours.
 pub(super) const MOSS: f32 = 2.0 / 3.0;

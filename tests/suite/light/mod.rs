@@ -6,5 +6,6 @@ pub mod haze;
 pub mod lights;
 pub mod ramp;
 pub mod scatter;
+pub mod skin;
 pub mod strand;
 pub mod visibility;

@@ -9,6 +9,7 @@ mod mesh_faults;
 pub mod meshes;
 pub mod presets;
 mod sequences;
+mod skin;
 pub mod slips;
 pub mod volumes;
 

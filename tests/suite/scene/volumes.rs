@@ -66,7 +66,8 @@ fn names(scene: &Scene) -> Vec<&str> {
 #[test]
 fn a_volume_has_every_key_of_water_with_the_same_texts() {
     let of = |title: &str| GROUPS.iter().find(|group| group.title == title).expect("a group").params;
-    let groups = ["Curves", "Volume", "Fur", "Cloth", "Long hair", "Strands of a file", "Mountain", "Grains"];
+    let groups =
+        ["Curves", "Volume", "Fur", "Cloth", "Long hair", "Strands of a file", "Mountain", "Grains", "Skin"];
     let own: Vec<&Param> = groups.into_iter().flat_map(of).collect();
     let named = of("Volumes");
     assert_eq!(own.len(), named.len());
@@ -113,7 +114,7 @@ fn every_key_of_a_volume_acts_as_that_of_water_does() {
 fn a_scene_of_today_shows_water_alone() {
     // The others have volumes of their own.
     for (name, _) in taki::scene::presets()
-        .filter(|(name, _)| !["torus", "bear", "cloth", "hair", "pour", "slope", "sugar"].contains(name))
+        .filter(|(name, _)| !["torus", "bear", "cloth", "hair", "pour", "slope", "sugar", "skin"].contains(name))
     {
         let scene = Scene::preset(name).unwrap();
         assert_eq!(names(&scene), ["water"], "{name}");

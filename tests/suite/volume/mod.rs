@@ -14,6 +14,7 @@ pub mod measured;
 pub mod measured_strands;
 pub mod mountain;
 pub mod pyramid;
+pub mod skin;
 pub mod structure;
 mod units;
 
