@@ -8,7 +8,7 @@ use super::{ShellShadows, Vertex};
 use crate::light::Light;
 use crate::light::ramp::Ramp;
 use crate::light::scatter::optics::ShellOptics;
-use crate::light::scatter::shell::{Below, Incoming, ShellDiffuse, ShellMatter};
+use crate::light::scatter::shell::{Below, ShellDiffuse, ShellMatter, Surroundings};
 use crate::mapping::shell::Shell;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -82,9 +82,10 @@ impl DiffuseKey {
             .shadows
             .as_ref()
             .map(|shadows| (0..self.lights.len()).map(|light| shadows.of(number, light)).collect());
-        let incoming = Incoming { lights: &self.lights, shares, ambient: self.ambient };
+        let surroundings =
+            Surroundings { lights: &self.lights, shares, ambient: self.ambient, opposite: &[] };
         let layers = volume.size[2].div_ceil(2) as usize;
-        ShellDiffuse::new(shell, layers, &matter, &incoming, monitor).map(Some)
+        ShellDiffuse::new(shell, layers, &matter, &surroundings, monitor).map(Some)
     }
 
     /// Mean colour of the opaque vertices that lie on the inner surface of a shell.

@@ -136,7 +136,7 @@ pub fn crossings(side: usize, x: f64, mu_0: f64, mu: f64) -> f64 {
 }
 
 /// Nodes and weights of Gauss's quadrature over 0..1, by Newton's method on the Legendre polynomial.
-fn gauss(n: usize) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn gauss(n: usize) -> (Vec<f64>, Vec<f64>) {
     let rule = |i: usize| {
         let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
         let mut slope = 1.0;

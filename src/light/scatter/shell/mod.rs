@@ -1,9 +1,16 @@
 //! §5 Diffuse light in shells: mean intensity J of light that scattered at least once, at the vertices of a
 //! shell's mesh and at several depths below each.
+//!
+//! Below every vertex J is first that of an endless layered slab, exact (`column`, `table`); then light
+//! spreads along the shell and through its core by diffusion (`sideways`, `core`).
 
 mod column;
+mod core;
+mod graph;
 mod matter;
 mod pieces;
+mod sideways;
+mod table;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -13,12 +20,12 @@ use crate::light::Light;
 use crate::mapping::shell::Shell;
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
-use column::{Column, Factored};
+pub use core::Opposite;
 pub use matter::layer_colors;
-use pieces::{Piece, pieces};
 
-/// Vertices between two reports of progress.
-const AT_ONCE: usize = 1 << 14;
+/// Most intervals between values of J below a vertex. Where a volume has more layers, values between are
+/// interpolated.
+const MOST_LAYERS: usize = 32;
 
 /// Matter of a shell as its diffuse light meets it: a reduced medium, in which scattering is isotropic.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,8 +54,9 @@ pub enum Below {
     Core,
 }
 
-/// What shines on a shell.
-pub struct Incoming<'a> {
+/// What shines on a shell, and what is opposite its vertices.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings<'a> {
     /// Lights.
     pub lights: &'a [Light],
     /// Share of each light that reaches each vertex past opaque matter, at the outer and at the inner
@@ -56,6 +64,8 @@ pub struct Incoming<'a> {
     pub shares: Option<Vec<&'a [[f32; 2]]>>,
     /// Radiance from everywhere.
     pub ambient: Vec3,
+    /// For a core: the inner surface opposite each vertex. May be empty.
+    pub opposite: &'a [Option<Opposite>],
 }
 
 /// J in one shell, in the unit of lights' intensities (irradiance/π). Light of lights that did not scatter
@@ -66,6 +76,8 @@ pub struct ShellDiffuse {
     pub layers: usize,
     /// J by colour: of vertex v at depth i/layers at v·(layers + 1) + i.
     pub values: Vec<Vec3>,
+    /// Steps of the solver of light along the shell.
+    pub steps: usize,
 }
 
 impl ShellDiffuse {
@@ -77,70 +89,67 @@ impl ShellDiffuse {
         shell: &Shell,
         layers: usize,
         matter: &ShellMatter,
-        incoming: &Incoming,
+        surroundings: &Surroundings,
         monitor: &dyn Monitor,
     ) -> Result<ShellDiffuse> {
-        let pieces = pieces(layers, matter.extinction.len());
-        let normals = normals(shell);
-        let count = shell.vertices();
-        let mut values = vec![Vec3::ZERO; count * (layers + 1)];
-        for (k, part) in values.chunks_mut(AT_ONCE * (layers + 1)).enumerate() {
-            monitor.progress("diffuse light in shells", (k * AT_ONCE) as u64, count as u64)?;
-            part.par_chunks_mut(layers + 1).enumerate().for_each(|(i, own)| {
-                let vertex = k * AT_ONCE + i;
-                let [outer, inner] = [0, 1].map(|end| shell.points[2 * vertex + end]);
-                let column = Column { matter, pieces: &pieces, layers, thickness: outer.distance(inner) };
-                own.iter_mut().for_each(|value| *value = Vec3::ZERO);
-                column.add_ambient(incoming.ambient, own);
-                for (number, light) in incoming.lights.iter().enumerate() {
-                    let (to_light, intensity) = light.at(outer);
-                    let shares = incoming.shares.as_ref().map_or([1.0; 2], |all| all[number][vertex]);
-                    column.add_beam(normals[vertex].dot(to_light), intensity, shares, own);
-                }
-                Factored::new(&column).solve(own);
-            });
+        let own = layers.clamp(1, MOST_LAYERS);
+        let matter = &matter.with_at_most(2 * MOST_LAYERS);
+        let pieces = pieces::pieces(own, matter.extinction.len());
+        let graph = graph::Graph::new(shell);
+        monitor.progress("diffuse light in shells", 0, 1)?;
+        let range = [f32::min, f32::max].map(|f| graph.thickness.iter().copied().reduce(f).unwrap_or(0.0));
+        let table = table::Table::new(matter, &pieces, own, range);
+        let normals = graph::normals(shell);
+        let surface = Surface { eta: matter.eta, roughness: 1.0 };
+        let mut values = vec![Vec3::ZERO; shell.vertices() * (own + 1)];
+        values.par_chunks_mut(own + 1).enumerate().for_each(|(vertex, values)| {
+            let thickness = graph.thickness[vertex];
+            table.add_ambient(thickness, surroundings.ambient, values);
+            for (number, light) in surroundings.lights.iter().enumerate() {
+                let (to_light, intensity) = light.at(shell.points[2 * vertex]);
+                let shares = surroundings.shares.as_ref().map_or([1.0; 2], |all| all[number][vertex]);
+                let mu = normals[vertex].dot(to_light);
+                let enters = if mu > 0.0 { (1.0 - surface.fresnel(mu)) * surface.stretch(mu) } else { 1.0 };
+                table.add_beam(thickness, mu, intensity * enters, shares, values);
+            }
+        });
+        let core = core::Core::new(matter, &graph, surroundings.opposite);
+        let sideways = sideways::Sideways::new(matter, &pieces, own, &graph, core);
+        let steps = sideways.spread(&mut values, monitor)?;
+        if own < layers {
+            values = resampled(&values, own, layers);
         }
-        Ok(ShellDiffuse { layers, values })
+        Ok(ShellDiffuse { layers, values, steps })
     }
 }
 
-/// Outward unit normals at the vertices: along the thickness, or where there is none, those of the outer
-/// surface.
-fn normals(shell: &Shell) -> Vec<Vec3> {
-    let mut sums = vec![Vec3::ZERO; shell.vertices()];
-    for face in shell.hull.iter().filter(|face| !face.is_eye() && face.points.iter().all(|p| p % 2 == 0)) {
-        let [a, b, c] = shell.corners(face);
-        let normal = (b - a).cross(c - a);
-        face.points.iter().for_each(|point| sums[*point as usize / 2] += normal);
-    }
-    let along = |(pair, sum): (&[Vec3; 2], Vec3)| {
-        (pair[0] - pair[1]).try_normalize().unwrap_or_else(|| sum.normalize_or_zero())
+/// Values of columns with `from` intervals at `to` of them.
+fn resampled(values: &[Vec3], from: usize, to: usize) -> Vec<Vec3> {
+    let of_column = |own: &[Vec3]| {
+        let at = |i: usize| {
+            let place = i as f32 * from as f32 / to as f32;
+            let first = (place as usize).min(from - 1);
+            own[first].lerp(own[first + 1], place - first as f32)
+        };
+        (0..=to).map(at).collect::<Vec<_>>()
     };
-    shell.points.as_chunks::<2>().0.iter().zip(sums).map(along).collect()
+    values.par_chunks(from + 1).flat_map_iter(of_column).collect()
 }
 
 /// Moments of Fresnel's reflectance for light that meets a surface from inside: ∫2μR dμ and ∫3μ²R dμ.
 fn fresnel_moments(eta: f32) -> [f32; 2] {
-    if eta <= 1.0 {
-        return [0.0; 2];
-    }
-    const STEPS: usize = 4096;
-    let mut sums = [0.0f64; 2];
-    for i in 0..STEPS {
-        let mu = (i as f64 + 0.5) / STEPS as f64;
-        let reflected = from_inside(eta, mu as f32) as f64;
-        sums[0] += 2.0 * mu * reflected / STEPS as f64;
-        sums[1] += 3.0 * mu * mu * reflected / STEPS as f64;
-    }
+    let sums = column::quadrature(eta).into_iter().fold([0.0; 2], |[one, two], [mu, weight, r]| {
+        [one + 2.0 * mu * weight * r, two + 3.0 * mu * mu * weight * r]
+    });
     sums.map(|sum| sum as f32)
 }
 
 /// Reflectance of the surface for light that meets it from inside with the cosine `mu`.
-fn from_inside(eta: f32, mu: f32) -> f32 {
-    let outside = 1.0 - (1.0 - mu * mu) * eta * eta;
-    if outside <= 0.0 {
-        return 1.0;
-    }
-    // Both ways along a path have the same reflectance.
-    Surface { eta, roughness: 1.0 }.fresnel(outside.sqrt())
+fn from_inside(eta: f64, mu: f64) -> f64 {
+    let outside = (1.0 - (1.0 - mu * mu) * eta * eta).max(0.0).sqrt();
+    let (across, along) = (
+        (eta * mu - outside) / (eta * mu + outside).max(1e-300),
+        (mu - eta * outside) / (mu + eta * outside).max(1e-300),
+    );
+    0.5 * (across * across + along * along)
 }

@@ -91,8 +91,8 @@ impl Exponent {
 /// Second moments of directions; see [`crate::volume::Moments`].
 #[derive(Clone, Copy)]
 pub struct Moments<S: Simd> {
-    diagonal: Lanes3<S>,
-    mixed: Lanes3<S>,
+    pub diagonal: Lanes3<S>,
+    pub mixed: Lanes3<S>,
 }
 
 impl<S: Simd> Moments<S> {

@@ -20,12 +20,15 @@ mod group;
 mod hits;
 mod ink;
 mod light;
+mod optics;
 mod packed;
 mod rows;
 mod scatter;
 mod shell;
 mod shell_fill;
 mod shell_light;
+mod shell_scatter;
+mod shell_way;
 mod strand;
 mod walk;
 

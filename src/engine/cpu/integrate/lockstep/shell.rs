@@ -9,17 +9,20 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 
 use super::cells::{Store, rho_codes, words};
-use super::hits::in_tile;
 use super::shell_light::{LitCell, Pending};
-use super::walk::{LaneUnits, Units, Walk};
+use super::shell_scatter::Scattered;
+use super::shell_way::{Levels, Rays, Way};
+use super::walk::Walk;
 use crate::engine::cpu::integrate::shell::{Hull, Place};
+use crate::engine::cpu::integrate::shell_scatter::depth_between;
 use crate::engine::cpu::integrate::{Integrator, RayResult, SheetOrder};
 use crate::light::AngleFrame;
+use crate::light::scatter::optics::Passage;
 use crate::mapping::shell::{LanePaths, LaneSegments};
+use crate::trace::Lookup;
 use crate::trace::lookup::Level;
-use crate::trace::{Lookup, Prefilter};
-use crate::util::lane_powers::{exp2, log2};
-use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, floor_cell, lanes_of};
+use crate::util::lane_powers::exp2;
+use crate::util::lanes::{Floats, LANES, Mask, Stored, Stored3, lanes_of};
 use crate::volume::Cell;
 
 use glam::Vec3;
@@ -32,11 +35,11 @@ pub struct ShellHit<'a> {
     pub d: Vec3,
     pub order: SheetOrder,
     /// T at the end.
-    transmittance: f32,
+    pub transmittance: f32,
     /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
     pub radiance: [Vec3; 2],
     /// Diffuse light from behind the ray's end.
-    beyond: Vec3,
+    pub beyond: Vec3,
     /// Cells walked by the view ray, and by its light rays.
     pub cells: [u32; 2],
 }
@@ -70,42 +73,6 @@ pub fn covers(integrator: &Integrator) -> bool {
     scene.trace.lookup == Lookup::Nearest && scene.angles == AngleFrame::World
 }
 
-/// Numbers of the lanes' rays.
-#[derive(Default)]
-struct Rays {
-    d: Stored3,
-    /// Origin of the path, and its distance from the eye, metres.
-    origin: Stored3,
-    metres: Stored,
-    /// Distance of the opaque scene from the path's origin, and parameter where the ray begins, metres.
-    t_end: Stored,
-    t_begin: Stored,
-    transmittance: Stored,
-    /// Cells walked.
-    cells: [i32; LANES],
-    /// Number of cells of the volume along x, y and z.
-    n: Stored3,
-    flow_cells: Stored,
-    extinction: Stored,
-    /// Number of the coarsest level.
-    coarsest: Stored,
-    /// Volume of a cell of the tetrahedron, m³.
-    cell: Stored,
-}
-
-/// Parts of the rays in their tetrahedra.
-struct Way<S: Simd> {
-    /// Where they begin, inside the tile, and their directions per metre, in cells.
-    start: Lanes3<S>,
-    direction: Lanes3<S>,
-    /// Metres.
-    length: Floats<S>,
-    /// Share of the coarser of the two levels.
-    share: Floats<S>,
-    /// Number of the finer one.
-    level: [u32; LANES],
-}
-
 /// Eight rays on their way through shells.
 pub struct ShellLanes<'a> {
     /// Numbers of the rays' hits.
@@ -114,6 +81,7 @@ pub struct ShellLanes<'a> {
     segments: LaneSegments,
     rays: Rays,
     pending: [Pending; 2],
+    scattered: Scattered,
 }
 
 /// What the lanes walk through.
@@ -135,6 +103,7 @@ impl<'a> ShellLanes<'a> {
             segments: LaneSegments::default(),
             rays: Rays::default(),
             pending: [pending(), pending()],
+            scattered: Scattered::new(integrator),
         }
     }
 
@@ -160,12 +129,14 @@ impl<'a> ShellLanes<'a> {
                 let hit = &mut hits[self.hits[lane]];
                 hit.transmittance = self.rays.transmittance.0[lane];
                 hit.cells[0] = self.rays.cells[lane] as u32;
+                self.scattered.end(ground.integrator, lane, hit);
             }
             on_way &= goes_on & enters;
         }
         for (kind, pending) in self.pending.iter_mut().enumerate() {
             pending.shade(simd, ground.integrator, kind, hits);
         }
+        self.scattered.shade(simd, ground.integrator, hits);
     }
 
     /// Gives a lane the ray number `next`, or a later one that has a way through its shell. Returns whether
@@ -269,14 +240,14 @@ impl<'a> ShellLanes<'a> {
         loop {
             let goes_on = walk.inside() & walk.t.simd_lt(way.length);
             active &= goes_on & transmittance.simd_ge(trace.early_end) & count.simd_lt(most);
-            let bits = active.to_bitmask() as u8;
-            if bits == 0 {
+            let lanes = active.to_bitmask() as u8;
+            if lanes == 0 {
                 break;
             }
             count += active.select(one, none);
             let index: [i32; LANES] = walk.index().to_array();
             let mut cells = [Cell::default(); LANES];
-            for lane in lanes_of(bits) {
+            for lane in lanes_of(lanes) {
                 cells[lane] = ground.levels[numbers[lane]].2.cell(index[lane]);
             }
             let enter = walk.t;
@@ -287,11 +258,15 @@ impl<'a> ShellLanes<'a> {
                 continue;
             }
             let leave = walk.t.simd_lt(way.length).select(walk.t, way.length);
-            let passed = transmittance * exp2(simd, -(rho * extinction * (leave - enter)));
+            let bits = rho * extinction * (leave - enter);
+            let passed = transmittance * exp2(simd, -bits);
             let found = Found {
                 bits: lit.to_bitmask() as u8,
                 cells: &cells,
                 weight: (transmittance - passed) * weight,
+                share: weight,
+                before: transmittance,
+                bits_in_cell: bits,
                 middle: (enter + leave) * 0.5,
             };
             self.light(simd, ground, &numbers, way, &found, hits);
@@ -337,12 +312,13 @@ impl<'a> ShellLanes<'a> {
         found: &Found<S>,
         hits: &mut [ShellHit<'a>],
     ) {
+        let integrator = ground.integrator;
         let (rays, segments) = (&self.rays, &self.segments);
         let along = found.middle / way.length;
-        let before = f32x8::splat(simd, 1.0) - along;
+        let rest = f32x8::splat(simd, 1.0) - along;
         let [from, to] = [segments.shares[0].load(simd), segments.shares[1].load(simd)];
         let mut shares = Stored3::default();
-        shares.store(from.times(before).plus(to.times(along)));
+        shares.store(from.times(rest).plus(to.times(along)));
         let [from, to] = [segments.at[0].0[2].load(simd), segments.at[1].0[2].load(simd)];
         let mut depth = Stored::default();
         depth.store(from + (to - from) * along);
@@ -351,6 +327,12 @@ impl<'a> ShellLanes<'a> {
         point.store(rays.origin.load(simd).plus(rays.d.load(simd).times(t)));
         let mut weight = Stored::default();
         weight.store(found.weight);
+        let [mut share, mut before, mut bits] = [Stored::default(); 3];
+        if !self.scattered.is_empty() {
+            share.store(found.share);
+            before.store(found.before);
+            bits.store(found.bits_in_cell);
+        }
         for lane in lanes_of(found.bits) {
             let hit = self.hits[lane];
             let level = &ground.levels[numbers[lane]].1;
@@ -363,10 +345,19 @@ impl<'a> ShellLanes<'a> {
             };
             let lit = LitCell { hit, cell: found.cells[lane], weight: weight.0[lane], place };
             let kind = usize::from(!level.is_whole);
+            if !self.scattered.is_empty()
+                && let Some(optics) = integrator.optics_of(&integrator.scene.shells[lit.place.shell])
+            {
+                let start = hits[hit].order.before;
+                let view = depth_between(start, before.0[lane]);
+                let passage = Passage { start: start * share.0[lane], view, cell: bits.0[lane] };
+                self.scattered.push(simd, integrator, level, (&lit, &passage, lane), hits, optics);
+                continue;
+            }
             let pending = &mut self.pending[kind];
-            pending.push(ground.integrator, level, &lit, &mut hits[hit]);
-            if pending.is_full() {
-                pending.shade(simd, ground.integrator, kind, hits);
+            pending.push(integrator, level, &lit, &mut hits[hit]);
+            if pending.cells.is_full() {
+                pending.shade(simd, integrator, kind, hits);
             }
         }
     }
@@ -378,58 +369,12 @@ struct Found<'c, S: Simd> {
     cells: &'c [Cell; LANES],
     /// Share of the cells in what the eye sees.
     weight: Floats<S>,
+    /// Share that the level counts by.
+    share: Floats<S>,
+    /// T in front of the cells.
+    before: Floats<S>,
+    /// Optical depth in the cells, bits.
+    bits_in_cell: Floats<S>,
     /// Parameters in the middle of the cells.
     middle: Floats<S>,
-}
-
-impl Rays {
-    /// Maps the segments to cells.
-    #[inline(always)]
-    fn way<S: Simd>(&self, simd: S, segments: &LaneSegments, integrator: &Integrator) -> Way<S> {
-        let splat = |x: f32| f32x8::splat(simd, x);
-        let n = self.n.load(simd);
-        let [from, to] = [segments.at[0].load(simd).by(n), segments.at[1].load(simd).by(n)];
-        let [t_in, t_out] = [segments.t[0].load(simd), segments.t[1].load(simd)];
-        let length = t_out - t_in;
-        let direction = to.minus(from).over(length);
-        let start = Lanes3 {
-            x: in_tile(simd, from.x, n.x),
-            y: in_tile(simd, from.y - self.flow_cells.load(simd), n.y),
-            z: from.z,
-        };
-        let mut way = Way { start, direction, length, share: splat(0.0), level: [0; LANES] };
-        if integrator.scene.trace.filter != Prefilter::None {
-            let forward = Lanes3::splat(simd, integrator.scene.camera.forward.as_vec3());
-            let cell_area = self.cell.load(simd) * direction.dot(direction).sqrt();
-            let c = self.d.load(simd).dot(forward);
-            let t = self.metres.load(simd) + t_in;
-            let across = splat(integrator.footprint) * (c * c * c) * (t * t) / cell_area;
-            let exact = splat(0.5) * log2(simd, across.max(splat(1e-30)));
-            let exact = exact.max(splat(0.0)).min(self.coarsest.load(simd));
-            let whole = floor_cell(simd, exact);
-            way.share = exact - whole.to_float::<f32x8<S>>();
-            way.level = whole.to_array().map(|level| level as u32);
-        }
-        way
-    }
-}
-
-/// Levels that the lanes walk through.
-struct Levels<S: Simd> {
-    units: LaneUnits<S>,
-    scale: Lanes3<S>,
-}
-
-impl<S: Simd> Levels<S> {
-    #[inline(always)]
-    fn new(simd: S, levels: &[(usize, Level, Store)], numbers: &[usize; LANES]) -> Self {
-        let (_, level, store) = &levels[numbers[0]];
-        if *numbers == [numbers[0]; LANES] {
-            let units = LaneUnits::splat(simd, &store.units);
-            return Levels { units, scale: Lanes3::splat(simd, level.scale) };
-        }
-        let units: [Units; LANES] = numbers.map(|number| levels[number].2.units);
-        let scale = Stored3::from_fn(|lane| levels[numbers[lane]].1.scale);
-        Levels { units: LaneUnits::new(simd, &units), scale: scale.load(simd) }
-    }
 }

@@ -29,7 +29,8 @@ pub struct LitCell {
 }
 
 /// Up to eight lit cells, one a lane: all of the volume itself, or all of coarser levels.
-pub struct Pending {
+#[derive(Default)]
+pub struct LitCells {
     count: usize,
     /// Number of each ray's hit.
     hits: [usize; LANES],
@@ -39,28 +40,31 @@ pub struct Pending {
     point: Stored3,
     /// Columns of J = world_from_cell.
     frame: [Stored3; 3],
-    /// V of each light.
-    visible: Vec<Stored>,
     /// Colours, and k_s in 255ths, where any volume has colours.
     color: Stored3,
     k_s: Stored,
 }
 
-impl Pending {
-    /// No cells, under a number of lights.
-    pub fn new(lights: usize) -> Self {
-        Pending {
-            count: 0,
-            hits: [0; LANES],
-            cells: [Cell::default(); LANES],
-            weight: Stored::default(),
-            d: Stored3::default(),
-            point: Stored3::default(),
-            frame: [Stored3::default(); 3],
-            visible: vec![Stored::default(); lights],
-            color: Stored3::default(),
-            k_s: Stored::default(),
-        }
+/// Lit cells in registers.
+pub struct Lit<S: Simd> {
+    /// k_d and k_s, in 255ths.
+    k: [Floats<S>; 2],
+    /// Second words of the cells.
+    pub second: Words<S>,
+    pub ink: Option<Ink<S>>,
+    /// Directions to the eye.
+    pub e: Lanes3<S>,
+    /// Columns of J = world_from_cell.
+    pub frame: [Lanes3<S>; 3],
+    pub point: Lanes3<S>,
+    pub weight: Floats<S>,
+}
+
+impl LitCells {
+    /// Number of the next cell.
+    #[inline]
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Whether the cells must be shaded before another one is added.
@@ -69,34 +73,30 @@ impl Pending {
         self.count == LANES
     }
 
-    /// Adds a cell of a ray.
+    /// Adds a cell of a ray in the direction `d`. Returns its colour, if any volume has colours.
     #[inline]
-    pub fn push(&mut self, integrator: &Integrator, level: &Level, lit: &LitCell, hit: &mut ShellHit) {
+    pub fn push(&mut self, integrator: &Integrator, lit: &LitCell, d: Vec3) -> Option<Vec3> {
         let (i, place) = (self.count, &lit.place);
         self.hits[i] = lit.hit;
         self.cells[i] = lit.cell;
         self.weight.0[i] = lit.weight;
-        self.d.set(i, hit.d);
+        self.d.set(i, d);
         self.point.set(i, place.point);
         let frame = integrator.frame(&integrator.scene.shells[place.shell], place);
         self.frame[0].set(i, frame.x_axis);
         self.frame[1].set(i, frame.y_axis);
         self.frame[2].set(i, frame.z_axis);
-        let volume = integrator.scene.shells[place.shell].volume as usize;
-        if let Some(ink) = integrator.ink(volume, lit.cell.k_codes().1 as f32) {
-            self.color.set(i, ink.color);
-            self.k_s.0[i] = ink.k_s;
-        }
-        let visible = &mut self.visible;
-        let walked = &mut hit.cells[1];
-        integrator.all_arriving(level, place, walked, |light, own| visible[light].0[i] = own.visible());
         self.count += 1;
+        let volume = integrator.scene.shells[place.shell].volume as usize;
+        let ink = integrator.ink(volume, lit.cell.k_codes().1 as f32)?;
+        self.color.set(i, ink.color);
+        self.k_s.0[i] = ink.k_s;
+        Some(ink.color)
     }
 
-    /// Adds the light of the cells to that of their rays, as cells of the kind 0 (the volume itself) or 1
-    /// (coarser levels), and forgets them.
+    /// Loads the cells.
     #[inline(always)]
-    pub fn shade<S: Simd>(&mut self, simd: S, integrator: &Integrator, kind: usize, hits: &mut [ShellHit]) {
+    pub fn load<S: Simd>(&self, simd: S, integrator: &Integrator) -> Lit<S> {
         let [first, second] = words(simd, &self.cells);
         let mut k = k_codes(first);
         let ink =
@@ -105,40 +105,97 @@ impl Pending {
             k[1] = ink.k_s;
         }
         let d = self.d.load(simd);
-        let e = Lanes3 { x: -d.x, y: -d.y, z: -d.z };
-        let frame = [self.frame[0].load(simd), self.frame[1].load(simd), self.frame[2].load(simd)];
-        let fibres = Fibres::new(simd, kind, second, &frame, e);
-        let exponent = Exponent::new(integrator.scene.p);
-        let (point, weight) = (self.point.load(simd), self.weight.load(simd));
-        let zero = f32x8::splat(simd, 0.0);
-        let mut sum = Lanes3 { x: zero, y: zero, z: zero };
-        if let Some(ink) = &ink {
-            sum = Lanes3::splat(simd, integrator.scene.ambient).by(ink.tint(simd, weight));
+        Lit {
+            k,
+            second,
+            ink,
+            e: Lanes3 { x: -d.x, y: -d.y, z: -d.z },
+            frame: [self.frame[0].load(simd), self.frame[1].load(simd), self.frame[2].load(simd)],
+            point: self.point.load(simd),
+            weight: self.weight.load(simd),
         }
-        for (light, visible) in integrator.lights.iter().zip(&self.visible) {
-            let (l, intensity) = light_at(simd, light, point);
-            let l_dot_e = l.dot(e);
-            let lit = match &integrator.strand {
-                Some(shading) => {
-                    let cosines = fibres.cosines(shading, (l, e), &frame);
-                    intensity.by(strand::psi(simd, shading, k, cosines, l_dot_e))
-                }
-                None => {
-                    let parts = fibres.psi_parts(simd, k, &exponent, l, e);
-                    match &ink {
-                        Some(ink) => intensity.by(ink.lit(parts).times(f32x8::splat(simd, 1.0 / 255.0))),
-                        None => intensity.times((parts[0] + parts[1]) * (1.0 / 255.0)),
-                    }
-                }
-            };
-            sum = sum.plus(lit.times(weight * visible.load(simd)));
-        }
+    }
+
+    /// Adds the light of the cells to that of their rays, as cells of the kind 0 (the volume itself) or 1
+    /// (coarser levels), and forgets them.
+    #[inline(always)]
+    pub fn add<S: Simd>(&mut self, sum: Lanes3<S>, kind: usize, hits: &mut [ShellHit]) {
         let mut stored = Stored3::default();
         stored.store(sum);
         for i in 0..self.count {
             hits[self.hits[i]].radiance[kind] += stored.get(i);
         }
         self.count = 0;
+    }
+}
+
+impl<S: Simd> Lit<S> {
+    /// Light that scatters once in the cells, for a light of `intensity` in the direction `l`, without the
+    /// share of the cells and without V.
+    #[inline(always)]
+    pub fn once(
+        &self,
+        simd: S,
+        integrator: &Integrator,
+        (fibres, exponent): (&Fibres<S>, &Exponent),
+        (l, intensity): (Lanes3<S>, Lanes3<S>),
+    ) -> Lanes3<S> {
+        let l_dot_e = l.dot(self.e);
+        match &integrator.strand {
+            Some(shading) => {
+                let cosines = fibres.cosines(shading, (l, self.e), &self.frame);
+                intensity.by(strand::psi(simd, shading, self.k, cosines, l_dot_e))
+            }
+            None => {
+                let parts = fibres.psi_parts(simd, self.k, exponent, l, self.e);
+                match &self.ink {
+                    Some(ink) => intensity.by(ink.lit(parts).times(f32x8::splat(simd, 1.0 / 255.0))),
+                    None => intensity.times((parts[0] + parts[1]) * (1.0 / 255.0)),
+                }
+            }
+        }
+    }
+}
+
+/// Lit cells whose matter scatters light once.
+pub struct Pending {
+    pub cells: LitCells,
+    /// V of each light.
+    visible: Vec<Stored>,
+}
+
+impl Pending {
+    /// No cells, under a number of lights.
+    pub fn new(lights: usize) -> Self {
+        Pending { cells: LitCells::default(), visible: vec![Stored::default(); lights] }
+    }
+
+    /// Adds a cell of a ray.
+    #[inline]
+    pub fn push(&mut self, integrator: &Integrator, level: &Level, lit: &LitCell, hit: &mut ShellHit) {
+        let (i, visible) = (self.cells.count(), &mut self.visible);
+        self.cells.push(integrator, lit, hit.d);
+        let walked = &mut hit.cells[1];
+        integrator.all_arriving(level, &lit.place, walked, |light, own| visible[light].0[i] = own.visible());
+    }
+
+    /// Adds the light of the cells to that of their rays, as [`LitCells::add`].
+    #[inline(always)]
+    pub fn shade<S: Simd>(&mut self, simd: S, integrator: &Integrator, kind: usize, hits: &mut [ShellHit]) {
+        let lit = self.cells.load(simd, integrator);
+        let fibres = Fibres::new(simd, kind, &lit);
+        let exponent = Exponent::new(integrator.scene.p);
+        let zero = f32x8::splat(simd, 0.0);
+        let mut sum = Lanes3 { x: zero, y: zero, z: zero };
+        if let Some(ink) = &lit.ink {
+            sum = Lanes3::splat(simd, integrator.scene.ambient).by(ink.tint(simd, lit.weight));
+        }
+        for (light, visible) in integrator.lights.iter().zip(&self.visible) {
+            let arrives = light_at(simd, light, lit.point);
+            let once = lit.once(simd, integrator, (&fibres, &exponent), arrives);
+            sum = sum.plus(once.times(lit.weight * visible.load(simd)));
+        }
+        self.cells.add(sum, kind, hits);
     }
 }
 
@@ -154,7 +211,7 @@ fn way_of<S: Simd>([x, y, z]: &[Lanes3<S>; 3]) -> Lanes3<S> {
 }
 
 /// Directions of the fibres in eight cells, in the world.
-enum Fibres<S: Simd> {
+pub enum Fibres<S: Simd> {
     /// One in each cell, of any length.
     One { t: Lanes3<S>, inverse_q: Floats<S> },
     /// Many in each cell.
@@ -162,16 +219,18 @@ enum Fibres<S: Simd> {
 }
 
 impl<S: Simd> Fibres<S> {
+    /// Those of cells of the kind 0 (the volume itself) or 1 (coarser levels).
     #[inline(always)]
-    fn new(simd: S, kind: usize, second: Words<S>, frame: &[Lanes3<S>; 3], e: Lanes3<S>) -> Self {
+    pub fn new(simd: S, kind: usize, lit: &Lit<S>) -> Self {
+        let Lit { second, e, frame, .. } = lit;
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         if kind == 0 {
-            let v = v_codes(second);
+            let v = v_codes(*second);
             let t = frame[0].times(v.x).plus(frame[1].times(v.y)).plus(frame[2].times(v.z));
             return Fibres::One { t, inverse_q: one / t.dot(t).max(f32x8::splat(simd, 1e-30)) };
         }
-        let moments = Moments::unpacked(simd, second).mapped(frame);
-        Fibres::Many(Spread::new(simd, &Metric([one, zero, one, one]), moments, e))
+        let moments = Moments::unpacked(simd, *second).mapped(frame);
+        Fibres::Many(Spread::new(simd, &Metric([one, zero, one, one]), moments, *e))
     }
 
     /// Diffuse and specular part of the reflection Ψ of Kajiya and Kay's model, times 255.
