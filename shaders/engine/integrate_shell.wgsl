@@ -2,8 +2,10 @@
 // the bindings. Twins: src/engine/cpu/integrate/shell.rs and shell_light.rs, which hold the reasoning.
 
 #import engine::integrate
+#import engine::shell_scatter
 #import layout
 #import light::fibre
+#import light::optics
 #import light::ramp
 #import light::shell_depth
 #import light::strand
@@ -35,6 +37,11 @@ struct ShellRay {
     light_cells: u32,
     // Whether the device ended a walk early.
     cut: bool,
+    // T at the shell's start. Radiance of the last cell where light scatters many times, and extinction
+    // there.
+    start: f32,
+    beyond: vec3<f32>,
+    beyond_extinction: vec3<f32>,
 }
 
 // An occupied cell of a shell.
@@ -83,6 +90,7 @@ fn trace_shell(
     var ray: ShellRay;
     ray.d = d;
     ray.transmittance = before.w;
+    ray.start = before.w;
     var done = path.left == 0u;
     while !done {
         var segment = path_next(&path);
@@ -104,7 +112,13 @@ fn trace_shell(
     let end = ray.transmittance;
     let ends = is_last | (end < frame.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    return vec4<f32>(before.rgb + ray.light + ambient_of(false) * (before.w - end) + passed, end);
+    var even = ambient_of(false) * (before.w - end);
+    if SHELL_SCATTER {
+        if own.optics.extinction.x > 0.0 {
+            even = beyond_end(ray);
+        }
+    }
+    return vec4<f32>(before.rgb + ray.light + even + passed, end);
 }
 
 // Walks through a tetrahedron. Twin: Integrator::through.
@@ -202,7 +216,8 @@ fn walk_tetrahedron(
                     sample.moments = moments_of(texel.y, level);
                 }
             }
-            let passed = (*ray).transmittance * exp2(-(sample.rho * own.extinction * (leave - enter)));
+            let bits = sample.rho * own.extinction * (leave - enter);
+            let passed = (*ray).transmittance * exp2(-bits);
             let weight = ((*ray).transmittance - passed) * share;
             let middle = 0.5 * (enter + leave);
             let point = begin + (*ray).d * middle;
@@ -210,8 +225,12 @@ fn walk_tetrahedron(
             let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * along;
             let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * along;
             let cell = ShellCell(segment, shares, depth, sample, texel.y, point);
-            if (LIGHTS > 0u) | COLORED {
-                (*ray).light += shell_lit(ray, cell, level, shell, own) * weight;
+            if SHELL_SCATTER {
+                let view = depth_between((*ray).start, (*ray).transmittance);
+                let passage = Passage((*ray).start * share, view, bits);
+                (*ray).light += shell_lit(ray, cell, level, shell, own, weight, passage);
+            } else if (LIGHTS > 0u) | COLORED {
+                (*ray).light += shell_lit(ray, cell, level, shell, own, weight, Passage(0.0, 0.0, 0.0));
             }
             (*ray).transmittance = passed;
         }
@@ -221,13 +240,15 @@ fn walk_tetrahedron(
     (*ray).cut |= !done;
 }
 
-// Light that a cell sends to the eye, relative to its weight, of all lights.
+// Light that a cell of this weight sends to the eye, of all lights.
 fn shell_lit(
     ray: ptr<function, ShellRay>,
     cell: ShellCell,
     level: Level,
     shell: Shell,
     own: VolumeConstants,
+    weight: f32,
+    passage: Passage,
 ) -> vec3<f32> {
     let n = vec3<f32>(own.cells);
     let frame_j = shell_frame(shell, cell.segment.prism, cell.shares, cell.depth);
@@ -267,6 +288,13 @@ fn shell_lit(
         color = ink.rgb;
         sum = frame.ambient * (color - 1.0);
     }
+    var scatter: Scatter;
+    if SHELL_SCATTER {
+        if own.optics.extinction.x > 0.0 {
+            scatter = scatter_new(ray, cell, level, shell, own, j, color, passage);
+            sum = scatter.diffuse;
+        }
+    }
     let count = select(0u, arrayLength(&lights), LIGHTS > 0u);
     var i = 0u;
     for (; i < count; i++) {
@@ -275,39 +303,53 @@ fn shell_lit(
         let l = in_frame(row_x, row_y, row_z, det, arrives.xyz, is_texture);
         let l_dot_e = dot3(l, e);
         var fibre = vec3<f32>(0.0);
-        if STRAND {
-            let root = sqrt(inverse_q);
-            var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
-            if MANY_DIRECTIONS {
-                if TILTED {
-                    var way = ROOT_TO_TIP;
-                    if !is_texture {
-                        way = row_x * way.x + row_y * way.y + row_z * way.z;
-                        way = select(way, -way, det < 0.0);
+        if SHELL_FIBRES {
+            if STRAND {
+                let root = sqrt(inverse_q);
+                var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
+                if MANY_DIRECTIONS {
+                    if TILTED {
+                        var way = ROOT_TO_TIP;
+                        if !is_texture {
+                            way = row_x * way.x + row_y * way.y + row_z * way.z;
+                            way = select(way, -way, det < 0.0);
+                        }
+                        t_dot = select(spread_along(spread, l, way), t_dot, has_one_direction(level));
+                    } else {
+                        t_dot = spread_of_one(spread, l);
                     }
-                    t_dot = select(spread_along(spread, l, way), t_dot, has_one_direction(level));
+                }
+                fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
+            } else {
+                var parts = vec2<f32>(0.0);
+                if MANY_DIRECTIONS {
+                    parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
                 } else {
-                    t_dot = spread_of_one(spread, l);
+                    parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
+                }
+                fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
+                if COLORED {
+                    fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
                 }
             }
-            fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
-        } else {
-            var parts = vec2<f32>(0.0);
-            if MANY_DIRECTIONS {
-                parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
-            } else {
-                parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
-            }
-            fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
-            if COLORED {
-                fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
-            }
         }
-        let visible = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
-        sum += light.intensity * arrives.w * fibre * visible;
+        let arriving = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
+        if SHELL_SCATTER {
+            if scatter.is_on {
+                let lit = scatter_light(scatter, (*ray).d, arrives.xyz, fibre, weight, arriving);
+                sum += light.intensity * arrives.w * lit;
+            } else {
+                sum += light.intensity * arrives.w * fibre * (arriving.x * arriving.y);
+            }
+        } else {
+            sum += light.intensity * arrives.w * fibre * (arriving.x * arriving.y);
+        }
     }
     (*ray).cut |= i < count;
-    return sum;
+    if SHELL_SCATTER {
+        return select(sum * weight, sum, scatter.is_on);
+    }
+    return sum * weight;
 }
 
 // A unit vector in the frame where angles are measured.
@@ -324,7 +366,8 @@ fn in_frame(
     return select(v, select(vec3<f32>(0.0), turned / length, length > 0.0), is_texture);
 }
 
-// V of light number `i`, which lies in the direction `l`. Twin: Integrator::shell_visibility.
+// V of light number `i`, which lies in the direction `l`: in the shell, and past opaque matter. Twin:
+// Integrator::arriving.
 fn shell_visibility(
     ray: ptr<function, ShellRay>,
     cell: ShellCell,
@@ -333,9 +376,10 @@ fn shell_visibility(
     own: VolumeConstants,
     i: u32,
     l: vec3<f32>,
-) -> f32 {
+) -> vec2<f32> {
     let segment = cell.segment;
     var visible = 1.0;
+    var open = 1.0;
     if SHELL_KEPT {
         let shares = cell.shares;
         let z = clamp(cell.depth, 0.0, 1.0) * f32(shell.layers);
@@ -358,9 +402,9 @@ fn shell_visibility(
         }
     }
     if SHELL_SHADOWS {
-        visible *= shell_shadow(shell, i, segment.vertices, cell.shares, cell.depth);
+        open = shell_shadow(shell, i, segment.vertices, cell.shares, cell.depth);
     }
-    return visible;
+    return vec2<f32>(visible, open);
 }
 
 // Share of light number `i` that opaque matter lets through. Twin: ShellShadows::at.
