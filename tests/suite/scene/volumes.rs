@@ -113,9 +113,9 @@ fn every_key_of_a_volume_acts_as_that_of_water_does() {
 #[test]
 fn a_scene_of_today_shows_water_alone() {
     // The others have volumes of their own.
-    for (name, _) in taki::scene::presets()
-        .filter(|(name, _)| !["torus", "bear", "cloth", "hair", "pour", "slope", "sugar", "skin"].contains(name))
-    {
+    for (name, _) in taki::scene::presets().filter(|(name, _)| {
+        !["torus", "bear", "cloth", "hair", "pour", "slope", "sugar", "skin"].contains(name)
+    }) {
         let scene = Scene::preset(name).unwrap();
         assert_eq!(names(&scene), ["water"], "{name}");
         assert!(scene.quads.iter().all(|quad| quad.material.volume == 0));
