@@ -6,6 +6,7 @@ mod flux;
 mod parity;
 mod pictures;
 mod renderer;
+mod shell;
 mod tracer;
 
 use glam::DVec3;
