@@ -31,6 +31,19 @@ view="--size 320x320 --set camera.target=-2.4,0.6,0 --set camera.fov=24"
 picture waterfall curves $view
 picture waterfall grains $view --set volume.builder=grains --set grains.filled=0.077
 
+skin() {
+    name=$1
+    shift
+    picture ../../assets/scenes/skin.toml "$name" --set image.width=320 --set image.height=320 \
+        --set camera.fov=9 --set camera.target=-0.02,0.13,0 --set image.samples=8 "$@"
+}
+skin skin
+skin melanin --set volumes.skin.melanin=0.3
+skin blood --set volumes.skin.blood=0.05
+skin oily --set volumes.skin.roughness=0.12
+skin furrow --set volumes.skin.furrow=0.08
+skin translucent --set trace.sigma=1000
+
 picture swatch.toml plain_weave
 picture swatch.toml twill --set cloth.weave=twill
 picture swatch.toml satin --set cloth.weave=satin
