@@ -4,9 +4,9 @@
 //! epidermis above. A renderer needs three numbers for each, so the spectra are taken at one wavelength in
 //! each of red, green and blue:
 //!
-//! - **Reduced scattering** of skin: 46 cm⁻¹ · (λ / 500 nm)^−1.421 (Jacques, "Optical properties of biological
-//!   tissues: a review", Physics in Medicine and Biology 58, 2013, table 1). The scattering is reduced by
-//!   similarity, so it is isotropic.
+//! - **Reduced scattering** of skin: 46 cm⁻¹ · (λ / 500 nm)^−1.421 (Jacques, "Optical properties of
+//!   biological tissues: a review", Physics in Medicine and Biology 58, 2013, table 1). The scattering is
+//!   reduced by similarity, so it is isotropic.
 //! - **Absorption** without melanin and blood: 0.244 + 85.3 · e^(−(λ − 154 nm) / 66.2 nm) cm⁻¹, and of
 //!   melanosomes: 6.6·10¹¹ · (λ / nm)^−3.33 cm⁻¹ (Jacques, "Skin optics", Oregon Medical Laser Center News,
 //!   January 1998).
