@@ -3,13 +3,14 @@
 
 #import engine::integrate
 #import engine::integrate_shell
+#import engine::shell_visibility
 #import layout
+#import light::fibre
 #import light::optics
 #import light::scatter
 #import mapping::shell
 #import trace::levels
 #import trace::lookup
-#import volume::cells
 
 // Whether light scatters many times in any shell: of fibres, or of skin, which has a surface.
 override SHELL_SCATTER: bool = false;
