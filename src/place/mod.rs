@@ -5,6 +5,7 @@ mod mesh;
 pub mod paint;
 mod pool;
 mod rock;
+mod shell_core;
 mod shell_diffuse;
 mod shell_shadows;
 mod show;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{ShellShadows, Vertex};
+use super::{ShellShadows, Vertex, shell_core};
 use crate::light::Light;
 use crate::light::ramp::Ramp;
 use crate::light::scatter::optics::ShellOptics;
@@ -82,8 +82,9 @@ impl DiffuseKey {
             .shadows
             .as_ref()
             .map(|shadows| (0..self.lights.len()).map(|light| shadows.of(number, light)).collect());
+        let opposite = if below == Below::Core { shell_core::opposite(shell) } else { Vec::new() };
         let surroundings =
-            Surroundings { lights: &self.lights, shares, ambient: self.ambient, opposite: &[] };
+            Surroundings { lights: &self.lights, shares, ambient: self.ambient, opposite: &opposite };
         let layers = volume.size[2].div_ceil(2) as usize;
         ShellDiffuse::new(shell, layers, &matter, &surroundings, monitor).map(Some)
     }

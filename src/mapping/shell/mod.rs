@@ -251,6 +251,22 @@ impl Shell {
         [Vec3::min, Vec3::max].map(|f| self.points.iter().copied().reduce(f).unwrap_or_default())
     }
 
+    /// Outward unit normals at the vertices: along the thickness, or where there is none, those of the outer
+    /// surface.
+    pub fn normals(&self) -> Vec<Vec3> {
+        let mut sums = vec![Vec3::ZERO; self.vertices()];
+        let is_outer = |face: &&HullFace| !face.is_eye() && face.points.iter().all(|point| point % 2 == 0);
+        for face in self.hull.iter().filter(is_outer) {
+            let [a, b, c] = self.corners(face);
+            let normal = (b - a).cross(c - a);
+            face.points.iter().for_each(|point| sums[*point as usize / 2] += normal);
+        }
+        let along = |([outer, inner], sum): (&[Vec3; 2], Vec3)| {
+            (*outer - *inner).try_normalize().unwrap_or_else(|| sum.normalize_or_zero())
+        };
+        self.points.as_chunks::<2>().0.iter().zip(sums).map(along).collect()
+    }
+
     /// Mean distance of the two surfaces at the vertices, metres.
     pub fn mean_thickness(&self) -> f64 {
         let pairs = self.points.as_chunks::<2>().0;

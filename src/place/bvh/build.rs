@@ -82,7 +82,7 @@ impl Bvh {
         }
         let face = |item: &Item| {
             let Caster { corners: [a, b, c], kinds } = triangles[item.number as usize];
-            Face { corner: a, edges: [b - a, c - a], kinds }
+            Face { corner: a, edges: [b - a, c - a], number: item.number, kinds }
         };
         bvh.faces = items.iter().map(face).collect();
         bvh

@@ -26,7 +26,20 @@ struct Face {
     corner: Vec3,
     /// Edges from `corner` to the second and to the third corner.
     edges: [Vec3; 2],
+    /// Number among the triangles that the tree was built of.
+    number: u32,
     kinds: u8,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Number of the triangle.
+    pub triangle: usize,
+    /// Distance along the ray, metres.
+    pub t: f32,
+    /// Shares of the triangle's corners, which add up to 1.
+    pub shares: Vec3,
 }
 
 /// Levels of the tree at most; the builder splits evenly from [`build::MAX_UNEVEN`] on.
@@ -67,6 +80,39 @@ impl Bvh {
 
     /// [`Bvh::is_hit`], nearer than `end` metres.
     pub fn is_hit_before(&self, from: Vec3, direction: Vec3, end: f32, kinds: u8) -> bool {
+        self.walk(from, direction, end, |face, end| {
+            face.kinds & kinds != 0 && face.is_hit(from, direction, *end)
+        })
+    }
+
+    /// The nearest triangle whose back a ray from `from` along the unit vector `direction` meets. Corners are
+    /// counter-clockwise as seen from the front.
+    pub fn first_way_out(&self, from: Vec3, direction: Vec3) -> Option<Hit> {
+        let mut nearest = None;
+        self.walk(from, direction, f32::INFINITY, |face, end| {
+            let [b, c] = face.edges;
+            if b.cross(c).dot(direction) > 0.0
+                && let Some([u, v, t]) = face.hit(from, direction, *end)
+            {
+                *end = t;
+                nearest =
+                    Some(Hit { triangle: face.number as usize, t, shares: Vec3::new(1.0 - u - v, u, v) });
+            }
+            false
+        });
+        nearest
+    }
+
+    /// Calls `is_enough` for triangles near a ray until it is true, and returns whether it was. Those farther
+    /// than `end` metres are left out; `is_enough` may lower that.
+    #[inline]
+    fn walk(
+        &self,
+        from: Vec3,
+        direction: Vec3,
+        mut end: f32,
+        mut is_enough: impl FnMut(&Face, &mut f32) -> bool,
+    ) -> bool {
         // A component of 0 would make 0·∞ in a box whose face holds the origin.
         let inverse =
             direction.to_array().map(|d| 1.0 / if d.abs() < 1e-20 { 1e-20f32.copysign(d) } else { d });
@@ -95,7 +141,7 @@ impl Bvh {
                     continue;
                 }
                 let own = &self.faces[first as usize..(first + count) as usize];
-                if own.iter().any(|face| face.kinds & kinds != 0 && face.is_hit(from, direction, end)) {
+                if own.iter().any(|face| is_enough(face, &mut end)) {
                     return true;
                 }
             }
@@ -151,9 +197,16 @@ impl Bvh {
 }
 
 impl Face {
-    /// Whether a ray meets the triangle before `end` (Möller and Trumbore 1997).
+    /// Whether a ray meets the triangle before `end`.
     #[inline]
     fn is_hit(&self, from: Vec3, direction: Vec3, end: f32) -> bool {
+        self.hit(from, direction, end).is_some()
+    }
+
+    /// Shares of the second and the third corner where a ray meets the triangle before `end`, and the
+    /// distance (Möller and Trumbore 1997).
+    #[inline]
+    fn hit(&self, from: Vec3, direction: Vec3, end: f32) -> Option<[f32; 3]> {
         let [b, c] = self.edges;
         let p = direction.cross(c);
         let inverse = 1.0 / b.dot(p);
@@ -163,6 +216,6 @@ impl Face {
         let v = direction.dot(q) * inverse;
         let t = c.dot(q) * inverse;
         // Comparisons with NaN, of a triangle seen from its edge, are false.
-        u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < end
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < end).then_some([u, v, t])
     }
 }

@@ -7,6 +7,7 @@ mod optics;
 mod parity;
 mod pictures;
 mod renderer;
+mod shell;
 mod tracer;
 
 use glam::DVec3;

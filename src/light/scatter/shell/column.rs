@@ -35,8 +35,9 @@ const LEAST: f64 = 1e-6;
 const CORE: f64 = 6.0;
 
 /// Weights with which J is fitted by straight lines between the values, besides the share of light that
-/// leaves from there. They keep values where nobody sees them close to J.
-const BY_DEPTH: f64 = 0.02;
+/// leaves from there: per optical depth and per share of the thickness. They keep values from which no light
+/// leaves close to J. With a tenth of them, values swing where the layers are deep.
+const BY_DEPTH: f64 = 0.1;
 const BY_LENGTH: f64 = 1e-4;
 
 /// One colour of a column.
@@ -258,19 +259,20 @@ impl Column {
         rows
     }
 
-    /// Values between which straight lines fit the sublayers' means best. Sublayers count as light leaves
-    /// from them, so the flux out of the shell is right although J is bent between two values.
+    /// Values between which straight lines fit the sublayers' means best. Those at the ends are then moved
+    /// so that the flux out of the shell is right although J is bent between two values.
     fn fitted(&self, means: &[f64]) -> Vec<f64> {
         let e3 = |t: f64| if t > 40.0 { 0.0 } else { exponential_integrals(t)[2] };
         let own = self.ends[self.own];
         let (mut diagonal, mut beside) = (vec![0.0; self.layers + 1], vec![0.0; self.layers]);
         let mut values = vec![0.0; self.layers + 1];
+        // The value above each sublayer, the share of the one below, and what leaves through both surfaces.
+        let mut places = Vec::with_capacity(means.len());
         for (i, (part, mean)) in self.parts.iter().zip(means).enumerate() {
-            let leaves_above = e3(self.ends[i]) - e3(self.ends[i + 1]);
-            let leaves_below =
-                if self.is_open { e3(own - self.ends[i + 1]) - e3(own - self.ends[i]) } else { 0.0 };
-            let leaves = part.albedo * (leaves_above + leaves_below);
-            let weight = leaves + BY_DEPTH * part.depth / own + BY_LENGTH * part.length;
+            let [a, b] = [self.ends[i], self.ends[i + 1]];
+            let below = if self.is_open { e3(own - b) - e3(own - a) } else { 0.0 };
+            let leaves = [e3(a) - e3(b), below].map(|share| part.albedo * share);
+            let weight = leaves[0] + leaves[1] + BY_DEPTH * part.depth + BY_LENGTH * part.length;
             let at = part.middle * self.layers as f64;
             let first = (at as usize).min(self.layers - 1);
             let share = at - first as f64;
@@ -279,6 +281,7 @@ impl Column {
             beside[first] += weight * share * (1.0 - share);
             values[first] += weight * (1.0 - share) * mean;
             values[first + 1] += weight * share * mean;
+            places.push((first, share, leaves));
         }
         for i in 1..values.len() {
             let factor = beside[i - 1] / diagonal[i - 1];
@@ -288,6 +291,24 @@ impl Column {
         for i in (0..values.len()).rev() {
             let below = if i + 1 < values.len() { beside[i] * values[i + 1] } else { 0.0 };
             values[i] = (values[i] - below) / diagonal[i];
+        }
+        for (end, own) in [0, self.layers].into_iter().enumerate() {
+            let (mut missing, mut seen) = (0.0, 0.0);
+            for ((first, share, leaves), mean) in places.iter().zip(means) {
+                let line = values[*first] * (1.0 - share) + values[first + 1] * share;
+                missing += leaves[end] * (mean - line);
+                seen += leaves[end]
+                    * if own == *first {
+                        1.0 - share
+                    } else if own == first + 1 {
+                        *share
+                    } else {
+                        0.0
+                    };
+            }
+            if seen > 0.0 {
+                values[own] += missing / seen;
+            }
         }
         values.iter_mut().for_each(|value| *value = value.max(0.0));
         values

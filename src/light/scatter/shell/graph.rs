@@ -1,7 +1,5 @@
 //! Neighbours of a shell's vertices, and how well light passes between them along the surface.
 
-use glam::Vec3;
-
 use crate::mapping::shell::Shell;
 
 /// A way between two columns.
@@ -94,19 +92,4 @@ impl Graph {
         let area: f64 = pairs().map(|(area, _)| f64::from(*area)).sum();
         if area > 0.0 { (sum / area) as f32 } else { 0.0 }
     }
-}
-
-/// Outward unit normals at the vertices: along the thickness, or where there is none, those of the outer
-/// surface.
-pub fn normals(shell: &Shell) -> Vec<Vec3> {
-    let mut sums = vec![Vec3::ZERO; shell.vertices()];
-    for face in shell.hull.iter().filter(|face| !face.is_eye() && face.points.iter().all(|p| p % 2 == 0)) {
-        let [a, b, c] = shell.corners(face);
-        let normal = (b - a).cross(c - a);
-        face.points.iter().for_each(|point| sums[*point as usize / 2] += normal);
-    }
-    let along = |(pair, sum): (&[Vec3; 2], Vec3)| {
-        (pair[0] - pair[1]).try_normalize().unwrap_or_else(|| sum.normalize_or_zero())
-    };
-    shell.points.as_chunks::<2>().0.iter().zip(sums).map(along).collect()
 }

@@ -99,21 +99,35 @@ impl ShellDiffuse {
         monitor.progress("diffuse light in shells", 0, 1)?;
         let range = [f32::min, f32::max].map(|f| graph.thickness.iter().copied().reduce(f).unwrap_or(0.0));
         let table = table::Table::new(matter, &pieces, own, range);
-        let normals = graph::normals(shell);
+        let normals = shell.normals();
         let surface = Surface { eta: matter.eta, roughness: 1.0 };
+        // Cosine with the normal, intensity behind the surface, and shares of a light at a vertex.
+        let arrives = |vertex: usize, number: usize, light: &Light| {
+            let (to_light, intensity) = light.at(shell.points[2 * vertex]);
+            let shares = surroundings.shares.as_ref().map_or([1.0; 2], |all| all[number][vertex]);
+            let mu = normals[vertex].dot(to_light);
+            let enters = if mu > 0.0 { (1.0 - surface.fresnel(mu)) * surface.stretch(mu) } else { 1.0 };
+            (mu, intensity * enters, shares)
+        };
         let mut values = vec![Vec3::ZERO; shell.vertices() * (own + 1)];
         values.par_chunks_mut(own + 1).enumerate().for_each(|(vertex, values)| {
             let thickness = graph.thickness[vertex];
             table.add_ambient(thickness, surroundings.ambient, values);
             for (number, light) in surroundings.lights.iter().enumerate() {
-                let (to_light, intensity) = light.at(shell.points[2 * vertex]);
-                let shares = surroundings.shares.as_ref().map_or([1.0; 2], |all| all[number][vertex]);
-                let mu = normals[vertex].dot(to_light);
-                let enters = if mu > 0.0 { (1.0 - surface.fresnel(mu)) * surface.stretch(mu) } else { 1.0 };
-                table.add_beam(thickness, mu, intensity * enters, shares, values);
+                let (mu, intensity, shares) = arrives(vertex, number, light);
+                table.add_beam(thickness, mu, intensity, shares, values);
             }
         });
-        let core = core::Core::new(matter, &graph, surroundings.opposite);
+        let mut core = core::Core::new(matter, &graph, surroundings.opposite);
+        let thin = surroundings.opposite.iter().enumerate();
+        for (vertex, opposite) in thin.filter_map(|(vertex, opposite)| Some((vertex, opposite.as_ref()?))) {
+            for (number, light) in surroundings.lights.iter().enumerate() {
+                let (mu, intensity, [_, share]) = arrives(vertex, number, light);
+                if mu > 0.0 {
+                    core.add_beam(&graph, (vertex, opposite), surface.refracted(mu), intensity * share);
+                }
+            }
+        }
         let sideways = sideways::Sideways::new(matter, &pieces, own, &graph, core);
         let steps = sideways.spread(&mut values, monitor)?;
         if own < layers {

@@ -188,9 +188,9 @@ impl<'a> Sideways<'a> {
             for (i, rest) in own.iter_mut().enumerate() {
                 *rest = -self.passed_sideways(known, vertex, i);
             }
-            // The column's core has no end.
+            // The columns' core has no end.
             if let (Some(kept), Some(rest)) = (self.core.kept.get(vertex), own.last_mut()) {
-                *rest += *kept * known[vertex * self.count + self.count - 1];
+                *rest += *kept * known[vertex * self.count + self.count - 1] + self.core.sources[vertex];
             }
         });
         // ‖J‖² in the norm of the matrix.

@@ -35,7 +35,7 @@ fn moments(g: f64) -> [f64; MOMENTS] {
 }
 
 /// Shares of a beam's light that a slab sends back and through, the latter with the beam, by doubling.
-fn exact(x: f64, omega: f64, g: f64, mu_0: f64) -> [f64; 2] {
+pub fn exact(x: f64, omega: f64, g: f64, mu_0: f64) -> [f64; 2] {
     exact_for(x, omega, g, mu_0, &eyes())
 }
 

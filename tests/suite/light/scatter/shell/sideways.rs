@@ -1,0 +1,152 @@
+//! Light along shells and through their cores.
+
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// J of scattered light in a slab of depth `x` whose half below x < 0 is lit from straight above, by random
+/// walks: in bins of width `step` along x around 0, and `layers` layers.
+fn walked(x: f64, omega: f64, layers: usize, step: f64, bins: usize, paths: u32) -> Vec<Vec<f64>> {
+    use rayon::prelude::*;
+    let width = bins as f64 * step;
+    let parts: Vec<Vec<f64>> = (0..64u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut rng = Pcg64Mcg::seed_from_u64(seed);
+            let mut sums = vec![0.0; 2 * bins * layers];
+            for _ in 0..paths / 64 {
+                let (mut at, mut depth) = (-width * 1.5 * rng.random::<f64>(), 0.0);
+                let (mut mu, mut along, mut weight, mut order) = (1.0, 0.0, 1.0, 0);
+                loop {
+                    let flight = -(1.0 - rng.random::<f64>()).ln();
+                    depth += flight * mu;
+                    at += flight * along;
+                    if !(0.0..x).contains(&depth) {
+                        break;
+                    }
+                    let bin = (at / step + bins as f64).floor();
+                    if order > 0 && (0.0..2.0 * bins as f64).contains(&bin) {
+                        let layer = (depth / x * layers as f64) as usize;
+                        sums[bin as usize * layers + layer.min(layers - 1)] += weight;
+                    }
+                    order += 1;
+                    weight *= omega;
+                    if weight < 0.05 {
+                        break;
+                    }
+                    mu = 1.0 - 2.0 * rng.random::<f64>();
+                    let turn = std::f64::consts::TAU * rng.random::<f64>();
+                    along = (1.0f64 - mu * mu).max(0.0).sqrt() * turn.cos();
+                }
+            }
+            sums
+        })
+        .collect();
+    // A path is the light on 1.5·width/paths of the surface, with an irradiance of π.
+    let of = (1.5 * width / f64::from(paths / 64 * 64)) * PI / (4.0 * PI * step * x / layers as f64);
+    let sum = |i: usize| parts.iter().map(|part| part[i]).sum::<f64>() * of;
+    (0..2 * bins).map(|bin| (0..layers).map(|layer| sum(bin * layers + layer)).collect()).collect()
+}
+
+#[test]
+fn light_spreads_below_a_shadows_edge_as_random_walks_do() {
+    for (x, omega, layers) in [(1.0, 0.95, 4), (4.0, 0.99, 4), (4.0, 0.8, 4), (16.0, 0.99, 16)] {
+        let bins = 32;
+        let step = 0.25f64.max(x / 16.0);
+        let truth = walked(x, omega, layers, step, bins, 1_000_000);
+        let n = 2 * bins as u32;
+        let shell = flat([n, 2], step as f32, |_| x as f32);
+        let shares: Vec<[f32; 2]> = (0..3 * (n + 1))
+            .map(|v| match (v % (n + 1)).cmp(&(bins as u32)) {
+                std::cmp::Ordering::Less => [1.0; 2],
+                std::cmp::Ordering::Equal => [0.5; 2],
+                std::cmp::Ordering::Greater => [0.0; 2],
+            })
+            .collect();
+        let light = [light(1.0)];
+        let lit = Surroundings { lights: &light, shares: Some(vec![&shares]), ..Default::default() };
+        let solved = solve(&shell, layers, &even(2 * layers, omega as f32, Below::Open), &lit);
+        // Means over the depth, in which the walks' noise is small.
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let got = |bin: usize| {
+            let [a, b] = [0, 1].map(|k| column(&solved, n as usize + 1 + bin + k));
+            let of = |l: usize| (a[l] + a[l + 1] + b[l] + b[l + 1]) / 4.0;
+            mean(&(0..layers).map(of).collect::<Vec<_>>())
+        };
+        let lit = mean(&truth[8]);
+        let mut worst = 0.0f64;
+        for (bin, truth) in truth.iter().enumerate().take(2 * bins - 8).skip(8) {
+            let error = (got(bin) - mean(truth)) / lit;
+            worst = worst.max(error.abs());
+        }
+        // Light falls by e over the length that the walks have.
+        let fall = |of: &dyn Fn(usize) -> f64| (of(bins + 4) / of(bins + 16)).ln();
+        let [got, want] = [fall(&got), fall(&|bin| mean(&truth[bin]))];
+        println!("x {x} ω {omega}: {} steps, worst {worst:.4}, fall {got:.3} want {want:.3}", solved.steps);
+    }
+}
+
+#[test]
+fn a_thin_core_is_part_of_a_slab() {
+    // Two flat shells, one above and one below a core: a box without sides.
+    for (deep, d, omega) in [(2.0, 1.0, 0.95), (2.0, 4.0, 0.95), (1.0, 3.0, 0.99), (4.0, 2.0, 0.9)] {
+        let x = 2.0 * deep + d;
+        let light_above = [light(1.0)];
+        let lit = Surroundings { lights: &light_above, ..Default::default() };
+        let layers = 8;
+        let truth = in_slab(x, omega, 32, Below::Open, &lit);
+        let n = 3u32;
+        let count = (n * n) as usize;
+        let mut mesh = SurfaceMesh::default();
+        for side in 0..2 {
+            for v in 0..count {
+                let z = if side == 0 { 0.0 } else { -x as f32 };
+                mesh.positions.push(Vec3::new((v % 3) as f32, (v / 3) as f32, z));
+                mesh.uv.push(Vec2::new((v % 3) as f32, (v / 3) as f32));
+                mesh.thickness.push(deep as f32);
+            }
+            for y in 0..2u32 {
+                for x in 0..2u32 {
+                    let at = |dx: u32, dy: u32| side * count as u32 + (y + dy) * n + x + dx;
+                    let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+                    let two = if side == 0 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+                    mesh.triangles.extend(two);
+                }
+            }
+        }
+        let shell = Shell::new(&mesh, Side::Inward).expect("two flat shells");
+        let opposite: Vec<Option<Opposite>> = (0..2 * count)
+            .map(|v| {
+                let other = ((v + count) % (2 * count)) as u32;
+                Some(Opposite { vertices: [other; 3], shares: Vec3::X, distance: d as f32 })
+            })
+            .collect();
+        let lit = Surroundings { opposite: &opposite, ..lit };
+        let solved = solve(&shell, layers, &even(2 * layers, omega as f32, Below::Core), &lit);
+        let [near, far] = [4, count + 4].map(|v| column(&solved, v));
+        println!("deep {deep} d {d} ω {omega}: {} steps", solved.steps);
+        for i in 0..=4 {
+            let tau = deep * i as f64 / 4.0;
+            let [got, other] = [between(&near, i as f64 / 4.0), between(&far, i as f64 / 4.0)];
+            let [want, want_other] = [between(&truth, tau / x), between(&truth, 1.0 - tau / x)];
+            println!("  τ {tau}: {got:.4} want {want:.4}; far {other:.4} want {want_other:.4}");
+        }
+    }
+}
+
+#[test]
+fn times() {
+    let n = 140;
+    let shell = flat([n, n], 0.01, |v| 0.02 + 0.01 * ((v % 17) as f32 / 17.0));
+    let matter = ShellMatter {
+        extinction: (0..16).map(|k| Vec3::splat(20.0 * k as f32)).collect(),
+        albedo: vec![Vec3::new(0.9, 0.8, 0.7); 16],
+        eta: 1.0,
+        below: Below::Opaque { albedo: Vec3::splat(0.3) },
+    };
+    let light = [light(0.7), light(0.2)];
+    let lit = Surroundings { lights: &light, ambient: Vec3::splat(0.1), ..Default::default() };
+    let start = std::time::Instant::now();
+    let solved = solve(&shell, 8, &matter, &lit);
+    println!("{} vertices: {} steps, {:?}", shell.vertices(), solved.steps, start.elapsed());
+}
