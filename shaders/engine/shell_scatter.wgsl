@@ -26,7 +26,7 @@ struct Scatter {
     eta: f32,
     // w', times what passes the surface.
     weight: vec3<f32>,
-    // Diffuse light that the cell sends to the eye.
+    // Diffuse light that the cell sends to the eye, and even light that its surface throws back.
     diffuse: vec3<f32>,
     // Outward normal of the shell, and share and normal of the cell in the surface.
     n: vec3<f32>,
@@ -98,6 +98,12 @@ fn scatter_new(
         * shell_diffuse(shell, layers, cell.segment.vertices, cell.shares, cell.depth);
     out.weight = passage_weight(passage, extinction) * leaving.x;
     out.diffuse = out.weight * albedo_j;
+    if SHELL_SURFACE {
+        if out.eta > 0.0 {
+            let thrown_back = (1.0 - leaving.x * (out.eta * out.eta)) * out.on_surface;
+            out.diffuse += frame.ambient * thrown_back;
+        }
+    }
     (*ray).beyond = albedo_j * leaving.x;
     (*ray).beyond_extinction = extinction;
     return out;

@@ -114,7 +114,9 @@ impl Integrator<'_> {
         let on_surface = cell.passage.surface_weight();
         let normal = CellNormal::new(&cell.moments, cell.j);
         let alpha2 = surface.roughness * surface.roughness + normal.variance;
-        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.place));
+        // Even light that the surface does not let in comes back from it.
+        let thrown_back = (1.0 - leaves * (surface.eta * surface.eta)) * on_surface;
+        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.place)) + self.scene.ambient * thrown_back;
         observer.ambient(sum);
         for i in 0..self.lights.len() {
             let light = self.arriving(level, cell.place, i, walked);

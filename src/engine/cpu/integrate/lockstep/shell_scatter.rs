@@ -239,7 +239,10 @@ impl PendingScatter {
         let moments = if kind == 0 { Moments::of(second) } else { Moments::unpacked(simd, second) };
         let normal = CellNormal::new(simd, &moments, &frame);
         let alpha2 = surface.roughness * surface.roughness + normal.variance;
-        let mut sum = reduced.by(own.albedo.by(self.diffuse.load(simd)));
+        let thrown_back = (f32x8::splat(simd, 1.0) - leaves * (surface.eta * surface.eta)) * on_surface;
+        let ambient = Lanes3::splat(simd, integrator.scene.ambient);
+        let diffuse = reduced.by(own.albedo.by(self.diffuse.load(simd)));
+        let mut sum = diffuse.plus(ambient.times(thrown_back));
         let zero = f32x8::splat(simd, 0.0);
         for (i, light) in integrator.lights.iter().enumerate() {
             let arriving = self.arriving(simd, i);
