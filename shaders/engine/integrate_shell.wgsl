@@ -50,6 +50,8 @@ struct ShellCell {
     direction: u32,
     // Position in the world.
     point: vec3<f32>,
+    // Shares and depth of the place that stands for the cell's diffuse light.
+    deep: vec4<f32>,
 }
 
 // Traces a shell from the face number `face` of its hull, as `trace` does a sheet.
@@ -214,12 +216,24 @@ fn walk_tetrahedron(
             let bits = sample.rho * own.extinction * (leave - enter);
             let passed = (*ray).transmittance * exp2(-bits);
             let weight = ((*ray).transmittance - passed) * share;
-            let middle = 0.5 * (enter + leave);
+            var middle = 0.5 * (enter + leave);
+            var deep = vec4<f32>(0.0);
+            if SHELL_SCATTER {
+                if own.optics.extinction.x > 0.0 {
+                    let within = enter + (leave - enter) * cell_within(bits);
+                    middle = within.x;
+                    let share_out = within.y / length;
+                    deep = vec4<f32>(
+                        segment.shares_in + (segment.shares_out - segment.shares_in) * share_out,
+                        segment.at_in.z + (segment.at_out.z - segment.at_in.z) * share_out,
+                    );
+                }
+            }
             let point = begin + (*ray).d * middle;
             let along = middle / length;
             let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * along;
             let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * along;
-            let cell = ShellCell(segment, shares, depth, sample, texel.y, point);
+            let cell = ShellCell(segment, shares, depth, sample, texel.y, point, deep);
             if SHELL_SCATTER {
                 let view = depth_between((*ray).start, (*ray).transmittance);
                 let passage = Passage((*ray).start * share, view, bits);

@@ -95,7 +95,7 @@ fn scatter_new(
     let layers = u32(own.cells.z + 1) / 2u;
     let extinction = out.own.extinction * leaving.y;
     let albedo_j = out.own.albedo
-        * shell_diffuse(shell, layers, cell.segment.vertices, cell.shares, cell.depth);
+        * shell_diffuse(shell, layers, cell.segment.vertices, cell.deep.xyz, cell.deep.w);
     out.weight = passage_weight(passage, extinction) * leaving.x;
     out.diffuse = out.weight * albedo_j;
     if SHELL_SURFACE {
