@@ -3,13 +3,14 @@
 
 #import engine::integrate
 #import engine::integrate_shell
+#import engine::shell_visibility
 #import layout
+#import light::fibre
 #import light::optics
 #import light::scatter
 #import mapping::shell
 #import trace::levels
 #import trace::lookup
-#import volume::cells
 
 // Whether light scatters many times in any shell: of fibres, or of skin, which has a surface.
 override SHELL_SCATTER: bool = false;
@@ -94,7 +95,7 @@ fn scatter_new(
     let layers = u32(own.cells.z + 1) / 2u;
     let extinction = out.own.extinction * leaving.y;
     let albedo_j = out.own.albedo
-        * shell_diffuse(shell, layers, cell.segment.vertices, cell.shares, cell.depth);
+        * shell_diffuse(shell, layers, cell.segment.vertices, cell.deep.xyz, cell.deep.w);
     out.weight = passage_weight(passage, extinction) * leaving.x;
     out.diffuse = out.weight * albedo_j;
     if SHELL_SURFACE {

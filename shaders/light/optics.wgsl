@@ -64,6 +64,14 @@ fn passage_surface_weight(passage: Passage) -> f32 {
     return (passed - exp2(-SURFACE_EXTINCTION * (passage.view + passage.cell))) * passage.start;
 }
 
+// Positions that stand for a cell of so many bits: of light from a light, and of diffuse light.
+fn cell_within(bits: f32) -> vec2<f32> {
+    let tau = bits * LN_2;
+    let passed = exp2(-bits);
+    let thick = vec2<f32>((1.0 - log2(1.0 + passed)) / bits, 1.0 / tau - passed / (1.0 - passed));
+    return select(thick, 0.5 - tau * vec2<f32>(1.0 / 8.0, 1.0 / 12.0), bits < 0.1);
+}
+
 // Optical depth from a cell to a light, where V in the shell is `through`.
 fn arriving_depth(through: f32) -> f32 {
     return -log2(max(through, 1e-30));

@@ -18,6 +18,7 @@ pub const FILES: &[(&str, &str)] = files! {
     "engine/bare" "engine/gbuffer" "engine/gloss" "engine/integrate" "engine/integrate_light"
     "engine/integrate_shell" "engine/opaque" "engine/paint" "engine/pool" "engine/sheets_many"
     "engine/sheets_one" "engine/shell_scatter"
+    "engine/shell_visibility"
     "picture/resolve"
 };
 
