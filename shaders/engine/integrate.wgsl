@@ -34,6 +34,8 @@ override CORNERED: bool = false;
 override MARCHED: bool = false;
 // The strand model of flowing water and hair replaces fibres.
 override STRAND: bool = false;
+// Whether other volumes beside them reflect as Kajiya and Kay's fibres do.
+override FIBRES_TOO: bool = false;
 // The strands are hairs, whose colour the ambient light takes.
 override HAIR: bool = false;
 // Light is scattered more than once.
@@ -109,15 +111,21 @@ struct VolumeConstants {
     ramp: Ramp,
     optics: Optics,
     levels: u32,
+    // Whether its cells reflect as strands do.
+    strands: u32,
     pad_a: u32,
     pad_b: u32,
-    pad_c: u32,
 }
 
-// Ambient light that cells, of mist or not, send on.
-fn ambient_of(is_of_mist: bool) -> vec3<f32> {
+// Whether the cells of a volume reflect as strands do, in a scene where any do.
+fn is_strand(own: VolumeConstants) -> bool {
+    return !FIBRES_TOO || own.strands != 0u;
+}
+
+// Ambient light that cells send on: all of it, as mist and fibres do, or the hair's share.
+fn ambient_of(is_all: bool) -> vec3<f32> {
     if HAIR {
-        return select(reflection.ambient, frame.ambient, is_of_mist);
+        return select(reflection.ambient, frame.ambient, is_all);
     }
     return frame.ambient;
 }
@@ -251,6 +259,8 @@ struct View {
     d_cell: vec3<f32>,
     // Constants of the strand model and of multiple scattering, if the scene uses them.
     strand: Strand,
+    // Whether the cells reflect as strands do, where any do.
+    is_strand: bool,
     similarity: Similarity,
     // Colours of the cells.
     ramp: Ramp,
@@ -304,6 +314,7 @@ fn trace(
     }
     if IN_COLOUR {
         view.strand = reflection.strand;
+        view.is_strand = is_strand(own);
         view.similarity = scatter_similarity(own.similarity, quad.mist);
     }
     if COLORED {
@@ -372,7 +383,7 @@ fn trace(
     // The weights of the ambient light add up: Σ_k T_k (1 − e^(−τ_k)) = T_before − T_end.
     let ends = is_last | (end < view.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    var color = ambient_of(quad.mist > 0.0) * (before.w - end) + passed;
+    var color = ambient_of((quad.mist > 0.0) | !is_strand(own)) * (before.w - end) + passed;
     if COLORED {
         color += frame.ambient * tint;
     }

@@ -202,7 +202,7 @@ fn lit_in_colour(seen: CellShading, light: RayLight, view: View, ray: ptr<functi
                 t_dot = spread_of_one(seen.spread, light.l_v);
             }
         }
-        if !is_mist(view) {
+        if !is_mist(view) & view.is_strand {
             let k_d = seen.k_d;
             let k_s = seen.k_s;
             lit = weight

@@ -109,7 +109,7 @@ fn trace_shell(
     let end = ray.transmittance;
     let ends = is_last | (end < frame.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    var even = ambient_of(false) * (before.w - end);
+    var even = ambient_of(!is_strand(own)) * (before.w - end);
     if SHELL_SCATTER {
         if own.optics.extinction.x > 0.0 {
             even = beyond_end(ray);
@@ -328,17 +328,21 @@ fn shell_lit(
                         t_dot = spread_of_one(spread, l);
                     }
                 }
-                fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
-            } else {
-                var parts = vec2<f32>(0.0);
-                if MANY_DIRECTIONS {
-                    parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
-                } else {
-                    parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
-                }
-                fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
-                if COLORED {
-                    fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
+                let table = reflection.strand;
+                fibre = strand_psi(strand_table, linear, table, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
+            }
+            if !STRAND | FIBRES_TOO {
+                if !STRAND || !is_strand(own) {
+                    var parts = vec2<f32>(0.0);
+                    if MANY_DIRECTIONS {
+                        parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
+                    } else {
+                        parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
+                    }
+                    fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
+                    if COLORED {
+                        fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
+                    }
                 }
             }
         }

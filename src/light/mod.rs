@@ -17,4 +17,4 @@ pub mod strand;
 pub mod visibility;
 
 pub use lights::{Background, Cone, Light, LightKind};
-pub use settings::{AngleFrame, Reflection, ReflectionKind, Scattering, Visibility};
+pub use settings::{AngleFrame, Reflection, ReflectionKind, Scattering, Visibility, VolumeReflection};

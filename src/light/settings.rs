@@ -54,6 +54,17 @@ pub enum ReflectionKind {
 
 words! { ReflectionKind { KajiyaKay => "kajiya-kay", Strand => "strand", Hair => "hair" } }
 
+/// Reflection model of the cells of one volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeReflection {
+    /// That of the scene.
+    Scene,
+    /// [`Reflection::KajiyaKay`], whatever the scene has.
+    KajiyaKay,
+}
+
+words! { VolumeReflection { Scene => "scene", KajiyaKay => "kajiya-kay" } }
+
 impl Reflection {
     /// Returns the model without its parameters.
     pub fn kind(&self) -> ReflectionKind {

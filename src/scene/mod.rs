@@ -58,7 +58,7 @@ use crate::light::haze::Haze;
 use crate::light::scatter::media::{Media, scattering};
 use crate::light::scatter::optics::ShellOptics;
 use crate::light::visibility::{LightVolumes, LitQuads};
-use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility};
+use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibility, VolumeReflection};
 use crate::mapping::Quad;
 use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
@@ -477,7 +477,9 @@ impl Scene {
     /// scattering.
     pub fn media(&self, volumes: &(impl AsRef<[VolumeTexture]> + ?Sized)) -> Option<Media> {
         let volumes = volumes.as_ref();
-        let make = || Media::new(&self.quads, &self.trace.attenuation, &self.reflection, self.p, volumes);
+        let reflections: Vec<&Reflection> =
+            (0..volumes.len()).map(|volume| self.reflection_of(volume)).collect();
+        let make = || Media::new(&self.quads, &self.trace.attenuation, &reflections, self.p, volumes);
         (self.scattering == Scattering::Multiple).then(make)
     }
 
@@ -485,12 +487,31 @@ impl Scene {
     /// light scatters once.
     pub fn shell_optics(&self, volumes: &[VolumeTexture]) -> Vec<Option<ShellOptics>> {
         let is_multiple = self.scattering == Scattering::Multiple && !self.shells.is_empty();
-        let of = |(recipe, volume): (&Recipe, &VolumeTexture)| {
-            let fibres = || scattering(&self.reflection, self.p, volume, recipe.ramp.even_k_s());
+        let of = |(i, (recipe, volume)): (usize, (&Recipe, &VolumeTexture))| {
+            let reflection = self.reflection_of(i);
+            let fibres = || scattering(reflection, self.p, volume, recipe.ramp.even_k_s());
             let of_fibres = || is_multiple.then(|| ShellOptics::of_fibres(&fibres().similarity()));
             recipe.skin.or_else(of_fibres)
         };
-        self.recipes.iter().zip(volumes).map(of).collect()
+        self.recipes.iter().zip(volumes).enumerate().map(of).collect()
+    }
+
+    /// Returns the reflection model of the cells of volume number `volume`.
+    pub fn reflection_of(&self, volume: usize) -> &Reflection {
+        match self.recipes[volume].reflection {
+            VolumeReflection::Scene => &self.reflection,
+            VolumeReflection::KajiyaKay => &Reflection::KajiyaKay,
+        }
+    }
+
+    /// Whether the cells of any volume reflect as strands do.
+    pub fn has_strands(&self) -> bool {
+        (0..self.recipes.len()).any(|volume| self.reflection_of(volume).strands().is_some())
+    }
+
+    /// Whether the cells of all volumes do.
+    pub fn has_strands_alone(&self) -> bool {
+        (0..self.recipes.len()).all(|volume| self.reflection_of(volume).strands().is_some())
     }
 
     /// Whether light scatters many times where shells show the volume of this number.

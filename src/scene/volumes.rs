@@ -13,7 +13,7 @@ use super::sequence::Sequence;
 use super::{Limits, Parts, Scene, Values, boxes, build, matter, measured, meshes};
 use crate::light::ramp::Ramp;
 use crate::light::scatter::optics::ShellOptics;
-use crate::light::{ReflectionKind, Scattering};
+use crate::light::{ReflectionKind, Scattering, VolumeReflection};
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -39,6 +39,8 @@ pub struct Recipe {
     pub matter: Option<Matter>,
     /// Colours of the cells.
     pub ramp: Ramp,
+    /// Reflection model of the cells.
+    pub reflection: VolumeReflection,
     /// How skin scatters light; `None` for other matter.
     pub skin: Option<ShellOptics>,
     /// Recipe of the cells from a simulation's grids, in place of `water`, whose size is theirs too.
@@ -88,6 +90,7 @@ impl Recipe {
         Ok(Recipe {
             name: name.into(),
             ramp: Ramp::new(&colors, water.k_s),
+            reflection: own_reflection(v, name),
             skin,
             water,
             matter,
@@ -181,6 +184,11 @@ impl Recipe {
     }
 }
 
+/// Returns the reflection model of the volume `name`.
+fn own_reflection(v: &Values, name: &str) -> VolumeReflection {
+    v.choice(&key_of_volume(name, "volume.reflection"), VolumeReflection::from_word)
+}
+
 /// Returns the colours of the volume `name` that the scene gives.
 fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     let keys = COLORS.map(|key| key_of_volume(name, key));
@@ -206,7 +214,8 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
         return Ok(colors);
     }
     let reflection = v.choice("light.reflection", ReflectionKind::from_word);
-    if reflection != ReflectionKind::KajiyaKay {
+    let is_of_scene = own_reflection(v, name) == VolumeReflection::Scene;
+    if is_of_scene && reflection != ReflectionKind::KajiyaKay {
         return of_light("light.reflection", reflection.word(), ReflectionKind::KajiyaKay.word());
     }
     let is_multiple = v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple;

@@ -67,9 +67,10 @@ pub struct Integrator<'a> {
     /// Places of the eye inside the shells.
     eyes: Vec<Option<Inside>>,
     medium: Medium,
+    /// Model of the volumes that reflect as strands do. Use [`Integrator::strand_of`].
     strand: Option<StrandShading>,
-    /// Ambient light that cells send on, but those of mist.
-    ambient: Vec3,
+    /// Whether cells of fibres in shells reflect as strands do. Where they differ, there are no lanes.
+    strands_in_shells: bool,
     /// Whether any volume has colours.
     is_colored: bool,
     media: Option<Media>,
@@ -92,6 +93,10 @@ struct FrameVolume {
     flow_cells: f32,
     /// Colours of the cells.
     ramp: Ramp,
+    /// Whether the cells reflect as strands do.
+    has_strands: bool,
+    /// Ambient light that cells send on, but those of mist.
+    ambient: Vec3,
 }
 
 /// The result of one ray.
@@ -327,8 +332,10 @@ impl<'a> Integrator<'a> {
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             flow_cells: flow_cells(flows[i], volume.size[1]),
             ramp: scene.recipes[i].ramp,
+            has_strands: scene.reflection_of(i).strands().is_some(),
+            ambient: scene.ambient * scene.reflection_of(i).ambient_share(),
         };
-        Integrator {
+        let integrator = Integrator {
             scene,
             volumes: volumes.iter().zip(levels).enumerate().map(frame_volume).collect(),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
@@ -349,15 +356,16 @@ impl<'a> Integrator<'a> {
                 .collect(),
             eyes: scene.shells.iter().map(|shell| scene.eye_inside(shell)).collect(),
             medium: Medium::of(&scene.trace),
-            strand: scene.reflection.shading(),
-            ambient: scene.ambient * scene.reflection.ambient_share(),
+            strand: scene.has_strands().then(|| scene.reflection.shading()).flatten(),
+            strands_in_shells: false,
             is_colored: scene.is_colored(),
             media: scene.media(volumes),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
             rays: scene.camera.ray_frame(scene.image.width, scene.image.height),
             lanes: Lanes::best(),
-        }
+        };
+        Integrator { strands_in_shells: integrator.models_in_shells()[1], ..integrator }
     }
 
     /// Returns the scene.
@@ -480,16 +488,16 @@ impl<'a> Integrator<'a> {
         let LevelResult { transmittance, lit, tint, cells } = result;
         let order = SheetOrder { before, is_last, behind };
         let is_mist = ray.matter[0].mist > 0.0;
-        self.composed((ray.point, is_mist), transmittance, cells, (&lit, tint), order)
+        self.composed((ray.point, ray.volume, is_mist), transmittance, cells, (&lit, tint), order)
     }
 
-    /// Result of a sheet, of mist or not, that a ray meets at `point` of the world and that lets
+    /// Result of a sheet of a volume, of mist or not, that a ray meets at `point` of the world and that lets
     /// `transmittance` pass, in which the lights send `lit` to the eye. The second part of `lit` is
     /// [`LevelResult::tint`].
     #[inline]
     fn composed(
         &self,
-        (point, is_mist): (Vec3, bool),
+        (point, volume, is_mist): (Vec3, usize, bool),
         transmittance: f32,
         cells: [u32; 2],
         (lit, tint): (&[Lit], Vec3),
@@ -497,7 +505,7 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
-        let mut radiance = self.ambient_of(is_mist) * (before - transmittance) + passed;
+        let mut radiance = self.ambient_of(volume, is_mist) * (before - transmittance) + passed;
         if self.is_colored {
             radiance += self.scene.ambient * tint;
         }
@@ -509,10 +517,27 @@ impl<'a> Integrator<'a> {
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
     }
 
-    /// Ambient light that cells, of mist or not, send on.
+    /// Ambient light that cells of a volume, of mist or not, send on.
     #[inline]
-    fn ambient_of(&self, is_mist: bool) -> Vec3 {
-        if is_mist { self.scene.ambient } else { self.ambient }
+    fn ambient_of(&self, volume: usize, is_mist: bool) -> Vec3 {
+        if is_mist { self.scene.ambient } else { self.volumes[volume].ambient }
+    }
+
+    /// Whether cells of fibres in any shell reflect as Kajiya and Kay's, and whether any reflect as strands.
+    fn models_in_shells(&self) -> [bool; 2] {
+        let mut models = [false; 2];
+        for shell in &self.scene.shells {
+            if self.optics_of(shell).is_none_or(|optics| optics.surface.is_none()) {
+                models[usize::from(self.volume_of(shell).has_strands)] = true;
+            }
+        }
+        models
+    }
+
+    /// Model of the cells of a volume, if they reflect as strands do.
+    #[inline]
+    fn strand_of(&self, volume: usize) -> Option<&StrandShading> {
+        self.strand.as_ref().filter(|_| self.volumes[volume].has_strands)
     }
 
     /// Multiple scattering in a quad, if the scene asks for it.

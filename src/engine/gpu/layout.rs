@@ -340,9 +340,9 @@ pub struct VolumeConstants {
     pub ramp: Ramp,
     pub optics: Optics,
     pub levels: u32,
+    pub strands: u32,
     pub pad_a: u32,
     pub pad_b: u32,
-    pub pad_c: u32,
 }
 
 /// Returns the constants of all volumes, as many as the uniform holds. `origins` are their first cells in the
@@ -365,6 +365,7 @@ pub fn volume_constants(
         ramp: Ramp::from(&scene.recipes[i].ramp),
         optics: optics[i].as_ref().map(Optics::from).unwrap_or_default(),
         levels: level_atlas(&scene.trace, volume.size).count,
+        strands: scene.reflection_of(i).strands().is_some().into(),
         ..VolumeConstants::default()
     };
     let mut all: Vec<VolumeConstants> = volumes.iter().enumerate().map(constants).collect();

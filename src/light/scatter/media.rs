@@ -44,15 +44,17 @@ pub struct Kind {
 }
 
 impl Media {
-    /// Multiple scattering in the materials of `quads`. `p` is the exponent of the specular term.
+    /// Multiple scattering in the materials of `quads`. `reflections` are the models of the volumes, and `p`
+    /// is the exponent of the specular term.
     pub fn new(
         quads: &[Quad],
         attenuation: &Attenuation,
-        reflection: &Reflection,
+        reflections: &[&Reflection],
         p: f32,
         volumes: &[VolumeTexture],
     ) -> Media {
-        let waters: Vec<Scattering> = volumes.iter().map(|v| scattering(reflection, p, v, None)).collect();
+        let waters = volumes.iter().zip(reflections).map(|(v, own)| scattering(own, p, v, None));
+        let waters: Vec<Scattering> = waters.collect();
         let own = if matches!(attenuation, Attenuation::PerCell { .. }) { 0.5 } else { 0.0 };
         let medium = |Kind { thickness_m, mist, volume }: &Kind| {
             let (water, volume) = (waters[*volume as usize], &volumes[*volume as usize]);

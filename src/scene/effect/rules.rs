@@ -1,6 +1,6 @@
 //! The rules by which a parameter switches others off.
 
-use crate::light::{LightKind, ReflectionKind, Visibility};
+use crate::light::{LightKind, ReflectionKind, Visibility, VolumeReflection};
 use crate::mapping::shell::Side;
 use crate::scene::Values;
 use crate::scene::build::EnvironmentKind;
@@ -137,9 +137,18 @@ pub(super) const RULES: &[Rule] = &[
     },
     Rule {
         keys: OF_SHADES,
+        switch: "volume.reflection",
+        needs: "kajiya-kay, because hairs have no such coefficients",
+        works: |v, switch| {
+            let is_hair = is(v, "light.reflection", ReflectionKind::Hair.word());
+            !is_hair || is(v, switch, VolumeReflection::KajiyaKay.word())
+        },
+    },
+    Rule {
+        keys: &["volume.reflection"],
         switch: "light.reflection",
-        needs: "kajiya-kay or strand",
-        works: |v, switch| !is(v, switch, ReflectionKind::Hair.word()),
+        needs: "strand or hair",
+        works: |v, switch| !is(v, switch, ReflectionKind::KajiyaKay.word()),
     },
     Rule {
         keys: &["trace.sigma"],

@@ -3,6 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
+use crate::light::VolumeReflection;
 use crate::scene::measured::Builder;
 use crate::volume::{LevelSetUnit, ReflectBy, RhoRule, StorageChoice, Up, VelocityAt};
 
@@ -177,6 +178,12 @@ pub(super) const VOLUME: Group = Group {
         p("volume.k_s", "k_s", "", Float(0.0, 1.0, 0.5), Upload)
             .doc("Specular reflection coefficient of the cells, before noise is added.")
             .when("Raise it for bright highlights along the strands; lower it for matt, milky water."),
+        p("volume.reflection", "", "", Choice(VolumeReflection::WORDS), Uniform)
+            .doc(
+                "Reflection of the cells: that of `light.reflection` (`scene`), or the paper's fibres \
+                 (`kajiya-kay`), which may have colours.",
+            )
+            .when("Set it to `kajiya-kay` for cloth or fur beside hair or water of another model."),
         p(COLORS[0], "", "", Color([1.0, 1.0, 1.0]), Uniform)
             .doc(
                 "Colour of what the cells reflect diffusely, and first of up to four on a ramp. Along it \

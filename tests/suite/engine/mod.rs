@@ -16,6 +16,7 @@ pub mod overlap;
 pub mod paint;
 pub mod rasters;
 pub mod ray;
+mod reflections;
 pub mod shaders;
 pub mod shell_scatter;
 pub mod shells;

@@ -241,6 +241,8 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "trace.lookup" => scene.trace.lookup.word(),
                 "volume.storage" => scene.recipes[0].asked_storage.word(),
                 "volumes.*.storage" => scene.recipes[1].asked_storage.word(),
+                "volume.reflection" => scene.recipes[0].reflection.word(),
+                "volumes.*.reflection" => scene.recipes[1].reflection.word(),
                 other => panic!("the variant of {other} is not compared"),
             };
             assert_eq!(variant, *word, "{setting}");

@@ -194,7 +194,7 @@ impl Integrator<'_> {
         // Diffuse light in a medium with optics holds the ambient light.
         let even = match self.optics_of(shell) {
             Some(_) => beyond,
-            None => self.ambient * (before - transmittance),
+            None => self.volume_of(shell).ambient * (before - transmittance),
         };
         let radiance = radiance[0] + radiance[1] + even + passed;
         RayResult { radiance, transmittance, uncovered: transmittance, cells }
@@ -303,7 +303,7 @@ impl Integrator<'_> {
                 continue;
             }
             let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));
-            observer.ambient(self.ambient * weight + more);
+            observer.ambient(self.volume_of(ray.shell).ambient * weight + more);
             let mut sum = more;
             for i in 0..self.lights.len() {
                 let visibility = self.shell_visibility(level, &place, i, &mut ray.cells[1]);
@@ -356,7 +356,8 @@ impl Integrator<'_> {
         let (l, e) = (frame(to_light), frame(-d));
         let l_dot_e = l.dot(e);
         let (p, identity) = (self.scene.p, Metric::IDENTITY);
-        let parts = match (&self.strand, fibres) {
+        let volume = self.scene.shells[place.shell].volume as usize;
+        let parts = match (self.strand_of(volume), fibres) {
             (None, Fibres::One(t)) => {
                 let inverse_q = 1.0 / t.length_squared().max(1e-30);
                 psi_parts([k_d, k_s], p, t.dot(l), t.dot(e), inverse_q)

@@ -100,7 +100,7 @@ impl Integrator<'_> {
             let k = [k_d, ink.map_or(k_s, |ink| ink.k_s)];
             let more = ink.map_or(Vec3::ZERO, |ink| (ink.color - Vec3::ONE) * weight);
             tint += more;
-            observer.ambient(self.ambient_of(matter.mist > 0.0) * (Vec3::splat(weight) + more));
+            observer.ambient(self.ambient_of(ray.volume, matter.mist > 0.0) * (Vec3::splat(weight) + more));
 
             let v = cell.v_code();
             let inverse_q = 1.0 / ray.metric.squared(v).max(1e-30);
@@ -132,7 +132,7 @@ impl Integrator<'_> {
                     observer.light(visibility, light.intensity * (lit * (1.0 / 255.0)));
                     continue;
                 }
-                let mut lit = match &self.strand {
+                let mut lit = match self.strand_of(ray.volume) {
                     Some(strand) if matter.mist == 0.0 => {
                         let [t_dot_l, t_dot_e] = match &spread {
                             Some(spread) => strand.cosines(spread, light.l_v, ROOT_TO_TIP),

@@ -34,7 +34,7 @@ const PENDING: u32 = 3 * LANES as u32;
 pub struct Group<'a, 'h> {
     pub integrator: &'a Integrator<'a>,
     /// Number of the volume.
-    volume: usize,
+    pub volume: usize,
     pub level: Level<'a>,
     pub store: Store<'a>,
     pub is_mist: bool,
@@ -339,7 +339,7 @@ impl<'a, 'h> Group<'a, 'h> {
         weight: Floats<S>,
         visible: Floats<S>,
     ) -> Light<S> {
-        if let Some(shading) = self.integrator.strand.as_ref().filter(|_| !self.is_mist) {
+        if let Some(shading) = self.integrator.strand_of(self.volume).filter(|_| !self.is_mist) {
             let cosines = angles.cosines(simd, shading, l_v);
             return Light::Colour(strand::psi(simd, shading, k, cosines, l_dot_e).times(weight * visible));
         }

@@ -294,7 +294,9 @@ impl<'a> Lockstep<'a> {
                 tint = tint * (1.0 - share) + other_tint * share;
             }
             let point = values.point.get(i % LANES);
-            let met = (point, values.mist.0[i % LANES] > 0.0);
+            let quad = met.packs[i / LANES].quads[i % LANES];
+            let volume = integrator.scene.quads[quad].material.volume as usize;
+            let met = (point, volume, values.mist.0[i % LANES] > 0.0);
             let passed = integrator.composed(met, transmittance, cells, (own, tint), sheet.order);
             integrator.add(&mut rays[sheet.ray].1, passed);
         }

@@ -84,7 +84,7 @@ impl Group<'_, '_> {
     /// Kajiya and Kay's model takes for one light.
     #[inline(always)]
     pub fn is_packed(&self, steps: &Steps) -> bool {
-        let is_dear = self.integrator.lights.len() > 1 || self.integrator.strand.is_some();
+        let is_dear = self.integrator.lights.len() > 1 || self.integrator.strand_of(self.volume).is_some();
         if !is_dear || self.is_mist || self.is_between {
             return false;
         }

@@ -67,10 +67,12 @@ impl<'a> ShellHit<'a> {
     }
 }
 
-/// Whether rays through shells may go side by side.
+/// Whether rays through shells may go side by side: all cells of fibres have one model.
 pub fn covers(integrator: &Integrator) -> bool {
     let scene = integrator.scene;
-    scene.trace.lookup == Lookup::Nearest && scene.angles == AngleFrame::World
+    scene.trace.lookup == Lookup::Nearest
+        && scene.angles == AngleFrame::World
+        && integrator.models_in_shells() != [true; 2]
 }
 
 /// Eight rays on their way through shells.

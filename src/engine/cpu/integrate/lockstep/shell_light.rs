@@ -141,7 +141,7 @@ impl<S: Simd> Lit<S> {
         (l, intensity): (Lanes3<S>, Lanes3<S>),
     ) -> Lanes3<S> {
         let l_dot_e = l.dot(self.e);
-        match &integrator.strand {
+        match integrator.strand.as_ref().filter(|_| integrator.strands_in_shells) {
             Some(shading) => {
                 let cosines = fibres.cosines(shading, (l, self.e), &self.frame);
                 intensity.by(strand::psi(simd, shading, self.k, cosines, l_dot_e))
