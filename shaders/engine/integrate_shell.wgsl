@@ -328,7 +328,8 @@ fn shell_lit(
                         t_dot = spread_of_one(spread, l);
                     }
                 }
-                fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
+                fibre =
+                    strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
             } else {
                 var parts = vec2<f32>(0.0);
                 if MANY_DIRECTIONS {
