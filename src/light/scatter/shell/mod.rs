@@ -119,7 +119,8 @@ impl ShellDiffuse {
             }
         });
         let mut core = core::Core::new(matter, &graph, surroundings.opposite);
-        let thin = surroundings.opposite.iter().enumerate();
+        let opposite = if matter.below == Below::Core { surroundings.opposite } else { &[] };
+        let thin = opposite.iter().enumerate();
         for (vertex, opposite) in thin.filter_map(|(vertex, opposite)| Some((vertex, opposite.as_ref()?))) {
             for (number, light) in surroundings.lights.iter().enumerate() {
                 let (mu, intensity, [_, share]) = arrives(vertex, number, light);
