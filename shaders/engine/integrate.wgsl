@@ -5,9 +5,11 @@
 
 #import engine::integrate_light
 #import engine::integrate_shell
+#import engine::shell_scatter
 #import layout
 #import light::fibre
 #import light::haze
+#import light::optics
 #import light::optical_depth
 #import light::ramp
 #import light::scatter
@@ -89,6 +91,7 @@ struct Reflection {
     strand: Strand,
     similarity: Similarity,
     ramp: Ramp,
+    optics: Optics,
     // Ambient light that hairs send on.
     ambient: vec3<f32>,
     pad: f32,
@@ -104,6 +107,7 @@ struct VolumeConstants {
     flow_cells: f32,
     similarity: Similarity,
     ramp: Ramp,
+    optics: Optics,
     levels: u32,
     pad_a: u32,
     pad_b: u32,
@@ -131,6 +135,9 @@ fn volume_of(number: u32) -> VolumeConstants {
     if IN_COLOUR {
         only.similarity = reflection.similarity;
         only.ramp = reflection.ramp;
+    }
+    if SHELL_SCATTER {
+        only.optics = reflection.optics;
     }
     return only;
 }

@@ -2,10 +2,12 @@
 // the bindings. Twins: src/engine/cpu/integrate/shell.rs and shell_light.rs, which hold the reasoning.
 
 #import engine::integrate
+#import engine::shell_scatter
+#import engine::shell_visibility
 #import layout
 #import light::fibre
+#import light::optics
 #import light::ramp
-#import light::shell_depth
 #import light::strand
 #import mapping
 #import mapping::shell
@@ -20,11 +22,6 @@
 override SHELLS: bool = false;
 // Whether the scene has quads.
 override QUADS: bool = true;
-// Whether rays walk to the lights in some shells, and whether V is kept at the vertices of some.
-override SHELL_MARCH: bool = false;
-override SHELL_KEPT: bool = false;
-// Whether opaque matter casts shadows on shells.
-override SHELL_SHADOWS: bool = false;
 
 // A ray inside a shell.
 struct ShellRay {
@@ -35,6 +32,11 @@ struct ShellRay {
     light_cells: u32,
     // Whether the device ended a walk early.
     cut: bool,
+    // T at the shell's start. Radiance of the last cell where light scatters many times, and extinction
+    // there.
+    start: f32,
+    beyond: vec3<f32>,
+    beyond_extinction: vec3<f32>,
 }
 
 // An occupied cell of a shell.
@@ -48,6 +50,8 @@ struct ShellCell {
     direction: u32,
     // Position in the world.
     point: vec3<f32>,
+    // Shares and depth of the place that stands for the cell's diffuse light.
+    deep: vec4<f32>,
 }
 
 // Traces a shell from the face number `face` of its hull, as `trace` does a sheet.
@@ -83,6 +87,7 @@ fn trace_shell(
     var ray: ShellRay;
     ray.d = d;
     ray.transmittance = before.w;
+    ray.start = before.w;
     var done = path.left == 0u;
     while !done {
         var segment = path_next(&path);
@@ -104,7 +109,13 @@ fn trace_shell(
     let end = ray.transmittance;
     let ends = is_last | (end < frame.early_end);
     let passed = select(vec3<f32>(0.0), behind * end, ends);
-    return vec4<f32>(before.rgb + ray.light + ambient_of(false) * (before.w - end) + passed, end);
+    var even = ambient_of(false) * (before.w - end);
+    if SHELL_SCATTER {
+        if own.optics.extinction.x > 0.0 {
+            even = beyond_end(ray);
+        }
+    }
+    return vec4<f32>(before.rgb + ray.light + even + passed, end);
 }
 
 // Walks through a tetrahedron. Twin: Integrator::through.
@@ -202,16 +213,33 @@ fn walk_tetrahedron(
                     sample.moments = moments_of(texel.y, level);
                 }
             }
-            let passed = (*ray).transmittance * exp2(-(sample.rho * own.extinction * (leave - enter)));
+            let bits = sample.rho * own.extinction * (leave - enter);
+            let passed = (*ray).transmittance * exp2(-bits);
             let weight = ((*ray).transmittance - passed) * share;
-            let middle = 0.5 * (enter + leave);
+            var middle = 0.5 * (enter + leave);
+            var deep = vec4<f32>(0.0);
+            if SHELL_SCATTER {
+                if own.optics.extinction.x > 0.0 {
+                    let within = enter + (leave - enter) * cell_within(bits);
+                    middle = within.x;
+                    let share_out = within.y / length;
+                    deep = vec4<f32>(
+                        segment.shares_in + (segment.shares_out - segment.shares_in) * share_out,
+                        segment.at_in.z + (segment.at_out.z - segment.at_in.z) * share_out,
+                    );
+                }
+            }
             let point = begin + (*ray).d * middle;
             let along = middle / length;
             let shares = segment.shares_in + (segment.shares_out - segment.shares_in) * along;
             let depth = segment.at_in.z + (segment.at_out.z - segment.at_in.z) * along;
-            let cell = ShellCell(segment, shares, depth, sample, texel.y, point);
-            if (LIGHTS > 0u) | COLORED {
-                (*ray).light += shell_lit(ray, cell, level, shell, own) * weight;
+            let cell = ShellCell(segment, shares, depth, sample, texel.y, point, deep);
+            if SHELL_SCATTER {
+                let view = depth_between((*ray).start, (*ray).transmittance);
+                let passage = Passage((*ray).start * share, view, bits);
+                (*ray).light += shell_lit(ray, cell, level, shell, own, weight, passage);
+            } else if (LIGHTS > 0u) | COLORED {
+                (*ray).light += shell_lit(ray, cell, level, shell, own, weight, Passage(0.0, 0.0, 0.0));
             }
             (*ray).transmittance = passed;
         }
@@ -221,13 +249,15 @@ fn walk_tetrahedron(
     (*ray).cut |= !done;
 }
 
-// Light that a cell sends to the eye, relative to its weight, of all lights.
+// Light that a cell of this weight sends to the eye, of all lights.
 fn shell_lit(
     ray: ptr<function, ShellRay>,
     cell: ShellCell,
     level: Level,
     shell: Shell,
     own: VolumeConstants,
+    weight: f32,
+    passage: Passage,
 ) -> vec3<f32> {
     let n = vec3<f32>(own.cells);
     let frame_j = shell_frame(shell, cell.segment.prism, cell.shares, cell.depth);
@@ -267,6 +297,13 @@ fn shell_lit(
         color = ink.rgb;
         sum = frame.ambient * (color - 1.0);
     }
+    var scatter: Scatter;
+    if SHELL_SCATTER {
+        if own.optics.extinction.x > 0.0 {
+            scatter = scatter_new(ray, cell, level, shell, own, j, color, passage);
+            sum = scatter.diffuse;
+        }
+    }
     let count = select(0u, arrayLength(&lights), LIGHTS > 0u);
     var i = 0u;
     for (; i < count; i++) {
@@ -275,39 +312,53 @@ fn shell_lit(
         let l = in_frame(row_x, row_y, row_z, det, arrives.xyz, is_texture);
         let l_dot_e = dot3(l, e);
         var fibre = vec3<f32>(0.0);
-        if STRAND {
-            let root = sqrt(inverse_q);
-            var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
-            if MANY_DIRECTIONS {
-                if TILTED {
-                    var way = ROOT_TO_TIP;
-                    if !is_texture {
-                        way = row_x * way.x + row_y * way.y + row_z * way.z;
-                        way = select(way, -way, det < 0.0);
+        if SHELL_FIBRES {
+            if STRAND {
+                let root = sqrt(inverse_q);
+                var t_dot = vec2<f32>(dot3(t, l), t_dot_e) * root;
+                if MANY_DIRECTIONS {
+                    if TILTED {
+                        var way = ROOT_TO_TIP;
+                        if !is_texture {
+                            way = row_x * way.x + row_y * way.y + row_z * way.z;
+                            way = select(way, -way, det < 0.0);
+                        }
+                        t_dot = select(spread_along(spread, l, way), t_dot, has_one_direction(level));
+                    } else {
+                        t_dot = spread_of_one(spread, l);
                     }
-                    t_dot = select(spread_along(spread, l, way), t_dot, has_one_direction(level));
+                }
+                fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
+            } else {
+                var parts = vec2<f32>(0.0);
+                if MANY_DIRECTIONS {
+                    parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
                 } else {
-                    t_dot = spread_of_one(spread, l);
+                    parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
+                }
+                fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
+                if COLORED {
+                    fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
                 }
             }
-            fibre = strand_psi(strand_table, linear, reflection.strand, k_d, k_s, t_dot.x, t_dot.y, l_dot_e);
-        } else {
-            var parts = vec2<f32>(0.0);
-            if MANY_DIRECTIONS {
-                parts = spread_psi_parts(spread, k_d, k_s, frame.p, l, l_dot_e);
-            } else {
-                parts = psi_parts(frame.p, k_d, k_s, t, l, t_dot_e, sin2_e, inverse_q);
-            }
-            fibre = vec3<f32>((parts.x + parts.y) * (1.0 / 255.0));
-            if COLORED {
-                fibre = (color * parts.x + vec3<f32>(parts.y)) * (1.0 / 255.0);
-            }
         }
-        let visible = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
-        sum += light.intensity * arrives.w * fibre * visible;
+        let arriving = shell_visibility(ray, cell, level, shell, own, i, arrives.xyz);
+        if SHELL_SCATTER {
+            if scatter.is_on {
+                let lit = scatter_light(scatter, (*ray).d, arrives.xyz, fibre, weight, arriving);
+                sum += light.intensity * arrives.w * lit;
+            } else {
+                sum += light.intensity * arrives.w * fibre * (arriving.x * arriving.y);
+            }
+        } else {
+            sum += light.intensity * arrives.w * fibre * (arriving.x * arriving.y);
+        }
     }
     (*ray).cut |= i < count;
-    return sum;
+    if SHELL_SCATTER {
+        return select(sum * weight, sum, scatter.is_on);
+    }
+    return sum * weight;
 }
 
 // A unit vector in the frame where angles are measured.
@@ -322,70 +373,6 @@ fn in_frame(
     let turned = vec3<f32>(dot3(row_x, v), dot3(row_y, v), dot3(row_z, v)) / det;
     let length = sqrt(dot3(turned, turned));
     return select(v, select(vec3<f32>(0.0), turned / length, length > 0.0), is_texture);
-}
-
-// V of light number `i`, which lies in the direction `l`. Twin: Integrator::shell_visibility.
-fn shell_visibility(
-    ray: ptr<function, ShellRay>,
-    cell: ShellCell,
-    level: Level,
-    shell: Shell,
-    own: VolumeConstants,
-    i: u32,
-    l: vec3<f32>,
-) -> f32 {
-    let segment = cell.segment;
-    var visible = 1.0;
-    if SHELL_KEPT {
-        let shares = cell.shares;
-        let z = clamp(cell.depth, 0.0, 1.0) * f32(shell.layers);
-        let vertices = segment.vertices;
-        let first = shell.light + i * shell.vertices * (shell.layers + 1u);
-        let a = vertex_visibility(ray, shell, first, vertices.x, z);
-        let b = vertex_visibility(ray, shell, first, vertices.y, z);
-        let c = vertex_visibility(ray, shell, first, vertices.z, z);
-        visible = clamp(a * shares.x + b * shares.y + c * shares.z, 0.0, 1.0);
-    }
-    if SHELL_MARCH {
-        if !SHELL_KEPT || shell.layers == 0u {
-            let place =
-                ShellPlace(segment.prism, segment.tetrahedron, cell.point, own.cells, own.flow_cells);
-            let far = light_distance(lights[i], cell.point);
-            let walked = shell_depth(level, shell, place, l, far, own.extinction, frame.max_cells);
-            (*ray).light_cells += walked.cells;
-            (*ray).cut |= walked.cut;
-            visible = exp2(-own.extinction * walked.depth);
-        }
-    }
-    if SHELL_SHADOWS {
-        visible *= shell_shadow(shell, i, segment.vertices, cell.shares, cell.depth);
-    }
-    return visible;
-}
-
-// Share of light number `i` that opaque matter lets through. Twin: ShellShadows::at.
-fn shell_shadow(shell: Shell, i: u32, vertices: vec3<u32>, shares: vec3<f32>, depth: f32) -> f32 {
-    let first = vec3<u32>(shell.shadows) + 2u * (vertices + i * shell.vertices);
-    let outer = vec3<f32>(shell_light_value(first.x), shell_light_value(first.y), shell_light_value(first.z));
-    let next = first + 1u;
-    let inner = vec3<f32>(shell_light_value(next.x), shell_light_value(next.y), shell_light_value(next.z));
-    let seen = outer + (inner - outer) * depth;
-    return clamp(seen.x * shares.x + seen.y * shares.y + seen.z * shares.z, 0.0, 1.0);
-}
-
-// V at the depth of `z` layers below a vertex. `first` is the first value of the shell and light.
-fn vertex_visibility(ray: ptr<function, ShellRay>, shell: Shell, first: u32, vertex: u32, z: f32) -> f32 {
-    // A shell that keeps nothing has no layers.
-    let layer = min(u32(z), max(shell.layers, 1u) - 1u);
-    let at = first + vertex * (shell.layers + 1u) + layer;
-    let near = shell_light_value(at);
-    let far = shell_light_value(at + 1u);
-    (*ray).cut |= (near < 0.0) | (far < 0.0);
-    return near + (far - near) * (z - f32(layer));
-}
-
-fn shell_light_value(index: u32) -> f32 {
-    return textureLoad(shell_light, vec2<u32>(index & ((1u << SHELL_ROW) - 1u), index >> SHELL_ROW), 0).x;
 }
 
 // Moments J·S·Jᵀ of the directions J·v. Twin: Moments::mapped.

@@ -35,8 +35,9 @@ struct Shell {
     light: u32,
     layers: u32,
     vertices: u32,
-    // First of the shares of light that opaque matter lets through.
+    // First of the shares of light that opaque matter lets through, and of the values of J.
     shadows: u32,
+    diffuse: u32,
 }
 
 // Corners and texture coordinates of a prism, and what stands beyond its sides.
@@ -69,11 +70,11 @@ fn shell_new(number: u32) -> Shell {
     let header = SHELL_TABLE + SHELL_HEADER * number;
     let a = shell_texel(header);
     let b = shell_texel(header + 1u);
-    let shadows = shell_texel(header + 2u).x;
+    let c = shell_texel(header + 2u);
     let skin = (b.x >> 31u) != 0u;
     let is_single = (b.x & 0x40000000u) != 0u;
     let volume = b.x & 0x3fffffffu;
-    return Shell(number, a.x, a.y, a.z, a.w, volume, skin, is_single, b.y, b.z, b.w, shadows);
+    return Shell(number, a.x, a.y, a.z, a.w, volume, skin, is_single, b.y, b.z, b.w, c.x, c.y);
 }
 
 // The shell of a face, given by its number.

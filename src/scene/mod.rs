@@ -493,6 +493,11 @@ impl Scene {
         self.recipes.iter().zip(volumes).map(of).collect()
     }
 
+    /// Whether light scatters many times where shells show the volume of this number.
+    pub fn scatters_many_times(&self, volume: usize) -> bool {
+        self.scattering == Scattering::Multiple || self.recipes[volume].skin.is_some()
+    }
+
     /// Returns everything that determines the opaque mesh.
     pub fn ground(&self) -> Ground {
         let shades = || self.triangles.iter().map(|own| own.shade);

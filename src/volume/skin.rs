@@ -110,11 +110,11 @@ impl SkinSpec {
         })
     }
 
-    /// Plates of a level; `None` where there are none, or they would be finer than two cells.
+    /// Plates of a level; `None` where there are none, or they would be finer than four cells.
     fn plates_of(&self, level: u32) -> Option<Plates> {
         let across = self.plates.checked_shl(level)?;
         let [nx, ny] = [self.size[0], self.size[1]];
-        if across == 0 || nx < 2 * across || self.furrow_cells <= 0.0 {
+        if across == 0 || u64::from(nx) < 4 * u64::from(across) || self.furrow_cells <= 0.0 {
             return None;
         }
         let size = nx as f32 / across as f32;

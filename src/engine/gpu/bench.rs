@@ -123,7 +123,7 @@ impl GpuBench {
                     }
                 };
             }
-            let inputs = (&prepared.up, &prepared.shell_shadows);
+            let inputs = (&prepared.up, &prepared.at_vertices);
             let shell_light =
                 ShellLightPass::default().get((gpu, timer), scene, volumes, inputs, |_, _| Ok(()));
             let shell_light = match shell_light {

@@ -126,7 +126,7 @@ impl<'a> FrameRun<'a> {
             }
         };
         let progress = |done, total| monitor.progress("light in shells", done, total);
-        let inputs = (&prepared.up, &prepared.shell_shadows);
+        let inputs = (&prepared.up, &prepared.at_vertices);
         let (shell_light, took) = renderer.shell_light.get((gpu, timer), scene, volumes, inputs, progress)?;
         seconds.visibility += took;
         let hint: TileHint = (variant, volumes[0].cells.address(), whole);

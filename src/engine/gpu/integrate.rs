@@ -8,6 +8,7 @@ use super::shader::resolve;
 use super::specialise::Source;
 use super::{Inputs, compute_pipeline};
 use crate::light::fibre::whole_exponent;
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::StrandParams;
 use crate::light::visibility::{Form, LightVolumes};
 use crate::light::{Reflection, Scattering, Visibility};
@@ -64,6 +65,8 @@ pub struct Variant {
     shell_march: bool,
     shell_kept: bool,
     shell_shadows: bool,
+    /// Whether light scatters many times in any shell, whether any has a surface, and whether any has fibres.
+    shell_optics: [bool; 3],
 }
 
 impl Variant {
@@ -103,12 +106,25 @@ impl Variant {
             shell_march: !scene.shells.is_empty() && scene.visibility == Visibility::March,
             shell_kept: false,
             shell_shadows: false,
+            shell_optics: [false, false, true],
         }
     }
 
     /// Returns the variant of a scene in which opaque matter casts shadows on shells, or none.
     pub fn with_shell_shadows(self, shell_shadows: bool) -> Self {
         Variant { shell_shadows, ..self }
+    }
+
+    /// Returns the variant of a scene whose volumes have these optics where shells show them.
+    pub fn with_shell_optics(self, scene: &Scene, optics: &[Option<ShellOptics>]) -> Self {
+        let own = || scene.shells.iter().map(|shell| optics[shell.volume as usize].as_ref());
+        let has_surface = |own: Option<&ShellOptics>| own.is_some_and(|optics| optics.surface.is_some());
+        let shell_optics = [
+            own().any(|own| own.is_some()),
+            own().any(has_surface),
+            own().next().is_none() || own().any(|own| !has_surface(own)),
+        ];
+        Variant { shell_optics, ..self }
     }
 
     /// Returns the variant of a scene with the visibility [`Visibility::Cached`] in which rays walk to the
@@ -224,6 +240,9 @@ impl Integrate {
             ("SHELL_MARCH", number(variant.shell_march)),
             ("SHELL_KEPT", number(variant.shell_kept)),
             ("SHELL_SHADOWS", number(variant.shell_shadows)),
+            ("SHELL_SCATTER", number(variant.shell_optics[0])),
+            ("SHELL_SURFACE", number(variant.shell_optics[1])),
+            ("SHELL_FIBRES", number(variant.shell_optics[2])),
         ];
         Self::compile(gpu, variant, &source(variant.many), &constants, true)
     }

@@ -6,6 +6,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, ramp, scatter};
 use crate::mapping::PlaneView;
@@ -299,6 +300,33 @@ pub struct Ramp {
     pub pad: f32,
 }
 
+/// Optics of a volume that shells show; extinction 0 where light scatters once. Twin:
+/// `shaders/light/optics.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Optics {
+    pub extinction: [f32; 3],
+    pub g: f32,
+    pub albedo: [f32; 3],
+    pub eta: f32,
+    pub isotropic: [f32; 3],
+    pub roughness: f32,
+}
+
+impl From<&ShellOptics> for Optics {
+    fn from(optics: &ShellOptics) -> Self {
+        Optics {
+            extinction: optics.extinction.to_array(),
+            g: optics.g,
+            albedo: optics.albedo.to_array(),
+            eta: optics.surface.map_or(0.0, |surface| surface.eta),
+            isotropic: optics.isotropic.to_array(),
+            roughness: optics.surface.map_or(0.0, |surface| surface.roughness),
+        }
+    }
+}
+
 /// Constants of one of several volumes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -310,6 +338,7 @@ pub struct VolumeConstants {
     pub flow_cells: f32,
     pub similarity: Similarity,
     pub ramp: Ramp,
+    pub optics: Optics,
     pub levels: u32,
     pub pad_a: u32,
     pub pad_b: u32,
@@ -317,12 +346,14 @@ pub struct VolumeConstants {
 }
 
 /// Returns the constants of all volumes, as many as the uniform holds. `origins` are their first cells in the
-/// texture, and `waters` the constants of multiple scattering in them, if the scene asks for it.
+/// texture, `waters` the constants of multiple scattering in them, if the scene asks for it, and `optics`
+/// those of shells.
 pub fn volume_constants(
     scene: &Scene,
     volumes: &[VolumeTexture],
     origins: &[[u32; 3]],
     waters: &[scatter::Similarity],
+    optics: &[Option<ShellOptics>],
 ) -> Vec<VolumeConstants> {
     let flows = scene.flows(volumes);
     let constants = |(i, volume): (usize, &VolumeTexture)| VolumeConstants {
@@ -332,6 +363,7 @@ pub fn volume_constants(
         flow_cells: flow_cells(flows[i], volume.size[1]),
         similarity: waters.get(i).map(Similarity::from).unwrap_or_default(),
         ramp: Ramp::from(&scene.recipes[i].ramp),
+        optics: optics[i].as_ref().map(Optics::from).unwrap_or_default(),
         levels: level_atlas(&scene.trace, volume.size).count,
         ..VolumeConstants::default()
     };
@@ -348,17 +380,19 @@ pub struct Reflection {
     pub strand: Strand,
     pub similarity: Similarity,
     pub ramp: Ramp,
+    pub optics: Optics,
     pub ambient: [f32; 3],
     pub pad: f32,
 }
 
 impl Reflection {
-    /// Packs the constants of the models that a scene uses, the colours of its first volume and the ambient
-    /// light that cells send on; the others stay 0.
+    /// Packs the constants of the models that a scene uses, the colours and optics of its first volume and
+    /// the ambient light that cells send on; the others stay 0.
     pub fn new(
         scene: &Scene,
         strand: Option<&StrandShading>,
         similarity: Option<&scatter::Similarity>,
+        optics: Option<&ShellOptics>,
     ) -> Self {
         let similarity = similarity.map(Similarity::from);
         let strand = strand.map(Strand::from);
@@ -366,6 +400,7 @@ impl Reflection {
             strand: strand.unwrap_or_default(),
             similarity: similarity.unwrap_or_default(),
             ramp: Ramp::from(&scene.recipes[0].ramp),
+            optics: optics.map(Optics::from).unwrap_or_default(),
             ambient: (scene.ambient * scene.reflection.ambient_share()).to_array(),
             pad: 0.0,
         }

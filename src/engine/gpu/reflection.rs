@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::device::Gpu;
 use super::layout;
 use super::strand::StrandTexture;
+use crate::light::scatter::optics::ShellOptics;
 use crate::light::scatter::{Profile, Similarity};
 use crate::light::strand::table::StrandTable;
 use crate::scene::Scene;
@@ -29,6 +30,8 @@ pub struct BoundReflection {
     pub profiles: wgpu::Buffer,
     /// Constants of multiple scattering in each volume; none with single scattering.
     pub waters: Vec<Similarity>,
+    /// Optics of the shells of each volume; `None` where light scatters once.
+    pub optics: Vec<Option<ShellOptics>>,
 }
 
 impl Reflections {
@@ -37,7 +40,9 @@ impl Reflections {
         let strand = scene.reflection.shading();
         let media = scene.media(volumes);
         let waters = media.as_ref().map_or(Vec::new(), |media| media.waters.clone());
-        let uniform = layout::Reflection::new(scene, strand.as_ref(), waters.first());
+        let optics = scene.shell_optics(volumes);
+        let first = optics.first().and_then(Option::as_ref);
+        let uniform = layout::Reflection::new(scene, strand.as_ref(), waters.first(), first);
         let table = strand.map(|strand| strand.table);
         let is_resident = match (&self.strand, &table) {
             (Some(_), None) => true,
@@ -69,6 +74,7 @@ impl Reflections {
             sampler: strand.sampler.clone(),
             profiles: profiles.clone(),
             waters,
+            optics,
         }
     }
 }

@@ -12,11 +12,13 @@ macro_rules! files {
 pub const FILES: &[(&str, &str)] = files! {
     "layout" "mapping" "mapping/shell" "mapping/shell_path" "walk" "volume/cells"
     "trace/levels" "trace/lookup" "trace/matter"
-    "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/ramp" "light/scatter"
+    "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/optics" "light/ramp"
+    "light/scatter"
     "light/strand" "light/visibility" "light/shell_depth" "light/shell_light"
     "engine/bare" "engine/gbuffer" "engine/gloss" "engine/integrate" "engine/integrate_light"
     "engine/integrate_shell" "engine/opaque" "engine/paint" "engine/pool" "engine/sheets_many"
-    "engine/sheets_one"
+    "engine/sheets_one" "engine/shell_scatter"
+    "engine/shell_visibility"
     "picture/resolve"
 };
 

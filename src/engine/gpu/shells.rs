@@ -1,6 +1,6 @@
 //! Shells on the device: their points, prisms and hulls in one texture, the faces of hulls that the eye sees,
 //! and V at their vertices, which a compute pass fills and which is kept from frame to frame. Shadows of
-//! opaque matter come from the host, into rows behind V. CPU twins:
+//! opaque matter and diffuse light come from the host, into rows behind V. CPU twins:
 //! `Projection::hulls` and `src/engine/cpu/integrate/shell_light.rs`.
 
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use super::timing::Timer;
 use super::upload::{Uploaded, write_rows};
 use crate::light::{Light, Visibility};
 use crate::mapping::shell::{Inside, Shell};
-use crate::place::ShellShadows;
+use crate::place::{DiffuseOfShells, ShellShadows};
 use crate::scene::Scene;
 use crate::trace::{extinction, flow_cells};
 use crate::util::error::{Error, Result};
@@ -74,6 +74,25 @@ struct Table {
     /// First share of light of each shell, if opaque matter hides any, and behind the last the end of all.
     /// They begin in the row behind V.
     shadows: Vec<u32>,
+    /// First value of J of each shell, if light scatters many times in it, and behind the last the end of
+    /// all. They begin in the row behind the shadows.
+    diffuse: Vec<u32>,
+}
+
+/// What the host computes at the vertices of shells.
+#[derive(Clone)]
+pub struct AtVertices {
+    /// Shadows of opaque matter, if there are any.
+    pub shadows: Option<Arc<ShellShadows>>,
+    /// Diffuse light, if light scatters many times in any shell.
+    pub diffuse: Option<Arc<DiffuseOfShells>>,
+}
+
+impl AtVertices {
+    fn is(&self, other: &AtVertices) -> bool {
+        self.shadows.as_ref().map(Arc::as_ptr) == other.shadows.as_ref().map(Arc::as_ptr)
+            && self.diffuse.as_ref().map(Arc::as_ptr) == other.diffuse.as_ref().map(Arc::as_ptr)
+    }
 }
 
 /// The shells of a scene on the device.
@@ -116,9 +135,16 @@ impl Table {
             let own = 2 * lights * shell.vertices() as u64;
             shadows.push(shadows[shadows.len() - 1].saturating_add(own.try_into().unwrap_or(u32::MAX)));
         }
+        let mut diffuse = vec![shadows[shadows.len() - 1].next_multiple_of(SHELL_ROW)];
+        for shell in &scene.shells {
+            let layers = volumes[shell.volume as usize].size[2].div_ceil(2);
+            let own = 3 * shell.vertices() as u64 * u64::from(layers + 1);
+            let own = if scene.scatters_many_times(shell.volume as usize) { own } else { 0 };
+            diffuse.push(diffuse[diffuse.len() - 1].saturating_add(own.try_into().unwrap_or(u32::MAX)));
+        }
         let eyes = scene.shells.iter().map(|shell| scene.eye_inside(shell)).collect();
         let (shells, quads) = (scene.shells.clone(), scene.quads.len() as u32);
-        Ok(Table { shells, eyes, quads, layers, firsts, shadows })
+        Ok(Table { shells, eyes, quads, layers, firsts, shadows, diffuse })
     }
 
     /// Whether both hold the same, wherever the eye is.
@@ -127,6 +153,7 @@ impl Table {
             && self.shells.iter().zip(&other.shells).all(|(a, b)| Shell::is_same(a, b))
             && (self.quads, &self.layers) == (other.quads, &other.layers)
             && (&self.firsts, &self.shadows) == (&other.firsts, &other.shadows)
+            && self.diffuse == other.diffuse
     }
 
     /// Number of texels.
@@ -155,7 +182,7 @@ impl Table {
                 shell.volume | if shell.skin { SKIN } else { 0 } | if shell.is_single { SINGLE } else { 0 };
             out.push([points, prisms, hull, face]);
             out.push([volume, self.firsts[i], self.layers[i], shell.vertices() as u32]);
-            out.push([self.shadows[i], 0, 0, 0]);
+            out.push([self.shadows[i], self.diffuse[i], 0, 0]);
             face += shell.hull.len() as u32;
             points = hull + shell.hull.len() as u32;
         }
@@ -308,8 +335,7 @@ struct Filled {
     /// Cells that each volume has moved down the flow, and its extinction.
     volumes: Vec<[f32; 2]>,
     max_cells: u32,
-    /// Shadows of opaque matter, if there are any.
-    shadows: Option<Arc<ShellShadows>>,
+    at_vertices: AtVertices,
 }
 
 impl Filled {
@@ -319,7 +345,7 @@ impl Filled {
             && self.lights == other.lights
             && self.volumes == other.volumes
             && self.max_cells == other.max_cells
-            && self.shadows.as_ref().map(Arc::as_ptr) == other.shadows.as_ref().map(Arc::as_ptr)
+            && self.at_vertices.is(&other.at_vertices)
     }
 }
 
@@ -329,8 +355,8 @@ impl ShellLightPass {
         self.last = None;
     }
 
-    /// Returns V at the vertices of a scene's shells and `shadows` behind it, `r32float`, and the seconds it
-    /// took to fill V: 0 if it is that of the last call. Calls `between` after each submission with the
+    /// Returns V at the vertices of a scene's shells and `at_vertices` behind it, `r32float`, and the seconds
+    /// it took to fill V: 0 if it is that of the last call. Calls `between` after each submission with the
     /// values done so far and in total; its error stops the work.
     ///
     /// # Errors
@@ -340,15 +366,17 @@ impl ShellLightPass {
         (gpu, timer): (&Gpu, &Timer),
         scene: &Scene,
         volumes: &[VolumeTexture],
-        (up, shadows): (&Uploaded, &Option<Arc<ShellShadows>>),
+        (up, at_vertices): (&Uploaded, &AtVertices),
         between: impl FnMut(u64, u64) -> Result<()>,
     ) -> Result<(wgpu::TextureView, f64)> {
         let format = wgpu::TextureFormat::R32Float;
         let table = &up.shells.table;
         let kept = table.firsts.last().copied().unwrap_or(0);
-        let count = match shadows {
-            Some(_) => table.shadows.last().copied().unwrap_or(0),
-            None => kept,
+        let end = |of: &[u32]| of.last().copied().unwrap_or(0);
+        let count = match at_vertices {
+            AtVertices { diffuse: Some(_), .. } => end(&table.diffuse),
+            AtVertices { shadows: Some(_), .. } => end(&table.shadows),
+            _ => kept,
         };
         if count == 0 {
             self.last = None;
@@ -368,7 +396,7 @@ impl ShellLightPass {
             lights: scene.volume_lights(),
             volumes: constants.collect(),
             max_cells: scene.trace.max_cells,
-            shadows: shadows.clone(),
+            at_vertices: at_vertices.clone(),
         };
         if let Some((last, view)) = &self.last
             && last.is(&filled)
@@ -377,14 +405,21 @@ impl ShellLightPass {
         }
         // The old values are dropped first, because both might not fit.
         self.last = None;
-        fits(gpu, "the light and shadows at the vertices of the shells", count.into(), "use fewer lights")?;
+        let what = "the light and shadows at the vertices of the shells";
+        fits(gpu, what, count.into(), "use fewer lights, or meshes of fewer triangles")?;
         let texture = texture(gpu, "light in shells", u64::from(count), format)?;
         let view = texture.create_view(&Default::default());
-        if let Some(shadows) = shadows {
-            let mut values: Vec<f32> = shadows.values().collect();
+        let write = |first: u32, mut values: Vec<f32>, what| {
             values.resize(values.len().next_multiple_of(SHELL_ROW as usize), 1.0);
-            let rows = [SHELL_ROW, table.shadows[0] / SHELL_ROW];
-            write_rows(gpu, &texture, rows, &values, "upload shadows on shells")?;
+            write_rows(gpu, &texture, [SHELL_ROW, first / SHELL_ROW], &values, what)
+        };
+        if let Some(shadows) = &at_vertices.shadows {
+            write(table.shadows[0], shadows.values().collect(), "upload shadows on shells")?;
+        }
+        if let Some(diffuse) = &at_vertices.diffuse {
+            let values = diffuse.iter().flatten().flat_map(|own| &own.values);
+            let values = values.flat_map(|value| value.to_array()).collect();
+            write(table.diffuse[0], values, "upload diffuse light in shells")?;
         }
         let seconds = match kept {
             0 => 0.0,

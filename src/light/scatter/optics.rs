@@ -117,6 +117,23 @@ impl Passage {
     }
 }
 
+/// Positions that stand for a cell of so many bits, 0 to 1 from where the ray enters it: one of light that
+/// comes from a light, and one of diffuse light.
+///
+/// In a thick cell the eye sees only what lies in front. The first position has the mean of e^(−2x) over what
+/// is seen, as if light came as deep as the eye looks, and the second is the mean of what is seen, because
+/// diffuse light is interpolated linearly. So light does not depend on where boundaries cut a ray. The
+/// middles of coarse cells were too dark, by a pattern of their boundaries.
+#[inline]
+pub fn within(bits: f32) -> [f32; 2] {
+    let tau = bits * LN_2;
+    if bits < 0.1 {
+        return [0.5 - tau * (1.0 / 8.0), 0.5 - tau * (1.0 / 12.0)];
+    }
+    let passed = exp2(-bits);
+    [(1.0 - log2(1.0 + passed)) / bits, 1.0 / tau - passed / (1.0 - passed)]
+}
+
 /// Light of one light at a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arriving {

@@ -54,7 +54,7 @@ pub(super) const LIGHT: Group = Group {
         p("light.scattering", "", "", Choice(Scattering::WORDS), Uniform)
             .doc(
                 "Scattering in the volume: `single` follows light that is scattered once, `multiple` any \
-                 number of times. `multiple` cannot be combined with `light.visibility=none`.",
+                 number of times. `multiple` cannot be combined with `light.visibility=none` or with boxes.",
             )
             .when("Choose `multiple` when thick water is too dark; shadows are filled and foam turns white."),
         p("light.p", "p", "", Float(1.0, 1e4, 20.0), Uniform)

@@ -257,7 +257,15 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
     let (hair, trilinear) = ("light.reflection=hair", "trace.lookup=trilinear");
     let (none, cached) = ("light.visibility=none", "light.visibility=cached");
     let colored = "light.ambient=[0.1,0.3,0.2]";
-    let variants: [&[&str]; 20] = [
+    let (multiple, skin) = ("light.scattering=multiple", "light.ambient=[0.2,0.3,0.1]");
+    let variants: [&[&str]; 27] = [
+        &[multiple],
+        &[multiple, pyramid, cached, "camera.fov=80"],
+        &[multiple, hair, colored, pyramid],
+        &[multiple, skin, colored, "trace.early_end=0.3"],
+        &[skin, cached],
+        &[skin, pyramid, none, "trace.early_end=0.3"],
+        &[skin, multiple, pyramid, "light.frame=texture"],
         &[hair, "hair.tilt=8"],
         &[hair, pyramid, cached, "camera.fov=80"],
         &[hair, trilinear, "light.frame=texture"],
@@ -297,7 +305,8 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
         [parts.image.width, parts.image.height] = [61, 40];
         let recipe = parts.recipes[0].clone();
         let ramp = if sets.contains(&colored) { ramp(3) } else { Ramp::WHITE };
-        parts.recipes = vec![Recipe { ramp, ..recipe.clone() }, Recipe { flow: 0.3, ..recipe }];
+        let skin = sets.contains(&skin).then(super::shell_scatter::skin);
+        parts.recipes = vec![Recipe { ramp, skin, ..recipe.clone() }, Recipe { flow: 0.3, ..recipe }];
         let mut torn = torn.clone();
         torn.volume = 1;
         parts.shells.extend([Arc::new(torn), Arc::new(ball.clone())]);

@@ -17,6 +17,7 @@ pub mod paint;
 pub mod rasters;
 pub mod ray;
 pub mod shaders;
+pub mod shell_scatter;
 pub mod shells;
 pub mod specialise;
 pub mod volumes;

@@ -8,8 +8,8 @@ use std::path::Path;
 use taki::engine::cpu::gloss;
 use taki::engine::gpu::binding;
 use taki::engine::gpu::layout::{
-    Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Quad, Ramp, Reflection,
-    ShellLightPart, Similarity, Strand, Tile, VertexMaterial, VolumeConstants, WORKGROUP,
+    Environment, FrameUniforms, Groups, HullFace, Light, LightVolume, MeshTile, Optics, Quad, Ramp,
+    Reflection, ShellLightPart, Similarity, Strand, Tile, VertexMaterial, VolumeConstants, WORKGROUP,
 };
 use taki::engine::gpu::shader::{FILES, imports, resolve};
 use taki::engine::gpu::shells;
@@ -177,12 +177,17 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Strand"), fields!(Strand: squeeze spread aeration g));
     let similarity = fields!(Similarity: extinction g albedo pad_0 reduced pad_1 isotropic pad_2);
     assert_eq!(members(&module, "Similarity"), similarity);
-    assert_eq!(members(&module, "Reflection"), fields!(Reflection: strand similarity ramp ambient pad));
+    assert_eq!(
+        members(&module, "Reflection"),
+        fields!(Reflection: strand similarity ramp optics ambient pad)
+    );
     let ramp = fields!(Ramp: first count step_0 k_s_factor step_1 k_s_summand step_2 pad);
     assert_eq!(members(&module, "Ramp"), ramp);
-    let volume =
-        fields!(VolumeConstants: cells extinction base flow_cells similarity ramp levels pad_a pad_b pad_c);
+    let volume = fields!(VolumeConstants: cells extinction base flow_cells similarity ramp optics levels
+        pad_a pad_b pad_c);
     assert_eq!(members(&module, "VolumeConstants"), volume);
+    let optics = fields!(Optics: extinction g albedo eta isotropic roughness);
+    assert_eq!(members(&module, "Optics"), optics);
     let module = validate(&stage("resolve")).expect("valid");
     assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced dither));
     let module = validate(&stage("visibility")).expect("valid");

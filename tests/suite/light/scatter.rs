@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod flux;
+mod optics;
 mod parity;
 mod pictures;
 mod renderer;

@@ -37,8 +37,8 @@ fn albedos_tell_melanin_and_blood() {
         assert!(lighter.cmplt(Vec3::ONE).all());
     }
     // Melanin takes most from blue, blood from green and blue.
-    let lost = (dermis - epidermis) / dermis;
-    assert!(lost.z > lost.y && lost.y > lost.x, "{lost}");
+    let absorption = LIGHT.epidermis();
+    assert!(absorption.z > absorption.y && absorption.y > absorption.x, "{absorption}");
     let lost = (dermis - flushed) / dermis;
     assert!(lost.y > 10.0 * lost.x && lost.z > 5.0 * lost.x, "{lost}");
     // Where there is no epidermis in a layer, it is dermis.

@@ -53,6 +53,19 @@ fn colours_that_cannot_be_shown_are_refused() {
 }
 
 #[test]
+fn colours_of_shells_go_with_light_that_scatters_many_times() {
+    let ring = Scene::preset("torus").expect("a preset");
+    let many = ring.with(&["light.scattering=multiple"]).expect("a scene");
+    assert!(!many.shells.is_empty() && many.recipes.iter().all(|recipe| recipe.ramp != Ramp::WHITE));
+    // A quad with the fur's volume refuses it.
+    let quad = ["materials.fur.carrier=face", "light.scattering=multiple"];
+    super::refused(
+        ring.with(&quad).map(|_| ()).map_err(|e| e.to_string()),
+        &["volumes.fur.color", "light.scattering=single"],
+    );
+}
+
+#[test]
 fn settings_of_other_builders_have_no_effect() {
     let fur = with(&FUR).expect("a scene");
     let said = |scene: &Scene, set: &str| {

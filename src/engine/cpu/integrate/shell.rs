@@ -10,7 +10,7 @@ use super::{FrameVolume, Integrator, Observer, RayResult, SheetOrder};
 use crate::light::AngleFrame;
 use crate::light::fibre::{Metric, Spread, psi_parts};
 use crate::light::ramp::Ink;
-use crate::light::scatter::optics::Passage;
+use crate::light::scatter::optics::{Passage, within};
 use crate::light::strand::ROOT_TO_TIP;
 use crate::mapping::shell::{End, HullFace, Segment, Shell, ShellPath};
 use crate::trace::lookup::{CellSample, Level, level_at};
@@ -55,6 +55,21 @@ pub(super) struct Place {
     pub depth: f32,
     /// The place in the world, metres.
     pub point: Vec3,
+}
+
+impl Place {
+    /// Place on a ray in a tetrahedron, `t` metres behind the start of its `segment` of this `length`.
+    #[inline]
+    pub fn on_ray(shell: usize, segment: &Segment, (origin, d): (Vec3, Vec3), t: f32, length: f32) -> Place {
+        let along = t / length;
+        Place {
+            shell,
+            tetrahedron: [segment.prism, segment.tetrahedron],
+            shares: segment.shares[0].lerp(segment.shares[1], along),
+            depth: segment.at[0].z + (segment.at[1].z - segment.at[0].z) * along,
+            point: origin + d * (segment.t[0] + t),
+        }
+    }
 }
 
 /// A ray inside a shell.
@@ -256,21 +271,22 @@ impl Integrator<'_> {
             let weight = (ray.transmittance - passed) * share;
             let ink = self.ink(ray.shell.volume as usize, sample.k[1]);
             let k = [sample.k[0], ink.map_or(sample.k[1], |ink| ink.k_s)];
-            let middle = 0.5 * (crossing.t_enter + crossing.t_exit);
-            let along = middle / length;
-            let place = Place {
-                shell: ray.number,
-                tetrahedron: [segment.prism, segment.tetrahedron],
-                shares: segment.shares[0].lerp(segment.shares[1], along),
-                depth: segment.at[0].z + (segment.at[1].z - segment.at[0].z) * along,
-                point: ray.origin + ray.d * (segment.t[0] + middle),
+            let place_at = |t: f32| Place::on_ray(ray.number, segment, (ray.origin, ray.d), t, length);
+            let place = match optics {
+                Some(_) => {
+                    place_at(crossing.t_enter + (crossing.t_exit - crossing.t_enter) * within(tau_bits)[0])
+                }
+                None => place_at(0.5 * (crossing.t_enter + crossing.t_exit)),
             };
             let j = self.frame(ray.shell, &place);
             let fibres = self.fibres(level, cell, &sample, &j);
             if let Some(optics) = optics {
                 let view = depth_between(ray.start, ray.transmittance);
+                let deep =
+                    place_at(crossing.t_enter + (crossing.t_exit - crossing.t_enter) * within(tau_bits)[1]);
                 let cell = ScatterCell {
                     place: &place,
+                    deep: &deep,
                     d: ray.d,
                     j: &j,
                     k,
@@ -283,7 +299,7 @@ impl Integrator<'_> {
                 let sum = self.scattered(optics, level, &cell, &mut ray.cells[1], observer);
                 ray.radiance[usize::from(!level.is_whole)] += sum;
                 ray.transmittance = passed;
-                ray.last = Some((place, color_of(ink)));
+                ray.last = Some((deep, color_of(ink)));
                 continue;
             }
             let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));

@@ -16,7 +16,9 @@ use crate::volume::Moments;
 
 /// An occupied cell of a shell in which light scatters many times.
 pub(super) struct ScatterCell<'c> {
+    /// Place that stands for the cell, and that for its diffuse light.
     pub place: &'c Place,
+    pub deep: &'c Place,
     /// Direction of the view ray.
     pub d: Vec3,
     /// J = world_from_cell.
@@ -82,7 +84,7 @@ impl Integrator<'_> {
         observer: &mut O,
     ) -> Vec3 {
         let reduced = cell.passage.weight(own.extinction);
-        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.place));
+        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.deep));
         observer.ambient(sum);
         for i in 0..self.lights.len() {
             let light = self.arriving(level, cell.place, i, walked);
@@ -114,7 +116,9 @@ impl Integrator<'_> {
         let on_surface = cell.passage.surface_weight();
         let normal = CellNormal::new(&cell.moments, cell.j);
         let alpha2 = surface.roughness * surface.roughness + normal.variance;
-        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.place));
+        // Even light that the surface does not let in comes back from it.
+        let thrown_back = (1.0 - leaves * (surface.eta * surface.eta)) * on_surface;
+        let mut sum = reduced * (own.albedo * self.diffuse_at(cell.deep)) + self.scene.ambient * thrown_back;
         observer.ambient(sum);
         for i in 0..self.lights.len() {
             let light = self.arriving(level, cell.place, i, walked);

@@ -5,7 +5,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use fearless_simd::u32x8;
 
-use super::{Corner, End, ShellPath};
+use super::{Corner, End, Segment, ShellPath};
 use crate::mapping::shell::{AT_SIDES, FACES, Face, Shell};
 use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Stored, Stored3, Words, lanes_of};
 
@@ -55,6 +55,19 @@ pub struct LaneSegments {
 }
 
 impl LaneSegments {
+    /// The segment of a lane.
+    #[inline]
+    pub fn get(&self, lane: usize) -> Segment {
+        Segment {
+            prism: self.prism[lane],
+            tetrahedron: self.tetrahedron[lane],
+            t: [self.t[0].0[lane], self.t[1].0[lane]],
+            at: [self.at[0].get(lane), self.at[1].get(lane)],
+            shares: [self.shares[0].get(lane), self.shares[1].get(lane)],
+            end: self.end[lane],
+        }
+    }
+
     /// Keeps the parts of the segments behind the parameters `least`, where these lie inside. Twin:
     /// [`Segment::from`](super::Segment::from).
     #[inline(always)]

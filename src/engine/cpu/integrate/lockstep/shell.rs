@@ -17,7 +17,7 @@ use crate::engine::cpu::integrate::shell::{Hull, Place};
 use crate::engine::cpu::integrate::shell_scatter::depth_between;
 use crate::engine::cpu::integrate::{Integrator, RayResult, SheetOrder};
 use crate::light::AngleFrame;
-use crate::light::scatter::optics::Passage;
+use crate::light::scatter::optics::{Passage, within};
 use crate::mapping::shell::{LanePaths, LaneSegments};
 use crate::trace::Lookup;
 use crate::trace::lookup::Level;
@@ -267,6 +267,7 @@ impl<'a> ShellLanes<'a> {
                 share: weight,
                 before: transmittance,
                 bits_in_cell: bits,
+                ends: [enter, leave],
                 middle: (enter + leave) * 0.5,
             };
             self.light(simd, ground, &numbers, way, &found, hits);
@@ -327,8 +328,10 @@ impl<'a> ShellLanes<'a> {
         point.store(rays.origin.load(simd).plus(rays.d.load(simd).times(t)));
         let mut weight = Stored::default();
         weight.store(found.weight);
-        let [mut share, mut before, mut bits] = [Stored::default(); 3];
+        let [mut share, mut before, mut bits, mut enter, mut leave] = [Stored::default(); 5];
         if !self.scattered.is_empty() {
+            enter.store(found.ends[0]);
+            leave.store(found.ends[1]);
             share.store(found.share);
             before.store(found.before);
             bits.store(found.bits_in_cell);
@@ -346,12 +349,19 @@ impl<'a> ShellLanes<'a> {
             let lit = LitCell { hit, cell: found.cells[lane], weight: weight.0[lane], place };
             let kind = usize::from(!level.is_whole);
             if !self.scattered.is_empty()
-                && let Some(optics) = integrator.optics_of(&integrator.scene.shells[lit.place.shell])
+                && integrator.optics_of(&integrator.scene.shells[lit.place.shell]).is_some()
             {
                 let start = hits[hit].order.before;
                 let view = depth_between(start, before.0[lane]);
                 let passage = Passage { start: start * share.0[lane], view, cell: bits.0[lane] };
-                self.scattered.push(simd, integrator, level, (&lit, &passage, lane), hits, optics);
+                let (segment, ray) = (segments.get(lane), (rays.origin.get(lane), rays.d.get(lane)));
+                let length = segment.t[1] - segment.t[0];
+                let [own, deep] = within(bits.0[lane]).map(|at| {
+                    let t = enter.0[lane] + (leave.0[lane] - enter.0[lane]) * at;
+                    Place::on_ray(lit.place.shell, &segment, ray, t, length)
+                });
+                let lit = LitCell { place: own, ..lit };
+                self.scattered.push(simd, integrator, level, (&lit, &deep, lane), &passage, hits);
                 continue;
             }
             let pending = &mut self.pending[kind];
@@ -375,6 +385,8 @@ struct Found<'c, S: Simd> {
     before: Floats<S>,
     /// Optical depth in the cells, bits.
     bits_in_cell: Floats<S>,
+    /// Parameters where the rays enter the cells, and where they leave them.
+    ends: [Floats<S>; 2],
     /// Parameters in the middle of the cells.
     middle: Floats<S>,
 }

@@ -51,14 +51,15 @@ impl Scattered {
         simd: S,
         integrator: &Integrator,
         level: &Level,
-        (lit, passage, lane): (&LitCell, &optics::Passage, usize),
+        (lit, deep, lane): (&LitCell, &Place, usize),
+        passage: &optics::Passage,
         hits: &mut [ShellHit],
-        optics: &optics::ShellOptics,
     ) {
+        let Some(optics) = integrator.optics_of(&integrator.scene.shells[lit.place.shell]) else { return };
         let kinds = [if optics.surface.is_some() { SKIN } else { FIBRES }, usize::from(!level.is_whole)];
         let pending = &mut self.lists[kinds[0]][kinds[1]];
-        let color = pending.push(integrator, level, (lit, passage), &mut hits[lit.hit], optics);
-        self.last[lane] = Some((lit.place, color));
+        let color = pending.push(integrator, level, (lit, deep), passage, &mut hits[lit.hit], optics);
+        self.last[lane] = Some((*deep, color));
         if pending.cells.is_full() {
             pending.shade(simd, integrator, kinds, hits);
         }
@@ -139,7 +140,8 @@ impl PendingScatter {
         &mut self,
         integrator: &Integrator,
         level: &Level,
-        (lit, passage): (&LitCell, &optics::Passage),
+        (lit, deep): (&LitCell, &Place),
+        passage: &optics::Passage,
         hit: &mut ShellHit,
         own: &optics::ShellOptics,
     ) -> Vec3 {
@@ -160,7 +162,7 @@ impl PendingScatter {
         if let Some(surface) = &own.surface {
             (self.eta.0[i], self.roughness.0[i]) = (surface.eta, surface.roughness);
         }
-        self.diffuse.set(i, integrator.diffuse_at(&lit.place));
+        self.diffuse.set(i, integrator.diffuse_at(deep));
         color
     }
 
@@ -239,7 +241,10 @@ impl PendingScatter {
         let moments = if kind == 0 { Moments::of(second) } else { Moments::unpacked(simd, second) };
         let normal = CellNormal::new(simd, &moments, &frame);
         let alpha2 = surface.roughness * surface.roughness + normal.variance;
-        let mut sum = reduced.by(own.albedo.by(self.diffuse.load(simd)));
+        let thrown_back = (f32x8::splat(simd, 1.0) - leaves * (surface.eta * surface.eta)) * on_surface;
+        let ambient = Lanes3::splat(simd, integrator.scene.ambient);
+        let diffuse = reduced.by(own.albedo.by(self.diffuse.load(simd)));
+        let mut sum = diffuse.plus(ambient.times(thrown_back));
         let zero = f32x8::splat(simd, 0.0);
         for (i, light) in integrator.lights.iter().enumerate() {
             let arriving = self.arriving(simd, i);
