@@ -24,7 +24,9 @@ fn diffuse(scene: &Scene, volume: &VolumeTexture) -> Option<Arc<DiffuseOfShells>
 }
 
 fn ball() -> Scene {
-    let mut scene = scene(shell(&sphere(3, 0.3), Side::Outward), [0.0, 0.0, 5.0]);
+    let mut ball = shell(&sphere(3, 0.3), Side::Outward);
+    ball.skin = true;
+    let mut scene = scene(ball, [0.0, 0.0, 5.0]);
     scene.edit().scattering = Scattering::Multiple;
     scene.edit().lights = vec![Light::Directional { to_light: Vec3::X, intensity: Vec3::ONE }];
     scene

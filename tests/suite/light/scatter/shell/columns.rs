@@ -31,8 +31,8 @@ fn a_flat_shell_sends_back_and_through_what_the_exact_slab_does() {
 
 #[test]
 fn a_half_space_reflects_as_chandrasekhar_found() {
-    for omega in [0.5, 0.8, 0.9, 0.95, 0.99, 1.0] {
-        for mu in [0.3, 0.5, 1.0] {
+    for omega in [0.5, 0.8, 0.95, 1.0] {
+        for mu in [0.3, 1.0] {
             let want = 1.0 - f64::sqrt(1.0 - omega) * h_function(omega, mu);
             let light = [light(mu)];
             let lit = Surroundings { lights: &light, ..Default::default() };
