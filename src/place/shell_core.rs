@@ -6,6 +6,9 @@ use super::bvh::{Bvh, Caster};
 use crate::light::scatter::shell::Opposite;
 use crate::mapping::shell::Shell;
 
+/// Tangent of the angle by which a ray is turned that found nothing.
+const TILT: f32 = 0.01;
+
 /// The inner surface opposite each vertex: where the ray against the normal leaves the body again, less the
 /// shell on both sides. Rays begin at the outer surface, because thin parts have no room for the inner ones.
 pub fn opposite(shell: &Shell) -> Vec<Option<Opposite>> {
@@ -19,7 +22,11 @@ pub fn opposite(shell: &Shell) -> Vec<Option<Opposite>> {
     let thickness = |vertex: usize| shell.points[2 * vertex].distance(shell.points[2 * vertex + 1]);
     let of = |(vertex, normal): (usize, &glam::Vec3)| {
         let from = shell.points[2 * vertex] - *normal * margin;
-        let hit = body.first_way_out(from, -*normal)?;
+        let (a, b) = normal.any_orthonormal_pair();
+        // A ray may slip through between two triangles.
+        let ways =
+            [*normal, *normal + a * TILT, *normal - (a + b) * TILT].map(|way| -way.normalize_or_zero());
+        let hit = ways.into_iter().find_map(|way| body.first_way_out(from, way))?;
         let vertices = outer[hit.triangle].points.map(|point| point / 2);
         let there = vertices.map(|vertex| thickness(vertex as usize));
         let both = thickness(vertex) + hit.shares.dot(there.into());

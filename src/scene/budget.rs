@@ -1,7 +1,8 @@
 //! Memory that a scene's picture takes besides its volume.
 
 use super::Parts;
-use crate::light::Visibility;
+use crate::light::scatter::shell::{DIFFUSE_BYTES, diffuse_work_bytes};
+use crate::light::{Scattering, Visibility};
 use crate::picture::{LEAST_ROWS, WORK_BYTES, canvas, row_bytes};
 use crate::place::{CASTER_BYTES, Pool, Vertex};
 
@@ -17,8 +18,9 @@ impl Parts {
         let paintings = self.triangles.iter().filter_map(|own| own.painting.as_ref());
         let painted = paintings.map(|painting| 2 * painting.bytes()).sum::<u64>();
         let shells = self.shells.iter().map(|shell| shell.bytes()).sum::<u64>();
-        let all = [rocks, environment, shells, painted, self.bytes_of_shadows_on_shells()];
-        all.into_iter().fold(canvas(&self.image, layers), u64::saturating_add)
+        let on_shells = [self.bytes_of_shadows_on_shells(), self.bytes_of_diffuse_on_shells()];
+        let all = [rocks, environment, shells, painted].into_iter().chain(on_shells);
+        all.fold(canvas(&self.image, layers), u64::saturating_add)
     }
 
     /// Returns the bytes of the shadows that opaque matter casts on shells: what casts them, and their shares
@@ -33,6 +35,23 @@ impl Parts {
         let vertices: u64 = self.shells.iter().map(|shell| shell.vertices() as u64).sum();
         let lights = (self.lights.len() + self.environment_lights.len()) as u64;
         if vertices == 0 { 0 } else { casters * CASTER_BYTES + 16 * lights * vertices }
+    }
+
+    /// Returns the bytes of the diffuse light in shells: its values on host and device, and what the host
+    /// needs while it solves for them in one shell.
+    fn bytes_of_diffuse_on_shells(&self) -> u64 {
+        let (mut kept, mut work) = (0, 0);
+        for shell in &self.shells {
+            let recipe = &self.recipes[shell.volume as usize];
+            if self.scattering == Scattering::Single && recipe.skin.is_none() {
+                continue;
+            }
+            let layers = recipe.water.size[2].div_ceil(2);
+            let vertices = shell.vertices() as u64;
+            kept += 2 * vertices * u64::from(layers + 1) * DIFFUSE_BYTES;
+            work = vertices.saturating_mul(diffuse_work_bytes(layers as usize)).max(work);
+        }
+        work.saturating_add(kept)
     }
 
     /// Returns the bytes that a picture of the whole image needs besides the volume, with every layer of an

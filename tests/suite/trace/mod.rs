@@ -3,5 +3,6 @@
 pub mod closed_forms;
 pub mod flow;
 pub mod limits;
+pub mod shell_diffuse;
 pub mod shell_shadows;
 pub mod shells;

@@ -27,6 +27,15 @@ pub use matter::layer_colors;
 /// interpolated.
 const MOST_LAYERS: usize = 32;
 
+/// Bytes of a value of J.
+pub const DIFFUSE_BYTES: u64 = size_of::<Vec3>() as u64;
+
+/// Bytes that a vertex takes while J is solved for between `layers` layers: six lists of values, the ways
+/// to its neighbours, and what sorts them.
+pub fn diffuse_work_bytes(layers: usize) -> u64 {
+    6 * DIFFUSE_BYTES * (layers.clamp(1, MOST_LAYERS) as u64 + 1) + 400
+}
+
 /// Matter of a shell as its diffuse light meets it: a reduced medium, in which scattering is isotropic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShellMatter {
@@ -119,7 +128,8 @@ impl ShellDiffuse {
             }
         });
         let mut core = core::Core::new(matter, &graph, surroundings.opposite);
-        let thin = surroundings.opposite.iter().enumerate();
+        let opposite = if matter.below == Below::Core { surroundings.opposite } else { &[] };
+        let thin = opposite.iter().enumerate();
         for (vertex, opposite) in thin.filter_map(|(vertex, opposite)| Some((vertex, opposite.as_ref()?))) {
             for (number, light) in surroundings.lights.iter().enumerate() {
                 let (mu, intensity, [_, share]) = arrives(vertex, number, light);

@@ -231,18 +231,14 @@ impl<'a> Sideways<'a> {
                 sum
             }));
             let far = ratio(left, curve).as_vec3();
-            let move_on =
-                |((value, rest), (way, product)): ((&mut [Vec3], &mut [Vec3]), (&[Vec3], &[Vec3]))| {
-                    for i in 0..value.len() {
-                        value[i] += way[i] * far;
-                        rest[i] -= product[i] * far;
-                    }
-                };
             values
                 .par_chunks_mut(chunk)
                 .zip(rest.par_chunks_mut(chunk))
                 .zip(way.par_chunks(chunk).zip(product.par_chunks(chunk)))
-                .for_each(move_on);
+                .for_each(|((value, rest), (way, product))| {
+                    value.iter_mut().zip(way).for_each(|(value, way)| *value += *way * far);
+                    rest.iter_mut().zip(product).for_each(|(rest, product)| *rest -= *product * far);
+                });
             let before = left;
             left = precondition(&rest, &mut solved);
             let share = ratio(left, before).as_vec3();

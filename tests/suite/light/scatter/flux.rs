@@ -35,11 +35,11 @@ fn moments(g: f64) -> [f64; MOMENTS] {
 }
 
 /// Shares of a beam's light that a slab sends back and through, the latter with the beam, by doubling.
-pub fn exact(x: f64, omega: f64, g: f64, mu_0: f64) -> [f64; 2] {
+fn exact(x: f64, omega: f64, g: f64, mu_0: f64) -> [f64; 2] {
     exact_for(x, omega, g, mu_0, &eyes())
 }
 
-fn exact_for(x: f64, omega: f64, g: f64, mu_0: f64, eyes: &[f64]) -> [f64; 2] {
+pub fn exact_for(x: f64, omega: f64, g: f64, mu_0: f64, eyes: &[f64]) -> [f64; 2] {
     let out = emergent(x, omega, &moments(g), &[mu_0], eyes);
     let [back, through] = out.faces.map(|face| face.iter().sum::<f64>() / eyes.len() as f64 / mu_0);
     [back, through + (-x / mu_0).exp()]

@@ -13,7 +13,7 @@ use taki::light::strand::hair::{Hair, Pigment};
 use taki::light::strand::table::StrandShading;
 
 /// Numbers of walks, and of the steps of a hair's albedo over the sine of the light's inclination.
-const WALKS: u32 = 100_000;
+const WALKS: u32 = 16_000;
 const SINES: usize = 41;
 
 /// A unit vector, uniform.
@@ -39,13 +39,23 @@ impl Hairs {
         let hair = Hair { pigment: Pigment::Melanin(melanin, 0.2), ..Hair::default() };
         let shading = StrandShading::new(&hair.strand());
         let mut hairs = Hairs { shading, albedo: Vec::new(), most: 0.0, along };
-        let mut rng = Pcg64Mcg::seed_from_u64(5);
+        const RINGS: usize = 1000;
+        const TURNS: usize = 48;
         for i in 0..SINES {
             let sine = -1.0 + 2.0 * i as f64 / (SINES - 1) as f64;
             let l = DVec3::new((1.0 - sine * sine).sqrt(), sine, 0.0);
-            let values: Vec<f64> = (0..8000).map(|_| hairs.phase(DVec3::Y, l, uniform(&mut rng))).collect();
-            hairs.albedo.push((values.iter().sum::<f64>() / 8000.0).min(1.0));
-            hairs.most = values.into_iter().fold(hairs.most, f64::max);
+            let mut sum = 0.0;
+            for ring in 0..RINGS {
+                let y = -1.0 + 2.0 * (ring as f64 + 0.5) / RINGS as f64;
+                for turn in 0..TURNS {
+                    let (sin, cos) = ((turn as f64 + 0.5) / TURNS as f64 * PI).sin_cos();
+                    let across = (1.0 - y * y).sqrt();
+                    let value = hairs.phase(DVec3::Y, l, DVec3::new(across * cos, y, across * sin));
+                    sum += value;
+                    hairs.most = hairs.most.max(value);
+                }
+            }
+            hairs.albedo.push((sum / (RINGS * TURNS) as f64).min(1.0));
         }
         hairs
     }
@@ -144,25 +154,26 @@ fn modelled(hairs: &Hairs, depth: f64, mu: f64) -> [f64; 2] {
 
 #[test]
 fn hairs_send_back_what_walks_from_hair_to_hair_do() {
-    for (name, melanin) in [("white", 0.0), ("blond", 0.1), ("brown", 0.5)] {
-        for along in [None, Some(DVec3::X), Some(DVec3::new(0.8, 0.0, 0.6))] {
-            let hairs = Hairs::new(melanin, along);
-            let moments = hairs.shading.moments();
-            println!("{name} ω {:.3} g {:.3} {along:?}", moments.albedo.y, moments.mean_cosine.y);
-            for depth in [2.0, 8.0, 24.0] {
-                for mu in [1.0, 0.5] {
-                    let l = light(mu).at(Vec3::ZERO).0.as_dvec3();
-                    let [once, truth] = hairs.walked(depth, l);
-                    let model = modelled(&hairs, depth, mu);
-                    let of = |side: usize| (model[side] - truth[side]) / (truth[side] + once[side]);
-                    println!(
-                        "  depth {depth} μ {mu}: once {once:.3?} more {truth:.3?} model {model:.3?} \
-                         errors of all {:.3} {:.3}",
-                        of(0),
-                        of(1)
-                    );
-                }
-            }
+    for (name, melanin) in [("blond", 0.1), ("brown", 0.5)] {
+        let hairs = Hairs::new(melanin, None);
+        for (depth, mu, allowed) in [(2.0, 1.0, 0.06), (8.0, 1.0, 0.06), (8.0, 0.5, 0.15)] {
+            let l = light(mu).at(Vec3::ZERO).0.as_dvec3();
+            let [once, truth] = hairs.walked(depth, l);
+            let model = modelled(&hairs, depth, mu);
+            let error = (model[0] - truth[0]) / (truth[0] + once[0]);
+            println!("{name} {depth} {mu}: once {once:.3?} more {truth:.3?} model {model:.3?} {error:.3}");
+            assert!(error.abs() < allowed, "{name}, depth {depth}, μ {mu}: {error}");
         }
     }
+}
+
+#[test]
+fn hairs_that_lie_along_the_light_scatter_it_on() {
+    // The reduced medium knows the hairs' mean albedo and cosine alone. Where all hairs lie nearly along the
+    // light, it sends several times too much back; docs/method.md says so.
+    let hairs = Hairs::new(0.1, Some(DVec3::new(0.8, 0.0, 0.6)));
+    let l = light(0.5).at(Vec3::ZERO).0.as_dvec3();
+    let ([_, truth], model) = (hairs.walked(8.0, l), modelled(&hairs, 8.0, 0.5));
+    println!("{truth:.3?} {model:.3?}");
+    assert!(model[0] > 2.0 * truth[0]);
 }

@@ -81,7 +81,7 @@ fn in_slab(x: f64, omega: f64, layers: usize, below: Below, surroundings: &Surro
 fn fluxes(values: &[f64], x: f64, omega: f64, mu: f64) -> [f64; 2] {
     let from_below = mu < 0.0;
     let mu = mu.abs();
-    const STEPS: usize = 20_000;
+    const STEPS: usize = 4000;
     let mut sums = [0.0; 2];
     for i in 0..STEPS {
         // Dense near both ends.

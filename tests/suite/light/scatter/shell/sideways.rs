@@ -79,10 +79,13 @@ fn light_spreads_below_a_shadows_edge_as_random_walks_do() {
             let error = (got(bin) - mean(truth)) / lit;
             worst = worst.max(error.abs());
         }
-        // Light falls by e over the length that the walks have.
+        assert!(worst < 0.05, "x {x}, ω {omega}: {worst}");
+        // The logarithm of the fall over twelve steps in the dark. A beam crosses a thin shell, and goes
+        // farther than diffusion knows.
         let fall = |of: &dyn Fn(usize) -> f64| (of(bins + 4) / of(bins + 16)).ln();
         let [got, want] = [fall(&got), fall(&|bin| mean(&truth[bin]))];
         println!("x {x} ω {omega}: {} steps, worst {worst:.4}, fall {got:.3} want {want:.3}", solved.steps);
+        assert!(x < 2.0 || (got / want - 1.0).abs() < 0.1, "x {x}, ω {omega}: {got}, not {want}");
     }
 }
 
@@ -124,20 +127,98 @@ fn a_thin_core_is_part_of_a_slab() {
         let lit = Surroundings { opposite: &opposite, ..lit };
         let solved = solve(&shell, layers, &even(2 * layers, omega as f32, Below::Core), &lit);
         let [near, far] = [4, count + 4].map(|v| column(&solved, v));
-        println!("deep {deep} d {d} ω {omega}: {} steps", solved.steps);
         for i in 0..=4 {
-            let tau = deep * i as f64 / 4.0;
-            let [got, other] = [between(&near, i as f64 / 4.0), between(&far, i as f64 / 4.0)];
-            let [want, want_other] = [between(&truth, tau / x), between(&truth, 1.0 - tau / x)];
-            println!("  τ {tau}: {got:.4} want {want:.4}; far {other:.4} want {want_other:.4}");
+            let tau = deep * f64::from(i) / 4.0;
+            let [got, other] = [&near, &far].map(|values| between(values, f64::from(i) / 4.0));
+            let [want, want_other] = [tau, x - tau].map(|tau| between(&truth, tau / x));
+            let errors = [(got - want) / want, (other - want_other) / want_other];
+            println!("deep {deep} d {d} ω {omega} τ {tau}: {errors:.3?}");
+            // J at the surface of diffusion is too high by 2/√3, so that its flux is right.
+            assert!(errors[0].abs() < 0.06 && errors[1].abs() < if i == 0 { 0.22 } else { 0.09 });
+        }
+        // Without the opposite side no light comes through.
+        let lit = Surroundings { opposite: &[], ..lit };
+        let dark = solve(&shell, layers, &even(2 * layers, omega as f32, Below::Core), &lit);
+        assert!(column(&dark, count + 4)[0] == 0.0);
+    }
+}
+
+/// A wavy shell of several colours with two lights, ambient light and shadows.
+fn wavy(below: Below, eta: f32) -> (Shell, ShellMatter, Vec<[f32; 2]>) {
+    let shell = flat([60, 60], 0.01, |v| 0.03 * ((v % 61) as f32 / 20.0).sin().max(0.0));
+    let matter = ShellMatter {
+        extinction: (0..16).map(|k| Vec3::new(20.0, 30.0, 0.0) * k as f32).collect(),
+        albedo: (0..16).map(|k| Vec3::new(1.0, k as f32 / 15.0, 0.0)).collect(),
+        eta,
+        below,
+    };
+    let shares = (0..61 * 61).map(|v| [f32::from(v % 7 > 2), f32::from(v % 5 > 1)]).collect();
+    (shell, matter, shares)
+}
+
+/// What lies below shells, and their index of refraction.
+const BELOW: [(Below, f32); 4] = [
+    (Below::Open, 1.0),
+    (Below::Opaque { albedo: Vec3::ONE }, 1.0),
+    (Below::Opaque { albedo: Vec3::ZERO }, 1.4),
+    (Below::Core, 1.4),
+];
+
+#[test]
+fn one_thread_and_many_give_the_same_bits() {
+    let (shell, matter, shares) = wavy(Below::Open, 1.0);
+    let light = [light(0.7), light(0.2)];
+    let lit = Surroundings {
+        lights: &light,
+        shares: Some(vec![&shares, &shares]),
+        ambient: Vec3::splat(0.1),
+        opposite: &[],
+    };
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| solve(&shell, 8, &matter, &lit))
+    };
+    let one = of(1);
+    assert!(one.steps > 2, "light goes along the shell");
+    assert_eq!(one, of(5));
+}
+
+#[test]
+fn without_light_it_is_dark_and_no_matter_breaks_the_numbers() {
+    for (below, eta) in BELOW {
+        let (shell, matter, shares) = wavy(below, eta);
+        let light = [light(0.7), light(-0.2), light(0.0), light(1e-4)];
+        let dark = Surroundings { lights: &light[1..1], ..Default::default() };
+        assert!(solve(&shell, 8, &matter, &dark).values.iter().all(|j| *j == Vec3::ZERO));
+        let opposite: Vec<Option<Opposite>> = (0..61 * 61u32)
+            .map(|v| {
+                Some(Opposite {
+                    vertices: [v, v / 2, 0],
+                    shares: Vec3::splat(1.0 / 3.0),
+                    distance: (v % 3) as f32,
+                })
+            })
+            .collect();
+        let lit = Surroundings {
+            lights: &light,
+            shares: Some(vec![&shares; 4]),
+            ambient: Vec3::splat(0.1),
+            opposite: &opposite,
+        };
+        let empty = ShellMatter { extinction: vec![Vec3::ZERO; 16], ..matter.clone() };
+        let dense = ShellMatter { extinction: vec![Vec3::splat(1e5); 16], ..matter.clone() };
+        for matter in [&matter, &empty, &dense] {
+            let solved = solve(&shell, 8, matter, &lit);
+            let is_sane = |j: &Vec3| j.is_finite() && j.min_element() >= 0.0 && j.max_element() < 10.0;
+            assert!(solved.values.iter().all(is_sane), "{below:?}, η {eta}");
         }
     }
 }
 
 #[test]
-fn times() {
-    let n = 140;
-    let shell = flat([n, n], 0.01, |v| 0.02 + 0.01 * ((v % 17) as f32 / 17.0));
+fn few_steps_solve_a_shell() {
+    // 20,000 vertices and 8 layers. The edges are as long as a third of the depth.
+    let shell = flat([140, 140], 0.01, |v| 0.02 + 0.01 * ((v % 17) as f32 / 17.0));
     let matter = ShellMatter {
         extinction: (0..16).map(|k| Vec3::splat(20.0 * k as f32)).collect(),
         albedo: vec![Vec3::new(0.9, 0.8, 0.7); 16],
@@ -149,4 +230,5 @@ fn times() {
     let start = std::time::Instant::now();
     let solved = solve(&shell, 8, &matter, &lit);
     println!("{} vertices: {} steps, {:?}", shell.vertices(), solved.steps, start.elapsed());
+    assert!(solved.steps < 20, "{} steps", solved.steps);
 }
