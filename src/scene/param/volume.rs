@@ -223,8 +223,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.source", "", "", Text(""), Volume)
             .doc(
                 "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz); \
-                 with `volume.builder=strands`, of a file of hair (.hair). Like all paths of a scene, it \
-                 lies in the folder of the scene. With `####` in its name it is a sequence, of which \
+                 with `volume.builder=strands`, of a file of hair (.hair) or of curves (.usdc, .usda, .usd, \
+                 .usdz). Like all paths of a scene, it lies in the folder of the scene. With `####` in its name it is a sequence, of which \
                  `volume.frame` chooses the file.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),
