@@ -31,7 +31,7 @@ struct Knots {
     weights: Option<Vec<f64>>,
 }
 
-/// Strands of a prim, and what is told about them.
+/// What is told about curves.
 #[derive(Default)]
 pub(super) struct Told {
     /// Curves of too few points for a segment.
@@ -44,7 +44,8 @@ impl Curves {
     /// Reads a prim. `None` for one without points.
     ///
     /// # Errors
-    /// [`Error::Input`](crate::util::error::Error::Input) for numbers that do not fit together or are not finite; [`Error::Memory`](crate::util::error::Error::Memory).
+    /// [`Error::Input`](crate::util::error::Error::Input) for numbers that do not fit together or are not
+    /// finite; [`Error::Memory`](crate::util::error::Error::Memory) for too many.
     pub fn read(
         layer: &mut Layer,
         shown: &Shown,

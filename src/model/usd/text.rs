@@ -6,9 +6,9 @@
 /// Most brackets that may be open at once. Files of real programs have up to some 30: a prim in a prim has
 /// one. The parser takes less than the smallest stack of a thread, 2 MiB, up to this depth.
 pub(super) const MOST_DEPTH: usize = 128;
-/// Bytes of memory for a byte of text, for a mark between elements, for one between a name and its value, for a word, of which an attribute
-/// has two, and for a bracket of a prim.
-/// Measured with openusd 0.6.0 on texts of nothing but one of these, and rounded up.
+/// Bytes of memory for a byte of text, for a mark between elements, for one between a name and its value,
+/// for a word, of which an attribute has two, and for a bracket of a prim. Measured with openusd 0.6.0 on
+/// texts of nothing but one of these, and rounded up.
 const BYTE: u128 = 4;
 const COMMA: u128 = 32;
 const MARK: u128 = 320;

@@ -166,8 +166,8 @@ pub(super) const IMPORT: Group = Group {
         p("import.file_unit", "", "m", Float(1e-6, 1e6, 1.0), Volume)
             .slider(0.001, 1.0)
             .doc(
-                "Length of the file's unit. Unless it is set, that of a file of USD is its metersPerUnit, or a \
-                 centimetre where it has none.",
+                "Length of the file's unit. Unless it is set, that of a file of USD is its metersPerUnit, \
+                 or a centimetre where it has none.",
             )
             .when("Set 0.01 for a file in centimetres, and 0.0254 for one in inches."),
         p("import.strand_diameter", "", "m", Float(0.0, 1.0, 0.0), Volume)

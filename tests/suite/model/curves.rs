@@ -119,9 +119,9 @@ fn straight_curves_keep_their_points_and_bends_have_more() {
     let folder = Folder::new(&[]);
     let cubic = |points: &str| {
         let own = format!(
-            "(metersPerUnit = 1)\ndef BasisCurves \"a\" {{ uniform token basis = \"catmullRom\" uniform token \
-             wrap = \"pinned\" int[] curveVertexCounts = [4] point3f[] points = [{points}] float[] widths = \
-             [0.1] (interpolation = \"constant\") }}"
+            "(metersPerUnit = 1)\ndef BasisCurves \"a\" {{ uniform token basis = \"catmullRom\" uniform \
+             token wrap = \"pinned\" int[] curveVertexCounts = [4] point3f[] points = [{points}] float[] \
+             widths = [0.1] (interpolation = \"constant\") }}"
         );
         text(&folder, &own).expect("curves").strands
     };
