@@ -60,7 +60,8 @@ impl Tally {
 impl LeftOut {
     /// A sentence for each.
     pub fn notes(&self) -> Vec<String> {
-        let flatten = "not followed: write the file again as one, for example with `usdcat --flatten`";
+        let flatten =
+            "these are not followed: write the file again as one, for example with `usdcat --flatten`";
         let mut notes: Vec<String> = [
             self.hidden.words("hidden or a guide", "hidden or guides", "left out"),
             self.hermite.words(
@@ -69,13 +70,13 @@ impl LeftOut {
                 "left out: export them as cubic curves",
             ),
             self.instancers.words("a point instancer", "point instancers", "left out with what they place"),
-            self.references.words("a reference", "references", flatten),
+            self.references.words("made of references", "made of references", flatten),
         ]
         .into_iter()
         .flatten()
         .collect();
         if self.layers {
-            notes.push(format!("the file has layers under it, which are {flatten}"));
+            notes.push(format!("the file has layers under it, and {flatten}"));
         }
         if self.variants > 0 {
             notes.push(format!("{} prims in variants are left out", self.variants));

@@ -97,7 +97,7 @@ fn a_file_says_its_unit_and_axes_and_what_is_left_out() {
     assert_eq!(usda, usdc);
     let notes = usdc.notes.join("\n");
     assert!(notes.contains("2 prims are hidden or guides, the first /guide"), "{notes}");
-    assert!(notes.contains("/turned is a reference") && notes.contains("--flatten"), "{notes}");
+    assert!(notes.contains("/turned is made of references") && notes.contains("--flatten"), "{notes}");
 
     let folder = Folder::new(&[]);
     let line = "{ uniform token type = \"linear\" int[] curveVertexCounts = [2] \
