@@ -12,7 +12,7 @@ use super::terminal::{Terminal, say};
 use super::{SceneOptions, default_output, grids};
 use crate::grid::{GridFile, is_grid};
 use crate::job::{check_volume_replaced, is_hair};
-use crate::model::Strands;
+use crate::model::StrandFile;
 use crate::output::frame::Output;
 use crate::scene::{Scene, key_of_volume, likeliest};
 use crate::util::error::{Error, Result};
@@ -44,9 +44,10 @@ enum VolumeCommand {
         #[arg(long)]
         overwrite: bool,
     },
-    /// Prints statistics of a volume file, the grids of a simulation, or what strands a .hair has.
+    /// Prints statistics of a volume file, the grids of a simulation, or what strands a file has.
     Info {
-        /// The file to read: an .npz with a volume or with grids, a .vdb, an .nvdb or a .hair.
+        /// The file to read: an .npz with a volume or with grids, a .vdb, an .nvdb, a .hair, or curves of
+        /// USD.
         file: PathBuf,
         /// Prints the statistics as one JSON object.
         #[arg(long)]
@@ -120,7 +121,7 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
         }
         VolumeCommand::Info { file, json, memory } => {
             terminal.watch();
-            if is_hair(file) {
+            if StrandFile::is_named(file) {
                 return strand_info(file, *json, *memory);
             }
             if is_grid(file) {
@@ -147,25 +148,33 @@ pub fn run(args: &VolumeArgs, terminal: &Terminal) -> Result<()> {
     }
 }
 
-/// Prints what strands a `.hair` has, in its own unit.
+/// Prints what strands a file has, in its own unit.
 fn strand_info(file: &Path, json: bool, memory: u64) -> Result<()> {
-    let strands = Strands::read(file, memory)?;
+    let StrandFile { strands, unit, is_z_up, notes } = StrandFile::read(file, None, memory)?;
     let [low, high] = strands.bounds().unwrap_or_default();
     let (thin, thick) =
         strands.widths.iter().fold((f32::INFINITY, 0.0f32), |(a, b), w| (a.min(*w), b.max(*w)));
+    let up = is_z_up.map(|is_z| if is_z { "z" } else { "y" });
     if json {
         return say(&serde_json::json!({
             "strands": strands.count(),
             "points": strands.points.len(),
             "bounds": [low.to_array(), high.to_array()],
             "thickness": [thin, thick],
+            "unit": unit,
+            "up": up,
+            "notes": notes,
         })
         .to_string());
     }
     say(&format!("strands    {}", strands.count()))?;
     say(&format!("points     {}", strands.points.len()))?;
     say(&format!("bounds     {low} to {high}, in the file's unit"))?;
-    say(&format!("thickness  {thin} to {thick}"))
+    say(&format!("thickness  {thin} to {thick}"))?;
+    if let Some((unit, up)) = unit.zip(up) {
+        say(&format!("unit       {unit} m, {up} points up"))?;
+    }
+    notes.iter().try_for_each(|note| say(&format!("note       {note}")))
 }
 
 /// Writes the strands of a scene's volume as a `.hair`, in metres, where a box shows them.

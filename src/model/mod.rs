@@ -1,5 +1,5 @@
 //! Geometry that other programs wrote: glTF 2.0 (`.gltf` with its buffers, `.glb`), OBJ with MTL, and strands
-//! of hair (`.hair`).
+//! of hair (`.hair`, and curves of USD).
 //!
 //! [`Model::read`] reads a whole file and checks all of it: a [`Model`] holds only finite numbers and indices
 //! that lead somewhere. Files are not trusted. References to other files are confined to the file's folder,
@@ -36,8 +36,10 @@ mod look;
 mod names;
 mod obj;
 mod paths;
+mod strand_file;
 mod strands;
 mod summary;
+mod usd;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -52,6 +54,7 @@ pub use look::{
     Wrap,
 };
 pub use names::{find_name, folded_name};
+pub use strand_file::StrandFile;
 pub use strands::Strands;
 pub use summary::{MaterialSummary, NodeSummary, Summary};
 

@@ -11,7 +11,7 @@ use super::param::key_of_volume;
 use super::{Limits, Recipe, Values, sequence};
 use crate::light::scatter::optics::{ShellOptics, Surface};
 use crate::light::skin::Tissue;
-use crate::model::Strands;
+use crate::model::StrandFile;
 use crate::util::error::{Error, Result};
 use crate::volume::{
     ClothSpec, FurSpec, GrainsSpec, HairSpec, Matter, MountainSpec, SkinSpec, StorageChoice, StrandsSpec, Up,
@@ -53,7 +53,7 @@ fn not_sparse(v: &Values, name: &str) -> Result<()> {
 /// Refuses a file of hair where another builder would make the cells, or read it as something else.
 pub(super) fn no_strands_elsewhere(v: &Values, name: &str) -> Result<()> {
     let key = |own: &str| key_of_volume(name, own);
-    let is_hair = |own: &&str| v.text(&key(own)).to_ascii_lowercase().ends_with(".hair");
+    let is_hair = |own: &&str| StrandFile::is_named(Path::new(&v.text(&key(own))));
     let builder = key("volume.builder");
     let reads = v.choice(&builder, Builder::from_word) == Builder::Strands;
     let given = ["volume.source", "volume.file"].into_iter().find(is_hair);
@@ -74,8 +74,8 @@ pub(super) fn no_strands_elsewhere(v: &Values, name: &str) -> Result<()> {
 /// those of [`matter`], and what the file may be.
 ///
 /// # Errors
-/// Errors of [`Strands::read`] and of paths; [`Error::Input`] for strands without extent or thickness, and
-/// for sparse storage.
+/// Errors of [`StrandFile::read`] and of paths; [`Error::Input`] for strands without extent or thickness,
+/// and for sparse storage.
 pub(super) fn strands(
     v: &Values,
     name: &str,
@@ -93,12 +93,25 @@ pub(super) fn strands(
     if v.text(&source).is_empty() {
         return Err(Error::input(
             format!("{} = \"strands\" without a file", key("volume.builder")),
-            format!("give {source} the .hair of another program"),
+            format!("give {source} the .hair or the .usdc of another program"),
         ));
     }
     let path = sequence::file(v, name, &source, folder, limits)?;
-    let strands = Strands::read(&path, limits.memory)?;
-    let unit = f64::from(v.float(&key("import.file_unit")));
+    let is_sequence = sequence::Sequence::of(v, name, folder).is_some();
+    let time = is_sequence.then(|| v.int(&key("volume.frame")) as f64);
+    let file = StrandFile::read(&path, time, limits.memory)?;
+    let strands = file.strands;
+    // What the scene says wins over the file.
+    let [unit, up] = ["import.file_unit", "volume.up"].map(key);
+    let unit = match file.unit {
+        Some(own) if !v.is_set(&unit) => own,
+        _ => f64::from(v.float(&unit)),
+    };
+    let up = match file.is_z_up {
+        Some(true) if !v.is_set(&up) => Up::Z,
+        Some(false) if !v.is_set(&up) => Up::Y,
+        _ => v.choice(&up, Up::from_word),
+    };
     let [diameter, longest] = ["import.strand_diameter", "import.longest"].map(key);
     let width = Some(v.float(&diameter)).filter(|width| *width > 0.0).map(|width| width / unit as f32);
     if width.is_none() && strands.widths.iter().all(|width| *width == 0.0) {
@@ -115,7 +128,8 @@ pub(super) fn strands(
         edge: 0.0,
         width,
         unit,
-        scene_from_file: v.choice(&key("volume.up"), Up::from_word).scene_from_file(),
+        scene_from_file: up.scene_from_file(),
+        notes: file.notes,
         alpha: water.alpha,
         k_d: water.k_d,
         k_s: (!has_ramp).then_some(water.k_s),
@@ -234,6 +248,12 @@ pub(super) fn too_thick(recipe: &Recipe) -> Option<String> {
             key("cloth.yarn"),
         )
     })
+}
+
+/// Returns what the file of strands has and the volume lacks, a warning each.
+pub(super) fn notes_on_strands(recipe: &Recipe) -> Vec<String> {
+    let Some(Matter::Strands(strands)) = &recipe.matter else { return Vec::new() };
+    strands.notes.iter().map(|note| format!("{}: {note}", strands.path.display())).collect()
 }
 
 fn mountain(v: &Values, name: &str, water: &WaterSpec, k_s: Option<f32>) -> MountainSpec {

@@ -682,6 +682,7 @@ impl Scene {
             }
         }
         warnings.extend(self.recipes.iter().filter_map(matter::too_thick));
+        warnings.extend(self.recipes.iter().flat_map(matter::notes_on_strands));
         warnings.extend(self.other_files(volumes));
         warnings.extend(self.values.iter().flat_map(quads::unused_materials));
         warnings.extend(self.values.iter().flat_map(volumes::unused));

@@ -30,6 +30,8 @@ pub struct StrandsSpec {
     pub unit: f64,
     /// Turn from the axes of the file to those of the scene.
     pub scene_from_file: DMat3,
+    /// What the file has and the strands lack, one sentence each.
+    pub notes: Vec<String>,
     /// Scale α of the density, kept beside the cells and not in them.
     pub alpha: f32,
     /// k_d.

@@ -154,8 +154,9 @@ pub(super) const HAIR: Group = Group {
 pub(super) const IMPORT: Group = Group {
     title: "Strands of a file",
     about: "Strands of a volume with `volume.builder=strands`, which `volume.source` names: a file .hair in \
-         the format of Cem Yuksel's models. The cells are cubes, and a box around the volume stands where \
-         the strands stand. Turn files whose z axis points up with `volume.up=z`. `volume.color` to \
+         the format of Cem Yuksel's models, or curves of USD (.usdc, .usda, .usd, .usdz). The cells are \
+         cubes, and a box around the volume stands where the strands stand. A file of USD says its unit and \
+         which axis points up; turn a .hair whose z axis points up with `volume.up=z`. `volume.color` to \
          `volume.color_4` run from root to tip.",
     params: &[
         p("import.longest", "", "cells", Int(3, 4096, 256), Volume)
@@ -164,7 +165,10 @@ pub(super) const IMPORT: Group = Group {
             .when("Raise it until single strands show; memory grows with its cube."),
         p("import.file_unit", "", "m", Float(1e-6, 1e6, 1.0), Volume)
             .slider(0.001, 1.0)
-            .doc("Length of the file's unit.")
+            .doc(
+                "Length of the file's unit. Unless it is set, that of a file of USD is its metersPerUnit, \
+                 or a centimetre where it has none.",
+            )
             .when("Set 0.01 for a file in centimetres, and 0.0254 for one in inches."),
         p("import.strand_diameter", "", "m", Float(0.0, 1.0, 0.0), Volume)
             .slider(0.0, 0.01)

@@ -231,9 +231,9 @@ pub(super) const VOLUME: Group = Group {
         p("volume.source", "", "", Text(""), Volume)
             .doc(
                 "Path of a simulation's file: OpenVDB (.vdb), NanoVDB (.nvdb) or arrays of NumPy (.npz); \
-                 with `volume.builder=strands`, of a file of hair (.hair). Like all paths of a scene, it \
-                 lies in the folder of the scene. With `####` in its name it is a sequence, of which \
-                 `volume.frame` chooses the file.",
+                 with `volume.builder=strands`, of a file of hair (.hair) or of curves (.usdc, .usda, .usd, \
+                 .usdz). Like all paths of a scene, it lies in the folder of the scene. With `####` in its \
+                 name it is a sequence, of which `volume.frame` chooses the file.",
             )
             .when("Set it to a frame of the simulation. `taki scene` lists what was found in it."),
         p("volume.grid", "", "", Text("density"), Volume)
@@ -270,7 +270,8 @@ pub(super) const VOLUME: Group = Group {
         p("volume.up", "", "", Choice(Up::WORDS), Volume)
             .doc(
                 "Axis of the file in `volume.source` that points up. With `z` the box is turned: the file's \
-                 (x, y, z) is (x, z, −y) in the scene.",
+                 (x, y, z) is (x, z, −y) in the scene. Unless it is set, that of a file of USD is its \
+                 upAxis.",
             )
             .when("Choose `z` for files of Blender and of other programs whose z axis points up."),
         p(ORIGIN, "", "m", Point([0.0, 0.0, 0.0]), Volume)

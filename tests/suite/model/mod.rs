@@ -1,6 +1,7 @@
 //! Reading of geometry from other programs. Reference truth: what each small file must become.
 
 mod broken;
+mod curves;
 mod faces;
 mod gltf;
 mod mutations;

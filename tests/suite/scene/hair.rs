@@ -66,6 +66,51 @@ fn a_box_stands_where_the_strands_of_a_file_stand() {
 }
 
 #[test]
+fn a_file_of_usd_says_its_unit_and_axes_unless_the_scene_does() {
+    let folder = Folder::new();
+    let usd = |height: f32, head: &str| {
+        format!(
+            "#usda 1.0\n({head})\ndef BasisCurves \"a\" {{ uniform token type = \"linear\" int[] \
+             curveVertexCounts = [2] point3f[] points.timeSamples = {{ 7: [(0,0,0), (0,0,{height})], 9: \
+             [(0,0,0), (0,0,{})] }} float[] widths = [1] (interpolation = \"constant\") }}\ndef \
+             PointInstancer \"p\" {{}}\n",
+            2.0 * height
+        )
+    };
+    for number in [7, 9] {
+        folder.write(&format!("a.{number}.usda"), &usd(100.0, "metersPerUnit = 0.01 upAxis = \"Z\""));
+    }
+    let load = |source: &str, own: &str| {
+        let text = format!(
+            "{PLACE}[volumes.s]\nbuilder = \"strands\"\nsource = \"{source}\"\n{own}\n[boxes.b]\nvolume = \
+             \"s\"\n"
+        );
+        folder.write("s.toml", &text);
+        Scene::load(&folder.path("s.toml"), &[], &Limits::default()).expect("a scene")
+    };
+    // Where the tip of the strand lies, metres.
+    let tip = |scene: &Scene| {
+        let Some(Matter::Strands(spec)) = &scene.recipes[0].matter else { panic!("no strands") };
+        spec.scene_from_file * spec.strands.points[1].as_dvec3() * spec.unit
+    };
+    let near = |source: &str, own: &str, place: DVec3| {
+        let tip = tip(&load(source, own));
+        assert!(tip.distance(place) < 1e-6, "{own}: {tip}");
+    };
+    near("a.7.usda", "", DVec3::Y);
+    near("a.7.usda", "up = \"y\"", DVec3::Z);
+    near("a.7.usda", "file_unit = 1.0", DVec3::Y * 100.0);
+    // A file of a sequence is read at its number.
+    near("a.9.usda", "", DVec3::Y);
+    near("a.#.usda", "frame = 9", DVec3::Y * 2.0);
+    near("a.#.usda", "frame = 7", DVec3::Y);
+    let scene = load("a.7.usda", "longest = 20");
+    let volumes = VolumeMemo::default().volumes(&scene, 1 << 30, &Unwatched).expect("volumes").0;
+    let warned = scene.warnings(&*volumes).into_iter().any(|own| own.contains("/p is a point instancer"));
+    assert!(warned);
+}
+
+#[test]
 fn strands_without_thickness_take_that_of_the_scene() {
     let (_folder, told) = scene("", 0.0);
     super::refused(told, &["no thickness", "volumes.s.strand_diameter"]);
@@ -87,6 +132,8 @@ fn a_file_of_hair_leads_to_its_builder() {
         &["volume.source=wig.HAIR"],
         &["volume.builder=flow", "volume.source=wig.hair"],
         &["volume.file=wig.hair"],
+        &["volume.source=wig.usdc"],
+        &["volume.file=wig.usd"],
     ] {
         let told = Scene::preset("fig5").expect("a preset").with(sets).map_err(|e| e.to_string());
         super::refused(told, &["volume.builder=strands", "volume.source"]);

@@ -77,6 +77,7 @@ fn a_pipe_in_place_of_a_file_is_refused_and_not_waited_for() {
     assert!(Command::new("mkfifo").arg(dir.path().join("f")).status().unwrap().success());
     run(&mut render("front", dir.path().join("p.png"))).done();
     symlink("f", dir.path().join("f.hair")).unwrap();
+    symlink("f", dir.path().join("f.usdc")).unwrap();
     for arguments in [
         &["compare", "f", "p.png"][..],
         &["compare", "p.png", "f"],
@@ -84,6 +85,7 @@ fn a_pipe_in_place_of_a_file_is_refused_and_not_waited_for() {
         &["stitch", "f", "-o", "x.png"],
         &["volume", "info", "f"],
         &["volume", "info", "f.hair"],
+        &["volume", "info", "f.usdc"],
         &["scene", "f"],
         &["scene", "front", "--set=volume.file=f"],
         &["scene", "front", "--set=volume.builder=strands", "--set=volume.source=f"],
