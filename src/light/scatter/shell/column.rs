@@ -338,7 +338,7 @@ fn own_parts(matter: &ShellMatter, pieces: &[Piece], c: usize, thickness: f64) -
         let [start, end] = piece.ends.map(f64::from);
         let (mut done, from) = (0.0, above);
         while done < depth || done == 0.0 {
-            let near = (from + done).min(to_end(from + depth));
+            let near = (from + done).min(to_end(from + done));
             let mut own = (THINNEST + GROWTH * near.max(0.0)).min(thickest);
             // A sublayer ends at the end of its piece; what would be left of it is shared by two.
             if depth - done < 2.0 * own {

@@ -145,14 +145,14 @@ fn a_thin_core_is_part_of_a_slab() {
 
 /// A wavy shell of several colours with two lights, ambient light and shadows.
 fn wavy(below: Below, eta: f32) -> (Shell, ShellMatter, Vec<[f32; 2]>) {
-    let shell = flat([60, 60], 0.01, |v| 0.03 * ((v % 61) as f32 / 20.0).sin().max(0.0));
+    let shell = flat([24, 24], 0.01, |v| 0.03 * ((v % 25) as f32 / 20.0).sin().max(0.0));
     let matter = ShellMatter {
         extinction: (0..16).map(|k| Vec3::new(20.0, 30.0, 0.0) * k as f32).collect(),
         albedo: (0..16).map(|k| Vec3::new(1.0, k as f32 / 15.0, 0.0)).collect(),
         eta,
         below,
     };
-    let shares = (0..61 * 61).map(|v| [f32::from(v % 7 > 2), f32::from(v % 5 > 1)]).collect();
+    let shares = (0..25 * 25).map(|v| [f32::from(v % 7 > 2), f32::from(v % 5 > 1)]).collect();
     (shell, matter, shares)
 }
 
@@ -190,7 +190,7 @@ fn without_light_it_is_dark_and_no_matter_breaks_the_numbers() {
         let light = [light(0.7), light(-0.2), light(0.0), light(1e-4)];
         let dark = Surroundings { lights: &light[1..1], ..Default::default() };
         assert!(solve(&shell, 8, &matter, &dark).values.iter().all(|j| *j == Vec3::ZERO));
-        let opposite: Vec<Option<Opposite>> = (0..61 * 61u32)
+        let opposite: Vec<Option<Opposite>> = (0..25 * 25u32)
             .map(|v| {
                 Some(Opposite {
                     vertices: [v, v / 2, 0],
