@@ -62,6 +62,9 @@ impl Layer {
             let depth = counts.depth;
             return Err(file.broken(format!("{depth} brackets are open at once")));
         }
+        if counts.is_nested {
+            return Err(file.broken("an array begins inside an array"));
+        }
         file.take(counts.memory)?;
         let data = openusd::usda::parse(&text).map_err(|error| file.broken(format!("{error:#}")))?;
         let specs: Vec<(String, SpecType)> = data

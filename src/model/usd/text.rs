@@ -20,6 +20,9 @@ const BRACE: u128 = 2000;
 pub(super) struct Counts {
     /// Most brackets that are open at once.
     pub depth: usize,
+    /// Whether an array begins inside an array. USD has no such value, and the parser doubles what it keeps
+    /// with each.
+    pub is_nested: bool,
     /// Bytes of memory that reading takes.
     pub memory: u128,
 }
@@ -27,17 +30,22 @@ pub(super) struct Counts {
 /// Counts brackets and values outside strings, paths of files, and comments.
 pub(super) fn count(text: &str) -> Counts {
     let bytes = text.as_bytes();
-    let (mut at, mut open, mut counts) = (0, 0usize, Counts::default());
+    let (mut at, mut open, mut arrays, mut counts) = (0, 0usize, 0usize, Counts::default());
     let (mut commas, mut marks, mut words, mut braces) = (0u128, 0u128, 0u128, 0u128);
     while let Some(byte) = bytes.get(at) {
         match byte {
             b'(' | b'[' | b'{' => {
                 open += 1;
+                counts.is_nested |= *byte == b'[' && arrays > 0;
+                arrays += usize::from(*byte == b'[');
                 counts.depth = counts.depth.max(open);
                 braces += u128::from(*byte == b'{');
                 commas += 1;
             }
-            b')' | b']' | b'}' => open = open.saturating_sub(1),
+            b')' | b']' | b'}' => {
+                open = open.saturating_sub(1);
+                arrays = arrays.saturating_sub(usize::from(*byte == b']'));
+            }
             b',' | b'\n' => commas += 1,
             b'=' | b':' => marks += 1,
             b'<' => {

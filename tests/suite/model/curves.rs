@@ -182,6 +182,10 @@ fn texts_that_would_fill_the_stack_or_the_memory_are_refused() {
     let deep = "def \"a\" {".repeat(5000);
     let error = text(&folder, &deep).expect_err("deep").to_string();
     assert!(error.contains("5000 brackets"), "{error}");
+    // The parser would double what it keeps with each bracket.
+    let nested = format!("def \"a\" ( foo = {}1{} ) {{}}", "[".repeat(100), "]".repeat(100));
+    let error = text(&folder, &nested).expect_err("nested").to_string();
+    assert!(error.contains("an array begins inside an array"), "{error}");
     // Brackets in strings and comments do not count.
     let quoted =
         "def \"a\" (doc = \"\"\"((((\"\"\") { string s = \"((\\\"(\" # ((((\n string t = '(' }".repeat(200);
