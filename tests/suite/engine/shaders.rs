@@ -302,7 +302,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 22] = [
+const COMPARED: [&str; 23] = [
     "Develop",
     "Environment",
     "Foam",
@@ -312,6 +312,7 @@ const COMPARED: [&str; 22] = [
     "Light",
     "LightVolume",
     "MeshTile",
+    "Optics",
     "Paint",
     "Quad",
     "Ramp",

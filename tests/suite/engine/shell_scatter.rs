@@ -142,7 +142,7 @@ fn the_surface_shines_where_it_mirrors_a_light() {
         // Head on, π·f is F·(α²/α⁴)/4.
         let surface = black.surface.expect("a surface");
         let truth = 2.0 * surface.fresnel(1.0) / (4.0 * surface.roughness.powi(2));
-        let [middle, side] = [36, 50].map(|x| frame.radiance[24 * 72 + x][1]);
+        let [middle, side] = [36, 54].map(|x| frame.radiance[24 * 72 + x][1]);
         assert!((middle - truth).abs() < 0.02 * truth, "{middle}, not {truth}");
         assert!(side < 0.8 * middle, "{side} beside {middle}");
     }
@@ -210,13 +210,18 @@ fn the_engines_agree_on_skin_beside_fur_and_beside_cells_that_scatter_once() {
     let Some(mut renderer) = renderer("skin beside fur") else { return };
     let volumes = [noise([12, 16, 10], 4), noise([9, 8, 7], 5)];
     for sets in [&["light.scattering=multiple"][..], &["light.visibility=cached"]] {
-        let ring = torus(14, 9, 0.35);
+        // No edge of the texture lies between cells; there rounding decides.
+        let moved = |mut mesh: SurfaceMesh| {
+            mesh.uv.iter_mut().for_each(|uv| *uv += Vec2::new(0.1371, 0.0713));
+            mesh
+        };
+        let ring = moved(torus(14, 9, 0.35));
         let mut scene =
             scene_of(Shell::new(&ring, Side::Outward).expect("valid"), [0.5, 4.5, 3.0], sets, skin());
         let parts = scene.edit();
         let recipe = parts.recipes[0].clone();
         parts.recipes.push(taki::scene::Recipe { skin: None, ..recipe });
-        let mut bent = Shell::new(&strip(9), Side::Inward).expect("valid");
+        let mut bent = Shell::new(&moved(strip(9)), Side::Inward).expect("valid");
         bent.volume = 1;
         parts.shells.push(Arc::new(bent));
         assert_eq!(scene.visibility == Visibility::Cached, sets[0].ends_with("cached"));
