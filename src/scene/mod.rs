@@ -576,8 +576,8 @@ impl Scene {
         self.shades.shadows_on_shells(mesh, &self.shells, &lights, monitor)
     }
 
-    /// Returns the diffuse light in the shells with optics ([`Scene::shell_optics`]), shell by shell. `mesh` is
-    /// the scene's opaque mesh, and `shadows` are those of [`Scene::shadows_on_shells`]. It is kept until
+    /// Returns the diffuse light in the shells with optics ([`Scene::shell_optics`]), shell by shell. `mesh`
+    /// is the scene's opaque mesh, and `shadows` are those of [`Scene::shadows_on_shells`]. It is kept until
     /// something else than the camera changes. `None` where no shell has optics.
     ///
     /// # Errors

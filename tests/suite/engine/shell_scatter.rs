@@ -176,13 +176,14 @@ fn the_engines_agree_where_light_scatters_many_times() {
     let (multiple, cached) = ("light.scattering=multiple", "light.visibility=cached");
     let (pyramid, trilinear) = ("trace.filter=pyramid", "trace.lookup=trilinear");
     let hair = "light.reflection=hair";
-    let variants: [&[&str]; 8] = [
+    let variants: [&[&str]; 9] = [
         &[multiple],
         &[multiple, pyramid, cached, "camera.fov=80"],
         &[multiple, hair, pyramid, cached],
         &[multiple, trilinear, "light.frame=texture", "light.p=7.5"],
         &[multiple, "trace.early_end=0.2", "image.samples=2"],
         &["trace.early_end=0.2"],
+        &[],
         &[pyramid, cached, "camera.fov=80"],
         &[trilinear, "light.visibility=none"],
     ];

@@ -78,7 +78,7 @@ fn a_file_of_usd_says_its_unit_and_axes_unless_the_scene_does() {
         )
     };
     for number in [7, 9] {
-        folder.write(&format!("a.{number}.usda"), &usd(100.0, "metersPerUnit = 0.01 upAxis = \"Z\""));
+        folder.write(&format!("a.{number}.usda"), usd(100.0, "metersPerUnit = 0.01 upAxis = \"Z\""));
     }
     let load = |source: &str, own: &str| {
         let text = format!(

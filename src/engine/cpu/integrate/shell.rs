@@ -83,8 +83,8 @@ struct ShellRay<'a> {
     /// T at the start, and here.
     start: f32,
     transmittance: f32,
-    /// Last occupied cell and its colour, if light scatters many times in the shell.
-    last: Option<(Place, Vec3)>,
+    /// Places of the frame and of J in the last occupied cell, and its colour, if light scatters many times in the shell.
+    last: Option<([Place; 2], Vec3)>,
     /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
     radiance: [Vec3; 2],
     /// Cells walked by the view ray, and by its light rays.
@@ -155,8 +155,8 @@ impl Integrator<'_> {
             self.through(&mut ray, &segment.from(t_begin).until(t_end), observer);
         }
         let beyond = match &ray.last {
-            Some((place, color)) if ray.transmittance < scene.trace.early_end => {
-                self.beyond_end(place, *color, d, [ray.start, ray.transmittance])
+            Some((places, color)) if ray.transmittance < scene.trace.early_end => {
+                self.beyond_end(places, *color, d, [ray.start, ray.transmittance])
             }
             _ => Vec3::ZERO,
         };
@@ -299,7 +299,7 @@ impl Integrator<'_> {
                 let sum = self.scattered(optics, level, &cell, &mut ray.cells[1], observer);
                 ray.radiance[usize::from(!level.is_whole)] += sum;
                 ray.transmittance = passed;
-                ray.last = Some((deep, color_of(ink)));
+                ray.last = Some(([place, deep], color_of(ink)));
                 continue;
             }
             let more = ink.map_or(Vec3::ZERO, |ink| scene.ambient * ((ink.color - Vec3::ONE) * weight));

@@ -140,10 +140,10 @@ impl Integrator<'_> {
 
     /// Diffuse light from behind the place where a ray has ended because too little is left of T, from its
     /// `start` at the shell to `transmittance`. In a medium with less extinction more is left. It is as
-    /// bright as the last cell there, of the colour `color`.
+    /// bright as the last cell, of the colour `color`, whose places are those of its frame and of its J.
     pub(super) fn beyond_end(
         &self,
-        place: &Place,
+        [place, deep]: &[Place; 2],
         color: Vec3,
         d: Vec3,
         [start, transmittance]: [f32; 2],
@@ -158,6 +158,6 @@ impl Integrator<'_> {
         };
         let depth = depth_between(start, transmittance);
         let left = (own.extinction * (stretch * -depth)).map(exp2) * (start * leaves);
-        left * (own.albedo * self.diffuse_at(place))
+        left * (own.albedo * self.diffuse_at(deep))
     }
 }

@@ -98,8 +98,8 @@ impl Core {
         core
     }
 
-    /// Adds what a beam scatters in the thin core below vertex `i`. `mu` > 0 is its cosine inside, `intensity`
-    /// what passed the outer surface.
+    /// Adds what a beam scatters in the thin core below vertex `i`. `mu` > 0 is its cosine inside, and
+    /// `intensity` what passed the outer surface.
     pub fn add_beam(&mut self, graph: &Graph, (i, opposite): (usize, &Opposite), mu: f32, intensity: Vec3) {
         let d = least(opposite.distance);
         let passed = (self.above * (-graph.thickness[i] / mu.max(1e-3))).exp();

@@ -27,7 +27,7 @@ pub struct Scattered {
     /// scatters once everywhere.
     lists: Vec<[PendingScatter; 2]>,
     /// Last cells of the lanes' rays and their colours.
-    last: [Option<(Place, Vec3)>; LANES],
+    last: [Option<([Place; 2], Vec3)>; LANES],
 }
 
 impl Scattered {
@@ -59,7 +59,7 @@ impl Scattered {
         let kinds = [if optics.surface.is_some() { SKIN } else { FIBRES }, usize::from(!level.is_whole)];
         let pending = &mut self.lists[kinds[0]][kinds[1]];
         let color = pending.push(integrator, level, (lit, deep), passage, &mut hits[lit.hit], optics);
-        self.last[lane] = Some((*deep, color));
+        self.last[lane] = Some(([lit.place, *deep], color));
         if pending.cells.is_full() {
             pending.shade(simd, integrator, kinds, hits);
         }
@@ -78,11 +78,11 @@ impl Scattered {
     /// Ends the ray in a lane.
     #[inline]
     pub fn end(&mut self, integrator: &Integrator, lane: usize, hit: &mut ShellHit) {
-        if let Some((place, color)) = self.last[lane].take()
+        if let Some((places, color)) = self.last[lane].take()
             && hit.transmittance < integrator.scene.trace.early_end
         {
             let ends = [hit.order.before, hit.transmittance];
-            hit.beyond = integrator.beyond_end(&place, color, hit.d, ends);
+            hit.beyond = integrator.beyond_end(&places, color, hit.d, ends);
         }
     }
 }
