@@ -16,14 +16,16 @@ builder = \"fur\"
 nx = 16
 ny = 16
 nz = 12
-hairs = 120
+hairs = 2000
+undercoat = 0.0
 k_d = 0.8
 [volumes.b]
 builder = \"fur\"
 nx = 16
 ny = 16
 nz = 12
-hairs = 120
+hairs = 2000
+undercoat = 0.0
 seed = 5
 [materials.a]
 volume = \"a\"
