@@ -186,7 +186,7 @@ pub(super) fn read(v: &Values, recipes: &[Recipe]) -> Result<Vec<SceneBox>> {
     }
     if v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple {
         return bad(
-            "has no multiple scattering, which is defined for flat water alone",
+            "has no multiple scattering, which quads and the shells of meshes have",
             "set light.scattering=single",
         );
     }

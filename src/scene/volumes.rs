@@ -220,7 +220,10 @@ fn colors(v: &Values, name: &str) -> Result<Vec<Vec3>> {
     }
     let is_multiple = v.choice("light.scattering", Scattering::from_word) == Scattering::Multiple;
     if is_multiple && is_on_quads(v, name) {
-        return of_light("light.scattering", Scattering::Multiple.word(), Scattering::Single.word());
+        return Err(Error::input(
+            format!("{} with light.scattering = \"multiple\" on quads, where it knows no colours", keys[0]),
+            "set light.scattering=single, leave the colours out, or show the volume by shells of meshes",
+        ));
     }
     let is_of_curves = v.choice(&builder, Builder::from_word) == Builder::Curves
         && v.text(&key_of_volume(name, "volume.file")).is_empty();

@@ -39,6 +39,8 @@ const CORE: f64 = 6.0;
 /// leaves close to J. With a tenth of them, values swing where the layers are deep.
 const BY_DEPTH: f64 = 0.1;
 const BY_LENGTH: f64 = 1e-4;
+/// Largest value over the largest mean of a sublayer: J at a surface is a little more than near it.
+const BEYOND_MEANS: f64 = 1.05;
 
 /// One colour of a column.
 pub struct Column {
@@ -260,7 +262,8 @@ impl Column {
     }
 
     /// Values between which straight lines fit the sublayers' means best. Those at the ends are then moved
-    /// so that the flux out of the shell is right although J is bent between two values.
+    /// so that the flux out of the shell is right although J is bent between two values. An end in empty
+    /// layers has no say in the flux, so no value is moved out of the range of J.
     fn fitted(&self, means: &[f64]) -> Vec<f64> {
         let e3 = |t: f64| if t > 40.0 { 0.0 } else { exponential_integrals(t)[2] };
         let own = self.ends[self.own];
@@ -310,7 +313,8 @@ impl Column {
                 values[own] += missing / seen;
             }
         }
-        values.iter_mut().for_each(|value| *value = value.max(0.0));
+        let largest = means.iter().copied().fold(0.0, f64::max) * BEYOND_MEANS;
+        values.iter_mut().for_each(|value| *value = value.clamp(0.0, largest));
         values
     }
 }

@@ -131,6 +131,29 @@ fn in_even_light_white_matter_has_its_radiance() {
 }
 
 #[test]
+fn empty_layers_have_no_more_light_than_there_is() {
+    // Cloth: little or nothing in the outer layers, and much behind them.
+    let shell = flat([1, 1], 1.0, |_| 1.0);
+    for (outer, depth, omega) in [(0.0, 40.0, 0.9), (1e-3, 8.0, 0.3), (0.05, 2.5, 0.6), (1e-4, 200.0, 1.0)] {
+        let extinction = [outer, outer, 0.3, 1.0, 1.0, 0.3, outer, outer].map(|rho| Vec3::splat(rho * depth));
+        for below in [Below::Open, Below::Opaque { albedo: Vec3::splat(0.1) }] {
+            let albedo = vec![Vec3::splat(omega); 8];
+            let matter = ShellMatter { extinction: extinction.to_vec(), albedo, eta: 1.0, below };
+            let even = Surroundings { ambient: Vec3::ONE, ..Surroundings::default() };
+            let solved = solve(&shell, 4, &matter, &even);
+            let most = solved.values.iter().map(|j| j.max_element()).fold(0.0, f32::max);
+            // J at the outer surface is a little more than in the first sublayer.
+            assert!((0.4..1.05).contains(&most), "{outer} {depth} {omega} {below:?}: {most}");
+            let lights = [light(0.6)];
+            let lit = solve(&shell, 4, &matter, &Surroundings { lights: &lights, ..Surroundings::default() });
+            let most = lit.values.iter().map(|j| j.max_element()).fold(0.0, f32::max);
+            // A beam's own mean intensity is ¼, and no matter makes more than a few times that of it.
+            assert!(most < 0.8, "{outer} {depth} {omega} {below:?}: {most}");
+        }
+    }
+}
+
+#[test]
 fn columns_of_any_length_are_those_of_an_even_shell() {
     // Columns so far from one another do not know of each other.
     let shell = flat([8, 8], 1e5, |v| 0.25 * v as f32);
