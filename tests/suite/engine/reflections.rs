@@ -6,7 +6,7 @@ use taki::picture::Frame;
 use taki::scene::{Limits, Scene};
 use taki::util::monitor::Unwatched;
 
-use super::gpu::{SURFACE, assert_parity, renderer};
+use super::gpu::{SURFACE, assert_same_radiance, renderer};
 use crate::scene::meshes::Folder;
 
 /// Two quads above two rings; the left ones show the volume `a`, the right ones `b`.
@@ -130,7 +130,7 @@ fn each_volume_has_its_model() {
             assert!(right, "{what}: strands beside fibres");
             assert!(!same(&both.0, &strands.0, false).0, "{what}: the models differ");
             if let Some(on_gpu) = both.1 {
-                assert_parity(&what, &[on_gpu, both.0]);
+                assert_same_radiance(&what, &[on_gpu, both.0]);
             }
         }
     }
@@ -155,6 +155,6 @@ fn fibres_of_their_own_have_colours_beside_hair() {
     // Hair is brown, and the fur is blue.
     assert!(colour(true) > 1.2 && colour(false) < 0.8, "{} {}", colour(true), colour(false));
     if let Some(on_gpu) = on_gpu {
-        assert_parity("colours beside hair", &[on_gpu, on_cpu]);
+        assert_same_radiance("colours beside hair", &[on_gpu, on_cpu]);
     }
 }

@@ -83,8 +83,8 @@ struct ShellRay<'a> {
     /// T at the start, and here.
     start: f32,
     transmittance: f32,
-    /// Places of the frame and of J in the last occupied cell, and its colour, if light scatters many times in
-    /// the shell.
+    /// Places of the frame and of J in the last occupied cell, and its colour, if light scatters many times
+    /// in the shell.
     last: Option<([Place; 2], Vec3)>,
     /// Linear radiance that cells of the volume itself, and coarser ones, have sent to the eye.
     radiance: [Vec3; 2],
