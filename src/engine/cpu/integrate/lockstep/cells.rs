@@ -103,10 +103,13 @@ impl<'a> Store<'a> {
         }
     }
 
+    /// The cell with this index. Lanes that have left the volume look behind it.
     #[inline(always)]
     fn sparse(&self, bricks: &Bricks, index: i32) -> Cell {
         let [x, y, z] = self.coordinates(index);
-        if index == NO_CELL { Cell::default() } else { *bricks.at(x, y, z) }
+        let [nx, ny, nz] = bricks.size();
+        let is_inside = index != NO_CELL && x < nx && y < ny && z < nz;
+        if is_inside { *bricks.at(x, y, z) } else { Cell::default() }
     }
 }
 
