@@ -2,8 +2,8 @@
 # Blender's USD export makes every curve without a bevel 2 m wide, though it renders nothing of it.
 #
 # Versions: bpy 5.2.3 of pip (Blender 5.2 LTS).
-# Expected: a Bézier, NURBS or poly curve with a bevel depth of 0, which Blender renders as nothing, is written
-#   without widths or with widths of 0; with a bevel depth of 0.01 its widths are 0.02.
+# Expected: a Bézier, NURBS or poly curve with a bevel depth of 0, which Blender renders as nothing, is
+#   written without widths or with widths of 0; with a bevel depth of 0.01 its widths are 0.02.
 # Seen: the widths are twice the radius of the points, which only scales the bevel and is 1 by default: 2 m,
 #   with and without a bevel. Widths of hair curves are true diameters.
 # Why it matters: a renderer that takes widths as diameters, as USD defines them, shows a guide curve of a few

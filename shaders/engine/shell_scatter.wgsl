@@ -18,7 +18,7 @@ override SHELL_SURFACE: bool = false;
 // Whether any shell has fibres.
 override SHELL_FIBRES: bool = true;
 
-// What the lights of a cell have in common.
+// Terms that the lights of a cell have in common.
 struct Scatter {
     is_on: bool,
     own: CellOptics,

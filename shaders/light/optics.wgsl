@@ -86,6 +86,7 @@ fn arriving_reduced(arriving: vec2<f32>, extinction: vec3<f32>, depth: f32) -> v
 fn optics_more(own: CellOptics, weight: vec3<f32>, once: f32, peak: Peak, arriving: vec2<f32>) -> vec3<f32> {
     let depth = arriving_depth(arriving.x);
     let s = own.whole * (depth * LN_2);
+    // Σ h_n s^(n−1)/(n−1)! by Horner's rule.
     var forward = vec3<f32>(peak.last * 0.2);
     forward = (forward * s + peak.first.w) * 0.25;
     forward = (forward * s + peak.first.z) * (1.0 / 3.0);

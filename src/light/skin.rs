@@ -31,7 +31,7 @@ const CM: f32 = 100.0;
 const FRECKLED: f32 = 4.0;
 const FLUSHED: f32 = 3.0;
 
-/// What skin is made of.
+/// Composition of skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tissue {
     /// Share of the epidermis that melanosomes fill, 0 to 1.

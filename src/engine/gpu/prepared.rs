@@ -24,7 +24,7 @@ pub struct PreparedScene {
     pub layers: u32,
     /// The light volumes to fill, if there are any: see [`Scene::light_plan`].
     pub light_volumes: Option<LightVolumes>,
-    /// What the host has computed at the vertices of shells.
+    /// Values that the host has computed at the vertices of shells.
     pub at_vertices: AtVertices,
     /// The reflection model and multiple scattering.
     pub reflection: BoundReflection,

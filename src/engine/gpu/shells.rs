@@ -79,7 +79,7 @@ struct Table {
     diffuse: Vec<u32>,
 }
 
-/// What the host computes at the vertices of shells.
+/// Values that the host computes at the vertices of shells.
 #[derive(Clone)]
 pub struct AtVertices {
     /// Shadows of opaque matter, if there are any.

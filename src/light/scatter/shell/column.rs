@@ -74,7 +74,7 @@ struct Part {
     albedo: f64,
 }
 
-/// What shines on a column.
+/// Light that shines on a column.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
     /// A light of intensity 1 whose direction has the cosine `mu` > 0 with the outward normal, or the inward

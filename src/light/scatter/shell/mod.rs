@@ -45,11 +45,11 @@ pub struct ShellMatter {
     pub albedo: Vec<Vec3>,
     /// Index of refraction behind the outer surface, at least 1.
     pub eta: f32,
-    /// What lies below the inner surface.
+    /// Matter below the inner surface.
     pub below: Below,
 }
 
-/// What lies below the inner surface of a shell.
+/// Matter below the inner surface of a shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Below {
     /// Nothing: light enters and leaves there as at the outer surface.
@@ -63,7 +63,7 @@ pub enum Below {
     Core,
 }
 
-/// What shines on a shell, and what is opposite its vertices.
+/// Light that shines on a shell, and inner surfaces opposite its vertices.
 #[derive(Clone, Debug, Default)]
 pub struct Surroundings<'a> {
     /// Lights.

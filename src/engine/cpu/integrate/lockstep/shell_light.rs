@@ -219,7 +219,7 @@ pub enum Fibres<S: Simd> {
 }
 
 impl<S: Simd> Fibres<S> {
-    /// Those of cells of the kind 0 (the volume itself) or 1 (coarser levels).
+    /// Directions in cells of the kind 0 (the volume itself) or 1 (coarser levels).
     #[inline(always)]
     pub fn new(simd: S, kind: usize, lit: &Lit<S>) -> Self {
         let Lit { second, e, frame, .. } = lit;

@@ -23,7 +23,7 @@ const SKIN: usize = 1;
 
 /// Lit cells in which light scatters many times.
 pub struct Scattered {
-    /// Of fibres and of skin: of the volume itself, and of coarser levels. There are none where light
+    /// Lists of fibres and of skin: of the volume itself, and of coarser levels. There are none where light
     /// scatters once everywhere.
     lists: Vec<[PendingScatter; 2]>,
     /// Last cells of the lanes' rays and their colours.
