@@ -5,6 +5,7 @@
 
 #import engine::integrate_light
 #import engine::integrate_shell
+#import engine::integrate_strands
 #import engine::shell_scatter
 #import layout
 #import light::fibre
@@ -17,6 +18,7 @@
 #import mapping
 #import mapping::shell
 #import trace::levels
+#import trace::lines
 #import trace::lookup
 #import trace::matter
 #import volume::cells
@@ -113,13 +115,20 @@ struct VolumeConstants {
     levels: u32,
     // Whether its cells reflect as strands do.
     strands: u32,
-    pad_a: u32,
+    // Whether its cells keep the lines of their strands.
+    lines: u32,
     pad_b: u32,
 }
 
 // Whether the cells of a volume reflect as strands do, in a scene where any do.
 fn is_strand(own: VolumeConstants) -> bool {
     return !FIBRES_TOO || own.strands != 0u;
+}
+
+// Finest level of a volume that rays through a quad walk, as a number.
+fn finest_of(own: VolumeConstants, quad: Quad) -> f32 {
+    let keeps_lines = !SEVERAL || own.lines != 0u;
+    return select(0.0, f32(STRANDS), LINES & keeps_lines & (quad.mist == 0.0));
 }
 
 // Ambient light that cells send on: all of it, as mist and fibres do, or the hair's share.
@@ -331,8 +340,9 @@ fn trace(
 
     // The level whose cells match the sample's footprint lies between two levels; both are walked.
     var finer = 0.0;
-    if PYRAMID {
-        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), 0.0, f32(own.levels - 1u));
+    if PYRAMID | LINES {
+        let finest = finest_of(own, quad);
+        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), finest, f32(own.levels - 1u));
     }
     let share = fract(finer);
     let walks = select(1u, 2u, share > 0.0);
@@ -342,7 +352,8 @@ fn trace(
     var i = 0u;
     for (; i < walks; i++) {
         let weight = select(share, 1.0 - share, i == 0u);
-        view.level = level_new(own.cells, own.base, u32(finer) + i);
+        let number = i32(floor(finer)) + i32(i);
+        view.level = level_new(own.cells, own.base, u32(max(number, 0)));
         view.origin = face_point(quad, hit.xy, own.cells, own.flow_cells);
         view.d_cell = d_cell;
         view.extinction = own.extinction;
@@ -358,12 +369,10 @@ fn trace(
             view.light = ray_light(0u, view.hit, view.level, view.lights);
         }
         var ray = ray_new(before.w);
-        if MIST_APART {
-            if is_mist(view) {
-                walk_mist(view, &ray);
-            } else {
-                walk_level(view, &ray);
-            }
+        if MIST_APART && is_mist(view) {
+            walk_mist(view, &ray);
+        } else if LINES && number == STRANDS {
+            walk_strands(view, &ray);
         } else {
             walk_level(view, &ray);
         }
@@ -537,11 +546,39 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     }
     let passed = (*ray).transmittance * exp2(-tau_bits);
 
+    let weight = (*ray).transmittance - passed;
+    light_cell((*walk).cell, texel.y, sample, vec2<f32>(tau_bits, weight), rho > 0.0, view, ray);
+    if MULTIPLE {
+        (*ray).depth += tau_bits;
+    }
+
+    (*ray).cells += select(1u + skipped, 0u, (*ray).done);
+    if LEAPS {
+        (*ray).cells = min((*ray).cells, view.max_cells);
+    }
+    (*ray).transmittance = passed;
+    (*ray).t = t_exit;
+    walk_step(walk, true);
+    (*ray).done |= ((*walk).cell.z >= view.level.size.z) | (passed < view.early_end)
+        | ((*ray).cells >= view.max_cells);
+}
+
+// Adds the light of a cell. `hides` is its optical depth, and T before the cell minus T behind it;
+// `direction` is its second word.
+fn light_cell(
+    cell: vec3<i32>,
+    direction: u32,
+    sample: CellSample,
+    hides: vec2<f32>,
+    occupied: bool,
+    view: View,
+    ray: ptr<function, Ray>,
+) {
     var seen: CellShading;
-    seen.cell = (*walk).cell;
-    seen.occupied = rho > 0.0;
-    seen.tau_bits = tau_bits;
-    seen.weight = (*ray).transmittance - passed;
+    seen.cell = cell;
+    seen.occupied = occupied;
+    seen.tau_bits = hides.x;
+    seen.weight = hides.y;
     seen.k_d = sample.k_d;
     seen.k_s = sample.k_s;
     if COLORED {
@@ -555,7 +592,7 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
     if MANY_DIRECTIONS {
         seen.spread = spread_new(view.metric, sample.moments, view.e_v);
     }
-    let v = v_code(texel.y);
+    let v = v_code(direction);
     let m = view.metric;
     let q = (m.x * v.x + m.y * v.y) * v.x + m.z * v.y * v.y + m.w * v.z * v.z;
     let inverse_q = 1.0 / max(q, 1e-30);
@@ -583,17 +620,4 @@ fn visit(walk: ptr<function, Walk>, ray: ptr<function, Ray>, view: View) {
             (*ray).cut |= i < view.lights;
         }
     }
-    if MULTIPLE {
-        (*ray).depth += tau_bits;
-    }
-
-    (*ray).cells += select(1u + skipped, 0u, (*ray).done);
-    if LEAPS {
-        (*ray).cells = min((*ray).cells, view.max_cells);
-    }
-    (*ray).transmittance = passed;
-    (*ray).t = t_exit;
-    walk_step(walk, true);
-    (*ray).done |= ((*walk).cell.z >= view.level.size.z) | (passed < view.early_end)
-        | ((*ray).cells >= view.max_cells);
 }

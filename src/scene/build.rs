@@ -79,6 +79,7 @@ fn structure(v: &Values, name: &str) -> Structure {
         strand_length: float("volume.strand_length"),
         coverage: float("volume.coverage"),
         crest: float("volume.crest"),
+        lines: v.choice("trace.lookup", Lookup::from_word) == Lookup::Strand,
     }
 }
 

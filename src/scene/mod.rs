@@ -504,6 +504,11 @@ impl Scene {
         }
     }
 
+    /// Whether the cells of any volume keep the lines of their strands.
+    pub fn keeps_lines(&self) -> bool {
+        self.recipes.iter().any(Recipe::has_lines)
+    }
+
     /// Whether the cells of any volume reflect as strands do.
     pub fn has_strands(&self) -> bool {
         (0..self.recipes.len()).any(|volume| self.reflection_of(volume).strands().is_some())

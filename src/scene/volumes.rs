@@ -59,6 +59,11 @@ pub struct Recipe {
 }
 
 impl Recipe {
+    /// Whether the volume's cells keep the lines of their strands.
+    pub fn has_lines(&self) -> bool {
+        self.water.structure.lines && self.file.is_none() && self.matter.is_none()
+    }
+
     /// Reads the recipe of the volume `name`. Its storage is not chosen yet.
     fn new(v: &Values, name: &str, folder: Option<&Path>, limits: &Limits) -> Result<Recipe> {
         let mut water = build::water(v, name);

@@ -9,6 +9,9 @@ use crate::util::powers::log2;
 use crate::volume::{Cell, Moments, VolumeTexture};
 use crate::walk::Crossing;
 
+/// Number of the level that stands for the strands' lines: finer than the volume's cells, which are level 0.
+pub const STRANDS: i32 = -1;
+
 /// One level of the volume, with what a walk needs to know about it.
 #[derive(Clone, Copy)]
 pub struct Level<'a> {

@@ -1,6 +1,7 @@
 //! §4 The trace: how view rays sample the volume, cell by cell.
 
 mod levels;
+pub mod lines;
 pub mod lookup;
 mod matter;
 mod settings;

@@ -37,9 +37,11 @@ pub enum Lookup {
     Nearest,
     /// Trilinear interpolation between eight cell centres, at the midpoint of the ray's segment in the cell.
     Trilinear,
+    /// The cell's own values; where a pixel sees less than a cell, the strands' lines ([`super::lines`]).
+    Strand,
 }
 
-words! { Lookup { Nearest => "nearest", Trilinear => "trilinear" } }
+words! { Lookup { Nearest => "nearest", Trilinear => "trilinear", Strand => "strand" } }
 
 /// Optical depth τ_k of a cell with density ρ.
 #[derive(Clone, Copy, Debug, PartialEq)]

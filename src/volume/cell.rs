@@ -6,16 +6,26 @@
 //! | x | 16–23 | k_d, unorm8 |
 //! | x | 24–31 | k_s, unorm8 |
 //! | y | 0–9, 10–19, 20–29 | v as three signed 10-bit numbers, largest magnitude 511 |
-//! | y | 30–31 | zero |
+//! | y | 30–31 | zero, or two bits of the strand's line |
 //!
 //! v is scaled by its largest component, not by its length, so the direction is code/|code|. The largest
 //! angular error is 0.0793° (a test checks it). Decoding needs shifts only, the length cancels in the fibre
 //! model, and packing an unpacked direction gives the same code again.
+//!
+//! # The strand's line
+//! Because the length is free, it carries where the strand passes the cell ([`Cell::with_line`]): the largest
+//! magnitude is 511 less the six low bits of an 8-bit number, whose two high bits are bits 30–31. Its low four
+//! bits are the place along the first of the two other axes, its high four that along the second, in
+//! sixteenths of a cell. Whoever reads the direction alone needs to know nothing of it. The largest angular
+//! error is then 0.0905°.
 
 use glam::Vec3;
 
 /// Largest magnitude of a component's code in v.
 pub const V_SCALE: f32 = 511.0;
+
+/// Steps of a strand's place along one axis of the cell.
+const LINE_STEPS: f32 = 16.0;
 
 /// A packed cell.
 #[repr(C)]
@@ -40,6 +50,44 @@ impl Cell {
         let code = (code + Vec3::splat(0.5).copysign(code)).as_ivec3();
         let bits = |c: i32| (c as u32) & 0x3ff;
         Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
+    }
+
+    /// Packs `v` and the line of the strand, which passes through `place` in direction `v`. `place` is in cells
+    /// from the cell's corner. Where the line passes outside the cell, it is moved to the nearest step inside.
+    pub fn with_line(v: Vec3, place: Vec3) -> Self {
+        let whole = Cell::from_direction(v);
+        if !whole.has_direction() {
+            return whole;
+        }
+        // Rounding can make a component equal to a larger one; the axis is that of the packed direction.
+        let axis = main_axis(whole.v_code());
+        let (a, b) = other_axes(axis);
+        let at = place + v * ((0.5 - place[axis]) / v[axis]);
+        let step = |x: f32| ((x * LINE_STEPS) as i32).clamp(0, LINE_STEPS as i32 - 1) as u32;
+        let line = step(at[a]) | step(at[b]) << 4;
+        let largest = V_SCALE - (line & 63) as f32;
+        let mut code = (v * (largest / v[axis].abs())).round();
+        for i in 0..3 {
+            // No other component may pass the largest, nor an earlier one reach it.
+            let most = if i < axis { largest - 1.0 } else { largest };
+            code[i] = if i == axis { largest.copysign(v[axis]) } else { code[i].clamp(-most, most) };
+        }
+        let bits = |c: f32| (c as i32 as u32) & 0x3ff;
+        Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 | (line >> 6) << 30 }
+    }
+
+    /// Point of the strand's line half way through the cell along the largest component of v, in cells from
+    /// the cell's centre, and the axis of that component. Only for cells of [`Cell::with_line`].
+    #[inline]
+    pub fn line(self) -> (Vec3, usize) {
+        let code = self.v_code();
+        let axis = main_axis(code);
+        let line = (V_SCALE - code[axis].abs()) as u32 | self.y >> 30 << 6;
+        let (a, b) = other_axes(axis);
+        let mut place = Vec3::ZERO;
+        place[a] = ((line & 15) as f32 + 0.5) / LINE_STEPS - 0.5;
+        place[b] = ((line >> 4) as f32 + 0.5) / LINE_STEPS - 0.5;
+        (place, axis)
     }
 
     /// Returns the cell with other ρ (before α), k_d and k_s. Each is clamped to 0 to 1.
@@ -91,6 +139,25 @@ impl Cell {
     pub fn v(self) -> Vec3 {
         self.v_code().normalize_or_zero()
     }
+}
+
+/// Axis of the component of the largest magnitude, the first of equal ones.
+#[inline]
+fn main_axis(v: Vec3) -> usize {
+    let a = v.abs();
+    if a.x >= a.y && a.x >= a.z {
+        0
+    } else if a.y >= a.z {
+        1
+    } else {
+        2
+    }
+}
+
+/// The two other axes, in order.
+#[inline]
+fn other_axes(axis: usize) -> (usize, usize) {
+    [(1, 2), (0, 2), (0, 1)][axis]
 }
 
 /// Rounds `x`, clamped to 0 to 1, to steps of 1/`scale`.

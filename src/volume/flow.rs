@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::bricks::{BRICK, Bricks, Marks, parted};
 use super::bundle::curve_points;
+use super::cell::Cell;
 use super::ripple::Ripple;
 use super::spec::WaterSpec;
 use crate::util::error::Result;
@@ -19,8 +20,35 @@ const TASKS_PER_ROUND: usize = 64;
 /// Number of curves from which [`expected_cells`] estimates how many cells all of them pass.
 const SAMPLE_CURVES: usize = 32;
 
+/// Length of a strand in a cell from which no later strand takes the cell's line from it, cells.
+const LINE_LENGTH: f32 = 0.5;
+
+/// Bytes of the line that a cell keeps while curves are walked.
+pub(super) const LINE_BYTES: usize = size_of::<Line>();
+
 /// Part of a curve inside one cell: index of the cell in its slab, and length × direction, cells.
 type Contribution = (u32, Vec3);
+
+/// A run of a curve's segments inside one cell.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    /// The cell; x and y wrapped into the tile.
+    pub cell: IVec3,
+    /// Length × direction, cells.
+    pub way: Vec3,
+    /// Number of the segment that enters.
+    pub segment: usize,
+    /// Length, and length × place of the middle in the cell, summed over the segments, cells.
+    length: f32,
+    places: Vec3,
+}
+
+impl Part {
+    /// Place of the middle, cells from the cell's corner.
+    fn middle(&self) -> Vec3 {
+        self.places / self.length.max(1e-20)
+    }
+}
 
 /// Contributions of one task to one slab.
 #[derive(Clone, Default)]
@@ -28,6 +56,8 @@ struct Bucket {
     parts: Vec<Contribution>,
     /// Noise of the strand in each part; empty if ρ does not follow the strands.
     noises: Vec<f32>,
+    /// Place of the middle of each part in its cell; empty if cells keep no lines.
+    places: Vec<Vec3>,
 }
 
 /// Sums over all curves, for each cell.
@@ -37,9 +67,34 @@ pub(super) struct Flow {
     /// Sums of length × noise and of length² of the parts inside the cell; empty if ρ does not follow the
     /// strands.
     pub strands: Vec<[f32; 2]>,
+    /// The strand that each cell keeps; empty if cells keep no lines.
+    lines: Vec<Line>,
+}
+
+/// The strand that a cell keeps: the first curve that passes half a cell of it, otherwise the longest. So a
+/// strand stays one line through all cells that other strands pass too.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    /// Length × direction inside the cell, cells.
+    way: Vec3,
+    /// Place of its middle, cells from the cell's corner.
+    place: Vec3,
 }
 
 impl Flow {
+    /// Packs the direction of a cell, or its strand's direction and line if cells keep lines.
+    fn cell(&self, index: usize) -> Cell {
+        match self.lines.get(index) {
+            Some(line) => Cell::with_line(line.way, line.place),
+            None => Cell::from_direction(self.directions[index]),
+        }
+    }
+
+    /// Packs the directions of all cells, in their order.
+    pub fn cells(&self) -> Vec<Cell> {
+        (0..self.directions.len()).into_par_iter().map(|index| self.cell(index)).collect()
+    }
+
     /// Noise of the strands in a cell: their mean weighted by length, scaled to variance 1.
     pub fn noise(&self, index: usize) -> f32 {
         self.strands.get(index).map_or(0.0, |[sum, squares]| sum / squares.max(1e-30).sqrt())
@@ -115,7 +170,12 @@ impl Flow {
     ) -> Result<Flow> {
         let cells = lengths.iter().sum();
         let strand_cells = if spec.structure.coherence > 0.0 { cells } else { 0 };
-        let mut flow = Flow { directions: vec![Vec3::ZERO; cells], strands: vec![[0.0; 2]; strand_cells] };
+        let line_cells = if spec.structure.lines { cells } else { 0 };
+        let mut flow = Flow {
+            directions: vec![Vec3::ZERO; cells],
+            strands: vec![[0.0; 2]; strand_cells],
+            lines: vec![Line::default(); line_cells],
+        };
         let curves = spec.across as usize * spec.deep as usize;
         let starts: Vec<usize> = (0..curves).step_by(CURVES_PER_TASK).collect();
         for (round, starts) in starts.chunks(TASKS_PER_ROUND).enumerate() {
@@ -140,6 +200,19 @@ impl Flow {
                 cells[index as usize] += v;
             }
         });
+        if !self.lines.is_empty() {
+            parted(&mut self.lines, lengths).into_par_iter().enumerate().for_each(|(slab, cells)| {
+                for bucket in tasks.iter().map(|buckets| &buckets[slab]) {
+                    for (&(index, way), &place) in bucket.parts.iter().zip(&bucket.places) {
+                        let line = &mut cells[index as usize];
+                        let [kept, own] = [line.way, way].map(Vec3::length_squared);
+                        if kept < LINE_LENGTH * LINE_LENGTH && own > kept {
+                            *line = Line { way, place };
+                        }
+                    }
+                }
+            });
+        }
         if self.strands.is_empty() {
             return;
         }
@@ -171,12 +244,15 @@ fn contributions(
         if coherent {
             strand_noise(spec, curve, points.len().saturating_sub(1), &mut noise);
         }
-        walk_curve(spec.size, &points, &mut |cell: IVec3, part: Vec3, segment: usize| {
-            let (slab, in_slab) = position(cell);
+        walk_curve(spec.size, &points, &mut |part: Part| {
+            let (slab, in_slab) = position(part.cell);
             let bucket = &mut buckets[slab];
-            bucket.parts.push((in_slab, part));
+            bucket.parts.push((in_slab, part.way));
             if coherent {
-                bucket.noises.push(noise[segment]);
+                bucket.noises.push(noise[part.segment]);
+            }
+            if spec.structure.lines {
+                bucket.places.push(part.middle());
             }
         });
     }
@@ -198,7 +274,7 @@ pub(super) fn marked(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<Marks> {
             let mut points = Vec::new();
             for curve in first..(first + CURVES_PER_TASK).min(curves) {
                 curve_points(spec, curve, &mut points);
-                walk_curve(spec.size, &points, &mut |cell: IVec3, _: Vec3, _: usize| marks.add(cell));
+                walk_curve(spec.size, &points, &mut |part: Part| marks.add(part.cell));
             }
         });
     }
@@ -215,7 +291,7 @@ pub(super) fn expected_cells(spec: &WaterSpec) -> u64 {
         .map(|&curve| {
             let (mut points, mut passed) = (Vec::new(), 0);
             curve_points(spec, curve, &mut points);
-            walk_curve(spec.size, &points, &mut |_: IVec3, _: Vec3, _: usize| passed += 1);
+            walk_curve(spec.size, &points, &mut |_: Part| passed += 1);
             passed
         })
         .sum();
@@ -231,19 +307,27 @@ fn strand_noise(spec: &WaterSpec, curve: usize, segments: usize, noise: &mut Vec
     Ripple::new(spec.structure.strand_length, &mut rng).sample(segments, noise);
 }
 
-/// Reports each cell that the curve passes, with length × direction of the curve there and the number of the
-/// segment that enters. Successive parts inside one cell are reported as one. x and y wrap around; cells
-/// outside the slab in z are dropped.
-pub(super) fn walk_curve(size: [u32; 3], points: &[Vec3], report: &mut impl FnMut(IVec3, Vec3, usize)) {
+/// Reports the parts of the curve, cell by cell. Successive segments inside one cell are one part. x and y
+/// wrap around; cells outside the slab in z are dropped.
+pub(super) fn walk_curve(size: [u32; 3], points: &[Vec3], report: &mut impl FnMut(Part)) {
     let size = IVec3::from_array(size.map(|n| n as i32));
-    let mut open: Option<(IVec3, Vec3, usize)> = None;
-    let mut add = |cell: IVec3, part: Vec3, segment: usize| match &mut open {
-        Some((last, sum, _)) if *last == cell => *sum += part,
-        _ => {
-            if let Some((last, sum, first)) = open.replace((cell, part, segment))
-                && (0..size.z).contains(&last.z)
-            {
-                report(last, sum, first);
+    let mut open: Option<Part> = None;
+    let mut add = |cell: IVec3, way: Vec3, start: Vec3, segment: usize| {
+        let middle = start + way * 0.5;
+        let places = (middle - middle.floor()) * way.length();
+        match &mut open {
+            Some(last) if last.cell == cell => {
+                last.way += way;
+                last.places += places;
+                last.length += way.length();
+            }
+            _ => {
+                let part = Part { cell, way, places, length: way.length(), segment };
+                if let Some(last) = open.replace(part)
+                    && (0..size.z).contains(&last.cell.z)
+                {
+                    report(last);
+                }
             }
         }
     };
@@ -252,17 +336,19 @@ pub(super) fn walk_curve(size: [u32; 3], points: &[Vec3], report: &mut impl FnMu
         let cell = cell_of(ends[0]);
         if cell == cell_of(ends[1]) {
             // Many segments lie in one cell, and then the walk would find that cell alone.
-            add(IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z), d, segment);
+            let wrapped = IVec3::new(cell.x.rem_euclid(size.x), cell.y.rem_euclid(size.y), cell.z);
+            add(wrapped, d, ends[0], segment);
             continue;
         }
         for crossing in Walk::new(size, ends[0], d, 1.0) {
-            add(crossing.cell, d * (crossing.t_exit - crossing.t_enter), segment);
+            let way = d * (crossing.t_exit - crossing.t_enter);
+            add(crossing.cell, way, ends[0] + d * crossing.t_enter, segment);
         }
     }
-    if let Some((cell, sum, first)) = open
-        && (0..size.z).contains(&cell.z)
+    if let Some(last) = open
+        && (0..size.z).contains(&last.cell.z)
     {
-        report(cell, sum, first);
+        report(last);
     }
 }
 

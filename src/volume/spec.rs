@@ -49,4 +49,6 @@ pub struct Structure {
     pub coverage: f32,
     /// Difference of k_d between ρ = 1 and ρ = 0.
     pub crest: f32,
+    /// Whether each cell keeps the line of its strand ([`Cell::with_line`](super::Cell::with_line)).
+    pub lines: bool,
 }

@@ -5,11 +5,11 @@
 //! the threads of a cell are added up. So a finer volume of the same threads lets as much light pass. A
 //! thread that is wider than a cell is cut into strips, which fill all cells of its round.
 
-use glam::{IVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::bricks::parted;
-use super::flow::walk_curve;
+use super::flow::{Part, walk_curve};
 use super::{Cell, Cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -138,14 +138,14 @@ pub(super) fn cells_of_threads(
                 for number in first..(first + round.div_ceil(TASKS_PER_ROUND)).min(end) {
                     thread.clear();
                     draw(number, &mut thread);
-                    let mut add = |(cell, part, first): (IVec3, Vec3, usize), last: usize, strips: u32| {
-                        let [x, y, z] = cell.to_array().map(|c| c as usize);
+                    let mut add = |part: Part, last: usize, strips: u32| {
+                        let [x, y, z] = part.cell.to_array().map(|c| c as usize);
                         let in_slab = ((z % layers) * ny + y) * nx + x;
-                        let look = thread.mean_look(first, last);
+                        let look = thread.mean_look(part.segment, last);
                         // A strip stands for its part of the round, or of what a thinner thread hides.
                         let share = look.width.max(look.width * look.width) / (strips * strips) as f32;
                         let look = Look { width: share, ..look };
-                        parts[z / layers].push((in_slab as u32, part, look));
+                        parts[z / layers].push((in_slab as u32, part.way, look));
                     };
                     // The segment that enters the next cell is the last one in this cell.
                     let strips = thread.strips();
@@ -154,9 +154,9 @@ pub(super) fn cells_of_threads(
                             continue;
                         }
                         let mut open = None;
-                        walk_curve(size, &points, &mut |cell, part, first| {
-                            if let Some(before) = open.replace((cell, part, first)) {
-                                add(before, first, strips);
+                        walk_curve(size, &points, &mut |part: Part| {
+                            if let Some(before) = open.replace(part) {
+                                add(before, part.segment, strips);
                             }
                         });
                         if let Some(before) = open {

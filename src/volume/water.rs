@@ -4,11 +4,9 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::flow::{self, Flow};
 use super::storage::check_sparse;
-use super::{Cell, Cells, VolumeTexture};
+use super::{Cells, VolumeTexture};
 use crate::util::cache::{Cache, key};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -22,9 +20,11 @@ impl WaterSpec {
         self.structure.coherence == 0.0 && self.structure.coverage == 0.0
     }
 
-    /// Bytes that building takes for each cell beside its vector: more than 0 if ρ follows the strands.
+    /// Bytes that building takes for each cell beside its vector: more than 0 if ρ follows the strands, or if
+    /// cells keep lines.
     pub fn strand_bytes(&self) -> usize {
-        if self.structure.coherence > 0.0 { size_of::<[f32; 2]>() } else { 0 }
+        let noise = if self.structure.coherence > 0.0 { size_of::<[f32; 2]>() } else { 0 };
+        noise + if self.structure.lines { flow::LINE_BYTES } else { 0 }
     }
 }
 
@@ -34,8 +34,7 @@ impl WaterSpec {
 /// Returns an error if `monitor` ends the work.
 pub fn build_water(spec: &WaterSpec, monitor: &dyn Monitor) -> Result<VolumeTexture> {
     let flow = Flow::new(spec, monitor)?;
-    let cells: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
-    let mut cells = cells.into();
+    let mut cells = flow.cells().into();
     let follows_strands = !spec.density_is_of_cells();
     set(spec, &mut cells, follows_strands.then_some(&flow));
     Ok(VolumeTexture { size: spec.size, alpha: spec.alpha, cells })
@@ -53,7 +52,7 @@ pub fn build_sparse_water(spec: &WaterSpec, memory: u64, monitor: &dyn Monitor) 
     check_sparse(spec, marks.count(), memory)?;
     let mut bricks = marks.bricks();
     let flow = Flow::packed(spec, &bricks, monitor)?;
-    bricks.fill(flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect());
+    bricks.fill(flow.cells());
     let mut cells = bricks.into();
     let follows_strands = !spec.density_is_of_cells();
     set(spec, &mut cells, follows_strands.then_some(&flow));

@@ -28,7 +28,7 @@ use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
-use crate::trace::lookup::{Level, level_at};
+use crate::trace::lookup::{Level, STRANDS, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -95,6 +95,8 @@ struct FrameVolume {
     ramp: Ramp,
     /// Whether the cells reflect as strands do.
     has_strands: bool,
+    /// Whether rays walk the lines of the strands where they see less than a cell.
+    has_lines: bool,
     /// Ambient light that cells send on, but those of mist.
     ambient: Vec3,
 }
@@ -333,6 +335,7 @@ impl<'a> Integrator<'a> {
             flow_cells: flow_cells(flows[i], volume.size[1]),
             ramp: scene.recipes[i].ramp,
             has_strands: scene.reflection_of(i).strands().is_some(),
+            has_lines: scene.recipes[i].has_lines(),
             ambient: scene.ambient * scene.reflection_of(i).ambient_share(),
         };
         let integrator = Integrator {
@@ -479,16 +482,30 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let ray = self.sheet_hit(quad, d_world, hit);
         let (level, share) = self.level_of(&ray, hit[2]);
-        let levels = &self.volumes[ray.volume].levels;
-        let mut result = self.walk(&ray, &Level::new(levels, level), before, observer);
+        let mut result = self.walk_numbered(&ray, level, before, observer);
         if share > 0.0 {
-            let next = self.walk(&ray, &Level::new(levels, level + 1), before, observer);
+            let next = self.walk_numbered(&ray, level + 1, before, observer);
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, tint, cells } = result;
         let order = SheetOrder { before, is_last, behind };
         let is_mist = ray.matter[0].mist > 0.0;
         self.composed((ray.point, ray.volume, is_mist), transmittance, cells, (&lit, tint), order)
+    }
+
+    /// Walks level `number` of a ray's volume, or its strands, which are level [`STRANDS`].
+    fn walk_numbered<O: Observer>(
+        &self,
+        ray: &SheetHit,
+        number: i32,
+        before: f32,
+        observer: &mut O,
+    ) -> LevelResult {
+        let levels = &self.volumes[ray.volume].levels;
+        if number == STRANDS {
+            return self.walk_strands(ray, &Level::new(levels, 0), before, observer);
+        }
+        self.walk(ray, &Level::new(levels, number as u32), before, observer)
     }
 
     /// Result of a sheet of a volume, of mist or not, that a ray meets at `point` of the world and that lets
@@ -624,17 +641,20 @@ impl<'a> Integrator<'a> {
     }
 
     /// Returns the finer of the two levels whose cells suit the ray `t` metres from the eye, and the share of
-    /// the coarser.
+    /// the coarser. A ray that sees less than a cell walks the strands, level [`STRANDS`], if cells keep them.
     #[inline]
-    fn level_of(&self, ray: &SheetHit, t: f32) -> (u32, f32) {
-        if self.scene.trace.filter == Prefilter::None {
+    fn level_of(&self, ray: &SheetHit, t: f32) -> (i32, f32) {
+        let volume = &self.volumes[ray.volume];
+        let is_filtered = self.scene.trace.filter != Prefilter::None;
+        if !is_filtered && !volume.has_lines {
             return (0, 0.0);
         }
         let forward = self.scene.camera.forward.as_vec3();
         let CellFrame { depth, det, .. } = ray.frame;
         let area = det.abs() * depth * ray.d_cell.length();
         let level = level_at(self.footprint, forward, ray.d_world, t, area);
-        let level = level.clamp(0.0, (self.volumes[ray.volume].levels.len() - 1) as f32);
-        (level as u32, level - level.floor())
+        let finest = if volume.has_lines && ray.matter[0].mist == 0.0 { STRANDS } else { 0 };
+        let level = level.clamp(finest as f32, (volume.levels.len() - 1) as f32);
+        (level.floor() as i32, level - level.floor())
     }
 }

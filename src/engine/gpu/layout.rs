@@ -341,7 +341,8 @@ pub struct VolumeConstants {
     pub optics: Optics,
     pub levels: u32,
     pub strands: u32,
-    pub pad_a: u32,
+    /// Whether the cells keep the lines of their strands.
+    pub lines: u32,
     pub pad_b: u32,
 }
 
@@ -366,6 +367,7 @@ pub fn volume_constants(
         optics: optics[i].as_ref().map(Optics::from).unwrap_or_default(),
         levels: level_atlas(&scene.trace, volume.size).count,
         strands: scene.reflection_of(i).strands().is_some().into(),
+        lines: scene.recipes[i].has_lines().into(),
         ..VolumeConstants::default()
     };
     let mut all: Vec<VolumeConstants> = volumes.iter().enumerate().map(constants).collect();

@@ -11,12 +11,12 @@ macro_rules! files {
 /// Name (without extension) and text of every file in `shaders/`.
 pub const FILES: &[(&str, &str)] = files! {
     "layout" "mapping" "mapping/shell" "mapping/shell_path" "walk" "volume/cells"
-    "trace/levels" "trace/lookup" "trace/matter"
+    "trace/levels" "trace/lines" "trace/lookup" "trace/matter"
     "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/optics" "light/ramp"
     "light/scatter"
     "light/strand" "light/visibility" "light/shell_depth" "light/shell_light"
     "engine/bare" "engine/gbuffer" "engine/gloss" "engine/integrate" "engine/integrate_light"
-    "engine/integrate_shell" "engine/opaque" "engine/paint" "engine/pool" "engine/sheets_many"
+    "engine/integrate_shell" "engine/integrate_strands" "engine/opaque" "engine/paint" "engine/pool" "engine/sheets_many"
     "engine/sheets_one" "engine/shell_scatter"
     "engine/shell_visibility"
     "picture/resolve"

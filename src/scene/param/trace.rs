@@ -124,14 +124,16 @@ pub(super) const TRACE: Group = Group {
                 "Choose `pyramid` when distant water flickers or looks grainy; it takes more memory and \
                  time.",
             ),
-        p("trace.lookup", "", "", Choice(Lookup::WORDS), Uniform)
+        p("trace.lookup", "", "", Choice(Lookup::WORDS), Volume)
             .doc(
                 "Values that a ray finds in a cell: `nearest` takes the cell's own, `trilinear` \
-                 interpolates ρ, k and v between eight cells.",
+                 interpolates ρ, k and v between eight cells. `strand` takes the cell's own too, but where a \
+                 pixel sees less than a cell of water, the ray meets the strands that made the cells, as \
+                 threads with soft edges. Shells and volumes from files have no such strands.",
             )
             .when(
-                "Choose `trilinear` for close views in which cells show as blocks; the walk takes 2 to 5 \
-                 times as long.",
+                "Choose `strand` for water seen from near by, where cells show as blocks; what is further \
+                 away stays as it is. `trilinear` blurs any volume; the walk takes 2 to 5 times as long.",
             ),
     ],
 };

@@ -183,8 +183,7 @@ pub(super) fn cells(
     };
     let draw = |strand: usize, points: &mut Vec<Vec3>| paths.strand(strand, points);
     let flow = Flow::along(&water, draw, monitor)?;
-    let made: Vec<Cell> = flow.directions.par_iter().map(|&v| Cell::from_direction(v)).collect();
-    let mut made: Cells = made.into();
+    let mut made: Cells = flow.cells().into();
     set(&water, &mut made, (!water.density_is_of_cells()).then_some(&flow));
     let made = made.dense().expect("the storage is dense");
     Ok((paths.thinned(grids, made), paths.largest))

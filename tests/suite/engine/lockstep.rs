@@ -112,7 +112,9 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
     parts.trace.attenuation =
         [Attenuation::PathLength { sigma: 6.0 }, Attenuation::PerCell { tau: 0.8 }][one_of(2) as usize];
     parts.trace.filter = [Prefilter::None, Prefilter::Pyramid][one_of(2) as usize];
-    parts.trace.lookup = [Lookup::Nearest, Lookup::Nearest, Lookup::Trilinear][one_of(3) as usize];
+    parts.trace.lookup =
+        [Lookup::Nearest, Lookup::Nearest, Lookup::Trilinear, Lookup::Strand][one_of(4) as usize];
+    parts.recipes[0].water.structure.lines = parts.trace.lookup == Lookup::Strand;
     parts.trace.max_cells = [65_536, 300, 13, 8, 1][one_of(5) as usize];
     parts.trace.early_end = [0.0, 0.001, 0.5][one_of(3) as usize];
     parts.trace.layers = 3;

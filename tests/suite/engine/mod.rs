@@ -21,4 +21,5 @@ pub mod shaders;
 pub mod shell_scatter;
 pub mod shells;
 pub mod specialise;
+pub mod strands;
 pub mod volumes;

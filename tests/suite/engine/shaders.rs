@@ -184,7 +184,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let ramp = fields!(Ramp: first count step_0 k_s_factor step_1 k_s_summand step_2 pad);
     assert_eq!(members(&module, "Ramp"), ramp);
     let volume = fields!(VolumeConstants: cells extinction base flow_cells similarity ramp optics levels
-        strands pad_a pad_b);
+        strands lines pad_b);
     assert_eq!(members(&module, "VolumeConstants"), volume);
     let optics = fields!(Optics: extinction g albedo eta isotropic roughness);
     assert_eq!(members(&module, "Optics"), optics);

@@ -3,6 +3,7 @@
 pub mod closed_forms;
 pub mod flow;
 pub mod limits;
+pub mod lines;
 pub mod shell_diffuse;
 pub mod shell_shadows;
 pub mod shells;

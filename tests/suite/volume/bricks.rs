@@ -52,6 +52,7 @@ fn spec() -> impl Strategy<Value = WaterSpec> {
                 strand_length: 0.1,
                 coverage,
                 crest,
+                lines: seed % 2 == 0,
             },
             seed,
             alpha: 0.9,

@@ -92,3 +92,33 @@ fn densities_and_coefficients_are_clamped_and_rounded_to_the_nearest_code() {
     }
     assert_eq!(cell(0.3, 0.3).v(), Vec3::Y, "density leaves the direction alone");
 }
+
+#[test]
+fn a_cell_keeps_the_line_of_its_strand_beside_the_direction() {
+    const LARGEST_LINE_ANGLE_DEGREES: f64 = 0.0905;
+    let docs = include_str!("../../../src/volume/cell.rs");
+    assert!(docs.contains(&format!("{LARGEST_LINE_ANGLE_DEGREES}°")), "the docs state another angle");
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    for i in 0..500_000 {
+        let mut v = Vec3::from_array(UnitSphere.sample(&mut rng));
+        // Two or three components may be equally large.
+        if i % 5 == 0 {
+            v = Vec3::new(v.x, v.x, if i % 10 == 0 { -v.x } else { v.z });
+        }
+        let inside = Vec3::new(rng.random(), rng.random(), rng.random());
+        let cell = Cell::with_line(v, inside).with_density(0.7, 0.2, 0.9);
+        let (a, b) = (v.as_dvec3().normalize(), cell.v_code().as_dvec3().normalize());
+        let error = a.cross(b).length().atan2(a.dot(b)).to_degrees();
+        assert!(error <= LARGEST_LINE_ANGLE_DEGREES, "{v} is turned by {error}°");
+        let (place, axis) = cell.line();
+        assert_eq!(place[axis], 0.0);
+        // The point where the true line passes the cell's middle along that axis, moved inside.
+        let at = inside + v * ((0.5 - inside[axis]) / v[axis]) - 0.5;
+        for other in (0..3).filter(|&other| other != axis) {
+            let error = (place[other] - at[other].clamp(-0.5, 0.5)).abs();
+            assert!(error <= 1.0 / 32.0 + 1e-4, "{v} through {inside}: {place} instead of {at}");
+        }
+        assert!((cell.rho() - 0.7).abs() < 1e-4);
+    }
+    assert_eq!(Cell::with_line(Vec3::ZERO, Vec3::splat(0.5)), Cell::default());
+}

@@ -19,6 +19,7 @@ fn rich(size: [u32; 3], grid: u32) -> WaterSpec {
         strand_length: 0.1,
         coverage: 1.0,
         crest: 0.5,
+        lines: true,
     };
     WaterSpec { structure, ..spec(size, grid) }
 }

@@ -260,7 +260,7 @@ impl Integrator<'_> {
                     &SheetDensity::WHOLE,
                     ray.shell.is_single,
                 ),
-                Lookup::Nearest => level.sample_cell(cell, &SheetDensity::WHOLE),
+                Lookup::Nearest | Lookup::Strand => level.sample_cell(cell, &SheetDensity::WHOLE),
             };
             observer.enter(&crossing, cell, sample.rho / 65535.0, ray.transmittance);
             if sample.rho <= 0.0 {
@@ -333,7 +333,7 @@ impl Integrator<'_> {
     /// Directions in a cell, in the frame where angles are measured.
     fn fibres(&self, level: &Level, cell: Cell, sample: &CellSample, j: &Mat3) -> Fibres {
         let j = if self.scene.angles == AngleFrame::Texture { Mat3::IDENTITY } else { *j };
-        if level.is_whole && self.scene.trace.lookup == Lookup::Nearest {
+        if level.is_whole && self.scene.trace.lookup != Lookup::Trilinear {
             return Fibres::One(j * cell.v_code());
         }
         Fibres::Many(sample.moments.unwrap_or_else(|| level.moments(cell)).mapped(&j))

@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
+use crate::trace::lookup::STRANDS;
 use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
@@ -50,7 +51,8 @@ pub struct Values {
     pub mist: Stored,
     /// ρ of uniform mist, in codes.
     pub even: Stored,
-    /// Finer of the two levels that suit the ray, and the share of the coarser.
+    /// Finer of the two levels that suit the ray ([`STRANDS`] or the number of a level), and the share of the
+    /// coarser.
     pub level: Stored,
     pub share: Stored,
 }
@@ -215,7 +217,8 @@ impl Hits {
         let even = is_mist.select(splat(MIST_RHO) * mist_left, zero);
 
         let (mut level, mut share) = (zero, zero);
-        if scene.trace.filter != Prefilter::None {
+        let keep_lines = integrator.volumes.iter().any(|volume| volume.has_lines);
+        if scene.trace.filter != Prefilter::None || keep_lines {
             let forward = scene.camera.forward.as_vec3();
             let forward = Lanes3 { x: splat(forward.x), y: splat(forward.y), z: splat(forward.z) };
             let c = d.dot(forward);
@@ -223,7 +226,9 @@ impl Hits {
             let across = area / (det.abs() * depth * d_cell.dot(d_cell).sqrt());
             let exact = splat(0.5) * log2(simd, across.max(splat(1e-30)));
             let coarsest = hits.of_volumes(simd, integrator, |volume| (volume.levels.len() - 1) as f32);
-            let exact = exact.max(zero).min(coarsest);
+            let finest = |volume: &FrameVolume| if volume.has_lines { STRANDS as f32 } else { 0.0 };
+            let finest = is_mist.select(zero, hits.of_volumes(simd, integrator, finest));
+            let exact = exact.max(finest).min(coarsest);
             level = floor_cell(simd, exact).to_float::<f32x8<S>>();
             share = exact - level;
         }

@@ -44,7 +44,7 @@ use super::walk::Lit;
 use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
-use crate::trace::lookup::Level;
+use crate::trace::lookup::{Level, STRANDS};
 use crate::util::lanes::LANES;
 
 /// Registers that rays are walked in.
@@ -119,6 +119,8 @@ struct Met {
     packs: Vec<Hits>,
     /// Sheets and which of their two levels is walked, by the index of the level and by strands or mist.
     walks: Vec<[Vec<(usize, usize)>; 2]>,
+    /// Sheets whose strands are walked.
+    strands: Vec<usize>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
     /// Colour that each sheet's two levels give to the ambient light; see
@@ -238,7 +240,7 @@ impl<'a> Lockstep<'a> {
     /// Walks the levels of the sheets.
     fn walk(&mut self) {
         let lights = self.integrator.lights.len();
-        let Met { sheets, packs, walks, lit, tints } = &mut self.met;
+        let Met { sheets, packs, walks, strands, lit, tints } = &mut self.met;
         tints.clear();
         tints.resize(sheets.len(), Default::default());
         lit.clear();
@@ -248,12 +250,28 @@ impl<'a> Lockstep<'a> {
         for i in 0..sheets.len() {
             let (values, lane) = (&packs[i / LANES].values, i % LANES);
             let volume = self.integrator.scene.quads[packs[i / LANES].quads[lane]].material.volume;
-            let level = self.firsts[volume as usize] + values.level.0[lane] as usize;
             let kind = usize::from(values.mist.0[lane] > 0.0);
-            walks[level][kind].push((i, 0));
-            if values.share.0[lane] > 0.0 {
-                walks[level + 1][kind].push((i, 1));
+            let (finer, share) = (values.level.0[lane] as i32, values.share.0[lane]);
+            for (which, level) in [finer, finer + 1].into_iter().enumerate() {
+                if which == 1 && share == 0.0 {
+                    break;
+                }
+                match level {
+                    STRANDS => strands.push(i),
+                    _ => walks[self.firsts[volume as usize] + level as usize][kind].push((i, which)),
+                }
             }
+        }
+        // Few rays are so close that they walk the strands: one at a time.
+        for i in strands.drain(..) {
+            let (pack, lane) = (&packs[i / LANES], i % LANES);
+            let (d_world, hit) = (pack.values.d_world.get(lane), pack.values.at.get(lane).into());
+            let ray = self.integrator.sheet_hit(pack.quads[lane], d_world, hit);
+            let before = sheets[i].order.before;
+            let walked = self.integrator.walk_numbered(&ray, STRANDS, before, &mut ());
+            tints[i][0] = walked.tint;
+            sheets[i].ends[0] = (walked.transmittance, walked.cells);
+            lit[2 * i * lights..][..lights].copy_from_slice(&walked.lit);
         }
         for (&(volume, level, store), kinds) in self.levels.iter().zip(&*walks) {
             for walks in kinds {

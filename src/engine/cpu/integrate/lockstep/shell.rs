@@ -70,7 +70,7 @@ impl<'a> ShellHit<'a> {
 /// Whether rays through shells may go side by side: all cells of fibres have one model.
 pub fn covers(integrator: &Integrator) -> bool {
     let scene = integrator.scene;
-    scene.trace.lookup == Lookup::Nearest
+    scene.trace.lookup != Lookup::Trilinear
         && scene.angles == AngleFrame::World
         && integrator.models_in_shells() != [true; 2]
 }
