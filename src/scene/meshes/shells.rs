@@ -9,6 +9,7 @@ use super::coordinates::Coordinates;
 use super::faces::unmapped_error;
 use super::{Carrier, ThicknessFrom};
 use crate::mapping::shell::{Shell, ShellFault, SurfaceMesh};
+use crate::scene::Recipe;
 use crate::util::error::{Error, Result};
 
 /// Returns the shells of a mesh, one for each material that has one.
@@ -76,6 +77,25 @@ fn shell(key: &Key, cover: &Cover) -> Result<Shell> {
     shell.volume = cover.material.volume;
     shell.skin = cover.has_body;
     Ok(shell)
+}
+
+/// Share of a shell's prisms that may turn over untold: at a few sharp edges it is not seen.
+const MOST_TURNED: f64 = 0.02;
+
+/// Returns a warning about each shell that turns over itself.
+pub(in crate::scene) fn turned_over(shells: &[Arc<Shell>], recipes: &[Recipe]) -> Vec<String> {
+    let told = |shell: &Arc<Shell>| {
+        let (turned, all) = (shell.turned_over(), shell.prisms.len());
+        (turned as f64 > MOST_TURNED * all as f64).then(|| {
+            format!(
+                "the shell of the volume {} turns over itself at {turned} of {all} triangles, where it is \
+                 thicker than half of the mesh: such parts look ragged and take long; lower the thickness of \
+                 its material, or paint it thinner there (thickness_from)",
+                recipes[shell.volume as usize].name
+            )
+        })
+    };
+    shells.iter().filter_map(told).collect()
 }
 
 fn no_colors(key: &Key, cover: &Cover) -> Error {
