@@ -712,7 +712,8 @@ impl Scene {
         warnings.extend(self.unmapped.iter().map(|(name, count)| {
             format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
         }));
-        warnings.extend(meshes::turned_over(&self.shells, &self.recipes));
+        let turned = |values| meshes::turned_over(&self.shells, &self.recipes, values);
+        warnings.extend(self.values.iter().flat_map(turned));
         warnings.extend(self.untextured.iter().cloned());
         let paintings = self.triangles.iter().filter_map(|own| own.painting.as_deref());
         if let (textures @ 1.., levels) = coarsened(paintings, MOST_BYTES) {

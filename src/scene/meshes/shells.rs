@@ -8,8 +8,8 @@ use super::build::{Cover, Key};
 use super::coordinates::Coordinates;
 use super::faces::unmapped_error;
 use super::{Carrier, ThicknessFrom};
-use crate::mapping::shell::{Shell, ShellFault, SurfaceMesh};
-use crate::scene::Recipe;
+use crate::mapping::shell::{Shell, ShellFault, Side, SurfaceMesh};
+use crate::scene::{Recipe, Values, volumes};
 use crate::util::error::{Error, Result};
 
 /// Returns the shells of a mesh, one for each material that has one.
@@ -82,9 +82,20 @@ fn shell(key: &Key, cover: &Cover) -> Result<Shell> {
 /// Share of a shell's prisms that may turn over untold: at a few sharp edges it is not seen.
 const MOST_TURNED: f64 = 0.02;
 
-/// Returns a warning about each shell that turns over itself.
-pub(in crate::scene) fn turned_over(shells: &[Arc<Shell>], recipes: &[Recipe]) -> Vec<String> {
+/// Returns a warning about each inward shell that turns over itself. Outward ones do so in narrow hollows, and
+/// seldom show it.
+pub(in crate::scene) fn turned_over(shells: &[Arc<Shell>], recipes: &[Recipe], v: &Values) -> Vec<String> {
+    let materials = volumes::used_materials(v);
+    let is_inward = |volume: &str| {
+        materials.iter().any(|material| {
+            let side = v.choice(&format!("materials.{material}.side"), Side::from_word);
+            side == Side::Inward && volumes::volume_of(v, material) == volume
+        })
+    };
     let told = |shell: &Arc<Shell>| {
+        if !is_inward(&recipes[shell.volume as usize].name) {
+            return None;
+        }
         let (turned, all) = (shell.turned_over(), shell.prisms.len());
         (turned as f64 > MOST_TURNED * all as f64).then(|| {
             format!(
