@@ -308,8 +308,8 @@ def bear(folder):
     wanted = 16 * (noises["cycles", 16] / noises["taki", 4]) ** 2
     each = (times["cycles", 256] - times["cycles", 16]) / (256 - 16)
     seconds = times["cycles", 16] + (wanted - 16) * each
-    print(f"Cycles needs about {wanted:.0f} samples and {seconds:.0f} s for the noise of taki's 4 samples, which "
-          f"take {times['taki', 4]:.1f} s: 1/{seconds / times['taki', 4]:.0f} of the time")
+    print(f"Cycles needs about {wanted:.0f} samples and {seconds:.0f} s for the noise of taki's 4 samples, "
+          f"which take {times['taki', 4]:.1f} s: 1/{seconds / times['taki', 4]:.0f} of the time")
 
 
 if __name__ == "__main__":

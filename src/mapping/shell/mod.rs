@@ -274,8 +274,8 @@ impl Shell {
         sum / pairs.len().max(1) as f64
     }
 
-    /// Number of prisms that turn over: an edge of one surface runs against the same edge of the other, because
-    /// the thickness is larger than the radius by which the mesh bends towards it.
+    /// Number of prisms that turn over: an edge of one surface runs against the same edge of the other,
+    /// because the thickness is larger than the radius by which the mesh bends towards it.
     pub fn turned_over(&self) -> usize {
         let edge = |prism: &Prism, [a, b]: [usize; 2], depth: u32| {
             let [a, b] = [a, b].map(|k| self.points[(2 * prism.vertices[k] + depth) as usize]);

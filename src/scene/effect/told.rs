@@ -25,7 +25,7 @@ fn transparent(values: &Values) -> Option<String> {
     let has_volume = !volumes::used_materials(values).is_empty() || !values.names("boxes").is_empty();
     (has_volume && values.float(key) == 0.0).then(|| {
         format!(
-            "{key} = 0 makes all volumes transparent; a cell hides most of what is behind it from about {more}"
+            "{key} = 0 makes all volumes transparent; a cell hides most of what lies behind it from {more} on"
         )
     })
 }

@@ -82,8 +82,8 @@ fn shell(key: &Key, cover: &Cover) -> Result<Shell> {
 /// Share of a shell's prisms that may turn over untold: at a few sharp edges it is not seen.
 const MOST_TURNED: f64 = 0.02;
 
-/// Returns a warning about each inward shell that turns over itself. Outward ones do so in narrow hollows, and
-/// seldom show it.
+/// Returns a warning about each inward shell that turns over itself. Outward ones do so in narrow hollows,
+/// and seldom show it.
 pub(in crate::scene) fn turned_over(shells: &[Arc<Shell>], recipes: &[Recipe], v: &Values) -> Vec<String> {
     let materials = volumes::used_materials(v);
     let is_inward = |volume: &str| {
