@@ -297,11 +297,19 @@ def bear(folder):
     best = {"taki": pictures["taki", 64], "cycles": pictures["cycles", 256]}
     print("| program | samples | s | covered | mean radiance | noise ÷ mean |")
     print("|---|--:|--:|--:|--:|--:|")
+    noises = {}
     for (who, samples), picture in pictures.items():
         green = lambda p: p[:, :3] @ [0.2126, 0.7152, 0.0722]
         noise = np.sqrt(((green(picture) - green(best[who])) ** 2).mean()) / green(best[who]).mean()
+        noises[who, samples] = noise
         print(f"| {who} | {samples} | {times[who, samples]:.1f} | {100 * picture[:, 3].mean():.2f} % | "
               f"{green(picture).mean():.5f} | {noise:.3f} |", flush=True)
+    # Noise falls with the root of the samples, and time grows by as much for each of them.
+    wanted = 16 * (noises["cycles", 16] / noises["taki", 4]) ** 2
+    each = (times["cycles", 256] - times["cycles", 16]) / (256 - 16)
+    seconds = times["cycles", 16] + (wanted - 16) * each
+    print(f"Cycles needs about {wanted:.0f} samples and {seconds:.0f} s for the noise of taki's 4 samples, "
+          f"which take {times['taki', 4]:.1f} s: 1/{seconds / times['taki', 4]:.0f} of the time")
 
 
 if __name__ == "__main__":

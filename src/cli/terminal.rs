@@ -1,5 +1,6 @@
 //! Output for the user (progress bar, warnings, error line) and the signals that stop work.
 
+use std::collections::HashSet;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -40,6 +41,8 @@ pub struct Terminal {
     signal: Arc<AtomicUsize>,
     /// Whether the next signal ends the process.
     at_once: Arc<AtomicBool>,
+    /// Warnings so far. A setting of the command line may be told by itself, and by its scene.
+    warned: Mutex<HashSet<String>>,
 }
 
 impl Terminal {
@@ -66,7 +69,7 @@ impl Terminal {
         // the file. By default the signal ends the process and leaves the file.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
-        Terminal { bar: Mutex::new(None), signal, at_once }
+        Terminal { bar: Mutex::new(None), signal, at_once, warned: Mutex::default() }
     }
 
     /// From now on the first signal asks the work to stop, and the second ends the process. Work that calls
@@ -188,6 +191,9 @@ impl Monitor for Terminal {
     }
 
     fn warn(&self, text: &str) {
-        self.print(&format!("taki: warning: {text}"));
+        let is_new = self.warned.lock().unwrap_or_else(|e| e.into_inner()).insert(text.to_owned());
+        if is_new {
+            self.print(&format!("taki: warning: {text}"));
+        }
     }
 }

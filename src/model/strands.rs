@@ -36,6 +36,15 @@ const MOST_SEGMENTS: usize = u16::MAX as usize;
 /// Numbers that are read at once.
 const CHUNK: usize = 1 << 14;
 
+/// Largest coordinate of a point, in the file's unit. Beyond it are slips; squares of lengths still have a
+/// float32.
+const FARTHEST: f32 = 1e12;
+
+/// Whether a point is one that a strand may have.
+pub(super) fn is_place(point: Vec3) -> bool {
+    point.is_finite() && point.abs().max_element() <= FARTHEST
+}
+
 /// Strands as rows of points, each from its root to its tip.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Strands {
@@ -159,7 +168,7 @@ impl Strands {
             0 => vec![thickness; points.len()],
             _ => floats(&mut input, points.len()).map_err(|e| Error::read(path, e))?,
         };
-        if let Some(at) = points.iter().position(|point| !point.is_finite()) {
+        if let Some(at) = points.iter().position(|point| !is_place(*point)) {
             return Err(fault(format!("point {at} is {}", points[at])));
         }
         if let Some(at) = widths.iter().position(|width| !(width.is_finite() && *width >= 0.0)) {

@@ -1,6 +1,7 @@
 //! Settings that have no effect, because another parameter switches off what they belong to.
 
 mod rules;
+mod told;
 
 use super::Values;
 use super::measured::Builder;
@@ -11,6 +12,7 @@ use super::read::split;
 use super::sequence::{self, Sequence};
 use super::volumes;
 use rules::{RULES, Rule, builder};
+pub(super) use told::told;
 
 /// Returns the first rule by which a key has no effect, with its switch, whose key is full.
 fn rule(values: &Values, key: &str) -> Option<(&'static Rule, String)> {
@@ -49,7 +51,7 @@ pub fn without_effect(values: &Values, key: &str) -> Option<String> {
     if let Some(why) = without_volume(values, key).or_else(|| without_water(values, key)) {
         return Some(why);
     }
-    if let Some(why) = without_sequence(values, key) {
+    if let Some(why) = without_sequence(values, key).or_else(|| without_fibres(values, key)) {
         return Some(why);
     }
     let (rule, switch) = rule(values, key)?;
@@ -75,6 +77,20 @@ fn without_volume(values: &Values, key: &str) -> Option<String> {
     let name = key.split('.').nth(1).filter(|_| OF_COVERS.iter().any(|pattern| matches(pattern, key)))?;
     let is_bare = meshes::materials_of(values, name).is_empty();
     is_bare.then(|| format!("{key} has no effect: no part of the mesh has a material of the scene"))
+}
+
+/// Keys of the light of fibres.
+const OF_FIBRES: [&str; 5] = ["hair.*", "light.p", "light.reflection", "light.scattering", "strand.*"];
+
+/// Returns why a key of the light of fibres has no effect: all volumes of the scene are skin.
+fn without_fibres(values: &Values, key: &str) -> Option<String> {
+    let is_of_fibres = OF_FIBRES.iter().any(|pattern| matches(pattern, key));
+    let is_skin = |name: &String| builder(values, name) == Builder::Skin;
+    (is_of_fibres && volumes::shown(values).iter().all(is_skin)).then(|| {
+        format!(
+            "{key} has no effect: the scene's volumes are skin, whose light scatters many times by itself"
+        )
+    })
 }
 
 /// Keys of the film of water on rocks and meshes.

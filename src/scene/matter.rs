@@ -250,6 +250,26 @@ pub(super) fn too_thick(recipe: &Recipe) -> Option<String> {
     })
 }
 
+/// Returns why no cell of a volume has density, as the end of a sentence; empty where it is not known.
+pub(super) fn why_empty(recipe: &Recipe) -> String {
+    let key = |own: &str| key_of_volume(&recipe.name, own);
+    match &recipe.matter {
+        matter if recipe.water.alpha == 0.0 && (matter.is_some() || recipe.file.is_none()) => {
+            format!("; {} is 0", key("volume.alpha"))
+        }
+        Some(Matter::Strands(_)) => format!(
+            "; the strands are too thin for the cells: raise {}, metres, or {}",
+            key("import.strand_diameter"),
+            key("import.longest")
+        ),
+        None if recipe.measured.is_some() => {
+            format!("; check {} and {}", key("volume.rho"), key("volume.rho_scale"))
+        }
+        None if recipe.file.is_some() => format!("; every rho of {} is 0", key("volume.file")),
+        _ => String::new(),
+    }
+}
+
 /// Returns what the file of strands has and the volume lacks, a warning each.
 pub(super) fn notes_on_strands(recipe: &Recipe) -> Vec<String> {
     let Some(Matter::Strands(strands)) = &recipe.matter else { return Vec::new() };

@@ -692,6 +692,7 @@ impl Scene {
         warnings.extend(self.values.iter().flat_map(quads::unused_materials));
         warnings.extend(self.values.iter().flat_map(volumes::unused));
         warnings.extend(self.values.iter().flat_map(bright_colours));
+        warnings.extend(self.values.iter().flat_map(effect::told));
         if !self.rocks.is_empty() && self.rocks.iter().all(|rock| self.is_behind(rock)) {
             warnings.push(
                 "all rock is seen from behind, and has the wrong light: list its corners counter-clockwise \
@@ -716,6 +717,8 @@ impl Scene {
         warnings.extend(self.unmapped.iter().map(|(name, count)| {
             format!("mesh {name}: {count} faces carry no volume, as their texture coordinates span no area")
         }));
+        let turned = |values| meshes::turned_over(&self.shells, &self.recipes, values);
+        warnings.extend(self.values.iter().flat_map(turned));
         warnings.extend(self.untextured.iter().cloned());
         let paintings = self.triangles.iter().filter_map(|own| own.painting.as_deref());
         if let (textures @ 1.., levels) = coarsened(paintings, MOST_BYTES) {
@@ -737,7 +740,13 @@ impl Scene {
                 volume.alpha == 0.0 || !volume.cells.stored().iter().any(|c| c.rho_code() > 0)
             };
             let empty = self.recipes.iter().zip(volumes).filter(|(_, volume)| is_empty(volume));
-            let words = |(recipe, _)| format!("{} is empty: no cell has density", self.volume_words(recipe));
+            let words = |(recipe, _)| {
+                format!(
+                    "{} is empty: no cell has density{}",
+                    self.volume_words(recipe),
+                    matter::why_empty(recipe)
+                )
+            };
             warnings.extend(empty.map(words));
         }
         warnings.extend(origin::rounded(self));

@@ -274,6 +274,18 @@ impl Shell {
         sum / pairs.len().max(1) as f64
     }
 
+    /// Number of prisms that turn over: an edge of one surface runs against the same edge of the other,
+    /// because the thickness is larger than the radius by which the mesh bends towards it.
+    pub fn turned_over(&self) -> usize {
+        let edge = |prism: &Prism, [a, b]: [usize; 2], depth: u32| {
+            let [a, b] = [a, b].map(|k| self.points[(2 * prism.vertices[k] + depth) as usize]);
+            b - a
+        };
+        let turns =
+            |prism: &&Prism| EDGES.iter().any(|&ends| edge(prism, ends, 0).dot(edge(prism, ends, 1)) < 0.0);
+        self.prisms.iter().filter(turns).count()
+    }
+
     /// Jacobian with which light is computed at a place in a prism that has an area in the texture, as
     /// columns like those of [`Shell::jacobian`]. The place is given by the shares of the prism's vertices
     /// and the depth from 0 to 1. The [`Tangents`] are interpolated along the surface and into the depth, so

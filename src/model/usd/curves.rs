@@ -75,6 +75,13 @@ impl Shape {
         }
     }
 
+    /// Whether a curve of `points` points has some behind its last segment, which shape nothing. Bézier
+    /// segments have three points each, and curves that do not close one more.
+    pub fn is_uneven(self, points: usize) -> bool {
+        let ends = usize::from(self.wrap != Wrap::Periodic);
+        self.basis == Basis::Bezier && self.segments(points) > 0 && !(points - ends).is_multiple_of(3)
+    }
+
     /// Ends of segments, each once: the number of varying values.
     pub fn knots(self, points: usize) -> usize {
         match (self.segments(points), self.wrap) {

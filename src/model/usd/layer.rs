@@ -62,6 +62,9 @@ impl Layer {
             let depth = counts.depth;
             return Err(file.broken(format!("{depth} brackets are open at once")));
         }
+        if let Some((bracket, line)) = counts.unclosed {
+            return Err(file.broken(format!("line {line}: nothing closes the bracket {bracket}")));
+        }
         if counts.is_nested {
             return Err(file.broken("an array begins inside an array"));
         }

@@ -108,6 +108,13 @@ pub(super) fn read(path: &Path, time: Option<f64>, budget: u64) -> Result<Strand
     if told.too_short > 0 {
         notes.push(format!("{} curves have too few points, and are left out", told.too_short));
     }
+    if told.uneven > 0 {
+        notes.push(format!(
+            "{} Bézier curves have points behind their last segment, which are left out: there are 3n + 1 \
+             points in a curve, and 3n in a periodic one",
+            told.uneven
+        ));
+    }
     if told.without_width > 0 && told.without_width < strands.count() {
         notes.push(format!("{} curves have no widths, and count as thin as nothing", told.without_width));
     }

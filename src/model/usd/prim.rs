@@ -9,6 +9,7 @@ use super::layer::Layer;
 use super::nurbs::Nurbs;
 use super::stage::{Kind, Shown};
 use super::transform;
+use crate::model::strands::is_place;
 use crate::util::error::Result;
 
 /// Curves of a prim.
@@ -38,6 +39,8 @@ pub(super) struct Told {
     pub too_short: usize,
     /// Curves without widths.
     pub without_width: usize,
+    /// Curves with points behind their last segment.
+    pub uneven: usize,
 }
 
 impl Curves {
@@ -140,6 +143,7 @@ impl Curves {
             };
             first += count;
             first_knot += ends;
+            told.uneven += usize::from(self.nurbs.is_none() && self.shape.is_uneven(*count));
             told.without_width += usize::from(self.widths.is_empty());
             match strand.len() {
                 0 | 1 => told.too_short += 1,
@@ -155,7 +159,7 @@ fn placed(path: &str, mut points: Vec<Vec3>, stage_from_own: &DAffine3, file: &F
     for (number, point) in points.iter_mut().enumerate() {
         let own = *point;
         *point = stage_from_own.transform_point3(own.as_dvec3()).as_vec3();
-        if !point.is_finite() {
+        if !is_place(*point) {
             return Err(file.broken(format!("{path}.points: point {number} is {own}")));
         }
     }

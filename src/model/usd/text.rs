@@ -23,6 +23,8 @@ pub(super) struct Counts {
     /// Whether an array begins inside an array. USD has no such value, and the parser doubles what it keeps
     /// with each.
     pub is_nested: bool,
+    /// The first bracket that nothing closes, or that another kind of bracket closes, with its line.
+    pub unclosed: Option<(char, usize)>,
     /// Bytes of memory that reading takes.
     pub memory: u128,
 }
@@ -31,11 +33,16 @@ pub(super) struct Counts {
 pub(super) fn count(text: &str) -> Counts {
     let bytes = text.as_bytes();
     let (mut at, mut open, mut arrays, mut counts) = (0, 0usize, 0usize, Counts::default());
+    // Brackets that are open, with their places, up to the depth that is read at all.
+    let (mut opened, mut unclosed) = (Vec::with_capacity(MOST_DEPTH), None);
     let (mut commas, mut marks, mut words, mut braces) = (0u128, 0u128, 0u128, 0u128);
     while let Some(byte) = bytes.get(at) {
         match byte {
             b'(' | b'[' | b'{' => {
                 open += 1;
+                if opened.len() < MOST_DEPTH {
+                    opened.push((*byte, at));
+                }
                 counts.is_nested |= *byte == b'[' && arrays > 0;
                 arrays += usize::from(*byte == b'[');
                 counts.depth = counts.depth.max(open);
@@ -43,6 +50,12 @@ pub(super) fn count(text: &str) -> Counts {
                 commas += 1;
             }
             b')' | b']' | b'}' => {
+                if open == opened.len()
+                    && let Some((own, place)) = opened.pop()
+                    && closing(own) != *byte
+                {
+                    unclosed.get_or_insert((own, place));
+                }
                 open = open.saturating_sub(1);
                 arrays = arrays.saturating_sub(usize::from(*byte == b']'));
             }
@@ -67,9 +80,22 @@ pub(super) fn count(text: &str) -> Counts {
         }
         at += 1;
     }
+    // Of those that are open at the end, the last was meant to be closed first.
+    let first = unclosed.or(opened.last().copied());
+    let line = |place: usize| 1 + bytes[..place].iter().filter(|byte| **byte == b'\n').count();
+    counts.unclosed = first.map(|(own, place)| (char::from(own), line(place)));
     counts.memory =
         BYTE * bytes.len() as u128 + COMMA * commas + MARK * marks + WORD * words + BRACE * braces;
     counts
+}
+
+/// The bracket that closes another.
+fn closing(open: u8) -> u8 {
+    match open {
+        b'(' => b')',
+        b'[' => b']',
+        _ => b'}',
+    }
 }
 
 /// Whether a byte belongs to a word or a number.

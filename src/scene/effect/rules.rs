@@ -82,6 +82,16 @@ const OF_SHADES: &[&str] = &[
     "volume.k_s",
 ];
 
+/// Keys of a volume of curves that a file of cells does without.
+const OF_CELLS: &[&str] = &[
+    "volume.coherence",
+    "volume.coverage",
+    "volume.crest",
+    "volume.k_d",
+    "volume.k_noise",
+    "volume.strand_length",
+];
+
 /// Need of strands where `volume.builder` is `flow`.
 const STRANDS: &str = "a number above 0, because volume.builder is \"flow\"";
 /// Need of a colour that follows another.
@@ -96,6 +106,13 @@ pub(super) fn builder(values: &Values, name: &str) -> Builder {
 fn has_strands(values: &Values, key: &str) -> bool {
     let is_flow = split_volume_key(key).is_some_and(|(name, _)| builder(values, name) == Builder::Flow);
     !is_flow || values.int(key) > 0
+}
+
+/// Whether the volume with this key of its file takes its cells from there.
+fn has_own_cells(values: &Values, key: &str) -> bool {
+    let is_of_curves =
+        split_volume_key(key).is_some_and(|(name, _)| builder(values, name) == Builder::Curves);
+    is_of_curves && !values.text(key).is_empty()
 }
 
 pub(super) const RULES: &[Rule] = &[
@@ -134,6 +151,18 @@ pub(super) const RULES: &[Rule] = &[
         switch: HAIR_COLOR,
         needs: "no colour, which stands in the place of melanin",
         works: |v, switch| !v.is_set(switch),
+    },
+    Rule {
+        keys: &["volume.k_d", "volume.k_s"],
+        switch: "volume.builder",
+        needs: "a builder other than skin, whose light has no such coefficients",
+        works: |v, switch| !is(v, switch, Builder::Skin.word()),
+    },
+    Rule {
+        keys: &["volume.reflection"],
+        switch: "volume.builder",
+        needs: "a builder other than skin, which has a light of its own",
+        works: |v, switch| !is(v, switch, Builder::Skin.word()),
     },
     Rule {
         keys: OF_SHADES,
@@ -363,12 +392,6 @@ pub(super) const RULES: &[Rule] = &[
         works: |v, switch| !v.is_set(switch),
     },
     Rule {
-        keys: &["volume.k_d", "volume.k_s"],
-        switch: "volume.builder",
-        needs: "a builder other than skin, whose light has no such coefficients",
-        works: |v, switch| !is(v, switch, Builder::Skin.word()),
-    },
-    Rule {
         keys: &["cloth.*"],
         switch: "volume.builder",
         needs: "cloth",
@@ -462,6 +485,21 @@ pub(super) const RULES: &[Rule] = &[
         switch: "volume.file",
         needs: "no file, because a file brings its own cells",
         works: |v, switch| v.text(switch).is_empty(),
+    },
+    Rule {
+        keys: OF_CELLS,
+        switch: "volume.file",
+        needs: "no file, because a file brings its own cells",
+        works: |v, switch| !has_own_cells(v, switch),
+    },
+    Rule {
+        keys: &["volume.k_s"],
+        switch: "volume.file",
+        needs: "no file or a colour, because a file brings its own k_s",
+        works: |v, switch| {
+            let name = split_volume_key(switch).map_or("", |(name, _)| name);
+            !has_own_cells(v, switch) || v.is_set(&key_of_volume(name, COLORS[0]))
+        },
     },
     Rule {
         keys: &["animate.frames"],

@@ -337,7 +337,11 @@ pub(super) fn too_many_faces(name: &str, faces: u128) -> Error {
 /// The error for a part without texture coordinates.
 pub(super) fn no_coordinates(key: &Key, cover: &Cover, primitive: &Primitive) -> Error {
     let mesh = &key.mesh;
-    let part = primitive.material.map_or("", |i| mesh.loaded.model.materials[i].name.as_str());
+    let parts = match primitive.material.map(|i| mesh.loaded.model.materials[i].name.as_str()) {
+        None => "the parts without a material".to_owned(),
+        Some("") => "the parts with a material without a name".into(),
+        Some(name) => format!("the parts {name:?}"),
+    };
     let sets = match primitive.uvs.len() {
         0 => "no texture coordinates".to_owned(),
         n => format!("{n} sets of texture coordinates, and none of number {}", mesh.uv),
@@ -345,7 +349,7 @@ pub(super) fn no_coordinates(key: &Key, cover: &Cover, primitive: &Primitive) ->
     let name = &mesh.name;
     let projections = Projection::WORDS[1..].join(", ");
     Error::input(
-        format!("{}: the parts {part:?} of {} have {sets}", key.words(cover), mesh.file.display()),
+        format!("{}: {parts} of {} have {sets}", key.words(cover), mesh.file.display()),
         match primitive.uvs.len() {
             0 => format!(
                 "unwrap the mesh in the program that made it, or set meshes.{name}.projection to one of \

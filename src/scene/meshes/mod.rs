@@ -22,6 +22,7 @@ pub use listing::PartSummary;
 pub use memo::{Loaded, ModelMemo};
 use names::{Named, listed};
 pub(super) use names::{dotted, in_key, other_spellings, unquoted, written};
+pub(super) use shells::turned_over;
 
 use super::build::confine;
 use super::names::likeliest;

@@ -8,7 +8,8 @@ use super::build::{Cover, Key};
 use super::coordinates::Coordinates;
 use super::faces::unmapped_error;
 use super::{Carrier, ThicknessFrom};
-use crate::mapping::shell::{Shell, ShellFault, SurfaceMesh};
+use crate::mapping::shell::{Shell, ShellFault, Side, SurfaceMesh};
+use crate::scene::{Recipe, Values, volumes};
 use crate::util::error::{Error, Result};
 
 /// Returns the shells of a mesh, one for each material that has one.
@@ -76,6 +77,36 @@ fn shell(key: &Key, cover: &Cover) -> Result<Shell> {
     shell.volume = cover.material.volume;
     shell.skin = cover.has_body;
     Ok(shell)
+}
+
+/// Share of a shell's prisms that may turn over untold: at a few sharp edges it is not seen.
+const MOST_TURNED: f64 = 0.02;
+
+/// Returns a warning about each inward shell that turns over itself. Outward ones do so in narrow hollows,
+/// and seldom show it.
+pub(in crate::scene) fn turned_over(shells: &[Arc<Shell>], recipes: &[Recipe], v: &Values) -> Vec<String> {
+    let materials = volumes::used_materials(v);
+    let is_inward = |volume: &str| {
+        materials.iter().any(|material| {
+            let side = v.choice(&format!("materials.{material}.side"), Side::from_word);
+            side == Side::Inward && volumes::volume_of(v, material) == volume
+        })
+    };
+    let told = |shell: &Arc<Shell>| {
+        if !is_inward(&recipes[shell.volume as usize].name) {
+            return None;
+        }
+        let (turned, all) = (shell.turned_over(), shell.prisms.len());
+        (turned as f64 > MOST_TURNED * all as f64).then(|| {
+            format!(
+                "the shell of the volume {} turns over itself at {turned} of {all} triangles, where it is \
+                 thicker than half of the mesh: such parts look ragged and take long; lower the thickness of \
+                 its material, or paint it thinner there (thickness_from)",
+                recipes[shell.volume as usize].name
+            )
+        })
+    };
+    shells.iter().filter_map(told).collect()
 }
 
 fn no_colors(key: &Key, cover: &Cover) -> Error {

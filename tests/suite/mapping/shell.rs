@@ -328,6 +328,24 @@ fn three_triangles_at_an_edge_end_there() {
 }
 
 #[test]
+fn shells_thicker_than_the_radius_turn_over() {
+    let turned = |mesh: SurfaceMesh, side| {
+        let shell = Shell::new(&mesh, side).expect("a shell");
+        (shell.turned_over(), shell.prisms.len())
+    };
+    // The inner surface of a unit sphere passes its centre where the shell is thicker than 1.
+    for (thickness, is_turned) in [(0.5, false), (0.95, false), (1.05, true), (3.0, true)] {
+        let (count, all) = turned(sphere(3, thickness), Side::Inward);
+        assert_eq!(count, if is_turned { all } else { 0 }, "{thickness}");
+    }
+    assert_eq!(turned(sphere(3, 3.0), Side::Outward).0, 0);
+    // Of a torus whose tube has the radius 0.7, all triangles turn over, and none below.
+    assert_eq!(turned(torus(60, 40, 0.6), Side::Inward).0, 0);
+    let (count, all) = turned(torus(60, 40, 0.8), Side::Inward);
+    assert_eq!(count, all);
+}
+
+#[test]
 fn an_inward_shell_lies_under_its_mesh() {
     let mesh = sphere(2, 0.25);
     for (side, depth, other) in [(Side::Outward, 1, 1.25), (Side::Inward, 0, 0.75)] {

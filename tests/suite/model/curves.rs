@@ -134,6 +134,47 @@ fn straight_curves_keep_their_points_and_bends_have_more() {
 }
 
 #[test]
+fn points_behind_the_last_bezier_segment_are_told() {
+    let folder = Folder::new(&[]);
+    let told = |points: usize, wrap: &str| {
+        let list: Vec<String> = (0..points).map(|i| format!("({i},{},0)", i % 3)).collect();
+        let text = text(
+            &folder,
+            &format!(
+                "def BasisCurves \"a\" {{ uniform token wrap = \"{wrap}\" \
+                 int[] curveVertexCounts = [{points}] \
+                 point3f[] points = [{}] float[] widths = [1] (interpolation = \"constant\") }}",
+                list.join(",")
+            ),
+        );
+        text.expect("curves").notes.iter().any(|note| note.starts_with("1 Bézier curves have points behind"))
+    };
+    for (points, wrap, is_told) in [
+        (4, "nonperiodic", false),
+        (5, "nonperiodic", true),
+        (6, "nonperiodic", true),
+        (7, "nonperiodic", false),
+        (6, "periodic", false),
+        (7, "periodic", true),
+    ] {
+        assert_eq!(told(points, wrap), is_told, "{points} {wrap}");
+    }
+}
+
+#[test]
+fn a_bracket_that_nothing_closes_is_told_with_its_line() {
+    let folder = Folder::new(&[]);
+    for (own, words) in [
+        ("def \"a\"\n{\n float[] widths = [1, 2\n int n = 3\n}\n", "line 4: nothing closes the bracket ["),
+        ("def \"a\" {\n point3f[] points = [(1, 2, 3), (4,\n", "line 3: nothing closes the bracket ("),
+        ("def \"a\" (\n doc = \"]\"\n) {\n", "line 4: nothing closes the bracket {"),
+    ] {
+        let error = text(&folder, own).expect_err("broken").to_string();
+        assert!(error.contains(words), "no {words:?} in: {error}");
+    }
+}
+
+#[test]
 fn broken_curves_are_told() {
     let folder = Folder::new(&[]);
     let with = |own: &str| {
@@ -156,6 +197,7 @@ fn broken_curves_are_told() {
         (&format!("{points} int[] curveVertexCounts = [2] float[] widths = [1, -2]"), "width 1 is -2"),
         (&format!("{points} int[] curveVertexCounts = [2] uniform token wrap = \"x\""), "wrap = \"x\""),
         (&points.replace("linear", "x"), "add up to 0"),
+        ("point3f[] points = [(0,0,1e30)] int[] curveVertexCounts = [1]", "point 0 is [0, 0, 1000000"),
         ("point3f[] points = [(0,0,nan)] int[] curveVertexCounts = [1]", "point 0 is"),
         ("uniform token[] xformOpOrder = [\"xformOp:bend\"] float xformOp:bend = 1", "xformOp:bend"),
     ] {

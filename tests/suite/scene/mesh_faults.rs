@@ -56,6 +56,23 @@ fn pairs(want: &[(&str, &str)]) -> Vec<(String, String)> {
 }
 
 #[test]
+fn parts_without_a_name_are_told_in_words() {
+    let mut bare = Doc::square();
+    bare.primitive().as_object_mut().expect("a primitive").remove("material");
+    for (mut doc, words) in [
+        (named(&["", "Leaf"]), "the parts with a material without a name of"),
+        (named(&["Leaf"]), "the parts \"Leaf\" of"),
+        (bare, "the parts without a material of"),
+    ] {
+        for primitive in doc.json["meshes"][0]["primitives"].as_array_mut().expect("primitives") {
+            primitive["attributes"].as_object_mut().expect("attributes").remove("TEXCOORD_0");
+        }
+        let said = fault(&folder(&doc), "material = \"water\"\n", &[]);
+        assert!(said.contains(&words.replace('"', "\\\"")) && said.contains("no texture"), "{said}");
+    }
+}
+
+#[test]
 fn a_printed_scene_warns_of_nothing_that_the_scene_does_not() {
     let folder = Folder::new();
     for (name, _) in presets() {

@@ -11,6 +11,7 @@ pub mod presets;
 mod sequences;
 mod skin;
 pub mod slips;
+mod told;
 pub mod volumes;
 
 use std::fs;

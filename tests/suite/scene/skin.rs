@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use taki::light::skin::Tissue;
-use taki::scene::{Limits, Scene, settings_without_effect};
+use taki::scene::{Limits, Scene, settings_without_effect, without_effect};
 use taki::volume::Matter;
 
 use super::meshes::Folder;
@@ -86,4 +86,16 @@ fn settings_without_effect_on_skin_are_told() {
     assert!(said(&wax, "melanin=0.2") && said(&wax, "oxygen=0.2") && !said(&wax, "eta=1.2"));
     let cloth = scene.with(&["volumes.skin.builder=cloth"]).expect("valid");
     assert!(said(&cloth, "blood=0.2"));
+    // The way out is not another reflection model: none of them is that of skin.
+    let hair = scene.with(&["light.reflection=hair"]).expect("valid");
+    for scene in [&scene, &hair] {
+        let why = |key: &str| without_effect(scene.values().expect("values"), key).expect("told");
+        for key in ["volumes.skin.reflection", "volumes.skin.k_d"] {
+            assert!(why(key).contains("while volumes.skin.builder is \"skin\""), "{}", why(key));
+        }
+        for key in ["light.scattering", "light.reflection", "light.p", "hair.melanin"] {
+            assert!(why(key).contains("the scene's volumes are skin"), "{}", why(key));
+        }
+    }
+    assert_eq!(without_effect(cloth.values().expect("values"), "light.scattering"), None);
 }
