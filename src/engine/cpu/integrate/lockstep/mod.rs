@@ -211,15 +211,16 @@ impl<'a> Lockstep<'a> {
                 met.packs.push(Hits::default());
             }
             let Some(pack) = met.packs.last_mut() else { continue };
-            pack.set(lane, quad, pixel.d, hit);
+            pack.set(lane, quad, (pixel.d, pixel.time), hit);
             met.sheets.push(Sheet { ray, order, ends: Default::default() });
         }
         // Missing rays are those before them.
         let missing = met.sheets.len().next_multiple_of(LANES) - met.sheets.len();
         if let Some(pack) = met.packs.last_mut() {
             let last = LANES - missing - 1;
-            let (quad, d, at) = (pack.quads[last], pack.values.d_world.get(last), pack.values.at.get(last));
-            (last + 1..LANES).for_each(|lane| pack.set(lane, quad, d, at.into()));
+            let (quad, values) = (pack.quads[last], &pack.values);
+            let (ray, at) = ((values.d_world.get(last), values.time.0[last]), values.at.get(last));
+            (last + 1..LANES).for_each(|lane| pack.set(lane, quad, ray, at.into()));
         }
         dispatch!(self.simd, simd => map_all(simd, self.integrator, &mut met.packs));
         !(met.sheets.is_empty() && shells.is_empty())
