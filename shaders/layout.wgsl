@@ -70,7 +70,13 @@ struct FrameUniforms {
     depth_rise: f32,
     depth_slope: f32,
     depth_scale: f32,
+    // Cells by which the volume moves down the flow while the shutter is open.
+    flow_moves: f32,
+    // Times of the sample in all pixels: SampleTimes of src/picture/shutter.rs.
+    shutter_first: f32,
+    shutter_step: f32,
     pad_d: f32,
+    pad_e: f32,
 }
 
 struct Light {
@@ -204,6 +210,30 @@ fn image_point(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> vec2<f32> {
     let x = 2.0 * (f32(pixel_x) + frame.jitter_x) / frame.image_width - 1.0;
     let y = 1.0 - 2.0 * (f32(pixel_y) + frame.jitter_y) / frame.image_height;
     return vec2<f32>(x, y);
+}
+
+// Time of the sample in a pixel of the whole image: -0.5 when the shutter opens, 0.5 when it closes. Twin:
+// SampleTimes::of in src/picture/shutter.rs.
+fn shutter_time(frame: FrameUniforms, pixel_x: u32, pixel_y: u32) -> f32 {
+    return frame.shutter_first + f32((hilbert(pixel_x, pixel_y) * 0x9e3779b9u) >> 8u) * frame.shutter_step;
+}
+
+// Number of a pixel along a Hilbert curve. Twin: hilbert of src/picture/shutter.rs.
+fn hilbert(pixel_x: u32, pixel_y: u32) -> u32 {
+    var x = pixel_x % 256u;
+    var y = pixel_y % 256u;
+    var number = 0u;
+    for (var side = 128u; side > 0u; side /= 2u) {
+        let right = select(0u, 1u, (x & side) != 0u);
+        let down = select(0u, 1u, (y & side) != 0u);
+        number += side * side * ((3u * right) ^ down);
+        if down == 0u {
+            let turned = select(vec2<u32>(x, y), vec2<u32>(255u - x, 255u - y), right == 1u);
+            x = turned.y;
+            y = turned.x;
+        }
+    }
+    return number;
 }
 
 // Vector from the eye to a point of the image plane at distance 1. Twin: Camera::ray_to.

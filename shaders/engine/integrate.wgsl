@@ -44,6 +44,8 @@ override HAIR: bool = false;
 override MULTIPLE: bool = false;
 // A cell's light has a colour of its own.
 override IN_COLOUR: bool = STRAND || MULTIPLE || COLORED;
+// The water moves while the shutter is open.
+override SHUTTER: bool = false;
 // The picture has an alpha channel.
 override ALPHA: bool = false;
 // Mist has its own walk, in which no cell is empty and all reflect alike.
@@ -117,8 +119,12 @@ struct VolumeConstants {
     strands: u32,
     // Whether its cells keep the lines of their strands.
     lines: u32,
-    pad_b: u32,
+    // As in `frame`.
+    flow_moves: f32,
 }
+
+// Time of the pixel's sample: see shutter_time.
+var<private> sample_time: f32;
 
 // Whether the cells of a volume reflect as strands do, in a scene where any do.
 fn is_strand(own: VolumeConstants) -> bool {
@@ -139,15 +145,23 @@ fn ambient_of(is_all: bool) -> vec3<f32> {
     return frame.ambient;
 }
 
-// Constants of the volume with this number.
+// Constants of the volume with this number, at the time of the sample.
 fn volume_of(number: u32) -> VolumeConstants {
     if SEVERAL {
+        if SHUTTER {
+            var moved = volumes[number];
+            moved.flow_cells += sample_time * moved.flow_moves;
+            return moved;
+        }
         return volumes[number];
     }
     var only: VolumeConstants;
     only.cells = frame.cells;
     only.extinction = frame.extinction;
     only.flow_cells = frame.flow_cells;
+    if SHUTTER {
+        only.flow_cells += sample_time * frame.flow_moves;
+    }
     only.levels = frame.levels;
     if IN_COLOUR {
         only.similarity = reflection.similarity;
@@ -171,6 +185,9 @@ fn integrate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let behind = textureLoad(opaque_radiance, pixel, 0).rgb;
     var result = vec4<f32>(behind, 1.0);
     var count = vec2<u32>(0u);
+    if SHUTTER {
+        sample_time = shutter_time(frame, frame.window_x + pixel.x, frame.window_y + pixel.y);
+    }
     if quad_number != 0u {
         result = sheets(quad_number, pixel, behind, &count);
         if frame.haze_density != 0.0 {

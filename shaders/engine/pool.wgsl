@@ -24,7 +24,8 @@ struct Wave {
     ring: f32,
     // Decay of a ring with the distance from its centre, 1/m.
     decay: f32,
-    pad: f32,
+    // Turns of the phase while the shutter is open.
+    moves: f32,
 }
 
 // Place of the scene's origin in a lattice that is fixed to the world.
@@ -121,25 +122,36 @@ fn to_eye_unit(in: OpaquePoint) -> vec3<f32> {
     return to_eye / max(sqrt(dot3(to_eye, to_eye)), 1e-6);
 }
 
+// Place of the surface whose waves are added up.
+struct WavePlace {
+    p: vec2<f32>,
+    // Factor of the slopes.
+    churn: f32,
+    // Width of a pixel on the surface, metres.
+    footprint: f32,
+    // Time of the sample: see shutter_time.
+    time: f32,
+}
+
 // Slopes and lift of one wave. The host generates `waves`, which adds up those of all
 // (src/engine/gpu/gbuffer.rs).
-fn rise(wave: Wave, toward: vec2<f32>, along: f32, steepest: f32, footprint: f32) -> vec3<f32> {
-    let wide = 3.0 * wave.k * footprint;
+fn rise(wave: Wave, toward: vec2<f32>, along: f32, steepest: f32, at: WavePlace) -> vec3<f32> {
+    let wide = 3.0 * wave.k * at.footprint;
     let blur = 1.0 + wide * wide;
     let steep = steepest / (blur * blur);
-    let t = wave.k * along + wave.phase;
+    let t = wave.k * along + wave.phase + wave.moves * at.time;
     return vec3<f32>(toward * (steep * sin_turns(t + 0.25)), steep * sin_turns(t));
 }
 
-fn straight_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
-    return rise(wave, wave.toward, dot2(wave.toward, p), wave.slope * churn, footprint);
+fn straight_wave(wave: Wave, at: WavePlace) -> vec3<f32> {
+    return rise(wave, wave.toward, dot2(wave.toward, at.p), wave.slope * at.churn, at);
 }
 
-fn ring_wave(wave: Wave, p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {
-    let away = p - wave.toward;
+fn ring_wave(wave: Wave, at: WavePlace) -> vec3<f32> {
+    let away = at.p - wave.toward;
     let along = max(sqrt(dot2(away, away)), 1e-3);
     let fall = 1.0 + along * wave.decay;
-    return rise(wave, away / along, along, wave.slope * churn / (fall * fall), footprint);
+    return rise(wave, away / along, along, wave.slope * at.churn / (fall * fall), at);
 }
 
 // Unit normal of the waves.
@@ -148,9 +160,9 @@ fn pool_normal(in: OpaquePoint) -> vec3<f32> {
     let e = to_eye_unit(in);
     let pixel = 2.0 * sqrt(dot3(frame.up, frame.up)) / frame.image_height;
     let footprint = sqrt(dot3(to_eye, to_eye)) * pixel / max(e.y, 0.05);
-    let p = in.position_world.xz;
     let churn = 1.0 + 1.5 * in.albedo.y;
-    let sum = waves(p, churn, footprint);
+    let time = shutter_time(frame, frame.window_x + in.pixel.x, frame.window_y + in.pixel.y);
+    let sum = waves(WavePlace(in.position_world.xz, churn, footprint, time));
     let n = vec3<f32>(-sum.x, max(1.0 - sum.z, 0.3), -sum.y);
     return n / sqrt(dot3(n, n));
 }

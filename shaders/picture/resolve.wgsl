@@ -12,6 +12,16 @@ struct Develop {
     balanced: u32,
     // 1: rounded by a pattern. 0: rounded to the nearest value.
     dither: u32,
+    // Turns pixels of the whole image into points that are 1 from its middle in the corners: factors along x
+    // and y, and what is subtracted.
+    place: vec4<f32>,
+    // Squared tangent of the angle at which a corner would be as dark by the cos^4 law; 0 without a vignette.
+    vignette: f32,
+    // Standard deviation of the grain in the middle greys; 0 without grain.
+    grain: f32,
+    // Number of the grain's pattern.
+    grain_seed: u32,
+    pad: u32,
 }
 
 const TONE_FILMIC: u32 = 1u;
@@ -57,12 +67,30 @@ fn agx(x: vec3<f32>) -> vec3<f32> {
     );
 }
 
-fn channel(exposed: f32, rounding: f32) -> u32 {
+fn channel(exposed: f32) -> f32 {
     var x = exposed;
     if develop.tone == TONE_FILMIC {
         x = filmic(x);
     }
-    return byte(srgb(clamp(x, 0.0, 1.0)), rounding);
+    return srgb(clamp(x, 0.0, 1.0));
+}
+
+// Factor by which the vignette darkens a pixel of the whole image. Twin: Resolver::vignette.
+fn vignette_at(x: u32, y: u32) -> f32 {
+    let px = (f32(x) + 0.5) * develop.place.x - develop.place.z;
+    let py = (f32(y) + 0.5) * develop.place.y - develop.place.w;
+    let fall = 1.0 + develop.vignette * (px * px + py * py);
+    return 1.0 / (fall * fall);
+}
+
+// Grain of a pixel of the whole image. Twin: grain of src/picture/resolve.rs.
+fn grain_at(x: u32, y: u32) -> f32 {
+    var h = (x * 0x8da6b343u) ^ (y * 0xd8163841u) ^ (develop.grain_seed * 0xcb1ab31fu);
+    h = (h ^ (h >> 16u)) * 0x7feb352du;
+    h = (h ^ (h >> 15u)) * 0x846ca68bu;
+    h = h ^ (h >> 16u);
+    let sum = (h & 0xffu) + ((h >> 8u) & 0xffu) + ((h >> 16u) & 0xffu) + (h >> 24u);
+    return (f32(sum) - 510.0) * (1.0 / 147.80054);
 }
 
 fn byte(encoded: f32, rounding: f32) -> u32 {
@@ -95,16 +123,23 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
             dot3(develop.balance[2].xyz, linear),
         );
     }
+    let at = vec2<u32>(frame.window_x + tile.x + id.x, frame.window_y + tile.y + id.y);
+    if develop.vignette > 0.0 {
+        linear *= vignette_at(at.x, at.y);
+    }
     // All curves are flat above 10⁴. The bound keeps their squares finite.
     let x = clamp(linear * develop.exposure, vec3<f32>(0.0), vec3<f32>(1e4));
     var t = 0.5;
     if develop.dither != 0u {
-        t = threshold(frame.window_x + tile.x + id.x, frame.window_y + tile.y + id.y);
+        t = threshold(at.x, at.y);
     }
-    var bytes = vec3<u32>(channel(x.r, t), channel(x.g, t), channel(x.b, t));
+    var v = vec3<f32>(channel(x.r), channel(x.g), channel(x.b));
     if develop.tone == TONE_AGX {
-        let v = agx(x);
-        bytes = vec3<u32>(byte(v.r, t), byte(v.g, t), byte(v.b, t));
+        v = agx(x);
     }
+    if develop.grain > 0.0 {
+        v += develop.grain * grain_at(at.x, at.y) * (4.0 * v * (1.0 - v));
+    }
+    let bytes = vec3<u32>(byte(v.r, t), byte(v.g, t), byte(v.b, t));
     picture[index] = bytes.r | (bytes.g << 8u) | (bytes.b << 16u) | (byte(alpha, 0.5) << 24u);
 }

@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::choice::{codec, movie_bits};
 use super::parse::{LAST_FRAME, fps, period};
+use super::quality::QualityOptions;
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, measured_words, samples, seconds, size, whole, window};
@@ -92,6 +93,8 @@ pub struct BatchArgs {
     /// Number of samples per pixel. More samples give smoother edges and take longer.
     #[arg(long, value_name = "N", value_parser = samples)]
     samples: Option<u32>,
+    #[command(flatten)]
+    quality: QualityOptions,
     /// Makes the backgrounds transparent: the same as --set image.alpha=true. They can then be put over
     /// a photograph.
     #[arg(long)]
@@ -244,7 +247,10 @@ fn default_pattern(scene: &str, sweeps: &[String]) -> PathBuf {
 pub fn run(args: &BatchArgs, terminal: &Terminal) -> Result<()> {
     args.scene.begin(terminal);
     args.engine.check()?;
-    let animation = args.scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
+    let scene = args.quality.before(&args.scene);
+    let animation = scene.animation(&args.settings(), &args.cache.add_to(args.scene.limits()))?;
+    let others = [args.scene.own_sets(), args.settings()].concat();
+    args.quality.tell(animation.values(), &others, terminal);
     args.scene.warn_of_settings(animation.values(), &args.sweeps, terminal);
     args.scene.warn_of_replaced(animation.values(), &args.settings(), terminal);
     // Frames from 0 on continue from the picture.

@@ -3,6 +3,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use super::quality::Quality;
 use crate::engine::EngineChoice;
 use crate::output::frame::Compression;
 use crate::output::movie::Codec;
@@ -32,6 +33,15 @@ pub fn engine() -> impl TypedValueParser<Value = EngineChoice> {
             EngineChoice::Gpu,
         ),
         ("cpu", "All cores of the CPU", EngineChoice::Cpu),
+    ])
+}
+
+/// Parser of `--quality`.
+pub fn quality() -> impl TypedValueParser<Value = Quality> {
+    choice(&[
+        ("draft", "One sample and two layers, for the place of things", Quality::Draft),
+        ("preview", "Four samples, for light and look", Quality::Preview),
+        ("final", "64 samples, interpolated cells and eight layers", Quality::Final),
     ])
 }
 

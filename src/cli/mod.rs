@@ -10,6 +10,7 @@ mod grids;
 mod new;
 mod options;
 mod parse;
+mod quality;
 mod quiet;
 mod render;
 mod scene;

@@ -48,6 +48,9 @@ pub struct SceneOptions {
     /// MiB. Work that would need more is refused before it starts.
     #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "4GiB")]
     pub memory: u64,
+    /// Settings that all others win over.
+    #[arg(skip)]
+    pub first: Vec<String>,
 }
 
 impl SceneOptions {
@@ -125,14 +128,15 @@ impl SceneOptions {
         }
     }
 
-    /// Returns the settings of --remove, --set and --seed, and then `more`.
+    /// Returns the settings of --remove, `first`, those of --set and --seed, and then `more`.
     pub fn all_sets(&self, more: &[String]) -> Vec<String> {
         let removes = self.removes.iter().map(|name| format!("{REMOVE}={name}"));
-        removes.chain(self.own_sets()).chain(more.iter().cloned()).collect()
+        let first = self.first.iter().cloned();
+        removes.chain(first).chain(self.own_sets()).chain(more.iter().cloned()).collect()
     }
 
     /// Returns the settings of --set and --seed.
-    fn own_sets(&self) -> Vec<String> {
+    pub fn own_sets(&self) -> Vec<String> {
         let seed = self.seed.map(|n| format!("volume.seed={n}"));
         self.sets.iter().cloned().chain(seed).collect()
     }

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::json;
 
+use super::quality::QualityOptions;
 use super::terminal::{Terminal, say};
 use super::{CacheOptions, DepthOptions, EngineOptions, LayerOptions, SceneOptions};
 use super::{crop, default_output, frame, measured_words, samples, size, window};
@@ -55,6 +56,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = frame, allow_negative_numbers = true)]
     frame: i32,
     #[command(flatten)]
+    quality: QualityOptions,
+    #[command(flatten)]
     engine: EngineOptions,
     #[command(flatten)]
     cache: CacheOptions,
@@ -77,7 +80,8 @@ pub fn run(args: &RenderArgs, terminal: &Terminal) -> Result<()> {
     more.extend(args.samples.map(|n| format!("image.samples={n}")));
     more.extend(args.alpha.then(|| "image.alpha=true".to_owned()));
     // The volumes are made once more for the picture, and warn then.
-    let animation = args.scene.animation(&more, &limits)?;
+    let animation = args.quality.before(&args.scene).animation(&more, &limits)?;
+    args.quality.tell(animation.values(), &[args.scene.own_sets(), more.clone()].concat(), terminal);
     args.scene.warn_of_settings(animation.values(), &[], terminal);
     args.scene.warn_of_replaced(animation.values(), &more, terminal);
     args.scene.warn_of_moved(args.frame, terminal);

@@ -4,6 +4,7 @@ pub mod cpu;
 pub mod exposure;
 mod frame;
 pub mod gpu;
+pub mod lens;
 mod options;
 pub mod overlap;
 pub mod pool_surface;
@@ -199,23 +200,25 @@ impl Engine {
             }
             Engine::Gpu { renderer, told, .. } => (renderer, told),
         };
-        let (mut frame, cut) = renderer.render_marked(scene, volumes, mesh, options, monitor)?;
-        if !cut.is_empty() {
-            let levels = renderer.levels(scene, volumes.as_ref());
-            let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels)
-                .with_shadows_of(volumes, mesh, monitor)?;
-            cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
-            // Strips and frames would repeat it.
-            if !std::mem::replace(told, true) {
-                let (device, pixels) = (renderer.gpu.name(), frame.counts.len());
-                monitor.warn(&format!(
-                    "{device} ends walks through so many cells early: the CPU engine finished {} of {pixels} \
-                     pixels",
-                    cut.len()
-                ));
+        lens::through(scene, options, monitor, |scene, options, monitor| {
+            let (mut frame, cut) = renderer.render_marked(scene, volumes, mesh, options, monitor)?;
+            if !cut.is_empty() {
+                let levels = renderer.levels(scene, volumes.as_ref());
+                let integrator = cpu::integrate::Integrator::with_levels(scene, volumes, &levels)
+                    .with_shadows_of(volumes, mesh, monitor)?;
+                cpu::render_pixels(&integrator, mesh, options, &cut, &mut frame, monitor)?;
+                // Strips and frames would repeat it.
+                if !std::mem::replace(told, true) {
+                    let (device, pixels) = (renderer.gpu.name(), frame.counts.len());
+                    monitor.warn(&format!(
+                        "{device} ends walks through so many cells early: the CPU engine finished {} of \
+                         {pixels} pixels",
+                        cut.len()
+                    ));
+                }
             }
-        }
-        Ok(frame)
+            Ok(frame)
+        })
     }
 }
 

@@ -108,6 +108,8 @@ struct Outline {
     near: f64,
     /// Size of the image, pixels.
     size: DVec2,
+    /// Distance by which it is shifted, pixels.
+    shift: DVec2,
 }
 
 impl Outline {
@@ -118,12 +120,13 @@ impl Outline {
             eye: scene.camera.eye_local(),
             near: f64::from(scene.camera.near),
             size: DVec2::new(width.into(), height.into()),
+            shift: DVec2::from(scene.image.shift.map(f64::from)),
         }
     }
 
     /// Projects a face's corners after clipping at the near plane. A face behind it has none.
     fn of(&self, corners: &[Vec3]) -> Vec<DVec2> {
-        let &Outline { axes: [forward, right, up], eye, near, size } = self;
+        let &Outline { axes: [forward, right, up], eye, near, size, shift } = self;
         // x and y are in units of the image plane; z is the distance along the view axis.
         let in_view = |corner: Vec3| {
             let away = corner.as_dvec3() - eye;
@@ -132,7 +135,7 @@ impl Outline {
         };
         let mut points = Vec::with_capacity(corners.len() + 1);
         let mut add = |p: DVec3| {
-            points.push((DVec2::new(p.x, -p.y) / p.z * 0.5 + 0.5) * size);
+            points.push((DVec2::new(p.x, -p.y) / p.z * 0.5 + 0.5) * size - shift);
         };
         for i in 0..corners.len() {
             let (p, q) = (in_view(corners[i]), in_view(corners[(i + 1) % corners.len()]));

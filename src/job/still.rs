@@ -184,7 +184,7 @@ impl Still {
         });
         Ok(StillWriter {
             sinks: sinks.collect::<Result<_>>()?,
-            whole: window == Window::whole(whole),
+            whole,
             look: scene.image.look,
             window,
             half: exr.half,
@@ -386,8 +386,8 @@ pub struct StillWriter {
     /// Files, and the layers of an EXR.
     sinks: Vec<(Sink, Vec<Layer>)>,
     window: Window,
-    /// Whether the window is the whole image.
-    whole: bool,
+    /// Width and height of the whole image, pixels.
+    whole: [u32; 2],
     look: Look,
     half: bool,
     gamut: Gamut,
@@ -408,10 +408,11 @@ impl StillWriter {
     pub fn push(&mut self, strip: &Frame) -> Result<()> {
         assert_eq!(strip.width, self.window.width, "whole rows");
         assert!(strip.height <= self.window.height - self.rows, "no more rows than the window has");
+        let window = Window { y: self.window.y + self.rows, height: strip.height, ..self.window };
         for (sink, layers) in &mut self.sinks {
             match sink {
                 Sink::Rows(_, encoding, _) => {
-                    let samples = samples_of(strip, *encoding, &self.look, self.whole);
+                    let samples = samples_of(strip, *encoding, &self.look, window, self.whole);
                     sink.push(samples)?;
                 }
                 Sink::Exr(..) => {

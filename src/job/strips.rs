@@ -12,6 +12,9 @@ const PROGRAM_BYTES: u64 = 256 << 20;
 /// Most pixels of a strip, unless one row of raster windows or bloom needs more. Larger strips would take
 /// more memory and save no time.
 const STRIP_PIXELS: u64 = 1 << 23;
+/// Bytes per pixel that a lens adds: the frame of one sample beside that of their mean.
+const LENS_BYTES: u64 = 32;
+
 /// Cuts the part `window` of a scene's image into strips of its full width, from the top. Each strip can be
 /// rendered within `memory` bytes, together with the device's targets, the scene's volumes, its rocks and its
 /// environment. Strips end between raster windows (see [`Grid`]) where that fits; else they divide one
@@ -19,7 +22,7 @@ const STRIP_PIXELS: u64 = 1 << 23;
 ///
 /// Bytes counted:
 /// - per pixel of a strip 34; with `surface_layers` 32 more; with bloom 12 more, and one strip if it fits;
-///   with an alpha channel 6 more, and with both 28 more;
+///   with an alpha channel 6 more, and with both 28 more; with a lens 32 more;
 /// - per pixel of the raster window, at most 2²¹ pixels, 88; where n > 1 quads overlap, the larger of 88 +
 ///   4·n and 32 + 16·n; with an alpha channel 4 more. The CPU engine takes 60 + 48·n per pixel, but only for
 ///   the bands in work, about an eighth of the window;
@@ -52,7 +55,8 @@ pub fn memory_of(
     let parts = scene.bytes_beside_volume(overlap::sheets(scene)).saturating_add(volumes);
     let available = memory.saturating_sub(parts).saturating_sub(WORK_BYTES + PROGRAM_BYTES.min(memory / 4));
     let blooms = image.look.bloom > 0.0;
-    let row = row_bytes(image, window.width, surface_layers);
+    let lens = if scene.lens.is_some() { LENS_BYTES * u64::from(window.width) } else { 0 };
+    let row = row_bytes(image, window.width, surface_layers) + lens;
     let [_, drawn] = Grid::default().size([image.width, image.height]);
     let wanted = (STRIP_PIXELS / u64::from(window.width)).max(u64::from(drawn));
     let wanted = if blooms { u64::from(window.height) } else { wanted };

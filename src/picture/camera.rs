@@ -250,7 +250,7 @@ pub fn sample_numbers(image: &Image) -> Range<u32> {
     first..first + image.samples
 }
 
-/// Offset of sample `sample` from the top left corner of a pixel, in pixels.
+/// Offset of sample `sample` from the top left corner of a pixel, in pixels, with the image's shift.
 ///
 /// The mean of an image's samples is the pixel's centre, because every sample has a mirror image: otherwise
 /// pictures with different numbers of samples would not register. The samples are n successive points of the
@@ -262,6 +262,12 @@ pub fn sample_numbers(image: &Image) -> Range<u32> {
 /// (Ernst, Stamminger and Greiner, "Filter Importance Sampling", 2006). Every pixel has its own samples, and
 /// its value is their unweighted mean.
 pub fn sample_offset(image: &Image, sample: u32) -> [f32; 2] {
+    let [x, y] = offset_in_pixel(image, sample);
+    [x + image.shift[0], y + image.shift[1]]
+}
+
+/// [`sample_offset`] without the image's shift.
+pub fn offset_in_pixel(image: &Image, sample: u32) -> [f32; 2] {
     if sample == CENTRE {
         return [0.5, 0.5];
     }

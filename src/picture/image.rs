@@ -16,6 +16,9 @@ pub struct Image {
     pub filter: Filter,
     /// Whether the background is transparent, so that the picture has an alpha channel.
     pub alpha: bool,
+    /// Distance by which the image is moved behind its pixels, pixels to the right and down: a pixel shows what
+    /// lies so far from it in the image of the same camera without it. 0 but for the samples of a lens.
+    pub shift: [f32; 2],
     /// Maximum error of simplified rock, in distances between samples. A larger error takes fewer triangles.
     pub rock_error: f32,
     /// Primaries of files of linear light.
@@ -65,6 +68,12 @@ pub struct Look {
     pub tone: Tone,
     /// Way in which values are rounded to 8 bits.
     pub dither: Dither,
+    /// Stops by which the corners are darker than the middle.
+    pub vignette: f32,
+    /// Standard deviation of the grain in the middle greys, as a share of white.
+    pub grain: f32,
+    /// Number of the grain's pattern.
+    pub grain_seed: u32,
 }
 
 /// Way in which values are rounded to 8 bits.

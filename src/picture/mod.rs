@@ -8,7 +8,9 @@ mod frame;
 mod gamut;
 mod grid;
 mod image;
+pub mod lens;
 pub mod resolve;
+pub mod shutter;
 pub mod white_balance;
 
 pub(crate) use budget::{LEAST_ROWS, WORK_BYTES, row_bytes};
@@ -19,3 +21,5 @@ pub use frame::{Frame, Layer, Seconds, Surface};
 pub use gamut::Gamut;
 pub use grid::Grid;
 pub use image::{AutoExposure, Dither, Filter, Image, Look, Tone};
+pub use lens::Lens;
+pub use shutter::SampleTimes;

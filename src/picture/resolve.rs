@@ -63,21 +63,40 @@ fn threshold(x: u32, y: u32) -> f32 {
     ((noise >> 24) as f32 + 0.5) / 256.0
 }
 
+/// Returns the grain of a pixel of the whole image: a number with the mean 0 and the variance 1, almost
+/// Gaussian, which depends on the pixel and on the number of the pattern. It is the sum of the four bytes of a
+/// hash (Wellons, "Prospecting for Hash Functions", 2018), in whole numbers so that both engines get the same.
+fn grain([x, y]: [u32; 2], seed: u32) -> f32 {
+    let mut h = x.wrapping_mul(0x8da6_b343) ^ y.wrapping_mul(0xd816_3841) ^ seed.wrapping_mul(0xcb1a_b31f);
+    h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
+    h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
+    h ^= h >> 16;
+    let sum: u32 = h.to_le_bytes().into_iter().map(u32::from).sum();
+    // The variance of four even bytes is (256² − 1)/3.
+    (sum as f32 - 510.0) * (1.0 / 147.800_54)
+}
+
 /// Develops the pixels of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolver(Develop);
 
 impl Resolver {
-    /// Resolver for this look.
+    /// Resolver for this look, without its vignette.
     pub fn new(look: &Look) -> Self {
         Resolver(Develop::new(look))
     }
 
-    /// Develops one pixel: division by alpha, white balance, exposure, tone curve, sRGB encoding and rounding
-    /// to 8 bits. `light` is R, G, B multiplied by alpha, and alpha, see [`lit`]; the result is not
-    /// multiplied. `at` is the pixel's column and row in the whole image, on which the dither depends.
+    /// Resolver for pixels of a whole image of this size, with the look's vignette.
+    pub fn over(look: &Look, size: [u32; 2]) -> Self {
+        Resolver(Develop::new(look).over(size))
+    }
+
+    /// Develops one pixel: division by alpha, white balance, exposure, vignette, tone curve, sRGB encoding,
+    /// grain and rounding to 8 bits. `light` is R, G, B multiplied by alpha, and alpha, see [`lit`]; the
+    /// result is not multiplied. `at` is the pixel's column and row in the whole image, on which vignette,
+    /// grain and dither depend.
     pub fn pixel(&self, light: [f32; 4], at: [u32; 2]) -> [u8; 4] {
-        let [r, g, b] = self.bytes(self.encoded(light), at);
+        let [r, g, b] = self.bytes(self.encoded(light, at), at);
         // Alpha is not dithered, so that what is solid or empty stays so.
         [r, g, b, byte(light[3], 0.5)]
     }
@@ -89,23 +108,40 @@ impl Resolver {
     }
 
     /// Develops one pixel as [`Resolver::pixel`] does, without rounding: values for a display, 0 to 1.
-    pub fn encoded(&self, light: [f32; 4]) -> [f32; 3] {
-        let x = self.exposed(light);
-        let encoded = match self.0.tone {
+    pub fn encoded(&self, light: [f32; 4], at: [u32; 2]) -> [f32; 3] {
+        let x = self.exposed(light, at);
+        let mut encoded = match self.0.tone {
             TONE_AGX => agx(x),
             TONE_FILMIC => x.map(|x| srgb(filmic(x).clamp(0.0, 1.0))),
             _ => x.map(|x| srgb(x.clamp(0.0, 1.0))),
         };
+        if self.0.grain > 0.0 {
+            let noise = self.0.grain * grain(at, self.0.grain_seed);
+            encoded = encoded.map(|x| x + noise * (4.0 * x * (1.0 - x)));
+        }
         encoded.map(|x| x.clamp(0.0, 1.0))
     }
 
-    /// Returns the linear values that the tone curve gets: alpha is divided out, white balance and exposure
-    /// are applied.
-    pub fn exposed(&self, [r, g, b, alpha]: [f32; 4]) -> [f32; 3] {
+    /// Factor by which the vignette darkens a pixel: 1/(1 + tan²)² = cos⁴ of an angle that grows from the
+    /// middle to the corners.
+    fn vignette(&self, at: [u32; 2]) -> f32 {
+        let Develop { place: [step_x, step_y, x, y], vignette, .. } = self.0;
+        let (x, y) = ((at[0] as f32 + 0.5) * step_x - x, (at[1] as f32 + 0.5) * step_y - y);
+        let fall = 1.0 + vignette * (x * x + y * y);
+        1.0 / (fall * fall)
+    }
+
+    /// Returns the linear values that the tone curve gets: alpha is divided out, white balance, exposure and
+    /// vignette are applied.
+    pub fn exposed(&self, [r, g, b, alpha]: [f32; 4], at: [u32; 2]) -> [f32; 3] {
         let develop = &self.0;
         let mut rgb = [r, g, b].map(|x| x / alpha.max(LEAST_ALPHA));
         if develop.balanced != 0 {
             rgb = develop.balance.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]);
+        }
+        if develop.vignette > 0.0 {
+            let vignette = self.vignette(at);
+            rgb = rgb.map(|x| x * vignette);
         }
         // All curves are flat above 10⁴. The bound keeps their squares finite.
         rgb.map(|x| (x * develop.exposure).clamp(0.0, 1e4))
@@ -138,7 +174,7 @@ pub fn lit<'a>(frame: &'a Frame, look: &Look, whole: bool) -> impl Fn(usize) -> 
 /// Develops the picture of a frame from its radiance. The frame is the part `window` of an image of `size`
 /// pixels; only the whole image gets bloom.
 pub fn develop(frame: &mut Frame, look: &Look, window: Window, size: [u32; 2]) {
-    let resolver = Resolver::new(look);
+    let resolver = Resolver::over(look, size);
     let mut picture = std::mem::take(&mut frame.picture);
     let lit = lit(frame, look, window == Window::whole(size));
     let width = window.width as usize;

@@ -18,6 +18,9 @@ use super::value::{Place, Raw, Value, Values};
 use super::{Limits, Record, Scene, expose, meshes, volumes};
 use crate::util::error::{Error, Result};
 
+/// Keys of the camera that do not move it.
+const OF_LENS: [&str; 4] = ["camera.f_number", "camera.focus", "camera.near", "camera.shutter"];
+
 /// A scene and its motion.
 #[derive(Clone, Debug)]
 pub struct Animation {
@@ -68,12 +71,7 @@ impl Animation {
     pub fn new(name: &str, values: Values, folder: Option<PathBuf>, limits: &Limits) -> Result<Animation> {
         let period = Some(values.count("animate.loop")).filter(|&n| n > 0);
         let frames = period.unwrap_or(values.count("animate.frames"));
-        let number = |key: &str| match values.get(key) {
-            // Taken in float64: the float32 of 23.976 is another number.
-            Value::Float(x) => x,
-            _ => f64::from(values.float(key)),
-        };
-        let (fps, speed) = (number("animate.fps"), number("animate.speed"));
+        let (fps, speed) = (number(&values, "animate.fps"), number(&values, "animate.speed"));
         let turn = values.int("animate.turn");
         if let Some(n) = period
             && turn != 0
@@ -84,14 +82,7 @@ impl Animation {
                 "make the loop a multiple of the turn",
             ));
         }
-        let flow = match period {
-            None => (speed, fps),
-            Some(n) => {
-                let lengths = speed * f64::from(n) / fps;
-                let whole = if speed == 0.0 { 0.0 } else { lengths.abs().round().max(1.0).copysign(lengths) };
-                (whole, f64::from(n))
-            }
-        };
+        let flow = flow(speed, fps, period);
         let mut tracks: Vec<(String, Keyframes)> = Vec::new();
         for i in values.names("animate.tracks") {
             let (key, track) = track(&values, &format!("animate.tracks.{i}"), period)?;
@@ -112,7 +103,7 @@ impl Animation {
         }
         let from = values.text("camera.from");
         let moves_camera =
-            |(key, _): &(String, Keyframes)| key.starts_with("camera.") && key != "camera.near";
+            |(key, _): &(String, Keyframes)| key.starts_with("camera.") && !OF_LENS.contains(&key.as_str());
         if !from.is_empty() && (path.is_some() || turn != 0 || tracks.iter().any(moves_camera)) {
             return Err(Error::input(
                 format!("camera.from = {from:?} and the animation both move the camera"),
@@ -203,8 +194,8 @@ impl Animation {
         Ok(())
     }
 
-    /// Returns the scene of a frame. It contains nothing of the animation: printed as a scene file, it gives
-    /// the same picture.
+    /// Returns the scene of a frame. It contains nothing of the animation but the speed of the flow while the
+    /// shutter is open: printed as a scene file, it gives the same picture.
     ///
     /// # Errors
     /// The errors of [`Scene::from_values`]; from frame 1 on the message names the frame.
@@ -248,6 +239,24 @@ impl Animation {
         if let Some(stops) = self.measured {
             expose(&mut values, stops);
         }
+        if values.float("image.grain") > 0.0 && number != 0 {
+            let moves = |(key, _): &(String, Keyframes)| key == "image.grain_seed";
+            let seed = values.int("image.grain_seed") + i64::from(number);
+            if !self.tracks.iter().any(moves) {
+                let seed = Raw::Int(seed.rem_euclid(1 << 31));
+                values.set("image.grain_seed", &seed, &place("image.grain_seed"))?;
+            }
+        }
+        let shutter = f64::from(values.float("camera.shutter"));
+        if shutter > 0.0 {
+            let half = 0.5 * shutter * self.fps;
+            let speed = match self.tracks.iter().find(|(key, _)| key == "volume.flow") {
+                Some((_, track)) => track.change(time - half, time + half) / shutter,
+                None => speed(&self.values),
+            };
+            let speed = Raw::Float(speed.clamp(-1000.0, 1000.0));
+            values.set("animate.speed", &speed, &place("animate.speed"))?;
+        }
         let scene = || {
             let folder = self.folder.as_deref();
             if !values.text("camera.from").is_empty() {
@@ -261,6 +270,33 @@ impl Animation {
         scene()
             .map(|scene| scene.recorded(self.record.clone()))
             .map_err(|e| if frame == 0 { e } else { at_frame(e, frame) })
+    }
+}
+
+/// Returns a number. It is taken in float64, because the float32 of 23.976 is another number.
+fn number(values: &Values, key: &str) -> f64 {
+    match values.get(key) {
+        Value::Float(x) => x,
+        _ => f64::from(values.float(key)),
+    }
+}
+
+/// Returns the speed of the flow as a fraction: lengths of the volume over frames, whole lengths in a loop.
+fn flow(speed: f64, fps: f64, period: Option<u32>) -> (f64, f64) {
+    let Some(n) = period.map(f64::from) else { return (speed, fps) };
+    let lengths = speed * n / fps;
+    let whole = if speed == 0.0 { 0.0 } else { lengths.abs().round().max(1.0).copysign(lengths) };
+    (whole, n)
+}
+
+/// Returns the speed at which the volume `water` moves down the flow, lengths per second.
+pub(super) fn speed(values: &Values) -> f64 {
+    let fps = number(values, "animate.fps");
+    let period = Some(values.count("animate.loop")).filter(|&n| n > 0);
+    match flow(number(values, "animate.speed"), fps, period) {
+        // Without a loop it is what was written.
+        (speed, _) if period.is_none() => speed,
+        (lengths, frames) => lengths / frames * fps,
     }
 }
 

@@ -14,7 +14,7 @@ use crate::light::strand::StrandParams;
 use crate::light::strand::hair::{Hair, Pigment};
 use crate::light::strand::water::Water;
 use crate::light::{Background, Cone, Light, LightKind, Reflection, ReflectionKind, Scattering, Visibility};
-use crate::picture::{AutoExposure, Camera, Dither, Filter, Gamut, Image, Look, Tone};
+use crate::picture::{AutoExposure, Camera, Dither, Filter, Gamut, Image, Lens, Look, Tone};
 use crate::trace::{Attenuation, AttenuationKind, Lookup, Prefilter, Trace};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
@@ -144,6 +144,7 @@ pub(super) fn image(v: &Values) -> Image {
         samples: v.count("image.samples"),
         filter: v.choice("image.filter", Filter::from_word),
         alpha: v.is_on("image.alpha"),
+        shift: [0.0; 2],
         rock_error: v.float("image.rock_error"),
         gamut: v.choice("image.primaries", Gamut::from_word),
         look: look(v),
@@ -160,6 +161,9 @@ fn look(v: &Values) -> Look {
         tint: v.float("image.tint"),
         tone: v.choice("image.tone", Tone::from_word),
         dither: v.choice("image.dither", Dither::from_word),
+        vignette: v.float("image.vignette"),
+        grain: v.float("image.grain"),
+        grain_seed: v.count("image.grain_seed"),
     }
 }
 
@@ -285,6 +289,13 @@ pub(super) fn camera(v: &Values, origin: DVec3) -> Result<Camera> {
         tan_half_fov: (v.float("camera.fov").to_radians() * 0.5).tan(),
         near: v.float("camera.near"),
     })
+}
+
+/// Returns the lens of the camera; `None` where it is a pinhole.
+pub(super) fn lens(v: &Values, camera: &Camera) -> Option<Lens> {
+    let [f_number, focus] = ["camera.f_number", "camera.focus"].map(|key| f64::from(v.float(key)));
+    let focus = if focus > 0.0 { focus } else { camera.eye.distance(v.point("camera.target")) };
+    (f_number > 0.0).then(|| Lens::new(camera.tan_half_fov.into(), f_number, focus))
 }
 
 pub(super) fn haze(v: &Values, origin: DVec3) -> Haze {

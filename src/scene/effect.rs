@@ -117,7 +117,7 @@ fn without_water(values: &Values, key: &str) -> Option<String> {
 }
 
 /// Parameters of the picture as shown, which EXR files do not hold.
-const OF_SHOWN_PICTURES: [&str; 7] = [
+const OF_SHOWN_PICTURES: [&str; 10] = [
     "image.exposure",
     "image.bloom",
     "image.bloom_radius",
@@ -125,6 +125,9 @@ const OF_SHOWN_PICTURES: [&str; 7] = [
     "image.tint",
     "image.tone",
     "image.dither",
+    "image.vignette",
+    "image.grain",
+    "image.grain_seed",
 ];
 
 /// Returns a sentence for each `--set` that has no effect on files of these kinds: pictures `as_shown`, and

@@ -90,6 +90,20 @@ impl Keyframes {
         Keyframes { keys, slopes, interpolation, period }
     }
 
+    /// Returns by how much the first component changes from one frame to another. Where a loop closes from
+    /// one value to another that shows the same picture, the step between them is no change.
+    pub fn change(&self, from: f64, to: f64) -> f64 {
+        let change = self.at(to)[0] - self.at(from)[0];
+        let ((first, start), (last, end)) = (&self.keys[0], &self.keys[self.keys.len() - 1]);
+        match self.period {
+            Some(n) if last - first == n => {
+                let turns = ((to - first) / n).floor() - ((from - first) / n).floor();
+                change + turns * (end[0] - start[0])
+            }
+            _ => change,
+        }
+    }
+
     /// Returns the components at a frame.
     pub fn at(&self, frame: f64) -> Vec<f64> {
         let first = self.keys[0].0;

@@ -21,6 +21,7 @@ mod read;
 mod record;
 mod remove;
 mod sequence;
+mod shot;
 mod slips;
 mod typed;
 mod value;
@@ -62,7 +63,7 @@ use crate::light::{AngleFrame, Background, Light, Reflection, Scattering, Visibi
 use crate::mapping::Quad;
 use crate::mapping::shell::{HullFace, Shell};
 use crate::picture::camera::DepthRange;
-use crate::picture::{AutoExposure, Camera, Image, check_image};
+use crate::picture::{AutoExposure, Camera, Image, Lens, check_image};
 use crate::place::paint::coarsened;
 use crate::place::paint::texture::MOST_BYTES;
 use crate::place::{
@@ -108,6 +109,8 @@ pub struct Parts {
     pub recipes: Vec<Recipe>,
     /// Distance that the waves of pools have moved, in lengths of the volume `water`, with which they move.
     pub wave_flow: f32,
+    /// Distance that they move while the shutter is open, in the same lengths.
+    pub wave_moves: f32,
     /// Quads that the volumes are mapped to.
     pub quads: Vec<Quad>,
     /// Shells of the volume: those of meshes, then those of boxes.
@@ -153,6 +156,8 @@ pub struct Parts {
     pub p: f32,
     /// Camera.
     pub camera: Camera,
+    /// Lens of the camera; `None` for a pinhole.
+    pub lens: Option<Lens>,
     /// Radiance where a ray meets nothing.
     pub background: Background,
     /// Haze between the eye and everything else.
@@ -307,7 +312,9 @@ impl Scene {
         let meshes = meshes::read(v, folder, limits)?;
         let boxes = boxes::read(v, &recipes)?;
         let origin = origin::origin(v, &meshes, &boxes);
-        let camera = build::camera(meshes::with_camera(v, &meshes, 0.0)?.as_ref().unwrap_or(v), origin)?;
+        let of_file = meshes::with_camera(v, &meshes, 0.0)?;
+        let of_camera = of_file.as_ref().unwrap_or(v);
+        let camera = build::camera(of_camera, origin)?;
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
@@ -324,6 +331,7 @@ impl Scene {
             boxes,
             recipes,
             wave_flow: v.float("volume.flow"),
+            wave_moves: volumes::exposed_flow(v),
             lights: build::lights(v, origin, lights, sun, environment_lights.len())?,
             environment_lights,
             environment,
@@ -343,6 +351,7 @@ impl Scene {
             scattering: build::scattering(v)?,
             p: v.float("light.p"),
             camera,
+            lens: build::lens(of_camera, &camera),
             background: build::background(v),
             haze: build::haze(v, origin),
             image,
@@ -749,6 +758,7 @@ impl Scene {
             };
             warnings.extend(empty.map(words));
         }
+        warnings.extend(shot::warnings(self));
         warnings.extend(origin::rounded(self));
         warnings
     }

@@ -90,12 +90,21 @@ const PRESETS: &[Preset] = &[
     ),
 ];
 
+/// Bases that are no scenes by themselves: name and text.
+const BASES: &[(&str, &str)] = &[("water", include_str!("../../assets/bases/water.toml"))];
+
 /// Name of the scene that is rendered when none is given.
 pub const DEFAULT: &str = PRESETS[0].0;
 
 /// Returns the text of a preset's scene file.
 pub fn text(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|p| p.0 == name).map(|p| p.2)
+}
+
+/// Returns the text of a base: that of a preset, or of one of the bases that are no scenes by themselves.
+pub fn base(name: &str) -> Option<&'static str> {
+    let own = BASES.iter().find(|base| base.0 == name).map(|base| base.1);
+    own.or_else(|| text(name))
 }
 
 /// Returns the presets' names.
@@ -113,6 +122,12 @@ pub fn nearest(name: &str) -> Option<&'static str> {
 /// Returns a sentence that lists the presets.
 pub fn listed() -> String {
     format!("presets: {}", names().collect::<Vec<_>>().join(", "))
+}
+
+/// Returns a sentence that lists what a base may be.
+pub fn listed_bases() -> String {
+    let others = BASES.iter().map(|base| base.0).collect::<Vec<_>>().join(", ");
+    format!("{}; or {others}, the look alone", listed())
 }
 
 /// Returns the presets' names and descriptions.

@@ -205,17 +205,17 @@ impl Source {
             None => Values::default(),
             Some(base) => {
                 let at = file.place(base.span().start);
-                let text = base.get_ref().as_str().and_then(|name| Some((name, presets::text(name)?)));
+                let text = base.get_ref().as_str().and_then(|name| Some((name, presets::base(name)?)));
                 let Some((name, text)) = text else {
                     let given = base.get_ref().as_str().unwrap_or_default();
                     return Err(Error::input(
                         format!("{}: base is no preset", at.0),
                         match presets::nearest(given) {
                             _ if given.contains(['.', '/']) => {
-                                format!("a base is no file; {}", presets::listed())
+                                format!("a base is no file; {}", presets::listed_bases())
                             }
                             Some(near) => format!("did you mean {near}?"),
-                            None => presets::listed(),
+                            None => presets::listed_bases(),
                         },
                     ));
                 };

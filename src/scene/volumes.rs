@@ -10,10 +10,11 @@ use super::meshes::Carrier;
 use super::names::likeliest;
 use super::param::{COLORS, PARAMS, WATER, key_of_volume, split_volume_key};
 use super::sequence::Sequence;
-use super::{Limits, Parts, Scene, Values, boxes, build, matter, measured, meshes};
+use super::{Limits, Parts, Scene, Values, animation, boxes, build, matter, measured, meshes};
 use crate::light::ramp::Ramp;
 use crate::light::scatter::optics::ShellOptics;
 use crate::light::{ReflectionKind, Scattering, VolumeReflection};
+use crate::picture::SampleTimes;
 use crate::trace::Prefilter;
 use crate::util::cache::Cache;
 use crate::util::error::{Error, Result};
@@ -56,6 +57,8 @@ pub struct Recipe {
     pub asked_storage: StorageChoice,
     /// Distance that the volume has moved down the flow, in lengths of the volume.
     pub flow: f32,
+    /// Distance that it moves while the shutter is open, in lengths of the volume; the middle of it is `flow`.
+    pub moves: f32,
 }
 
 impl Recipe {
@@ -92,6 +95,7 @@ impl Recipe {
         // What was measured stands where it was; only copies of a volume can flow.
         let is_placed = measured.is_some() || matches!(matter, Some(Matter::Strands(_)));
         let flow = if is_placed { 0.0 } else { v.float(&key_of_volume(name, "volume.flow")) };
+        let moves = if is_placed || name != WATER { 0.0 } else { exposed_flow(v) };
         Ok(Recipe {
             name: name.into(),
             ramp: Ramp::new(&colors, water.k_s),
@@ -105,6 +109,7 @@ impl Recipe {
             storage: Storage::Dense,
             asked_storage: build::asked_storage(v, name)?,
             flow,
+            moves,
         })
     }
 
@@ -345,6 +350,12 @@ pub(super) fn without_effect(v: &Values, key: &str) -> Option<String> {
     (!is_shown(v, name) && !is_waves).then(|| format!("{key} has no effect: {}", why_unused(v, name)))
 }
 
+/// Returns the distance that the volume `water`, and the waves with it, move while the shutter is open, in
+/// lengths of the volume.
+pub(super) fn exposed_flow(v: &Values) -> f32 {
+    (f64::from(v.float("camera.shutter")) * animation::speed(v)) as f32
+}
+
 /// Reads the recipes of the volumes that the scene shows.
 ///
 /// # Errors
@@ -505,6 +516,34 @@ impl Scene {
     pub(crate) fn flows(&self, volumes: &[VolumeTexture]) -> Vec<f32> {
         assert_eq!(volumes.len(), self.recipes.len(), "one volume for each recipe of the scene");
         self.recipes.iter().map(|recipe| recipe.flow).collect()
+    }
+
+    /// Returns the distance that each volume moves while the shutter is open, in cells.
+    ///
+    /// # Panics
+    /// If the scene has another number of volumes than `volumes`.
+    pub(crate) fn flow_moves(&self, volumes: &[VolumeTexture]) -> Vec<f32> {
+        assert_eq!(volumes.len(), self.recipes.len(), "one volume for each recipe of the scene");
+        let cells = |(recipe, volume): (&Recipe, &VolumeTexture)| recipe.moves * volume.size[1] as f32;
+        self.recipes.iter().zip(volumes).map(cells).collect()
+    }
+
+    /// Whether any volume moves while the shutter is open.
+    pub(crate) fn moves(&self) -> bool {
+        self.recipes.iter().any(|recipe| recipe.moves != 0.0)
+    }
+
+    /// Whether what a sample sees depends on the number of samples, among which time and lens are divided.
+    pub(crate) fn counts_samples(&self) -> bool {
+        self.lens.is_some() || self.moves() || self.wave_moves != 0.0
+    }
+
+    /// Returns the times of a sample in all pixels; zeros if nothing moves while the shutter is open.
+    pub(crate) fn sample_times(&self, sample: u32) -> SampleTimes {
+        match self.moves() || self.wave_moves != 0.0 {
+            true => SampleTimes::new(&self.image, sample),
+            false => SampleTimes::default(),
+        }
     }
 
     /// Whether any volume has colours.

@@ -15,6 +15,7 @@ const FLOORS: &[&[&str]] = &[
     &["output"],
     &["scene"],
     &["engine/options", "engine/overlap", "engine/pool_surface"],
+    &["engine/lens"],
     &["engine/cpu", "engine/gpu"],
     &["engine/exposure", "engine/long_walks"],
     &["engine"],

@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 use crate::engine::overlap;
 use crate::mapping::{PlaneView, Quad};
-use crate::picture::Image;
-use crate::picture::camera::sample_offset;
+use crate::picture::camera::{offset_in_pixel, sample_offset};
+use crate::picture::{Image, SampleTimes};
 use crate::place::Mesh;
 use crate::scene::Scene;
 use crate::util::window::Window;
@@ -130,8 +130,9 @@ pub fn run_on(simd: Level, scene: &Scene, mesh: &Mesh, window: Window, sample: u
 pub fn shade_pools(scene: &Scene, mesh: &Mesh, sample: u32, bands: &mut [OnceLock<Gbuffer>]) {
     let shading = Shading::new(scene, mesh, &scene.depth_range(mesh));
     let (simd, offset) = (Level::new(), sample_offset(&scene.image, sample));
+    let times = SampleTimes::new(&scene.image, sample);
     bands.par_iter_mut().filter_map(OnceLock::get_mut).for_each(|band| {
-        dispatch!(simd, simd => shading.pools(simd, offset, band));
+        dispatch!(simd, simd => shading.pools(simd, offset, times, band));
     });
 }
 
@@ -154,6 +155,10 @@ pub struct Drawing<'a> {
     grid: Grid,
     /// Offset of each sample from the top left corner of a pixel, pixels.
     offsets: Vec<[f32; 2]>,
+    /// The same in an image that is not shifted.
+    in_pixel: Vec<[f32; 2]>,
+    /// Times of each sample.
+    times: Vec<SampleTimes>,
     rock: Rasteriser,
     water: Rasteriser,
     shading: Shading<'a>,
@@ -179,14 +184,25 @@ impl<'a> Drawing<'a> {
     /// Projects the triangles of a window inside the image for samples, given by their numbers.
     pub fn new(simd: Level, scene: &'a Scene, mesh: &'a Mesh, window: Window, samples: &[u32]) -> Self {
         let offsets: Vec<[f32; 2]> = samples.iter().map(|&s| sample_offset(&scene.image, s)).collect();
-        let grid = Grid::new(window, band_rows(window), &offsets);
+        let times = samples.iter().map(|&s| SampleTimes::new(&scene.image, s)).collect();
+        let in_pixel: Vec<_> = samples.iter().map(|&s| offset_in_pixel(&scene.image, s)).collect();
+        let grid = Grid::new(window, band_rows(window), &in_pixel);
         let depth = scene.depth_range(mesh);
         let projection = Projection::new(scene, &depth, &grid);
         let rock = Rasteriser::new(projection.rock(mesh), &grid);
         let mut water = projection.water();
         water.extend(projection.hulls());
         let water = Rasteriser::new(water, &grid);
-        Drawing { simd, grid, offsets, rock, water, shading: Shading::new(scene, mesh, &depth) }
+        Drawing {
+            simd,
+            grid,
+            offsets,
+            in_pixel,
+            times,
+            rock,
+            water,
+            shading: Shading::new(scene, mesh, &depth),
+        }
     }
 
     /// Returns the targets of band number `i` for one of the samples. Triangles are drawn for several
@@ -203,7 +219,7 @@ impl<'a> Drawing<'a> {
     /// Draws the triangles of band number `i` for the samples from number `first` on, [`SAMPLES`] of them
     /// unless fewer are left.
     fn cover(&self, i: usize, first: usize, canvas: &mut Canvas) {
-        let samples = &self.offsets[first..self.offsets.len().min(first + SAMPLES)];
+        let samples = &self.in_pixel[first..self.in_pixel.len().min(first + SAMPLES)];
         let shifts = Shifts::new(samples);
         let Canvas { rock, water, targets, .. } = canvas;
         rock.clear();
@@ -229,7 +245,8 @@ impl<'a> Drawing<'a> {
         targets.pools.clear();
         let first = sample - sample % SAMPLES;
         let count = SAMPLES.min(self.offsets.len() - first);
-        let sample = Which { index: sample - first, count, offset: self.offsets[sample] };
+        let (offset, times) = (self.offsets[sample], self.times[sample]);
+        let sample = Which { index: sample - first, count, offset, in_pixel: self.in_pixel[sample], times };
         dispatch!(self.simd, simd => self.shading.opaque(simd, &self.rock, rock, sample, targets));
         if self.water.reaches(i) {
             self.shading.water(&self.water, water, sample, targets);

@@ -24,8 +24,8 @@ use crate::light::visibility::{LightVolumes, Medium};
 use crate::light::{AngleFrame, Light, Visibility};
 use crate::mapping::shell::Inside;
 use crate::mapping::{CellFrame, Quad, QuadMap};
-use crate::picture::Camera;
 use crate::picture::camera::{RayFrame, footprint, sample_offset};
+use crate::picture::{Camera, SampleTimes};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, STRANDS, level_at};
@@ -89,8 +89,10 @@ struct FrameVolume {
     size: [u32; 3],
     /// Optical depth in bits per unit of ρ code (and per metre, unless attenuation is per cell).
     extinction: f32,
-    /// Distance that the volume has moved down the flow, cells.
+    /// Distance that the volume has moved down the flow at the time of the frame, cells.
     flow_cells: f32,
+    /// Distance that it moves while the shutter is open, cells.
+    flow_moves: f32,
     /// Colours of the cells.
     ramp: Ramp,
     /// Whether the cells reflect as strands do.
@@ -99,6 +101,14 @@ struct FrameVolume {
     has_lines: bool,
     /// Ambient light that cells send on, but those of mist.
     ambient: Vec3,
+}
+
+impl FrameVolume {
+    /// Distance that the volume has moved down the flow at the time of a ray, cells; see [`SampleTimes`].
+    #[inline]
+    fn flow_at(&self, time: f32) -> f32 {
+        self.flow_cells + time * self.flow_moves
+    }
 }
 
 /// The result of one ray.
@@ -170,6 +180,8 @@ struct SheetOrder {
     is_last: bool,
     /// Linear radiance behind all sheets.
     behind: Vec3,
+    /// Time of the ray; see [`SampleTimes`].
+    time: f32,
 }
 
 /// Walks the rays of many pixels, in lockstep where that covers the scene.
@@ -203,6 +215,8 @@ struct PixelRay {
     /// Index of the pixel in the targets of the raster pass.
     i: usize,
     d: Vec3,
+    /// Time of the ray; see [`SampleTimes`].
+    time: f32,
     /// Linear radiance behind all sheets.
     behind: Vec3,
     /// Share of a backdrop that shows behind them.
@@ -232,7 +246,8 @@ impl PixelRay {
         }
         let (number, hit) = gbuffer.face(self.i, self.sheets)?;
         let is_last = gbuffer.face(self.i, self.sheets + 1).is_none();
-        let order = SheetOrder { before: self.all.transmittance, is_last, behind: self.behind };
+        let (before, behind, time) = (self.all.transmittance, self.behind, self.time);
+        let order = SheetOrder { before, is_last, behind, time };
         let met = match scene.face(number) {
             Face::Quad(_) => Carrier::Quad(number, hit),
             Face::Hull(shell, face) => {
@@ -327,12 +342,13 @@ impl<'a> Integrator<'a> {
     }
 
     fn of_levels(scene: &'a Scene, volumes: &[VolumeTexture], levels: &[Levels]) -> Self {
-        let flows = scene.flows(volumes);
+        let (flows, moves) = (scene.flows(volumes), scene.flow_moves(volumes));
         let frame_volume = |(i, (volume, levels)): (usize, (&VolumeTexture, &Levels))| FrameVolume {
             levels: levels.clone(),
             size: volume.size,
             extinction: extinction(&scene.trace.attenuation, volume.alpha),
             flow_cells: flow_cells(flows[i], volume.size[1]),
+            flow_moves: moves[i],
             ramp: scene.recipes[i].ramp,
             has_strands: scene.reflection_of(i).strands().is_some(),
             has_lines: scene.recipes[i].has_lines(),
@@ -428,7 +444,8 @@ impl<'a> Integrator<'a> {
         let offset = sample_offset(image, sample);
         let d = self.rays.direction(Camera::image_point(image.width, image.height, pixel, offset));
         let all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
-        Ok(PixelRay { i, d, behind, shows, all, sheets: 0, ended: false })
+        let time = SampleTimes::new(image, sample).of(pixel);
+        Ok(PixelRay { i, d, time, behind, shows, all, sheets: 0, ended: false })
     }
 
     /// Adds a sheet to those that a ray has passed.
@@ -457,7 +474,7 @@ impl<'a> Integrator<'a> {
 
     /// Walks the volume of quad number `quad` from its point `hit` = (u, v, metres from the eye) along the
     /// unit world direction `d_world`. Nothing is in front of the quad; `behind` is the linear radiance
-    /// behind it.
+    /// behind it. The water stands where it does at the time of the frame.
     pub fn trace<O: Observer>(
         &self,
         quad: usize,
@@ -466,7 +483,7 @@ impl<'a> Integrator<'a> {
         behind: Vec3,
         observer: &mut O,
     ) -> RayResult {
-        self.sheet(quad, d_world, hit, SheetOrder { before: 1.0, is_last: true, behind }, observer)
+        self.sheet(quad, d_world, hit, SheetOrder { before: 1.0, is_last: true, behind, time: 0.0 }, observer)
     }
 
     /// Traces one sheet of a ray. Sheets are composited face by face: if a slab extends behind the next
@@ -477,10 +494,11 @@ impl<'a> Integrator<'a> {
         quad: usize,
         d_world: Vec3,
         hit: [f32; 3],
-        SheetOrder { before, is_last, behind }: SheetOrder,
+        order: SheetOrder,
         observer: &mut O,
     ) -> RayResult {
-        let ray = self.sheet_hit(quad, d_world, hit);
+        let before = order.before;
+        let ray = self.sheet_hit(quad, d_world, hit, order.time);
         let (level, share) = self.level_of(&ray, hit[2]);
         let mut result = self.walk_numbered(&ray, level, before, observer);
         if share > 0.0 {
@@ -488,7 +506,6 @@ impl<'a> Integrator<'a> {
             result = result.mixed(next, share);
         }
         let LevelResult { transmittance, lit, tint, cells } = result;
-        let order = SheetOrder { before, is_last, behind };
         let is_mist = ray.matter[0].mist > 0.0;
         self.composed((ray.point, ray.volume, is_mist), transmittance, cells, (&lit, tint), order)
     }
@@ -518,7 +535,7 @@ impl<'a> Integrator<'a> {
         transmittance: f32,
         cells: [u32; 2],
         (lit, tint): (&[Lit], Vec3),
-        SheetOrder { before, is_last, behind }: SheetOrder,
+        SheetOrder { before, is_last, behind, .. }: SheetOrder,
     ) -> RayResult {
         let ends = is_last || transmittance < self.scene.trace.early_end;
         let passed = if ends { behind * transmittance } else { Vec3::ZERO };
@@ -582,9 +599,9 @@ impl<'a> Integrator<'a> {
     }
 
     /// Maps a ray to the cells of quad number `number`, which it meets at `hit` = (u, v, metres from the
-    /// eye).
+    /// eye) at this time ([`SampleTimes`]).
     #[inline]
-    fn sheet_hit(&self, number: usize, d_world: Vec3, hit: [f32; 3]) -> SheetHit<'_> {
+    fn sheet_hit(&self, number: usize, d_world: Vec3, hit: [f32; 3], time: f32) -> SheetHit<'_> {
         let scene = self.scene;
         let quad = &scene.quads[number];
         let map = &quad.map;
@@ -619,7 +636,7 @@ impl<'a> Integrator<'a> {
             side,
             d_world,
             d_cell,
-            origin: self.face_point(quad, uv),
+            origin: self.face_point(quad, uv, time),
             // A distant eye leaves float32 no digits along the ray.
             point: map.point_world(uv.x, uv.y),
             metric,
@@ -630,12 +647,12 @@ impl<'a> Integrator<'a> {
 
     /// Returns the point on the face z = 0 where the walk begins, in cells, inside the tile.
     #[inline]
-    fn face_point(&self, quad: &Quad, uv: Vec2) -> Vec3 {
-        let FrameVolume { size, flow_cells, .. } = &self.volumes[quad.material.volume as usize];
-        let [nx, ny, _] = size.map(|n| n as f32);
+    fn face_point(&self, quad: &Quad, uv: Vec2, time: f32) -> Vec3 {
+        let volume = &self.volumes[quad.material.volume as usize];
+        let [nx, ny, _] = volume.size.map(|n| n as f32);
         let x = (uv.x * quad.material.repeat_u + quad.offset.x) * nx;
         // After the volume has moved down the flow, the ray meets a point further up in it.
-        let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - flow_cells;
+        let y = (uv.y * quad.material.repeat_v + quad.offset.y) * ny - volume.flow_at(time);
         let copy = |at: f32, n: f32| floor_cell(at / n) as f32;
         Vec3::new(x - nx * copy(x, nx), y - ny * copy(y, ny), 0.0)
     }

@@ -25,6 +25,7 @@ pub use pixels::render_pixels;
 use rasters::{Bands, is_drawn};
 pub use visibility::LightVolumeCache;
 
+use crate::engine::lens;
 use crate::engine::options::RenderOptions;
 use crate::picture::camera::{CENTRE, sample_numbers};
 use crate::picture::resolve::develop;
@@ -54,7 +55,7 @@ pub fn render(
 /// Pixels whose triangles are held at once.
 const BAND_PIXELS: u64 = 1 << 21;
 
-/// Renders the options' part of the image and of the samples. A pixel has the same bits in every window.
+/// Renders the options' part of the image and of the samples, through the lens if the scene has one. A pixel has the same bits in every window.
 /// Light volumes stay in `light_volumes` for later frames.
 ///
 /// # Errors
@@ -70,10 +71,13 @@ pub fn render_with(
     light_volumes: &mut LightVolumeCache,
     monitor: &dyn Monitor,
 ) -> Result<Frame> {
-    render_volumes(scene, volumes.as_ref(), mesh, options, light_volumes, monitor)
+    let volumes = volumes.as_ref();
+    lens::through(scene, options, monitor, |scene, options, monitor| {
+        render_volumes(scene, volumes, mesh, options, light_volumes, monitor)
+    })
 }
 
-/// [`render_with`], compiled once for all kinds of lists of volumes.
+/// [`render_with`] through a pinhole, compiled once for all kinds of lists of volumes.
 fn render_volumes(
     scene: &Scene,
     volumes: &[VolumeTexture],

@@ -75,7 +75,7 @@ pub fn render_pixels(
     if image.look.bloom > 0.0 && window == whole {
         develop_whole(frame, &image.look);
     } else {
-        let resolver = Resolver::new(&image.look);
+        let resolver = Resolver::over(&image.look, [image.width, image.height]);
         for i in pixels {
             let light = lit(frame, &image.look, false)(i);
             frame.picture[i] = resolver.pixel(light, pixel(i));

@@ -65,7 +65,7 @@ fn value_noise<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, origin: &Foam) -> F
 
 /// Returns the slopes of the surface along x and z at the points (x, z), metres, and the lift of its normal.
 /// `churn` scales the slopes. A wave fades out as `footprint`, the width of a pixel on the surface in metres,
-/// reaches half its length, because the pixel then sees the wave's mean.
+/// reaches half its length, because the pixel then sees the wave's mean. `time` is that of the samples.
 #[inline(always)]
 fn slopes<S: Simd>(
     simd: S,
@@ -73,6 +73,7 @@ fn slopes<S: Simd>(
     [px, pz]: [Floats<S>; 2],
     churn: Floats<S>,
     footprint: Floats<S>,
+    time: Floats<S>,
 ) -> [Floats<S>; 3] {
     let splat = |x: f32| f32x8::splat(simd, x);
     let one = splat(1.0);
@@ -94,7 +95,7 @@ fn slopes<S: Simd>(
             (tx, tz, tx * px + tz * pz, blur)
         };
         let steep = splat(wave.slope) * churn / (thin * thin);
-        let t = splat(wave.k) * along + splat(wave.phase);
+        let t = splat(wave.k) * along + splat(wave.phase) + splat(wave.moves) * time;
         let slope = steep * sin_turns(simd, t + splat(0.25));
         sums[0] += tx * slope;
         sums[1] += tz * slope;
@@ -183,7 +184,8 @@ fn around<S: Simd>(simd: S, surface: &Surface, position: Lanes3<S>, r: Lanes3<S>
 /// Shades a pool's surface under the points `at` of the image. Returns the linear radiance, metres from the
 /// eye, and the unit normal. The radiance adds the mirrored surroundings, the glint of the lights (Blinn 1977
 /// with the exponent 256) and the light from below through the depth of water; foam covers all of them.
-/// `shadow_light` is [`Scene::shadow_light`], and `rays` are the camera's vectors forward, right and up.
+/// `shadow_light` is [`Scene::shadow_light`], `rays` are the camera's vectors forward, right and up, and
+/// `time` is that of the samples while the shutter is open.
 #[inline(always)]
 pub fn shade<S: Simd>(
     simd: S,
@@ -192,7 +194,7 @@ pub fn shade<S: Simd>(
     rays: &[Vec3; 3],
     surface: &Surface,
     points: &Points<S>,
-    at: [Floats<S>; 2],
+    (at, time): ([Floats<S>; 2], Floats<S>),
 ) -> (Lanes3<S>, Floats<S>, Lanes3<S>) {
     let splat = |x: f32| f32x8::splat(simd, x);
     let (zero, one) = (splat(0.0), splat(1.0));
@@ -206,7 +208,7 @@ pub fn shade<S: Simd>(
     let footprint = distance * splat(pixel) / e.y.max(splat(0.05));
     // The surface is rougher where water falls in.
     let churn = one + splat(1.5) * foam;
-    let [slope_x, slope_z, lift] = slopes(simd, surface, [position.x, position.z], churn, footprint);
+    let [slope_x, slope_z, lift] = slopes(simd, surface, [position.x, position.z], churn, footprint, time);
     let n = Lanes3 { x: -slope_x, y: (one - lift).max(splat(0.3)), z: -slope_z };
     let n = n.over(n.dot(n).sqrt());
     // The mirrored view never points into the water, because other waves would hide that view.

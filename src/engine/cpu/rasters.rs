@@ -130,7 +130,8 @@ impl Rasters {
         };
         let Kept { pass, bands, used, .. } = &mut self.kept[i];
         *used = self.turn;
-        if pass.scene.wave_flow != scene.wave_flow {
+        let waves = |scene: &Scene| (scene.wave_flow, scene.wave_moves);
+        if waves(&pass.scene) != waves(scene) {
             if !scene.pools.is_empty() {
                 // No other frame holds them.
                 shade_pools(scene, mesh, sample, Arc::get_mut(bands)?);
@@ -156,6 +157,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         boxes: _,
         // The waves of pools are drawn anew.
         wave_flow: _,
+        wave_moves: _,
         quads,
         shells,
         lights,
@@ -178,12 +180,14 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
         scattering: _,
         p: _,
         camera,
+        // The camera and the image of a sample are those of its point of the lens.
+        lens: _,
         background,
         haze,
         image,
         shades: _,
     } = &**a;
-    let Image { width, height, samples, filter: _, alpha, rock_error, gamut: _, look: _ } = *image;
+    let Image { width, height, samples, filter: _, alpha, shift: _, rock_error, gamut: _, look: _ } = *image;
     let of_image = (width, height, samples, alpha, rock_error, sample_offset(image, sample));
     let other = &b.image;
     let of_other_image = (

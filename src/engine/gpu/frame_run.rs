@@ -146,7 +146,7 @@ impl<'a> FrameRun<'a> {
             shell_light,
             part,
             keep_rasters: options.keep_rasters,
-            look: Develop::new(&scene.image.look),
+            look: Develop::new(&scene.image.look).over(whole),
             tiler: Tiler::new(options.tile_pixels, known, scene.volume_lights().len()),
             hint,
             monitor,

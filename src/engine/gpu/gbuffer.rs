@@ -23,11 +23,11 @@ pub fn gbuffer_source() -> String {
     let waves: String = (0..WAVES)
         .map(|i| {
             let kind = if i < STRAIGHT { "straight" } else { "ring" };
-            format!("    sum += {kind}_wave(pool.waves[{i}u], p, churn, footprint);\n")
+            format!("    sum += {kind}_wave(pool.waves[{i}u], at);\n")
         })
         .collect();
     let sum = format!(
-        "fn waves(p: vec2<f32>, churn: f32, footprint: f32) -> vec3<f32> {{\n    \
+        "fn waves(at: WavePlace) -> vec3<f32> {{\n    \
          var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
     );
     resolve(&format!("#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n{sum}"))

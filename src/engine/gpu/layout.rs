@@ -64,7 +64,11 @@ pub struct FrameUniforms {
     pub depth_rise: f32,
     pub depth_slope: f32,
     pub depth_scale: f32,
+    pub flow_moves: f32,
+    pub shutter_first: f32,
+    pub shutter_step: f32,
     pub pad_d: f32,
+    pub pad_e: f32,
 }
 
 /// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
@@ -343,7 +347,7 @@ pub struct VolumeConstants {
     pub strands: u32,
     /// Whether the cells keep the lines of their strands.
     pub lines: u32,
-    pub pad_b: u32,
+    pub flow_moves: f32,
 }
 
 /// Returns the constants of all volumes, as many as the uniform holds. `origins` are their first cells in the
@@ -356,7 +360,7 @@ pub fn volume_constants(
     waters: &[scatter::Similarity],
     optics: &[Option<ShellOptics>],
 ) -> Vec<VolumeConstants> {
-    let flows = scene.flows(volumes);
+    let (flows, moves) = (scene.flows(volumes), scene.flow_moves(volumes));
     let constants = |(i, volume): (usize, &VolumeTexture)| VolumeConstants {
         cells: volume.size.map(|n| n as i32),
         extinction: extinction(&scene.trace.attenuation, volume.alpha),
@@ -368,6 +372,7 @@ pub fn volume_constants(
         levels: level_atlas(&scene.trace, volume.size).count,
         strands: scene.reflection_of(i).strands().is_some().into(),
         lines: scene.recipes[i].has_lines().into(),
+        flow_moves: moves[i],
         ..VolumeConstants::default()
     };
     let mut all: Vec<VolumeConstants> = volumes.iter().enumerate().map(constants).collect();
@@ -472,6 +477,7 @@ impl FrameUniforms {
         let image = &scene.image;
         let haze = scene.haze.seen_from(camera.eye_local());
         let [jitter_x, jitter_y] = sample_offset(image, sample);
+        let times = scene.sample_times(sample);
         let (right, up) = camera.image_plane(image.width, image.height);
         let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y], depth);
         let to_point = camera.depth_to_point(depth);
@@ -516,7 +522,11 @@ impl FrameUniforms {
             depth_rise: to_point.rise,
             depth_slope: to_point.slope,
             depth_scale: to_point.scale,
+            flow_moves: scene.flow_moves(volumes)[0],
+            shutter_first: times.first,
+            shutter_step: times.step,
             pad_d: 0.0,
+            pad_e: 0.0,
         }
     }
 }

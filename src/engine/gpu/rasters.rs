@@ -54,6 +54,7 @@ impl Key {
             extinction: 0.0,
             texture_frame: 0,
             flow_cells: 0.0,
+            flow_moves: 0.0,
             levels: 0,
             footprint: 0.0,
             ..*frame

@@ -14,7 +14,7 @@ use super::upload::Resident;
 use super::visibility::VisibilityPass;
 use super::walks_ended;
 use crate::engine::options::RenderOptions;
-use crate::engine::overlap;
+use crate::engine::{lens, overlap};
 use crate::light::Visibility;
 use crate::picture::Frame;
 use crate::place::Mesh;
@@ -122,14 +122,16 @@ impl GpuRenderer {
         options: &RenderOptions,
         monitor: &dyn Monitor,
     ) -> Result<Frame> {
-        let (frame, cut) = self.render_marked(scene, volumes, mesh, options, monitor)?;
-        match cut.len() {
-            0 => Ok(frame),
-            count => Err(walks_ended(&self.gpu.name(), &format!("{count} pixels are unfinished"))),
-        }
+        lens::through(scene, options, monitor, |scene, options, monitor| {
+            let (frame, cut) = self.render_marked(scene, volumes, mesh, options, monitor)?;
+            match cut.len() {
+                0 => Ok(frame),
+                count => Err(walks_ended(&self.gpu.name(), &format!("{count} pixels are unfinished"))),
+            }
+        })
     }
 
-    /// Renders as [`GpuRenderer::render`], and also returns the indices of the pixels whose walks the device
+    /// Renders as [`GpuRenderer::render`] through a pinhole, and also returns the indices of the pixels whose walks the device
     /// ended early. They hold no radiance, cells or picture.
     ///
     /// # Errors

@@ -46,8 +46,8 @@ pub struct Wave {
     pub ring: f32,
     /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)².
     pub decay: f32,
-    /// Padding.
-    pub pad: f32,
+    /// Turns of the phase while the shutter is open.
+    pub moves: f32,
 }
 
 /// Cells per metre of the lattices of the foam's noise. Twin: `foam_noise` of `shaders/engine/pool.wgsl`.
@@ -148,7 +148,7 @@ impl Surface {
             holdout: f32::from(u8::from(pool.holdout)),
             absorption: pool.absorption.to_array(),
             middle: middle.to_array(),
-            waves: waves(pool, &scene.falls(), flow, scene.camera.origin),
+            waves: waves(pool, &scene.falls(), [flow, scene.wave_moves], scene.camera.origin),
             foam: FOAM.map(|scale| Foam::new(scene.camera.origin, scale)),
             ..Surface::default()
         };
@@ -165,7 +165,9 @@ impl Surface {
     }
 }
 
-fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32, origin: DVec3) -> [Wave; WAVES] {
+/// Returns the waves of a pool, which have moved by `flow` and go on by `moves` while the shutter is open, both
+/// in lengths of the volume that they move with.
+fn waves(pool: &Pool, falls: &[[Vec3; 4]], [flow, moves]: [f32; 2], origin: DVec3) -> [Wave; WAVES] {
     let mut waves = [Wave::default(); WAVES];
     let family = Family::new(pool.seed, Stream::Wave);
     // All waves are equally steep: A = λ·a, where Σ A²/2 is the variance of the height.
@@ -185,6 +187,7 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32, origin: DVec3) -> [Wave; W
             k,
             phase: (phase - flow * turns(length(i), pool.period) + before).rem_euclid(1.0),
             slope: TAU * a,
+            moves: -moves * turns(length(i), pool.period),
             ..Wave::default()
         };
     }
@@ -199,7 +202,7 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], flow: f32, origin: DVec3) -> [Wave; W
                 slope: TAU * pool.rings / (0.45 * pool.wavelength),
                 ring: 1.0,
                 decay: 1.0 / (2.0 * pool.foam_reach),
-                pad: 0.0,
+                moves: -moves * turns(wavelength, pool.period),
             };
         }
     }

@@ -90,12 +90,7 @@ fn of_exr(path: &Path, image: &Image, window: Window, bits: u8, memory: u64) -> 
         develop(&mut frame, &image.look, window, whole);
         rgb_rows(&frame)
     } else {
-        samples_of(
-            &frame,
-            Encoding { bits, ..Encoding::DISPLAY },
-            &image.look,
-            window == Window::whole(whole),
-        )
+        samples_of(&frame, Encoding { bits, ..Encoding::DISPLAY }, &image.look, window, whole)
     };
     Ok(Shown { size: [width, height], samples })
 }

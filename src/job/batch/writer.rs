@@ -120,6 +120,8 @@ struct Open {
     seconds: Seconds,
     /// Samples of the rows so far, for movies: 8 bits, and 16 bits.
     rgb: [Vec<u8>; 2],
+    /// Number of those rows.
+    rows: u32,
 }
 
 fn write(receive: &Receiver<Message>, outcomes: &Mutex<Outcomes>, watcher: &dyn Watcher) {
@@ -165,16 +167,24 @@ fn begin(mut start: Start, movies: &mut Vec<(PathBuf, Movie)>) -> Open {
         }
         Err(e) => Some(e),
     };
-    Open { start, writer, error, seconds: Seconds::default(), rgb: Default::default() }
+    Open { start, writer, error, seconds: Seconds::default(), rgb: Default::default(), rows: 0 }
 }
 
 fn push(open: &mut Open, strip: &Frame, movies: &[(PathBuf, Movie)]) {
     let clock = Instant::now();
     let image = &open.start.scene.image;
-    let whole = open.start.window == Window::whole([image.width, image.height]);
+    let strip_window =
+        Window { y: open.start.window.y + open.rows, height: strip.height, ..open.start.window };
+    open.rows += strip.height;
     for (rgb, bits) in open.rgb.iter_mut().zip([8, 16]) {
         if let Some((_, movie)) = movies.iter().find(|(_, movie)| movie.encoding().bits == bits) {
-            rgb.extend(samples_of(strip, movie.encoding(), &image.look, whole));
+            rgb.extend(samples_of(
+                strip,
+                movie.encoding(),
+                &image.look,
+                strip_window,
+                [image.width, image.height],
+            ));
         }
     }
     if let Some(writer) = &mut open.writer
@@ -193,7 +203,7 @@ fn end(
     movies: &mut Vec<(PathBuf, Movie)>,
     watcher: &dyn Watcher,
 ) -> (usize, Name, Result<Seconds>) {
-    let Open { start, writer, error, mut seconds, rgb } = open;
+    let Open { start, writer, error, mut seconds, rgb, rows: _ } = open;
     let clock = Instant::now();
     let finished = match error {
         Some(e) => Err(e),

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 
 use crate::picture::resolve::{Resolver, lit, srgb};
 use crate::picture::{Frame, Gamut, Look};
+use crate::util::window::Window;
 
 /// Encoding of a developed picture's samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,20 +61,21 @@ impl std::fmt::Display for Encoding {
 }
 
 /// Returns the samples of a frame, row by row; those of 16 bits with the higher byte first. 8 bits are those
-/// of the frame's picture. 16 bits are developed from its radiance by `look`, with bloom if it is the `whole`
-/// image; linear ones without tone curve, in the primaries of the encoding.
-pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, whole: bool) -> Vec<u8> {
+/// of the frame's picture. 16 bits are developed from its radiance by `look`, with bloom if its `window` is the
+/// whole image of `size` pixels; linear ones without tone curve and grain, in the primaries of the encoding.
+pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, window: Window, size: [u32; 2]) -> Vec<u8> {
     if encoding.bits == 8 {
         return frame.picture.iter().flat_map(|p| p[..encoding.channels()].iter().copied()).collect();
     }
-    let (resolver, lit) = (Resolver::new(look), lit(frame, look, whole));
+    let (resolver, lit) = (Resolver::over(look, size), lit(frame, look, window == Window::whole(size)));
     let from_rec709 = encoding.gamut.from_rec709();
     let mut samples = vec![0; frame.radiance.len() * encoding.pixel_bytes()];
     samples.par_chunks_mut(encoding.pixel_bytes()).enumerate().for_each(|(i, pixel)| {
         let light = lit(i);
+        let at = [window.x + i as u32 % window.width, window.y + i as u32 / window.width];
         let [r, g, b] = match encoding.linear {
-            true => multiplied(from_rec709, resolver.exposed(light)).map(|x| x.clamp(0.0, 1.0)),
-            false => resolver.encoded(light),
+            true => multiplied(from_rec709, resolver.exposed(light, at)).map(|x| x.clamp(0.0, 1.0)),
+            false => resolver.encoded(light, at),
         };
         for (sample, value) in pixel.chunks_exact_mut(2).zip([r, g, b, light[3]]) {
             sample.copy_from_slice(&((value * 65_535.0 + 0.5) as u16).to_be_bytes());

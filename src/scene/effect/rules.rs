@@ -502,6 +502,27 @@ pub(super) const RULES: &[Rule] = &[
         },
     },
     Rule {
+        keys: &["image.grain_seed"],
+        switch: "image.grain",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["camera.focus"],
+        switch: "camera.f_number",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["camera.shutter"],
+        switch: "animate.speed",
+        needs: "another number than 0",
+        works: |v, switch| {
+            let moves = |i: &String| v.text(&format!("animate.tracks.{i}.key")) == "volume.flow";
+            v.float(switch) != 0.0 || v.names("animate.tracks").iter().any(moves)
+        },
+    },
+    Rule {
         keys: &["animate.frames"],
         switch: "animate.loop",
         needs: "0, because a loop is as long as it says",

@@ -9,8 +9,8 @@ use crate::scene::keyframes::Interpolation;
 pub(super) const IMAGE: Group = Group {
     title: "Image",
     about: "These parameters set the size of the picture, its samples, and the way from linear radiance to \
-         what is shown. Exposure, bloom, white balance, tone curve and dither change what is shown; an EXR \
-         holds the radiance without them.",
+         what is shown. Exposure, bloom, white balance, tone curve, vignette, grain and dither change what \
+         is shown; an EXR holds the radiance without them.",
     params: &[
         p("image.width", "", "pixels", Int(1, 1_000_000, 1280), Uniform)
             .slider(16.0, 8192.0)
@@ -112,6 +112,26 @@ pub(super) const IMAGE: Group = Group {
                 "Choose `none` for the smallest files, or when pixel values should be compared; smooth \
                  skies then show bands.",
             ),
+        p("image.vignette", "", "stops", Float(0.0, 8.0, 0.0), Uniform)
+            .slider(0.0, 3.0)
+            .doc(
+                "Stops by which the corners are darker than the middle, as tests of lenses state it; between \
+                 them the light falls by the cos⁴ law. An EXR is without it.",
+            )
+            .when("Set it to about 0.7 to lead the eye to the middle, as a fast lens does; 0 is even."),
+        p("image.grain", "", "", Float(0.0, 0.5, 0.0), Uniform)
+            .slider(0.0, 0.1)
+            .doc(
+                "Grain of the picture as shown: standard deviation in the middle greys, as a share of white. \
+                 Black and white stay clean, and so do EXR files and `--linear`. A grain is a pixel.",
+            )
+            .when(
+                "Set it to about 0.02 for the look of film; an animation gets another pattern in each frame.",
+            ),
+        p("image.grain_seed", "", "", Int(0, 2_147_483_647, 0), Uniform)
+            .slider(0.0, 100.0)
+            .doc("Number of the grain's pattern. An animation adds the number of its frame.")
+            .when("Change it where two pictures side by side should not have the same grain."),
     ],
 };
 

@@ -61,7 +61,7 @@ impl Overview {
     pub fn show(&mut self, ui: &mut Ui, environment: &Environment, image: &Image) {
         let key = OverviewKey::new(environment, image);
         if self.cached.as_ref().is_none_or(|cached| cached.key != key) {
-            let resolver = Resolver::new(&image.look);
+            let resolver = Resolver::new(&Look { grain: 0.0, ..image.look });
             let pixels = environment.overview(SIZE[0], SIZE[1]);
             let pixels = pixels.iter().zip(0..).map(|(radiance, i)| {
                 let at = [i % SIZE[0] as u32, i / SIZE[0] as u32];

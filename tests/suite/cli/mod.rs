@@ -2,4 +2,5 @@
 
 mod again;
 pub mod faults;
+mod quality;
 mod slips;

@@ -235,9 +235,10 @@ fn the_picture_is_the_tone_curve_of_the_radiance_on_both_engines() {
         ["image.tone=none", "image.exposure=-2"],
         ["image.tone=agx", "image.exposure=1"],
         ["image.temperature=3200", "image.tint=8"],
+        ["image.vignette=1.5", "image.grain=0.05"],
     ] {
         let scene = scene("front", &["image.width=64", "image.height=64", sets[0], sets[1]]);
-        let resolver = taki::picture::resolve::Resolver::new(&scene.image.look);
+        let resolver = taki::picture::resolve::Resolver::over(&scene.image.look, [64, 64]);
         for frame in both(&mut renderer, &scene) {
             let mut other = 0;
             for ((linear, picture), i) in frame.radiance.iter().zip(&frame.picture).zip(0..) {

@@ -97,6 +97,7 @@ fn scene(rng: &mut Pcg64Mcg) -> Scene {
     [parts.image.width, parts.image.height] = SIZE;
     parts.ambient = Vec3::new(0.1, 0.2, 0.3);
     parts.recipes[0].flow = [0.0, 0.4][one_of(2) as usize];
+    parts.recipes[0].moves = [0.0, 0.7][one_of(2) as usize];
     parts.p = [12.0, 1.0, 7.3][one_of(3) as usize];
     parts.angles = [AngleFrame::World, AngleFrame::Texture][one_of(2) as usize];
     parts.visibility = [Visibility::None, Visibility::March, Visibility::Cached][one_of(3) as usize];
@@ -308,7 +309,8 @@ fn every_instruction_set_gives_the_bits_of_the_scalar_walk_through_shells() {
         let recipe = parts.recipes[0].clone();
         let ramp = if sets.contains(&colored) { ramp(3) } else { Ramp::WHITE };
         let skin = sets.contains(&skin).then(super::shell_scatter::skin);
-        parts.recipes = vec![Recipe { ramp, skin, ..recipe.clone() }, Recipe { flow: 0.3, ..recipe }];
+        parts.recipes =
+            vec![Recipe { ramp, skin, ..recipe.clone() }, Recipe { flow: 0.3, moves: 0.6, ..recipe }];
         let mut torn = torn.clone();
         torn.volume = 1;
         parts.shells.extend([Arc::new(torn), Arc::new(ball.clone())]);

@@ -163,7 +163,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         forward samples zenith light_count horizon p ambient early_end cells max_cells image_width
         image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
         window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha anchor
-        depth_shift depth_rise depth_slope depth_scale pad_d);
+        depth_shift depth_rise depth_slope depth_scale flow_moves shutter_first shutter_step pad_d pad_e);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
@@ -184,12 +184,16 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let ramp = fields!(Ramp: first count step_0 k_s_factor step_1 k_s_summand step_2 pad);
     assert_eq!(members(&module, "Ramp"), ramp);
     let volume = fields!(VolumeConstants: cells extinction base flow_cells similarity ramp optics levels
-        strands lines pad_b);
+        strands lines flow_moves);
     assert_eq!(members(&module, "VolumeConstants"), volume);
     let optics = fields!(Optics: extinction g albedo eta isotropic roughness);
     assert_eq!(members(&module, "Optics"), optics);
     let module = validate(&stage("resolve")).expect("valid");
-    assert_eq!(members(&module, "Develop"), fields!(Develop: balance exposure tone balanced dither));
+    assert_eq!(
+        members(&module, "Develop"),
+        fields!(Develop: balance exposure tone balanced dither place vignette grain
+        grain_seed pad)
+    );
     let module = validate(&stage("visibility")).expect("valid");
     // The host pads this struct to the size that a uniform needs.
     let (mut light_volume, size) = fields!(LightVolume: direction first_column offset column_count cells
@@ -215,7 +219,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Paint"), paint);
     assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
     assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
-    assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay pad));
+    assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay moves));
 }
 
 #[test]

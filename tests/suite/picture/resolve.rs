@@ -1,8 +1,13 @@
-//! Tone curves: grey stays grey, and brighter light is never shown darker. Dither: the mean is exact.
+//! Tone curves: grey stays grey, and brighter light is never shown darker. Dither: the mean is exact. Vignette
+//! and grain: closed forms.
 
 use crate::engine::gpu::scene;
+use taki::engine::{RenderOptions, cpu};
+use taki::output::frame::{Encoding, samples_of};
 use taki::picture::resolve::Resolver;
 use taki::picture::{Dither, Look, Tone};
+use taki::util::monitor::Unwatched;
+use taki::util::window::Window;
 
 fn look(tone: Tone) -> Look {
     Look { tone, dither: Dither::None, ..scene("front", &[]).image.look }
@@ -18,7 +23,7 @@ fn a_dithered_gradient_has_no_bands_and_the_right_mean_in_every_row_and_column()
     let dithered = Resolver::new(&Look { dither: Dither::Pattern, ..look(Tone::None) });
     let grey = |linear: f32| [linear, linear, linear, 1.0];
     // 128 rows of one step of 255: without dither two flat bands.
-    let exact = |row: u32| dithered.encoded(grey(0.2 + row as f32 * 2.7e-5))[0] * 255.0;
+    let exact = |row: u32| dithered.encoded(grey(0.2 + row as f32 * 2.7e-5), [0; 2])[0] * 255.0;
     let (first, last) = (exact(0), exact(127));
     assert!(last - first > 0.5 && last - first < 1.5, "{first} to {last}");
     let mut columns = [0.0; 128];
@@ -96,4 +101,84 @@ fn what_is_drawn_in_is_drawn_out_again() {
     let got = f32::from(r) - f32::from(g);
     // Each of the two is rounded by up to half a step.
     assert!((got - want).abs() <= 1.0 && g.abs_diff(b) <= 1, "{r} {g} {b}: {got} for {want}");
+}
+
+#[test]
+fn a_vignette_darkens_the_corners_by_its_stops_and_follows_the_cosine_law() {
+    let size = [3001, 2001];
+    let light = [0.4, 0.5, 0.6, 1.0];
+    let of = |vignette| Resolver::over(&Look { vignette, ..look(Tone::None) }, size);
+    for stops in [0.5, 1.0, 3.0] {
+        let share = |at: [u32; 2]| of(stops).exposed(light, at)[1] / 0.5;
+        for corner in [[0, 0], [3000, 0], [0, 2000], [3000, 2000]] {
+            let seen = -share(corner).log2();
+            assert!((seen - stops).abs() < 0.003 * stops, "{stops} stops: {seen} in {corner:?}");
+        }
+        assert_eq!(share([1500, 1000]), 1.0, "the middle");
+        // A picture whose corner lies at an angle of which cos⁴ is that dark.
+        let tan_corner = (2f64.powf(f64::from(stops) / 2.0) - 1.0).sqrt();
+        for at in [[700u32, 1900u32], [2900, 1000], [1500, 400]] {
+            let away = (f64::from(at[0]) - 1500.0).hypot(f64::from(at[1]) - 1000.0);
+            let tan = tan_corner * away / 1500.5f64.hypot(1000.5);
+            let truth = (1.0 / (1.0 + tan * tan)).powi(2);
+            assert!((f64::from(share(at)) - truth).abs() < 1e-4, "{stops} stops at {at:?}");
+        }
+    }
+    // Without the size of the image, and without stops, nothing is darkened.
+    let alone = Resolver::new(&Look { vignette: 3.0, ..look(Tone::None) });
+    assert_eq!(alone.exposed(light, [0, 0]), [0.4, 0.5, 0.6]);
+    assert_eq!(of(0.0).exposed(light, [0, 0]), [0.4, 0.5, 0.6]);
+}
+
+#[test]
+fn grain_has_the_deviation_that_is_asked_for_and_leaves_black_and_white() {
+    let of = |grain_seed| Resolver::new(&Look { grain: 0.03, grain_seed, ..look(Tone::None) });
+    let clean = Resolver::new(&look(Tone::None));
+    for linear in [0.0f32, 0.05, 0.214, 0.6, 1.0] {
+        let light = [linear, linear, linear, 1.0];
+        let middle = f64::from(clean.encoded(light, [0; 2])[0]);
+        let noise: Vec<f64> =
+            (0..40_000).map(|i| f64::from(of(7).encoded(light, [i % 200, i / 200])[0]) - middle).collect();
+        let mean = noise.iter().sum::<f64>() / 40_000.0;
+        let deviation = (noise.iter().map(|x| x * x).sum::<f64>() / 40_000.0).sqrt();
+        let truth = 0.03 * 4.0 * middle * (1.0 - middle);
+        assert!(mean.abs() < 0.03 * truth + 1e-9, "{linear}: mean {mean}");
+        assert!((deviation - truth).abs() < 0.02 * truth + 1e-7, "{linear}: {deviation} for {truth}");
+        // Neighbours along a row and along a column have nothing to do with each other.
+        for step in [1, 200] {
+            let pairs = noise.iter().zip(&noise[step..]);
+            let shared = pairs.map(|(a, b)| a * b).sum::<f64>() / 40_000.0;
+            assert!(shared.abs() <= 0.02 * truth * truth + 1e-12, "{linear}: {shared}");
+        }
+    }
+    // All channels have the same grain, and another seed another one.
+    let [r, g, b] = of(7).encoded([0.2, 0.2, 0.2, 1.0], [5, 9]);
+    assert!(r == g && g == b && of(8).encoded([0.2, 0.2, 0.2, 1.0], [5, 9])[0] != r);
+}
+
+#[test]
+fn a_crop_has_the_vignette_and_the_grain_of_the_whole_picture_in_8_and_16_bits() {
+    let scene = scene(
+        "front",
+        &["image.width=48", "image.height=40", "image.samples=1", "image.vignette=2", "image.grain=0.05"],
+    );
+    let volumes = scene.volumes(1 << 30, &Unwatched).expect("the volumes");
+    let render = |window| {
+        let options = RenderOptions { window, ..Default::default() };
+        cpu::render_with(&scene, &volumes, &scene.mesh(), &options, &mut Default::default(), &Unwatched)
+            .expect("a frame")
+    };
+    let (whole, size) = (render(None), [48, 40]);
+    let window = Window { x: 31, y: 5, width: 13, height: 22 };
+    let part = render(Some(window));
+    let samples = |frame, window| {
+        let encoding = Encoding { bits: 16, ..Encoding::DISPLAY };
+        samples_of(frame, encoding, &scene.image.look, window, size)
+    };
+    let [all, own] = [samples(&whole, Window::whole(size)), samples(&part, window)];
+    for (i, pixel) in window.each().enumerate() {
+        let at = Window::whole(size).index(pixel);
+        assert_eq!(part.picture[i], whole.picture[at], "{pixel:?}");
+        assert_eq!(own[6 * i..][..6], all[6 * at..][..6], "{pixel:?}");
+    }
 }

@@ -199,6 +199,48 @@ fn a_frame_is_a_scene_of_its_own() {
 }
 
 #[test]
+fn an_open_shutter_takes_the_speed_of_the_flow_along() {
+    let moves = |text: &str, frame: i32| {
+        let scene = animation(text).unwrap().at(frame).unwrap();
+        // The frame's scene by itself moves as far.
+        let again = Animation::new("s", source(&scene.to_toml()).values().unwrap(), None, &Limits::default())
+            .unwrap();
+        assert_eq!(again.at(0).unwrap().recipes[0].moves, scene.recipes[0].moves, "{text}");
+        assert_eq!(scene.wave_moves, scene.recipes[0].moves, "{text}");
+        scene.recipes[0].moves
+    };
+    let open = "[camera]\nshutter = 0.25\n";
+    assert_eq!(moves(&format!("{open}[animate]\nspeed = 0.8\n"), 7), 0.2);
+    assert_eq!(moves("[animate]\nspeed = 0.8\n", 7), 0.0);
+    // A loop of two seconds rounds 1.6 lengths to two.
+    assert_eq!(moves(&format!("{open}[animate]\nspeed = 0.8\nfps = 24\nloop = 48\n"), 7), 0.25);
+    // A track moves the flow by a tenth in a frame, and by another length where the loop closes.
+    let track = format!(
+        "{open}[animate]\nfps = 10\nloop = 20\n[[animate.tracks]]\nkey = \"volume.flow\"\nframes = [0, 20]\n\
+         values = [0, 2]\n"
+    );
+    for frame in [0, 3, 19, 20] {
+        assert!((moves(&track, frame) - 0.25).abs() < 1e-6, "frame {frame}: {}", moves(&track, frame));
+    }
+    let slow = format!(
+        "{open}[animate]\nfps = 10\n[[animate.tracks]]\nkey = \"volume.flow\"\nframes = [0, 10, 20]\n\
+         values = [0, 0, 5]\n"
+    );
+    assert_eq!(moves(&slow, 3), 0.0);
+    assert!((moves(&slow, 15) - 1.25).abs() < 1e-6);
+}
+
+#[test]
+fn grain_changes_from_frame_to_frame_and_nothing_else_counts_frames() {
+    let seed = |text: &str, frame| animation(text).unwrap().at(frame).unwrap().image.look.grain_seed;
+    let grain = "[image]\ngrain = 0.02\ngrain_seed = 5\n";
+    assert_eq!([0, 1, 9].map(|frame| seed(grain, frame)), [5, 6, 14]);
+    assert_eq!([0, 9].map(|frame| seed("[image]\ngrain_seed = 5\n", frame)), [5, 5]);
+    let looped = format!("{grain}[animate]\nloop = 4\n");
+    assert_eq!([1, 5, -3].map(|frame| seed(&looped, frame)), [6, 6, 6]);
+}
+
+#[test]
 fn what_cannot_move_is_refused_with_the_reason() {
     let one = |key: &str, frames: &str, values: &str| {
         animation(&format!("[[animate.tracks]]\nkey = \"{key}\"\nframes = {frames}\nvalues = {values}\n"))

@@ -9,7 +9,7 @@ use taki::engine::{RenderOptions, cpu};
 use taki::grid;
 use taki::output::frame::{Difference, Tolerance, encode_png, read_png};
 use taki::picture::Frame;
-use taki::scene::{Scene, presets};
+use taki::scene::{Limits, Scene, presets};
 use taki::util::monitor::Unwatched;
 
 /// Settings of a picture so small that its snapshot stays under 64 KiB.
@@ -181,4 +181,27 @@ fn a_scene_that_takes_its_volume_from_a_file_gives_the_same_bytes() {
             assert!(picture("fig5", "gpu", file) == picture("mine.toml", "gpu", file), "gpu {file}");
         }
     }
+}
+
+#[test]
+fn the_base_water_has_the_look_of_the_default_scene_and_nothing_of_its_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("own.toml");
+    let sheet = "[sheets.own]\npoints = [[0, 3, 0], [0, -3, 1]]\nwidths = [2]\n";
+    std::fs::write(&file, format!("version = 1\nbase = \"water\"\n{sheet}")).expect("written");
+    let own = Scene::load(&file, &[], &Limits::default()).expect("a scene");
+    let default = Scene::preset("waterfall").expect("a preset");
+    assert_eq!(own.recipes[0].water, default.recipes[0].water);
+    assert_eq!((own.trace, own.p, own.ambient), (default.trace, default.p, default.ambient));
+    assert_eq!(own.lights, default.lights);
+    assert_eq!(own.quads[0].material.thickness_m, default.quads[0].material.thickness_m);
+    assert!(own.rocks.is_empty() && own.pools.is_empty() && !own.quads.is_empty());
+    let names = own.values().expect("not edited").names("sheets");
+    assert_eq!(names, ["own"]);
+    // Without the base, the sheet shows the volume that it always showed.
+    std::fs::write(&file, format!("version = 1\n{sheet}")).expect("written");
+    let plain = Scene::load(&file, &[], &Limits::default()).expect("a scene");
+    assert_eq!(plain.recipes[0].water.size, [40, 40, 40]);
+    // It is no preset: nothing renders it by itself.
+    assert!(Scene::preset("water").is_err());
 }

@@ -16,7 +16,7 @@ use crate::engine::pool_surface::{self, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, DepthToPoint, footprint};
-use crate::picture::{Camera, Image};
+use crate::picture::{Camera, Image, SampleTimes};
 use crate::place::Mesh;
 use crate::scene::{Face, Parts, Scene};
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
@@ -49,6 +49,10 @@ pub struct Which {
     pub count: usize,
     /// Its offset from the top left corner of a pixel, pixels.
     pub offset: [f32; 2],
+    /// The same in an image that is not shifted.
+    pub in_pixel: [f32; 2],
+    /// Its times in all pixels.
+    pub times: SampleTimes,
 }
 
 /// Up to eight pixels of a band, one a lane; those that are missing repeat the last one.
@@ -123,7 +127,7 @@ impl<'a> Shading<'a> {
             let seen = if is_rock.any_true() {
                 let spots = Spots::new(simd, rock, &pixels, sample);
                 self.keep_pools(&spots, &pixels, first, count, &mut out.pools);
-                let near = self.rock(simd, &spots, at);
+                let near = self.rock(simd, &spots, at, self.times(simd, &pixels.at, sample.times));
                 if is_rock.all_true() { near } else { near.or(self.background(simd, at, is_rock), is_rock) }
             } else {
                 self.background(simd, at, is_rock)
@@ -134,7 +138,7 @@ impl<'a> Shading<'a> {
 
     /// Shades the pools of a band again, of which nothing but the waves has changed.
     #[inline(always)]
-    pub fn pools<S: Simd>(&self, simd: S, offset: [f32; 2], out: &mut Gbuffer) {
+    pub fn pools<S: Simd>(&self, simd: S, offset: [f32; 2], times: SampleTimes, out: &mut Gbuffer) {
         let width = out.window.width;
         for pixels in out.pools.chunks(LANES) {
             let mut at = [[0; LANES]; 2];
@@ -146,7 +150,8 @@ impl<'a> Shading<'a> {
                 [spots.places[0][lane], spots.places[1][lane]] = place;
             }
             let (mut opaque, mut normal) = ([[0.0; 4]; LANES], [Vec4::ZERO; LANES]);
-            self.rock(simd, &spots, self.image_points(simd, &at, offset)).store(&mut opaque, &mut normal);
+            let (at, time) = (self.image_points(simd, &at, offset), self.times(simd, &at, times));
+            self.rock(simd, &spots, at, time).store(&mut opaque, &mut normal);
             for (lane, pixel) in pixels.iter().enumerate() {
                 out.opaque[pixel.index as usize] = opaque[lane];
                 out.normal[pixel.index as usize] = normal[lane];
@@ -190,6 +195,15 @@ impl<'a> Shading<'a> {
         ]
     }
 
+    /// Times of a sample in pixels, given by their columns and rows; zeros if no pool moves.
+    #[inline(always)]
+    fn times<S: Simd>(&self, simd: S, pixels: &[[u32; LANES]; 2], times: SampleTimes) -> Floats<S> {
+        if self.scene.wave_moves == 0.0 {
+            return f32x8::splat(simd, 0.0);
+        }
+        Stored::from_fn(|lane| times.of([pixels[0][lane], pixels[1][lane]])).load(simd)
+    }
+
     /// Radiance of the background; in a picture with alpha only that of the haze in front of it. Lanes that
     /// are `skipped` get any values. Twin: `background_targets`.
     #[inline(always)]
@@ -225,7 +239,7 @@ impl<'a> Shading<'a> {
     /// Radiance, metres from the eye, and normal of the opaque points under the samples. Of a holdout in a
     /// picture with alpha, only the haze in front of it has a radiance. Lanes without rock get any values.
     #[inline(always)]
-    fn rock<S: Simd>(&self, simd: S, spots: &Spots, at: [Floats<S>; 2]) -> Seen<S> {
+    fn rock<S: Simd>(&self, simd: S, spots: &Spots, at: [Floats<S>; 2], time: Floats<S>) -> Seen<S> {
         let splat = |x: f32| f32x8::splat(simd, x);
         let scene = self.scene;
         let position = self.points(simd, at, spots.depth.load(simd));
@@ -255,6 +269,7 @@ impl<'a> Shading<'a> {
             let is_here = !u32x8::load_array(simd, of_pools).simd_eq(0);
             if is_here.any_true() {
                 let pool = &self.pools[number as usize];
+                let at = (at, time);
                 let seen = pool::shade(simd, scene, self.shadow_light, &self.rays, pool, &points, at);
                 let seen = Seen { opaque: (seen.0, seen.1), normal: (seen.2, distance) };
                 let others = Seen { opaque: (radiance, distance), normal: (normal, distance) };
@@ -322,7 +337,7 @@ impl<'a> Shading<'a> {
 impl Which {
     /// How far the sample sees points from where the pixel's centre sees them, pixels.
     fn shift(&self) -> [f64; 2] {
-        self.offset.map(raster::shift)
+        self.in_pixel.map(raster::shift)
     }
 }
 

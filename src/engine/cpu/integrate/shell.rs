@@ -55,12 +55,21 @@ pub(super) struct Place {
     pub depth: f32,
     /// The place in the world, metres.
     pub point: Vec3,
+    /// Time of the ray; see [`SampleTimes`](crate::picture::SampleTimes).
+    pub time: f32,
 }
 
 impl Place {
-    /// Place on a ray in a tetrahedron, `t` metres behind the start of its `segment` of this `length`.
+    /// Place on a ray in a tetrahedron, `t` metres behind the start of its `segment` of this `length`. The ray
+    /// has an origin, a direction and a time.
     #[inline]
-    pub fn on_ray(shell: usize, segment: &Segment, (origin, d): (Vec3, Vec3), t: f32, length: f32) -> Place {
+    pub fn on_ray(
+        shell: usize,
+        segment: &Segment,
+        (origin, d, time): (Vec3, Vec3, f32),
+        t: f32,
+        length: f32,
+    ) -> Place {
         let along = t / length;
         Place {
             shell,
@@ -68,6 +77,7 @@ impl Place {
             shares: segment.shares[0].lerp(segment.shares[1], along),
             depth: segment.at[0].z + (segment.at[1].z - segment.at[0].z) * along,
             point: origin + d * (segment.t[0] + t),
+            time,
         }
     }
 }
@@ -80,6 +90,7 @@ struct ShellRay<'a> {
     origin: Vec3,
     metres: f32,
     d: Vec3,
+    time: f32,
     /// T at the start, and here.
     start: f32,
     transmittance: f32,
@@ -143,6 +154,7 @@ impl Integrator<'_> {
             origin,
             metres,
             d,
+            time: order.time,
             start: order.before,
             transmittance: order.before,
             last: None,
@@ -185,7 +197,7 @@ impl Integrator<'_> {
     pub(super) fn left_shell(
         &self,
         shell: &Shell,
-        SheetOrder { before, is_last, behind }: SheetOrder,
+        SheetOrder { before, is_last, behind, .. }: SheetOrder,
         transmittance: f32,
         (radiance, beyond): ([Vec3; 2], Vec3),
         cells: [u32; 2],
@@ -210,7 +222,7 @@ impl Integrator<'_> {
             return;
         }
         let volume = self.volume_of(ray.shell);
-        let (origin, d_cell) = in_cells(segment, volume.size, volume.flow_cells);
+        let (origin, d_cell) = in_cells(segment, volume.size, volume.flow_at(ray.time));
         let (mut level, mut share) = (0, 0.0);
         if self.scene.trace.filter != Prefilter::None {
             let [nx, ny, nz] = volume.size.map(|n| n as f32);
@@ -272,7 +284,8 @@ impl Integrator<'_> {
             let weight = (ray.transmittance - passed) * share;
             let ink = self.ink(ray.shell.volume as usize, sample.k[1]);
             let k = [sample.k[0], ink.map_or(sample.k[1], |ink| ink.k_s)];
-            let place_at = |t: f32| Place::on_ray(ray.number, segment, (ray.origin, ray.d), t, length);
+            let place_at =
+                |t: f32| Place::on_ray(ray.number, segment, (ray.origin, ray.d, ray.time), t, length);
             let place = match optics {
                 Some(_) => {
                     place_at(crossing.t_enter + (crossing.t_exit - crossing.t_enter) * within(tau_bits)[0])
@@ -400,7 +413,8 @@ impl Integrator<'_> {
     ) -> f32 {
         let shell = &*self.scene.shells[place.shell];
         let Some(path) = ShellPath::inside(shell, place.tetrahedron, place.point, l) else { return 0.0 };
-        let FrameVolume { size, flow_cells, .. } = *self.volume_of(shell);
+        let volume = self.volume_of(shell);
+        let (size, flow_cells) = (volume.size, volume.flow_at(place.time));
         let n = Vec2::new(size[0] as f32, size[1] as f32);
         let most = self.scene.trace.max_cells;
         let (mut depth, mut count) = (0.0, 0);

@@ -150,7 +150,7 @@ impl Integrator<'_> {
         let (vertex, layer) = (k / (layers + 1), k % (layers + 1));
         let depth = layer as f32 / layers as f32;
         let (point, tetrahedron) = self.scene.shells[shell].below_vertex(vertex, depth);
-        let place = Place { shell, tetrahedron, shares: Vec3::ZERO, depth, point };
+        let place = Place { shell, tetrahedron, shares: Vec3::ZERO, depth, point, time: 0.0 };
         let level = Level::new(&self.volume_of(&self.scene.shells[shell]).levels, 0);
         self.walked_visibility(&level, &place, i, &mut 0)
     }

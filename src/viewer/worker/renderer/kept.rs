@@ -24,6 +24,8 @@ pub struct Rendered {
     pub frame: Arc<Frame>,
     /// Samples per pixel of `frame`.
     pub samples: u32,
+    /// Samples per pixel that were asked for.
+    asked: u32,
     pub volumes: Arc<Vec<VolumeTexture>>,
     /// The samples taken so far, at least those of `frame` unless there are none.
     pub sums: Sums,
@@ -92,6 +94,7 @@ impl Rendered {
             size: job.request.size,
             frame: Arc::new(frame),
             samples: 1,
+            asked: job.request.samples,
             volumes: job.volumes.clone(),
             sums: Sums::default(),
         }
@@ -111,11 +114,14 @@ impl Rendered {
             // A file may have changed without its name.
             && map(old) == map(new)
             && changed_keys(old.written(), new.written()).iter().all(is_of_development)
+            && old.wave_moves == new.wave_moves
+            && (self.asked == job.request.samples || !new.counts_samples())
     }
 
     /// Makes the picture that of a request which it serves: develops it anew if the look is another.
     fn take_over(&mut self, job: &Job) {
         self.scene = job.request.scene.clone();
+        self.asked = job.request.samples;
         if self.look != job.look {
             self.look = job.look;
             develop_whole(Arc::make_mut(&mut self.frame), &job.look);
@@ -136,6 +142,7 @@ impl Rendered {
             size: self.size,
             frame: self.frame.clone(),
             samples: self.samples,
+            asked: self.asked,
             volumes: self.volumes.clone(),
             sums: std::mem::take(&mut self.sums),
         })

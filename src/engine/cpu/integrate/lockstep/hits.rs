@@ -31,6 +31,8 @@ pub struct Values {
     /// u, v and metres from the eye.
     pub at: Stored3,
     pub d_world: Stored3,
+    /// Times of the rays; see [`SampleTimes`](crate::picture::SampleTimes).
+    pub time: Stored,
     /// Jacobian: cx and cy, its depth and its determinant.
     pub cx: [Stored; 2],
     pub cy: [Stored; 2],
@@ -128,11 +130,12 @@ impl Hits {
         }
     }
 
-    /// Puts a ray in direction `d_world` in place `lane`, which meets a quad at `at`.
+    /// Puts a ray in direction `d_world` in place `lane`, which meets a quad at `at` at this time.
     #[inline]
-    pub fn set(&mut self, lane: usize, quad: usize, d_world: Vec3, at: [f32; 3]) {
+    pub fn set(&mut self, lane: usize, quad: usize, (d_world, time): (Vec3, f32), at: [f32; 3]) {
         self.quads[lane] = quad;
         self.values.d_world.set(lane, d_world);
+        self.values.time.0[lane] = time;
         self.values.at.set(lane, at.into());
     }
 
@@ -197,7 +200,9 @@ impl Hits {
             z: a.z + e1.z * p_x + e2.z * p_y,
         };
 
-        let flow_cells = hits.of_volumes(simd, integrator, |volume| volume.flow_cells);
+        let flow_moves = hits.of_volumes(simd, integrator, |volume| volume.flow_moves);
+        let flow_cells = hits.of_volumes(simd, integrator, |volume| volume.flow_cells)
+            + hits.values.time.load(simd) * flow_moves;
         let x = (u * repeat_u + hits.of_quads(simd, all, |quad| quad.offset.x)) * nx;
         let y = (v * repeat_v + hits.of_quads(simd, all, |quad| quad.offset.y)) * ny - flow_cells;
         let origin = Lanes3 { x: in_tile(simd, x, nx), y: in_tile(simd, y, ny), z: zero };

@@ -213,15 +213,16 @@ impl<'a> Lockstep<'a> {
                 met.packs.push(Hits::default());
             }
             let Some(pack) = met.packs.last_mut() else { continue };
-            pack.set(lane, quad, pixel.d, hit);
+            pack.set(lane, quad, (pixel.d, pixel.time), hit);
             met.sheets.push(Sheet { ray, order, ends: Default::default() });
         }
         // Missing rays are those before them.
         let missing = met.sheets.len().next_multiple_of(LANES) - met.sheets.len();
         if let Some(pack) = met.packs.last_mut() {
             let last = LANES - missing - 1;
-            let (quad, d, at) = (pack.quads[last], pack.values.d_world.get(last), pack.values.at.get(last));
-            (last + 1..LANES).for_each(|lane| pack.set(lane, quad, d, at.into()));
+            let (quad, values) = (pack.quads[last], &pack.values);
+            let (ray, at) = ((values.d_world.get(last), values.time.0[last]), values.at.get(last));
+            (last + 1..LANES).for_each(|lane| pack.set(lane, quad, ray, at.into()));
         }
         dispatch!(self.simd, simd => map_all(simd, self.integrator, &mut met.packs));
         !(met.sheets.is_empty() && shells.is_empty())
@@ -266,7 +267,7 @@ impl<'a> Lockstep<'a> {
         for i in strands.drain(..) {
             let (pack, lane) = (&packs[i / LANES], i % LANES);
             let (d_world, hit) = (pack.values.d_world.get(lane), pack.values.at.get(lane).into());
-            let ray = self.integrator.sheet_hit(pack.quads[lane], d_world, hit);
+            let ray = self.integrator.sheet_hit(pack.quads[lane], d_world, hit, sheets[i].order.time);
             let before = sheets[i].order.before;
             let walked = self.integrator.walk_numbered(&ray, STRANDS, before, &mut ());
             tints[i][0] = walked.tint;

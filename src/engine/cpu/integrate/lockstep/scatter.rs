@@ -68,7 +68,8 @@ impl<'a> LaneScatter<'a> {
             scatter.reduced.set(lane, medium.similarity.reduced);
             scatter.isotropic.set(lane, medium.similarity.isotropic);
             let at = values.at.get(lane).to_array();
-            let terms = integrator.ray_scatter(&integrator.sheet_hit(quad, values.d_world.get(lane), at))?;
+            let terms =
+                integrator.ray_scatter(&integrator.sheet_hit(quad, values.d_world.get(lane), at, 0.0))?;
             for (light, terms) in scatter.lights.iter_mut().zip(&terms) {
                 let Row { near, far, share, .. } = terms.row;
                 (light.near[lane], light.far[lane], light.share.0[lane]) = (near, far, share);

@@ -168,7 +168,7 @@ impl<'a> ShellLanes<'a> {
             rays.transmittance.0[lane] = hit.order.before;
             rays.cells[lane] = 0;
             rays.n.set(lane, Vec3::from_array(volume.size.map(|n| n as f32)));
-            rays.flow_cells.0[lane] = volume.flow_cells;
+            rays.flow_cells.0[lane] = volume.flow_at(hit.order.time);
             rays.extinction.0[lane] = volume.extinction;
             rays.coarsest.0[lane] = (volume.levels.len() - 1) as f32;
             return true;
@@ -347,6 +347,7 @@ impl<'a> ShellLanes<'a> {
                 shares: shares.get(lane),
                 depth: depth.0[lane],
                 point: point.get(lane),
+                time: hits[hit].order.time,
             };
             let lit = LitCell { hit, cell: found.cells[lane], weight: weight.0[lane], place };
             let kind = usize::from(!level.is_whole);
@@ -356,7 +357,8 @@ impl<'a> ShellLanes<'a> {
                 let start = hits[hit].order.before;
                 let view = depth_between(start, before.0[lane]);
                 let passage = Passage { start: start * share.0[lane], view, cell: bits.0[lane] };
-                let (segment, ray) = (segments.get(lane), (rays.origin.get(lane), rays.d.get(lane)));
+                let ray = (rays.origin.get(lane), rays.d.get(lane), hits[hit].order.time);
+                let segment = segments.get(lane);
                 let length = segment.t[1] - segment.t[0];
                 let [own, deep] = within(bits.0[lane]).map(|at| {
                     let t = enter.0[lane] + (leave.0[lane] - enter.0[lane]) * at;
