@@ -93,7 +93,7 @@ fn points_of_the_lens_fill_its_disc_evenly_about_its_middle() {
             // half the radius.
             for c in 0..2 {
                 let second = points.iter().map(|p| p[c] * p[c]).sum::<f64>() / f64::from(n);
-                assert!(close(second, 0.25 * 0.25, 0.15, 0.0), "{n}: {second}");
+                assert!(close(second, 0.25 * 0.25, 4.0 / f64::from(n), 0.0), "{n}: {second}");
             }
             let near = points.iter().filter(|p| p[0].hypot(p[1]) < 0.25).count() as f64 / f64::from(n);
             assert!((near - 0.25).abs() < 0.07, "{n}: {near}");
