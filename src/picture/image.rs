@@ -16,8 +16,8 @@ pub struct Image {
     pub filter: Filter,
     /// Whether the background is transparent, so that the picture has an alpha channel.
     pub alpha: bool,
-    /// Distance by which the image is moved behind its pixels, pixels to the right and down: a pixel shows what
-    /// lies so far from it in the image of the same camera without it. 0 but for the samples of a lens.
+    /// Distance by which the image is moved behind its pixels, pixels to the right and down: a pixel shows
+    /// what lies so far from it in the image of the same camera without it. 0 but for the samples of a lens.
     pub shift: [f32; 2],
     /// Maximum error of simplified rock, in distances between samples. A larger error takes fewer triangles.
     pub rock_error: f32,

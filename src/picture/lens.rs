@@ -21,8 +21,8 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// Lens of a camera whose image has the given tangent of half its vertical field of view, with an f-number
-    /// above 0, focused on a plane `focus` metres away.
+    /// Lens of a camera whose image has the given tangent of half its vertical field of view, with an
+    /// f-number above 0, focused on a plane `focus` metres away.
     ///
     /// The sensor lies v = ½·[`SENSOR_HEIGHT`]/tan behind the lens, where it is sharp for the plane in focus:
     /// 1/f = 1/v + 1/focus. The opening is f divided by the f-number.
@@ -40,8 +40,8 @@ impl Lens {
         2.0 * self.radius * (1.0 / self.focus - 1.0 / depth).abs() * pixels
     }
 
-    /// Returns the point of the lens through which sample `sample` of an image sees the scene, to the right of
-    /// its middle and above, metres.
+    /// Returns the point of the lens through which sample `sample` of an image sees the scene, to the right
+    /// of its middle and above, metres.
     ///
     /// The points lie on a spiral of the golden angle, whose turns have equal areas (Vogel 1979). Each has a
     /// mirror image, as the samples' places in the pixel have, so that their mean is the middle.
@@ -56,7 +56,8 @@ impl Lens {
         [side * cos, side * sin]
     }
 
-    /// Returns the camera and the image of one sample, which sees the scene through its own point of the lens.
+    /// Returns the camera and the image of one sample, which sees the scene through its own point of the
+    /// lens.
     pub fn seen(&self, camera: &Camera, image: &Image, sample: u32) -> (Camera, Image) {
         let [x, y] = self.point(image, sample);
         let pixels = 0.5 * f64::from(image.height) / (f64::from(camera.tan_half_fov) * self.focus);

@@ -64,8 +64,9 @@ fn threshold(x: u32, y: u32) -> f32 {
 }
 
 /// Returns the grain of a pixel of the whole image: a number with the mean 0 and the variance 1, almost
-/// Gaussian, which depends on the pixel and on the number of the pattern. It is the sum of the four bytes of a
-/// hash (Wellons, "Prospecting for Hash Functions", 2018), in whole numbers so that both engines get the same.
+/// Gaussian, which depends on the pixel and on the number of the pattern. It is the sum of the four bytes of
+/// a hash (Wellons, "Prospecting for Hash Functions", 2018), in whole numbers so that both engines get the
+/// same.
 fn grain([x, y]: [u32; 2], seed: u32) -> f32 {
     let mut h = x.wrapping_mul(0x8da6_b343) ^ y.wrapping_mul(0xd816_3841) ^ seed.wrapping_mul(0xcb1a_b31f);
     h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);

@@ -3,8 +3,8 @@
 //!
 //! The n samples of a pixel lie in n equal parts of the time that the shutter is open, one in each. Where in
 //! its part a sample lies depends on the pixel alone: the golden ratio's multiples follow one another along a
-//! Hilbert curve through the pixels, so that neighbours fill one another's gaps without a visible pattern. With
-//! times common to all pixels, 16 samples would show 16 copies of every drop.
+//! Hilbert curve through the pixels, so that neighbours fill one another's gaps without a visible pattern.
+//! With times common to all pixels, 16 samples would show 16 copies of every drop.
 
 use super::Image;
 

@@ -24,8 +24,8 @@ pub(super) fn warnings(scene: &Scene) -> Vec<String> {
     }
     if let Some((blur, wanted)) = samples_of_lens(scene).filter(|&(_, wanted)| samples < wanted) {
         warnings.push(format!(
-            "the lens blurs points to discs of up to {blur:.1} pixels, in which {samples} samples show copies: \
-             set image.samples={wanted} or more, or a higher camera.f_number"
+            "the lens blurs points to discs of up to {blur:.1} pixels, in which {samples} samples show \
+             copies: set image.samples={wanted} or more, or a higher camera.f_number"
         ));
     }
     warnings

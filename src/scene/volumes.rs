@@ -57,7 +57,8 @@ pub struct Recipe {
     pub asked_storage: StorageChoice,
     /// Distance that the volume has moved down the flow, in lengths of the volume.
     pub flow: f32,
-    /// Distance that it moves while the shutter is open, in lengths of the volume; the middle of it is `flow`.
+    /// Distance that it moves while the shutter is open, in lengths of the volume; the middle of it is
+    /// `flow`.
     pub moves: f32,
 }
 

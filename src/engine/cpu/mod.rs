@@ -55,8 +55,8 @@ pub fn render(
 /// Pixels whose triangles are held at once.
 const BAND_PIXELS: u64 = 1 << 21;
 
-/// Renders the options' part of the image and of the samples, through the lens if the scene has one. A pixel has the same bits in every window.
-/// Light volumes stay in `light_volumes` for later frames.
+/// Renders the options' part of the image and of the samples, through the lens if the scene has one. A pixel
+/// has the same bits in every window. Light volumes stay in `light_volumes` for later frames.
 ///
 /// # Errors
 /// Errors of `monitor`, which may stop the work. With cached visibility, [`Error::Memory`] if the light

@@ -131,8 +131,8 @@ impl GpuRenderer {
         })
     }
 
-    /// Renders as [`GpuRenderer::render`] through a pinhole, and also returns the indices of the pixels whose walks the device
-    /// ended early. They hold no radiance, cells or picture.
+    /// Renders as [`GpuRenderer::render`] through a pinhole, and also returns the indices of the pixels whose
+    /// walks the device ended early. They hold no radiance, cells or picture.
     ///
     /// # Errors
     /// As [`GpuRenderer::render`], except for walks that the device ended.

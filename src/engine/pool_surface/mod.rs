@@ -165,8 +165,8 @@ impl Surface {
     }
 }
 
-/// Returns the waves of a pool, which have moved by `flow` and go on by `moves` while the shutter is open, both
-/// in lengths of the volume that they move with.
+/// Returns the waves of a pool, which have moved by `flow` and go on by `moves` while the shutter is open,
+/// both in lengths of the volume that they move with.
 fn waves(pool: &Pool, falls: &[[Vec3; 4]], [flow, moves]: [f32; 2], origin: DVec3) -> [Wave; WAVES] {
     let mut waves = [Wave::default(); WAVES];
     let family = Family::new(pool.seed, Stream::Wave);

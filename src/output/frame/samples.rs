@@ -61,8 +61,9 @@ impl std::fmt::Display for Encoding {
 }
 
 /// Returns the samples of a frame, row by row; those of 16 bits with the higher byte first. 8 bits are those
-/// of the frame's picture. 16 bits are developed from its radiance by `look`, with bloom if its `window` is the
-/// whole image of `size` pixels; linear ones without tone curve and grain, in the primaries of the encoding.
+/// of the frame's picture. 16 bits are developed from its radiance by `look`, with bloom if its `window` is
+/// the whole image of `size` pixels; linear ones without tone curve and grain, in the primaries of the
+/// encoding.
 pub fn samples_of(frame: &Frame, encoding: Encoding, look: &Look, window: Window, size: [u32; 2]) -> Vec<u8> {
     if encoding.bits == 8 {
         return frame.picture.iter().flat_map(|p| p[..encoding.channels()].iter().copied()).collect();

@@ -183,8 +183,8 @@ pub(super) const POOLS: Group = Group {
 
 pub(super) const CAMERA: Group = Group {
     title: "Camera",
-    about: "The camera is a pinhole at `camera.eye` that looks at `camera.target`. In the viewer the mouse \
-         moves it.",
+    about: "The camera is a pinhole, or a lens, at `camera.eye` that looks at `camera.target`. In the viewer \
+         the mouse moves it.",
     params: &[
         p("camera.from", "", "", Text(""), Uniform)
             .doc(
@@ -215,13 +215,13 @@ pub(super) const CAMERA: Group = Group {
         p("camera.f_number", "N", "", Float(0.0, 128.0, 0.0), Uniform)
             .slider(0.0, 22.0)
             .doc(
-                "F-number of the lens, behind which lies a sensor 24 mm high, as that of a 35 mm camera: things \
-                 in front of and behind the plane in focus become blurred. 0 is a pinhole, through which all is \
-                 sharp. Each sample sees the scene from one point of the lens.",
+                "F-number of the lens, behind which lies a sensor 24 mm high, as that of a 35 mm camera: \
+                 things in front of and behind the plane in focus become blurred. 0 is a pinhole, through \
+                 which all is sharp. Each sample sees the scene from one point of the lens.",
             )
             .when(
-                "Set it to 2.8 or less to part a near fall from what is behind it; give the picture 64 samples \
-                 or more.",
+                "Set it to 2.8 or less to part a near fall from what is behind it; give the picture 64 \
+                 samples or more.",
             ),
         p("camera.focus", "", "m", Float(0.0, 1e6, 0.0), Uniform)
             .slider(0.0, 50.0)
@@ -234,8 +234,8 @@ pub(super) const CAMERA: Group = Group {
             .slider(0.0, 1.0)
             .doc(
                 "Time for which the shutter is open, half of it before the frame's time and half after. The \
-                 volume `water` moves meanwhile with `animate.speed`, and the waves of pools with it; cameras, \
-                 other volumes and other parameters stay where they are at the frame's time.",
+                 volume `water` moves meanwhile with `animate.speed`, and the waves of pools with it; \
+                 cameras, other volumes and other parameters stay where they are at the frame's time.",
             )
             .when(
                 "Set it to 1/60 for the crisp water of a snapshot, 1/8 to 1 for silk; give the picture 16 \

@@ -194,7 +194,7 @@ fn the_base_water_has_the_look_of_the_default_scene_and_nothing_of_its_place() {
     assert_eq!(own.recipes[0].water, default.recipes[0].water);
     assert_eq!((own.trace, own.p, own.ambient), (default.trace, default.p, default.ambient));
     assert_eq!(own.lights, default.lights);
-    assert_eq!(own.quads[0].material.thickness_m, default.quads[0].material.thickness_m);
+    assert_eq!(own.quads[0].material.thickness_m, 0.8);
     assert!(own.rocks.is_empty() && own.pools.is_empty() && !own.quads.is_empty());
     let names = own.values().expect("not edited").names("sheets");
     assert_eq!(names, ["own"]);

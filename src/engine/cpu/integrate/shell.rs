@@ -60,8 +60,8 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Place on a ray in a tetrahedron, `t` metres behind the start of its `segment` of this `length`. The ray
-    /// has an origin, a direction and a time.
+    /// Place on a ray in a tetrahedron, `t` metres behind the start of its `segment` of this `length`. The
+    /// ray has an origin, a direction and a time.
     #[inline]
     pub fn on_ray(
         shell: usize,
