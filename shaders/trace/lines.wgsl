@@ -2,6 +2,7 @@
 // stage integrate. Twins: src/trace/lines.rs, which explains it, and Cell::line in src/volume/cell.rs.
 
 #import layout
+#import light::fibre
 #import trace::levels
 #import volume::cells
 
@@ -64,9 +65,18 @@ fn line_through(segment: LineSegment, texel: vec2<u32>, corner: vec3<f32>) -> f3
     let exit = min(nearest + reach, segment.half);
     let w_main = select(select(w.z, w.y, is_y), w.x, is_x);
     let d_main = select(select(d.z, d.y, is_y), d.x, is_x);
-    let share = max(1.0 - abs(w_main + d_main * ((enter + exit) * 0.5)), 0.0);
-    let sum = line_upto(exit - nearest, u, k) - line_upto(enter - nearest, u, k);
-    let through = sum * share * ON_LINE * largest * sqrt(inverse);
+    let corner_main = select(select(corner.z, corner.y, is_y), corner.x, is_x);
+    let low = enter - nearest;
+    let high = exit - nearest;
+    let sum = line_upto(high, u, k) - line_upto(low, u, k);
+    let square_low = u - k * low * low;
+    let square_high = u - k * high * high;
+    let cube_low = square_low * square_low * square_low;
+    let moment = (cube_low - square_high * square_high * square_high) / (6.0 * k);
+    // Towards the next centre along the strand, its share falls from 1 to 0.
+    let side = 1.0 - 2.0 * corner_main;
+    let share = 1.0 - side * (w_main + d_main * nearest);
+    let through = max(share * sum - side * d_main * moment, 0.0) * ON_LINE * largest * sqrt(inverse);
     return select(0.0, through, (u > 0.0) & (exit > enter));
 }
 

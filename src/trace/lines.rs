@@ -64,9 +64,15 @@ impl Segment {
         if exit <= enter {
             return 0.0;
         }
-        let upto = |s: f32| s * (u * u + s * s * k * (0.2 * k * s * s - 2.0 / 3.0 * u));
-        let along = w[axis] + d[axis] * ((enter + exit) * 0.5);
-        let share = (1.0 - along.abs()).max(0.0);
-        (upto(exit - nearest) - upto(enter - nearest)) * share * ON_LINE * v[axis].abs() * inverse.sqrt()
+        let (from, to) = (enter - nearest, exit - nearest);
+        let cubes = [from, to].map(|s| (u - k * s * s).powi(3));
+        let sum = |s: f32| s * (u * u + s * s * k * (0.2 * k * s * s - 2.0 / 3.0 * u));
+        let sum = sum(to) - sum(from);
+        let moment = (cubes[0] - cubes[1]) / (6.0 * k);
+        // Towards the next centre along the strand, its share falls from 1 to 0.
+        let side = 1.0 - 2.0 * corner[axis];
+        let share = 1.0 - side * (w[axis] + d[axis] * nearest);
+        let through = share * sum - side * d[axis] * moment;
+        through.max(0.0) * ON_LINE * v[axis].abs() * inverse.sqrt()
     }
 }

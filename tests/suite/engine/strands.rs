@@ -1,7 +1,9 @@
 //! The strands that rays walk where they see less than a cell: both engines, and what they keep of the cells.
 
 use crate::engine::gpu::{assert_parity, both, renderer, scene};
+use glam::Vec3;
 use taki::engine::cpu;
+use taki::light::Light;
 use taki::picture::Frame;
 use taki::scene::Scene;
 use taki::util::monitor::Unwatched;
@@ -35,13 +37,17 @@ fn the_engines_agree_on_strands() {
         &["light.visibility=cached", "light.scattering=multiple"],
         &["light.reflection=strand", "trace.filter=pyramid", "camera.eye=[0.5,1,-3]"],
         &["trace.attenuation=per-cell", "trace.tau=0.3"],
-        &["lights.rim.direction=[-0.4,0.2,-0.9]", "materials.water.repeat_u=0.6", "volume.flow=0.3"],
+        &["materials.water.repeat_u=0.6", "volume.flow=0.3", "materials.water.mist=0.1"],
         &["volume.storage=sparse", "trace.max_cells=9"],
     ];
     for variant in variants {
         let sets: Vec<&str> = CLOSE.iter().chain(variant).copied().collect();
         assert_parity(&variant.join(" "), &both(&mut renderer, &scene("front", &sets)));
     }
+    let mut several = scene("front", &CLOSE);
+    let lights = &mut several.edit().lights;
+    lights.push(Light::Directional { to_light: Vec3::new(-0.4, 0.2, 0.9).normalize(), intensity: Vec3::ONE });
+    assert_parity("two lights", &both(&mut renderer, &several));
 }
 
 #[test]
