@@ -20,10 +20,10 @@ pub const STRAND_RADIUS: f32 = 0.5;
 
 /// Density on the line of a strand along an axis, in units of its cell's: the mean over the cell is 1. The
 /// mean of (1 − d²/R²)² over a tube's cross-section, πR², is 1/3.
-const ON_LINE: f32 = 3.0 / (std::f32::consts::PI * STRAND_RADIUS * STRAND_RADIUS);
+pub const ON_LINE: f32 = 3.0 / (std::f32::consts::PI * STRAND_RADIUS * STRAND_RADIUS);
 
 /// Smallest squared sine between a ray and a line; a ray along a strand is treated as one at this angle.
-const LEAST_SINE2: f32 = 1e-4;
+pub const LEAST_SINE2: f32 = 1e-4;
 
 /// Part of a ray between eight centres of cells.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ impl Segment {
             return 0.0;
         }
         let (from, to) = (enter - nearest, exit - nearest);
-        let cubes = [from, to].map(|s| (u - k * s * s).powi(3));
+        let cubes = [from, to].map(|s| u - k * s * s).map(|x| x * x * x);
         let sum = |s: f32| s * (u * u + s * s * k * (0.2 * k * s * s - 2.0 / 3.0 * u));
         let sum = sum(to) - sum(from);
         let moment = (cubes[0] - cubes[1]) / (6.0 * k);

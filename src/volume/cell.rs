@@ -25,7 +25,7 @@ use glam::Vec3;
 pub const V_SCALE: f32 = 511.0;
 
 /// Steps of a strand's place along one axis of the cell.
-const LINE_STEPS: f32 = 16.0;
+pub const LINE_STEPS: f32 = 16.0;
 
 /// A packed cell.
 #[repr(C)]

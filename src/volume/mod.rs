@@ -31,7 +31,7 @@ mod water;
 
 pub use bricks::{BRICK, Bricks, grid as brick_grid};
 pub use bundle::curve_points;
-pub use cell::{Cell, V_SCALE};
+pub use cell::{Cell, LINE_STEPS, V_SCALE};
 pub use cells::Cells;
 pub use cloth::{ClothSpec, Weave, WeaveName};
 pub use file::{ReadOptions, check_npz, has_reflection, read_npz, write_npz};

@@ -45,7 +45,7 @@ pub struct Group<'a, 'h> {
     exponent: Exponent,
     pub hits: &'h Hits,
     /// T before the sheets.
-    before: Stored,
+    pub before: Stored,
 }
 
 /// A batch of steps: the cells that the rays pass, and what they let through.
@@ -62,8 +62,8 @@ pub struct Steps {
     /// Share of the cells in what the eye sees.
     pub weight: [Stored; BATCH],
     /// Depth of the cells, and before them, in bits.
-    tau_bits: [Stored; BATCH],
-    depth: [Stored; BATCH],
+    pub tau_bits: [Stored; BATCH],
+    pub depth: [Stored; BATCH],
 }
 
 impl Default for Steps {
@@ -93,10 +93,10 @@ pub struct Ends {
 
 /// Memory that every group uses again.
 pub struct Scratch<'a> {
-    steps: Steps,
-    lights: Vec<LaneLight<'a>>,
+    pub steps: Steps,
+    pub lights: Vec<LaneLight<'a>>,
     /// Colour that the cells give to the ambient light, minus that of white ones.
-    tint: Stored3,
+    pub tint: Stored3,
 }
 
 impl Scratch<'_> {
@@ -176,19 +176,7 @@ impl<'a, 'h> Group<'a, 'h> {
             // Cells wait until there are enough of them to keep all lanes of walks to the light busy.
             let is_enough = pending >= PENDING || lights.iter().all(|light| !light.marches());
             if ends || is_enough || steps.count + ROW > BATCH {
-                let is_packed = scatter.is_none() && self.is_packed(steps);
-                for light in &mut *lights {
-                    if !(is_packed && light.looks_up()) {
-                        self.visibility(simd, steps, light, &mut walked);
-                    }
-                }
-                if is_packed {
-                    self.shade_packed(simd, steps, (lights, tint));
-                } else {
-                    for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
-                        self.shade(simd, steps, j, (lights, tint), scatter.as_ref());
-                    }
-                }
+                self.light_batch(simd, steps, (lights, tint), scatter.as_ref(), &mut walked);
                 (steps.count, pending) = (0, 0);
             }
             if ends {
@@ -210,6 +198,31 @@ impl<'a, 'h> Group<'a, 'h> {
         }
         let seen = (walk.count - view.early).to_array().map(|count| count as u32);
         Ends { transmittance: view.transmittance.to_array(), cells: [seen, walked] }
+    }
+
+    /// Adds the light of the lit cells of the batch.
+    #[inline(always)]
+    pub fn light_batch<S: Simd>(
+        &self,
+        simd: S,
+        steps: &Steps,
+        (lights, tint): (&mut [LaneLight], &mut Stored3),
+        scatter: Option<&LaneScatter>,
+        walked: &mut [u32; LANES],
+    ) {
+        let is_packed = scatter.is_none() && self.is_packed(steps);
+        for light in &mut *lights {
+            if !(is_packed && light.looks_up()) {
+                self.visibility(simd, steps, light, walked);
+            }
+        }
+        if is_packed {
+            self.shade_packed(simd, steps, (lights, tint));
+        } else {
+            for j in (0..steps.count).filter(|&j| steps.lit[j] != 0) {
+                self.shade(simd, steps, j, (lights, tint), scatter);
+            }
+        }
     }
 
     /// Follows T through the cells of a row.

@@ -30,6 +30,7 @@ mod shell_light;
 mod shell_scatter;
 mod shell_way;
 mod strand;
+mod strands;
 mod walk;
 
 use fearless_simd::{Simd, dispatch};
@@ -80,6 +81,9 @@ impl Lanes {
     }
 }
 
+/// Index of the walks through the strands of a volume's first level, behind those through its cells and mist.
+const OF_STRANDS: usize = 2;
+
 /// Pixels whose rays are grouped together.
 const STRETCH: usize = 256;
 
@@ -117,10 +121,8 @@ struct Met {
     sheets: Vec<Sheet>,
     /// Eight sheets in each pack, in their order.
     packs: Vec<Hits>,
-    /// Sheets and which of their two levels is walked, by the index of the level and by strands or mist.
-    walks: Vec<[Vec<(usize, usize)>; 2]>,
-    /// Sheets whose strands are walked.
-    strands: Vec<usize>,
+    /// Sheets and which of their two levels is walked, by the index of the level and by cells, mist or strands.
+    walks: Vec<[Vec<(usize, usize)>; 3]>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
     /// Colour that each sheet's two levels give to the ambient light; see
@@ -241,7 +243,7 @@ impl<'a> Lockstep<'a> {
     /// Walks the levels of the sheets.
     fn walk(&mut self) {
         let lights = self.integrator.lights.len();
-        let Met { sheets, packs, walks, strands, lit, tints } = &mut self.met;
+        let Met { sheets, packs, walks, lit, tints } = &mut self.met;
         tints.clear();
         tints.resize(sheets.len(), Default::default());
         lit.clear();
@@ -257,25 +259,12 @@ impl<'a> Lockstep<'a> {
                 if which == 1 && share == 0.0 {
                     break;
                 }
-                match level {
-                    STRANDS => strands.push(i),
-                    _ => walks[self.firsts[volume as usize] + level as usize][kind].push((i, which)),
-                }
+                let (level, kind) = if level == STRANDS { (0, OF_STRANDS) } else { (level as usize, kind) };
+                walks[self.firsts[volume as usize] + level][kind].push((i, which));
             }
         }
-        // Few rays are so close that they walk the strands: one at a time.
-        for i in strands.drain(..) {
-            let (pack, lane) = (&packs[i / LANES], i % LANES);
-            let (d_world, hit) = (pack.values.d_world.get(lane), pack.values.at.get(lane).into());
-            let ray = self.integrator.sheet_hit(pack.quads[lane], d_world, hit, sheets[i].order.time);
-            let before = sheets[i].order.before;
-            let walked = self.integrator.walk_numbered(&ray, STRANDS, before, &mut ());
-            tints[i][0] = walked.tint;
-            sheets[i].ends[0] = (walked.transmittance, walked.cells);
-            lit[2 * i * lights..][..lights].copy_from_slice(&walked.lit);
-        }
         for (&(volume, level, store), kinds) in self.levels.iter().zip(&*walks) {
-            for walks in kinds {
+            for (kind, walks) in kinds.iter().enumerate() {
                 for walks in walks.chunks(LANES) {
                     // Missing rays are filled up with the first.
                     let of = |lane: usize| walks[if lane < walks.len() { lane } else { 0 }].0;
@@ -283,8 +272,12 @@ impl<'a> Lockstep<'a> {
                     let before = std::array::from_fn(|lane| sheets[of(lane)].order.before);
                     let hits = Hits::picked(packs, picks, &mut room);
                     let group = Group::new(self.integrator, volume, (level, store), hits, before);
-                    let Ends { transmittance, cells } =
-                        dispatch!(self.simd, simd => group.walk(simd, &mut self.scratch));
+                    let Ends { transmittance, cells } = match kind {
+                        OF_STRANDS => {
+                            dispatch!(self.simd, simd => group.walk_strands(simd, &mut self.scratch))
+                        }
+                        _ => dispatch!(self.simd, simd => group.walk(simd, &mut self.scratch)),
+                    };
                     for (lane, &(i, which)) in walks.iter().enumerate() {
                         tints[i][which] = self.scratch.tint(lane);
                         sheets[i].ends[which] = (transmittance[lane], cells.map(|cells| cells[lane]));

@@ -258,6 +258,12 @@ impl<S: Simd> Walk<S> {
         self.inside().select(x + y + z, i32x8::splat(self.simd, NO_CELL))
     }
 
+    /// Coordinates of each ray's cell, if their factors are 1.
+    #[inline(always)]
+    pub fn coordinates(&self) -> [Ints<S>; 3] {
+        self.offset
+    }
+
     /// Goes to the next cell of each ray.
     #[inline(always)]
     pub fn advance(&mut self) {
