@@ -2,9 +2,9 @@
 //! cells around it, each along the line that its cell keeps. Twin: `shaders/trace/lines.wgsl`.
 //!
 //! A strand is a tube of the radius [`STRAND_RADIUS`] around its line. Its density falls as (1 − d²/R²)² with
-//! the distance d from the line, and along the line it goes over linearly from the centre of one cell to that
-//! of the next, so strands that pass several cells have no steps. Everything is in cells, so a tube is as much
-//! wider than deep as a cell is.
+//! the distance d from the line, and along the line it goes over linearly from the centre of one cell to the
+//! next, so strands that pass several cells have no steps. Everything is in cells: a tube is as much wider
+//! than deep as a cell is.
 //!
 //! Rays walk the grid of the cells' centres: between the same eight centres, the same eight lines are near.
 //! None of the others reaches there, because no line passes within [`STRAND_RADIUS`] of the centre of another

@@ -13,9 +13,9 @@
 //! model, and packing an unpacked direction gives the same code again.
 //!
 //! # The strand's line
-//! Because the length is free, it carries where the strand passes the cell ([`Cell::with_line`]): the largest
-//! magnitude is 511 less the six low bits of an 8-bit number, whose two high bits are bits 30–31. Its low four
-//! bits are the place along the first of the two other axes, its high four that along the second, in
+//! Because the length is free, it carries where the strand passes the cell ([`Cell::with_line`]): the
+//! largest magnitude is 511 less the six low bits of an 8-bit number, whose two high bits are bits 30–31. Its
+//! low four bits are the place along the first of the two other axes, its high four that along the second, in
 //! sixteenths of a cell. Whoever reads the direction alone needs to know nothing of it. The largest angular
 //! error is then 0.0905°.
 
@@ -52,8 +52,8 @@ impl Cell {
         Cell { x: 0, y: bits(code.x) | bits(code.y) << 10 | bits(code.z) << 20 }
     }
 
-    /// Packs `v` and the line of the strand, which passes through `place` in direction `v`. `place` is in cells
-    /// from the cell's corner. Where the line passes outside the cell, it is moved to the nearest step inside.
+    /// Packs `v` and the line of the strand, which passes through `place` in direction `v`. `place` is in
+    /// cells from the cell's corner. A line that passes outside the cell is moved to the nearest step inside.
     pub fn with_line(v: Vec3, place: Vec3) -> Self {
         let whole = Cell::from_direction(v);
         if !whole.has_direction() {

@@ -121,7 +121,8 @@ struct Met {
     sheets: Vec<Sheet>,
     /// Eight sheets in each pack, in their order.
     packs: Vec<Hits>,
-    /// Sheets and which of their two levels is walked, by the index of the level and by cells, mist or strands.
+    /// Sheets and which of their two levels is walked, by the index of the level and by cells, mist or
+    /// strands.
     walks: Vec<[Vec<(usize, usize)>; 3]>,
     /// Light of each sheet's two levels, light by light.
     lit: Vec<Lit>,
