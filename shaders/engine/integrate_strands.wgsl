@@ -3,6 +3,7 @@
 
 #import engine::integrate
 #import layout
+#import light::optical_depth
 #import trace::levels
 #import trace::lines
 #import trace::lookup
