@@ -75,7 +75,8 @@ struct FrameUniforms {
     // Times of the sample in all pixels: SampleTimes of src/picture/shutter.rs.
     shutter_first: f32,
     shutter_step: f32,
-    pad_d: f32,
+    // Levels by which a pixel is coarser than one of its samples.
+    pixel_levels: f32,
     pad_e: f32,
 }
 

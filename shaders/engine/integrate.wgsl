@@ -131,10 +131,16 @@ fn is_strand(own: VolumeConstants) -> bool {
     return !FIBRES_TOO || own.strands != 0u;
 }
 
-// Finest level of a volume that rays through a quad walk, as a number.
-fn finest_of(own: VolumeConstants, quad: Quad) -> f32 {
-    let keeps_lines = !SEVERAL || own.lines != 0u;
-    return select(0.0, f32(STRANDS), LINES & keeps_lines & (quad.mist == 0.0));
+// Level that a ray through a quad walks, from the one whose cells are as large as its sample's footprint.
+// Twin: walked_level of src/trace/lookup.rs.
+fn walked_level(level: f32, own: VolumeConstants, quad: Quad) -> f32 {
+    let cells = clamp(level, 0.0, f32(own.levels - 1u));
+    if !LINES {
+        return cells;
+    }
+    let keeps_lines = (!SEVERAL || own.lines != 0u) && quad.mist == 0.0;
+    let of_pixel = level + frame.pixel_levels;
+    return select(cells, max(of_pixel, f32(STRANDS)), keeps_lines && of_pixel < 0.0);
 }
 
 // Ambient light that cells send on: all of it, as mist and fibres do, or the hair's share.
@@ -358,8 +364,7 @@ fn trace(
     // The level whose cells match the sample's footprint lies between two levels; both are walked.
     var finer = 0.0;
     if PYRAMID | LINES {
-        let finest = finest_of(own, quad);
-        finer = clamp(level_at(jacobian, d_world, d_cell, hit.z), finest, f32(own.levels - 1u));
+        finer = walked_level(level_at(jacobian, d_world, d_cell, hit.z), own, quad);
     }
     let share = fract(finer);
     let walks = select(1u, 2u, share > 0.0);

@@ -128,6 +128,23 @@ pub struct CellSample {
     pub moments: Option<Moments>,
 }
 
+/// Levels by which a pixel is coarser than one of its `samples`.
+pub fn pixel_levels(samples: u32) -> f32 {
+    0.5 * (samples as f32).log2()
+}
+
+/// Level that a ray walks, from the one whose cells are as large as its sample's footprint: at least 0 and at
+/// most `coarsest`. In a volume that keeps lines, it is less where the whole pixel, which is `pixel_levels`
+/// coarser, sees less than a cell: down to [`STRANDS`].
+#[inline]
+pub fn walked_level(level: f32, pixel_levels: f32, keeps_lines: bool, coarsest: f32) -> f32 {
+    let of_pixel = level + pixel_levels;
+    match keeps_lines && of_pixel < 0.0 {
+        true => of_pixel.max(STRANDS as f32),
+        false => level.clamp(0.0, coarsest),
+    }
+}
+
 /// Level whose cells are as large as a sample's footprint: the footprint covers 4^level cells across the ray.
 /// The fraction is the share of the next coarser level; the result is not clamped to the levels there are.
 ///

@@ -28,7 +28,7 @@ use crate::picture::camera::{RayFrame, footprint, sample_offset};
 use crate::picture::{Camera, SampleTimes};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
-use crate::trace::lookup::{Level, STRANDS, level_at};
+use crate::trace::lookup::{Level, STRANDS, level_at, pixel_levels, walked_level};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -48,6 +48,8 @@ pub struct Integrator<'a> {
     per_cell: bool,
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
+    /// See [`pixel_levels`].
+    pixel_levels: f32,
     lights: Vec<Light>,
     /// Visibility of the scene, or `Cached` where light volumes stand for walks to the lights.
     visibility: Visibility,
@@ -359,6 +361,7 @@ impl<'a> Integrator<'a> {
             volumes: volumes.iter().zip(levels).enumerate().map(frame_volume).collect(),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             footprint: footprint(&scene.camera, &scene.image),
+            pixel_levels: pixel_levels(scene.image.samples),
             lights: scene.volume_lights(),
             light_volumes: (scene.visibility == Visibility::Cached)
                 .then(|| scene.light_volumes(volumes, u64::MAX).expect("the largest budget fits")),
@@ -658,7 +661,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// Returns the finer of the two levels whose cells suit the ray `t` metres from the eye, and the share of
-    /// the coarser. A ray that sees less than a cell walks the strands, level [`STRANDS`], if there are any.
+    /// the coarser. Where a pixel sees less than a cell, it walks the strands, level [`STRANDS`], if there are
+    /// any.
     #[inline]
     fn level_of(&self, ray: &SheetHit, t: f32) -> (i32, f32) {
         let volume = &self.volumes[ray.volume];
@@ -670,8 +674,9 @@ impl<'a> Integrator<'a> {
         let CellFrame { depth, det, .. } = ray.frame;
         let area = det.abs() * depth * ray.d_cell.length();
         let level = level_at(self.footprint, forward, ray.d_world, t, area);
-        let finest = if volume.has_lines && ray.matter[0].mist == 0.0 { STRANDS } else { 0 };
-        let level = level.clamp(finest as f32, (volume.levels.len() - 1) as f32);
+        let keeps_lines = volume.has_lines && ray.matter[0].mist == 0.0;
+        let coarsest = (volume.levels.len() - 1) as f32;
+        let level = walked_level(level, self.pixel_levels, keeps_lines, coarsest);
         (level.floor() as i32, level - level.floor())
     }
 }

@@ -12,6 +12,7 @@ use crate::light::{AngleFrame, environment, ramp, scatter};
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::{MAX_VOLUMES, Scene};
+use crate::trace::lookup::pixel_levels;
 use crate::trace::{extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
@@ -67,7 +68,7 @@ pub struct FrameUniforms {
     pub flow_moves: f32,
     pub shutter_first: f32,
     pub shutter_step: f32,
-    pub pad_d: f32,
+    pub pixel_levels: f32,
     pub pad_e: f32,
 }
 
@@ -525,7 +526,7 @@ impl FrameUniforms {
             flow_moves: scene.flow_moves(volumes)[0],
             shutter_first: times.first,
             shutter_step: times.step,
-            pad_d: 0.0,
+            pixel_levels: pixel_levels(image.samples),
             pad_e: 0.0,
         }
     }

@@ -231,9 +231,12 @@ impl Hits {
             let across = area / (det.abs() * depth * d_cell.dot(d_cell).sqrt());
             let exact = splat(0.5) * log2(simd, across.max(splat(1e-30)));
             let coarsest = hits.of_volumes(simd, integrator, |volume| (volume.levels.len() - 1) as f32);
-            let finest = |volume: &FrameVolume| if volume.has_lines { STRANDS as f32 } else { 0.0 };
-            let finest = is_mist.select(zero, hits.of_volumes(simd, integrator, finest));
-            let exact = exact.max(finest).min(coarsest);
+            let keeps_lines = |volume: &FrameVolume| f32::from(u8::from(volume.has_lines));
+            let keeps_lines = hits.of_volumes(simd, integrator, keeps_lines).simd_gt(0.0) & !is_mist;
+            let of_pixel = exact + integrator.pixel_levels;
+            let is_close = keeps_lines & of_pixel.simd_lt(zero);
+            let strands = of_pixel.max(splat(STRANDS as f32));
+            let exact = is_close.select(strands, exact.max(zero).min(coarsest));
             level = floor_cell(simd, exact).to_float::<f32x8<S>>();
             share = exact - level;
         }
