@@ -374,7 +374,6 @@ pub fn volume_constants(
         strands: scene.reflection_of(i).strands().is_some().into(),
         lines: scene.recipes[i].has_lines().into(),
         flow_moves: moves[i],
-        ..VolumeConstants::default()
     };
     let mut all: Vec<VolumeConstants> = volumes.iter().enumerate().map(constants).collect();
     all.resize(MAX_VOLUMES, VolumeConstants::default());
