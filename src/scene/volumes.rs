@@ -535,7 +535,7 @@ impl Scene {
     }
 
     /// Whether what a sample sees depends on the number of samples, among which time and lens are divided.
-    pub(crate) fn counts_samples(&self) -> bool {
+    pub fn counts_samples(&self) -> bool {
         self.lens.is_some() || self.moves() || self.wave_moves != 0.0
     }
 
