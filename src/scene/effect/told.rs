@@ -6,11 +6,12 @@ use crate::scene::Values;
 use crate::scene::measured::Builder;
 use crate::scene::param::{COLORS, Param, key_of_volume, split_volume_key};
 use crate::scene::volumes;
-use crate::trace::AttenuationKind;
+use crate::trace::{AttenuationKind, Lookup};
 
 /// Returns a warning about each value by which the scene shows less than it seems to.
 pub(in crate::scene) fn told(values: &Values) -> Vec<String> {
     let mut told: Vec<String> = transparent(values).into_iter().collect();
+    told.extend(without_lines(values));
     told.extend(volumes::shown(values).iter().filter_map(|name| crowded(values, name)));
     told.extend(of_volumes(values));
     told
@@ -27,6 +28,21 @@ fn transparent(values: &Values) -> Option<String> {
         format!(
             "{key} = 0 makes all volumes transparent; a cell hides most of what lies behind it from {more} on"
         )
+    })
+}
+
+/// Returns a warning where rays look for the strands of cells, and no volume keeps any.
+fn without_lines(values: &Values) -> Option<String> {
+    let keeps_lines = |name: &String| {
+        builder(values, name) == Builder::Curves
+            && values.text(&key_of_volume(name, "volume.file")).is_empty()
+    };
+    let shown = volumes::shown(values);
+    let looks = values.choice("trace.lookup", Lookup::from_word) == Lookup::Strand;
+    (looks && !shown.is_empty() && !shown.iter().any(keeps_lines)).then(|| {
+        "trace.lookup = \"strand\" finds no strands, which only volumes of curves keep: cells are shown as with \
+         nearest; set trace.lookup=trilinear for close views"
+            .to_string()
     })
 }
 

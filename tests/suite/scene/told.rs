@@ -50,6 +50,13 @@ fn one(text: &str, sets: &[&str], words: &[&str]) {
 }
 
 #[test]
+fn strands_that_no_volume_keeps_are_told() {
+    one(RING, &["trace.lookup=strand"], &["trace.lookup", "finds no strands"]);
+    let scene = Scene::preset("fig5").expect("a preset").with(&["trace.lookup=strand"]).expect("valid");
+    assert_eq!(scene.warnings(NO_VOLUMES), Vec::<String>::new());
+}
+
+#[test]
 fn an_extinction_of_nothing_is_told() {
     assert_eq!(warnings(RING, &[]), Vec::<String>::new());
     one(RING, &["trace.sigma=0"], &["trace.sigma = 0 makes all volumes transparent", "1.5 ÷"]);
