@@ -661,8 +661,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// Returns the finer of the two levels whose cells suit the ray `t` metres from the eye, and the share of
-    /// the coarser. Where a pixel sees less than a cell, it walks the strands, level [`STRANDS`], if there are
-    /// any.
+    /// the coarser. Where a pixel sees less than a cell, it walks the strands, level [`STRANDS`], if there
+    /// are any.
     #[inline]
     fn level_of(&self, ray: &SheetHit, t: f32) -> (i32, f32) {
         let volume = &self.volumes[ray.volume];

@@ -1,5 +1,5 @@
-//! The walk of eight rays through the strands of a volume, and what each meets of them. Twin of `walk_strands`
-//! in `src/engine/cpu/integrate/walk.rs` and of `src/trace/lines.rs`, with the same bits.
+//! The walk of eight rays through the strands of a volume, and what each meets of them. Twin of
+//! `walk_strands` in `src/engine/cpu/integrate/walk.rs` and of `src/trace/lines.rs`, with the same bits.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
