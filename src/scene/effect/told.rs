@@ -40,8 +40,8 @@ fn without_lines(values: &Values) -> Option<String> {
     let shown = volumes::shown(values);
     let looks = values.choice("trace.lookup", Lookup::from_word) == Lookup::Strand;
     (looks && !shown.is_empty() && !shown.iter().any(keeps_lines)).then(|| {
-        "trace.lookup = \"strand\" finds no strands, which only volumes of curves keep: cells are shown as with \
-         nearest; set trace.lookup=trilinear for close views"
+        "trace.lookup = \"strand\" finds no strands, which only volumes of curves keep: cells are shown as \
+         with nearest; set trace.lookup=trilinear for close views"
             .to_string()
     })
 }
