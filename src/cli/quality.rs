@@ -7,7 +7,8 @@ use super::options::SceneOptions;
 use super::terminal::Terminal;
 use crate::scene::{Values, full_key};
 
-/// Settings of each word. What they leave out stays as the scene says.
+/// Settings of each word. What they leave out stays as the scene says: a lookup that interpolates may be its
+/// look, and one that does not loses density by it.
 const DRAFT: &[&str] = &[
     "image.samples=1",
     "image.filter=box",
@@ -15,20 +16,10 @@ const DRAFT: &[&str] = &[
     "trace.lookup=nearest",
     "trace.layers=2",
 ];
-const PREVIEW: &[&str] = &[
-    "image.samples=4",
-    "image.filter=gaussian",
-    "trace.filter=pyramid",
-    "trace.lookup=nearest",
-    "trace.layers=4",
-];
-const FINAL: &[&str] = &[
-    "image.samples=64",
-    "image.filter=blackman-harris",
-    "trace.filter=pyramid",
-    "trace.lookup=trilinear",
-    "trace.layers=8",
-];
+const PREVIEW: &[&str] =
+    &["image.samples=4", "image.filter=gaussian", "trace.filter=pyramid", "trace.layers=4"];
+const FINAL: &[&str] =
+    &["image.samples=64", "image.filter=blackman-harris", "trace.filter=pyramid", "trace.layers=8"];
 
 /// A word of `--quality`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +51,8 @@ impl Quality {
 /// Option of commands that render pictures.
 #[derive(Args, Clone)]
 pub struct QualityOptions {
-    /// Sets the samples, the filters, the lookup and the layers together: image.samples, image.filter,
-    /// trace.filter, trace.lookup and trace.layers. --set and --samples win over it.
+    /// Sets the samples, the filters and the layers together: image.samples, image.filter, trace.filter and
+    /// trace.layers; draft sets trace.lookup=nearest too. --set, --samples and --sweep win over it.
     #[arg(long, value_parser = choice::quality(), value_name = "WORD")]
     pub quality: Option<Quality>,
 }

@@ -12,6 +12,7 @@ use crate::trace::{AttenuationKind, Lookup};
 pub(in crate::scene) fn told(values: &Values) -> Vec<String> {
     let mut told: Vec<String> = transparent(values).into_iter().collect();
     told.extend(without_lines(values));
+    told.extend(without_motion(values));
     told.extend(volumes::shown(values).iter().filter_map(|name| crowded(values, name)));
     told.extend(of_volumes(values));
     told
@@ -46,10 +47,19 @@ fn without_lines(values: &Values) -> Option<String> {
     })
 }
 
+/// Returns a warning where the shutter is open, and nothing is shown that moves meanwhile.
+fn without_motion(values: &Values) -> Option<String> {
+    let moves =
+        !values.names("pools").is_empty() || volumes::shown(values).iter().any(|name| name == "water");
+    (values.float("camera.shutter") > 0.0 && !moves)
+        .then(|| "camera.shutter moves the volume water and pools, of which the scene shows none".to_string())
+}
+
 /// Returns a warning about a volume with more clumps or locks than hairs.
 fn crowded(values: &Values, name: &str) -> Option<String> {
+    let gathers = |key: &str| values.float(&key_of_volume(name, key)) > 0.0;
     let keys = match builder(values, name) {
-        Builder::Fur => ["fur.clumps", "fur.hairs"],
+        Builder::Fur if gathers("fur.clumping") => ["fur.clumps", "fur.hairs"],
         Builder::Hair => ["tress.locks", "tress.strand_count"],
         _ => return None,
     };

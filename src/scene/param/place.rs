@@ -238,7 +238,7 @@ pub(super) const CAMERA: Group = Group {
                  cameras, other volumes and other parameters stay where they are at the frame's time.",
             )
             .when(
-                "Set it to 1/60 for the crisp water of a snapshot, 1/8 to 1 for silk; give the picture 16 \
+                "Set it to 0.017 for the crisp water of a snapshot, 0.125 to 1 for silk; give the picture 16 \
                  samples or more.",
             ),
     ],

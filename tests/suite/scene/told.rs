@@ -57,6 +57,13 @@ fn strands_that_no_volume_keeps_are_told() {
 }
 
 #[test]
+fn a_shutter_before_nothing_that_moves_is_told() {
+    one(RING, &["camera.shutter=0.1"], &["camera.shutter", "shows none"]);
+    let scene = Scene::preset("fig5").expect("a preset").with(&["camera.shutter=0.1"]).expect("valid");
+    assert!(!scene.warnings(NO_VOLUMES).concat().contains("shows none"));
+}
+
+#[test]
 fn an_extinction_of_nothing_is_told() {
     assert_eq!(warnings(RING, &[]), Vec::<String>::new());
     one(RING, &["trace.sigma=0"], &["trace.sigma = 0 makes all volumes transparent", "1.5 ÷"]);
