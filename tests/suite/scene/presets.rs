@@ -191,7 +191,8 @@ fn the_base_water_has_the_look_of_the_default_scene_and_nothing_of_its_place() {
     std::fs::write(&file, format!("version = 1\nbase = \"water\"\n{sheet}")).expect("written");
     let own = Scene::load(&file, &[], &Limits::default()).expect("a scene");
     // What is near shows its strands, too.
-    let default = Scene::preset("waterfall").expect("a preset").with(&["trace.lookup=strand"]).expect("valid");
+    let default =
+        Scene::preset("waterfall").expect("a preset").with(&["trace.lookup=strand"]).expect("valid");
     assert_eq!(own.recipes[0].water, default.recipes[0].water);
     assert_eq!((own.trace, own.p, own.ambient), (default.trace, default.p, default.ambient));
     assert_eq!(own.lights, default.lights);
