@@ -56,15 +56,15 @@ fn walk_strands(view: View, ray: ptr<function, Ray>) {
     }
 }
 
-// What a ray meets of the strand of a cell.
+// A strand of a cell as a ray meets it.
 struct MetStrand {
     cell: vec3<i32>,
     texel: vec2<u32>,
     tau_bits: f32,
 }
 
-// What a ray meets, between eight centres of cells, of the strand of one of them. `upper` is the highest of
-// the cells; `depth_of_t` is the optical depth of ρ = 1 in one unit of t, bits.
+// Finds the strand of one of the eight cells between whose centres a ray is. `upper` is the highest of the
+// cells; `depth_of_t` is the optical depth of ρ = 1 in one unit of t, bits.
 fn strand_at(corner: i32, segment: LineSegment, upper: vec3<i32>, depth_of_t: f32, view: View) -> MetStrand {
     let away = vec3<i32>(corner & 1, (corner >> 1u) & 1, corner >> 2u);
     var met: MetStrand;

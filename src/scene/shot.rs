@@ -1,4 +1,4 @@
-//! What the lens and the shutter ask of a picture.
+//! Samples that a lens and an open shutter want.
 
 use std::f64::consts::PI;
 

@@ -80,7 +80,7 @@ pub(super) fn count(text: &str) -> Counts {
         }
         at += 1;
     }
-    // Of those that are open at the end, the last was meant to be closed first.
+    // The last of those that are open at the end was meant to be closed first.
     let first = unclosed.or(opened.last().copied());
     let line = |place: usize| 1 + bytes[..place].iter().filter(|byte| **byte == b'\n').count();
     counts.unclosed = first.map(|(own, place)| (char::from(own), line(place)));

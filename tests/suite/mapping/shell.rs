@@ -339,7 +339,7 @@ fn shells_thicker_than_the_radius_turn_over() {
         assert_eq!(count, if is_turned { all } else { 0 }, "{thickness}");
     }
     assert_eq!(turned(sphere(3, 3.0), Side::Outward).0, 0);
-    // Of a torus whose tube has the radius 0.7, all triangles turn over, and none below.
+    // A torus whose tube has the radius 0.7 turns over where its shell is thicker than that.
     assert_eq!(turned(torus(60, 40, 0.6), Side::Inward).0, 0);
     let (count, all) = turned(torus(60, 40, 0.8), Side::Inward);
     assert_eq!(count, all);

@@ -190,7 +190,7 @@ fn the_base_water_has_the_look_of_the_default_scene_and_nothing_of_its_place() {
     let sheet = "[sheets.own]\npoints = [[0, 3, 0], [0, -3, 1]]\nwidths = [2]\n";
     std::fs::write(&file, format!("version = 1\nbase = \"water\"\n{sheet}")).expect("written");
     let own = Scene::load(&file, &[], &Limits::default()).expect("a scene");
-    // What is near shows its strands, too.
+    // The base shows strands near by, too.
     let default =
         Scene::preset("waterfall").expect("a preset").with(&["trace.lookup=strand"]).expect("valid");
     assert_eq!(own.recipes[0].water, default.recipes[0].water);

@@ -57,7 +57,7 @@ impl Lit {
     }
 }
 
-/// What all lights need to know of a cell that a ray sees.
+/// Values of a cell that a ray sees, which all lights share.
 struct Seen {
     /// Position in the level.
     at: IVec3,
@@ -73,7 +73,7 @@ struct Seen {
     depth: f32,
 }
 
-/// What is constant along a ray through one level, and the light so far.
+/// Terms of a ray that are constant through one level, and its light so far.
 struct Walked<'a> {
     ray: &'a SheetHit<'a>,
     level: &'a Level<'a>,
