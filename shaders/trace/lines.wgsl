@@ -6,7 +6,7 @@
 #import trace::levels
 #import volume::cells
 
-// Whether rays that see less than a cell walk the strands.
+// Whether rays walk the strands where their pixel sees less than a cell.
 override LINES: bool = false;
 
 // Number of the level that stands for the strands' lines.

@@ -140,7 +140,7 @@ impl Integrator<'_> {
 
     /// Walks the strands of the volume to the end of the slab or of the ray, between the centres of the cells
     /// of its finest level. T before the sheet is `before`. Twin: `walk_strands` of
-    /// `shaders/engine/integrate.wgsl`.
+    /// `shaders/engine/integrate_strands.wgsl`.
     pub(super) fn walk_strands<O: Observer>(
         &self,
         ray: &SheetHit,
