@@ -1,5 +1,5 @@
-// §4 The walk of a ray whose pixel sees less than a cell: through the strands that made the cells. Part of the
-// stage integrate. Twin: walk_strands of src/engine/cpu/integrate/walk.rs.
+// §4 The walk of a ray whose pixel sees less than a cell: through the strands that made the cells. Part of
+// the stage integrate. Twin: walk_strands of src/engine/cpu/integrate/walk.rs.
 
 #import engine::integrate
 #import layout
