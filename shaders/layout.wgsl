@@ -75,9 +75,9 @@ struct FrameUniforms {
     // Times of the sample in all pixels: SampleTimes of src/picture/shutter.rs.
     shutter_first: f32,
     shutter_step: f32,
-    // Levels by which a pixel is coarser than one of its samples.
-    pixel_levels: f32,
-    pad_e: f32,
+    // Turn of the sample to walk strands: StrandTurn of src/trace/lookup.rs.
+    strand_scale: f32,
+    strand_shift: f32,
 }
 
 struct Light {

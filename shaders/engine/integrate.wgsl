@@ -132,15 +132,15 @@ fn is_strand(own: VolumeConstants) -> bool {
 }
 
 // Level that a ray through a quad walks, from the one whose cells are as large as its sample's footprint.
-// Twin: walked_level of src/trace/lookup.rs.
+// Twin: StrandTurn::level of src/trace/lookup.rs.
 fn walked_level(level: f32, own: VolumeConstants, quad: Quad) -> f32 {
     let cells = clamp(level, 0.0, f32(own.levels - 1u));
     if !LINES {
         return cells;
     }
     let keeps_lines = (!SEVERAL || own.lines != 0u) && quad.mist == 0.0;
-    let of_pixel = level + frame.pixel_levels;
-    return select(cells, max(of_pixel, f32(STRANDS)), keeps_lines && of_pixel < 0.0);
+    let in_turn = level * frame.strand_scale + frame.strand_shift;
+    return select(cells, max(in_turn, f32(STRANDS)), keeps_lines && in_turn < 0.0);
 }
 
 // Ambient light that cells send on: all of it, as mist and fibres do, or the hair's share.

@@ -128,20 +128,35 @@ pub struct CellSample {
     pub moments: Option<Moments>,
 }
 
-/// Levels by which a pixel is coarser than one of its `samples`.
-pub fn pixel_levels(samples: u32) -> f32 {
-    0.5 * (samples as f32).log2()
+/// Turn of a sample to walk strands. Where strands and cells are blended, the samples of a pixel take turns:
+/// the first ones walk the strands, the last ones the cells, and at most one walks both. So the blend costs
+/// hardly more than its parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StrandTurn {
+    /// Number of samples.
+    pub scale: f32,
+    /// Number of samples times the levels by which a pixel is coarser than one of them, plus the number of
+    /// earlier samples.
+    pub shift: f32,
 }
 
-/// Level that a ray walks, from the one whose cells are as large as its sample's footprint: at least 0 and at
-/// most `coarsest`. In a volume that keeps lines, it is less where the whole pixel, which is `pixel_levels`
-/// coarser, sees less than a cell: down to [`STRANDS`].
-#[inline]
-pub fn walked_level(level: f32, pixel_levels: f32, keeps_lines: bool, coarsest: f32) -> f32 {
-    let of_pixel = level + pixel_levels;
-    match keeps_lines && of_pixel < 0.0 {
-        true => of_pixel.max(STRANDS as f32),
-        false => level.clamp(0.0, coarsest),
+impl StrandTurn {
+    /// Turn of a sample of a picture with so many.
+    pub fn new(samples: u32, sample: u32) -> Self {
+        let scale = samples as f32;
+        StrandTurn { scale, shift: scale * (0.5 * scale.log2()) + sample as f32 }
+    }
+
+    /// Level that a ray walks, from the one whose cells are as large as its sample's footprint: at least 0
+    /// and at most `coarsest`. In a volume that keeps lines, it is less where the whole pixel sees less than
+    /// a cell and it is the sample's turn: down to [`STRANDS`].
+    #[inline]
+    pub fn level(self, level: f32, keeps_lines: bool, coarsest: f32) -> f32 {
+        let in_turn = level * self.scale + self.shift;
+        match keeps_lines && in_turn < 0.0 {
+            true => in_turn.max(STRANDS as f32),
+            false => level.clamp(0.0, coarsest),
+        }
     }
 }
 

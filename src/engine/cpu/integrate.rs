@@ -28,7 +28,7 @@ use crate::picture::camera::{RayFrame, footprint, sample_offset};
 use crate::picture::{Camera, SampleTimes};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
-use crate::trace::lookup::{Level, STRANDS, level_at, pixel_levels, walked_level};
+use crate::trace::lookup::{Level, STRANDS, StrandTurn, level_at};
 use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
@@ -48,8 +48,6 @@ pub struct Integrator<'a> {
     per_cell: bool,
     /// Footprint of a sample; see [`footprint`].
     footprint: f32,
-    /// See [`pixel_levels`].
-    pixel_levels: f32,
     lights: Vec<Light>,
     /// Visibility of the scene, or `Cached` where light volumes stand for walks to the lights.
     visibility: Visibility,
@@ -184,6 +182,8 @@ struct SheetOrder {
     behind: Vec3,
     /// Time of the ray; see [`SampleTimes`].
     time: f32,
+    /// Turn of its sample to walk strands.
+    turn: StrandTurn,
 }
 
 /// Walks the rays of many pixels, in lockstep where that covers the scene.
@@ -219,6 +219,8 @@ struct PixelRay {
     d: Vec3,
     /// Time of the ray; see [`SampleTimes`].
     time: f32,
+    /// Turn of its sample to walk strands.
+    turn: StrandTurn,
     /// Linear radiance behind all sheets.
     behind: Vec3,
     /// Share of a backdrop that shows behind them.
@@ -248,8 +250,8 @@ impl PixelRay {
         }
         let (number, hit) = gbuffer.face(self.i, self.sheets)?;
         let is_last = gbuffer.face(self.i, self.sheets + 1).is_none();
-        let (before, behind, time) = (self.all.transmittance, self.behind, self.time);
-        let order = SheetOrder { before, is_last, behind, time };
+        let &PixelRay { behind, time, turn, .. } = self;
+        let order = SheetOrder { before: self.all.transmittance, is_last, behind, time, turn };
         let met = match scene.face(number) {
             Face::Quad(_) => Carrier::Quad(number, hit),
             Face::Hull(shell, face) => {
@@ -361,7 +363,6 @@ impl<'a> Integrator<'a> {
             volumes: volumes.iter().zip(levels).enumerate().map(frame_volume).collect(),
             per_cell: matches!(scene.trace.attenuation, Attenuation::PerCell { .. }),
             footprint: footprint(&scene.camera, &scene.image),
-            pixel_levels: pixel_levels(scene.image.samples),
             lights: scene.volume_lights(),
             light_volumes: (scene.visibility == Visibility::Cached)
                 .then(|| scene.light_volumes(volumes, u64::MAX).expect("the largest budget fits")),
@@ -448,7 +449,8 @@ impl<'a> Integrator<'a> {
         let d = self.rays.direction(Camera::image_point(image.width, image.height, pixel, offset));
         let all = RayResult { radiance: Vec3::ZERO, transmittance: 1.0, uncovered: 1.0, cells: [0, 0] };
         let time = SampleTimes::new(image, sample).of(pixel);
-        Ok(PixelRay { i, d, time, behind, shows, all, sheets: 0, ended: false })
+        let turn = StrandTurn::new(image.samples, sample);
+        Ok(PixelRay { i, d, time, turn, behind, shows, all, sheets: 0, ended: false })
     }
 
     /// Adds a sheet to those that a ray has passed.
@@ -486,7 +488,9 @@ impl<'a> Integrator<'a> {
         behind: Vec3,
         observer: &mut O,
     ) -> RayResult {
-        self.sheet(quad, d_world, hit, SheetOrder { before: 1.0, is_last: true, behind, time: 0.0 }, observer)
+        let turn = StrandTurn::new(self.scene.image.samples, 0);
+        let order = SheetOrder { before: 1.0, is_last: true, behind, time: 0.0, turn };
+        self.sheet(quad, d_world, hit, order, observer)
     }
 
     /// Traces one sheet of a ray. Sheets are composited face by face: if a slab extends behind the next
@@ -502,7 +506,7 @@ impl<'a> Integrator<'a> {
     ) -> RayResult {
         let before = order.before;
         let ray = self.sheet_hit(quad, d_world, hit, order.time);
-        let (level, share) = self.level_of(&ray, hit[2]);
+        let (level, share) = self.level_of(&ray, hit[2], order.turn);
         let mut result = self.walk_numbered(&ray, level, before, observer);
         if share > 0.0 {
             let next = self.walk_numbered(&ray, level + 1, before, observer);
@@ -664,7 +668,7 @@ impl<'a> Integrator<'a> {
     /// the coarser. Where a pixel sees less than a cell, it walks the strands, level [`STRANDS`], if there
     /// are any.
     #[inline]
-    fn level_of(&self, ray: &SheetHit, t: f32) -> (i32, f32) {
+    fn level_of(&self, ray: &SheetHit, t: f32, turn: StrandTurn) -> (i32, f32) {
         let volume = &self.volumes[ray.volume];
         let is_filtered = self.scene.trace.filter != Prefilter::None;
         if !is_filtered && !volume.has_lines {
@@ -676,7 +680,7 @@ impl<'a> Integrator<'a> {
         let level = level_at(self.footprint, forward, ray.d_world, t, area);
         let keeps_lines = volume.has_lines && ray.matter[0].mist == 0.0;
         let coarsest = (volume.levels.len() - 1) as f32;
-        let level = walked_level(level, self.pixel_levels, keeps_lines, coarsest);
+        let level = turn.level(level, keeps_lines, coarsest);
         (level.floor() as i32, level - level.floor())
     }
 }

@@ -12,7 +12,7 @@ use crate::light::{AngleFrame, environment, ramp, scatter};
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::{MAX_VOLUMES, Scene};
-use crate::trace::lookup::pixel_levels;
+use crate::trace::lookup::StrandTurn;
 use crate::trace::{extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
@@ -68,8 +68,8 @@ pub struct FrameUniforms {
     pub flow_moves: f32,
     pub shutter_first: f32,
     pub shutter_step: f32,
-    pub pixel_levels: f32,
-    pub pad_e: f32,
+    pub strand_scale: f32,
+    pub strand_shift: f32,
 }
 
 /// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
@@ -478,6 +478,7 @@ impl FrameUniforms {
         let haze = scene.haze.seen_from(camera.eye_local());
         let [jitter_x, jitter_y] = sample_offset(image, sample);
         let times = scene.sample_times(sample);
+        let turn = StrandTurn::new(image.samples, sample);
         let (right, up) = camera.image_plane(image.width, image.height);
         let clip = camera.clip_from_world(image.width, image.height, [jitter_x, jitter_y], depth);
         let to_point = camera.depth_to_point(depth);
@@ -525,8 +526,8 @@ impl FrameUniforms {
             flow_moves: scene.flow_moves(volumes)[0],
             shutter_first: times.first,
             shutter_step: times.step,
-            pixel_levels: pixel_levels(image.samples),
-            pad_e: 0.0,
+            strand_scale: turn.scale,
+            strand_shift: turn.shift,
         }
     }
 }

@@ -84,6 +84,10 @@ impl Batch {
         let last = std::mem::take(&mut *outcomes.lock().unwrap_or_else(|e| e.into_inner()));
         let ended = ended.and(work.note(last));
         let whole = work.failure.is_none();
+        if ended.is_ok() && whole {
+            // A process that was killed may have claimed a picture that this run was done with.
+            self.own().filter_map(|n| self.files(n).into_iter().next()).for_each(|f| Claims::clear_dead(&f));
+        }
         let ended = ended.and_then(|()| if whole { self.assemble(watcher) } else { Ok(()) });
         let Work { mut summary, failure, .. } = work;
         let result = match (ended, failure) {

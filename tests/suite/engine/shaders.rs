@@ -164,7 +164,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
         window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha anchor
         depth_shift depth_rise depth_slope depth_scale flow_moves shutter_first
-        shutter_step pixel_levels pad_e);
+        shutter_step strand_scale strand_shift);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),

@@ -322,17 +322,41 @@ fn memory_threads_and_files_stay_flat() {
     grows_not("auto", if long() { 2000 } else { 400 });
 }
 
-#[test]
-fn a_claim_of_a_process_that_has_ended_is_taken_over_at_once_even_if_nobody_buried_it() {
-    let dir = folder();
-    let mut zombie = Command::new("true").spawn().unwrap();
+/// A process that has ended and is not waited for, and what its claims hold.
+fn dead_owner() -> (std::process::Child, String) {
+    let zombie = Command::new("true").spawn().unwrap();
     std::thread::sleep(Duration::from_millis(200));
     let machine = &taki::output::frame::Owner::me().machine;
     let owner = format!(r#"{{"host":"here","machine":"{machine}","pid":{},"started":0}}"#, zombie.id());
+    (zombie, owner)
+}
+
+#[test]
+fn a_claim_of_a_process_that_has_ended_is_taken_over_at_once_even_if_nobody_buried_it() {
+    let dir = folder();
+    let (mut zombie, owner) = dead_owner();
     fs::write(dir.path().join(".f.0000.png.taki-claim-0"), owner).unwrap();
     let ended = run(&mut batch(dir.path(), ["--frames", "0-1", "-o", "f.####.png", "--events=json"]));
     assert_eq!(counts(&ended), [2, 0, 2, 0, 0]);
     assert!(!ended.stdout().contains("waiting"), "{}", ended.stdout());
     assert_eq!(files(dir.path()).len(), 2);
+    zombie.wait().unwrap();
+}
+
+#[test]
+fn a_claim_that_a_killed_process_left_on_a_finished_picture_is_gone_at_the_end() {
+    let dir = folder();
+    let (mut zombie, owner) = dead_owner();
+    let mut command = taki(["batch", "front", "--engine=cpu", "--size=32x32", "--samples=4096"]);
+    command.args(["--frames", "0-2", "-o", "f.####.png", "--events=json"]).current_dir(dir.path());
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let events = std::io::BufReader::new(child.stdout.take().unwrap());
+    let mut lines = std::io::BufRead::lines(events).map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("\"saved\"")), "no picture");
+    fs::write(dir.path().join(".f.0000.png.taki-claim-0"), owner).unwrap();
+    assert!(lines.any(|line| line.contains("\"saved\"")), "the run had ended before the claim was there");
+    lines.for_each(drop);
+    assert_eq!(wait(&mut child), Some(0));
+    assert_eq!(files(dir.path()).into_keys().collect::<Vec<_>>(), ["f.0000.png", "f.0001.png", "f.0002.png"]);
     zombie.wait().unwrap();
 }

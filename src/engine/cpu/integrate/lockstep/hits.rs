@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
-use crate::trace::lookup::STRANDS;
+use crate::trace::lookup::{STRANDS, StrandTurn};
 use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
@@ -141,7 +141,7 @@ impl Hits {
 
     /// Maps the eight rays to the cells of their quads, once all are in place.
     #[inline(always)]
-    pub fn map<S: Simd>(&mut self, simd: S, integrator: &Integrator) {
+    pub fn map<S: Simd>(&mut self, simd: S, integrator: &Integrator, turn: StrandTurn) {
         self.is_one_quad = self.quads == [self.quads[0]; LANES];
         let scene = integrator.scene;
         let all = &scene.quads;
@@ -233,10 +233,10 @@ impl Hits {
             let coarsest = hits.of_volumes(simd, integrator, |volume| (volume.levels.len() - 1) as f32);
             let keeps_lines = |volume: &FrameVolume| f32::from(u8::from(volume.has_lines));
             let keeps_lines = hits.of_volumes(simd, integrator, keeps_lines).simd_gt(0.0) & !is_mist;
-            let of_pixel = exact + integrator.pixel_levels;
-            let is_close = keeps_lines & of_pixel.simd_lt(zero);
-            let strands = of_pixel.max(splat(STRANDS as f32));
-            let exact = is_close.select(strands, exact.max(zero).min(coarsest));
+            let in_turn = exact * turn.scale + turn.shift;
+            let walks_strands = keeps_lines & in_turn.simd_lt(zero);
+            let exact =
+                walks_strands.select(in_turn.max(splat(STRANDS as f32)), exact.max(zero).min(coarsest));
             level = floor_cell(simd, exact).to_float::<f32x8<S>>();
             share = exact - level;
         }

@@ -45,7 +45,7 @@ use super::walk::Lit;
 use super::{Carrier, Integrator, PixelRay, RayResult, SheetOrder};
 use crate::engine::cpu::gbuffer::Gbuffer;
 use crate::light::Visibility;
-use crate::trace::lookup::{Level, STRANDS};
+use crate::trace::lookup::{Level, STRANDS, StrandTurn};
 use crate::util::lanes::LANES;
 
 /// Registers that rays are walked in.
@@ -172,6 +172,7 @@ impl<'a> Lockstep<'a> {
         result: &mut impl FnMut(usize, RayResult),
     ) {
         let integrator = self.integrator;
+        let turn = StrandTurn::new(integrator.scene.image.samples, sample);
         for (number, stretch) in pixels.chunks(STRETCH).enumerate() {
             for (i, &pixel) in (number * STRETCH..).zip(stretch) {
                 match integrator.pixel_ray(gbuffer, pixel, sample) {
@@ -179,7 +180,7 @@ impl<'a> Lockstep<'a> {
                     Err(dry) => result(i, dry),
                 }
             }
-            while self.meet(gbuffer) {
+            while self.meet(gbuffer, turn) {
                 self.walk();
                 self.compose();
                 self.walk_shells();
@@ -189,7 +190,7 @@ impl<'a> Lockstep<'a> {
     }
 
     /// Finds the next sheet or shell of every ray. Returns whether there is any.
-    fn meet(&mut self, gbuffer: &Gbuffer) -> bool {
+    fn meet(&mut self, gbuffer: &Gbuffer, turn: StrandTurn) -> bool {
         let Lockstep { rays, met, shells, shells_in_lanes, .. } = self;
         met.sheets.clear();
         met.packs.clear();
@@ -227,7 +228,7 @@ impl<'a> Lockstep<'a> {
             let (ray, at) = ((values.d_world.get(last), values.time.0[last]), values.at.get(last));
             (last + 1..LANES).for_each(|lane| pack.set(lane, quad, ray, at.into()));
         }
-        dispatch!(self.simd, simd => map_all(simd, self.integrator, &mut met.packs));
+        dispatch!(self.simd, simd => map_all(simd, self.integrator, turn, &mut met.packs));
         !(met.sheets.is_empty() && shells.is_empty())
     }
 
@@ -318,9 +319,9 @@ impl<'a> Lockstep<'a> {
 
 /// Maps the rays of all packs to their cells.
 #[inline(always)]
-fn map_all<S: Simd>(simd: S, integrator: &Integrator, packs: &mut [Hits]) {
+fn map_all<S: Simd>(simd: S, integrator: &Integrator, turn: StrandTurn, packs: &mut [Hits]) {
     // A closure might not be inlined here, and would lose the instruction set.
     for pack in packs {
-        pack.map(simd, integrator);
+        pack.map(simd, integrator, turn);
     }
 }
