@@ -131,20 +131,23 @@ pub struct CellSample {
 /// Turn of a sample to walk strands. Where strands and cells are blended, the samples of a pixel take turns:
 /// the first ones walk the strands, the last ones the cells, and at most one walks both. So the blend costs
 /// hardly more than its parts.
+///
+/// The turn of sample i of n comes in the middle half of the levels from −i/n to −(i + 1)/n. A level is the
+/// whole pixel's, so pictures with more samples show the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrandTurn {
-    /// Number of samples.
+    /// Factor of the sample's level.
     pub scale: f32,
-    /// Number of samples times the levels by which a pixel is coarser than one of them, plus the number of
-    /// earlier samples.
+    /// Summand.
     pub shift: f32,
 }
 
 impl StrandTurn {
     /// Turn of a sample of a picture with so many.
     pub fn new(samples: u32, sample: u32) -> Self {
-        let scale = samples as f32;
-        StrandTurn { scale, shift: scale * (0.5 * scale.log2()) + sample as f32 }
+        let n = samples as f32;
+        let pixel_levels = 0.5 * n.log2();
+        StrandTurn { scale: 2.0 * n, shift: 2.0 * (n * pixel_levels + sample as f32) + 0.5 }
     }
 
     /// Level that a ray walks, from the one whose cells are as large as its sample's footprint: at least 0

@@ -5,6 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, UnitSphere};
 use rand_pcg::Pcg64Mcg;
 use taki::trace::lines::{STRAND_RADIUS, Segment};
+use taki::trace::lookup::StrandTurn;
 use taki::volume::Cell;
 
 /// Density of a cell's strand at `p`, cells from the cell's centre, by its definition.
@@ -94,5 +95,33 @@ fn no_line_reaches_beyond_the_eight_cells_around_a_point() {
         if slope[far].abs() < 0.05 || far == axis {
             assert_eq!(reached, 0.0, "{cell:?} at {p}");
         }
+    }
+}
+
+#[test]
+fn the_samples_of_a_pixel_take_turns_to_walk_strands() {
+    for samples in [1, 3, 4, 16, 100] {
+        let pixel_levels = 0.5 * (samples as f32).log2();
+        let shares = |of_pixel: f32| -> Vec<f32> {
+            let level = of_pixel - pixel_levels;
+            let own = |i| StrandTurn::new(samples, i).level(level, true, 3.0);
+            (0..samples).map(own).map(|level| (-level).clamp(0.0, 1.0)).collect()
+        };
+        assert!(shares(0.0).iter().all(|&share| share == 0.0));
+        assert!(shares(-1.0).iter().chain(&shares(-5.0)).all(|&share| share == 1.0));
+        for step in 0..=1000 {
+            let strands = step as f32 / 1000.0;
+            let shares = shares(-strands);
+            assert!(shares.is_sorted_by(|a, b| a >= b), "{shares:?}");
+            let both = shares.iter().filter(|&&share| share > 0.0 && share < 1.0).count();
+            assert!(both <= 1, "{both} of {samples} samples walk both");
+            // At the ends of its turn, a sample is a quarter ahead or behind.
+            let off = shares.iter().sum::<f32>() - strands * samples as f32;
+            assert!(off.abs() < 0.2501, "{off} samples too many at {strands}");
+        }
+        // Without lines, or seen from afar, the levels are those of the cells.
+        let turn = StrandTurn::new(samples, 0);
+        assert_eq!(turn.level(-7.0, false, 3.0), 0.0);
+        assert_eq!([turn.level(1.25, true, 3.0), turn.level(9.0, true, 3.0)], [1.25, 3.0]);
     }
 }

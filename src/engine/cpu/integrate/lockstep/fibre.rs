@@ -150,15 +150,16 @@ impl<S: Simd> Moments<S> {
     #[inline(always)]
     pub fn unpacked(simd: S, word: Words<S>) -> Self {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
-        let float = |word: Words<S>| signed(word).to_float::<f32x8<S>>();
-        let share = |shift: u32| float((word >> shift) & 127) * (1.0 / 127.0);
-        let (x, z) = (share(0), share(7));
+        let (x, z) = (unsigned_share(word), unsigned_share(word >> 7));
         let yy = (one - x * x - z * z).max(zero);
         let y = yy.sqrt();
-        let r = |shift: u32| (signed(word << shift) >> 26).to_float::<f32x8<S>>() * (1.0 / 31.0);
         Moments {
             diagonal: Lanes3 { x: x * x, y: yy, z: z * z },
-            mixed: Lanes3 { x: r(12) * (x * y), y: r(6) * (x * z), z: r(0) * (y * z) },
+            mixed: Lanes3 {
+                x: signed_share(word << 12) * (x * y),
+                y: signed_share(word << 6) * (x * z),
+                z: signed_share(word) * (y * z),
+            },
         }
     }
 
@@ -278,4 +279,16 @@ impl<S: Simd> Spread<S> {
         let wide = one + splat(p.p) * variance;
         [k_d * sin2_l.sqrt(), k_s * pow(self.simd, base, splat(p.p) / wide) / wide.sqrt()]
     }
+}
+
+/// Numbers from 0 to 1 in the lowest 7 bits.
+#[inline(always)]
+fn unsigned_share<S: Simd>(word: Words<S>) -> Floats<S> {
+    signed(word & 127).to_float::<f32x8<S>>() * (1.0 / 127.0)
+}
+
+/// Numbers from −1 to 1 in the highest 6 bits.
+#[inline(always)]
+fn signed_share<S: Simd>(word: Words<S>) -> Floats<S> {
+    (signed(word) >> 26).to_float::<f32x8<S>>() * (1.0 / 31.0)
 }

@@ -98,23 +98,26 @@ impl<S: Simd> CellOptics<S> {
         let depth = light.depth(simd);
         let length = depth * LN_2;
         let seen = light.reduced(simd, self.extinction, depth);
-        let of = |weight: Floats<S>, reduced, seen: Floats<S>, whole: Floats<S>, isotropic: Floats<S>| {
-            let s = whole * length;
-            let mut forward = peak[4] * 0.2;
-            forward = (forward * s + peak[3]) * 0.25;
-            forward = (forward * s + peak[2]) * (1.0 / 3.0);
-            forward = (forward * s + peak[1]) * 0.5;
-            forward = (forward * s + peak[0]) * s;
-            let sum: Floats<S> = weight * (seen * reduced) + (whole * forward - isotropic) * once;
-            sum.max(zero)
+        let (w, i) = (self.whole, self.isotropic);
+        let forward = Lanes3 {
+            x: forward_sum(peak, w.x * length),
+            y: forward_sum(peak, w.y * length),
+            z: forward_sum(peak, w.z * length),
         };
-        let (w, r, i) = (self.whole, self.reduced, self.isotropic);
-        Lanes3 {
-            x: of(weight.x, r.x, seen.x, w.x, i.x),
-            y: of(weight.y, r.y, seen.y, w.y, i.y),
-            z: of(weight.z, r.z, seen.z, w.z, i.z),
-        }
+        let reduced = weight.by(seen.by(self.reduced));
+        let sum = reduced.plus(w.by(forward).minus(i).times(once));
+        Lanes3 { x: sum.x.max(zero), y: sum.y.max(zero), z: sum.z.max(zero) }
     }
+}
+
+/// Light that the forward peaks pass on, by the depth `s` in units of the matter.
+#[inline(always)]
+fn forward_sum<S: Simd>(peak: &[Floats<S>; ORDERS - 1], s: Floats<S>) -> Floats<S> {
+    let mut forward = peak[4] * 0.2;
+    forward = (forward * s + peak[3]) * 0.25;
+    forward = (forward * s + peak[2]) * (1.0 / 3.0);
+    forward = (forward * s + peak[1]) * 0.5;
+    (forward * s + peak[0]) * s
 }
 
 /// Forward peaks; see [`crate::light::scatter::forward_peak`].

@@ -11,7 +11,7 @@ use super::scatter::LaneScatter;
 use super::walk::{BATCH, NO_CELL, Units, Walk};
 use crate::trace::lines::{LEAST_SINE2, ON_LINE, STRAND_RADIUS};
 use crate::util::lane_powers::exp2;
-use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Stored, Stored3, Words, signed};
+use crate::util::lanes::{Floats, Ints, LANES, Lanes3, Mask, Stored, Stored3, Words, signed};
 use crate::util::powers::log2;
 use crate::volume::{Cell, LINE_STEPS, V_SCALE};
 
@@ -161,12 +161,11 @@ impl<S: Simd> Segments<S> {
         let [x, y, z] = [v.x.abs(), v.y.abs(), v.z.abs()];
         let is_x = x.simd_ge(y) & x.simd_ge(z);
         let is_y = y.simd_ge(z);
-        let main = |of: Lanes3<S>| is_x.select(of.x, is_y.select(of.y, of.z));
-        let largest = is_x.select(x, is_y.select(y, z));
+        let axes = [is_x, is_y];
+        let largest = main(axes, Lanes3 { x, y, z });
         let low = (splat(V_SCALE) - largest).to_int::<i32x8<S>>();
         let line = low | signed((second >> 30) << 6);
-        let place = |step: Ints<S>| (step.to_float::<f32x8<S>>() + 0.5) / splat(LINE_STEPS) - 0.5;
-        let (a, b) = (place(line & 15), place(line >> 4));
+        let (a, b) = (place(simd, line & 15), place(simd, line >> 4));
         let place = Lanes3 {
             x: is_x.select(zero, a),
             y: is_x.select(a, is_y.select(zero, b)),
@@ -190,17 +189,40 @@ impl<S: Simd> Segments<S> {
         let enter = (nearest - reach).max(-self.half);
         let exit = (nearest + reach).min(self.half);
         let (from, to) = (enter - nearest, exit - nearest);
-        let cube = |s: Floats<S>| {
-            let x = u - k * s * s;
-            x * x * x
-        };
-        let sum = |s: Floats<S>| s * (u * u + s * s * k * (splat(0.2) * k * s * s - splat(2.0 / 3.0) * u));
-        let moment = (cube(from) - cube(to)) / (splat(6.0) * k);
-        let sum = sum(to) - sum(from);
-        let side = one - splat(2.0) * main(corner);
-        let share = one - side * (main(w) + main(d) * nearest);
-        let through = share * sum - side * main(d) * moment;
+        let moment = (cube(u, k, from) - cube(u, k, to)) / (splat(6.0) * k);
+        let sum = sum(simd, u, k, to) - sum(simd, u, k, from);
+        let side = one - splat(2.0) * main(axes, corner);
+        let share = one - side * (main(axes, w) + main(axes, d) * nearest);
+        let through = share * sum - side * main(axes, d) * moment;
         let through = through.max(zero) * ON_LINE * largest * inverse.sqrt();
         (u.simd_gt(0.0) & exit.simd_gt(enter)).select(through, zero)
     }
+}
+
+// Functions and not closures, which might not be inlined and would then lose the instruction set.
+
+/// Components along the main axes of lines: x in the first lanes of `axes`, y in the second, otherwise z.
+#[inline(always)]
+fn main<S: Simd>([is_x, is_y]: [Mask<S>; 2], of: Lanes3<S>) -> Floats<S> {
+    is_x.select(of.x, is_y.select(of.y, of.z))
+}
+
+/// Places of lines across their main axes, from −½ to ½, by their steps.
+#[inline(always)]
+fn place<S: Simd>(simd: S, step: Ints<S>) -> Floats<S> {
+    (step.to_float::<f32x8<S>>() + 0.5) / f32x8::splat(simd, LINE_STEPS) - 0.5
+}
+
+/// Cube of u − k·s².
+#[inline(always)]
+fn cube<S: Simd>(u: Floats<S>, k: Floats<S>, s: Floats<S>) -> Floats<S> {
+    let x = u - k * s * s;
+    x * x * x
+}
+
+/// Integral of (u − k·s²)² from 0 to s.
+#[inline(always)]
+fn sum<S: Simd>(simd: S, u: Floats<S>, k: Floats<S>, s: Floats<S>) -> Floats<S> {
+    let splat = |x: f32| f32x8::splat(simd, x);
+    s * (u * u + s * s * k * (splat(0.2) * k * s * s - splat(2.0 / 3.0) * u))
 }
