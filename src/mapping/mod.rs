@@ -15,6 +15,7 @@ mod quad;
 mod sheet;
 pub mod shell;
 mod splash;
+mod surge;
 mod view;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -22,6 +23,7 @@ use glam::{DVec3, Vec2, Vec3};
 pub use quad::Quad;
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use splash::Splash;
+pub use surge::Surges;
 pub use view::{FARTHEST, PlaneView};
 
 /// Cross product of two vectors in a plane: its component along the normal.

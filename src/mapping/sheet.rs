@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::{Material, Quad, QuadFault, QuadMap};
+use super::{Material, Quad, QuadFault, QuadMap, Surges};
 
 /// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -40,6 +40,8 @@ pub struct Sheet {
     pub offset: Vec2,
     /// Erosion towards the borders.
     pub ends: Ends,
+    /// Erosion between surges.
+    pub surges: Surges,
     /// Material of all quads. Its numbers of copies count over the whole sheet.
     pub material: Material,
     /// [`Quad::mist`] of all quads.
@@ -209,7 +211,10 @@ impl Sheet {
                 let extent = (to - from).as_vec2();
                 let material = Material { repeat_u: extent.x, repeat_v: extent.y, ..self.material };
                 let way = |row: usize| (ends[row].arc / last.arc) as f32;
-                let erosion = at.map(|(row, u)| self.ends.erosion(u, way(row)));
+                let erosion = at.map(|(row, u)| {
+                    let e = self.ends.erosion(u, way(row));
+                    e + (1.0 - e) * self.surges.lack(u, texture(&ends[row], u).y)
+                });
                 let (offset, mist) = (from.as_vec2(), self.mist);
                 quads.push(Quad { corners, map, material, offset, erosion, mist });
             }

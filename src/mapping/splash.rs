@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-use super::{Ends, GRAVITY, Material, Sheet};
+use super::{Ends, GRAVITY, Material, Sheet, Surges};
 use crate::util::random::{Family, Stream};
 
 /// Number of points of a parabola. At every time a drop is within 0.6 ‰ of the arc's length from the sheet,
@@ -109,6 +109,7 @@ impl Splash {
             stretch: 1.0,
             offset,
             ends: ENDS,
+            surges: Surges::default(),
             material: self.material,
             mist: self.mist,
         }

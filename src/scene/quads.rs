@@ -1,6 +1,7 @@
 //! Builders of the volume's quads: the scene's own, those of its sheets and those of its splashes.
 
 use glam::{DVec3, Vec2, Vec3};
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::meshes::Carrier;
 use super::names::likeliest;
@@ -8,7 +9,7 @@ use super::param::{POINT_MAX, WATER};
 use super::read::MAX_QUADS;
 use super::volumes::{used_materials, volume_of};
 use super::{Recipe, Values};
-use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash};
+use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash, Surges};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 
@@ -271,6 +272,12 @@ fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result
             fade: float("fade"),
             head: float("head"),
         },
+        surges: Surges::new(
+            float("surge"),
+            v.count(&key("surges")),
+            f64::from(materials.recipes[material.volume as usize].flow),
+            xxh3_64(name.as_bytes()),
+        ),
         material,
         mist,
     })

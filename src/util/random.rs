@@ -33,6 +33,8 @@ pub enum Stream {
     Splash = 10,
     /// One hair; index: number of the hair.
     Hair = 11,
+    /// Surges of a sheet; index: row of the lattice.
+    Surge = 12,
 }
 
 /// The generators of one seed and one stream.

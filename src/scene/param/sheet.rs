@@ -82,6 +82,17 @@ pub(super) const SHEETS: Group = Group {
         p("sheets.*.fade", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc("Share of the way over which the foot fades to nothing.")
             .when("Raise it when the foot ends in a hard line at a pool or a rock."),
+        p("sheets.*.surge", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Largest share of the water that a lull between two surges lacks. Surges travel down with \
+                 the water and return with the volume, so loops close. They differ from sheet to sheet, by \
+                 the sheet's name.",
+            )
+            .when("Raise it to about 0.5 when a fall is too even to be alive; leave it at 0 for mist."),
+        p("sheets.*.surges", "", "", Int(1, 64, 3), Uniform)
+            .slider(1.0, 12.0)
+            .doc("Number of surges in one copy of the volume along the flow.")
+            .when("Raise it for quick, short pulses; keep at least two segments for each surge in view."),
         p("sheets.*.head", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc("Share of the way over which the head grows from nothing.")
             .when("Raise it for mist, and for sheets whose beginning is in view."),

@@ -3,6 +3,7 @@
 pub mod sheet;
 pub mod shell;
 pub mod splash;
+pub mod surge;
 
 use glam::{DMat3, DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
 use proptest::prelude::*;

@@ -30,7 +30,7 @@ fn scene(text: &str) -> Scene {
 }
 
 /// A vertical sheet from y = 3 to y = −2, 2 m wide.
-fn plumb(more: &str) -> Scene {
+pub fn plumb(more: &str) -> Scene {
     scene(&format!("[sheets.a]\npoints = [[0, 3, 0], [0, 1, 0], [0, -2, 0]]\nwidths = [2.0]\n{more}\n"))
 }
 
