@@ -3,6 +3,7 @@
 
 mod field;
 pub mod shade;
+pub mod stone;
 mod strata;
 pub mod wet;
 
@@ -11,6 +12,7 @@ use rayon::prelude::*;
 
 use super::Vertex;
 use field::{displace, hollows};
+use stone::StoneKind;
 use strata::Strata;
 
 /// Largest number of subdivisions of a rock: a mesh of a million points.
@@ -23,6 +25,12 @@ pub struct Rock {
     pub name: String,
     /// Whether a picture with an alpha channel has a hole in its place.
     pub holdout: bool,
+    /// Kind of its stone.
+    pub kind: StoneKind,
+    /// Strength of the stone's grain, cracks and streaks.
+    pub grain: f32,
+    /// Amount of moss on the stone, 0 to 1.
+    pub moss: f32,
     /// Patch corners (u,v) = (0,0) (1,0) (1,1) (0,1), counter-clockwise seen from the outside; metres.
     pub corners: [Vec3; 4],
     /// Number of subdivisions: the mesh has 2^levels squares a side.
@@ -70,6 +78,19 @@ impl Rock {
         side * side
     }
 
+    /// Returns the unit normal of the patch.
+    fn out(&self) -> Vec3 {
+        let [a, b, c, d] = self.corners;
+        (c - a).cross(d - b).normalize_or(Vec3::Z)
+    }
+
+    /// Returns the unit vectors across the beds, and along them and the patch.
+    fn bed_axes(&self) -> (Vec3, Vec3) {
+        let level = Vec3::Y.cross(self.out()).normalize_or(Vec3::X);
+        let (sin, cos) = self.strata_tilt.to_radians().sin_cos();
+        (Vec3::Y * cos + level * sin, level * cos - Vec3::Y * sin)
+    }
+
     /// Builds the vertices, dry and without shade from other rock. Positions are measured from `origin`.
     pub(super) fn vertices(&self, origin: DVec3) -> Vec<Vertex> {
         let n = 1usize << self.levels;
@@ -77,7 +98,7 @@ impl Rock {
         let field = |channel| displace(self.levels, self.h, self.seed, channel);
         let tint = field(1);
         let [a, b, c, d] = self.corners;
-        let out = (c - a).cross(d - b).normalize_or(Vec3::Z);
+        let out = self.out();
         let uv = |i: usize| ((i % side) as f32 / n as f32, (i / side) as f32 / n as f32);
         let mut height = field(0);
         if self.ridges > 0.0 {
@@ -105,7 +126,7 @@ impl Rock {
         }
         let mut tone = vec![0.0; side * side];
         if self.strata > 0.0 {
-            let strata = Strata::new(self, out, origin);
+            let strata = Strata::new(self, origin);
             let (bend, weather) = (field(5), field(6));
             let size = self.strata * self.strata_height;
             height.par_iter_mut().zip(&mut tone).enumerate().for_each(|(i, (height, tone))| {

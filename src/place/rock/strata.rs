@@ -52,12 +52,10 @@ pub struct Bed {
 }
 
 impl Strata {
-    /// Makes the beds of a rock whose patch faces `out`. Beds are fixed to the world; `origin` is the place
-    /// from which points are measured.
-    pub fn new(rock: &Rock, out: Vec3, origin: DVec3) -> Strata {
-        let level = Vec3::Y.cross(out).normalize_or(Vec3::X);
-        let (sin, cos) = rock.strata_tilt.to_radians().sin_cos();
-        let (up, along) = (Vec3::Y * cos + level * sin, level * cos - Vec3::Y * sin);
+    /// Makes the beds of a rock. Beds are fixed to the world; `origin` is the place from which points are
+    /// measured.
+    pub fn new(rock: &Rock, origin: DVec3) -> Strata {
+        let (up, along) = rock.bed_axes();
         let beds = |axis: Vec3| origin.dot(axis.as_dvec3()) / f64::from(rock.strata_height);
         let octave = |thin: f64| {
             let (s, t) = (beds(up) * thin, beds(along) * thin / f64::from(LENGTH));
