@@ -133,7 +133,7 @@ impl Mesh {
 
 /// Version of the mesh builder, a part of the cache key of meshes. Raise it with every change to the vertices
 /// that a [`Ground`] makes; a test compares their checksums.
-pub const BUILDER_VERSION: u32 = 1;
+pub const BUILDER_VERSION: u32 = 2;
 
 /// Everything that determines the opaque mesh of a scene: equal grounds have equal meshes.
 #[derive(Clone, Debug, PartialEq)]

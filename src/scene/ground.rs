@@ -58,6 +58,7 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
             strata_height: v.float(&key("strata_height")),
             strata_tilt: v.float(&key("strata_tilt")),
             strata_color: v.float(&key("strata_color")),
+            round: v.float(&key("round")),
             border: v.float(&key("border")),
             wet: v.float(&key("wet")),
             wet_reach: v.float(&key("wet_reach")),

@@ -2,6 +2,7 @@
 //! four corners. It becomes a mesh, with ridges, beds and ragged borders.
 
 mod field;
+mod patch;
 pub mod shade;
 pub mod stone;
 mod strata;
@@ -11,12 +12,29 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Vertex;
-use field::{displace, hollows};
+use field::hollows;
+use patch::steeper;
 use stone::StoneKind;
 use strata::Strata;
 
 /// Largest number of subdivisions of a rock: a mesh of a million points.
 pub const MAX_LEVELS: u32 = 10;
+
+/// Least cosine between the normal of a vertex and that of the patch.
+const LEAST_OUTWARD: f32 = 0.02;
+
+/// Returns a normal that does not point into the rock.
+///
+/// Displacement within the patch may fold the mesh over itself. There the triangles face into the rock.
+/// Normals that were interpolated between both sides would pass 0, and a point that looks into the rock is
+/// in the dark: both showed as black dots.
+fn outward(n: Vec3, out: Vec3) -> Vec3 {
+    let cos = n.dot(out);
+    if cos >= LEAST_OUTWARD {
+        return n;
+    }
+    (n + out * (LEAST_OUTWARD - cos)).normalize_or(out)
+}
 
 /// Parameters of a rock.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +77,8 @@ pub struct Rock {
     pub strata_tilt: f32,
     /// Relative variation of the albedo from bed to bed.
     pub strata_color: f32,
+    /// Share by which the patch's outline is rounded to an ellipse, 0 to 1.
+    pub round: f32,
     /// Standard deviation of the displacement of points within the patch, border included; metres.
     pub border: f32,
     /// Wetness of the rock where water is, 0 to 1.
@@ -95,9 +115,8 @@ impl Rock {
     pub(super) fn vertices(&self, origin: DVec3) -> Vec<Vertex> {
         let n = 1usize << self.levels;
         let side = n + 1;
-        let field = |channel| displace(self.levels, self.h, self.seed, channel);
+        let field = |channel| self.field(channel, self.h);
         let tint = field(1);
-        let [a, b, c, d] = self.corners;
         let out = self.out();
         let uv = |i: usize| ((i % side) as f32 / n as f32, (i / side) as f32 / n as f32);
         let mut height = field(0);
@@ -109,21 +128,10 @@ impl Rock {
         }
         for (i, h) in height.iter_mut().enumerate() {
             let (u, v) = uv(i);
-            *h = *h * self.amplitude + self.bulge * 16.0 * u * (1.0 - u) * v * (1.0 - v);
+            let dome = 16.0 * u * (1.0 - u) * v * (1.0 - v);
+            *h = *h * self.amplitude + self.bulge * steeper(dome, self.round);
         }
-        let mut base: Vec<Vec3> = (0..side * side)
-            .map(|i| {
-                let (u, v) = uv(i);
-                a.lerp(b, u).lerp(d.lerp(c, u), v)
-            })
-            .collect();
-        if self.border > 0.0 {
-            let along = (b - a + c - d).normalize_or_zero();
-            let across = out.cross(along);
-            for ((p, x), y) in base.iter_mut().zip(field(3)).zip(field(4)) {
-                *p += (along * x + across * y) * self.border;
-            }
-        }
+        let base = self.base();
         let mut tone = vec![0.0; side * side];
         if self.strata > 0.0 {
             let strata = Strata::new(self, origin);
@@ -146,7 +154,7 @@ impl Rock {
             let shade = (1.0 + self.color_noise * tint[i]).max(0.1) * (1.0 - self.cavity * hollow[i]);
             Vertex {
                 position: positions[i].to_array(),
-                normal: du.cross(dv).normalize_or(out).to_array(),
+                normal: outward(du.cross(dv).normalize_or(out), out).to_array(),
                 albedo: (self.color * shade * (1.0 + tone[i])).to_array(),
                 ..Vertex::default()
             }

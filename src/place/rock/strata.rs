@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use rand::RngExt;
 
-use super::Rock;
+use super::{Rock, StoneKind};
 use crate::util::random::{Family, Stream};
 
 /// Share of a block's side over which it blends into its neighbour. A smaller share makes steps finer than
@@ -17,6 +17,14 @@ const UNEVEN: f32 = 0.44;
 /// Number of thinner beds in each bed, and the size of their steps relative to those of the bed.
 const THIN: (f32, f32) = (3.3, 0.3);
 
+/// Mean height of a group of beds of a kind of stone, in mean bed heights, and the numbers of beds that a
+/// group may have.
+const GROUP: f32 = 3.0;
+const COUNTS: [f32; 6] = [1.0, 1.0, 2.0, 3.0, 5.0, 9.0];
+/// Mean width of a broken column, in bed heights, and how much higher or lower it stands at most.
+const COLUMN: f64 = 1.7;
+const BROKEN: f32 = 0.22;
+
 /// The beds of one rock.
 pub struct Strata {
     /// Unit vector across the beds.
@@ -28,6 +36,8 @@ pub struct Strata {
     family: Family,
     /// Beds and blocks between the world's origin and that of the scene, across and along, for each octave.
     before: [[Lattice; 2]; 2],
+    /// Groups of beds and columns before the scene's origin, of a kind of stone.
+    uneven: Option<[Lattice; 2]>,
 }
 
 /// A number that is too large for float32: whole cells, and the rest, 0 to 1.
@@ -61,7 +71,9 @@ impl Strata {
             let (s, t) = (beds(up) * thin, beds(along) * thin / f64::from(LENGTH));
             [Lattice::new(s), Lattice::new(t)]
         };
+        let groups = || [Lattice::new(beds(up) / f64::from(GROUP)), Lattice::new(beds(along) / COLUMN)];
         Strata {
+            uneven: (rock.kind != StoneKind::Plain).then(groups),
             up,
             along,
             height: rock.strata_height,
@@ -73,7 +85,10 @@ impl Strata {
     /// Returns the bed at a point. Its bounds bend by `bend` bed heights there.
     pub fn at(&self, point: Vec3, bend: f32) -> Bed {
         let (s, t) = (point.dot(self.up) / self.height + bend, point.dot(self.along) / self.height + bend);
-        let thick = self.octave(s, t, 0);
+        let thick = match self.uneven {
+            None => self.octave(s, t, 0),
+            Some([groups, columns]) => self.uneven_bed(s, t, groups, columns),
+        };
         let thin = self.octave(s * THIN.0, t * THIN.0, 1);
         Bed { out: thick.out + THIN.1 * thin.out, tone: 0.7 * thick.tone + 0.3 * thin.tone }
     }
@@ -82,6 +97,61 @@ impl Strata {
     fn random(&self, octave: i64, i: i64, j: i64) -> f32 {
         let index = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(2 * j as u64 + octave as u64);
         self.family.member(index).random_range(-1.0..1.0)
+    }
+
+    /// Returns the bed at a point of a kind of stone. Groups of beds are split into one to nine beds, so that
+    /// beds are thick in one place and thin in another, and broken columns of rock stand higher or lower.
+    fn uneven_bed(&self, s: f32, t: f32, groups: Lattice, columns: Lattice) -> Bed {
+        const COUNT: i64 = 1 << 42;
+        const BOUND: i64 = COUNT + 1;
+        const COLUMN_AT: i64 = COUNT + 2;
+        const RISE: i64 = COUNT + 3;
+        let random = |i: i64, j: i64| self.random(0, i, j);
+        let (column, left, right) =
+            cell(t / COLUMN as f32 + columns.rest, |i| random(columns.cells + i, COLUMN_AT));
+        let x = (t / COLUMN as f32 + columns.rest - left) / (right - left);
+        let rise = |i: i64| random(columns.cells + i, RISE);
+        let broken = rise(column) + (rise(column + 1) - rise(column)) * step((x - 0.8) / 0.2);
+        let at = (s + BROKEN * broken) / GROUP + groups.rest;
+        let (group, low, high) = cell(at, |i| random(groups.cells + i, BOUND));
+        let counts = COUNTS.len() as f32;
+        let pick = (0.5 + 0.5 * random(groups.cells + group, COUNT)) * counts;
+        let count = COUNTS[(pick as usize).min(COUNTS.len() - 1)];
+        let f = (at - low) / (high - low) * count;
+        let own = (groups.cells + group) * 16;
+        let bound = |k: i64| {
+            // The group's own bounds are not moved.
+            let inside = k > 0 && (k as f32) < count;
+            if inside { UNEVEN * random(own + k, BOUND + 8) } else { 0.0 }
+        };
+        let (k, first, last) = cell(f, bound);
+        let thickness = (last - first) * (high - low) * GROUP / count;
+        self.bed(own + k, (f - first) / (last - first), t, thickness)
+    }
+
+    /// Returns bed number `i` of a kind of stone at its height `f`, 0 to 1.
+    fn bed(&self, i: i64, f: f32, t: f32, thickness: f32) -> Bed {
+        const FACE: i64 = 1 << 43;
+        const TONE: i64 = FACE + 1;
+        const SHIFT: i64 = FACE + 2;
+        let random = |j: i64| self.random(1, i, j);
+        let along = self.before[0][1];
+        // Thick beds break into long blocks.
+        let blocks = t / (LENGTH * (0.4 + 0.6 * thickness)) + 8.0 * random(SHIFT) + along.rest;
+        let (j, left, right) = cell(blocks, |j| random(FACE + 8 + 2 * (along.cells + j)));
+        let block = |j: i64| 0.5 * random(FACE + 9 + 2 * (along.cells + j));
+        let own = block(j);
+        let width = 0.5 * JOINT;
+        let (near_left, near_right) =
+            (1.0 - step((blocks - left) / width), 1.0 - step((right - blocks) / width));
+        let stands = own + (block(j - 1) - own) * 0.5 * near_left + (block(j + 1) - own) * 0.5 * near_right;
+        let face = 0.5 * random(FACE) + 0.35 * f - 0.15;
+        // Edges are as wide in thick beds as in thin ones.
+        let edge = (JOINT / thickness.max(0.3)).min(0.5);
+        let rounding = 0.3 * (1.0 - step(f / edge)) + 0.3 * (1.0 - step((1.0 - f) / edge));
+        // Thin beds stand out less.
+        let size = thickness.sqrt().min(1.3);
+        Bed { out: (stands + face - rounding) * size, tone: random(TONE) }
     }
 
     /// Returns the bed at a point of one octave. Beds have height 1; the point lies at `s` across and `t`

@@ -103,6 +103,9 @@ pub(super) const ROCKS: Group = Group {
         p("rocks.*.strata_color", "", "", Float(0.0, 1.0, 0.3), Upload)
             .doc("Largest relative difference of a layer's albedo from the mean.")
             .when("Raise it to tell layers apart by colour; lower it for one kind of stone."),
+        p("rocks.*.round", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc("Share by which the outline of the patch is rounded to an ellipse.")
+            .when("Raise it to 0.8 for boulders, whose patches would show their corners."),
         p("rocks.*.border", "", "m", Float(0.0, 1e4, 0.0), Upload)
             .slider(0.0, 3.0)
             .doc("Standard deviation of the displacement of points within the patch, at the first level.")
