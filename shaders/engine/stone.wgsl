@@ -2,7 +2,6 @@
 // numbers of each kind: src/place/rock/stone.rs.
 
 #import engine::gbuffer
-#import engine::opaque
 #import layout
 
 @group(0) @binding(16) var<storage, read> stones: array<Stone>;

@@ -7,10 +7,11 @@ use glam::Vec3;
 
 use super::opaque::{Points, View, fresnel};
 use crate::place::stone::{COARSEST, CRACK, CRACK_SHARE, EDGE, GRADIENT, OCTAVES, STREAK, Stone};
-use crate::util::lanes::{Floats, Lanes3, Mask, Words, floor_cell, unsigned};
+use crate::place::tiles::Tile;
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Words, floor_cell, unsigned};
 
 /// Factor that gives the noise a deviation of 1.
-const UNIT: f32 = 276.745_57;
+pub const UNIT: f32 = 276.745_57;
 
 /// Skewed cell of a lattice.
 type Cell<S> = [Words<S>; 3];
@@ -223,6 +224,36 @@ pub fn stone_at<S: Simd>(
         ..*points
     };
     (points, View { n: seen.or(unit.dot(e).simd_lt(zero), unit), e, distance })
+}
+
+/// Lays the stones of points' tiles over the points, as [`stone_at`] does.
+#[inline(always)]
+pub fn lay_stones<S: Simd>(
+    simd: S,
+    stones: &[Stone],
+    tiles: [&Tile; LANES],
+    mut points: Points<S>,
+    mut view: View<S>,
+    angle: f32,
+) -> (Points<S>, View<S>) {
+    let (plain_points, plain_view) = (points, view);
+    let mut numbers = [0; LANES];
+    for lane in 0..LANES {
+        numbers[lane] = tiles[lane].stone;
+    }
+    for lane in 0..LANES {
+        let number = numbers[lane];
+        if number == 0 || numbers[..lane].contains(&number) {
+            continue;
+        }
+        let (laid, seen) = stone_at(simd, &stones[number as usize - 1], &plain_points, &plain_view, angle);
+        let is_here = u32x8::load_array(simd, numbers).simd_eq(number);
+        points.albedo = laid.albedo.or(is_here, points.albedo);
+        points.wet = is_here.select(laid.wet, points.wet);
+        points.film = is_here.select(laid.film, points.film);
+        view.n = seen.n.or(is_here, view.n);
+    }
+    (points, view)
 }
 
 /// As [`film_lobe`](super::opaque::film_lobe), for a film on a stone: a lobe with the squared roughness

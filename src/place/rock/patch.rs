@@ -11,7 +11,10 @@ const SMOOTHER: f32 = 0.5;
 /// Share of that displacement that is left in the patch's middle.
 const MIDDLE: f32 = 0.4;
 /// Smallest area of a displaced square, relative to the square before.
-const LEAST_AREA: f32 = 0.15;
+const LEAST_AREA: f32 = 0.1;
+/// One square of so many may be folded before its surroundings are smoothed, and the most passes of that.
+const FEW: usize = 40;
+const MOST_PASSES: usize = 200;
 
 /// Makes the sides of a dome steeper, the more the rounder its outline is.
 pub fn steeper(dome: f32, round: f32) -> f32 {
@@ -82,29 +85,54 @@ impl Rock {
             let share = 1.0 - (1.0 - MIDDLE) * (4.0 * from_edge).min(1.0);
             (along * x + across * y) * (self.border * share)
         });
-        let moves: Vec<Vec3> = moves.collect();
-        // Halving finds a displacement that folds no square over.
-        let mut most = 1.0;
-        while most > 0.01 && self.folds(&base, &moves, most) {
-            most *= 0.8;
-        }
+        let mut moves: Vec<Vec3> = moves.collect();
+        self.unfold(&base, &mut moves);
         for (p, by) in base.iter_mut().zip(moves) {
-            *p += by * most;
+            *p += by;
         }
         base
     }
 
-    /// Whether a displacement by a share of `moves` turns a square of the patch over, or nearly so.
-    fn folds(&self, base: &[Vec3], moves: &[Vec3], share: f32) -> bool {
+    /// Lessens a displacement where it would turn squares of the patch over: everywhere until few are left,
+    /// then by the mean around each of those.
+    fn unfold(&self, base: &[Vec3], moves: &mut [Vec3]) {
         let side = (1usize << self.levels) + 1;
         let out = self.out();
-        let area = |share: f32, i: usize| {
-            let at = |i: usize| base[i] + moves[i] * share;
+        let area = |moves: &[Vec3], i: usize| {
+            let at = |i: usize| base[i] + moves[i];
             let (right, up) = (at(i + 1) - at(i), at(i + side) - at(i));
-            right.cross(up).dot(out)
+            let (left, down) = (at(i + side) - at(i + side + 1), at(i + 1) - at(i + side + 1));
+            right.cross(up).dot(out).min(left.cross(down).dot(out))
         };
-        let squares = (0..side * (side - 1)).filter(|i| i % side + 1 < side);
-        squares.into_iter().any(|i| area(share, i) < LEAST_AREA * area(0.0, i))
+        let squares: Vec<usize> = (0..side * (side - 1)).filter(|i| i % side + 1 < side).collect();
+        let still = vec![Vec3::ZERO; moves.len()];
+        let least: Vec<f32> = squares.iter().map(|&i| LEAST_AREA * area(&still, i)).collect();
+        let folded = |moves: &[Vec3]| -> Vec<usize> {
+            let all = squares.iter().zip(&least);
+            all.filter(|&(&i, &least)| area(moves, i) < least).map(|(&i, _)| i).collect()
+        };
+        while folded(moves).len() > squares.len() / FEW {
+            moves.iter_mut().for_each(|by| *by *= 0.9);
+        }
+        for _ in 0..MOST_PASSES {
+            let found = folded(moves);
+            if found.is_empty() {
+                return;
+            }
+            let before = moves.to_vec();
+            for i in found {
+                let (x, y) = (i % side, i / side);
+                for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+                    let columns = x.saturating_sub(1)..(x + 2).min(side);
+                    let rows = y.saturating_sub(1)..(y + 2).min(side);
+                    let around = rows.flat_map(|y| columns.clone().map(move |x| y * side + x));
+                    let (sum, count) =
+                        around.fold((Vec3::ZERO, 0.0), |(sum, count), i| (sum + before[i], count + 1.0));
+                    // A little less than the mean, so that wide folds go too.
+                    moves[y * side + x] = sum * (0.995 / count);
+                }
+            }
+        }
     }
 
     /// Moves a point of the unit square towards the ellipse that fits into it, by the map that takes lines

@@ -130,7 +130,7 @@ struct Recipe {
 
 /// Weights of the octaves in the noises that place moss and lichen.
 const MOSS: [f32; OCTAVES] = [0.0, 0.45, 0.45, 0.45, 0.4, 0.35, 0.25, 0.2, 0.0, 0.0];
-const LICHEN: [f32; OCTAVES] = [0.0, 0.45, 0.0, 0.45, 0.6, 0.4, 0.25, 0.15, 0.0, 0.0];
+const LICHEN: [f32; OCTAVES] = [0.0, 0.5, 0.0, 0.6, 0.5, 0.35, 0.2, 0.1, 0.0, 0.0];
 /// Shares of the octaves' tones that have the stone's tint.
 const TINTED: [f32; OCTAVES] = [1.0, 1.0, 1.0, 0.8, 0.5, 0.3, 0.2, 0.3, 0.3, 0.2];
 /// Albedo of a mat of moss.
@@ -155,7 +155,7 @@ impl StoneKind {
                 along: 1.0,
                 streaks: 0.16,
                 film: 0.05,
-                bare: 1.2,
+                bare: 1.4,
                 lichen: Vec3::new(0.36, 0.37, 0.28),
             },
             StoneKind::Basalt => Recipe {
@@ -168,7 +168,7 @@ impl StoneKind {
                 along: 1.0,
                 streaks: 0.18,
                 film: 0.045,
-                bare: 1.5,
+                bare: 2.1,
                 lichen: Vec3::new(0.23, 0.24, 0.19),
             },
             StoneKind::Limestone => Recipe {
@@ -178,10 +178,10 @@ impl StoneKind {
                 crack: [0.5, 0.55, 0.45, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
                 fold: [0.6, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, 0.0],
                 tint: Vec3::new(1.05, 1.0, 0.85),
-                along: 2.2,
+                along: 1.5,
                 streaks: 0.24,
                 film: 0.05,
-                bare: 1.35,
+                bare: 1.5,
                 lichen: Vec3::new(0.16, 0.16, 0.14),
             },
             StoneKind::Slate => Recipe {
@@ -191,10 +191,10 @@ impl StoneKind {
                 crack: [0.4, 0.6, 0.65, 0.55, 0.35, 0.0, 0.0, 0.0, 0.0, 0.0],
                 fold: [0.8, 0.9, 0.95, 0.9, 0.8, 0.5, 0.3, 0.0, 0.0, 0.0],
                 tint: Vec3::new(1.15, 1.0, 0.86),
-                along: 4.5,
+                along: 2.2,
                 streaks: 0.15,
                 film: 0.03,
-                bare: 1.4,
+                bare: 1.9,
                 lichen: Vec3::new(0.27, 0.28, 0.2),
             },
         })

@@ -10,16 +10,15 @@ use super::{Gbuffer, map_hull, map_quad};
 use crate::engine::cpu::gloss::{Looks, Samples};
 use crate::engine::cpu::haze;
 use crate::engine::cpu::lights::background_at;
-use crate::engine::cpu::opaque::{Points, View};
+use crate::engine::cpu::opaque::Points;
 use crate::engine::cpu::pool;
-use crate::engine::cpu::stone::stone_at;
+use crate::engine::cpu::stone::lay_stones;
 use crate::engine::pool_surface::{self, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, DepthToPoint, footprint};
 use crate::picture::{Camera, Image, SampleTimes};
 use crate::place::Mesh;
-use crate::place::tiles::Tile;
 use crate::scene::{Face, Parts, Scene};
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 use crate::util::window::Window;
@@ -252,7 +251,8 @@ impl<'a> Shading<'a> {
             holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
         }
         let points = Points::at(simd, &self.mesh.vertices, tiles, &spots.places, position);
-        let (points, view) = self.stony(simd, tiles, points.view(simd, scene), points);
+        let view = points.view(simd, scene);
+        let (points, view) = lay_stones(simd, &self.mesh.stones, tiles, points, view, self.sample_angle);
         let mut distance = view.distance;
         let (mut radiance, mut normal) = if tiles.iter().any(|tile| tile.paint > 0) {
             let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));
@@ -293,36 +293,6 @@ impl<'a> Shading<'a> {
             passes = is_hole.select(transmittance, zero);
         }
         Seen { opaque: (radiance, distance), normal: (normal, passes) }
-    }
-
-    /// Lays the stones of points' tiles over the points.
-    #[inline(always)]
-    fn stony<S: Simd>(
-        &self,
-        simd: S,
-        tiles: [&Tile; LANES],
-        mut view: View<S>,
-        mut points: Points<S>,
-    ) -> (Points<S>, View<S>) {
-        let mut numbers = [0; LANES];
-        for lane in 0..LANES {
-            numbers[lane] = tiles[lane].stone;
-        }
-        let (plain_points, plain_view) = (points, view);
-        for lane in 0..LANES {
-            let number = numbers[lane];
-            if number == 0 || numbers[..lane].contains(&number) {
-                continue;
-            }
-            let stone = &self.mesh.stones[number as usize - 1];
-            let (laid, seen) = stone_at(simd, stone, &plain_points, &plain_view, self.sample_angle);
-            let is_here = u32x8::load_array(simd, numbers).simd_eq(number);
-            points.albedo = laid.albedo.or(is_here, points.albedo);
-            points.wet = is_here.select(laid.wet, points.wet);
-            points.film = is_here.select(laid.film, points.film);
-            view.n = seen.n.or(is_here, view.n);
-        }
-        (points, view)
     }
 
     /// The points at these depths under points of the image. Twin: `point_at` of
