@@ -47,7 +47,7 @@ struct Stone {
     slope2: f32,
     moss_color: vec3<f32>,
     moss2: f32,
-    lichen_color: vec3<f32>,
+    lichen: vec3<f32>,
     lichen2: f32,
     octaves: array<Octave, 10>,
 }
@@ -167,7 +167,7 @@ fn stone_at(in: OpaquePoint, n: vec3<f32>) -> StonePoint {
     tone += stones[number].streaks * streak;
     var albedo = in.albedo * max(vec3<f32>(1.0 + tone) + stones[number].tint * tinted, vec3<f32>(0.1));
     let bare = below((lichen - stones[number].bare) / sqrt(EDGE * EDGE + max(lichen2, 0.0)));
-    albedo += (stones[number].lichen_color * (1.0 + tone) - albedo) * (bare * (1.0 - wet));
+    albedo += (in.albedo * stones[number].lichen * (1.0 + tone) - albedo) * (bare * (1.0 - wet));
     var rough = 1.0;
     if stones[number].moss > 0.0 {
         let bias = 3.0 * (n.y - 1.0 + 1.3 * stones[number].moss);

@@ -197,7 +197,7 @@ pub fn stone_at<S: Simd>(
     let mut albedo = points.albedo.by(Lanes3 { x: of(tint.x), y: of(tint.y), z: of(tint.z) });
     let edge2 = splat(EDGE * EDGE);
     let bare = below(simd, (lichen - splat(stone.bare)) / (edge2 + lichen2.max(zero)).sqrt());
-    let color = Lanes3::splat(simd, Vec3::from(stone.lichen_color)).times(one + tone);
+    let color = points.albedo.scaled(Vec3::from(stone.lichen)).times(one + tone);
     albedo = albedo.plus(color.minus(albedo).times(bare * (one - wet)));
     let mut rough = one;
     if stone.moss > 0.0 {

@@ -7,14 +7,14 @@ use super::{MAX_LEVELS, Rock, StoneKind};
 
 /// Roughness that the displacement within the patch of a kind of stone has in addition, because fine
 /// displacement would fold the mesh over itself.
-const SMOOTHER: f32 = 0.5;
+const SMOOTHER: f32 = 0.35;
 /// Share of that displacement that is left in the patch's middle.
-const MIDDLE: f32 = 0.4;
+const MIDDLE: f32 = 0.5;
 /// Smallest area of a displaced square, relative to the square before.
 const LEAST_AREA: f32 = 0.1;
 /// One square of so many may be folded before its surroundings are smoothed, and the most passes of that.
-const FEW: usize = 40;
-const MOST_PASSES: usize = 200;
+const FEW: usize = 25;
+const MOST_PASSES: usize = 300;
 
 /// Makes the sides of a dome steeper, the more the rounder its outline is.
 pub fn steeper(dome: f32, round: f32) -> f32 {

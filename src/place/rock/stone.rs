@@ -105,8 +105,8 @@ pub struct Stone {
     pub moss_color: [f32; 3],
     /// Sum of the squared weights of moss's noise.
     pub moss2: f32,
-    /// Albedo of lichen.
-    pub lichen_color: [f32; 3],
+    /// Factor of the albedo under lichen.
+    pub lichen: [f32; 3],
     /// Sum of the squared weights of lichen's noise.
     pub lichen2: f32,
     /// The octaves, the coarsest first.
@@ -156,7 +156,7 @@ impl StoneKind {
                 streaks: 0.16,
                 film: 0.05,
                 bare: 1.4,
-                lichen: Vec3::new(0.36, 0.37, 0.28),
+                lichen: Vec3::new(1.5, 1.56, 1.3),
             },
             StoneKind::Basalt => Recipe {
                 albedo: Vec3::new(0.075, 0.07, 0.066),
@@ -169,7 +169,7 @@ impl StoneKind {
                 streaks: 0.18,
                 film: 0.045,
                 bare: 2.1,
-                lichen: Vec3::new(0.23, 0.24, 0.19),
+                lichen: Vec3::new(2.4, 2.5, 2.0),
             },
             StoneKind::Limestone => Recipe {
                 albedo: Vec3::new(0.36, 0.33, 0.275),
@@ -182,7 +182,7 @@ impl StoneKind {
                 streaks: 0.24,
                 film: 0.05,
                 bare: 1.5,
-                lichen: Vec3::new(0.16, 0.16, 0.14),
+                lichen: Vec3::new(0.5, 0.5, 0.52),
             },
             StoneKind::Slate => Recipe {
                 albedo: Vec3::new(0.105, 0.11, 0.118),
@@ -195,7 +195,7 @@ impl StoneKind {
                 streaks: 0.15,
                 film: 0.03,
                 bare: 1.9,
-                lichen: Vec3::new(0.27, 0.28, 0.2),
+                lichen: Vec3::new(2.1, 2.2, 1.6),
             },
         })
     }
@@ -239,7 +239,7 @@ impl Stone {
             slope2: sum(|octave| octave.slope),
             moss_color: MOSS_ALBEDO.to_array(),
             moss2: sum(|octave| octave.moss),
-            lichen_color: recipe.lichen.to_array(),
+            lichen: recipe.lichen.to_array(),
             lichen2: sum(|octave| octave.lichen),
             octaves,
         })

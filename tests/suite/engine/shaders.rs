@@ -225,7 +225,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let octave = fields!(Octave: tone slope crack fold moss lichen tinted pad);
     assert_eq!(members(&module, "Octave"), octave);
     let stone = fields!(Stone: cells along rest moss streak_cells streaks streak_rest film up bare tint slope2
-        moss_color moss2 lichen_color lichen2 octaves);
+        moss_color moss2 lichen lichen2 octaves);
     assert_eq!(members(&module, "Stone"), stone);
     assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
     assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));

@@ -89,7 +89,7 @@ fn cubic(x: f64) -> f64 {
 /// Albedo and normal of a level, dry point of granite without moss, as its documentation has them.
 fn truth(stone: &Stone, p: DVec3, spacing: f64) -> (DVec3, DVec3) {
     let (mut tone, mut tinted, mut lichen, mut lichen2) = (0.0, 0.0, 0.0, f64::from(stone.lichen2));
-    let (mut slope, mut before) = (DVec3::ZERO, 0.0);
+    let (mut slope, mut before) = (DVec3::ZERO, 0.0f64);
     for (k, octave) in stone.octaves.iter().enumerate() {
         let [a_tone, a_slope, crack, fold, weight_lichen, share] =
             [octave.tone, octave.slope, octave.crack, octave.fold, octave.lichen, octave.tinted]
@@ -115,7 +115,7 @@ fn truth(stone: &Stone, p: DVec3, spacing: f64) -> (DVec3, DVec3) {
     let bare = cubic(0.5 + grown / 20f64.sqrt());
     let factor = DVec3::splat(1.0 + tone) + Vec3::from(stone.tint).as_dvec3() * tinted;
     let rock = factor.max(DVec3::splat(0.1)) * 0.2;
-    let color = Vec3::from(stone.lichen_color).as_dvec3() * (1.0 + tone);
+    let color = Vec3::from(stone.lichen).as_dvec3() * (0.2 * (1.0 + tone));
     (rock.lerp(color, bare), DVec3::new(-slope.x, 1.0, -slope.z).normalize())
 }
 
