@@ -55,6 +55,11 @@ impl Rock {
         Vec2::new(a.distance(b) + d.distance(c), a.distance(d) + b.distance(c)) * 0.5
     }
 
+    /// Returns the longer side of a square of the mesh, metres.
+    pub(super) fn square(&self) -> f32 {
+        self.sides().max_element() / (1u32 << self.levels) as f32
+    }
+
     /// Returns the points of the patch, with its ragged border.
     pub(super) fn base(&self) -> Vec<Vec3> {
         let [a, b, c, d] = self.corners;

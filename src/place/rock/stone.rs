@@ -155,7 +155,7 @@ impl StoneKind {
                 along: 1.0,
                 streaks: 0.16,
                 film: 0.05,
-                bare: 1.4,
+                bare: 1.6,
                 lichen: Vec3::new(1.5, 1.56, 1.3),
             },
             StoneKind::Basalt => Recipe {
@@ -194,7 +194,7 @@ impl StoneKind {
                 along: 2.2,
                 streaks: 0.15,
                 film: 0.03,
-                bare: 1.9,
+                bare: 2.3,
                 lichen: Vec3::new(2.1, 2.2, 1.6),
             },
         })

@@ -24,6 +24,8 @@ const COUNTS: [f32; 6] = [1.0, 1.0, 2.0, 3.0, 5.0, 9.0];
 /// Mean width of a broken column, in bed heights, and how much higher or lower it stands at most.
 const COLUMN: f64 = 1.7;
 const BROKEN: f32 = 0.22;
+/// Height of a ledge, in squares of the mesh.
+const LEDGE: f32 = 2.5;
 
 /// The beds of one rock.
 pub struct Strata {
@@ -38,6 +40,8 @@ pub struct Strata {
     before: [[Lattice; 2]; 2],
     /// Groups of beds and columns before the scene's origin, of a kind of stone.
     uneven: Option<[Lattice; 2]>,
+    /// Height over which a bed of a kind of stone blends into the next, in bed heights.
+    ledge: f32,
 }
 
 /// A number that is too large for float32: whole cells, and the rest, 0 to 1.
@@ -51,6 +55,18 @@ impl Lattice {
     fn new(x: f64) -> Lattice {
         Lattice { cells: x.floor() as i64, rest: (x - x.floor()) as f32 }
     }
+}
+
+/// The place of a point in the beds of a kind of stone.
+struct UnevenBed {
+    /// Number of the bed.
+    number: i64,
+    /// Height of the point in the bed, 0 to 1.
+    f: f32,
+    /// Height of the bed, in mean heights.
+    thickness: f32,
+    /// Upper bound of the bed, in groups.
+    top: f32,
 }
 
 /// Properties of a bed at a point.
@@ -74,6 +90,7 @@ impl Strata {
         let groups = || [Lattice::new(beds(up) / f64::from(GROUP)), Lattice::new(beds(along) / COLUMN)];
         Strata {
             uneven: (rock.kind != StoneKind::Plain).then(groups),
+            ledge: (LEDGE * rock.square() / rock.strata_height).min(0.4),
             up,
             along,
             height: rock.strata_height,
@@ -99,38 +116,62 @@ impl Strata {
         self.family.member(index).random_range(-1.0..1.0)
     }
 
-    /// Returns the bed at a point of a kind of stone. Groups of beds are split into one to nine beds, so that
-    /// beds are thick in one place and thin in another, and broken columns of rock stand higher or lower.
+    /// Returns the bed at a point of a kind of stone. It blends into the bed above it over the width of a
+    /// ledge, because a mesh would show a step as teeth.
     fn uneven_bed(&self, s: f32, t: f32, groups: Lattice, columns: Lattice) -> Bed {
-        const COUNT: i64 = 1 << 42;
-        const BOUND: i64 = COUNT + 1;
-        const COLUMN_AT: i64 = COUNT + 2;
-        const RISE: i64 = COUNT + 3;
-        let random = |i: i64, j: i64| self.random(0, i, j);
-        let (column, left, right) =
-            cell(t / COLUMN as f32 + columns.rest, |i| random(columns.cells + i, COLUMN_AT));
-        let x = (t / COLUMN as f32 + columns.rest - left) / (right - left);
-        let rise = |i: i64| random(columns.cells + i, RISE);
-        let broken = rise(column) + (rise(column + 1) - rise(column)) * step((x - 0.8) / 0.2);
-        let at = (s + BROKEN * broken) / GROUP + groups.rest;
-        let (group, low, high) = cell(at, |i| random(groups.cells + i, BOUND));
-        let counts = COUNTS.len() as f32;
-        let pick = (0.5 + 0.5 * random(groups.cells + group, COUNT)) * counts;
-        let count = COUNTS[(pick as usize).min(COUNTS.len() - 1)];
-        let f = (at - low) / (high - low) * count;
-        let own = (groups.cells + group) * 16;
-        let bound = |k: i64| {
-            // The group's own bounds are not moved.
-            let inside = k > 0 && (k as f32) < count;
-            if inside { UNEVEN * random(own + k, BOUND + 8) } else { 0.0 }
-        };
-        let (k, first, last) = cell(f, bound);
-        let thickness = (last - first) * (high - low) * GROUP / count;
-        self.bed(own + k, (f - first) / (last - first), t, thickness)
+        let at = (s + BROKEN * self.broken(t, columns)) / GROUP + groups.rest;
+        let found = self.find(groups, at);
+        let bed = self.bed(&found, t);
+        let to_top = (found.top - at) * GROUP;
+        if to_top >= self.ledge {
+            return bed;
+        }
+        let next = self.find(groups, found.top + 1e-4);
+        let above = self.bed(&UnevenBed { f: 0.0, ..next }, t);
+        Bed { out: bed.out + (above.out - bed.out) * (1.0 - step(to_top / self.ledge)), tone: bed.tone }
     }
 
-    /// Returns bed number `i` of a kind of stone at its height `f`, 0 to 1.
-    fn bed(&self, i: i64, f: f32, t: f32, thickness: f32) -> Bed {
+    /// Returns how far the broken column at `t` stands out of its place, −1 to 1.
+    fn broken(&self, t: f32, columns: Lattice) -> f32 {
+        const COLUMN_AT: i64 = 1 << 42;
+        const RISE: i64 = COLUMN_AT + 1;
+        let t = t / COLUMN as f32 + columns.rest;
+        let random = |i: i64, j: i64| self.random(0, columns.cells + i, j);
+        let (column, left, right) = cell(t, |i| random(i, COLUMN_AT));
+        let x = (t - left) / (right - left);
+        let (own, next) = (random(column, RISE), random(column + 1, RISE));
+        own + (next - own) * step((x - 0.8) / 0.2)
+    }
+
+    /// Finds the bed at a height among groups of beds, in groups. Groups are split into one to nine beds, so
+    /// that beds are thick in one place and thin in another.
+    fn find(&self, groups: Lattice, at: f32) -> UnevenBed {
+        const COUNT: i64 = (1 << 42) + 2;
+        const BOUND: i64 = COUNT + 1;
+        const INNER: i64 = COUNT + 2;
+        let (group, low, high) = cell(at, |i| self.random(0, groups.cells + i, BOUND));
+        let number = groups.cells + group;
+        let pick = (0.5 + 0.5 * self.random(0, number, COUNT)) * COUNTS.len() as f32;
+        let count = COUNTS[(pick as usize).min(COUNTS.len() - 1)];
+        let height = (high - low) / count;
+        let own = number * 16;
+        let bound = |k: i64| {
+            // The group's own bounds are not moved.
+            let is_inside = k > 0 && (k as f32) < count;
+            if is_inside { UNEVEN * self.random(0, own + k, INNER) } else { 0.0 }
+        };
+        let (k, first, last) = cell((at - low) / height, bound);
+        UnevenBed {
+            number: own + k,
+            f: ((at - low) / height - first) / (last - first),
+            thickness: (last - first) * height * GROUP,
+            top: low + last * height,
+        }
+    }
+
+    /// Returns a bed of a kind of stone at `t` along it.
+    fn bed(&self, found: &UnevenBed, t: f32) -> Bed {
+        let UnevenBed { number: i, f, thickness, .. } = *found;
         const FACE: i64 = 1 << 43;
         const TONE: i64 = FACE + 1;
         const SHIFT: i64 = FACE + 2;
