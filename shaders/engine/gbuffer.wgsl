@@ -55,6 +55,8 @@ struct MeshTile {
     paint: u32,
     // Number of the first texture coordinates of its triangles.
     coordinates: u32,
+    // Number of its stone plus 1; 0: plain rock.
+    stone: u32,
 }
 
 // Vertices in a row of the largest tile.
@@ -85,6 +87,10 @@ struct OpaquePoint {
     shade: vec3<f32>,
     // Whether a picture with alpha has a hole here.
     holdout: bool,
+    // Number of the stone plus 1; 0: plain rock.
+    stone: u32,
+    // Squared roughness of the film of water on a stone; 0: that of plain rock.
+    film: f32,
 }
 
 struct OpaqueTargets {
@@ -146,6 +152,7 @@ fn opaque_point(pixel: vec2<u32>) -> OpaquePoint {
     out.pixel = pixel;
     out.position_world = point_at(frame, at, drawn.w);
     out.holdout = tile.holdout != 0u;
+    out.stone = tile.stone;
     if tile.pitch == 0u {
         let triangle = clamp(floor(drawn.x * 0.5), 0.0, f32(tile.side) - 1.0);
         let origin = vec2<f32>(2.0 * triangle + 0.25, 0.25);

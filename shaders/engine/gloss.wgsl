@@ -157,8 +157,9 @@ fn tile_of(pixel: vec2<u32>) -> MeshTile {
 
 @fragment
 fn painted_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
-    var in = opaque_point(vec2<u32>(clip.xy));
-    let n = seen_normal(in);
+    let seen = stony(opaque_point(vec2<u32>(clip.xy)));
+    var in = seen.point;
+    let n = seen.normal;
     let tile = tile_of(in.pixel);
     if tile.paint == 0u {
         return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
@@ -175,8 +176,9 @@ fn painted_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
 // As `painted_fragment`, under an environment.
 @fragment
 fn painted_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
-    var in = opaque_point(vec2<u32>(clip.xy));
-    let n = seen_normal(in);
+    let seen = stony(opaque_point(vec2<u32>(clip.xy)));
+    var in = seen.point;
+    let n = seen.normal;
     let tile = tile_of(in.pixel);
     if tile.paint == 0u {
         let sky = environment_irradiance(environment, mirrored(in, n));

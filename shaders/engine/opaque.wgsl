@@ -1,6 +1,7 @@
 // §3 Shading of a point of rock in the raster pass. Twin: src/engine/cpu/opaque.rs.
 
 #import engine::gbuffer
+#import engine::stone
 #import layout
 #import light::environment
 #import light::haze
@@ -32,7 +33,7 @@ fn lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) -> Lit 
     var out = sum;
     out.irradiance += light.intensity * (arrives.w * lit * cos_light);
     if in.shade.z > 0.0 {
-        out.gloss += light.intensity * (arrives.w * lit * cos_light * film_lobe(n, arrives.xyz, e));
+        out.gloss += light.intensity * (arrives.w * lit * cos_light * film_on(in, n, arrives.xyz, e));
     }
     return out;
 }
@@ -71,6 +72,27 @@ fn opaque_targets(radiance: vec3<f32>, n: vec3<f32>, to_eye: vec3<f32>, holdout:
     return out;
 }
 
+// Applies the stone under a point, if it has one. Returns the point and its normal on the eye's side.
+fn stony(in: OpaquePoint) -> StonePoint {
+    let n = seen_normal(in);
+    if STONES {
+        if in.stone > 0u {
+            return stone_at(in, n);
+        }
+    }
+    return StonePoint(in, n);
+}
+
+// π times the reflectance of the film of water at a point.
+fn film_on(in: OpaquePoint, n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
+    if STONES {
+        if in.film > 0.0 {
+            return stone_lobe(n, l, e, in.film);
+        }
+    }
+    return film_lobe(n, l, e);
+}
+
 // π times the reflectance of a film of water on rough rock: Blinn 1977 with the exponent s = 32, normalised
 // by (s + 8)/8π.
 fn film_lobe(n: vec3<f32>, l: vec3<f32>, e: vec3<f32>) -> f32 {
@@ -98,8 +120,9 @@ fn background_radiance(d: vec3<f32>) -> vec3<f32> {
 
 @fragment
 fn opaque_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
-    let in = opaque_point(vec2<u32>(clip.xy));
-    let n = seen_normal(in);
+    let seen = stony(opaque_point(vec2<u32>(clip.xy)));
+    let in = seen.point;
+    let n = seen.normal;
     return shade_opaque(in, n, frame.ambient, background_radiance(mirrored(in, n)));
 }
 
@@ -107,8 +130,9 @@ fn opaque_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
 // mirrored view.
 @fragment
 fn opaque_environment_fragment(@builtin(position) clip: vec4<f32>) -> OpaqueTargets {
-    let in = opaque_point(vec2<u32>(clip.xy));
-    let n = seen_normal(in);
+    let seen = stony(opaque_point(vec2<u32>(clip.xy)));
+    let in = seen.point;
+    let n = seen.normal;
     let sky = environment_irradiance(environment, mirrored(in, n));
     return shade_opaque(in, n, frame.ambient + environment_irradiance(environment, n), sky);
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::paint::{Painting, Paints, texture};
 use super::pool::Pool;
+use super::rock::stone::Stone;
 use super::rock::{Rock, shade, wet};
 use super::tiles::{self, Tile};
 use super::triangles::{MeshShade, ShadeMemo, WaterFaces, kinds};
@@ -39,6 +40,8 @@ pub struct Mesh {
     pub tiles: Arc<Vec<Tile>>,
     /// Paints of tiles.
     pub paints: Arc<Paints>,
+    /// Stones of tiles.
+    pub stones: Arc<Vec<Stone>>,
 }
 
 impl Mesh {
@@ -46,7 +49,27 @@ impl Mesh {
     /// whether it is a holdout.
     pub fn new(vertices: Vec<Vertex>, grids: impl IntoIterator<Item = (u32, bool)>) -> Mesh {
         let tiles = tiles::cut(&vertices, grids.into_iter());
-        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), paints: Arc::default() }
+        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), ..Mesh::default() }
+    }
+
+    /// Gives the tiles of rocks their stones. `rocks` are the rocks with the ranges of their vertices; points
+    /// are measured from `origin`.
+    fn with_stones<'a>(
+        mut self,
+        rocks: impl IntoIterator<Item = (&'a Rock, Range<usize>)>,
+        origin: DVec3,
+    ) -> Mesh {
+        let mut stones = Vec::new();
+        for (rock, own) in rocks {
+            let Some(stone) = Stone::new(rock, origin) else { continue };
+            stones.push(stone);
+            let tiles = Arc::make_mut(&mut self.tiles).iter_mut();
+            for tile in tiles.filter(|tile| own.contains(&(tile.first as usize))) {
+                tile.stone = stones.len() as u32;
+            }
+        }
+        self.stones = Arc::new(stones);
+        self
     }
 
     /// Adds the triangles of other meshes.
@@ -78,7 +101,12 @@ impl Mesh {
                 }));
             }
         }
-        Mesh { vertices: Arc::new(vertices), tiles: Arc::new(tiles), paints: Arc::new(paints) }
+        Mesh {
+            vertices: Arc::new(vertices),
+            tiles: Arc::new(tiles),
+            paints: Arc::new(paints),
+            stones: self.stones,
+        }
     }
 
     /// Returns the first vertex of each tile of triangles, in order, and the mean colour of its texture.
@@ -105,7 +133,7 @@ impl Mesh {
 
 /// Version of the mesh builder, a part of the cache key of meshes. Raise it with every change to the vertices
 /// that a [`Ground`] makes; a test compares their checksums.
-pub const BUILDER_VERSION: u32 = 1;
+pub const BUILDER_VERSION: u32 = 2;
 
 /// Everything that determines the opaque mesh of a scene: equal grounds have equal meshes.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,7 +158,7 @@ pub struct Ground {
 impl Ground {
     /// Builds the mesh. `memo` holds parts of what was built last.
     pub fn mesh(&self, memo: &ShadeMemo) -> Mesh {
-        self.with_meshes(Mesh::new(self.vertices(memo), self.grids()), memo, None)
+        self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None)
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
@@ -139,7 +167,12 @@ impl Ground {
         let make = || Ok::<_, Infallible>(self.vertices(memo));
         let key = key("mesh", BUILDER_VERSION, &self.of_grids());
         let Ok(vertices) = cache.get("meshes", &key, count, make);
-        self.with_meshes(Mesh::new(vertices, self.grids()), memo, Some(cache))
+        self.with_meshes(self.grid_mesh(vertices), memo, Some(cache))
+    }
+
+    /// Makes the mesh of rocks and pools of their vertices.
+    fn grid_mesh(&self, vertices: Vec<Vertex>) -> Mesh {
+        Mesh::new(vertices, self.grids()).with_stones(self.rocks.iter().zip(self.ranges()), self.origin)
     }
 
     /// Everything that determines the vertices of rocks and pools.

@@ -15,7 +15,7 @@ mod vertex;
 
 pub use mesh::{BUILDER_VERSION, Ground, Mesh, Triangles};
 pub use pool::{MAX_POOLS, Pool};
-pub use rock::{MAX_LEVELS, Rock, wet::wet_albedo, wet::wetness};
+pub use rock::{MAX_LEVELS, Rock, stone, stone::StoneKind, wet::wet_albedo, wet::wetness};
 pub use shell_core::opposite;
 pub use shell_diffuse::{DiffuseKey, DiffuseOfShells};
 pub use shell_shadows::{CASTER_BYTES, ShellShadows};

@@ -43,6 +43,8 @@ pub struct Tile {
     pub paint: u32,
     /// Number of the first texture coordinates of its triangles.
     pub coordinates: u32,
+    /// Number of the stone plus 1; 0 for plain rock and all else.
+    pub stone: u32,
     /// Neighbours in the same grid at the edges y = 0, x = side, y = side and x = 0.
     pub neighbours: [Option<u32>; 4],
     /// Lower corner of the bounding box, metres.
@@ -78,6 +80,7 @@ pub fn cut(vertices: &[Vertex], grids: impl Iterator<Item = (u32, bool)>) -> Vec
                     holdout,
                     paint: 0,
                     coordinates: 0,
+                    stone: 0,
                     neighbours: [
                         (y > 0).then(|| own - across),
                         (x + 1 < across).then_some(own + 1),
@@ -111,6 +114,7 @@ pub fn cut_triangles(vertices: &[Vertex], first: u32, holdout: bool) -> impl Ite
             holdout,
             paint: 0,
             coordinates: 0,
+            stone: 0,
             neighbours: [None; 4],
             low: positions.clone().fold(Vec3::INFINITY, Vec3::min),
             high: positions.fold(Vec3::NEG_INFINITY, Vec3::max),

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 
 use super::Values;
 use crate::mapping::QuadMap;
-use crate::place::{MAX_POOLS, Pool, Rock, Show, Vertex};
+use crate::place::{MAX_POOLS, Pool, Rock, Show, StoneKind, Vertex};
 use crate::util::error::{Error, Result};
 
 /// Returns the rocks, relative to `origin`.
@@ -23,7 +23,9 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
         if show == Show::Hidden {
             continue;
         }
-        let color = v.triple(&key("color"));
+        let kind = v.choice(&key("kind"), StoneKind::from_word);
+        let own = kind.albedo().filter(|_| !v.is_set(&key("color")));
+        let color = own.unwrap_or_else(|| v.triple(&key("color")));
         if color.max_element() > 1.0 {
             return Err(Error::input(
                 format!("{} = {color} reflects more light than it receives", key("color")),
@@ -39,6 +41,9 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
         }
         rocks.push(Rock {
             holdout: show == Show::Holdout,
+            kind,
+            grain: v.float(&key("grain")),
+            moss: v.float(&key("moss")),
             corners,
             levels: v.count(&key("levels")),
             h: v.float(&key("h")),
@@ -53,6 +58,7 @@ pub(super) fn rocks(v: &Values, origin: DVec3, memory: u64) -> Result<Vec<Rock>>
             strata_height: v.float(&key("strata_height")),
             strata_tilt: v.float(&key("strata_tilt")),
             strata_color: v.float(&key("strata_color")),
+            round: v.float(&key("round")),
             border: v.float(&key("border")),
             wet: v.float(&key("wet")),
             wet_reach: v.float(&key("wet_reach")),

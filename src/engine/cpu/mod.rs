@@ -11,6 +11,7 @@ pub mod pixels;
 pub mod pool;
 pub mod rasters;
 pub mod ray;
+pub mod stone;
 pub mod visibility;
 
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -5,12 +5,14 @@ use fearless_simd::prelude::*;
 use glam::{Vec2, Vec3};
 
 use super::lights::{background_at, irradiance_at, light_at};
+use super::stone::stone_lobe;
 use crate::place::Vertex;
 use crate::place::tiles::Tile;
 use crate::scene::Scene;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3};
 
 /// Points of the opaque mesh, one a lane, with values interpolated between its vertices.
+#[derive(Clone, Copy)]
 pub struct Points<S: Simd> {
     /// Position in the world, metres.
     pub position: Lanes3<S>,
@@ -27,6 +29,8 @@ pub struct Points<S: Simd> {
     pub shadow: Floats<S>,
     /// Strength of the film of water, 0 to 1.
     pub wet: Floats<S>,
+    /// Squared roughness of the film of water on a stone; 0: that of plain rock.
+    pub film: Floats<S>,
 }
 
 /// How the eye sees eight points.
@@ -84,6 +88,7 @@ impl<S: Simd> Points<S> {
             occlusion: occlusion.load(simd),
             shadow: shadow.load(simd),
             wet: wet.load(simd),
+            film: f32x8::splat(simd, 0.0),
         }
     }
 
@@ -127,7 +132,7 @@ impl<S: Simd> Points<S> {
             let cos_light = n.dot(to_light).max(zero);
             irradiance = irradiance.plus(intensity.times(lit * cos_light));
             if is_wet.any_true() {
-                let lobe = film_lobe(simd, n, to_light, e);
+                let lobe = self.film_on(simd, n, to_light, e);
                 gloss = gloss.plus(intensity.times(lit * cos_light * lobe));
             }
         }
@@ -137,6 +142,17 @@ impl<S: Simd> Points<S> {
         }
         let mirror = sky.times(open * fresnel(simd, n.dot(e)));
         dry.plus(gloss.plus(mirror).times(self.wet))
+    }
+
+    /// Returns π times the reflectance of the film of water at the points.
+    #[inline(always)]
+    fn film_on(&self, simd: S, n: Lanes3<S>, l: Lanes3<S>, e: Lanes3<S>) -> Floats<S> {
+        let plain = film_lobe(simd, n, l, e);
+        let is_stone = self.film.simd_gt(f32x8::splat(simd, 0.0));
+        if is_stone.any_true() {
+            return is_stone.select(stone_lobe(simd, n, l, e, self.film), plain);
+        }
+        plain
     }
 }
 

@@ -33,6 +33,7 @@ bindings! {
         PAINTS = 13
         CORNER_UVS = 14
         TEXELS = 15
+        STONES = 16
     }
     /// `shaders/engine/integrate.wgsl`; `shaders/engine/bare.wgsl` has some of them.
     integrate {

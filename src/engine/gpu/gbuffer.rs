@@ -11,6 +11,7 @@ use super::device::Gpu;
 use super::shader::resolve;
 use super::targets::FLOATS;
 use crate::engine::pool_surface::{STRAIGHT, WAVES};
+use crate::place::StoneKind;
 use crate::scene::Scene;
 use crate::util::error::Result;
 use pipeline::{NEARER, OpaqueVariant, PipelineState, pipeline};
@@ -48,9 +49,9 @@ pub struct Gbuffer {
     // Index: environment.
     background: [OnceLock<wgpu::RenderPipeline>; 2],
     rock_surface: OnceLock<wgpu::RenderPipeline>,
-    // Index: environment + 2 · one light.
-    rock: [OnceLock<wgpu::RenderPipeline>; 4],
-    painted: [OnceLock<wgpu::RenderPipeline>; 4],
+    // Index: number of the variant.
+    rock: [OnceLock<wgpu::RenderPipeline>; 8],
+    painted: [OnceLock<wgpu::RenderPipeline>; 8],
     pool: [OnceLock<wgpu::RenderPipeline>; 4],
     volume: OnceLock<wgpu::RenderPipeline>,
     peel: OnceLock<wgpu::RenderPipeline>,
@@ -80,7 +81,8 @@ impl Gbuffer {
 
     /// Compiles the pipelines that a scene with `layers` layers of volume quads needs.
     pub fn compile(&self, gpu: &Gpu, scene: &Scene, layers: u32) {
-        let variant = OpaqueVariant::new(scene.environment.is_some(), scene.lights.len());
+        let has_stones = scene.rocks.iter().any(|rock| rock.kind != StoneKind::Plain);
+        let variant = OpaqueVariant::new(scene.environment.is_some(), scene.lights.len(), has_stones);
         self.background(gpu, variant);
         if !scene.rocks.is_empty() || !scene.triangles.is_empty() {
             self.rock_surface_pipeline(gpu);
@@ -109,7 +111,7 @@ impl Gbuffer {
         self.opaque_pipeline(
             gpu,
             &self.background,
-            OpaqueVariant { one_light: false, ..variant },
+            OpaqueVariant { one_light: false, stones: false, ..variant },
             "background",
             wgpu::CompareFunction::GreaterEqual,
         )
@@ -130,6 +132,7 @@ impl Gbuffer {
 
     /// Draws pools. Equal depths pass, so that a pool can be redrawn with other waves.
     fn pool(&self, gpu: &Gpu, variant: OpaqueVariant) -> &wgpu::RenderPipeline {
+        let variant = OpaqueVariant { stones: false, ..variant };
         self.opaque_pipeline(gpu, &self.pool, variant, "pool", wgpu::CompareFunction::GreaterEqual)
     }
 
@@ -143,11 +146,16 @@ impl Gbuffer {
         name: &str,
         compare: wgpu::CompareFunction,
     ) -> &'a wgpu::RenderPipeline {
-        pipelines[usize::from(variant.environment) + 2 * usize::from(variant.one_light)].get_or_init(|| {
+        pipelines[variant.number()].get_or_init(|| {
             let vertex = if name == "pool" { "pool_vertex" } else { "behind_vertex" };
             let fragment =
                 format!("{name}{}_fragment", if variant.environment { "_environment" } else { "" });
-            let state = PipelineState { compare, writes_depth: name == "pool", one_light: variant.one_light };
+            let state = PipelineState {
+                compare,
+                writes_depth: name == "pool",
+                one_light: variant.one_light,
+                stones: variant.stones,
+            };
             pipeline(gpu, &self.module, [vertex, &fragment], &[FLOATS; 2], state)
         })
     }

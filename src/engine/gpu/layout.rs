@@ -114,6 +114,7 @@ pub struct MeshTile {
     pub holdout: u32,
     pub paint: u32,
     pub coordinates: u32,
+    pub stone: u32,
 }
 
 /// One light.

@@ -43,6 +43,7 @@ pub fn packed(tiles: &[Tile]) -> Vec<MeshTile> {
         holdout: u32::from(t.holdout),
         paint: t.paint,
         coordinates: t.coordinates,
+        stone: t.stone,
     };
     tiles.iter().map(packed).collect()
 }

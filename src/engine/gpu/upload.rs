@@ -18,6 +18,7 @@ use crate::light::Scattering;
 use crate::light::environment::Map;
 use crate::light::scatter::media::{kinds, profile_length};
 use crate::place::paint::Paints;
+use crate::place::stone::Stone;
 use crate::place::tiles::steps;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
@@ -71,6 +72,7 @@ struct ResidentMesh {
     coats: wgpu::Buffer,
     tiles: wgpu::Buffer,
     paints: Option<UploadedPaints>,
+    stones: wgpu::Buffer,
     /// Indices of all lists of triangles.
     indices: wgpu::Buffer,
     /// Range of each list in `indices`.
@@ -106,6 +108,10 @@ pub struct Uploaded {
     pub tiles: wgpu::Buffer,
     /// Paints of the tiles, if any tile has one.
     pub paints: Option<UploadedPaints>,
+    /// Stones of the tiles, `array<Stone>`, at least one.
+    pub stones: wgpu::Buffer,
+    /// Whether any tile has a stone.
+    pub has_stones: bool,
     /// Indices of the lists of triangles.
     pub indices: wgpu::Buffer,
     /// Parts of the rock to draw.
@@ -216,7 +222,7 @@ impl Uploaded {
                 "lower their number or use --engine cpu",
             ));
         }
-        let ResidentMesh { positions, coats, tiles, paints, indices, lists, upload, .. } =
+        let ResidentMesh { positions, coats, tiles, paints, stones, indices, lists, upload, .. } =
             resident.mesh(gpu, mesh).clone();
         let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
@@ -263,6 +269,8 @@ impl Uploaded {
             positions,
             coats,
             tiles,
+            stones,
+            has_stones: !mesh.stones.is_empty(),
             paints,
             indices,
             rock,
@@ -351,6 +359,8 @@ impl Resident {
             // The buffers are bound even for a scene without a mesh.
             coats.resize(coats.len().max(1), VertexMaterial::from(&Vertex::default()));
             packed.resize(packed.len().max(1), Zeroable::zeroed());
+            let mut stones = mesh.stones.to_vec();
+            stones.resize(stones.len().max(1), Stone::default());
             let (indices, lists) = tiles::lists();
             let storage = wgpu::BufferUsages::STORAGE;
             ResidentMesh {
@@ -359,6 +369,7 @@ impl Resident {
                 coats: buffer("coats", bytemuck::cast_slice(&coats), storage),
                 tiles: buffer("tiles", bytemuck::cast_slice(&packed), storage),
                 paints: UploadedPaints::new(gpu, &mesh.paints),
+                stones: buffer("stones", bytemuck::cast_slice(&stones), storage),
                 indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
                 lists: Arc::new(lists),
                 upload: *uploads,

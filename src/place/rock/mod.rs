@@ -2,7 +2,9 @@
 //! four corners. It becomes a mesh, with ridges, beds and ragged borders.
 
 mod field;
+mod patch;
 pub mod shade;
+pub mod stone;
 mod strata;
 pub mod wet;
 
@@ -10,11 +12,29 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Vertex;
-use field::{displace, hollows};
+use field::hollows;
+use patch::steeper;
+use stone::StoneKind;
 use strata::Strata;
 
 /// Largest number of subdivisions of a rock: a mesh of a million points.
 pub const MAX_LEVELS: u32 = 10;
+
+/// Least cosine between the normal of a vertex and that of the patch.
+const LEAST_OUTWARD: f32 = 0.02;
+
+/// Returns a normal that does not point into the rock.
+///
+/// Displacement within the patch may fold the mesh over itself. There the triangles face into the rock.
+/// Normals that were interpolated between both sides would pass 0, and a point that looks into the rock is
+/// in the dark: both showed as black dots.
+fn outward(n: Vec3, out: Vec3) -> Vec3 {
+    let cos = n.dot(out);
+    if cos >= LEAST_OUTWARD {
+        return n;
+    }
+    (n + out * (LEAST_OUTWARD - cos)).normalize_or(out)
+}
 
 /// Parameters of a rock.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +43,12 @@ pub struct Rock {
     pub name: String,
     /// Whether a picture with an alpha channel has a hole in its place.
     pub holdout: bool,
+    /// Kind of its stone.
+    pub kind: StoneKind,
+    /// Strength of the stone's grain, cracks and streaks.
+    pub grain: f32,
+    /// Amount of moss on the stone, 0 to 1.
+    pub moss: f32,
     /// Patch corners (u,v) = (0,0) (1,0) (1,1) (0,1), counter-clockwise seen from the outside; metres.
     pub corners: [Vec3; 4],
     /// Number of subdivisions: the mesh has 2^levels squares a side.
@@ -51,6 +77,8 @@ pub struct Rock {
     pub strata_tilt: f32,
     /// Relative variation of the albedo from bed to bed.
     pub strata_color: f32,
+    /// Share by which the patch's outline is rounded to an ellipse, 0 to 1.
+    pub round: f32,
     /// Standard deviation of the displacement of points within the patch, border included; metres.
     pub border: f32,
     /// Wetness of the rock where water is, 0 to 1.
@@ -70,14 +98,26 @@ impl Rock {
         side * side
     }
 
+    /// Returns the unit normal of the patch.
+    fn out(&self) -> Vec3 {
+        let [a, b, c, d] = self.corners;
+        (c - a).cross(d - b).normalize_or(Vec3::Z)
+    }
+
+    /// Returns the unit vectors across the beds, and along them and the patch.
+    fn bed_axes(&self) -> (Vec3, Vec3) {
+        let level = Vec3::Y.cross(self.out()).normalize_or(Vec3::X);
+        let (sin, cos) = self.strata_tilt.to_radians().sin_cos();
+        (Vec3::Y * cos + level * sin, level * cos - Vec3::Y * sin)
+    }
+
     /// Builds the vertices, dry and without shade from other rock. Positions are measured from `origin`.
     pub(super) fn vertices(&self, origin: DVec3) -> Vec<Vertex> {
         let n = 1usize << self.levels;
         let side = n + 1;
-        let field = |channel| displace(self.levels, self.h, self.seed, channel);
+        let field = |channel| self.field(channel, self.h);
         let tint = field(1);
-        let [a, b, c, d] = self.corners;
-        let out = (c - a).cross(d - b).normalize_or(Vec3::Z);
+        let out = self.out();
         let uv = |i: usize| ((i % side) as f32 / n as f32, (i / side) as f32 / n as f32);
         let mut height = field(0);
         if self.ridges > 0.0 {
@@ -88,24 +128,13 @@ impl Rock {
         }
         for (i, h) in height.iter_mut().enumerate() {
             let (u, v) = uv(i);
-            *h = *h * self.amplitude + self.bulge * 16.0 * u * (1.0 - u) * v * (1.0 - v);
+            let dome = 16.0 * u * (1.0 - u) * v * (1.0 - v);
+            *h = *h * self.amplitude + self.bulge * steeper(dome, self.round);
         }
-        let mut base: Vec<Vec3> = (0..side * side)
-            .map(|i| {
-                let (u, v) = uv(i);
-                a.lerp(b, u).lerp(d.lerp(c, u), v)
-            })
-            .collect();
-        if self.border > 0.0 {
-            let along = (b - a + c - d).normalize_or_zero();
-            let across = out.cross(along);
-            for ((p, x), y) in base.iter_mut().zip(field(3)).zip(field(4)) {
-                *p += (along * x + across * y) * self.border;
-            }
-        }
+        let base = self.base();
         let mut tone = vec![0.0; side * side];
         if self.strata > 0.0 {
-            let strata = Strata::new(self, out, origin);
+            let strata = Strata::new(self, origin);
             let (bend, weather) = (field(5), field(6));
             let size = self.strata * self.strata_height;
             height.par_iter_mut().zip(&mut tone).enumerate().for_each(|(i, (height, tone))| {
@@ -125,7 +154,7 @@ impl Rock {
             let shade = (1.0 + self.color_noise * tint[i]).max(0.1) * (1.0 - self.cavity * hollow[i]);
             Vertex {
                 position: positions[i].to_array(),
-                normal: du.cross(dv).normalize_or(out).to_array(),
+                normal: outward(du.cross(dv).normalize_or(out), out).to_array(),
                 albedo: (self.color * shade * (1.0 + tone[i])).to_array(),
                 ..Vertex::default()
             }

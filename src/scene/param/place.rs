@@ -3,7 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
-use crate::place::Show;
+use crate::place::{Show, StoneKind};
 use crate::scene::build::EnvironmentKind;
 
 pub(super) const ROCKS: Group = Group {
@@ -27,6 +27,25 @@ pub(super) const ROCKS: Group = Group {
                 "Choose `holdout` for a stand-in of the rock in a photograph that the water is put over, \
                  `hidden` to look at the rest alone.",
             ),
+        p("rocks.*.kind", "", "", Choice(StoneKind::WORDS), Upload)
+            .doc(
+                "Kind of stone: `plain`, or `granite`, `basalt`, `limestone` or `slate` with grain, cracks, \
+                 streaks and lichen finer than the mesh, an albedo, and beds of very uneven height.",
+            )
+            .when(
+                "Choose `granite` for massive pale rock, `basalt` for dark broken rock, `limestone` for \
+                 pale beds, `slate` for thin dark ones; leave `plain` for earth and far hills.",
+            ),
+        p("rocks.*.grain", "", "", Float(0.0, 4.0, 1.0), Upload)
+            .slider(0.0, 2.0)
+            .doc("Strength of the grain, cracks and streaks of a `kind`.")
+            .when("Lower it for worn, polished rock; raise it for rock that is broken or seen from afar."),
+        p("rocks.*.moss", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc(
+                "Amount of moss on a `kind` of stone: at 0.5 it covers level rock and little of what is \
+                 steep, at 1 nearly all.",
+            )
+            .when("Raise it for shade and spray; leave it at 0 for dry or new rock."),
         p("rocks.*.levels", "", "", Int(0, crate::place::MAX_LEVELS as i64, 7), Upload)
             .slider(0.0, 9.0)
             .doc("Number of subdivisions: the mesh has 2^levels squares a side.")
@@ -47,7 +66,10 @@ pub(super) const ROCKS: Group = Group {
             .doc("Seed of the rock's randomness.")
             .when("Change it for another rock of the same kind, or when two rocks look alike."),
         p("rocks.*.color", "", "", Color([0.12, 0.11, 0.10]), Upload)
-            .doc("Mean albedo of the dry rock, linear RGB.")
+            .doc(
+                "Mean albedo of the dry rock, linear RGB. If a rock has a `kind` and no `color`, the kind's \
+                 albedo holds.",
+            )
             .when("Lower it when the rock is as bright as the water; raise green against red for moss."),
         p("rocks.*.color_noise", "", "", Float(0.0, 1.0, 0.3), Upload)
             .doc("Relative fractal variation of the albedo.")
@@ -81,6 +103,9 @@ pub(super) const ROCKS: Group = Group {
         p("rocks.*.strata_color", "", "", Float(0.0, 1.0, 0.3), Upload)
             .doc("Largest relative difference of a layer's albedo from the mean.")
             .when("Raise it to tell layers apart by colour; lower it for one kind of stone."),
+        p("rocks.*.round", "", "", Float(0.0, 1.0, 0.0), Upload)
+            .doc("Share by which the outline of the patch is rounded to an ellipse.")
+            .when("Raise it to 0.8 for boulders, whose patches would show their corners."),
         p("rocks.*.border", "", "m", Float(0.0, 1e4, 0.0), Upload)
             .slider(0.0, 3.0)
             .doc("Standard deviation of the displacement of points within the patch, at the first level.")

@@ -17,6 +17,7 @@ use taki::engine::gpu::{gbuffer_source, integrate_source, visibility_source};
 use taki::engine::pool_surface::{AROUND, Foam, Surface, WAVES, Wave};
 use taki::picture::{Develop, TONE_AGX, TONE_FILMIC};
 use taki::place::paint::{self, Paint, TextureUse};
+use taki::place::stone::{self, Octave, Stone};
 use wgpu::naga;
 
 /// Name of each stage, and its text with all imports.
@@ -214,10 +215,18 @@ fn host_structs_have_the_layout_the_shaders_read() {
     assert_eq!(members(&module, "Surface"), surface);
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
-    assert_eq!(members(&module, "MeshTile"), fields!(MeshTile: first pitch side holdout paint coordinates));
+    assert_eq!(
+        members(&module, "MeshTile"),
+        fields!(MeshTile: first pitch side holdout paint coordinates stone)
+    );
     assert_eq!(members(&module, "TextureUse"), fields!(TextureUse: first size levels rule));
     let paint = fields!(Paint: color surface relief relief_scale roughness metallic has_gloss slots);
     assert_eq!(members(&module, "Paint"), paint);
+    let octave = fields!(Octave: tone slope crack fold moss lichen tinted pad);
+    assert_eq!(members(&module, "Octave"), octave);
+    let stone = fields!(Stone: cells along rest moss streak_cells streaks streak_rest film up bare tint slope2
+        moss_color moss2 lichen lichen2 octaves);
+    assert_eq!(members(&module, "Stone"), stone);
     assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
     assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay moves));
@@ -269,6 +278,13 @@ fn constants_are_the_same_on_both_sides() {
     assert_eq!(of(&gbuffer, "CLAMP"), f64::from(paint::CLAMP));
     assert_eq!(of(&gbuffer, "DIELECTRIC"), f64::from(gloss::DIELECTRIC));
     assert_eq!(of(&gbuffer, "LEAST_ALPHA"), f64::from(gloss::LEAST_ALPHA));
+    assert_eq!(wide("OCTAVES"), stone::OCTAVES);
+    let ours = [stone::COARSEST, stone::GRADIENT, stone::CRACK, stone::CRACK_SHARE, stone::EDGE];
+    let names = ["COARSEST", "GRADIENT", "CRACK", "CRACK_SHARE", "EDGE"];
+    assert_eq!(names.map(|name| of(&gbuffer, name) as f32), ours);
+    let streak = ["STREAK_WIDTH", "STREAK_HEIGHT"].map(|name| of(&gbuffer, name) as f32);
+    assert_eq!(streak, stone::STREAK);
+    assert_eq!(of(&gbuffer, "UNIT") as f32, taki::engine::cpu::stone::UNIT);
     assert_eq!(wide("TILE_ROW"), taki::place::tiles::SIDE as usize + 1);
     assert_eq!([wide("AROUND_COLUMNS"), wide("AROUND_ROWS")], AROUND);
     let size = ["STRAND_X", "STRAND_Y", "STRAND_Z"].map(|name| constant(name) as usize);
@@ -307,7 +323,7 @@ fn binding_numbers_are_the_same_on_both_sides() {
 }
 
 /// The structs that [`host_structs_have_the_layout_the_shaders_read`] compares.
-const COMPARED: [&str; 23] = [
+const COMPARED: [&str; 25] = [
     "Develop",
     "Environment",
     "Foam",
@@ -317,6 +333,7 @@ const COMPARED: [&str; 23] = [
     "Light",
     "LightVolume",
     "MeshTile",
+    "Octave",
     "Optics",
     "Paint",
     "Quad",
@@ -324,6 +341,7 @@ const COMPARED: [&str; 23] = [
     "Reflection",
     "ShellLightPart",
     "Similarity",
+    "Stone",
     "Strand",
     "Surface",
     "TextureUse",

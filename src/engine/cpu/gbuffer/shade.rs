@@ -12,6 +12,7 @@ use crate::engine::cpu::haze;
 use crate::engine::cpu::lights::background_at;
 use crate::engine::cpu::opaque::Points;
 use crate::engine::cpu::pool;
+use crate::engine::cpu::stone::lay_stones;
 use crate::engine::pool_surface::{self, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
@@ -251,6 +252,7 @@ impl<'a> Shading<'a> {
         }
         let points = Points::at(simd, &self.mesh.vertices, tiles, &spots.places, position);
         let view = points.view(simd, scene);
+        let (points, view) = lay_stones(simd, &self.mesh.stones, tiles, points, view, self.sample_angle);
         let mut distance = view.distance;
         let (mut radiance, mut normal) = if tiles.iter().any(|tile| tile.paint > 0) {
             let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));

@@ -10,12 +10,19 @@ pub struct OpaqueVariant {
     pub environment: bool,
     /// Whether the scene has exactly one light.
     pub one_light: bool,
+    /// Whether any rock has a kind of stone.
+    pub stones: bool,
 }
 
 impl OpaqueVariant {
     /// Returns the variant for a number of lights.
-    pub fn new(environment: bool, lights: usize) -> OpaqueVariant {
-        OpaqueVariant { environment, one_light: lights == 1 }
+    pub fn new(environment: bool, lights: usize, stones: bool) -> OpaqueVariant {
+        OpaqueVariant { environment, one_light: lights == 1, stones }
+    }
+
+    /// Returns the number of the variant, below 8.
+    pub fn number(self) -> usize {
+        usize::from(self.environment) + 2 * usize::from(self.one_light) + 4 * usize::from(self.stones)
     }
 }
 
@@ -27,11 +34,17 @@ pub struct PipelineState {
     pub writes_depth: bool,
     /// Value of the shader's constant `ONE_LIGHT`.
     pub one_light: bool,
+    /// Value of the shader's constant `STONES`.
+    pub stones: bool,
 }
 
 /// Draws nearer fragments and writes their depth.
-pub const NEARER: PipelineState =
-    PipelineState { compare: wgpu::CompareFunction::Greater, writes_depth: true, one_light: false };
+pub const NEARER: PipelineState = PipelineState {
+    compare: wgpu::CompareFunction::Greater,
+    writes_depth: true,
+    one_light: false,
+    stones: false,
+};
 
 /// Creates a pipeline without vertex buffers.
 pub fn pipeline(
@@ -44,6 +57,9 @@ pub fn pipeline(
     let target =
         |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
     let targets: Vec<_> = targets.iter().map(target).collect();
+    let set = [("ONE_LIGHT", state.one_light), ("STONES", state.stones)];
+    let constants: Vec<_> =
+        set.into_iter().filter(|(_, is_set)| *is_set).map(|(name, _)| (name, 1.0)).collect();
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(fragment),
         layout: None,
@@ -66,7 +82,7 @@ pub fn pipeline(
             module,
             entry_point: Some(fragment),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: if state.one_light { &[("ONE_LIGHT", 1.0)] } else { &[] },
+                constants: &constants,
                 ..Default::default()
             },
             targets: &targets,

@@ -114,6 +114,7 @@ impl Run<'_> {
                     (at::POSITIONS, &up.positions),
                     (at::TILES, &up.tiles),
                     (at::COATS, &up.coats),
+                    (at::STONES, &up.stones),
                 ];
                 if let Some(paints) = &up.paints {
                     buffers.extend([
@@ -275,7 +276,8 @@ impl Run<'_> {
     }
 
     fn variant(&self) -> OpaqueVariant {
-        OpaqueVariant::new(self.inputs.up.environment.is_some(), self.inputs.frame.light_count as usize)
+        let Inputs { up, frame, .. } = *self.inputs;
+        OpaqueVariant::new(up.environment.is_some(), frame.light_count as usize, up.has_stones)
     }
 
     /// Restricts drawing to the window: targets may be larger than a window at the image's edge.
