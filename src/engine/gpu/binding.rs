@@ -15,7 +15,7 @@ macro_rules! bindings {
 }
 
 bindings! {
-    /// `shaders/engine/gbuffer.wgsl`, and the pool in `shaders/engine/pool.wgsl`.
+    /// `shaders/engine/gbuffer.wgsl`, and pools in `shaders/engine/pool.wgsl` and `pool_field.wgsl`.
     gbuffer {
         FRAME = 0
         LIGHTS = 1
@@ -33,6 +33,8 @@ bindings! {
         PAINTS = 13
         CORNER_UVS = 14
         TEXELS = 15
+        POOL_SLOPES = 16
+        POOL_CARRIED = 17
     }
     /// `shaders/engine/integrate.wgsl`; `shaders/engine/bare.wgsl` has some of them.
     integrate {

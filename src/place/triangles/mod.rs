@@ -119,7 +119,7 @@ impl Ground {
         };
         let Ok(coats) = made;
         let mut mesh = grids.with_triangles(&kept.refined);
-        let Mesh { vertices, tiles, paints } = &mut mesh;
+        let Mesh { vertices, tiles, paints, .. } = &mut mesh;
         let vertices = Arc::make_mut(vertices);
         for tile in tiles.iter().filter(|tile| !tile.is_grid()) {
             // The raster pass darkens a texture under the film pixel by pixel.
