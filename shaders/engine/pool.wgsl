@@ -34,6 +34,9 @@ struct Foam {
     cells: vec2<i32>,
     // The rest, 0 to 1.
     rest: vec2<f32>,
+    // Cells per metre along x: cosine and sine of the lattice's turn times its scale. Used by fields.
+    axis: vec2<f32>,
+    pad: vec2<f32>,
 }
 
 struct Surface {

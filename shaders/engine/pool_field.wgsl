@@ -56,15 +56,23 @@ fn carried_at(p: vec2<f32>) -> vec4<f32> {
     return near * (1.0 - f.y) + far * f.y;
 }
 
+// Noise of one lattice at a point.
+fn turned_noise(p: vec2<f32>, lattice: Foam) -> f32 {
+    let axis = lattice.axis;
+    return value_noise(vec2<f32>(p.x * axis.x - p.y * axis.y, p.x * axis.y + p.y * axis.x), lattice);
+}
+
 // Cover of foam of a density at a point of its pattern, and the pattern's noise there.
 fn lace(p: vec2<f32>, density: f32) -> vec2<f32> {
-    let q = p * pool.foam_scale;
-    let wide = value_noise(q * 2.3, pool.foam[0]);
-    let noise = 0.45 * wide + 0.27 * value_noise(q * 5.1, pool.foam[1])
-        + 0.17 * value_noise(q * 11.0, pool.foam[2]) + 0.11 * value_noise(q * 23.0, pool.foam[3]);
-    let patches = clamp((1.7 * density + wide - 1.05) * 2.5, 0.0, 1.0);
-    let line = clamp((0.015 + 0.24 * density * density - abs(noise - 0.5)) * 18.0 + 0.5, 0.0, 1.0);
-    return vec2<f32>(patches * line, noise);
+    let wide = turned_noise(p, pool.foam[0]);
+    let next = turned_noise(p, pool.foam[1]);
+    let q = p + (vec2<f32>(wide, next) - vec2<f32>(0.5)) * (0.2 / pool.foam_scale);
+    let noise = 0.45 * wide + 0.27 * next + 0.17 * turned_noise(q, pool.foam[2])
+        + 0.11 * turned_noise(q, pool.foam[3]);
+    let patches = clamp((2.2 * density + wide - 1.05) * 1.5, 0.0, 1.0);
+    let line = clamp((0.03 + 0.25 * density * density - abs(noise - 0.5)) * 9.0 + 0.5, 0.0, 1.0);
+    let thick = 0.45 + 0.55 * min(1.6 * density, 1.0);
+    return vec2<f32>(patches * line * thick, noise);
 }
 
 // Unit normal of the field's waves and of the fine ones, whose crests `carried.w` bends.

@@ -23,7 +23,7 @@ const SHORE: f32 = 0.05;
 /// Number of straight waves of a sum.
 pub const STRAIGHT: usize = 20;
 /// The longest of them, which a field has in their place.
-pub const STRAIGHT_IN_FIELD: usize = 5;
+pub const STRAIGHT_IN_FIELD: usize = 6;
 /// Length of the shortest straight wave relative to the longest.
 pub const SHORTEST: f32 = 0.09;
 

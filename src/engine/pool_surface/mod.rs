@@ -31,7 +31,7 @@ pub const WAVES: usize = STRAIGHT + RINGS;
 /// Cells of the surroundings' map: columns about the vertical, and rows upwards.
 pub const AROUND: [usize; 2] = [64, 12];
 /// Length of the longest and the shortest fine wave relative to the longest of a field.
-const FINE: [f32; 2] = [0.5, 0.05];
+const FINE: [f32; 2] = [0.4, 0.04];
 /// Metres by which noise moves fine waves, relative to the longest wave of a field: crests turn by some 20°.
 const BEND: f32 = 0.3;
 /// Time after which a pattern of foam is taken up anew, about, seconds. The current would draw it out for
@@ -70,13 +70,24 @@ pub struct Foam {
     pub cells: [i32; 2],
     /// The rest, 0 to 1.
     pub rest: [f32; 2],
+    /// Cells per metre along x: cosine and sine of the lattice's turn times its scale. Used by fields.
+    pub axis: [f32; 2],
+    /// Padding.
+    pub pad: [f32; 2],
 }
 
 impl Foam {
-    /// Returns the place of `origin` in a lattice of `scale` cells per metre.
-    fn new(origin: DVec3, scale: f32) -> Foam {
-        let at = [origin.x, origin.z].map(|x| x * f64::from(scale));
-        Foam { cells: at.map(|x| x.floor() as i32), rest: at.map(|x| (x - x.floor()) as f32) }
+    /// Returns the place of `origin` in a lattice of `scale` cells per metre, which is turned by `angle`.
+    fn new(origin: DVec3, scale: f32, angle: f32) -> Foam {
+        let (sin, cos) = angle.sin_cos();
+        let axis = [cos * scale, sin * scale];
+        let [c, s] = axis.map(f64::from);
+        let at = match angle {
+            0.0 => [origin.x, origin.z].map(|x| x * f64::from(scale)),
+            _ => [origin.x * c - origin.z * s, origin.x * s + origin.z * c],
+        };
+        let cells = at.map(|x| x.floor() as i32);
+        Foam { cells, rest: at.map(|x| (x - x.floor()) as f32), axis, pad: [0.0; 2] }
     }
 }
 
@@ -174,7 +185,11 @@ impl Surface {
             None => surface.waves = waves(pool, &scene.falls(), [flow, scene.wave_moves], origin),
             Some(field) => surface.add_field(pool, field, [flow, scene.wave_moves], origin),
         }
-        surface.foam = FOAM.map(|scale| Foam::new(origin, scale * surface.foam_scale));
+        surface.foam = std::array::from_fn(|i| {
+            // Lattices that are turned against each other show none of their axes.
+            let angle = if field.is_some() { 0.5 + 0.9 * i as f32 } else { 0.0 };
+            Foam::new(origin, FOAM[i] * surface.foam_scale, angle)
+        });
         let Parts { camera, image, .. } = &**scene;
         let eye = camera.eye_local() - middle.as_dvec3();
         let plane = PlaneView::new([Vec3::X, Vec3::Z, Vec3::Y], eye, camera.rays(image.width, image.height));
@@ -193,7 +208,7 @@ impl Surface {
     /// shutter is open.
     fn add_field(&mut self, pool: &Pool, field: &PoolField, at: [f32; 2], origin: DVec3) {
         self.waves = fine_waves(pool, field.longest, at, origin);
-        self.foam_scale = 1.0 / field.longest;
+        self.foam_scale = 1.6 / field.longest;
         self.bend = BEND * field.longest;
         // Three times the waves per metre of the modes' middle, as for a wave of a sum.
         self.field_blur = 3.0 / (0.75 * field.longest);

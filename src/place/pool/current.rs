@@ -4,7 +4,8 @@
 //! the velocity is ∇φ + drift with ∇²φ − φ/L² = source, without flow through rock. The term φ/L² takes the
 //! water down again over the length L. Eddies are the curl of noise, which is 0 at rocks (Bridson, Houriham
 //! and Nordenstam 2007). Foam floats where water sinks, so it gathers there, and along shores, where waves make
-//! more: ∇·(v·f) + f/τ = D·∇²f + shore, and f is `pools.*.foam` where water falls in.
+//! more: ∇·(v·f) + f/τ + s·f = D·∇²f + shore, where s is the part of sinking water that takes its foam along,
+//! and f is `pools.*.foam` where water falls in.
 
 use glam::{IVec2, Vec2};
 
@@ -23,6 +24,9 @@ const SWEEPS: usize = 12;
 const EDDIES: f32 = 0.7;
 /// Mixing of foam by small eddies, as a share of speed times cell, beside what the scheme itself mixes.
 const MIXING: f32 = 0.15;
+/// Share of sinking water that takes its foam along. With 0, all foam would gather in a ring where the current
+/// ends.
+const TAKEN_DOWN: f32 = 0.75;
 /// Foam that waves leave on the shore, relative to that where water falls in.
 const SHORE: f32 = 0.25;
 
@@ -91,9 +95,9 @@ pub fn faces(pool: &Pool, basin: &Basin) -> Faces {
     let grid = basin.grid;
     let [nx, nz] = grid.size;
     let (h, drift) = (grid.cell, drift(pool, basin));
-    // Water pushed out of a disc of radius r with the speed v at its edge has the divergence 2v/r.
+    // Water pushed out of a band of the half width r with the speed v at its edge has the divergence v/r.
     let radius = (CHURNED * pool.foam_reach).max(0.75 * h);
-    let push = 2.0 * pool.current / radius;
+    let push = pool.current / radius;
     let churned: Vec<f32> =
         (0..grid.cells()).map(|i| if is_churned(pool, basin, i) { push } else { 0.0 }).collect();
     let phi = potential(basin, &churned, drift, pool.foam_reach);
@@ -170,7 +174,7 @@ fn eddies(pool: &Pool, basin: &Basin, phi: &[f32], push: f32) -> Vec<f32> {
     let away = from_rock(basin);
     let size = (0.6 * pool.foam_reach).max(4.0 * grid.cell);
     // φ at the edge of churned water, about.
-    let strongest = push * (CHURNED * pool.foam_reach) * pool.foam_reach * 0.5;
+    let strongest = push * (CHURNED * pool.foam_reach) * pool.foam_reach;
     let mut eddies = vec![0.0; (nx + 1) * (nz + 1)];
     for z in 1..nz {
         for x in 1..nx {
@@ -251,7 +255,7 @@ pub fn foam(pool: &Pool, basin: &Basin, faces: &Faces) -> Vec<f32> {
 pub struct Balance {
     /// What flows in.
     pub flows_in: f32,
-    /// Share of its own density that flows out, mixes away and decays.
+    /// Share of its own density that flows out, mixes away, sinks and decays.
     pub leaves: f32,
 }
 
@@ -262,7 +266,8 @@ pub fn balance(pool: &Pool, basin: &Basin, faces: &Faces, i: usize, foam: &[f32]
     let row = i / nx * (nx + 1) + i % nx;
     // Outward velocities through the four sides.
     let out = [-faces.x[row], faces.x[row + 1], -faces.z[i], faces.z[i + nx]];
-    let mut own = Balance { flows_in: 0.0, leaves: grid.cell / pool.foam_life };
+    let sinks = -out.iter().sum::<f32>();
+    let mut own = Balance { flows_in: 0.0, leaves: grid.cell / pool.foam_life + TAKEN_DOWN * sinks.max(0.0) };
     for (side, neighbour) in grid.neighbours(i).into_iter().enumerate() {
         let Some(j) = neighbour else {
             own.leaves += out[side].max(0.0);

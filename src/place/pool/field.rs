@@ -14,16 +14,17 @@ use crate::util::cache::Cache;
 /// Most cells along a side of the grid.
 const MOST: usize = 512;
 /// Cells along the longest wave, where the pool is small enough for [`MOST`].
-const CELLS_OF_WAVE: f32 = 12.0;
+const CELLS_OF_WAVE: f32 = 18.0;
 /// Fewest cells along the longest wave. Larger pools get longer waves.
-const FEWEST_OF_WAVE: f32 = 8.0;
+const FEWEST_OF_WAVE: f32 = 10.0;
 /// Fewest cells along the shorter side.
 const SHORTEST_SIDE: f32 = 32.0;
 /// Number of frequencies. Each has a field of complex amplitudes.
 pub const MODES: usize = 4;
-/// Wavelengths of the modes relative to the longest. They are 4/4, 4/5, 4/6 and 4/7, so that all modes repeat
-/// after four periods of the longest, and one run in time tells them apart.
-pub const LENGTHS: [f32; MODES] = [1.0, 0.8, 4.0 / 6.0, 4.0 / 7.0];
+/// Waves of each mode in four lengths of the longest: whole numbers, so that one run in time tells them apart.
+pub const HARMONICS: [u32; MODES] = [4, 5, 7, 9];
+/// Wavelengths of the modes relative to the longest.
+pub const LENGTHS: [f32; MODES] = [1.0, 0.8, 4.0 / 7.0, 4.0 / 9.0];
 /// Version of the fields' builder, a part of their key in the cache. Raise it with every change to them.
 pub const FIELD_VERSION: u32 = 1;
 
@@ -264,6 +265,13 @@ impl PoolField {
     /// place in the world from which positions are measured.
     pub fn new(pool: &Pool, mesh: &Mesh, water: &[[Vec3; 4]], origin: DVec3) -> Option<PoolField> {
         (pool.waves == PoolWaves::Field).then(|| PoolField::of(pool, &Basin::new(pool, mesh, water), origin))
+    }
+
+    /// Returns the bytes that a pool's field and its textures take on host and device.
+    pub fn bytes(pool: &Pool) -> u64 {
+        let grid = Grid::of(pool);
+        let texel = size_of::<[f32; 4]>();
+        (grid.cells() * (size_of::<Amplitudes>() + 2 * texel) + grid.halved().cells() * 2 * texel) as u64
     }
 
     /// Returns [`PoolField::new`], from the cache where it is stored there under a key.

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3, Vec2};
 use rand::RngExt;
 use rayon::prelude::*;
 
-use super::field::{Amplitudes, Basin, LENGTHS, MODES};
+use super::field::{Amplitudes, Basin, HARMONICS, LENGTHS, MODES};
 use super::{Pool, STRAIGHT_IN_FIELD};
 use crate::util::random::{Family, Stream};
 
@@ -21,13 +21,15 @@ const COURANT: f32 = 0.7;
 /// Wavelengths of the longest mode in which waves fall to 1/e.
 const DECAY: f32 = 12.0;
 /// Wavelengths of the longest mode that waves travel before the amplitudes are taken.
-const TRAVEL: f32 = 30.0;
+const TRAVEL: f32 = 20.0;
 /// Most steps of a run.
 const MOST_STEPS: usize = 6000;
 /// Wavelengths over which waves are absorbed at the grid's border, and the largest damping of a step there.
 const ABSORBED: (f32, f32) = (1.5, 0.3);
 /// Number of straight waves of each mode that come from outside.
 const INCIDENT: usize = 3;
+/// Length relative to the longest of the waves whose amplitude is `pools.*.rings`.
+const RINGS: f32 = 0.6;
 /// Modulus of the wave of a point source one wavelength away, ¼·|H₀(2π)| of Green's function.
 const AT_ONE_WAVELENGTH: f32 = 0.079_577;
 
@@ -138,16 +140,16 @@ impl<'a> Run<'a> {
     }
 
     /// Adds sources where water falls in, of random phases in every cell: a thin jet makes rings, and a wide
-    /// fall waves without a common centre. Their amplitude one wavelength away is `pools.*.rings`.
+    /// fall waves without a common centre. Those of the length [`RINGS`] have the amplitude `pools.*.rings` one
+    /// longest wavelength away, and all are equally steep there.
     pub fn drive(&mut self, pool: &Pool) {
         let grid = self.basin.grid;
         let reach = (0.25 * self.longest).max(grid.cell);
         let is_driven = |i: &usize| !self.basin.solid[*i] && self.basin.from_impact(grid.middle(*i)) < reach;
         let driven: Vec<usize> = (0..grid.cells()).into_par_iter().filter(is_driven).collect();
         let family = Family::new(pool.seed, Stream::Wave);
-        let all = LENGTHS.iter().map(|l| l * l).sum::<f32>().sqrt();
         let strength = pool.rings * self.courant * self.courant
-            / (AT_ONE_WAVELENGTH * all * (driven.len().max(1) as f32).sqrt());
+            / (AT_ONE_WAVELENGTH * RINGS * (driven.len().max(1) as f32).sqrt());
         for i in driven {
             let mut random = family.member(1 << 32 | i as u64);
             let source = LENGTHS
@@ -221,7 +223,7 @@ impl<'a> Run<'a> {
     /// Returns e^(iωt) of each mode at a step.
     fn turn(&self, step: usize) -> Complex {
         std::array::from_fn(|k| {
-            let turns = ((k + 4) * step) % self.period;
+            let turns = (HARMONICS[k] as usize * step) % self.period;
             unit(turns as f32 / self.period as f32)
         })
     }

@@ -5,7 +5,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::{NOISE, value_noise};
-use crate::engine::pool_surface::{FOAM, SlopeMap, Surface};
+use crate::engine::pool_surface::{Foam, SlopeMap, Surface};
 use crate::place::PoolField;
 use crate::util::lanes::{Floats, LANES, Stored};
 
@@ -132,27 +132,32 @@ pub fn lace<S: Simd>(
     [cover_a * share_a + cover_b * share_b, noise_a * share_a + noise_b * share_b]
 }
 
-/// Returns cover and noise of one pattern: lines along which noise has its mean, and which close to cells.
-/// They widen with the density to a whole cover, and lie in patches.
+/// Returns the noise of one lattice at points (x, z).
 #[inline(always)]
-fn one_lace<S: Simd>(
-    simd: S,
-    surface: &Surface,
-    [px, pz]: [Floats<S>; 2],
-    density: Floats<S>,
-) -> [Floats<S>; 2] {
+fn turned_noise<S: Simd>(simd: S, [px, pz]: [Floats<S>; 2], lattice: &Foam) -> Floats<S> {
+    let [cos, sin] = [f32x8::splat(simd, lattice.axis[0]), f32x8::splat(simd, lattice.axis[1])];
+    value_noise(simd, px * cos - pz * sin, px * sin + pz * cos, lattice)
+}
+
+/// Returns cover and noise of one pattern: lines along which noise has its mean, and which close to cells.
+/// They widen with the density to a whole cover, and lie in patches. Wide noise moves the fine one, which
+/// makes it swirl.
+#[inline(always)]
+fn one_lace<S: Simd>(simd: S, surface: &Surface, p: [Floats<S>; 2], density: Floats<S>) -> [Floats<S>; 2] {
     let splat = |x: f32| f32x8::splat(simd, x);
-    let (zero, one) = (splat(0.0), splat(1.0));
-    let scale = splat(surface.foam_scale);
-    let (qx, qz) = (px * scale, pz * scale);
-    let wide = value_noise(simd, qx * splat(FOAM[0]), qz * splat(FOAM[0]), &surface.foam[0]);
-    let mut noise = splat(NOISE[0]) * wide;
-    for i in 1..FOAM.len() {
-        let octave = splat(FOAM[i]);
-        noise += splat(NOISE[i]) * value_noise(simd, qx * octave, qz * octave, &surface.foam[i]);
-    }
-    let patches = ((splat(1.7) * density + wide - splat(1.05)) * splat(2.5)).max(zero).min(one);
-    let width = splat(0.015) + splat(0.24) * density * density;
-    let line = ((width - (noise - splat(0.5)).abs()) * splat(18.0) + splat(0.5)).max(zero).min(one);
-    [patches * line, noise]
+    let (zero, half, one) = (splat(0.0), splat(0.5), splat(1.0));
+    let foam = &surface.foam;
+    let wide = turned_noise(simd, p, &foam[0]);
+    let next = turned_noise(simd, p, &foam[1]);
+    let by = splat(0.2 / surface.foam_scale);
+    let q = [p[0] + (wide - half) * by, p[1] + (next - half) * by];
+    let noise = splat(NOISE[0]) * wide
+        + splat(NOISE[1]) * next
+        + splat(NOISE[2]) * turned_noise(simd, q, &foam[2])
+        + splat(NOISE[3]) * turned_noise(simd, q, &foam[3]);
+    let patches = ((splat(2.2) * density + wide - splat(1.05)) * splat(1.5)).max(zero).min(one);
+    let width = splat(0.03) + splat(0.25) * density * density;
+    let line = ((width - (noise - half).abs()) * splat(9.0) + half).max(zero).min(one);
+    let thick = splat(0.45) + splat(0.55) * (splat(1.6) * density).min(one);
+    [patches * line * thick, noise]
 }
