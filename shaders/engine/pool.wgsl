@@ -22,7 +22,7 @@ struct Wave {
     slope: f32,
     // 1 for a ring, 0 for a straight wave.
     ring: f32,
-    // Decay of a ring with the distance from its centre, 1/m.
+    // Decay of a ring with the distance from its centre, 1/m; of a fine wave the side it is bent to, 1 or -1.
     decay: f32,
     // Turns of the phase while the shutter is open.
     moves: f32,
@@ -34,6 +34,9 @@ struct Foam {
     cells: vec2<i32>,
     // The rest, 0 to 1.
     rest: vec2<f32>,
+    // Cells per metre along x: cosine and sine of the lattice's turn times its scale. Used by fields.
+    axis: vec2<f32>,
+    pad: vec2<f32>,
 }
 
 struct Surface {
@@ -44,7 +47,8 @@ struct Surface {
     // 1: a hole in a picture with alpha.
     holdout: f32,
     absorption: vec3<f32>,
-    pad_b: f32,
+    // Scale of the foam's pattern, relative to that of a pool without a field.
+    foam_scale: f32,
     middle: vec3<f32>,
     // Metres along a view ray beyond which points of the pool's plane are not used.
     far: f32,
@@ -53,9 +57,17 @@ struct Surface {
     across: vec3<f32>,
     height: f32,
     along: vec3<f32>,
-    pad_c: f32,
+    // Metres by which noise moves fine waves.
+    bend: f32,
     normal: vec3<f32>,
-    pad_d: f32,
+    // Turns per metre at which the field's waves fade as a pixel grows.
+    field_blur: f32,
+    // x and z of the corner of the field's grid, metres, and its cells per metre.
+    field_origin: vec2<f32>,
+    field_scale: f32,
+    pad: f32,
+    // Seconds by which both patterns of foam are carried, and their shares.
+    carry: vec4<f32>,
     foam: array<Foam, 4>,
     waves: array<Wave, 32>,
     // Map of the surroundings: radiance × cover, and the cover.
@@ -224,9 +236,16 @@ fn pool_lit_by(sum: Lit, in: OpaquePoint, n: vec3<f32>, e: vec3<f32>, i: u32) ->
     return out;
 }
 
-// Shades a point of the surface. `sky` is the radiance of the sky along the mirrored view.
-fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
-    let to_eye = frame.eye_world - in.position_world;
+// Light of a point of the surface without foam.
+struct PoolLight {
+    // Radiance of clear water.
+    clear: vec3<f32>,
+    // Light that reaches the surface: the radiance of white foam.
+    irradiance: vec3<f32>,
+}
+
+// Light of a point of the surface. `sky` is the radiance of the sky along the mirrored view.
+fn pool_light(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> PoolLight {
     let e = to_eye_unit(in);
     var sum = Lit(ambient * (1.0 - in.shade.x), vec3<f32>(0.0));
     if ONE_LIGHT {
@@ -241,13 +260,18 @@ fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>)
     let through = exp2(pool.absorption * (-3.174 * in.albedo.x));
     let body = pool.color * (1.0 - through) + pool.bottom * through;
     let back = fresnel(max(dot3(n, e), 0.02));
-    let clear = mirror * back + sum.gloss + body * sum.irradiance * (1.0 - back);
+    return PoolLight(mirror * back + sum.gloss + body * sum.irradiance * (1.0 - back), sum.irradiance);
+}
 
+// Shades a point of the surface. `sky` is the radiance of the sky along the mirrored view.
+fn shade_pool(in: OpaquePoint, n: vec3<f32>, ambient: vec3<f32>, sky: vec3<f32>) -> OpaqueTargets {
+    let to_eye = frame.eye_world - in.position_world;
+    let water = pool_light(in, n, ambient, sky);
     let p = in.position_world.xz + vec2<f32>(n.x, n.z) * 0.3;
     let noise = foam_noise(p);
     let cover = clamp((1.6 * in.albedo.y + noise - 1.05) * 2.2, 0.0, 1.0);
-    let foam = sum.irradiance * ((0.25 + 0.5 * noise) * cover);
-    return opaque_targets(clear * (1.0 - cover) + foam, n, to_eye, pool.holdout != 0.0);
+    let foam = water.irradiance * ((0.25 + 0.5 * noise) * cover);
+    return opaque_targets(water.clear * (1.0 - cover) + foam, n, to_eye, pool.holdout != 0.0);
 }
 
 // Values in full vectors, because software Vulkan interpolates whole vectors.

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::paint::{Painting, Paints, texture};
 use super::pool::Pool;
+use super::pool::field::{FIELD_VERSION, PoolField};
 use super::rock::stone::Stone;
 use super::rock::{Rock, shade, wet};
 use super::tiles::{self, Tile};
@@ -42,6 +43,8 @@ pub struct Mesh {
     pub paints: Arc<Paints>,
     /// Stones of tiles.
     pub stones: Arc<Vec<Stone>>,
+    /// Waves and foam of each pool that has a field of them, by the pool's number; empty without pools.
+    pub fields: Arc<Vec<Option<PoolField>>>,
 }
 
 impl Mesh {
@@ -106,7 +109,13 @@ impl Mesh {
             tiles: Arc::new(tiles),
             paints: Arc::new(paints),
             stones: self.stones,
+            fields: self.fields,
         }
+    }
+
+    /// Returns the field of waves and foam of a pool, given by its index, if it has one.
+    pub fn field(&self, pool: usize) -> Option<&PoolField> {
+        self.fields.get(pool)?.as_ref()
     }
 
     /// Returns the first vertex of each tile of triangles, in order, and the mean colour of its texture.
@@ -158,7 +167,7 @@ pub struct Ground {
 impl Ground {
     /// Builds the mesh. `memo` holds parts of what was built last.
     pub fn mesh(&self, memo: &ShadeMemo) -> Mesh {
-        self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None)
+        self.with_fields(self.with_meshes(self.grid_mesh(self.vertices(memo)), memo, None), None)
     }
 
     /// Returns [`Ground::mesh`], from `cache` where it is stored there.
@@ -167,12 +176,28 @@ impl Ground {
         let make = || Ok::<_, Infallible>(self.vertices(memo));
         let key = key("mesh", BUILDER_VERSION, &self.of_grids());
         let Ok(vertices) = cache.get("meshes", &key, count, make);
-        self.with_meshes(self.grid_mesh(vertices), memo, Some(cache))
+        let mesh = self.with_meshes(self.grid_mesh(vertices), memo, Some(cache));
+        self.with_fields(mesh, Some(cache))
     }
 
     /// Makes the mesh of rocks and pools of their vertices.
     fn grid_mesh(&self, vertices: Vec<Vertex>) -> Mesh {
         Mesh::new(vertices, self.grids()).with_stones(self.rocks.iter().zip(self.ranges()), self.origin)
+    }
+
+    /// Adds the fields of pools to the mesh, from `cache` where they are stored there.
+    fn with_fields(&self, mut mesh: Mesh, cache: Option<&Cache>) -> Mesh {
+        let field = |pool: &Pool| match cache {
+            Some(cache) => {
+                let parts = (&self.rocks, &self.triangles, pool, &self.water, self.origin);
+                let key = key("pool", FIELD_VERSION, &parts);
+                PoolField::cached(pool, &mesh, &self.water, self.origin, (cache, &key))
+            }
+            None => PoolField::new(pool, &mesh, &self.water, self.origin),
+        };
+        let fields: Vec<Option<PoolField>> = self.pools.iter().map(field).collect();
+        mesh.fields = Arc::new(fields);
+        mesh
     }
 
     /// Everything that determines the vertices of rocks and pools.

@@ -3,7 +3,7 @@
 mod bvh;
 mod mesh;
 pub mod paint;
-mod pool;
+pub mod pool;
 mod rock;
 mod shell_core;
 mod shell_diffuse;
@@ -14,7 +14,8 @@ mod triangles;
 mod vertex;
 
 pub use mesh::{BUILDER_VERSION, Ground, Mesh, Triangles};
-pub use pool::{MAX_POOLS, Pool};
+pub use pool::field::PoolField;
+pub use pool::{MAX_POOLS, Pool, PoolWaves};
 pub use rock::{MAX_LEVELS, Rock, stone, stone::StoneKind, wet::wet_albedo, wet::wetness};
 pub use shell_core::opposite;
 pub use shell_diffuse::{DiffuseKey, DiffuseOfShells};

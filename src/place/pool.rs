@@ -1,10 +1,17 @@
 //! Pools: level water that falls end in, as part of the opaque mesh. [`crate::engine::pool_surface`] shades
 //! them.
 
+pub mod current;
+pub mod field;
+pub mod waves;
+
+use std::f32::consts::TAU;
+
 use glam::Vec3;
 
 use super::Vertex;
 use super::rock::wet::nearest_on_triangle;
+use crate::util::words::words;
 
 /// Largest number of pools in a scene.
 pub const MAX_POOLS: usize = 8;
@@ -12,6 +19,38 @@ pub const MAX_POOLS: usize = 8;
 const SQUARES: usize = 128;
 /// Depth below which the shore has foam, metres.
 const SHORE: f32 = 0.05;
+
+/// Number of straight waves of a sum.
+pub const STRAIGHT: usize = 20;
+/// The longest of them, which a field has in their place.
+pub const STRAIGHT_IN_FIELD: usize = 6;
+/// Length of the shortest straight wave relative to the longest.
+pub const SHORTEST: f32 = 0.09;
+
+/// Choice of how a pool's waves and foam are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PoolWaves {
+    /// A sum of straight waves and rings, and foam by the distance from falling water.
+    #[default]
+    Sum,
+    /// Waves that are mirrored and bent by rocks, and foam that a current carries.
+    Field,
+}
+
+words! { PoolWaves { Sum => "sum", Field => "field" } }
+
+/// Returns the straight waves' amplitude relative to their length. All waves are equally steep: A = λ·a, where
+/// Σ A²/2 is the variance of the height.
+pub fn steepness(pool: &Pool) -> f32 {
+    let length = |i: usize| pool.straight_length(i);
+    let sum: f32 = (0..STRAIGHT).map(|i| length(i) * length(i) * 0.5).sum();
+    pool.height / sum.sqrt()
+}
+
+/// Returns the steepest slope of a straight wave.
+pub fn straight_slope(pool: &Pool) -> f32 {
+    TAU * steepness(pool)
+}
 
 /// Parameters of a pool.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +69,8 @@ pub struct Pool {
     pub bottom: Vec3,
     /// Absorption, 1/m.
     pub absorption: Vec3,
+    /// How waves and foam are made.
+    pub waves: PoolWaves,
     /// Standard deviation of the surface's height, metres.
     pub height: f32,
     /// Length of the longest wave, metres.
@@ -42,6 +83,12 @@ pub struct Pool {
     pub foam: f32,
     /// Distance from the falling water at which the foam ends, metres.
     pub foam_reach: f32,
+    /// Time in which carried foam falls to 1/e, seconds.
+    pub foam_life: f32,
+    /// Speed at which falling water pushes the surface away, m/s.
+    pub current: f32,
+    /// Speed of the whole surface away from falling water, m/s.
+    pub drift: f32,
     /// Seed of the waves.
     pub seed: u64,
 }
@@ -51,6 +98,11 @@ impl Pool {
     pub const SQUARES: usize = SQUARES;
     /// Vertices of the mesh.
     pub const VERTICES: usize = (SQUARES + 1) * (SQUARES + 1);
+
+    /// Returns the length of a straight wave of a sum, metres, by its number.
+    pub fn straight_length(&self, i: usize) -> f32 {
+        self.wavelength * SHORTEST.powf(i as f32 / (STRAIGHT - 1) as f32)
+    }
 
     /// Returns the height of the surface, metres.
     pub fn level(&self) -> f32 {
@@ -111,7 +163,11 @@ impl Pool {
             let p = Vec3::from(vertex.position);
             let away = |[a, b]: &[Vec3; 2]| p.distance(nearest_on_triangle(p, [*a, *b, *b]));
             let metres = impacts.iter().map(away).fold(self.foam_reach, f32::min);
-            let near = 1.0 - metres / self.foam_reach;
+            let near = match self.waves {
+                PoolWaves::Sum => 1.0 - metres / self.foam_reach,
+                // The current carries it.
+                PoolWaves::Field => 0.0,
+            };
             let depth = (self.level() - ground).clamp(0.0, self.depth);
             let shore = 0.45 * (1.0 - depth / SHORE).max(0.0);
             vertex.albedo = [depth, self.foam * (near * near * (3.0 - 2.0 * near)).max(shore), 0.0];

@@ -4,7 +4,7 @@ use super::Parts;
 use crate::light::scatter::shell::{DIFFUSE_BYTES, diffuse_work_bytes};
 use crate::light::{Scattering, Visibility};
 use crate::picture::{LEAST_ROWS, WORK_BYTES, canvas, row_bytes};
-use crate::place::{CASTER_BYTES, Pool, Vertex};
+use crate::place::{CASTER_BYTES, Pool, PoolField, PoolWaves, Vertex};
 
 impl Parts {
     /// Returns the bytes that rocks, pools, the environment and the raster window take on host and device,
@@ -19,7 +19,9 @@ impl Parts {
         let painted = paintings.map(|painting| 2 * painting.bytes()).sum::<u64>();
         let shells = self.shells.iter().map(|shell| shell.bytes()).sum::<u64>();
         let on_shells = [self.bytes_of_shadows_on_shells(), self.bytes_of_diffuse_on_shells()];
-        let all = [rocks, environment, shells, painted].into_iter().chain(on_shells);
+        let has_field = |pool: &&Pool| pool.waves == PoolWaves::Field;
+        let fields = self.pools.iter().filter(has_field).map(PoolField::bytes).sum::<u64>();
+        let all = [rocks, environment, shells, painted, fields].into_iter().chain(on_shells);
         all.fold(canvas(&self.image, layers), u64::saturating_add)
     }
 

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 
 use super::Values;
 use crate::mapping::QuadMap;
-use crate::place::{MAX_POOLS, Pool, Rock, Show, StoneKind, Vertex};
+use crate::place::{MAX_POOLS, Pool, PoolWaves, Rock, Show, StoneKind, Vertex};
 use crate::util::error::{Error, Result};
 
 /// Returns the rocks, relative to `origin`.
@@ -128,12 +128,16 @@ pub(super) fn pools(v: &Values, origin: DVec3) -> Result<Vec<Pool>> {
             color,
             bottom,
             absorption: v.triple(&key("absorption")),
+            waves: v.choice(&key("waves"), PoolWaves::from_word),
             height: float("height"),
             wavelength: float("wavelength"),
             rings: float("rings"),
             period: float("period"),
             foam: float("foam"),
             foam_reach: float("foam_reach"),
+            foam_life: float("foam_life"),
+            current: float("current"),
+            drift: float("drift"),
             seed: v.int(&key("seed")) as u64,
             name,
         });

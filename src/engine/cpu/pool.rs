@@ -1,14 +1,17 @@
 //! §3 Shading of a pool's surface in the raster pass, eight points side by side. Twin:
 //! `shaders/engine/pool.wgsl`.
 
+mod field;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 use glam::Vec3;
 
 use super::lights::{background_at, irradiance_at, light_at};
 use super::opaque::{Points, fresnel};
-use crate::engine::pool_surface::{AROUND, FOAM, Foam, Surface};
+use crate::engine::pool_surface::{AROUND, FOAM, Foam, SlopeMap, Surface};
 use crate::mapping::FARTHEST;
+use crate::place::PoolField;
 use crate::scene::Scene;
 use crate::util::lane_powers::exp2;
 use crate::util::lanes::floor_cell;
@@ -66,11 +69,13 @@ fn value_noise<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, origin: &Foam) -> F
 /// Returns the slopes of the surface along x and z at the points (x, z), metres, and the lift of its normal.
 /// `churn` scales the slopes. A wave fades out as `footprint`, the width of a pixel on the surface in metres,
 /// reaches half its length, because the pixel then sees the wave's mean. `time` is that of the samples.
+/// Beside a field, waves are moved by `bend` metres along or against their direction.
 #[inline(always)]
 fn slopes<S: Simd>(
     simd: S,
     surface: &Surface,
     [px, pz]: [Floats<S>; 2],
+    bend: Option<Floats<S>>,
     churn: Floats<S>,
     footprint: Floats<S>,
     time: Floats<S>,
@@ -92,7 +97,9 @@ fn slopes<S: Simd>(
             let inverse = one / away;
             (away_x * inverse, away_z * inverse, away, blur * (one + away * splat(wave.decay)))
         } else {
-            (tx, tz, tx * px + tz * pz, blur)
+            let along = tx * px + tz * pz;
+            let along = if let Some(bend) = bend { along + splat(wave.decay) * bend } else { along };
+            (tx, tz, along, blur)
         };
         let steep = splat(wave.slope) * churn / (thin * thin);
         let t = splat(wave.k) * along + splat(wave.phase) + splat(wave.moves) * time;
@@ -181,6 +188,9 @@ fn around<S: Simd>(simd: S, surface: &Surface, position: Lanes3<S>, r: Lanes3<S>
     (Lanes3 { x, y, z }, cover)
 }
 
+/// Textures of a pool with a field: its slopes and what it carries.
+pub type FieldMaps<'a> = (&'a SlopeMap, &'a PoolField);
+
 /// Shades a pool's surface under the points `at` of the image. Returns the linear radiance, metres from the
 /// eye, and the unit normal. The radiance adds the mirrored surroundings, the glint of the lights (Blinn 1977
 /// with the exponent 256) and the light from below through the depth of water; foam covers all of them.
@@ -192,13 +202,13 @@ pub fn shade<S: Simd>(
     scene: &Scene,
     shadow_light: Option<usize>,
     rays: &[Vec3; 3],
-    surface: &Surface,
+    (surface, maps): (&Surface, Option<FieldMaps>),
     points: &Points<S>,
     (at, time): ([Floats<S>; 2], Floats<S>),
 ) -> (Lanes3<S>, Floats<S>, Lanes3<S>) {
     let splat = |x: f32| f32x8::splat(simd, x);
     let (zero, one) = (splat(0.0), splat(1.0));
-    let (depth, foam) = (points.albedo.x, points.albedo.y);
+    let (depth, mut foam) = (points.albedo.x, points.albedo.y);
     let position = on_pool(simd, rays, surface, points.position, at);
     let to_eye = Lanes3::splat(simd, scene.camera.eye_local().as_vec3()).minus(position);
     let distance = to_eye.dot(to_eye).sqrt();
@@ -206,9 +216,22 @@ pub fn shade<S: Simd>(
 
     let pixel = 2.0 * scene.camera.tan_half_fov / scene.image.height as f32;
     let footprint = distance * splat(pixel) / e.y.max(splat(0.05));
+    let place = [position.x, position.z];
+    let carried = maps.map(|(_, field)| field::carried_at(simd, surface, field, place));
+    if let Some([carried, ..]) = carried {
+        foam = carried.max(foam).min(one);
+    }
     // The surface is rougher where water falls in.
     let churn = one + splat(1.5) * foam;
-    let [slope_x, slope_z, lift] = slopes(simd, surface, [position.x, position.z], churn, footprint, time);
+    let bend = carried.map(|[_, _, _, noise]| noise * splat(surface.bend));
+    let [mut slope_x, mut slope_z, lift] = slopes(simd, surface, place, bend, churn, footprint, time);
+    if let Some((map, _)) = maps {
+        let wide = splat(surface.field_blur) * footprint;
+        let blur = one + wide * wide;
+        let [of_x, of_z] = field::slopes(simd, surface, map, place, time);
+        slope_x += of_x / (blur * blur);
+        slope_z += of_z / (blur * blur);
+    }
     let n = Lanes3 { x: -slope_x, y: (one - lift).max(splat(0.3)), z: -slope_z };
     let n = n.over(n.dot(n).sqrt());
     // The mirrored view never points into the water, because other waves would hide that view.
@@ -256,6 +279,13 @@ pub fn shade<S: Simd>(
     // Noise is at most 1, so that there is no foam where its density is 0.
     if !foam.simd_gt(zero).any_true() {
         return (clear, distance, n);
+    }
+    if let Some([_, v_x, v_z, _]) = carried {
+        let aside = splat(0.1 / surface.foam_scale);
+        let p = [position.x + n.x * aside, position.z + n.z * aside];
+        let [cover, noise] = field::lace(simd, surface, p, [v_x, v_z], foam);
+        let white = irradiance.times((splat(0.25) + splat(0.5) * noise) * cover);
+        return (clear.times(one - cover).plus(white), distance, n);
     }
     let (x, z) = (position.x + n.x * splat(0.3), position.z + n.z * splat(0.3));
     let mut noise = zero;

@@ -15,7 +15,7 @@ macro_rules! bindings {
 }
 
 bindings! {
-    /// `shaders/engine/gbuffer.wgsl`, and the pool in `shaders/engine/pool.wgsl`.
+    /// `shaders/engine/gbuffer.wgsl`, and pools in `shaders/engine/pool.wgsl` and `pool_field.wgsl`.
     gbuffer {
         FRAME = 0
         LIGHTS = 1
@@ -34,6 +34,8 @@ bindings! {
         CORNER_UVS = 14
         TEXELS = 15
         STONES = 16
+        POOL_SLOPES = 17
+        POOL_CARRIED = 18
     }
     /// `shaders/engine/integrate.wgsl`; `shaders/engine/bare.wgsl` has some of them.
     integrate {

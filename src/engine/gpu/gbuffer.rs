@@ -11,7 +11,7 @@ use super::device::Gpu;
 use super::shader::resolve;
 use super::targets::FLOATS;
 use crate::engine::pool_surface::{STRAIGHT, WAVES};
-use crate::place::StoneKind;
+use crate::place::{PoolWaves, StoneKind};
 use crate::scene::Scene;
 use crate::util::error::Result;
 use pipeline::{NEARER, OpaqueVariant, PipelineState, pipeline};
@@ -21,17 +21,25 @@ const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 /// Returns the pass's shader with everything it imports. The sum over a pool's waves is unrolled: software
 /// Vulkan reads an array at a constant index once for eight pixels, but lane by lane inside a loop.
 pub fn gbuffer_source() -> String {
-    let waves: String = (0..WAVES)
-        .map(|i| {
-            let kind = if i < STRAIGHT { "straight" } else { "ring" };
-            format!("    sum += {kind}_wave(pool.waves[{i}u], at);\n")
-        })
-        .collect();
-    let sum = format!(
-        "fn waves(at: WavePlace) -> vec3<f32> {{\n    \
-         var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
-    );
-    resolve(&format!("#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n{sum}"))
+    let wave = |i: usize| {
+        let kind = if i < STRAIGHT { "straight" } else { "ring" };
+        format!("    sum += {kind}_wave(pool.waves[{i}u], at);\n")
+    };
+    let fine = |i: usize| format!("    sum += fine_wave(pool.waves[{i}u], at, bend);\n");
+    let sum = |name: &str, more: &str, waves: String| {
+        format!(
+            "fn {name}(at: WavePlace{more}) -> vec3<f32> {{\n    \
+             var sum = vec3<f32>(0.0);\n{waves}    return sum;\n}}\n"
+        )
+    };
+    let sums = [
+        sum("waves", "", (0..WAVES).map(wave).collect()),
+        sum("fine_waves", ", bend: f32", (0..STRAIGHT).map(fine).collect()),
+    ];
+    resolve(&format!(
+        "#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n#import engine::pool_field\n{}",
+        sums.concat()
+    ))
 }
 
 /// The part of the targets that has to be drawn.
@@ -53,6 +61,7 @@ pub struct Gbuffer {
     rock: [OnceLock<wgpu::RenderPipeline>; 8],
     painted: [OnceLock<wgpu::RenderPipeline>; 8],
     pool: [OnceLock<wgpu::RenderPipeline>; 4],
+    pool_field: [OnceLock<wgpu::RenderPipeline>; 4],
     volume: OnceLock<wgpu::RenderPipeline>,
     peel: OnceLock<wgpu::RenderPipeline>,
     hull: OnceLock<wgpu::RenderPipeline>,
@@ -72,6 +81,7 @@ impl Gbuffer {
             rock: Default::default(),
             painted: Default::default(),
             pool: Default::default(),
+            pool_field: Default::default(),
             volume: OnceLock::new(),
             peel: OnceLock::new(),
             hull: OnceLock::new(),
@@ -89,8 +99,8 @@ impl Gbuffer {
             let is_painted = scene.triangles.iter().any(|own| own.painting.is_some());
             self.rock(gpu, variant, is_painted);
         }
-        if !scene.pools.is_empty() {
-            self.pool(gpu, variant);
+        for pool in &scene.pools {
+            self.pool(gpu, variant, pool.waves == PoolWaves::Field);
         }
         if !scene.quads.is_empty() {
             self.volume(gpu);
@@ -130,10 +140,13 @@ impl Gbuffer {
         self.opaque_pipeline(gpu, pipelines, variant, name, wgpu::CompareFunction::Less)
     }
 
-    /// Draws pools. Equal depths pass, so that a pool can be redrawn with other waves.
-    fn pool(&self, gpu: &Gpu, variant: OpaqueVariant) -> &wgpu::RenderPipeline {
+    /// Draws pools, with or without a field. Equal depths pass, so that a pool can be redrawn with other
+    /// waves.
+    fn pool(&self, gpu: &Gpu, variant: OpaqueVariant, has_field: bool) -> &wgpu::RenderPipeline {
+        let (pipelines, name) =
+            if has_field { (&self.pool_field, "pool_field") } else { (&self.pool, "pool") };
         let variant = OpaqueVariant { stones: false, ..variant };
-        self.opaque_pipeline(gpu, &self.pool, variant, "pool", wgpu::CompareFunction::GreaterEqual)
+        self.opaque_pipeline(gpu, pipelines, variant, name, wgpu::CompareFunction::GreaterEqual)
     }
 
     /// Returns the pipeline of `pipelines` for a variant, compiled at its first use. `name` begins the
@@ -147,12 +160,13 @@ impl Gbuffer {
         compare: wgpu::CompareFunction,
     ) -> &'a wgpu::RenderPipeline {
         pipelines[variant.number()].get_or_init(|| {
-            let vertex = if name == "pool" { "pool_vertex" } else { "behind_vertex" };
+            let is_pool = name.starts_with("pool");
+            let vertex = if is_pool { "pool_vertex" } else { "behind_vertex" };
             let fragment =
                 format!("{name}{}_fragment", if variant.environment { "_environment" } else { "" });
             let state = PipelineState {
                 compare,
-                writes_depth: name == "pool",
+                writes_depth: is_pool,
                 one_light: variant.one_light,
                 stones: variant.stones,
             };

@@ -11,6 +11,7 @@ mod groups;
 mod integrate;
 pub mod layout;
 pub mod packing;
+mod pools;
 mod prepared;
 mod rasters;
 mod readback;

@@ -17,7 +17,8 @@ pub const FILES: &[(&str, &str)] = files! {
     "light/strand" "light/visibility" "light/shell_depth" "light/shell_light"
     "engine/bare" "engine/gbuffer" "engine/gloss" "engine/integrate" "engine/integrate_light"
     "engine/integrate_shell" "engine/integrate_strands" "engine/opaque" "engine/paint" "engine/pool"
-    "engine/sheets_many" "engine/sheets_one" "engine/shell_scatter" "engine/shell_visibility" "engine/stone"
+    "engine/pool_field" "engine/sheets_many" "engine/sheets_one" "engine/shell_scatter"
+    "engine/shell_visibility" "engine/stone"
     "picture/resolve"
 };
 

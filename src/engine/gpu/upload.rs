@@ -10,6 +10,7 @@ use super::bricks::{self, UploadedBricks};
 use super::device::Gpu;
 use super::layout::{self, Quad, VertexMaterial};
 use super::packing::Packing;
+use super::pools::{UploadedPool, upload_carried};
 use super::rasters::hash_twice;
 use super::shells::{ResidentShells, UploadedShells, seen_faces};
 use super::tiles::{self, Part};
@@ -77,6 +78,8 @@ struct ResidentMesh {
     indices: wgpu::Buffer,
     /// Range of each list in `indices`.
     lists: Arc<Vec<Range<u32>>>,
+    /// Foam of each pool that has a field.
+    carried: Vec<Option<wgpu::TextureView>>,
     /// Number of the upload, unique among meshes and maps.
     upload: u64,
 }
@@ -116,8 +119,8 @@ pub struct Uploaded {
     pub indices: wgpu::Buffer,
     /// Parts of the rock to draw.
     pub rock: Vec<Part>,
-    /// Uniform `Surface` of each pool, and its parts to draw.
-    pub pools: Vec<(wgpu::Buffer, Vec<Part>)>,
+    /// Pools.
+    pub pools: Vec<UploadedPool>,
     /// The scene's environment, if it has one.
     pub environment: Option<UploadedEnvironment>,
     /// Hash of everything drawn except the pools' waves: quads, faces of hulls, lights, mesh and environment.
@@ -222,11 +225,13 @@ impl Uploaded {
                 "lower their number or use --engine cpu",
             ));
         }
-        let ResidentMesh { positions, coats, tiles, paints, stones, indices, lists, upload, .. } =
-            resident.mesh(gpu, mesh).clone();
+        let ResidentMesh { positions, coats, tiles, paints, stones, indices, lists, carried, upload, .. } =
+            resident.mesh(gpu, mesh)?.clone();
         let steps = steps(&mesh.tiles, &scene.camera, &scene.image);
         let (rock, mut pool_parts) = tiles::parts(&mesh.tiles, &steps, &lists);
         pool_parts.resize_with(pools.len(), Vec::new);
+        let slopes = pool_surface::slope_maps(scene, mesh);
+        let on_device = UploadedPool::all(gpu, &pools, &slopes, carried, pool_parts)?;
         let levels = resident.levels.get(volumes, &scene.pyramid_specs(volumes));
         let packs = scene.recipes.iter().all(|recipe| recipe.asked_storage == StorageChoice::Auto);
         let VolumesOnDevice { held: levels, origins, views: [cells, bricks] } =
@@ -274,11 +279,7 @@ impl Uploaded {
             paints,
             indices,
             rock,
-            pools: pools
-                .iter()
-                .map(|pool| gpu.buffer_with("pool", bytemuck::bytes_of(pool), wgpu::BufferUsages::UNIFORM))
-                .zip(pool_parts)
-                .collect(),
+            pools: on_device,
         })
     }
 }
@@ -346,10 +347,14 @@ impl Resident {
     }
 
     /// Returns the mesh on the device, uploaded unless it is resident.
-    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> &ResidentMesh {
+    fn mesh(&mut self, gpu: &Gpu, mesh: &Mesh) -> Result<&ResidentMesh> {
         self.mesh.take_if(|known| !Arc::ptr_eq(&known.mesh.vertices, &mesh.vertices));
         let uploads = &mut self.uploads;
-        self.mesh.get_or_insert_with(|| {
+        let carried = match self.mesh {
+            Some(_) => Vec::new(),
+            None => upload_carried(gpu, mesh)?,
+        };
+        Ok(self.mesh.get_or_insert_with(|| {
             *uploads += 1;
             let buffer = |name, bytes, usage| gpu.buffer_with(name, bytes, usage);
             let position = |v: &Vertex| Vec3::from(v.position).extend(1.0).to_array();
@@ -372,9 +377,10 @@ impl Resident {
                 stones: buffer("stones", bytemuck::cast_slice(&stones), storage),
                 indices: buffer("indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
                 lists: Arc::new(lists),
+                carried,
                 upload: *uploads,
             }
-        })
+        }))
     }
 }
 
@@ -500,8 +506,18 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
             format!("at most {most} texels on a side fit there; make it smaller or use --engine cpu"),
         ));
     }
+    upload_floats(gpu, "environment", [width, height], &map.texels)
+}
+
+/// Uploads a 2-D texture of four floats a texel.
+pub(super) fn upload_floats(
+    gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    texels: &[[f32; 4]],
+) -> Result<wgpu::TextureView> {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("environment"),
+        label: Some(label),
         size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
@@ -510,6 +526,6 @@ fn upload_map(gpu: &Gpu, map: &Map) -> Result<wgpu::TextureView> {
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    write_rows(gpu, &texture, [width, 0], &map.texels, "upload environment")?;
+    write_rows(gpu, &texture, [width, 0], texels, &format!("upload {label}"))?;
     Ok(texture.create_view(&Default::default()))
 }

@@ -8,6 +8,7 @@
 //! points where water falls in.
 
 mod around;
+mod maps;
 
 use std::f32::consts::TAU;
 
@@ -15,20 +16,27 @@ use glam::{DVec3, Vec2, Vec3};
 use rand::RngExt;
 
 use crate::mapping::{GRAVITY, PlaneView};
-use crate::place::{Mesh, Pool};
+use crate::place::pool::{STRAIGHT_IN_FIELD, straight_slope};
+use crate::place::{Mesh, Pool, PoolField};
 use crate::scene::{Parts, Scene};
 use crate::util::random::{Family, Stream};
 
-/// Number of straight waves.
-pub const STRAIGHT: usize = 20;
+pub use crate::place::pool::STRAIGHT;
+pub use maps::{SlopeMap, slope_maps};
+
 /// Number of ring waves: two for each point where water falls in.
 const RINGS: usize = 12;
 /// Number of waves of a pool.
 pub const WAVES: usize = STRAIGHT + RINGS;
 /// Cells of the surroundings' map: columns about the vertical, and rows upwards.
 pub const AROUND: [usize; 2] = [64, 12];
-/// Length of the shortest straight wave relative to the longest.
-const SHORTEST: f32 = 0.09;
+/// Length of the longest and the shortest fine wave relative to the longest of a field.
+const FINE: [f32; 2] = [0.4, 0.04];
+/// Metres by which noise moves fine waves, relative to the longest wave of a field: crests turn by some 20°.
+const BEND: f32 = 0.3;
+/// Time after which a pattern of foam is taken up anew, about, seconds. The current would draw it out for
+/// longer.
+const PATTERN: f32 = 1.2;
 
 /// One wave, straight or ring-shaped.
 #[repr(C)]
@@ -44,7 +52,8 @@ pub struct Wave {
     pub slope: f32,
     /// 1 for a ring, 0 for a straight wave.
     pub ring: f32,
-    /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)².
+    /// Decay of a ring with the distance r from its centre, 1/m: the slope is divided by (1 + r·decay)². Of a
+    /// fine wave beside a field, the side it is bent to: 1 or −1.
     pub decay: f32,
     /// Turns of the phase while the shutter is open.
     pub moves: f32,
@@ -61,13 +70,24 @@ pub struct Foam {
     pub cells: [i32; 2],
     /// The rest, 0 to 1.
     pub rest: [f32; 2],
+    /// Cells per metre along x: cosine and sine of the lattice's turn times its scale. Used by fields.
+    pub axis: [f32; 2],
+    /// Padding.
+    pub pad: [f32; 2],
 }
 
 impl Foam {
-    /// Returns the place of `origin` in a lattice of `scale` cells per metre.
-    fn new(origin: DVec3, scale: f32) -> Foam {
-        let at = [origin.x, origin.z].map(|x| x * f64::from(scale));
-        Foam { cells: at.map(|x| x.floor() as i32), rest: at.map(|x| (x - x.floor()) as f32) }
+    /// Returns the place of `origin` in a lattice of `scale` cells per metre, which is turned by `angle`.
+    fn new(origin: DVec3, scale: f32, angle: f32) -> Foam {
+        let (sin, cos) = angle.sin_cos();
+        let axis = [cos * scale, sin * scale];
+        let [c, s] = axis.map(f64::from);
+        let at = match angle {
+            0.0 => [origin.x, origin.z].map(|x| x * f64::from(scale)),
+            _ => [origin.x * c - origin.z * s, origin.x * s + origin.z * c],
+        };
+        let cells = at.map(|x| x.floor() as i32);
+        Foam { cells, rest: at.map(|x| (x - x.floor()) as f32), axis, pad: [0.0; 2] }
     }
 }
 
@@ -85,8 +105,8 @@ pub struct Surface {
     pub holdout: f32,
     /// Absorption of the water, 1/m.
     pub absorption: [f32; 3],
-    /// Padding.
-    pub pad_b: f32,
+    /// Scale of the foam's pattern, relative to that of a pool without a field.
+    pub foam_scale: f32,
     /// Centre of the pool, metres.
     pub middle: [f32; 3],
     /// Metres along a view ray beyond which points of the pool's plane are not used.
@@ -97,12 +117,20 @@ pub struct Surface {
     pub height: f32,
     /// See `across`.
     pub along: [f32; 3],
-    /// Padding.
-    pub pad_c: f32,
+    /// Metres by which noise moves fine waves.
+    pub bend: f32,
     /// See `across`.
     pub normal: [f32; 3],
+    /// Turns per metre at which the field's waves fade as a pixel grows.
+    pub field_blur: f32,
+    /// x and z of the corner of the field's grid, metres.
+    pub field_origin: [f32; 2],
+    /// Cells of that grid per metre; 0 without a field.
+    pub field_scale: f32,
     /// Padding.
-    pub pad_d: f32,
+    pub pad: f32,
+    /// Seconds by which both patterns of foam are carried, and their shares.
+    pub carry: [f32; 4],
     /// The foam's lattices.
     pub foam: [Foam; FOAM.len()],
     /// The straight waves, then the rings; unused rings have slope 0.
@@ -119,7 +147,8 @@ impl Default for Surface {
 
 /// Returns the surface of each pool of a scene; `mesh` is the scene's opaque mesh.
 pub fn surfaces(scene: &Scene, mesh: &Mesh) -> Vec<Surface> {
-    scene.pools.iter().map(|pool| Surface::new(scene, mesh, pool)).collect()
+    let surface = |(i, pool)| Surface::new(scene, mesh, pool, mesh.field(i));
+    scene.pools.iter().enumerate().map(surface).collect()
 }
 
 /// Returns the position of a direction about the vertical, 0 to 1. It rises with x/(|x| + |z|) of the
@@ -138,8 +167,8 @@ pub fn turns(wavelength: f32, period: f32) -> f32 {
 }
 
 impl Surface {
-    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh.
-    pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool) -> Surface {
+    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh, and `field` the pool's.
+    pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool, field: Option<&PoolField>) -> Surface {
         let middle = pool.corners.iter().sum::<Vec3>() / 4.0;
         let flow = scene.wave_flow.rem_euclid(1.0);
         let mut surface = Surface {
@@ -148,10 +177,19 @@ impl Surface {
             holdout: f32::from(u8::from(pool.holdout)),
             absorption: pool.absorption.to_array(),
             middle: middle.to_array(),
-            waves: waves(pool, &scene.falls(), [flow, scene.wave_moves], scene.camera.origin),
-            foam: FOAM.map(|scale| Foam::new(scene.camera.origin, scale)),
+            foam_scale: 1.0,
             ..Surface::default()
         };
+        let origin = scene.camera.origin;
+        match field {
+            None => surface.waves = waves(pool, &scene.falls(), [flow, scene.wave_moves], origin),
+            Some(field) => surface.add_field(pool, field, [flow, scene.wave_moves], origin),
+        }
+        surface.foam = std::array::from_fn(|i| {
+            // Lattices that are turned against each other show none of their axes.
+            let angle = if field.is_some() { 0.5 + 0.9 * i as f32 } else { 0.0 };
+            Foam::new(origin, FOAM[i] * surface.foam_scale, angle)
+        });
         let Parts { camera, image, .. } = &**scene;
         let eye = camera.eye_local() - middle.as_dvec3();
         let plane = PlaneView::new([Vec3::X, Vec3::Z, Vec3::Y], eye, camera.rays(image.width, image.height));
@@ -165,15 +203,61 @@ impl Surface {
     }
 }
 
+impl Surface {
+    /// Adds what a pool with a field needs beside its textures, at the flow `at`, which goes on while the
+    /// shutter is open.
+    fn add_field(&mut self, pool: &Pool, field: &PoolField, at: [f32; 2], origin: DVec3) {
+        self.waves = fine_waves(pool, field.longest, at, origin);
+        self.foam_scale = 1.6 / field.longest;
+        self.bend = BEND * field.longest;
+        // Three times the waves per metre of the modes' middle, as for a wave of a sum.
+        self.field_blur = 3.0 / (0.75 * field.longest);
+        self.field_origin = field.grid.origin;
+        self.field_scale = 1.0 / field.grid.cell;
+        // Two patterns follow one another half a time apart. Each is taken up anew where its share is 0.
+        let times = (pool.period / PATTERN).round().max(1.0);
+        let lasts = pool.period / times;
+        let carried = |phase: f32| (at[0] * times + phase).fract() - 0.5;
+        let both = [carried(0.0), carried(0.5)];
+        let [a, b] = both.map(|part| 1.0 - 2.0 * part.abs());
+        self.carry = [both[0] * lasts, both[1] * lasts, a, b];
+    }
+}
+
+/// Returns the fine waves beside a field, which are shorter than those of its grid. Waves of similar lengths
+/// run in directions far from each other, a golden angle apart, so that no two make stripes together.
+fn fine_waves(pool: &Pool, longest: f32, [flow, moves]: [f32; 2], origin: DVec3) -> [Wave; WAVES] {
+    let mut waves = [Wave::default(); WAVES];
+    let family = Family::new(pool.seed, Stream::Wave);
+    let slope = straight_slope(pool) * (1.0 - STRAIGHT_IN_FIELD as f32 / STRAIGHT as f32).sqrt();
+    for (i, wave) in waves[..STRAIGHT].iter_mut().enumerate() {
+        let mut random = family.member(2000 + i as u64);
+        let golden = TAU * 0.381_966 * i as f32;
+        let (sin, cos) = (golden + random.random_range(-0.5f32..0.5)).sin_cos();
+        let length = longest * FINE[0] * (FINE[1] / FINE[0]).powf(i as f32 / (STRAIGHT - 1) as f32);
+        let phase: f32 = random.random_range(0.0..1.0);
+        let k = 1.0 / length;
+        let along = f64::from(k) * (f64::from(cos) * origin.x + f64::from(sin) * origin.z);
+        *wave = Wave {
+            toward: [cos, sin],
+            k,
+            phase: (phase - flow * turns(length, pool.period) + along.rem_euclid(1.0) as f32).rem_euclid(1.0),
+            slope,
+            decay: if i % 2 == 0 { 1.0 } else { -1.0 },
+            moves: -moves * turns(length, pool.period),
+            ..Wave::default()
+        };
+    }
+    waves
+}
+
 /// Returns the waves of a pool, which have moved by `flow` and go on by `moves` while the shutter is open,
 /// both in lengths of the volume that they move with.
 fn waves(pool: &Pool, falls: &[[Vec3; 4]], [flow, moves]: [f32; 2], origin: DVec3) -> [Wave; WAVES] {
     let mut waves = [Wave::default(); WAVES];
     let family = Family::new(pool.seed, Stream::Wave);
-    // All waves are equally steep: A = λ·a, where Σ A²/2 is the variance of the height.
-    let length = |i: usize| pool.wavelength * SHORTEST.powf(i as f32 / (STRAIGHT - 1) as f32);
-    let sum: f32 = (0..STRAIGHT).map(|i| length(i) * length(i) * 0.5).sum();
-    let a = pool.height / sum.sqrt();
+    let length = |i: usize| pool.straight_length(i);
+    let slope = straight_slope(pool);
     for (i, wave) in waves[..STRAIGHT].iter_mut().enumerate() {
         let mut random = family.member(i as u64);
         let (sin, cos) = random.random_range(0.0..TAU).sin_cos();
@@ -186,7 +270,7 @@ fn waves(pool: &Pool, falls: &[[Vec3; 4]], [flow, moves]: [f32; 2], origin: DVec
             toward: [cos, sin],
             k,
             phase: (phase - flow * turns(length(i), pool.period) + before).rem_euclid(1.0),
-            slope: TAU * a,
+            slope,
             moves: -moves * turns(length(i), pool.period),
             ..Wave::default()
         };

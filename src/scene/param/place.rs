@@ -3,7 +3,7 @@
 use super::Cost::*;
 use super::Kind::*;
 use super::{Group, p};
-use crate::place::{Show, StoneKind};
+use crate::place::{PoolWaves, Show, StoneKind};
 use crate::scene::build::EnvironmentKind;
 
 pub(super) const ROCKS: Group = Group {
@@ -171,6 +171,13 @@ pub(super) const POOLS: Group = Group {
                 "Raise it to hide the ground; raise red against the others for bluer and greener \
                  shallows.",
             ),
+        p("pools.*.waves", "", "", Choice(PoolWaves::WORDS), Upload)
+            .doc(
+                "How waves and foam are made. `sum`: straight waves and rings, and a disc of foam where water \
+                 falls in. `field`: waves that rocks mirror and bend, and foam that a current carries, on a grid \
+                 of at most 512×512 cells.",
+            )
+            .when("Choose `field` where rocks stand in the water or the pool is seen from near."),
         p("pools.*.height", "", "m", Float(0.0, 10.0, 0.008), Upload)
             .slider(0.0, 0.1)
             .doc("Standard deviation of the surface's height.")
@@ -198,8 +205,26 @@ pub(super) const POOLS: Group = Group {
             .when("Raise it for a white plunge pool; lower it for quiet water."),
         p("pools.*.foam_reach", "", "m", Float(1e-3, 1e4, 2.0), Upload)
             .slider(0.1, 10.0)
-            .doc("Distance from the falling water at which the foam ends.")
+            .doc(
+                "Distance from the falling water at which the foam ends; with `waves=field` the length over \
+                 which the current slows down.",
+            )
             .when("Raise it for a high fall that churns the whole pool; lower it for a thin jet."),
+        p("pools.*.foam_life", "", "s", Float(0.01, 1e4, 4.0), Upload)
+            .slider(0.5, 20.0)
+            .doc("Time in which foam falls to 1/e on its way, with `waves=field`.")
+            .when("Raise it for foam that drifts far; lower it for foam that stays where water falls in."),
+        p("pools.*.current", "", "m/s", Float(0.0, 100.0, 0.7), Upload)
+            .slider(0.0, 3.0)
+            .doc("Speed at which falling water pushes the surface away, with `waves=field`.")
+            .when("Raise it for heavy water; lower it for thin jets."),
+        p("pools.*.drift", "", "m/s", Float(0.0, 100.0, 0.1), Upload)
+            .slider(0.0, 1.0)
+            .doc(
+                "Speed of the whole surface, with `waves=field`: from the falling water through the middle of \
+                 the pool.",
+            )
+            .when("Raise it for a pool that a stream leaves; lower it for a basin without an outlet."),
         p("pools.*.seed", "", "", Int(0, i64::MAX, 1), Upload)
             .doc("Seed of the waves' randomness.")
             .when("Change it for other waves of the same kind."),

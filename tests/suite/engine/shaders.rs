@@ -210,8 +210,8 @@ fn host_structs_have_the_layout_the_shaders_read() {
     let environment =
         fields!(Environment: irradiance to_sun rim2 sun_radiance intensity turn pad_a pad_b pad_c);
     assert_eq!(members(&module, "Environment"), environment);
-    let surface = fields!(Surface: color radius bottom holdout absorption pad_b middle far across height
-        along pad_c normal pad_d foam waves around);
+    let surface = fields!(Surface: color radius bottom holdout absorption foam_scale middle far across
+        height along bend normal field_blur field_origin field_scale pad carry foam waves around);
     assert_eq!(members(&module, "Surface"), surface);
     let coat = fields!(VertexMaterial: albedo_r albedo_g albedo_b normal_xy normal_z_wet occlusion_shadow);
     assert_eq!(members(&module, "VertexMaterial"), coat);
@@ -228,7 +228,7 @@ fn host_structs_have_the_layout_the_shaders_read() {
         moss_color moss2 lichen lichen2 octaves);
     assert_eq!(members(&module, "Stone"), stone);
     assert_eq!(members(&module, "HullFace"), fields!(HullFace: a number b u_a c v_a uv_b uv_c));
-    assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest));
+    assert_eq!(members(&module, "Foam"), fields!(Foam: cells rest axis pad));
     assert_eq!(members(&module, "Wave"), fields!(Wave: toward k phase slope ring decay moves));
 }
 

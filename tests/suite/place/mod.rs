@@ -3,6 +3,7 @@
 
 pub mod mesh_shade;
 pub mod paint;
+pub mod pool_field;
 pub mod stone;
 pub mod tiles;
 pub mod triangles;

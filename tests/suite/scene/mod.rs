@@ -237,6 +237,7 @@ fn every_word_of_a_choice_gives_the_variant_of_its_name() {
                 "meshes.*.show" => shown(scene.triangles.first().map(|own| own.holdout)),
                 "pools.*.show" => shown(scene.pools.first().map(|pool| pool.holdout)),
                 "rocks.*.kind" => scene.rocks[0].kind.word(),
+                "pools.*.waves" => scene.pools[0].waves.word(),
                 "rocks.*.show" => shown(scene.rocks.first().map(|rock| rock.holdout)),
                 "trace.attenuation" => scene.trace.attenuation.kind().word(),
                 "trace.filter" => scene.trace.filter.word(),

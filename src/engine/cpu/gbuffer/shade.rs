@@ -13,7 +13,7 @@ use crate::engine::cpu::lights::background_at;
 use crate::engine::cpu::opaque::Points;
 use crate::engine::cpu::pool;
 use crate::engine::cpu::stone::lay_stones;
-use crate::engine::pool_surface::{self, Surface};
+use crate::engine::pool_surface::{self, SlopeMap, Surface};
 use crate::light::haze::EyeHaze;
 use crate::mapping::PlaneView;
 use crate::picture::camera::{DepthRange, DepthToPoint, footprint};
@@ -29,6 +29,7 @@ pub struct Shading<'a> {
     mesh: &'a Mesh,
     shadow_light: Option<usize>,
     pools: Vec<Surface>,
+    slopes: Vec<Option<SlopeMap>>,
     haze: EyeHaze,
     /// Vectors forward, right and up of the camera; see [`Camera::rays`].
     rays: [Vec3; 3],
@@ -100,6 +101,7 @@ impl<'a> Shading<'a> {
             mesh,
             shadow_light: scene.shadow_light(),
             pools: pool_surface::surfaces(scene, mesh),
+            slopes: pool_surface::slope_maps(scene, mesh),
             haze: scene.haze.seen_from(eye),
             rays: rays.map(|v| v.as_vec3()),
             eye: eye.as_vec3(),
@@ -270,7 +272,8 @@ impl<'a> Shading<'a> {
             }
             let is_here = !u32x8::load_array(simd, of_pools).simd_eq(0);
             if is_here.any_true() {
-                let pool = &self.pools[number as usize];
+                let maps = self.slopes[number as usize].as_ref().zip(self.mesh.field(number as usize));
+                let pool = (&self.pools[number as usize], maps);
                 let at = (at, time);
                 let seen = pool::shade(simd, scene, self.shadow_light, &self.rays, pool, &points, at);
                 let seen = Seen { opaque: (seen.0, seen.1), normal: (seen.2, distance) };

@@ -8,6 +8,7 @@ use super::Gbuffer;
 use super::pipeline::OpaqueVariant;
 use crate::engine::gpu::binding::{bind_buffer, bind_texture, gbuffer as at};
 use crate::engine::gpu::device::Gpu;
+use crate::engine::gpu::pools::UploadedPool;
 use crate::engine::gpu::tiles::{Part, in_view};
 use crate::engine::gpu::timing::Span;
 use crate::engine::gpu::{Inputs, Uploaded};
@@ -103,7 +104,7 @@ impl Run<'_> {
             let variant = self.variant();
             let pipeline = self.pass.background(gpu, variant);
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &self.bind(pipeline, &[(at::FRAME, &self.uniform)], true, None), &[]);
+            pass.set_bind_group(0, &self.bind(pipeline, &[(at::FRAME, &self.uniform)], true, &[]), &[]);
             pass.draw(0..3, 0..1);
             if rock {
                 let pipeline = self.pass.rock(gpu, variant, up.paints.is_some());
@@ -123,7 +124,11 @@ impl Run<'_> {
                         (at::TEXELS, &paints.texels),
                     ]);
                 }
-                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, Some(&surface)), &[]);
+                pass.set_bind_group(
+                    0,
+                    &self.bind(pipeline, &buffers, false, &[(at::ROCK_SURFACE, &surface)]),
+                    &[],
+                );
                 pass.draw(0..3, 0..1);
             }
         });
@@ -139,13 +144,15 @@ impl Run<'_> {
         let Inputs { gpu, up, .. } = *self.inputs;
         let load = Some(wgpu::LoadOp::Load);
         self.draw_opaque(encoder, "gbuffer pools", (depth, load), KEEP, span, |pass| {
-            let pipeline = self.pass.pool(gpu, self.variant());
-            pass.set_pipeline(pipeline);
-            for (surface, parts) in &up.pools {
+            for UploadedPool { surface, field, parts } in &up.pools {
+                let pipeline = self.pass.pool(gpu, self.variant(), field.is_some());
+                pass.set_pipeline(pipeline);
                 let lit = [(at::FRAME, &self.uniform), (at::LIGHTS, &up.lights), (at::POOL, surface)];
                 let mesh = [(at::POSITIONS, &up.positions), (at::TILES, &up.tiles), (at::COATS, &up.coats)];
                 let buffers = [lit, mesh].concat();
-                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, None), &[]);
+                let textures = field.iter().flatten().zip([at::POOL_SLOPES, at::POOL_CARRIED]);
+                let textures: Vec<_> = textures.map(|(view, binding)| (binding, view)).collect();
+                pass.set_bind_group(0, &self.bind(pipeline, &buffers, false, &textures), &[]);
                 draw(pass, up, parts.iter());
             }
         });
@@ -196,7 +203,7 @@ impl Run<'_> {
         if up.quad_count > 0 {
             let pipeline = self.pass.volume(gpu);
             let group =
-                self.bind(pipeline, &[(at::FRAME, &self.uniform), (at::QUADS, &up.quads)], false, None);
+                self.bind(pipeline, &[(at::FRAME, &self.uniform), (at::QUADS, &up.quads)], false, &[]);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..6, 0..up.quad_count);
@@ -252,13 +259,13 @@ impl Run<'_> {
     }
 
     /// Binds buffers, the environment's uniform if the shader shades opaque geometry, its map if `with_map`,
-    /// and the positions on the mesh.
+    /// and other textures.
     fn bind(
         &self,
         pipeline: &wgpu::RenderPipeline,
         buffers: &[(u32, &wgpu::Buffer)],
         with_map: bool,
-        rock_surface: Option<&wgpu::TextureView>,
+        textures: &[(u32, &wgpu::TextureView)],
     ) -> wgpu::BindGroup {
         let Inputs { gpu, up, .. } = *self.inputs;
         let mut entries: Vec<_> =
@@ -271,7 +278,7 @@ impl Run<'_> {
                 entries.push(bind_texture(at::ENVIRONMENT_MAP, &environment.map));
             }
         }
-        entries.extend(rock_surface.map(|view| bind_texture(at::ROCK_SURFACE, view)));
+        entries.extend(textures.iter().map(|(binding, view)| bind_texture(*binding, view)));
         group(gpu, pipeline, &entries)
     }
 
