@@ -18,7 +18,7 @@ const EDGE: f32 = 0.35;
 const STREAK_WIDTH: f32 = 0.45;
 const STREAK_HEIGHT: f32 = 4.5;
 // Factor that gives the noise a deviation of 1.
-const UNIT: f32 = 276.74557;
+const UNIT: f32 = 0.541047;
 
 struct Octave {
     tone: f32,
@@ -52,14 +52,13 @@ struct Stone {
     octaves: array<Octave, 10>,
 }
 
-// Gradient at a point of the lattice, each component from -1 to 1.
+// Gradient at a point of the lattice, each component from -511.5 to 511.5.
 fn corner_gradient(cell: vec3<u32>) -> vec3<f32> {
     var h = (cell.x * 0x8da6b343u) ^ (cell.y * 0xd8163841u) ^ (cell.z * 0xcb1ab31fu);
     h = (h ^ (h >> 15u)) * 0x9e3779b1u;
     h = (h ^ (h >> 13u)) * 0x85ebca6bu;
-    h = h ^ (h >> 16u);
-    let bits = vec3<u32>(h & 1023u, (h >> 10u) & 1023u, (h >> 20u) & 1023u);
-    return vec3<f32>(bits) * (2.0 / 1023.0) - vec3<f32>(1.0);
+    let bits = vec3<u32>(h >> 22u, (h >> 12u) & 1023u, (h >> 2u) & 1023u);
+    return vec3<f32>(bits) - vec3<f32>(511.5);
 }
 
 // Share of a corner at the distance `d` in the noise: its gradient, and its value last.

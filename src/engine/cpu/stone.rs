@@ -8,91 +8,97 @@ use glam::Vec3;
 use super::opaque::{Points, View, fresnel};
 use crate::place::stone::{COARSEST, CRACK, CRACK_SHARE, EDGE, GRADIENT, OCTAVES, STREAK, Stone};
 use crate::place::tiles::Tile;
-use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Words, floor_cell, unsigned};
+use crate::util::lanes::{Floats, LANES, Lanes3, Mask, Words, floor_cell, signed, unsigned};
 
 /// Factor that gives the noise a deviation of 1.
-pub const UNIT: f32 = 276.745_57;
-
-/// Skewed cell of a lattice.
-type Cell<S> = [Words<S>; 3];
+pub const UNIT: f32 = 0.541_047;
 
 /// Noise at a point: its gradient per cell, and its value.
+#[derive(Clone, Copy)]
 struct Noise<S: Simd> {
     gradient: Lanes3<S>,
     value: Floats<S>,
 }
 
-/// Returns the gradient at a point of the lattice, each component from −1 to 1.
-#[inline(always)]
-fn corner_gradient<S: Simd>(simd: S, cell: Cell<S>) -> Lanes3<S> {
-    let splat = |x: u32| u32x8::splat(simd, x);
-    let [x, y, z] = cell;
-    let h = (x * splat(0x8da6_b343)) ^ (y * splat(0xd816_3841)) ^ (z * splat(0xcb1a_b31f));
-    let h = (h ^ (h >> 15)) * splat(0x9e37_79b1);
-    let h = (h ^ (h >> 13)) * splat(0x85eb_ca6b);
-    let h = h ^ (h >> 16);
-    let bits = splat(1023);
-    let (two, one) = (f32x8::splat(simd, 2.0 / 1023.0), f32x8::splat(simd, 1.0));
-    let [x, y, z]: [Floats<S>; 3] =
-        [(h & bits).to_float(), ((h >> 10) & bits).to_float(), ((h >> 20) & bits).to_float()];
-    Lanes3 { x: x * two - one, y: y * two - one, z: z * two - one }
-}
+/// Factors of a lattice point's coordinates in its hash.
+const HASH: [u32; 3] = [0x8da6_b343, 0xd816_3841, 0xcb1a_b31f];
 
-/// Returns the share of a corner at the distance `d` in the noise.
+/// Adds the share of a corner at the distance `d` to a noise. `hashed` are the coordinates of the corner
+/// times [`HASH`].
 #[inline(always)]
-fn corner_share<S: Simd>(simd: S, cell: Cell<S>, d: Lanes3<S>) -> Noise<S> {
+fn add_corner<S: Simd>(simd: S, sum: Noise<S>, hashed: [Words<S>; 3], d: Lanes3<S>) -> Noise<S> {
     let splat = |x: f32| f32x8::splat(simd, x);
-    let g = corner_gradient(simd, cell);
+    let h = hashed[0] ^ hashed[1] ^ hashed[2];
+    let h = (h ^ (h >> 15)) * u32x8::splat(simd, 0x9e37_79b1);
+    let h = (h ^ (h >> 13)) * u32x8::splat(simd, 0x85eb_ca6b);
+    let bits = u32x8::splat(simd, 1023);
+    // Signed numbers take one instruction to convert, others many.
+    let x = signed(h >> 22).to_float::<f32x8<S>>();
+    let y = signed((h >> 12) & bits).to_float::<f32x8<S>>();
+    let z = signed((h >> 2) & bits).to_float::<f32x8<S>>();
+    let middle = splat(511.5);
+    let g = Lanes3 { x: x - middle, y: y - middle, z: z - middle };
     let t = (splat(0.5) - d.dot(d)).max(splat(0.0));
     let t2 = t * t;
     let t4 = t2 * t2;
     let along = g.dot(d);
-    Noise { gradient: g.times(t4).minus(d.times(splat(8.0) * t2 * t * along)), value: t4 * along }
+    let gradient = sum.gradient.plus(g.times(t4).minus(d.times(splat(8.0) * t2 * t * along)));
+    Noise { gradient, value: sum.value + t4 * along }
+}
+
+/// Adds the share of a corner that lies one step along some axes from the first, at the distance `d` of which
+/// the point lies; `shift` is what the skew adds to each component.
+#[inline(always)]
+fn add_step<S: Simd>(
+    simd: S,
+    sum: Noise<S>,
+    (hashed, next): ([Words<S>; 3], [Words<S>; 3]),
+    d: Lanes3<S>,
+    steps: [Mask<S>; 3],
+    shift: f32,
+) -> Noise<S> {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let shift = f32x8::splat(simd, shift);
+    let away = Lanes3 {
+        x: d.x - steps[0].select(one, zero) + shift,
+        y: d.y - steps[1].select(one, zero) + shift,
+        z: d.z - steps[2].select(one, zero) + shift,
+    };
+    let corner = [
+        steps[0].select(next[0], hashed[0]),
+        steps[1].select(next[1], hashed[1]),
+        steps[2].select(next[2], hashed[2]),
+    ];
+    add_corner(simd, sum, corner, away)
 }
 
 /// Returns simplex noise of deviation 1. `cells` is the skewed cell of the origin.
 #[inline(always)]
 fn simplex<S: Simd>(simd: S, p: Lanes3<S>, cells: [u32; 3]) -> Noise<S> {
     let splat = |x: f32| f32x8::splat(simd, x);
-    let (zero, one) = (u32x8::splat(simd, 0), u32x8::splat(simd, 1));
     let skew = (p.x + p.y + p.z) * splat(1.0 / 3.0);
-    let whole = [floor_cell(simd, p.x + skew), floor_cell(simd, p.y + skew), floor_cell(simd, p.z + skew)];
-    let i = Lanes3 {
-        x: whole[0].to_float::<f32x8<S>>(),
-        y: whole[1].to_float::<f32x8<S>>(),
-        z: whole[2].to_float::<f32x8<S>>(),
-    };
+    let (x, y, z) =
+        (floor_cell(simd, p.x + skew), floor_cell(simd, p.y + skew), floor_cell(simd, p.z + skew));
+    let i = Lanes3 { x: x.to_float::<f32x8<S>>(), y: y.to_float::<f32x8<S>>(), z: z.to_float::<f32x8<S>>() };
     let back = (i.x + i.y + i.z) * splat(1.0 / 6.0);
     let d = p.minus(i);
     let d = Lanes3 { x: d.x + back, y: d.y + back, z: d.z + back };
     let (xy, yz, zx) = (d.x.simd_ge(d.y), d.y.simd_ge(d.z), d.z.simd_ge(d.x));
-    let cell = [
-        unsigned(whole[0]) + u32x8::splat(simd, cells[0]),
-        unsigned(whole[1]) + u32x8::splat(simd, cells[1]),
-        unsigned(whole[2]) + u32x8::splat(simd, cells[2]),
+    let word = |x: u32| u32x8::splat(simd, x);
+    let hashed = [
+        (unsigned(x) + word(cells[0])) * word(HASH[0]),
+        (unsigned(y) + word(cells[1])) * word(HASH[1]),
+        (unsigned(z) + word(cells[2])) * word(HASH[2]),
     ];
-    let first = [xy & !zx, yz & !xy, zx & !yz];
-    let second = [xy | !zx, yz | !xy, zx | !yz];
-    let share = |steps: [Mask<S>; 3], shift: f32| {
-        let steps = [steps[0].select(one, zero), steps[1].select(one, zero), steps[2].select(one, zero)];
-        let away = Lanes3 {
-            x: d.x - steps[0].to_float::<f32x8<S>>() + splat(shift),
-            y: d.y - steps[1].to_float::<f32x8<S>>() + splat(shift),
-            z: d.z - steps[2].to_float::<f32x8<S>>() + splat(shift),
-        };
-        corner_share(simd, [cell[0] + steps[0], cell[1] + steps[1], cell[2] + steps[2]], away)
-    };
+    let next = [hashed[0] + word(HASH[0]), hashed[1] + word(HASH[1]), hashed[2] + word(HASH[2])];
+    let zero = splat(0.0);
+    let nothing = Noise { gradient: Lanes3 { x: zero, y: zero, z: zero }, value: zero };
+    let sum = add_corner(simd, nothing, hashed, d);
+    let sum = add_step(simd, sum, (hashed, next), d, [xy & !zx, yz & !xy, zx & !yz], 1.0 / 6.0);
+    let sum = add_step(simd, sum, (hashed, next), d, [xy | !zx, yz | !xy, zx | !yz], 1.0 / 3.0);
     let half = splat(0.5);
     let last = Lanes3 { x: d.x - half, y: d.y - half, z: d.z - half };
-    let near = corner_share(simd, cell, d);
-    let mut sum = near;
-    for more in [
-        share(first, 1.0 / 6.0),
-        share(second, 1.0 / 3.0),
-        corner_share(simd, [cell[0] + one, cell[1] + one, cell[2] + one], last),
-    ] {
-        sum = Noise { gradient: sum.gradient.plus(more.gradient), value: sum.value + more.value };
-    }
+    let sum = add_corner(simd, sum, next, last);
     Noise { gradient: sum.gradient.times(splat(UNIT)), value: sum.value * splat(UNIT) }
 }
 
@@ -157,16 +163,23 @@ pub fn stone_at<S: Simd>(
         }
         let noise = simplex(simd, p.times(splat(scale)), cells.map(|c| c << k));
         let (value, g) = (noise.value, noise.gradient);
-        let soft = splat(0.1) + splat(1.5) / samples;
-        let folded = value / (value * value + soft * soft).sqrt();
-        let steep = weight * splat(octave.slope / GRADIENT) * (one + (folded - one) * splat(octave.fold));
+        let mut steep = weight * splat(octave.slope / GRADIENT);
+        // Octaves without grooves and cracks add nothing below.
+        if octave.fold > 0.0 {
+            let soft = splat(0.1) + splat(1.5) / samples;
+            let folded = value / (value * value + soft * soft).sqrt();
+            steep *= one + (folded - one) * splat(octave.fold);
+        }
         slope = slope.plus(g.times(steep));
-        let away = value.abs() / g.dot(g).max(one).sqrt();
-        let reach = splat(CRACK) + splat(0.5) / samples;
-        let line = splat(CRACK) / reach * (one - away / reach).max(zero) - splat(CRACK * CRACK_SHARE);
-        let open = (splat(0.5) + splat(0.6) * before).max(zero).min(one);
-        let grey = splat(octave.tone * (1.0 - octave.tinted)) * value;
-        tone += weight * (grey - splat(octave.crack) * open * line);
+        let mut grey = splat(octave.tone * (1.0 - octave.tinted)) * value;
+        if octave.crack > 0.0 {
+            let away = value.abs() / g.dot(g).max(one).sqrt();
+            let reach = splat(CRACK) + splat(0.5) / samples;
+            let line = splat(CRACK) / reach * (one - away / reach).max(zero) - splat(CRACK * CRACK_SHARE);
+            let open = (splat(0.5) + splat(0.6) * before).max(zero).min(one);
+            grey -= splat(octave.crack) * open * line;
+        }
+        tone += weight * grey;
         tinted += weight * splat(octave.tone * octave.tinted) * value;
         let kept = weight * weight;
         slope2 -= kept * splat(octave.slope * octave.slope);
@@ -181,14 +194,14 @@ pub fn stone_at<S: Simd>(
     let q = position.scaled(streak_size).plus(Lanes3::splat(simd, Vec3::from(stone.streak_rest)));
     let streak_cells = stone.streak_cells.map(|c| c as u32);
     let mut streak = zero;
-    let broad = shown(simd, splat(wide) / spacing);
-    if broad.simd_gt(zero).any_true() {
-        streak += splat(0.7) * broad * simplex(simd, q, streak_cells).value;
-    }
-    let narrow = shown(simd, splat(0.25 * wide) / spacing);
-    if narrow.simd_gt(zero).any_true() {
-        let fine = simplex(simd, q.times(splat(4.0)), streak_cells.map(|c| c << 2));
-        streak += splat(0.7) * narrow * fine.value;
+    for k in [0, 2] {
+        let scale = (1u32 << k) as f32;
+        let weight = shown(simd, splat(wide / scale) / spacing);
+        if !weight.simd_gt(zero).any_true() {
+            break;
+        }
+        let noise = simplex(simd, q.times(splat(scale)), streak_cells.map(|c| c << k));
+        streak += splat(0.7) * weight * noise.value;
     }
     let streak = streak * (one - n.y * n.y);
     tone += splat(stone.streaks) * streak;
@@ -226,34 +239,39 @@ pub fn stone_at<S: Simd>(
     (points, View { n: seen.or(unit.dot(e).simd_lt(zero), unit), e, distance })
 }
 
-/// Lays the stones of points' tiles over the points, as [`stone_at`] does.
-#[inline(always)]
+/// Lays the stones of points' tiles over the points, as [`stone_at`] does. It is not inlined: its code is
+/// long, and rock is shaded in several places.
+#[inline(never)]
 pub fn lay_stones<S: Simd>(
     simd: S,
     stones: &[Stone],
     tiles: [&Tile; LANES],
-    mut points: Points<S>,
-    mut view: View<S>,
+    plain: (Points<S>, View<S>),
     angle: f32,
 ) -> (Points<S>, View<S>) {
-    let (plain_points, plain_view) = (points, view);
-    let mut numbers = [0; LANES];
-    for lane in 0..LANES {
-        numbers[lane] = tiles[lane].stone;
-    }
-    for lane in 0..LANES {
-        let number = numbers[lane];
-        if number == 0 || numbers[..lane].contains(&number) {
-            continue;
-        }
-        let (laid, seen) = stone_at(simd, &stones[number as usize - 1], &plain_points, &plain_view, angle);
-        let is_here = u32x8::load_array(simd, numbers).simd_eq(number);
-        points.albedo = laid.albedo.or(is_here, points.albedo);
-        points.wet = is_here.select(laid.wet, points.wet);
-        points.film = is_here.select(laid.film, points.film);
-        view.n = seen.n.or(is_here, view.n);
-    }
-    (points, view)
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (mut points, mut view) = plain;
+            let mut numbers = [0; LANES];
+            for lane in 0..LANES {
+                numbers[lane] = tiles[lane].stone;
+            }
+            for lane in 0..LANES {
+                let number = numbers[lane];
+                if number == 0 || numbers[..lane].contains(&number) {
+                    continue;
+                }
+                let (laid, seen) = stone_at(simd, &stones[number as usize - 1], &plain.0, &plain.1, angle);
+                let is_here = u32x8::load_array(simd, numbers).simd_eq(number);
+                points.albedo = laid.albedo.or(is_here, points.albedo);
+                points.wet = is_here.select(laid.wet, points.wet);
+                points.film = is_here.select(laid.film, points.film);
+                view.n = seen.n.or(is_here, view.n);
+            }
+            (points, view)
+        },
+    )
 }
 
 /// As [`film_lobe`](super::opaque::film_lobe), for a film on a stone: a lobe with the squared roughness

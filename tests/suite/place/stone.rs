@@ -69,8 +69,7 @@ fn noise(p: DVec3) -> (f64, DVec3) {
         let mut h = x.wrapping_mul(0x8da6_b343) ^ y.wrapping_mul(0xd816_3841) ^ z.wrapping_mul(0xcb1a_b31f);
         h = (h ^ (h >> 15)).wrapping_mul(0x9e37_79b1);
         h = (h ^ (h >> 13)).wrapping_mul(0x85eb_ca6b);
-        h ^= h >> 16;
-        let g = DVec3::from_array([0, 10, 20].map(|bit| f64::from(h >> bit & 1023) / 511.5 - 1.0));
+        let g = DVec3::from_array([22, 12, 2].map(|bit| f64::from(h >> bit & 1023) - 511.5));
         let t = (0.5 - away.length_squared()).max(0.0);
         value += t.powi(4) * g.dot(away);
         gradient += g * t.powi(4) - away * (8.0 * t.powi(3) * g.dot(away));
@@ -78,7 +77,7 @@ fn noise(p: DVec3) -> (f64, DVec3) {
             corner[order[step]] = 1.0;
         }
     }
-    (value * 276.745_57, gradient * 276.745_57)
+    (value * 0.541_047, gradient * 0.541_047)
 }
 
 fn cubic(x: f64) -> f64 {

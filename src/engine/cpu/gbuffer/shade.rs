@@ -253,8 +253,11 @@ impl<'a> Shading<'a> {
             holes[lane] = u32::from(tiles[lane].holdout && scene.image.alpha);
         }
         let points = Points::at(simd, &self.mesh.vertices, tiles, &spots.places, position);
-        let view = points.view(simd, scene);
-        let (points, view) = lay_stones(simd, &self.mesh.stones, tiles, points, view, self.sample_angle);
+        let mut seen = (points, points.view(simd, scene));
+        if tiles.iter().any(|tile| tile.stone > 0) {
+            seen = lay_stones(simd, &self.mesh.stones, tiles, seen, self.sample_angle);
+        }
+        let (points, view) = seen;
         let mut distance = view.distance;
         let (mut radiance, mut normal) = if tiles.iter().any(|tile| tile.paint > 0) {
             let [forward, right, up] = self.rays.map(|v| Lanes3::splat(simd, v));
