@@ -150,10 +150,9 @@ fn potential(basin: &Basin, source: &[f32], drift: Vec2, length: f32) -> Vec<f32
             [weight, constant]
         })
         .collect();
-    for round in 0..RELAXATIONS {
+    for _ in 0..RELAXATIONS {
         for half in 0..2 {
-            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half + round) % 2 == 0)
-            {
+            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half) % 2 == 0) {
                 if basin.solid[i] {
                     continue;
                 }
@@ -241,7 +240,7 @@ pub fn foam(pool: &Pool, basin: &Basin, faces: &Faces) -> Vec<f32> {
                     continue;
                 }
                 let Balance { flows_in, leaves } = balance(pool, basin, faces, i, &foam);
-                let is_shore = away[i] < 1.5 * grid.cell;
+                let is_shore = away[i] < 1.2 * grid.cell;
                 let washed = if is_shore { SHORE * pool.foam / pool.foam_life * grid.cell } else { 0.0 };
                 foam[i] = (flows_in + washed) / leaves;
             }

@@ -29,7 +29,7 @@ const ABSORBED: (f32, f32) = (1.5, 0.3);
 /// Number of straight waves of each mode that come from outside.
 const INCIDENT: usize = 3;
 /// Length relative to the longest of the waves whose amplitude is `pools.*.rings`.
-const RINGS: f32 = 0.6;
+const RINGS: f32 = 0.4;
 /// Modulus of the wave of a point source one wavelength away, ¼·|H₀(2π)| of Green's function.
 const AT_ONE_WAVELENGTH: f32 = 0.079_577;
 

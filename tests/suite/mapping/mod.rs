@@ -41,6 +41,7 @@ fn material() -> impl Strategy<Value = Material> {
         repeat_u,
         repeat_v,
         volume: 0,
+        billow: Default::default(),
     })
 }
 

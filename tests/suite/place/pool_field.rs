@@ -64,7 +64,7 @@ fn without_a_wall_nothing_is_mirrored() {
     let mut run = Run::new(&open, 1.0);
     run.reflect(&along_x());
     assert!(run.amplitudes().iter().flatten().flatten().all(|part| *part == 0.0));
-    assert!(off_the_standing_wave(&open).iter().all(|worst| *worst > 0.9), "the comparison can fail");
+    assert!(off_the_standing_wave(&open).iter().all(|worst| *worst > 0.8), "the comparison can fail");
 }
 
 /// A pool of 24 m × 12 m in which a jet of 4 cm falls, at (−4, 0).
@@ -100,9 +100,9 @@ fn rings_fall_with_the_root_of_the_distance_and_lose_a_twelfth_a_wave() {
         let truth = (4.0f32 / 1.5).sqrt() * (2.5f32 / 12.0).exp();
         assert!((near / far / truth - 1.0).abs() < 0.15, "{k}: {near} {far} {truth}");
     }
-    // `rings` is the amplitude of waves of 0.6 times the longest, one of the longest away. The cells of the
+    // `rings` is the amplitude of waves of 0.4 times the longest, one of the longest away. The cells of the
     // jet have random phases, so that one jet differs from the mean of all.
-    let size = mean(2, 1.0) / LENGTHS[2] * 0.6;
+    let size = mean(2, 1.0) / LENGTHS[2] * 0.4;
     assert!((0.003..0.03).contains(&size), "{size}");
 }
 
