@@ -1,8 +1,9 @@
 //! §4 Billows of mist: noise that rises and thins and thickens a sheet of mist from ray to ray. Twin:
 //! `shaders/trace/billow.wgsl`.
 //!
-//! Noise that is carried on and on would not come back to where a loop began. So two fields of noise rise side
-//! by side, half a loop apart, and cross-fade; each begins anew while its share is 0 (Max and Becker 1996).
+//! Noise that is carried on and on would not come back to where a loop began. So two fields of noise rise
+//! side by side, half a loop apart, and cross-fade; each begins anew while its share is 0 (Max and Becker
+//! 1996).
 
 use glam::Vec3;
 
@@ -18,8 +19,8 @@ const SHARES: [f32; 2] = [0.65, 0.35];
 /// Cells between the two fields.
 const APART: f32 = 37.0;
 
-/// Where both fields of noise are in a loop: how far each has risen, in loops from −½ to ½, and their weights.
-/// The squares of the weights add up to 1, so that the contrast stays the same.
+/// Where both fields of noise are in a loop: how far each has risen, in loops from −½ to ½, and their
+/// weights. The squares of the weights add up to 1, so that the contrast stays the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BillowTimes {
     /// Of the first field and the second.

@@ -167,7 +167,8 @@ pub fn turns(wavelength: f32, period: f32) -> f32 {
 }
 
 impl Surface {
-    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh, and `field` the pool's.
+    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh, and `field` the
+    /// pool's.
     pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool, field: Option<&PoolField>) -> Surface {
         let middle = pool.corners.iter().sum::<Vec3>() / 4.0;
         let flow = scene.wave_flow.rem_euclid(1.0);
