@@ -78,6 +78,9 @@ struct FrameUniforms {
     // Turn of the sample to walk strands: StrandTurn of src/trace/lookup.rs.
     strand_scale: f32,
     strand_shift: f32,
+    // How far both fields of billows have risen, in loops, and their weights: BillowTimes of
+    // src/trace/billow.rs.
+    billow: vec4<f32>,
 }
 
 struct Light {
@@ -127,6 +130,8 @@ struct Quad {
     a: vec3<f32>,
     // Ψ of mist, which replaces that of the cells; 0 if the quad is not mist.
     mist: f32,
+    // Billows of mist: strength, reciprocal size in 1/m, metres of rise in a loop, and padding.
+    billow: vec4<f32>,
 }
 
 // Rectangular part of the window, pixels.

@@ -17,6 +17,7 @@
 #import light::strand
 #import mapping
 #import mapping::shell
+#import trace::billow
 #import trace::levels
 #import trace::lines
 #import trace::lookup
@@ -380,6 +381,11 @@ fn trace(
         view.d_cell = d_cell;
         view.extinction = own.extinction;
         view.matter = matter_at(quad, hit.xy, view.level.number > 0u);
+        if BILLOWS && quad.mist > 0.0 {
+            let factor = billow_factor(quad.billow, frame.billow, view.hit.point);
+            view.matter.scale *= factor;
+            view.matter.shift *= factor;
+        }
         view.leaps = view.matter.shift <= 0.0;
         if PYRAMID {
             view.origin *= view.level.scale;

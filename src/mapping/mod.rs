@@ -196,6 +196,19 @@ pub struct Material {
     pub repeat_v: f32,
     /// Number of the volume among those of the scene.
     pub volume: u32,
+    /// Billows of mist.
+    pub billow: Billow,
+}
+
+/// Noise that thins and thickens mist and rises through it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Billow {
+    /// Strength, 0 to 1; 0: even mist.
+    pub strength: f32,
+    /// Reciprocal of the billows' size, 1/m.
+    pub inverse_size: f32,
+    /// Distance that they rise while the volume moves by its own length, metres.
+    pub rise: f32,
 }
 
 /// Jacobian J = world_from_cell at one point of a quad, in the axes e1, e2 and seen normal of the quad's

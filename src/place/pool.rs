@@ -39,8 +39,8 @@ pub enum PoolWaves {
 
 words! { PoolWaves { Sum => "sum", Field => "field" } }
 
-/// Returns the straight waves' amplitude relative to their length. All waves are equally steep: A = λ·a, where
-/// Σ A²/2 is the variance of the height.
+/// Returns the straight waves' amplitude relative to their length. All waves are equally steep: A = λ·a,
+/// where Σ A²/2 is the variance of the height.
 pub fn steepness(pool: &Pool) -> f32 {
     let length = |i: usize| pool.straight_length(i);
     let sum: f32 = (0..STRAIGHT).map(|i| length(i) * length(i) * 0.5).sum();

@@ -9,7 +9,7 @@ use super::param::{POINT_MAX, WATER};
 use super::read::MAX_QUADS;
 use super::volumes::{used_materials, volume_of};
 use super::{Recipe, Values};
-use crate::mapping::{Ends, Material, Quad, Sheet, SheetFault, Splash, Surges};
+use crate::mapping::{Billow, Ends, Material, Quad, Sheet, SheetFault, Splash, Surges};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
 
@@ -118,6 +118,11 @@ fn material(v: &Values, materials: &Materials, what: &str, key: &str) -> Result<
         repeat_u: float("repeat_u"),
         repeat_v: float("repeat_v"),
         volume: materials.volume(&volume_of(v, &name)),
+        billow: Billow {
+            strength: float("billow"),
+            inverse_size: 1.0 / float("billow_size"),
+            rise: float("billow_rise"),
+        },
     };
     Ok((material, float("mist")))
 }

@@ -52,6 +52,12 @@ impl SheetDensity {
         matter
     }
 
+    /// Multiplies the density by a factor, as billows of mist do. Light rays see mist without its billows.
+    #[inline]
+    pub fn billowed(self, factor: f32) -> Self {
+        SheetDensity { scale: self.scale * factor, shift: self.shift * factor, ..self }
+    }
+
     /// Density map at `uv` for cells of a coarse level. ρ of a coarse cell belongs to none of the cells in
     /// it, so erosion scales it by the mean loss instead of subtracting e.
     #[inline]

@@ -29,7 +29,7 @@ use crate::picture::{Camera, SampleTimes};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, STRANDS, StrandTurn, level_at};
-use crate::trace::{Attenuation, Prefilter, SheetDensity, extinction, flow_cells};
+use crate::trace::{Attenuation, BillowTimes, Prefilter, SheetDensity, billow, extinction, flow_cells};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
@@ -74,6 +74,8 @@ pub struct Integrator<'a> {
     /// Whether any volume has colours.
     is_colored: bool,
     media: Option<Media>,
+    /// Where the billows of mist are.
+    billow_times: BillowTimes,
     /// Index of each quad's medium in `media`.
     medium_of_quad: Vec<u32>,
     haze: EyeHaze,
@@ -383,6 +385,7 @@ impl<'a> Integrator<'a> {
             strands_in_shells: false,
             is_colored: scene.is_colored(),
             media: scene.media(volumes),
+            billow_times: BillowTimes::new(scene.wave_flow),
             medium_of_quad: kinds(&scene.quads).1,
             haze: scene.haze.seen_from(scene.camera.eye_local()),
             rays: scene.camera.ray_frame(scene.image.width, scene.image.height),
@@ -634,6 +637,13 @@ impl<'a> Integrator<'a> {
             metric = Metric::IDENTITY;
             e_v = -d_cell / d_cell.dot(d_cell).sqrt();
         }
+        // A distant eye leaves float32 no digits along the ray.
+        let point = map.point_world(uv.x, uv.y);
+        let mut matter = [SheetDensity::new(quad, uv), SheetDensity::of_coarse(quad, uv)];
+        if quad.mist > 0.0 && quad.material.billow.strength > 0.0 {
+            let factor = billow::factor(&quad.material.billow, &self.billow_times, point);
+            matter = matter.map(|matter| matter.billowed(factor));
+        }
         SheetHit {
             quad: number,
             volume,
@@ -644,11 +654,10 @@ impl<'a> Integrator<'a> {
             d_world,
             d_cell,
             origin: self.face_point(quad, uv, time),
-            // A distant eye leaves float32 no digits along the ray.
-            point: map.point_world(uv.x, uv.y),
+            point,
             metric,
             e_v,
-            matter: [SheetDensity::new(quad, uv), SheetDensity::of_coarse(quad, uv)],
+            matter,
         }
     }
 

@@ -37,7 +37,8 @@ pub fn gbuffer_source() -> String {
         sum("fine_waves", ", bend: f32", (0..STRAIGHT).map(fine).collect()),
     ];
     resolve(&format!(
-        "#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n#import engine::pool_field\n{}",
+        "#import engine::gbuffer\n#import engine::gloss\n#import engine::pool\n\
+         #import engine::pool_field\n{}",
         sums.concat()
     ))
 }

@@ -9,11 +9,11 @@ use glam::Vec3;
 use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, ramp, scatter};
-use crate::mapping::PlaneView;
+use crate::mapping::{Billow, PlaneView};
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::{MAX_VOLUMES, Scene};
 use crate::trace::lookup::StrandTurn;
-use crate::trace::{extinction, flow_cells, level_atlas};
+use crate::trace::{BillowTimes, extinction, flow_cells, level_atlas};
 use crate::util::window::Window;
 use crate::volume::VolumeTexture;
 
@@ -70,6 +70,7 @@ pub struct FrameUniforms {
     pub shutter_step: f32,
     pub strand_scale: f32,
     pub strand_shift: f32,
+    pub billow: [f32; 4],
 }
 
 /// Material of a vertex of the opaque mesh. Numbers from 0 or −1 to 1 are packed in pairs into words.
@@ -155,6 +156,7 @@ pub struct Quad {
     pub erosion: [f32; 4],
     pub a: [f32; 3],
     pub mist: f32,
+    pub billow: [f32; 4],
 }
 
 /// Uniforms of a submission that fills columns of one light volume.
@@ -529,6 +531,10 @@ impl FrameUniforms {
             shutter_step: times.step,
             strand_scale: turn.scale,
             strand_shift: turn.shift,
+            billow: {
+                let BillowTimes { risen, weights } = BillowTimes::new(scene.wave_flow);
+                [risen[0], risen[1], weights[0], weights[1]]
+            },
         }
     }
 }
@@ -591,6 +597,10 @@ impl Quad {
             erosion: quad.erosion,
             a: map.a_world.to_array(),
             mist: quad.mist,
+            billow: {
+                let Billow { strength, inverse_size, rise } = quad.material.billow;
+                [strength, inverse_size, rise, 0.0]
+            },
         }
     }
 }

@@ -31,7 +31,7 @@ pub const WAVES: usize = STRAIGHT + RINGS;
 /// Cells of the surroundings' map: columns about the vertical, and rows upwards.
 pub const AROUND: [usize; 2] = [64, 12];
 /// Length of the longest and the shortest fine wave relative to the longest of a field.
-const FINE: [f32; 2] = [0.4, 0.04];
+const FINE: [f32; 2] = [0.4, 0.06];
 /// Metres by which noise moves fine waves, relative to the longest wave of a field: crests turn by some 20°.
 const BEND: f32 = 0.3;
 /// Time after which a pattern of foam is taken up anew, about, seconds. The current would draw it out for
@@ -167,7 +167,8 @@ pub fn turns(wavelength: f32, period: f32) -> f32 {
 }
 
 impl Surface {
-    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh, and `field` the pool's.
+    /// Computes the surface of one pool of a scene; `mesh` is the scene's opaque mesh, and `field` the
+    /// pool's.
     pub fn new(scene: &Scene, mesh: &Mesh, pool: &Pool, field: Option<&PoolField>) -> Surface {
         let middle = pool.corners.iter().sum::<Vec3>() / 4.0;
         let flow = scene.wave_flow.rem_euclid(1.0);

@@ -3,9 +3,9 @@
 //! Water that falls in pushes the surface outwards, and the pool drifts as a whole. Both go round the rocks:
 //! the velocity is ∇φ + drift with ∇²φ − φ/L² = source, without flow through rock. The term φ/L² takes the
 //! water down again over the length L. Eddies are the curl of noise, which is 0 at rocks (Bridson, Houriham
-//! and Nordenstam 2007). Foam floats where water sinks, so it gathers there, and along shores, where waves make
-//! more: ∇·(v·f) + f/τ + s·f = D·∇²f + shore, where s is the part of sinking water that takes its foam along,
-//! and f is `pools.*.foam` where water falls in.
+//! and Nordenstam 2007). Foam floats where water sinks, so it gathers there, and along shores, where waves
+//! make more: ∇·(v·f) + f/τ + s·f = D·∇²f + shore, where s is the part of sinking water that takes its foam
+//! along, and f is `pools.*.foam` where water falls in.
 
 use glam::{IVec2, Vec2};
 
@@ -24,8 +24,8 @@ const SWEEPS: usize = 12;
 const EDDIES: f32 = 0.7;
 /// Mixing of foam by small eddies, as a share of speed times cell, beside what the scheme itself mixes.
 const MIXING: f32 = 0.15;
-/// Share of sinking water that takes its foam along. With 0, all foam would gather in a ring where the current
-/// ends.
+/// Share of sinking water that takes its foam along. With 0, all foam would gather in a ring where the
+/// current ends.
 const TAKEN_DOWN: f32 = 0.75;
 /// Foam that waves leave on the shore, relative to that where water falls in.
 const SHORE: f32 = 0.25;
@@ -150,10 +150,9 @@ fn potential(basin: &Basin, source: &[f32], drift: Vec2, length: f32) -> Vec<f32
             [weight, constant]
         })
         .collect();
-    for round in 0..RELAXATIONS {
+    for _ in 0..RELAXATIONS {
         for half in 0..2 {
-            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half + round) % 2 == 0)
-            {
+            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half) % 2 == 0) {
                 if basin.solid[i] {
                     continue;
                 }
@@ -241,7 +240,7 @@ pub fn foam(pool: &Pool, basin: &Basin, faces: &Faces) -> Vec<f32> {
                     continue;
                 }
                 let Balance { flows_in, leaves } = balance(pool, basin, faces, i, &foam);
-                let is_shore = away[i] < 1.5 * grid.cell;
+                let is_shore = away[i] < 1.2 * grid.cell;
                 let washed = if is_shore { SHORE * pool.foam / pool.foam_life * grid.cell } else { 0.0 };
                 foam[i] = (flows_in + washed) / leaves;
             }

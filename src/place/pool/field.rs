@@ -21,12 +21,13 @@ const FEWEST_OF_WAVE: f32 = 10.0;
 const SHORTEST_SIDE: f32 = 32.0;
 /// Number of frequencies. Each has a field of complex amplitudes.
 pub const MODES: usize = 4;
-/// Waves of each mode in four lengths of the longest: whole numbers, so that one run in time tells them apart.
+/// Waves of each mode in four lengths of the longest: whole numbers, so that one run in time tells them
+/// apart.
 pub const HARMONICS: [u32; MODES] = [4, 5, 7, 9];
 /// Wavelengths of the modes relative to the longest.
 pub const LENGTHS: [f32; MODES] = [1.0, 0.8, 4.0 / 7.0, 4.0 / 9.0];
 /// Version of the fields' builder, a part of their key in the cache. Raise it with every change to them.
-pub const FIELD_VERSION: u32 = 1;
+pub const FIELD_VERSION: u32 = 2;
 
 /// A grid of square cells over the pool, with sides along x and z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,8 +55,8 @@ pub struct PoolField {
     pub amplitudes: Vec<Amplitudes>,
     /// Cells of the foam, twice as wide.
     pub coarse: Grid,
-    /// Density of the foam, 0 to 1, velocity along x and z in metres per second, and noise from −1 to 1 that is
-    /// smooth over a wave's length.
+    /// Density of the foam, 0 to 1, velocity along x and z in metres per second, and noise from −1 to 1 that
+    /// is smooth over a wave's length.
     pub carried: Vec<[f32; 4]>,
 }
 

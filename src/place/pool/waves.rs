@@ -29,7 +29,7 @@ const ABSORBED: (f32, f32) = (1.5, 0.3);
 /// Number of straight waves of each mode that come from outside.
 const INCIDENT: usize = 3;
 /// Length relative to the longest of the waves whose amplitude is `pools.*.rings`.
-const RINGS: f32 = 0.6;
+const RINGS: f32 = 0.4;
 /// Modulus of the wave of a point source one wavelength away, ¼·|H₀(2π)| of Green's function.
 const AT_ONE_WAVELENGTH: f32 = 0.079_577;
 
@@ -140,8 +140,8 @@ impl<'a> Run<'a> {
     }
 
     /// Adds sources where water falls in, of random phases in every cell: a thin jet makes rings, and a wide
-    /// fall waves without a common centre. Those of the length [`RINGS`] have the amplitude `pools.*.rings` one
-    /// longest wavelength away, and all are equally steep there.
+    /// fall waves without a common centre. Those of the length [`RINGS`] have the amplitude `pools.*.rings`
+    /// one longest wavelength away, and all are equally steep there.
     pub fn drive(&mut self, pool: &Pool) {
         let grid = self.basin.grid;
         let reach = (0.25 * self.longest).max(grid.cell);

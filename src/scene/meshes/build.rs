@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::paint::{Plan, untextured};
 use super::{Becomes, Carrier, Projection, SceneMesh, ThicknessFrom, faces, opaque, shells};
 use crate::mapping::shell::{Shell, Side};
-use crate::mapping::{Material, Quad};
+use crate::mapping::{Billow, Material, Quad};
 use crate::model::{Primitive, is_collapsed};
 use crate::place::{MAX_ADDED, SHADE_BYTES, Triangles, Vertex};
 use crate::scene::read::MAX_QUADS;
@@ -252,6 +252,7 @@ fn cover(v: &Values, name: &str, recipes: &[Recipe]) -> Cover {
             repeat_u: float("repeat_u"),
             repeat_v: float("repeat_v"),
             volume: volume as u32,
+            billow: Billow::default(),
         },
         mist: float("mist"),
         carrier: v.choice(&key("carrier"), Carrier::from_word),

@@ -173,9 +173,9 @@ pub(super) const POOLS: Group = Group {
             ),
         p("pools.*.waves", "", "", Choice(PoolWaves::WORDS), Upload)
             .doc(
-                "How waves and foam are made. `sum`: straight waves and rings, and a disc of foam where water \
-                 falls in. `field`: waves that rocks mirror and bend, and foam that a current carries, on a grid \
-                 of at most 512×512 cells.",
+                "How waves and foam are made. `sum`: straight waves and rings, and a disc of foam where \
+                 water falls in. `field`: waves that rocks mirror and bend, and foam that a current \
+                 carries, on a grid of at most 512×512 cells.",
             )
             .when("Choose `field` where rocks stand in the water or the pool is seen from near."),
         p("pools.*.height", "", "m", Float(0.0, 10.0, 0.008), Upload)
@@ -221,8 +221,8 @@ pub(super) const POOLS: Group = Group {
         p("pools.*.drift", "", "m/s", Float(0.0, 100.0, 0.1), Upload)
             .slider(0.0, 1.0)
             .doc(
-                "Speed of the whole surface, with `waves=field`: from the falling water through the middle of \
-                 the pool.",
+                "Speed of the whole surface, with `waves=field`: from the falling water through the middle \
+                 of the pool.",
             )
             .when("Raise it for a pool that a stream leaves; lower it for a basin without an outlet."),
         p("pools.*.seed", "", "", Int(0, i64::MAX, 1), Upload)

@@ -30,6 +30,17 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
                  keeps the strands.",
             )
             .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
+        p("materials.*.billow", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc("Strength of the billows in mist, which thin and thicken it. 0 keeps it even.")
+            .when("Raise it for spray beside falling water; lower it for a calm veil."),
+        p("materials.*.billow_size", "", "m", Float(1e-3, 1e4, 1.0), Uniform)
+            .slider(0.05, 10.0)
+            .doc("Size of the billows. The finer ones in them are 2.7 times smaller.")
+            .when("Lower it in small scenes; raise it for wide clouds of spray."),
+        p("materials.*.billow_rise", "", "m", Float(-1e4, 1e4, 2.0), Uniform)
+            .slider(-5.0, 10.0)
+            .doc("Distance that the billows rise while `volume.flow` grows by 1. Loops close with any value.")
+            .when("Raise it for quick spray; set it below 0 for mist that sinks."),
         p("materials.*.volume", "", "", Text("water"), Upload)
             .doc("Name of the volume that the material shows: `water`, or one of `volumes`.")
             .when("Name another volume for other matter beside the water, such as grass on the bank."),

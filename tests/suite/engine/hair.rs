@@ -57,7 +57,8 @@ fn rectangle(light: Light, reflection: Reflection) -> Scene {
         Scene::preset("front").expect("a preset").with(&["light.visibility=none"]).expect("valid");
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let corners = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];
-    let material = Material { thickness_m: 0.45, repeat_u: 1.0, repeat_v: 1.0, volume: 0 };
+    let material =
+        Material { thickness_m: 0.45, repeat_u: 1.0, repeat_v: 1.0, volume: 0, billow: Default::default() };
     let parts = scene.edit();
     parts.quads = vec![Quad::new(corners, material).expect("a quad")];
     (parts.lights, parts.ambient, parts.reflection) = (vec![light], Vec3::ZERO, reflection);

@@ -32,7 +32,8 @@ const COMPOSITE_ABSOLUTE: f64 = 1.2e-5;
 const DOUBT_M: f64 = 1e-3;
 
 fn quad(corners: [Vec3; 4], thickness_m: f32) -> Quad {
-    let material = Material { thickness_m, repeat_u: 1.0, repeat_v: 1.0, volume: 0 };
+    let material =
+        Material { thickness_m, repeat_u: 1.0, repeat_v: 1.0, volume: 0, billow: Default::default() };
     Quad::new(corners, material).expect("a quad")
 }
 

@@ -16,7 +16,7 @@ use taki::light::strand::hair::Hair;
 use taki::light::strand::water::Water;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::shell::{Shell, Side};
-use taki::mapping::{Material, Quad};
+use taki::mapping::{Billow, Material, Quad};
 use taki::place::Mesh;
 use taki::scene::{Limits, Recipe, Scene};
 use taki::trace::{Attenuation, Lookup, Prefilter};
@@ -58,6 +58,7 @@ fn quads(rng: &mut Pcg64Mcg) -> Vec<Quad> {
         repeat_u: rng.random_range(1..4) as f32,
         repeat_v: rng.random_range(1..4) as f32,
         volume: 0,
+        billow: Billow { strength: 0.7, inverse_size: 2.0, rise: 1.0 },
     };
     let rectangle = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];
     let wedge = [corner(0.0, 0.0), corner(2.0, 0.0), corner(1.5, 3.0), corner(0.25, 2.5)];

@@ -165,14 +165,14 @@ fn host_structs_have_the_layout_the_shaders_read() {
         image_height extinction texture_frame haze_density haze_falloff window_x window_y window_width
         window_height flow_cells layers haze_color haze_far shadow_light levels footprint alpha anchor
         depth_shift depth_rise depth_slope depth_scale flow_moves shutter_first
-        shutter_step strand_scale strand_shift);
+        shutter_step strand_scale strand_shift billow);
     assert_eq!(members(&module, "FrameUniforms"), frame);
     assert_eq!(
         members(&module, "Light"),
         fields!(Light: vector has_position intensity cos_edge axis inverse_soft)
     );
     let quad = fields!(Quad: corners e1 thickness e2 repeat_u n repeat_v across height along profile normal
-        volume e f g offset erosion a mist);
+        volume e f g offset erosion a mist billow);
     assert_eq!(members(&module, "Quad"), quad);
     assert_eq!(members(&module, "Tile"), fields!(Tile: x y width height));
     assert_eq!(members(&module, "Groups"), fields!(Groups: area first count pad_a pad_b));

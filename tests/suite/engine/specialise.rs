@@ -145,7 +145,7 @@ fn the_walk_without_light_has_no_model_of_light() {
 fn every_set_of_switches_leaves_a_valid_shader() {
     let switches = [
         "PER_CELL", "MARCH", "CACHED", "CODES", "CORNERED", "STRAND", "HAIR", "TILTED", "MULTIPLE", "ERODED",
-        "PYRAMID", "LEAPS",
+        "BILLOWS", "PYRAMID", "LEAPS",
     ];
     for many in [false, true] {
         let source = Source::read("integrate", &integrate_source(many));

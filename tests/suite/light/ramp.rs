@@ -34,7 +34,8 @@ fn lit_by(ramp: Ramp, ambient: Vec3, to_light: Vec3) -> (Scene, Vec3) {
     let mut scene = Scene::preset("front").expect("a preset");
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let corners = [corner(0.0, 0.0), corner(2.0, 0.0), corner(2.0, 3.0), corner(0.0, 3.0)];
-    let material = Material { thickness_m: 0.4, repeat_u: 1.0, repeat_v: 1.0, volume: 0 };
+    let material =
+        Material { thickness_m: 0.4, repeat_u: 1.0, repeat_v: 1.0, volume: 0, billow: Default::default() };
     let intensity = Vec3::new(1.0, 0.7, 0.4);
     let parts = scene.edit();
     parts.quads = vec![Quad::new(corners, material).expect("a quad")];

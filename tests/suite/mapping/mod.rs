@@ -42,6 +42,7 @@ fn material() -> impl Strategy<Value = Material> {
         repeat_u,
         repeat_v,
         volume: 0,
+        billow: Default::default(),
     })
 }
 

@@ -8,9 +8,9 @@ use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 use glam::{DVec3, Vec2, Vec3};
 use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::light::{Light, Visibility};
-use taki::mapping::{CellFrame, GRAVITY, Quad};
+use taki::mapping::{Billow, CellFrame, GRAVITY, Material, Quad};
 use taki::scene::{Limits, Scene, Source};
-use taki::trace::{Attenuation, MIST_OF_CELLS, MIST_RHO};
+use taki::trace::{Attenuation, BillowTimes, MIST_OF_CELLS, MIST_RHO};
 use taki::volume::{Cell, VolumeTexture};
 
 /// The preset `front` with the text's sheets or splashes in place of its quads.
@@ -314,6 +314,31 @@ fn eroded_water_transmits_by_what_is_left_of_its_density() {
             }
         }
     }
+}
+
+#[test]
+fn billows_multiply_the_density_of_mist_at_each_ray() {
+    let billow = Billow { strength: 0.8, inverse_size: 3.0, rise: 1.0 };
+    let (mut thinned, volume) = (0, uniform(0.5));
+    for i in 0..20 {
+        let uv = [0.05 * i as f32, 0.5];
+        let mist = |billow: Billow| {
+            through(
+                |q| Quad { mist: 0.3, material: Material { billow, ..q.material }, ..q },
+                Visibility::None,
+                &volume,
+                uv,
+            )
+        };
+        let (even, own) = (mist(Billow::default()), mist(billow));
+        let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        let point = corner(2.0 * uv[0], 3.0 * uv[1]);
+        let truth = f64::from(taki::trace::billow::factor(&billow, &BillowTimes::new(0.0), point));
+        let ratio = f64::from(own.transmittance).ln() / f64::from(even.transmittance).ln();
+        assert!(close(ratio, truth, 1e-4, 1e-5), "{uv:?}: {ratio} {truth}");
+        thinned += u32::from(truth < 0.9);
+    }
+    assert!(thinned > 0, "some rays meet thinner mist");
 }
 
 #[test]

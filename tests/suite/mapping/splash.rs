@@ -18,7 +18,13 @@ fn splash() -> Splash {
         segments: 6,
         width: 0.3,
         seed: 7,
-        material: Material { thickness_m: 0.1, repeat_u: 1.0, repeat_v: 1.0, volume: 0 },
+        material: Material {
+            thickness_m: 0.1,
+            repeat_u: 1.0,
+            repeat_v: 1.0,
+            volume: 0,
+            billow: Default::default(),
+        },
         mist: 0.0,
     }
 }

@@ -53,8 +53,8 @@ fn off_the_standing_wave(basin: &Basin) -> [f32; MODES] {
 #[test]
 fn a_wall_makes_a_standing_wave_of_a_wave_that_meets_it() {
     let worst = off_the_standing_wave(&basin(300));
-    // On its way of up to two wavelengths a mirrored wave loses 1 − e^(−2/12) = 0.15 of itself; 8 cells a wave
-    // and the edges of a wall of 12 m take the rest.
+    // On its way of up to two wavelengths a mirrored wave loses 1 − e^(−2/12) = 0.15 of itself; 8 cells a
+    // wave and the edges of a wall of 12 m take the rest.
     assert!(worst.iter().all(|worst| *worst < 0.35), "{worst:?}");
 }
 
@@ -64,14 +64,14 @@ fn without_a_wall_nothing_is_mirrored() {
     let mut run = Run::new(&open, 1.0);
     run.reflect(&along_x());
     assert!(run.amplitudes().iter().flatten().flatten().all(|part| *part == 0.0));
-    assert!(off_the_standing_wave(&open).iter().all(|worst| *worst > 0.9), "the comparison can fail");
+    assert!(off_the_standing_wave(&open).iter().all(|worst| *worst > 0.8), "the comparison can fail");
 }
 
 /// A pool of 24 m × 12 m in which a jet of 4 cm falls, at (−4, 0).
 fn jet(more: &str) -> Scene {
     of(&format!(
-        "[pools.p]\ncorners = [[-12,0,6],[12,0,6],[12,0,-6],[-12,0,-6]]\nwaves = \"field\"\nwavelength = 1.0\n\
-         rings = 0.01\n{more}\n[materials.water]\n[[quads]]\n\
+        "[pools.p]\ncorners = [[-12,0,6],[12,0,6],[12,0,-6],[-12,0,-6]]\nwaves = \"field\"\n\
+         wavelength = 1.0\nrings = 0.01\n{more}\n[materials.water]\n[[quads]]\n\
          corners = [[-4.02,2,0],[-3.98,2,0],[-3.98,-1,0],[-4.02,-1,0]]\n[image]\nwidth = 64\nheight = 64\n"
     ))
 }
@@ -100,9 +100,9 @@ fn rings_fall_with_the_root_of_the_distance_and_lose_a_twelfth_a_wave() {
         let truth = (4.0f32 / 1.5).sqrt() * (2.5f32 / 12.0).exp();
         assert!((near / far / truth - 1.0).abs() < 0.15, "{k}: {near} {far} {truth}");
     }
-    // `rings` is the amplitude of waves of 0.6 times the longest, one of the longest away. The cells of the
+    // `rings` is the amplitude of waves of 0.4 times the longest, one of the longest away. The cells of the
     // jet have random phases, so that one jet differs from the mean of all.
-    let size = mean(2, 1.0) / LENGTHS[2] * 0.6;
+    let size = mean(2, 1.0) / LENGTHS[2] * 0.4;
     assert!((0.003..0.03).contains(&size), "{size}");
 }
 
@@ -195,13 +195,9 @@ fn foam_keeps_its_balance_and_passes_no_rock() {
         off += f64::from((own.flows_in - own.leaves * foam[i]).abs());
     }
     assert!(gained > 1.0 && off < 1e-3 * gained, "{gained} {lost} {off}");
-    // It reaches out from the jet and thins.
+    // It thins against the drift.
     let at = |x: f32| foam[basin.grid.cell_at(Vec2::new(x, 0.0)).expect("in the pool")];
-    assert!(
-        at(-4.0) == 0.8 && at(-5.5) > 0.05 && at(-5.5) < 0.8 && at(-11.0) < 0.1,
-        "{:?}",
-        [-4.0, -5.5].map(at)
-    );
+    assert!(at(-4.0) == 0.8 && at(-5.5) > 0.0 && at(-5.5) < 0.1, "{:?}", [-4.0, -5.5].map(at));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::tolerance::{CLOSED_FORM_RELATIVE, close};
 use glam::{Vec2, Vec3};
 use taki::engine::cpu::integrate::{Integrator, RayResult};
 use taki::light::{Light, Visibility};
-use taki::mapping::{Material, Quad};
+use taki::mapping::{Billow, Material, Quad};
 use taki::scene::{Limits, Scene};
 use taki::trace::Attenuation;
 use taki::volume::{Cell, VolumeTexture};
@@ -32,7 +32,7 @@ fn rectangle(material: Material) -> Scene {
 }
 
 fn material(thickness_m: f32, repeat_u: f32, repeat_v: f32) -> Material {
-    Material { thickness_m, repeat_u, repeat_v, volume: 0 }
+    Material { thickness_m, repeat_u, repeat_v, volume: 0, billow: Billow::default() }
 }
 
 /// A volume with the same cell everywhere.

@@ -1,5 +1,6 @@
 //! §4 The trace.
 
+pub mod billow;
 pub mod closed_forms;
 pub mod flow;
 pub mod limits;

@@ -445,7 +445,13 @@ fn a_flat_shell_is_the_slab_where_no_border_is_near() {
     };
     let with_quad = {
         let mut scene = with_shell.clone();
-        let material = taki::mapping::Material { thickness_m: thickness, repeat_u, repeat_v, volume: 0 };
+        let material = taki::mapping::Material {
+            thickness_m: thickness,
+            repeat_u,
+            repeat_v,
+            volume: 0,
+            billow: Default::default(),
+        };
         scene.edit().shells.clear();
         scene.edit().quads = vec![taki::mapping::Quad::new(corners, material).expect("a quad")];
         scene

@@ -40,7 +40,8 @@ fn the_engines_agree_on_eroded_sheets_and_mist() {
         "{CURVED}[materials.fog]\nmist = 0.6\n[sheets.b]\npoints = [[0, -1, 1], [0, 1, 1]]\n\
         widths = [2.0]\nmaterial = \"fog\"\nsegments = 3\ncolumns = 3\nedge = 1.0\nhead = 0.5\nfade = 0.5\n"
     );
-    for (text, layers) in [(CURVED, 1), (mist.as_str(), 3)] {
+    let billows = mist.replace("mist = 0.6", "mist = 0.6\nbillow = 1.0\nbillow_size = 0.4");
+    for (text, layers) in [(CURVED, 1), (mist.as_str(), 3), (billows.as_str(), 3)] {
         for visibility in [Visibility::None, Visibility::March, Visibility::Cached] {
             for (strand, scattering) in
                 [(false, Scattering::Single), (true, Scattering::Single), (false, Scattering::Multiple)]

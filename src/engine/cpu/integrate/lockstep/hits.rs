@@ -11,7 +11,7 @@ use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
 use crate::trace::lookup::{STRANDS, StrandTurn};
-use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter};
+use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter, billow};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
 
@@ -220,6 +220,18 @@ impl Hits {
         let mist_scale = splat(MIST_OF_CELLS) * mist_left;
         let mist_shift = splat((1.0 - MIST_OF_CELLS) * MIST_RHO) * mist_left;
         let even = is_mist.select(splat(MIST_RHO) * mist_left, zero);
+        let (mut mist_scale, mut mist_shift) = (mist_scale, mist_shift);
+        let strength = hits.of_quads(simd, all, |quad| quad.material.billow.strength);
+        if (is_mist & strength.simd_gt(zero)).any_true() {
+            let mut points = Stored3::default();
+            points.store(point);
+            let times = &integrator.billow_times;
+            let of =
+                |lane: usize| billow::factor(&all[hits.quads[lane]].material.billow, times, points.get(lane));
+            let factor = Stored::from_fn(of).load(simd);
+            mist_scale *= factor;
+            mist_shift *= factor;
+        }
 
         let (mut level, mut share) = (zero, zero);
         let keep_lines = integrator.volumes.iter().any(|volume| volume.has_lines);
