@@ -137,7 +137,7 @@ const TINTED: [f32; OCTAVES] = [1.0, 1.0, 1.0, 0.8, 0.5, 0.3, 0.2, 0.3, 0.3, 0.2
 const MOSS_ALBEDO: Vec3 = Vec3::new(0.036, 0.048, 0.016);
 
 impl StoneKind {
-    /// Returns the mean albedo of the dry stone, linear RGB; `None` for plain rock, which has none of its own.
+    /// Returns the mean albedo of the dry stone, linear RGB; `None` for plain rock.
     pub fn albedo(self) -> Option<Vec3> {
         self.recipe().map(|recipe| recipe.albedo)
     }
