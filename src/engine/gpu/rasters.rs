@@ -56,7 +56,9 @@ impl Key {
             flow_cells: 0.0,
             flow_moves: 0.0,
             levels: 0,
-            footprint: 0.0,
+            strand_scale: 0.0,
+            strand_shift: 0.0,
+            billow: [0.0; 4],
             ..*frame
         };
         Key(hash_twice(&(bytemuck::bytes_of(&frame), geometry)))
