@@ -8,9 +8,9 @@
 #import light::environment
 
 // Slopes along x and z in each cell, and their change while the shutter is open.
-@group(0) @binding(16) var pool_slopes: texture_2d<f32>;
+@group(0) @binding(17) var pool_slopes: texture_2d<f32>;
 // Density of the foam, velocity along x and z in metres per second, and noise, in cells twice as wide.
-@group(0) @binding(17) var pool_carried: texture_2d<f32>;
+@group(0) @binding(18) var pool_carried: texture_2d<f32>;
 
 // Weighted sum of a cell and its neighbours along x.
 fn slopes_of_row(at: vec2<i32>, weights: vec3<f32>) -> vec4<f32> {

@@ -128,8 +128,10 @@ struct Recipe {
     lichen: Vec3,
 }
 
-/// Weights of the octaves in the noises that place moss and lichen.
-const MOSS: [f32; OCTAVES] = [0.0, 0.45, 0.45, 0.45, 0.4, 0.35, 0.25, 0.2, 0.0, 0.0];
+/// Weights of the octaves in the noises that place moss and lichen. Signs alternate, so that moss grows on
+/// bright and dark grain alike, however many octaves a sample shows: otherwise the mean albedo would change
+/// with the distance.
+const MOSS: [f32; OCTAVES] = [0.0, 0.45, -0.45, 0.45, -0.4, 0.35, -0.25, 0.2, 0.0, 0.0];
 const LICHEN: [f32; OCTAVES] = [0.0, 0.5, 0.0, 0.6, 0.5, 0.35, 0.2, 0.1, 0.0, 0.0];
 /// Shares of the octaves' tones that have the stone's tint.
 const TINTED: [f32; OCTAVES] = [1.0, 1.0, 1.0, 0.8, 0.5, 0.3, 0.2, 0.3, 0.3, 0.2];
@@ -212,12 +214,16 @@ impl Stone {
         let (cells, rest) = place(far / f64::from(COARSEST));
         let [wide, high] = STREAK.map(f64::from);
         let (streak_cells, streak_rest) = place(origin / DVec3::new(wide, high, wide));
+        // Without its part along the grain's tone, moss has no correlation with it.
+        let product =
+            |a: &[f32; OCTAVES], b: &[f32; OCTAVES]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        let shared = product(&MOSS, &recipe.tone) / product(&recipe.tone, &recipe.tone);
         let octave = |k: usize| Octave {
             tone: rock.grain * recipe.tone[k],
             slope: rock.grain * recipe.slope[k],
             crack: (rock.grain * recipe.crack[k]).min(1.0),
             fold: recipe.fold[k],
-            moss: MOSS[k],
+            moss: MOSS[k] - shared * recipe.tone[k],
             lichen: LICHEN[k],
             tinted: TINTED[k],
             pad: 0.0,

@@ -502,6 +502,36 @@ pub(super) const RULES: &[Rule] = &[
         },
     },
     Rule {
+        keys: &["sheets.*.surges"],
+        switch: "sheets.*.surge",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["materials.*.billow", "materials.*.billow_rise", "materials.*.billow_size"],
+        switch: "materials.*.mist",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["materials.*.billow_rise", "materials.*.billow_size"],
+        switch: "materials.*.billow",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["rocks.*.grain", "rocks.*.moss"],
+        switch: "rocks.*.kind",
+        needs: "a kind of stone",
+        works: |v, switch| !is(v, switch, "plain"),
+    },
+    Rule {
+        keys: &["pools.*.current", "pools.*.drift", "pools.*.foam_life"],
+        switch: "pools.*.waves",
+        needs: "field",
+        works: |v, switch| is(v, switch, "field"),
+    },
+    Rule {
         keys: &["image.grain_seed"],
         switch: "image.grain",
         needs: "a number above 0",

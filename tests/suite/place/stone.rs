@@ -111,7 +111,8 @@ fn truth(stone: &Stone, p: DVec3, spacing: f64) -> (DVec3, DVec3) {
     }
     let edge = f64::from(EDGE).powi(2);
     let grown = (lichen - f64::from(stone.bare)) / (edge + lichen2.max(0.0)).sqrt();
-    let bare = cubic(0.5 + grown / 20f64.sqrt());
+    let u = (0.5 + grown / 5.0).clamp(0.0, 1.0);
+    let bare = u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
     let factor = DVec3::splat(1.0 + tone) + Vec3::from(stone.tint).as_dvec3() * tinted;
     let rock = factor.max(DVec3::splat(0.1)) * 0.2;
     let color = Vec3::from(stone.lichen).as_dvec3() * (0.2 * (1.0 + tone));
@@ -171,15 +172,17 @@ fn mean_albedo(stone: &Stone, n: Vec3, spacing: f32) -> Vec3 {
 #[test]
 fn small_samples_have_in_the_mean_the_albedo_of_a_large_one() {
     for kind in KINDS {
-        // Moss is left out: it grows where the noise of the grain is high, so its mean depends on the samples.
-        let stone = stone(kind, "");
-        let n = Vec3::new(0.3, 0.5, 0.8).normalize();
-        let far = mean_albedo(&stone, n, 20.0);
-        for spacing in [0.001, 0.02, 0.15] {
-            let near = mean_albedo(&stone, n, spacing);
-            // The cover of lichen is exact for normal noise; simplex noise has other tails.
-            let off = (near / far - 1.0).abs().max_element();
-            assert!(off < 0.03, "{} {spacing}: {near} {far}", kind.word());
+        // Cover is exact for normal noise; simplex noise has other tails. The signs of moss's weights leave
+        // some correlation with the grain.
+        for (more, most) in [("", 0.03), ("moss = 0.5\n", 0.06)] {
+            let stone = stone(kind, more);
+            let n = Vec3::new(0.3, 0.5, 0.8).normalize();
+            let far = mean_albedo(&stone, n, 20.0);
+            for spacing in [0.001, 0.02, 0.15] {
+                let near = mean_albedo(&stone, n, spacing);
+                let off = (near / far - 1.0).abs().max_element();
+                assert!(off < most, "{} {more} {spacing}: {near} {far}", kind.word());
+            }
         }
     }
 }
