@@ -7,6 +7,8 @@
 //! make more: ∇·(v·f) + f/τ + s·f = D·∇²f + shore, where s is the part of sinking water that takes its foam
 //! along, and f is `pools.*.foam` where water falls in.
 
+use std::f32::consts::SQRT_2;
+
 use glam::{IVec2, Vec2};
 
 use super::Pool;
@@ -152,7 +154,8 @@ fn potential(basin: &Basin, source: &[f32], drift: Vec2, length: f32) -> Vec<f32
         .collect();
     for _ in 0..RELAXATIONS {
         for half in 0..2 {
-            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half) % 2 == 0) {
+            for i in (0..phi.len()).filter(|i| (i % grid.size[0] + i / grid.size[0] + half).is_multiple_of(2))
+            {
                 if basin.solid[i] {
                     continue;
                 }
@@ -196,7 +199,7 @@ fn from_rock(basin: &Basin) -> Vec<f32> {
     let [nx, nz] = basin.grid.size;
     let mut away: Vec<f32> = basin.solid.iter().map(|solid| if *solid { 0.0 } else { 1e6 }).collect();
     let sweep = |away: &mut Vec<f32>, x: usize, z: usize, sign: isize| {
-        for (dx, dz, step) in [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, 1.4142), (1, -1, 1.4142)] {
+        for (dx, dz, step) in [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, SQRT_2), (1, -1, SQRT_2)] {
             let [from_x, from_z] = [x as isize + sign * dx, z as isize + sign * dz];
             if (0..nx as isize).contains(&from_x) && (0..nz as isize).contains(&from_z) {
                 let near = away[from_z as usize * nx + from_x as usize] + step;

@@ -140,7 +140,7 @@ impl<'a> Run<'a> {
     }
 
     /// Adds sources where water falls in, of random phases in every cell: a thin jet makes rings, and a wide
-    /// fall waves without a common centre. Those of the length [`RINGS`] have the amplitude `pools.*.rings`
+    /// fall waves without a common centre. Those of the length `RINGS` have the amplitude `pools.*.rings`
     /// one longest wavelength away, and all are equally steep there.
     pub fn drive(&mut self, pool: &Pool) {
         let grid = self.basin.grid;
