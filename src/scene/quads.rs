@@ -118,10 +118,11 @@ fn material(v: &Values, materials: &Materials, what: &str, key: &str) -> Result<
         repeat_u: float("repeat_u"),
         repeat_v: float("repeat_v"),
         volume: materials.volume(&volume_of(v, &name)),
-        billow: Billow {
-            strength: float("billow"),
-            inverse_size: 1.0 / float("billow_size"),
-            rise: float("billow_rise"),
+        billow: match float("billow") {
+            0.0 => Billow::default(),
+            strength => {
+                Billow { strength, inverse_size: 1.0 / float("billow_size"), rise: float("billow_rise") }
+            }
         },
     };
     Ok((material, float("mist")))

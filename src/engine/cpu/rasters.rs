@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::gbuffer::{Gbuffer, band_rows, pixel_bytes, shade_pools};
 use crate::light::environment::Environment;
+use crate::mapping::Quad;
 use crate::mapping::shell::Shell;
 use crate::picture::Image;
 use crate::picture::camera::sample_offset;
@@ -131,7 +132,9 @@ impl Rasters {
         let Kept { pass, bands, used, .. } = &mut self.kept[i];
         *used = self.turn;
         let waves = |scene: &Scene| (scene.wave_flow, scene.wave_moves);
-        if waves(&pass.scene) != waves(scene) {
+        // Pools mirror the water, so its erosion is seen in them.
+        let thinned = |(a, b): (&Quad, &Quad)| a.erosion != b.erosion;
+        if waves(&pass.scene) != waves(scene) || pass.scene.quads.iter().zip(&scene.quads).any(thinned) {
             if !scene.pools.is_empty() {
                 // No other frame holds them.
                 shade_pools(scene, mesh, sample, Arc::get_mut(bands)?);
@@ -201,7 +204,7 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
     of_image == of_other_image
         && *camera == b.camera
         && trace.layers == b.trace.layers
-        && *quads == b.quads
+        && lie_alike(quads, &b.quads)
         && shells.len() == b.shells.len()
         && shells.iter().zip(&b.shells).all(|(a, b)| Shell::is_same(a, b))
         && *lights == b.lights
@@ -214,6 +217,11 @@ fn looks_alike(a: &Scene, b: &Scene, sample: u32) -> bool {
             (Some(a), Some(b)) => is_same_sky(a, b),
             _ => false,
         }
+}
+
+/// Whether quads are the same but for their erosion, which the pass does not read.
+fn lie_alike(a: &[Quad], b: &[Quad]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Quad { erosion: b.erosion, ..*a } == *b)
 }
 
 fn is_same_sky(a: &Environment, b: &Environment) -> bool {

@@ -243,9 +243,11 @@ impl Uploaded {
         let environment = scene.environment.as_ref().map(layout::Environment::new);
         let environment_bytes: &[u8] = environment.as_ref().map_or(&[], bytemuck::bytes_of);
         let number = map.as_ref().map(|(_, number)| *number);
+        // The raster pass does not read erosion, which surges change from frame to frame.
+        let even: Vec<Quad> = quads.iter().map(|quad| Quad { erosion: [0.0; 4], ..*quad }).collect();
         Ok(Uploaded {
             geometry: hash_twice(&(
-                quad_bytes,
+                bytemuck::cast_slice::<_, u8>(&even),
                 face_bytes,
                 light_bytes,
                 upload,

@@ -31,7 +31,10 @@ pub(super) const MATERIALS_AND_QUADS: Group = Group {
             )
             .when("Set it to 0.25 to 0.5 for mist; raise it when the mist looks too dark."),
         p("materials.*.billow", "", "", Float(0.0, 1.0, 0.0), Uniform)
-            .doc("Strength of the billows in mist, which thin and thicken it. 0 keeps it even.")
+            .doc(
+                "Strength of the billows in mist, which thin and thicken it. 0 keeps it even, as mist on \
+                  meshes is.",
+            )
             .when("Raise it for spray beside falling water; lower it for a calm veil."),
         p("materials.*.billow_size", "", "m", Float(1e-3, 1e4, 1.0), Uniform)
             .slider(0.05, 10.0)

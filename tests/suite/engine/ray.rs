@@ -15,9 +15,11 @@ use taki::util::window::Window;
 /// Coarse rocks, because each report projects them again.
 const FIG5_ROCKS: [&str; 4] =
     ["rocks.wall.levels=4", "rocks.left.levels=4", "rocks.right.levels=4", "rocks.foot.levels=4"];
-const WATERFALL_ROCKS: [&str; 12] = [
+const WATERFALL_ROCKS: [&str; 14] = [
     "haze.density=0",
     "trace.filter=none",
+    "trace.lookup=nearest",
+    "materials.mist.billow=0",
     "rocks.wall.levels=4",
     "rocks.left.levels=4",
     "rocks.right.levels=4",
