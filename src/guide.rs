@@ -13,6 +13,7 @@ pages! {
     grids "grids.md"
     simulation "simulation.md"
     method "method.md"
+    look "look.md"
     parameters "parameters.md"
     scenes_and_files "scenes-and-files.md"
     aces "aces.md"

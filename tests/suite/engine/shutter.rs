@@ -75,9 +75,10 @@ fn every_sample_has_its_own_part_of_the_time_and_neighbours_fill_the_gaps() {
     }
 }
 
-/// Settings that leave what stands still while the shutter is open, and strands, which a single sample of a
-/// picture with one sees otherwise than one of several.
-const STEADY: [&str; 9] = [
+/// Settings without what stands still or moves along straight lines while the shutter is open, and without
+/// strands, which the samples of a pixel see in turns.
+const STEADY: [&str; 10] = [
+    "pools.plunge.waves=sum",
     "camera.shutter=2.0",
     "rocks.wall.levels=2",
     "rocks.hills.levels=2",

@@ -184,7 +184,8 @@ fn cached_visibility_is_within_two_per_cent_of_an_exact_walk_from_every_cell() {
     let keys = ["main.edge", "main.breakup", "main.fade", "leap.edge", "leap.breakup"];
     let more = ["thread.edge", "thread.breakup", "far.edge", "far.breakup"];
     let surges = ["main.surge", "leap.surge", "thread.surge", "far.surge"];
-    let whole: Vec<String> = keys.iter().chain(&more).chain(&surges).map(|key| format!("sheets.{key}=0")).collect();
+    let whole: Vec<String> =
+        keys.iter().chain(&more).chain(&surges).map(|key| format!("sheets.{key}=0")).collect();
     let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
     let few = [&whole[..], &["light.cache=160"]].concat();
     // A directional light on a parallelogram is exact except for the codes. √T in 255ths gives T to 0.0039·√T

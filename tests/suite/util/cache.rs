@@ -141,7 +141,14 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
     let dir = tempdir().unwrap();
     let cache = Cache::new(dir.path(), 64 << 20).keeping_all();
     let base = ["volume.nx=16", "volume.ny=16", "volume.nz=8", "curves.across=5", "curves.deep=3"];
-    let place = ["rocks.wall.levels=3", "rocks.bed.levels=2", "rocks.left.levels=2", "rocks.hills.levels=2"];
+    let place = [
+        "rocks.wall.levels=3",
+        "rocks.bed.levels=2",
+        "rocks.left.levels=2",
+        "rocks.hills.levels=2",
+        // A field would take most of the time.
+        "pools.plunge.waves=sum",
+    ];
     let changes = [
         &[][..],
         &["volume.alpha=0.5"],
@@ -221,7 +228,18 @@ fn the_versions_of_the_builders_stand_for_what_they_make() {
     let scene = |name: &str, sets: &[&str]| Scene::preset(name).unwrap().with(sets).unwrap();
     let water = scene(
         "waterfall",
-        &["volume.nx=24", "volume.ny=20", "volume.nz=12", "volume.coherence=0.5", "volume.coverage=0.5"],
+        &[
+            "volume.nx=24",
+            "volume.ny=20",
+            "volume.nz=12",
+            "volume.coherence=0.5",
+            "volume.coverage=0.5",
+            "curves.bundles=13",
+            "curves.radius=0.034",
+            "curves.wander=0.08",
+            "curves.loose=0.22",
+            "trace.lookup=nearest",
+        ],
     );
     let volume = build_water(&water.recipes[0].water, &Unwatched).unwrap();
     let place = scene("waterfall", &crate::engine::gpu::COARSE_PLACE);
@@ -229,5 +247,5 @@ fn the_versions_of_the_builders_stand_for_what_they_make() {
     let made = format!("{:08x} {vertices:08x}", volume.checksum());
     let versions = [taki::volume::BUILDER_VERSION, taki::place::BUILDER_VERSION];
     // Without a new version, a new checksum would leave users with their old volumes and meshes.
-    assert_eq!((versions, made.as_str()), ([1, 2], "b972003d d3c98441"));
+    assert_eq!((versions, made.as_str()), ([1, 2], "b972003d e81c1bb6"));
 }
