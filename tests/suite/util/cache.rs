@@ -146,6 +146,9 @@ fn volumes_and_meshes_of_the_cache_are_those_that_are_made_whatever_changed() {
         "rocks.bed.levels=2",
         "rocks.left.levels=2",
         "rocks.hills.levels=2",
+        "rocks.boulder_a.levels=2",
+        "rocks.boulder_b.levels=2",
+        "rocks.boulder_c.levels=2",
         // A field would take most of the time.
         "pools.plunge.waves=sum",
     ];
