@@ -130,6 +130,9 @@ struct Quad {
     a: vec3<f32>,
     // Ψ of mist, which replaces that of the cells; 0 if the quad is not mist.
     mist: f32,
+    // Holes: shares that are torn at v = 0 and v = 1, and the holes' cells across a copy of the volume and
+    // along it.
+    tear: vec4<f32>,
     // Billows of mist: strength, reciprocal size in 1/m, metres of rise in a loop, and padding.
     billow: vec4<f32>,
 }

@@ -22,6 +22,7 @@
 #import trace::lines
 #import trace::lookup
 #import trace::matter
+#import trace::tear
 #import volume::cells
 #import walk
 
@@ -364,8 +365,16 @@ fn trace(
 
     // The level whose cells match the sample's footprint lies between two levels; both are walked.
     var finer = 0.0;
+    var seen_level = 0.0;
     if PYRAMID | LINES {
-        finer = walked_level(level_at(jacobian, d_world, d_cell, hit.z), own, quad);
+        seen_level = level_at(jacobian, d_world, d_cell, hit.z);
+        finer = walked_level(seen_level, own, quad);
+    }
+    let on_face = face_point(quad, hit.xy, own.cells, own.flow_cells);
+    var torn = 0.0;
+    if TEARS {
+        let cells = vec2<f32>(own.cells.xy);
+        torn = tear_erosion(quad, hit.xy, on_face.xy / cells, cells.x, seen_level);
     }
     let share = fract(finer);
     let walks = select(1u, 2u, share > 0.0);
@@ -377,10 +386,10 @@ fn trace(
         let weight = select(share, 1.0 - share, i == 0u);
         let number = i32(floor(finer)) + i32(i);
         view.level = level_new(own.cells, own.base, u32(max(number, 0)));
-        view.origin = face_point(quad, hit.xy, own.cells, own.flow_cells);
+        view.origin = on_face;
         view.d_cell = d_cell;
         view.extinction = own.extinction;
-        view.matter = matter_at(quad, hit.xy, view.level.number > 0u);
+        view.matter = matter_at(quad, hit.xy, torn, view.level.number > 0u);
         if BILLOWS && quad.mist > 0.0 {
             let factor = billow_factor(quad.billow, frame.billow, view.hit.point);
             view.matter.scale *= factor;

@@ -1,6 +1,7 @@
 // §4 Billows of mist. Twin: src/trace/billow.rs, which holds the reasoning.
 
 #import layout
+#import trace::noise
 
 // Whether any mist billows.
 override BILLOWS: bool = false;
@@ -8,17 +9,9 @@ override BILLOWS: bool = false;
 const BILLOW_CONTRAST: f32 = 4.5;
 const BILLOW_MOST: f32 = 3.0;
 
-// Hash of a lattice point, 0 to 1.
-fn billow_lattice(x: u32, y: u32, z: u32) -> f32 {
-    var h = (x * 0x8da6b343u) ^ (y * 0xd8163841u) ^ (z * 0xcb1ab31fu);
-    h = (h ^ (h >> 13u)) * 0x9e3779b1u;
-    h = h ^ (h >> 16u);
-    return f32(h >> 8u) / 16777216.0;
-}
-
 fn billow_row(x: u32, y: u32, z: u32, s: f32) -> f32 {
-    let near = billow_lattice(x, y, z);
-    return near + (billow_lattice(x + 1u, y, z) - near) * s;
+    let near = lattice(x, y, z);
+    return near + (lattice(x + 1u, y, z) - near) * s;
 }
 
 // Value noise between the values of the lattice, 0 to 1.

@@ -24,15 +24,16 @@ struct SheetDensity {
     left: f32,
 }
 
-// Density map at texture coordinates of a quad. For cells of a coarse level (`coarse`), erosion scales ρ by
+// Density map at texture coordinates of a quad, in which holes erode by `torn`. For cells of a coarse level (`coarse`), erosion scales ρ by
 // the mean loss instead of subtracting e.
-fn matter_at(quad: Quad, uv: vec2<f32>, coarse: bool) -> SheetDensity {
+fn matter_at(quad: Quad, uv: vec2<f32>, torn: f32, coarse: bool) -> SheetDensity {
     if !ERODED {
         return SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);
     }
     let near = quad.erosion.x + (quad.erosion.y - quad.erosion.x) * uv.x;
     let far = quad.erosion.w + (quad.erosion.z - quad.erosion.w) * uv.x;
-    let e = clamp(near + (far - near) * uv.y, 0.0, 1.0);
+    let even = clamp(near + (far - near) * uv.y, 0.0, 1.0);
+    let e = even + (1.0 - even) * torn;
     if quad.mist > 0.0 {
         let left = 1.0 - e;
         let shift = (1.0 - MIST_OF_CELLS) * MIST_RHO * left;

@@ -227,8 +227,7 @@ impl LightVolumes {
     /// the walks of `rays` view rays.
     pub fn exact(lit: &LitQuads, rays: u64, budget: u64) -> Option<Self> {
         let is_directional = |light: &Light| matches!(light, Light::Directional { .. });
-        let is_even =
-            |quad: &Quad| quad.mist > 0.0 || quad.erosion == [0.0; 4] && quad.map.is_parallelogram();
+        let is_even = |quad: &Quad| quad.mist > 0.0 || !quad.changes_matter() && quad.map.is_parallelogram();
         let fits = lit.trace.max_cells <= MAX_WALK_CELLS
             && lit.lights.iter().all(is_directional)
             && lit.quads.iter().all(is_even);

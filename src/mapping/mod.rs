@@ -16,6 +16,7 @@ mod sheet;
 pub mod shell;
 mod splash;
 mod surge;
+mod tears;
 mod view;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -24,6 +25,7 @@ pub use quad::Quad;
 pub use sheet::{Ends, GRAVITY, Sheet, SheetFault, Station};
 pub use splash::Splash;
 pub use surge::Surges;
+pub use tears::{Tear, Tears};
 pub use view::{FARTHEST, PlaneView};
 
 /// Cross product of two vectors in a plane: its component along the normal.

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Material, QuadFault, QuadMap};
+use super::{Material, QuadFault, QuadMap, Tear};
 
 /// Quad with its material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,19 +17,29 @@ pub struct Quad {
     pub offset: Vec2,
     /// Erosion e at A, B, C and D, bilinear between them. It leaves max(ρ − e, 0) of the density ρ.
     pub erosion: [f32; 4],
+    /// Holes in the water.
+    pub tear: Tear,
     /// Ψ of mist, which replaces that of the cells. With 0 the quad is not mist.
     pub mist: f32,
 }
 
 impl Quad {
-    /// Quad that begins at the texture's origin and has no erosion and no mist. `corners` are in the world,
+    /// Quad that begins at the texture's origin and has no erosion, no holes and no mist. `corners` are in the world,
     /// metres.
     ///
     /// # Errors
     /// Returns the [`QuadFault`] of corners that cannot be mapped.
     pub fn new(corners: [Vec3; 4], material: Material) -> std::result::Result<Quad, QuadFault> {
         let map = QuadMap::new(corners)?;
-        Ok(Quad { corners, map, material, offset: Vec2::ZERO, erosion: [0.0; 4], mist: 0.0 })
+        Ok(Quad {
+            corners,
+            map,
+            material,
+            offset: Vec2::ZERO,
+            erosion: [0.0; 4],
+            tear: Tear::default(),
+            mist: 0.0,
+        })
     }
 
     /// Triangle of a mesh, whose corners (world, metres) have the texture coordinates `uv`, in copies of the
@@ -60,7 +70,25 @@ impl Quad {
         let material = Material { repeat_u: size.x as f32, repeat_v: size.y as f32, ..material };
         // Whole copies are left out: they would cost digits.
         let offset = (low - low.floor()).as_vec2();
-        Ok(Quad { corners: [a, b, c, c], map, material, offset, erosion: [0.0; 4], mist: 0.0 })
+        Ok(Quad {
+            corners: [a, b, c, c],
+            map,
+            material,
+            offset,
+            erosion: [0.0; 4],
+            tear: Tear::default(),
+            mist: 0.0,
+        })
+    }
+
+    /// Whether holes are torn into the quad.
+    pub fn is_torn(&self) -> bool {
+        self.tear.open != [0.0; 2]
+    }
+
+    /// Whether the quad shows less than the volume's own matter, or mist in its place.
+    pub fn changes_matter(&self) -> bool {
+        self.mist > 0.0 || self.erosion != [0.0; 4] || self.is_torn()
     }
 
     /// Whether a triangle is drawn.

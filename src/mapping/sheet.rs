@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::{Material, Quad, QuadFault, QuadMap, Surges};
+use super::{Material, Quad, QuadFault, QuadMap, Surges, Tear, Tears};
 
 /// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -42,6 +42,8 @@ pub struct Sheet {
     pub ends: Ends,
     /// Erosion between surges.
     pub surges: Surges,
+    /// Holes.
+    pub tears: Tears,
     /// Material of all quads. Its numbers of copies count over the whole sheet.
     pub material: Material,
     /// [`Quad::mist`] of all quads.
@@ -180,6 +182,13 @@ impl Sheet {
         DVec2::new(angle.sin(), angle.cos() - 1.0) * radius
     }
 
+    /// Share of the water that is torn at a row between those at the `ends`. By continuity the thickness is
+    /// as 1/(speed × width).
+    fn torn(&self, speed: &Speed, row: &Station, [first, last]: &[Station; 2]) -> f32 {
+        let flux = |row: &Station| speed.at(row.point) * row.width;
+        self.tears.open(flux(first) / flux(row), row.time / last.time)
+    }
+
     /// Quads of the sheet, row by row from the lip, each row from u = 0. Neighbours share corners, texture
     /// coordinates and erosion to the last bit.
     ///
@@ -189,6 +198,7 @@ impl Sheet {
         let rows = self.rows();
         let (first, last) = (rows[0], rows[rows.len() - 1]);
         let across = self.across.as_dvec3();
+        let speed = Speed::new(self, rows.iter().map(|row| row.point.y));
         let out = (last.point - first.point).cross(across).normalize_or_zero();
         let borders = self.borders();
         let corner = |row: &Station, u: f32| {
@@ -200,6 +210,10 @@ impl Sheet {
             let position = DVec2::new(f64::from(u), self.along(row, &last));
             self.offset.as_dvec2() + position * repeat.as_dvec2()
         };
+        let torn = rows.iter().map(|row| self.torn(&speed, row, &[first, last]));
+        let torn: Vec<f32> = torn.collect();
+        let width = self.widths.iter().map(|&w| f64::from(w)).sum::<f64>() / self.widths.len() as f64;
+        let lattice = self.tears.lattice(width / f64::from(repeat.x), last.arc / f64::from(repeat.y));
         let mut quads = Vec::new();
         for (segment, ends) in rows.windows(2).enumerate() {
             for (column, sides) in borders.windows(2).enumerate() {
@@ -215,8 +229,9 @@ impl Sheet {
                     let e = self.ends.erosion(u, way(row));
                     e + (1.0 - e) * self.surges.lack(u, texture(&ends[row], u).y)
                 });
+                let tear = Tear { open: [torn[segment], torn[segment + 1]], lattice };
                 let (offset, mist) = (from.as_vec2(), self.mist);
-                quads.push(Quad { corners, map, material, offset, erosion, mist });
+                quads.push(Quad { corners, map, material, offset, erosion, tear, mist });
             }
         }
         Ok(quads)

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-use super::{Ends, GRAVITY, Material, Sheet, Surges};
+use super::{Ends, GRAVITY, Material, Sheet, Surges, Tears};
 use crate::util::random::{Family, Stream};
 
 /// Number of points of a parabola. At every time a drop is within 0.6 ‰ of the arc's length from the sheet,
@@ -54,6 +54,8 @@ pub struct Splash {
     pub width: f32,
     /// Seed of the arcs' randomness.
     pub seed: u64,
+    /// Holes that leave the drops.
+    pub tears: Tears,
     /// Material of all arcs.
     pub material: Material,
     /// [`super::Quad::mist`] of all quads.
@@ -110,6 +112,7 @@ impl Splash {
             offset,
             ends: ENDS,
             surges: Surges::default(),
+            tears: self.tears,
             material: self.material,
             mist: self.mist,
         }

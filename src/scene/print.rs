@@ -191,6 +191,8 @@ fn quad_json(quad: &Quad, origin: DVec3) -> Json {
         "offset": quad.offset.to_array(),
         "extent": [quad.material.repeat_u, quad.material.repeat_v],
         "erosion": quad.erosion,
+        // Shares that are torn at v = 0 and v = 1.
+        "torn": quad.tear.open,
         "mist": quad.mist,
         // Index in the list of volumes.
         "volume": quad.material.volume,

@@ -9,9 +9,13 @@ use super::param::{POINT_MAX, WATER};
 use super::read::MAX_QUADS;
 use super::volumes::{used_materials, volume_of};
 use super::{Recipe, Values};
-use crate::mapping::{Billow, Ends, Material, Quad, Sheet, SheetFault, Splash, Surges};
+use crate::mapping::{Billow, Ends, Material, Quad, Sheet, SheetFault, Splash, Surges, Tears};
 use crate::util::error::{Error, Result};
 use crate::util::unit::unit;
+
+/// Length of the holes between the threads of a fall and between the drops of a splash, in their widths.
+const THREADS: f32 = 8.0;
+const DROPS: f32 = 2.0;
 
 /// Materials of a scene.
 struct Materials<'a> {
@@ -188,6 +192,7 @@ fn splash_quads(
         segments: v.count(&key("segments")),
         width: float("width"),
         seed: v.int(&key("seed")) as u64,
+        tears: Tears { strength: float("tear"), size: float("tear_size"), length: DROPS },
         material,
         mist,
     };
@@ -284,6 +289,7 @@ fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result
             f64::from(materials.recipes[material.volume as usize].flow),
             xxh3_64(name.as_bytes()),
         ),
+        tears: Tears { strength: float("tear"), size: float("tear_size"), length: THREADS },
         material,
         mist,
     })

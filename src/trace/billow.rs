@@ -7,6 +7,7 @@
 
 use glam::Vec3;
 
+use super::noise::lattice;
 use crate::mapping::Billow;
 
 /// Strength of the contrast: the standard deviation of the density is about half of [`Billow::strength`].
@@ -37,15 +38,6 @@ impl BillowTimes {
         let length = (shares[0] * shares[0] + shares[1] * shares[1]).sqrt();
         BillowTimes { risen, weights: shares.map(|share| share / length) }
     }
-}
-
-/// Hashes a lattice point to a number from 0 to 1.
-#[inline]
-fn lattice(x: u32, y: u32, z: u32) -> f32 {
-    let h = x.wrapping_mul(0x8da6_b343) ^ y.wrapping_mul(0xd816_3841) ^ z.wrapping_mul(0xcb1a_b31f);
-    let h = (h ^ (h >> 13)).wrapping_mul(0x9e37_79b1);
-    let h = h ^ (h >> 16);
-    (h >> 8) as f32 / 16_777_216.0
 }
 
 /// Value noise between the values of the lattice, 0 to 1.

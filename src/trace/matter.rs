@@ -33,13 +33,15 @@ pub struct SheetDensity {
 }
 
 impl SheetDensity {
-    /// Density map at the texture coordinates `uv` of a quad, for the volume's own cells.
+    /// Density map at the texture coordinates `uv` of a quad, for the volume's own cells. Holes erode what else
+    /// is left by `torn`, 0 to 1.
     #[inline]
-    pub fn new(quad: &Quad, uv: Vec2) -> Self {
+    pub fn new(quad: &Quad, uv: Vec2, torn: f32) -> Self {
         let [a, b, c, d] = quad.erosion;
         let near = a + (b - a) * uv.x;
         let far = d + (c - d) * uv.x;
         let e = (near + (far - near) * uv.y).clamp(0.0, 1.0);
+        let e = e + (1.0 - e) * torn;
         let mut matter =
             SheetDensity { scale: 1.0, shift: e * -65535.0, mist: 0.0, even: 0.0, left: mean_left(e) };
         if quad.mist > 0.0 {
@@ -58,11 +60,11 @@ impl SheetDensity {
         SheetDensity { scale: self.scale * factor, shift: self.shift * factor, ..self }
     }
 
-    /// Density map at `uv` for cells of a coarse level. ρ of a coarse cell belongs to none of the cells in
+    /// Density map, as [`SheetDensity::new`], for cells of a coarse level. ρ of a coarse cell belongs to none of the cells in
     /// it, so erosion scales it by the mean loss instead of subtracting e.
     #[inline]
-    pub fn of_coarse(quad: &Quad, uv: Vec2) -> Self {
-        let matter = SheetDensity::new(quad, uv);
+    pub fn of_coarse(quad: &Quad, uv: Vec2, torn: f32) -> Self {
+        let matter = SheetDensity::new(quad, uv, torn);
         match quad.mist > 0.0 {
             true => matter,
             false => SheetDensity { scale: matter.left, shift: 0.0, ..matter },

@@ -5,7 +5,9 @@ mod levels;
 pub mod lines;
 pub mod lookup;
 mod matter;
+mod noise;
 mod settings;
+pub mod tear;
 
 pub use billow::BillowTimes;
 pub use levels::{level_atlas, pyramid_spec};

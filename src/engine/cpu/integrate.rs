@@ -29,7 +29,7 @@ use crate::picture::{Camera, SampleTimes};
 use crate::place::{DiffuseOfShells, Mesh, ShellShadows};
 use crate::scene::{Face, Scene};
 use crate::trace::lookup::{Level, STRANDS, StrandTurn, level_at};
-use crate::trace::{Attenuation, BillowTimes, Prefilter, SheetDensity, billow, extinction, flow_cells};
+use crate::trace::{Attenuation, BillowTimes, Prefilter, SheetDensity, billow, extinction, flow_cells, tear};
 use crate::util::error::Result;
 use crate::util::monitor::Monitor;
 use crate::volume::{Cell, Levels, VolumeTexture, levels_of};
@@ -639,7 +639,17 @@ impl<'a> Integrator<'a> {
         }
         // A distant eye leaves float32 no digits along the ray.
         let point = map.point_world(uv.x, uv.y);
-        let mut matter = [SheetDensity::new(quad, uv), SheetDensity::of_coarse(quad, uv)];
+        let origin = self.face_point(quad, uv, time);
+        let torn = match quad.is_torn() {
+            true => {
+                let [nx, ny, _] = self.volumes[volume].size.map(|n| n as f32);
+                let place = Vec2::new(origin.x / nx, origin.y / ny);
+                let seen = self.seen_level(volume, &frame, [d_world, d_cell], hit[2]);
+                tear::erosion(&quad.tear, uv.y, place, nx, seen.unwrap_or(0.0))
+            }
+            false => 0.0,
+        };
+        let mut matter = [SheetDensity::new(quad, uv, torn), SheetDensity::of_coarse(quad, uv, torn)];
         if quad.mist > 0.0 && quad.material.billow.strength > 0.0 {
             let factor = billow::factor(&quad.material.billow, &self.billow_times, point);
             matter = matter.map(|matter| matter.billowed(factor));
@@ -653,7 +663,7 @@ impl<'a> Integrator<'a> {
             side,
             d_world,
             d_cell,
-            origin: self.face_point(quad, uv, time),
+            origin,
             point,
             metric,
             e_v,
@@ -673,20 +683,27 @@ impl<'a> Integrator<'a> {
         Vec3::new(x - nx * copy(x, nx), y - ny * copy(y, ny), 0.0)
     }
 
+    /// Returns the level, no whole number, whose cells suit a ray `t` metres from the eye. `None` where all
+    /// rays walk the volume itself. `directions` are those in the world and in cells.
+    #[inline]
+    fn seen_level(&self, volume: usize, frame: &CellFrame, directions: [Vec3; 2], t: f32) -> Option<f32> {
+        if self.scene.trace.filter == Prefilter::None && !self.volumes[volume].has_lines {
+            return None;
+        }
+        let [d_world, d_cell] = directions;
+        let forward = self.scene.camera.forward.as_vec3();
+        let area = frame.det.abs() * frame.depth * d_cell.length();
+        Some(level_at(self.footprint, forward, d_world, t, area))
+    }
+
     /// Returns the finer of the two levels whose cells suit the ray `t` metres from the eye, and the share of
     /// the coarser. Where a pixel sees less than a cell, it walks the strands, level [`STRANDS`], if there
     /// are any.
     #[inline]
     fn level_of(&self, ray: &SheetHit, t: f32, turn: StrandTurn) -> (i32, f32) {
         let volume = &self.volumes[ray.volume];
-        let is_filtered = self.scene.trace.filter != Prefilter::None;
-        if !is_filtered && !volume.has_lines {
-            return (0, 0.0);
-        }
-        let forward = self.scene.camera.forward.as_vec3();
-        let CellFrame { depth, det, .. } = ray.frame;
-        let area = det.abs() * depth * ray.d_cell.length();
-        let level = level_at(self.footprint, forward, ray.d_world, t, area);
+        let seen = self.seen_level(ray.volume, &ray.frame, [ray.d_world, ray.d_cell], t);
+        let Some(level) = seen else { return (0, 0.0) };
         let keeps_lines = volume.has_lines && ray.matter[0].mist == 0.0;
         let coarsest = (volume.levels.len() - 1) as f32;
         let level = turn.level(level, keeps_lines, coarsest);

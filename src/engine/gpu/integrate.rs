@@ -12,6 +12,7 @@ use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::StrandParams;
 use crate::light::visibility::{Form, LightVolumes};
 use crate::light::{Reflection, Scattering, Visibility};
+use crate::mapping::Quad;
 use crate::scene::Scene;
 use crate::trace::{Attenuation, Lookup, Prefilter};
 use crate::util::error::Result;
@@ -55,6 +56,7 @@ pub struct Variant {
     multiple: bool,
     eroded: bool,
     billows: bool,
+    tears: bool,
     pyramid: bool,
     trilinear: bool,
     lines: bool,
@@ -99,7 +101,8 @@ impl Variant {
             tilted: scene.has_strands() && scene.reflection.strands().is_some_and(StrandParams::is_tilted),
             colored: scene.is_colored(),
             multiple: scene.scattering == Scattering::Multiple,
-            eroded: scene.quads.iter().any(|quad| quad.mist > 0.0 || quad.erosion != [0.0; 4]),
+            eroded: scene.quads.iter().any(Quad::changes_matter),
+            tears: scene.quads.iter().any(Quad::is_torn),
             billows: scene.quads.iter().any(|quad| quad.mist > 0.0 && quad.material.billow.strength > 0.0),
             pyramid: scene.trace.filter == Prefilter::Pyramid,
             trilinear: scene.trace.lookup == Lookup::Trilinear,
@@ -240,6 +243,7 @@ impl Integrate {
             ("MULTIPLE", number(variant.multiple)),
             ("ERODED", number(variant.eroded)),
             ("BILLOWS", number(variant.billows)),
+            ("TEARS", number(variant.tears)),
             ("PYRAMID", number(variant.pyramid)),
             ("TRILINEAR", number(variant.trilinear)),
             ("LINES", number(variant.lines)),

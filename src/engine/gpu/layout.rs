@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::light::scatter::optics::ShellOptics;
 use crate::light::strand::table::StrandShading;
 use crate::light::{AngleFrame, environment, ramp, scatter};
-use crate::mapping::{Billow, PlaneView};
+use crate::mapping::{Billow, PlaneView, Tear};
 use crate::picture::camera::{DepthRange, clip_to_window, footprint, sample_offset};
 use crate::scene::{MAX_VOLUMES, Scene};
 use crate::trace::lookup::StrandTurn;
@@ -156,6 +156,7 @@ pub struct Quad {
     pub erosion: [f32; 4],
     pub a: [f32; 3],
     pub mist: f32,
+    pub tear: [f32; 4],
     pub billow: [f32; 4],
 }
 
@@ -597,6 +598,10 @@ impl Quad {
             erosion: quad.erosion,
             a: map.a_world.to_array(),
             mist: quad.mist,
+            tear: {
+                let Tear { open: [near, far], lattice: [across, along] } = quad.tear;
+                [near, far, across as f32, along as f32]
+            },
             billow: {
                 let Billow { strength, inverse_size, rise } = quad.material.billow;
                 [strength, inverse_size, rise, 0.0]

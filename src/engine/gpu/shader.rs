@@ -11,7 +11,7 @@ macro_rules! files {
 /// Name (without extension) and text of every file in `shaders/`.
 pub const FILES: &[(&str, &str)] = files! {
     "layout" "mapping" "mapping/shell" "mapping/shell_path" "walk" "volume/cells"
-    "trace/billow" "trace/levels" "trace/lines" "trace/lookup" "trace/matter"
+    "trace/billow" "trace/levels" "trace/lines" "trace/lookup" "trace/matter" "trace/noise" "trace/tear"
     "light/environment" "light/fibre" "light/haze" "light/optical_depth" "light/optics" "light/ramp"
     "light/scatter"
     "light/strand" "light/visibility" "light/shell_depth" "light/shell_light"

@@ -7,6 +7,7 @@ use super::{AROUND, turn};
 use crate::mapping::Quad;
 use crate::place::{Mesh, Vertex};
 use crate::scene::Scene;
+use crate::trace::tear;
 
 /// Step between the mesh vertices that are sampled.
 const STRIDE: usize = 5;
@@ -95,9 +96,10 @@ fn add_water(scene: &Scene, middle: Vec3, cells: &mut [[f32; 4]]) {
     let solid_angle = std::f32::consts::TAU / cells.len() as f32;
     let mut cover = vec![0.0f32; cells.len()];
     for quad in scene.quads.iter().filter(|quad| quad.mist == 0.0) {
-        let Quad { corners: [a, b, c, d], erosion, .. } = quad;
+        let Quad { corners: [a, b, c, d], erosion, tear, .. } = quad;
         let area = (*c - *a).cross(*d - *b).length() * 0.5 / (POINTS * POINTS) as f32;
-        let share_left = (1.0 - erosion.iter().sum::<f32>() / 4.0).clamp(0.0, 1.0);
+        let whole = 1.0 - tear.open.map(tear::mean).iter().sum::<f32>() / 2.0;
+        let share_left = (1.0 - erosion.iter().sum::<f32>() / 4.0).clamp(0.0, 1.0) * whole;
         for i in 0..POINTS * POINTS {
             let u = ((i % POINTS) as f32 + 0.5) / POINTS as f32;
             let v = ((i / POINTS) as f32 + 0.5) / POINTS as f32;

@@ -508,6 +508,18 @@ pub(super) const RULES: &[Rule] = &[
         works: |v, switch| v.float(switch) > 0.0,
     },
     Rule {
+        keys: &["sheets.*.tear_size"],
+        switch: "sheets.*.tear",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
+        keys: &["splashes.*.tear_size"],
+        switch: "splashes.*.tear",
+        needs: "a number above 0",
+        works: |v, switch| v.float(switch) > 0.0,
+    },
+    Rule {
         keys: &["materials.*.billow", "materials.*.billow_rise", "materials.*.billow_size"],
         switch: "materials.*.mist",
         needs: "a number above 0",

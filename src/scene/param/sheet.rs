@@ -82,6 +82,17 @@ pub(super) const SHEETS: Group = Group {
         p("sheets.*.fade", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc("Share of the way over which the foot fades to nothing.")
             .when("Raise it when the foot ends in a hard line at a pool or a rock."),
+        p("sheets.*.tear", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Share of the water that is torn into threads and drops. Holes open where the fall has \
+                 stretched the sheet thin, by 1/(speed × width), and grow with time; so the lip stays whole. \
+                 They fall with the water.",
+            )
+            .when("Raise it to 0.5 or more for high falls; leave it at 0 for thick and short ones."),
+        p("sheets.*.tear_size", "", "m", Float(1e-3, 1e4, 0.1), Uniform)
+            .slider(0.01, 1.0)
+            .doc("Width of a hole where the sheet has its mean width. Holes are eight times as long.")
+            .when("Set it to the distance of the fall's threads; the finest are a quarter of it."),
         p("sheets.*.surge", "", "", Float(0.0, 1.0, 0.0), Uniform)
             .doc(
                 "Largest share of the water that a lull between two surges lacks. Surges travel down with \

@@ -54,6 +54,15 @@ pub(super) const SPLASHES: Group = Group {
             .slider(0.05, 2.0)
             .doc("Mean width of an arc at its end.")
             .when("Raise it for broad sheets of spray; lower it for thin jets of drops."),
+        p("splashes.*.tear", "", "", Float(0.0, 1.0, 0.0), Uniform)
+            .doc(
+                "Share of the water that is torn into drops where the arcs have spread. The foot stays whole.",
+            )
+            .when("Raise it to 1 for spray; leave it at 0 for smooth sheets."),
+        p("splashes.*.tear_size", "", "m", Float(1e-3, 1e4, 0.03), Uniform)
+            .slider(0.005, 0.2)
+            .doc("Width of a hole. Holes are twice as long.")
+            .when("Set it to the distance between drops."),
         p("splashes.*.seed", "", "", Int(0, i64::MAX, 1), Uniform)
             .doc("Seed of the arcs' randomness.")
             .when("Change it for another arrangement of the arcs."),

@@ -16,7 +16,7 @@ use taki::light::strand::hair::Hair;
 use taki::light::strand::water::Water;
 use taki::light::{AngleFrame, Light, Reflection, Scattering, Visibility};
 use taki::mapping::shell::{Shell, Side};
-use taki::mapping::{Billow, Material, Quad};
+use taki::mapping::{Billow, Material, Quad, Tear};
 use taki::place::Mesh;
 use taki::scene::{Limits, Recipe, Scene};
 use taki::trace::{Attenuation, Lookup, Prefilter};
@@ -66,6 +66,8 @@ fn quads(rng: &mut Pcg64Mcg) -> Vec<Quad> {
     quads[1].erosion = [0.0, 0.3, 0.9, 0.5];
     quads[2].mist = 0.4;
     quads[3].erosion = [0.1; 4];
+    quads[0].tear = Tear { open: [0.2, 0.9], lattice: [5, 3] };
+    quads[2].tear = Tear { open: [0.0, 0.5], lattice: [2, 7] };
     quads.to_vec()
 }
 

@@ -4,6 +4,7 @@ pub mod sheet;
 pub mod shell;
 pub mod splash;
 pub mod surge;
+pub mod tears;
 
 use glam::{DMat3, DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
 use proptest::prelude::*;

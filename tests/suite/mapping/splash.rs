@@ -18,6 +18,7 @@ fn splash() -> Splash {
         segments: 6,
         width: 0.3,
         seed: 7,
+        tears: Default::default(),
         material: Material {
             thickness_m: 0.1,
             repeat_u: 1.0,

@@ -8,3 +8,4 @@ pub mod lines;
 pub mod shell_diffuse;
 pub mod shell_shadows;
 pub mod shells;
+pub mod tear;

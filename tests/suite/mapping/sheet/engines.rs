@@ -41,7 +41,8 @@ fn the_engines_agree_on_eroded_sheets_and_mist() {
         widths = [2.0]\nmaterial = \"fog\"\nsegments = 3\ncolumns = 3\nedge = 1.0\nhead = 0.5\nfade = 0.5\n"
     );
     let billows = mist.replace("mist = 0.6", "mist = 0.6\nbillow = 1.0\nbillow_size = 0.4");
-    for (text, layers) in [(CURVED, 1), (mist.as_str(), 3), (billows.as_str(), 3)] {
+    let torn = CURVED.replace("edge = 0.6", "edge = 0.6\ntear = 0.9\ntear_size = 0.2");
+    for (text, layers) in [(CURVED, 1), (mist.as_str(), 3), (billows.as_str(), 3), (torn.as_str(), 1)] {
         for visibility in [Visibility::None, Visibility::March, Visibility::Cached] {
             for (strand, scattering) in
                 [(false, Scattering::Single), (true, Scattering::Single), (false, Scattering::Multiple)]

@@ -11,7 +11,7 @@ use crate::engine::cpu::integrate::{FrameVolume, Integrator};
 use crate::light::AngleFrame;
 use crate::mapping::Quad;
 use crate::trace::lookup::{STRANDS, StrandTurn};
-use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter, billow};
+use crate::trace::{MEAN_EROSION, MIST_OF_CELLS, MIST_RHO, Prefilter, billow, tear};
 use crate::util::lane_powers::log2;
 use crate::util::lanes::{Floats, LANES, Lanes3, Stored, Stored3, floor_cell};
 
@@ -207,12 +207,40 @@ impl Hits {
         let y = (v * repeat_v + hits.of_quads(simd, all, |quad| quad.offset.y)) * ny - flow_cells;
         let origin = Lanes3 { x: in_tile(simd, x, nx), y: in_tile(simd, y, ny), z: zero };
 
+        let keep_lines = integrator.volumes.iter().any(|volume| volume.has_lines);
+        let is_filtered = scene.trace.filter != Prefilter::None || keep_lines;
+        let mut seen = zero;
+        if is_filtered {
+            let forward = scene.camera.forward.as_vec3();
+            let forward = Lanes3 { x: splat(forward.x), y: splat(forward.y), z: splat(forward.z) };
+            let c = d.dot(forward);
+            let area = splat(integrator.footprint) * (c * c * c) * (t * t);
+            let across = area / (det.abs() * depth * d_cell.dot(d_cell).sqrt());
+            seen = splat(0.5) * log2(simd, across.max(splat(1e-30)));
+        }
+
+        let is_torn = hits.of_quads(simd, all, |quad| f32::from(u8::from(quad.is_torn())));
+        let mut torn = zero;
+        if is_torn.simd_gt(zero).any_true() {
+            let mut places = Stored3::default();
+            places.store(Lanes3 { x: origin.x / nx, y: origin.y / ny, z: seen });
+            let (mut cells, at_v) = (Stored::default(), &at.0[1]);
+            cells.store(nx);
+            let of = |lane: usize| {
+                let place = places.get(lane);
+                let quad = &all[hits.quads[lane]];
+                tear::erosion(&quad.tear, at_v.0[lane], place.truncate(), cells.0[lane], place.z)
+            };
+            torn = Stored::from_fn(of).load(simd);
+        }
+
         let ea = hits.of_quads(simd, all, |quad| quad.erosion[0]);
         let eb = hits.of_quads(simd, all, |quad| quad.erosion[1]);
         let ec = hits.of_quads(simd, all, |quad| quad.erosion[2]);
         let ed = hits.of_quads(simd, all, |quad| quad.erosion[3]);
         let (near, far) = (ea + (eb - ea) * u, ed + (ec - ed) * u);
         let e = (near + (far - near) * v).max(zero).min(one);
+        let e = e + (one - e) * torn;
         let left = (one - e) * (one - splat(MEAN_EROSION) * e);
         let mist = hits.of_quads(simd, all, |quad| if quad.mist > 0.0 { quad.mist * 255.0 } else { 0.0 });
         let is_mist = mist.simd_gt(0.0);
@@ -234,21 +262,14 @@ impl Hits {
         }
 
         let (mut level, mut share) = (zero, zero);
-        let keep_lines = integrator.volumes.iter().any(|volume| volume.has_lines);
-        if scene.trace.filter != Prefilter::None || keep_lines {
-            let forward = scene.camera.forward.as_vec3();
-            let forward = Lanes3 { x: splat(forward.x), y: splat(forward.y), z: splat(forward.z) };
-            let c = d.dot(forward);
-            let area = splat(integrator.footprint) * (c * c * c) * (t * t);
-            let across = area / (det.abs() * depth * d_cell.dot(d_cell).sqrt());
-            let exact = splat(0.5) * log2(simd, across.max(splat(1e-30)));
+        if is_filtered {
             let coarsest = hits.of_volumes(simd, integrator, |volume| (volume.levels.len() - 1) as f32);
             let keeps_lines = |volume: &FrameVolume| f32::from(u8::from(volume.has_lines));
             let keeps_lines = hits.of_volumes(simd, integrator, keeps_lines).simd_gt(0.0) & !is_mist;
-            let in_turn = exact * turn.scale + turn.shift;
+            let in_turn = seen * turn.scale + turn.shift;
             let walks_strands = keeps_lines & in_turn.simd_lt(zero);
             let exact =
-                walks_strands.select(in_turn.max(splat(STRANDS as f32)), exact.max(zero).min(coarsest));
+                walks_strands.select(in_turn.max(splat(STRANDS as f32)), seen.max(zero).min(coarsest));
             level = floor_cell(simd, exact).to_float::<f32x8<S>>();
             share = exact - level;
         }
