@@ -7,6 +7,7 @@
 override BILLOWS: bool = false;
 
 const BILLOW_CONTRAST: f32 = 4.5;
+const BILLOW_DEVIATION: f32 = 0.136;
 const BILLOW_MOST: f32 = 3.0;
 
 fn billow_row(x: u32, y: u32, z: u32, s: f32) -> f32 {
@@ -41,5 +42,7 @@ fn billow_factor(billow: vec4<f32>, times: vec4<f32>, point: vec3<f32>) -> f32 {
     }
     let both = billow_field(billow, point, times.x, 0.0) * times.z
         + billow_field(billow, point, times.y, 37.0) * times.w;
-    return clamp(1.0 + billow.x * BILLOW_CONTRAST * both, 0.0, BILLOW_MOST);
+    let contrast = billow.x * BILLOW_CONTRAST;
+    let mean = 0.5 * (contrast * BILLOW_DEVIATION) * (contrast * BILLOW_DEVIATION);
+    return min(exp(contrast * both - mean), BILLOW_MOST);
 }

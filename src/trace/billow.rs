@@ -10,8 +10,10 @@ use glam::Vec3;
 use super::noise::lattice;
 use crate::mapping::Billow;
 
-/// Strength of the contrast: the standard deviation of the density is about half of [`Billow::strength`].
+/// Strength of the contrast: the standard deviation of the density is about 0.6 times [`Billow::strength`].
 const CONTRAST: f32 = 4.5;
+/// Standard deviation of the noise.
+const DEVIATION: f32 = 0.136;
 /// Largest factor of the density.
 const MOST: f32 = 3.0;
 /// How much finer the second octave is, and the shares of both.
@@ -73,5 +75,8 @@ pub fn factor(billow: &Billow, times: &BillowTimes, point: Vec3) -> f32 {
         let sum = SHARES[0] * noise(p) + SHARES[1] * noise(p * FINER);
         (sum - 0.5) * times.weights[i]
     };
-    (1.0 + billow.strength * CONTRAST * (field(0) + field(1))).clamp(0.0, MOST)
+    // The exponential of a normal number has this mean, and leaves no holes in the mist.
+    let contrast = billow.strength * CONTRAST;
+    let mean = 0.5 * (contrast * DEVIATION) * (contrast * DEVIATION);
+    (contrast * (field(0) + field(1)) - mean).exp().min(MOST)
 }

@@ -24,7 +24,7 @@ fn billows_keep_the_mean_and_the_contrast_at_every_time() {
         let variance = all.iter().map(|f| (f - mean).powi(2)).sum::<f32>() / all.len() as f32;
         assert!((mean - 1.0).abs() < 0.05, "{flow}: {mean}");
         assert!((0.2..0.5).contains(&variance.sqrt()), "{flow}: {variance}");
-        assert!(all.iter().all(|f| (0.0..=3.0).contains(f)));
+        assert!(all.iter().all(|f| (0.1..=3.0).contains(f)), "mist has no holes");
     }
 }
 
