@@ -318,7 +318,7 @@ impl Scene {
         let environment = build::environment(v, folder, limits)?;
         let sun = environment.as_ref().and_then(Environment::sunlight);
         let environment_lights = environment.as_ref().map_or(Vec::new(), Environment::volume_lights);
-        let mut quads = quads::quads(v, origin, &recipes)?;
+        let mut quads = quads::quads(v, origin, camera.eye_local().as_vec3(), &recipes)?;
         let surfaces = meshes::build(v, &meshes, origin, &recipes, quads.len(), limits)?;
         quads.extend(surfaces.quads);
         let mut shells = surfaces.shells;

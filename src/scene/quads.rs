@@ -1,6 +1,6 @@
 //! Builders of the volume's quads: the scene's own, those of its sheets and those of its splashes.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Quat, Vec2, Vec3};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::meshes::Carrier;
@@ -23,6 +23,8 @@ struct Materials<'a> {
     names: Vec<String>,
     /// Volumes that they show.
     recipes: &'a [Recipe],
+    /// Eye that mist may face, metres.
+    eye: Vec3,
 }
 
 impl Materials<'_> {
@@ -33,10 +35,11 @@ impl Materials<'_> {
     }
 }
 
-/// Returns the quads, relative to `origin`. `recipes` are those of the volumes that they show.
-pub(super) fn quads(v: &Values, origin: DVec3, recipes: &[Recipe]) -> Result<Vec<Quad>> {
+/// Returns the quads, relative to `origin`, turned towards the eye where their material asks for it. `recipes` are those of
+/// the volumes that they show.
+pub(super) fn quads(v: &Values, origin: DVec3, eye: Vec3, recipes: &[Recipe]) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
-    let materials = &Materials { names: v.names("materials"), recipes };
+    let materials = &Materials { names: v.names("materials"), recipes, eye };
     for i in v.names("quads") {
         let key = format!("quads.{i}.corners");
         if !v.is_set(&key) {
@@ -219,6 +222,21 @@ fn splash_quads(
     Ok(())
 }
 
+/// Turns a sheet about the vertical through its middle until its rows are at right angles to the view, by at
+/// most a quarter.
+fn facing(points: Vec<Vec3>, across: Vec3, eye: Vec3) -> (Vec<Vec3>, Vec3) {
+    let middle = points.iter().sum::<Vec3>() / points.len() as f32;
+    let level = |v: Vec3| unit(v.with_y(0.0));
+    let (Some(rows), Some(view)) = (level(across), level(eye - middle)) else {
+        // From above, or with rows that stand upright, no turn helps.
+        return (points, across);
+    };
+    let wanted = Vec3::Y.cross(view);
+    let wanted = if wanted.dot(rows) < 0.0 { -wanted } else { wanted };
+    let turn = Quat::from_rotation_arc(rows, wanted);
+    (points.iter().map(|p| middle + turn * (*p - middle)).collect(), turn * across)
+}
+
 fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result<Sheet> {
     let key = |what: &str| format!("sheets.{name}.{what}");
     let bad = |what: String, fix: String| Err(Error::input(format!("sheet {name}: {what}"), fix));
@@ -267,6 +285,8 @@ fn sheet(v: &Values, origin: DVec3, materials: &Materials, name: &str) -> Result
         );
     }
     let float = |what: &str| v.float(&key(what));
+    let faces = mist > 0.0 && v.is_on(&format!("materials.{}.facing", v.text(&key("material"))));
+    let (points, across) = if faces { facing(points, across, materials.eye) } else { (points, across) };
     Ok(Sheet {
         points,
         widths,

@@ -25,8 +25,13 @@ use crate::util::error::{Error, Result};
 const MAX_BYTES: u64 = 16 << 20;
 /// Largest number of quads in a scene. More would not fit into the quad buffer of a small GPU.
 pub const MAX_QUADS: usize = 65_536;
-/// Version of the scene format that this program reads and writes.
+/// Version of the scene format in which a file that names no base leaves the paper's values as they are.
+/// Printed scenes have it, because they leave nothing out.
 pub const VERSION: i64 = 1;
+/// Newest version that this program reads: a file that names no base begins with [`LOOK`].
+const NEWEST: i64 = 2;
+/// Base of files of the newest version.
+const LOOK: &str = "water";
 
 /// A scene to which a mesh is added.
 const AROUND_MESH: &str = "version = 1
@@ -200,14 +205,14 @@ impl Source {
             Error::input(format!("{}: {message}", file.place(at).0), fix)
         })?;
         let root = root.into_inner();
-        file.version(&root)?;
-        let mut values = match root.get("base") {
+        let version = file.version(&root)?;
+        let own = root.get("base").map(|base| (base.get_ref().as_str().unwrap_or_default(), base.span()));
+        let base = own.or((version == NEWEST).then_some((LOOK, 0..0)));
+        let mut values = match base {
             None => Values::default(),
-            Some(base) => {
-                let at = file.place(base.span().start);
-                let text = base.get_ref().as_str().and_then(|name| Some((name, presets::base(name)?)));
-                let Some((name, text)) = text else {
-                    let given = base.get_ref().as_str().unwrap_or_default();
+            Some((given, span)) => {
+                let at = file.place(span.start);
+                let Some((name, text)) = presets::base(given).map(|text| (given, text)) else {
                     return Err(Error::input(
                         format!("{}: base is no preset", at.0),
                         match presets::nearest(given) {
@@ -295,26 +300,24 @@ impl File<'_> {
         1 + self.newlines.partition_point(|&end| end < byte)
     }
 
-    fn version(&self, root: &DeTable) -> Result<()> {
+    /// Returns the version of the file.
+    fn version(&self, root: &DeTable) -> Result<i64> {
         let Some(value) = root.get("version") else {
             return Err(Error::input(
                 format!("{}: the scene has no version", self.source.origin),
-                format!("add the line `version = {VERSION}` at the top"),
+                format!("add the line `version = {NEWEST}` at the top"),
             ));
         };
         let at = self.place(value.span().start);
         match raw(value.get_ref()) {
-            Raw::Int(VERSION) => Ok(()),
-            Raw::Int(newer) if newer > VERSION => Err(Error::input(
-                format!(
-                    "{}: scene version {newer} is newer than {VERSION}, the newest this taki knows",
-                    at.0
-                ),
+            Raw::Int(version @ VERSION..=NEWEST) => Ok(version),
+            Raw::Int(newer) if newer > NEWEST => Err(Error::input(
+                format!("{}: scene version {newer} is newer than {NEWEST}, the newest this taki knows", at.0),
                 format!("it needs taki ≥ {newer}.0, this is {}", env!("CARGO_PKG_VERSION")),
             )),
             _ => Err(Error::input(
                 format!("{}: not a scene version", at.0),
-                format!("write `version = {VERSION}`"),
+                format!("write `version = {NEWEST}`"),
             )),
         }
     }

@@ -520,7 +520,12 @@ pub(super) const RULES: &[Rule] = &[
         works: |v, switch| v.float(switch) > 0.0,
     },
     Rule {
-        keys: &["materials.*.billow", "materials.*.billow_rise", "materials.*.billow_size"],
+        keys: &[
+            "materials.*.billow",
+            "materials.*.billow_rise",
+            "materials.*.billow_size",
+            "materials.*.facing",
+        ],
         switch: "materials.*.mist",
         needs: "a number above 0",
         works: |v, switch| v.float(switch) > 0.0,

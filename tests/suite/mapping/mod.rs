@@ -1,5 +1,6 @@
 //! §3 The mapping between quad and volume against its definition in float64. Reference truth.
 
+pub mod facing;
 pub mod sheet;
 pub mod shell;
 pub mod splash;

@@ -460,13 +460,33 @@ fn a_scene_replaces_its_bases_quads_and_merges_its_lights() {
 }
 
 #[test]
-fn only_version_1_is_read() {
-    refused(read("[volume]\nnx = 4\n"), &["s.toml", "no version", "version = 1"]);
-    refused(read("\nversion = 2\n"), &["s.toml:2: ", "needs taki ≥ 2"]);
-    for wrong in ["\"x\"", "0", "-1", "1.0", "[1]", "99999999999999999999"] {
-        refused(read(&format!("version = {wrong}\n")), &["s.toml:1: ", "version = 1"]);
+fn versions_1_and_2_are_read() {
+    refused(read("[volume]\nnx = 4\n"), &["s.toml", "no version", "version = 2"]);
+    refused(read("\nversion = 3\n"), &["s.toml:2: ", "needs taki ≥ 3"]);
+    for wrong in ["\"x\"", "0", "-1", "1.0", "2.0", "[1]", "99999999999999999999"] {
+        refused(read(&format!("version = {wrong}\n")), &["s.toml:1: ", "version = 2"]);
     }
     read("version = 1\n").unwrap();
+}
+
+#[test]
+fn a_file_of_version_2_begins_with_the_look_of_water() {
+    let sheet = "[sheets.a]\npoints = [[0, 1, 0], [0, -1, 0]]\n";
+    let values = |top: &str| {
+        let scene = read(&format!("{top}\n{sheet}")).unwrap();
+        scene.values().unwrap().to_toml()
+    };
+    let plain = values("version = 1");
+    let water = values("version = 1\nbase = \"water\"");
+    assert_eq!(values("version = 2"), water);
+    assert_ne!(plain, water);
+    for base in ["fig5", "waterfall"] {
+        let of = |version: u32| values(&format!("version = {version}\nbase = \"{base}\""));
+        assert_eq!(of(1), of(2));
+    }
+    // What is printed means the same whatever it began with.
+    assert!(water.starts_with("version = 1\n"));
+    assert_eq!(read(&water).unwrap().values().unwrap().to_toml(), water);
 }
 
 #[test]
