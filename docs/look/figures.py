@@ -1,10 +1,10 @@
-"""Figures for the eye: how streaky, rough and even falling water looks, in photographs and in pictures of taki.
+"""Figures for the eye: how streaky, rough and even falling water looks, in photographs and pictures of taki.
 
     python figures.py PICTURE:X,Y,W,H ...          boxes of water in pictures
     python figures.py --frames PICTURE:X,Y,W,H ... the same box in frames that follow one another: flicker too
 
-The flow runs down each box. Brightness is replaced by its rank among the box's pixels, so a tone curve changes
-no figure. A picture is first reduced so that its box is 96 pixels wide, which also takes the noise of cameras
+The flow runs down each box. Brightness is replaced by its rank among the box's pixels, so a tone curve
+changes no figure. A picture is first reduced so that its box is 96 pixels wide, which also takes the noise of cameras
 and of JPEG files away; boxes that are not so wide are refused.
 
 Needs numpy and Pillow.

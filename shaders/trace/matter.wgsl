@@ -24,8 +24,8 @@ struct SheetDensity {
     left: f32,
 }
 
-// Density map at texture coordinates of a quad, in which holes erode by `torn`. For cells of a coarse level (`coarse`), erosion scales ρ by
-// the mean loss instead of subtracting e.
+// Density map at texture coordinates of a quad, in which holes erode by `torn`. For cells of a coarse level
+// (`coarse`), erosion scales ρ by the mean loss instead of subtracting e.
 fn matter_at(quad: Quad, uv: vec2<f32>, torn: f32, coarse: bool) -> SheetDensity {
     if !ERODED {
         return SheetDensity(1.0, 0.0, 0.0, 0.0, 1.0);

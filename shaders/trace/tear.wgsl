@@ -43,7 +43,8 @@ fn tear_erosion(quad: Quad, uv: vec2<f32>, place: vec2<f32>, cells: f32, level: 
     if open <= 0.0 {
         return 0.0;
     }
-    let torn = clamp((tear_rank(vec2<u32>(quad.tear.zw), place) - (1.0 - open)) * (1.0 / TEAR_SOFT), 0.0, 1.0);
+    let rank = tear_rank(vec2<u32>(quad.tear.zw), place);
+    let torn = clamp((rank - (1.0 - open)) * (1.0 / TEAR_SOFT), 0.0, 1.0);
     let mean = select(open - 0.5 * TEAR_SOFT, open * open / (2.0 * TEAR_SOFT), open < TEAR_SOFT);
     let hole = log2(cells / quad.tear.z);
     let unseen = clamp(1.0 + (level - hole) * (1.0 / TEAR_LEVELS), 0.0, 1.0);

@@ -24,8 +24,8 @@ pub struct Quad {
 }
 
 impl Quad {
-    /// Quad that begins at the texture's origin and has no erosion, no holes and no mist. `corners` are in the world,
-    /// metres.
+    /// Quad that begins at the texture's origin and has no erosion, no holes and no mist. `corners` are in
+    /// the world, metres.
     ///
     /// # Errors
     /// Returns the [`QuadFault`] of corners that cannot be mapped.

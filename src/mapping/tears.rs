@@ -25,7 +25,7 @@ pub struct Tear {
 }
 
 impl Tears {
-    /// Share of the water that is torn where the sheet's thickness is `thinned` times that of its beginning, at
+    /// Share of the water that is torn where the sheet is `thinned` times as thick as at its beginning, at
     /// the share `time` of the water's time. It takes both: thin water tears, and tears need time to grow.
     pub fn open(&self, thinned: f64, time: f64) -> f32 {
         (f64::from(self.strength) * (1.0 - thinned).max(0.0) * time.clamp(0.0, 1.0)) as f32

@@ -35,8 +35,8 @@ impl Materials<'_> {
     }
 }
 
-/// Returns the quads, relative to `origin`, turned towards the eye where their material asks for it. `recipes` are those of
-/// the volumes that they show.
+/// Returns the quads, relative to `origin`. Those whose material asks for it are turned towards `eye`.
+/// `recipes` are those of the volumes that they show.
 pub(super) fn quads(v: &Values, origin: DVec3, eye: Vec3, recipes: &[Recipe]) -> Result<Vec<Quad>> {
     let mut quads = Vec::new();
     let materials = &Materials { names: v.names("materials"), recipes, eye };

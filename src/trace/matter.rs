@@ -33,8 +33,8 @@ pub struct SheetDensity {
 }
 
 impl SheetDensity {
-    /// Density map at the texture coordinates `uv` of a quad, for the volume's own cells. Holes erode what else
-    /// is left by `torn`, 0 to 1.
+    /// Density map at the texture coordinates `uv` of a quad, for the volume's own cells. Holes erode the
+    /// share `torn` of what else is left.
     #[inline]
     pub fn new(quad: &Quad, uv: Vec2, torn: f32) -> Self {
         let [a, b, c, d] = quad.erosion;
@@ -60,8 +60,8 @@ impl SheetDensity {
         SheetDensity { scale: self.scale * factor, shift: self.shift * factor, ..self }
     }
 
-    /// Density map, as [`SheetDensity::new`], for cells of a coarse level. ρ of a coarse cell belongs to none of the cells in
-    /// it, so erosion scales it by the mean loss instead of subtracting e.
+    /// Density map, as [`SheetDensity::new`], for cells of a coarse level. ρ of a coarse cell belongs to none
+    /// of the cells in it, so erosion scales it by the mean loss instead of subtracting e.
     #[inline]
     pub fn of_coarse(quad: &Quad, uv: Vec2, torn: f32) -> Self {
         let matter = SheetDensity::new(quad, uv, torn);

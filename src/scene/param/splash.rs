@@ -55,9 +55,7 @@ pub(super) const SPLASHES: Group = Group {
             .doc("Mean width of an arc at its end.")
             .when("Raise it for broad sheets of spray; lower it for thin jets of drops."),
         p("splashes.*.tear", "", "", Float(0.0, 1.0, 0.0), Uniform)
-            .doc(
-                "Share of the water that is torn into drops where the arcs have spread. The foot stays whole.",
-            )
+            .doc("Share of the water that is torn into drops where arcs have spread. Their foot stays whole.")
             .when("Raise it to 1 for spray; leave it at 0 for smooth sheets."),
         p("splashes.*.tear_size", "", "m", Float(1e-3, 1e4, 0.03), Uniform)
             .slider(0.005, 0.2)

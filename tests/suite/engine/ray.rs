@@ -8,7 +8,7 @@ use taki::light::Light;
 use taki::picture::Image;
 use taki::picture::camera::sample_offset;
 use taki::scene::Scene;
-use taki::trace::Prefilter;
+use taki::trace::{Prefilter, tear};
 use taki::util::monitor::Unwatched;
 use taki::util::window::Window;
 
@@ -112,6 +112,13 @@ fn a_rays_report_is_the_pixel_of_the_frame_on_every_pixel() {
                 let mix = |a: f32, b: f32, x: f32| a * (1.0 - x) + b * x;
                 let [a, b, c, d] = quad.erosion;
                 let e = mix(mix(a, b, u), mix(d, c, u), v);
+                let (extent, size) = ([quad.material.repeat_u, quad.material.repeat_v], volume.size);
+                let place = [0, 1].map(|axis| {
+                    let n = size[axis] as f32;
+                    let x = (face.uv[axis] * extent[axis] + quad.offset[axis]) * n;
+                    (x - n * (x / n).floor()) / n
+                });
+                let e = e + (1.0 - e) * tear::erosion(&quad.tear, v, place.into(), size[0] as f32, 0.0);
                 let rho = match quad.mist > 0.0 {
                     true => (0.3 * cell.rho() + 0.7 * 32768.0 / 65535.0) * (1.0 - e),
                     false => (cell.rho() - e).max(0.0),

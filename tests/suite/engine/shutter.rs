@@ -77,7 +77,7 @@ fn every_sample_has_its_own_part_of_the_time_and_neighbours_fill_the_gaps() {
 
 /// Settings without what stands still or moves along straight lines while the shutter is open, and without
 /// strands, which the samples of a pixel see in turns.
-const STEADY: [&str; 10] = [
+const STEADY: [&str; 12] = [
     "pools.plunge.waves=sum",
     "camera.shutter=2.0",
     "rocks.wall.levels=2",
@@ -85,6 +85,8 @@ const STEADY: [&str; 10] = [
     "trace.lookup=nearest",
     "materials.mist.billow=0",
     "sheets.main.surge=0",
+    "sheets.main_left.surge=0",
+    "sheets.main_right.surge=0",
     "sheets.leap.surge=0",
     "sheets.thread.surge=0",
     "sheets.far.surge=0",

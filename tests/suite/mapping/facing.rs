@@ -9,7 +9,8 @@ use taki::scene::Scene;
 fn cloud(eye: Vec3, mist: f32, facing: bool) -> Scene {
     let [x, y, z] = eye.to_array();
     read(&format!(
-        "[camera]\neye = [{x}, {y}, {z}]\ntarget = [1, 0, 2]\n[materials.fog]\nmist = {mist}\nfacing = {facing}\n
+        "[camera]\neye = [{x}, {y}, {z}]\ntarget = [1, 0, 2]\n
+        [materials.fog]\nmist = {mist}\nfacing = {facing}\n
         [sheets.a]\npoints = [[1, -1, 2], [1.2, 1, 2], [0.8, 2, 1.9]]\nwidths = [2.0]\nmaterial = \"fog\"\n"
     ))
     .unwrap_or_else(|e| panic!("{e}"))
