@@ -33,12 +33,14 @@ pub fn scene(preset: &str, sets: &[&str]) -> Scene {
 
 /// A coarse version of the default scene's place. On a fine mesh, the normals and the foam change so much
 /// inside one pixel that the two engines' interpolations differ by more than their shading may.
-pub const COARSE_PLACE: [&str; 10] = [
+pub const COARSE_PLACE: [&str; 12] = [
     "rocks.wall.levels=1",
     "rocks.left.levels=1",
     "rocks.right.levels=1",
     "rocks.far_right.levels=1",
     "rocks.bed.levels=1",
+    "rocks.rim_left.levels=1",
+    "rocks.rim_right.levels=1",
     "rocks.boulder_a.levels=1",
     "rocks.boulder_b.levels=1",
     "rocks.boulder_c.levels=1",
